@@ -1,0 +1,41 @@
+# Two commands for a fresh machine with Python 3.11 and make: `make search`, `make test`.
+PYTHON ?= python3.11
+BUDGET ?= 40
+VENV := .venv
+BIN := $(VENV)/bin
+READY := $(VENV)/.installed
+
+.PHONY: search test lint types layers tests bench clean
+.DEFAULT_GOAL := help
+
+help:  ## show the commands
+	@grep -hE '^[a-z]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/'
+
+search: $(READY)  ## fly BUDGET scenarios (default 40) per landing system and map
+	$(BIN)/pytest --garl-budget=$(BUDGET) landing_systems/
+
+test: lint types layers tests  ## lint, types, layers and all tests
+
+lint: $(READY)
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+
+types: $(READY)
+	$(BIN)/mypy
+
+layers: $(READY)
+	$(BIN)/lint-imports
+
+tests: $(READY)
+	$(BIN)/pytest -n 2 --dist=worksteal tests landing_systems
+
+bench: $(READY)  ## measure frames, flights and the plugin's overhead
+	$(BIN)/python -m benchmarks
+
+clean:  ## remove the virtual environment and the run folder
+	rm -rf $(VENV) .garl
+
+$(READY): pyproject.toml constraints.txt
+	$(PYTHON) -m venv $(VENV)
+	$(BIN)/pip install --quiet --disable-pip-version-check -c constraints.txt -e '.[dev]'
+	touch $@

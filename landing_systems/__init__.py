@@ -1,0 +1,1 @@
+"""The reference landing systems of this repository and their tests."""

@@ -1,0 +1,1 @@
+"""Modules that the reference landing systems share."""

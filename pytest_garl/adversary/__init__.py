@@ -1,0 +1,1 @@
+"""Who interferes: the policies that steer dynamic objects."""

@@ -1,0 +1,27 @@
+"""The exceptions that pytest-garl raises on purpose, all under one base class."""
+
+from __future__ import annotations
+
+
+class GarlError(Exception):
+    """Base of every error that pytest-garl raises.
+
+    The message says what was found, where, what was expected and what to do next; it
+    is shown to the user as it is, without a traceback.
+    """
+
+
+class ScenarioError(GarlError):
+    """A scenario, map or gene that cannot be flown; the message names file and key."""
+
+
+class OptionError(GarlError):
+    """A command-line option, ini key or marker argument that makes no sense."""
+
+
+class LandingSystemError(GarlError):
+    """A landing system that cannot be loaded or does not keep the contract."""
+
+
+class LedgerError(GarlError):
+    """A ledger that cannot be opened, written or continued."""

@@ -1,0 +1,232 @@
+"""The contract between a landing system and whatever flies it.
+
+A landing system is any class with two methods; there is nothing to inherit::
+
+    class MyLandingSystem:
+        airframe = Airframe()                                   # optional
+
+        def reset(self, mission: Mission) -> None: ...
+        def step(self, observation: Observation) -> Command: ...
+
+World frame: metres, seconds, radians; x east, y north, z up; origin on the ground at
+the map's centre.  Quaternions are x, y, z, w and turn body vectors into world vectors.
+The body frame is x forward, y left, z up; the camera looks along the body's -z axis.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Protocol, runtime_checkable
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Camera:
+    """A pinhole camera under the UAV's belly, looking along the body's -z axis.
+
+    Image right (+u) is the body's right (-y); image down (+v) is the body's back (-x).
+    At zero yaw (nose east) the image's top is east and its right is south.  There is no
+    lens distortion.  The default is 320x240 at 10 Hz with 90 degrees of horizontal field
+    of view; the paper's code used 640x480.
+    """
+
+    width_px: int = 320
+    height_px: int = 240
+    field_of_view_rad: float = math.pi / 2
+    rate_hz: float = 10.0
+
+    @property
+    def focal_px(self) -> float:
+        """Focal length in pixels, the same on both axes."""
+        return self.width_px / 2 / math.tan(self.field_of_view_rad / 2)
+
+    @property
+    def centre_px(self) -> tuple[float, float]:
+        """Principal point (cx, cy) in pixels, pixel centres at whole numbers."""
+        return (self.width_px - 1) / 2, (self.height_px - 1) / 2
+
+    @property
+    def matrix(self) -> NDArray[np.float64]:
+        """Camera matrix, shape (3, 3), as OpenCV takes it."""
+        import numpy as np
+
+        (cx, cy), f = self.centre_px, self.focal_px
+        return np.array([[f, 0.0, cx], [0.0, f, cy], [0.0, 0.0, 1.0]])
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Airframe:
+    """What a landing system declares about the vehicle that it flies.
+
+    ``latency_s`` is the delay between an image and the command that it leads to.
+    ``control_rate_hz`` is how often ``control`` is asked for motor thrusts; ``None``
+    means that the simulator's own simple flight control follows the commands.  The
+    defaults are those of the DJI Matrice 100 (see ``simulation/vehicle.py``).
+    """
+
+    mass_kg: float = 2.355
+    size_m: float = 1.0
+    camera: Camera = field(default_factory=Camera)
+    latency_s: float = 0.1
+    control_rate_hz: float | None = None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Mission:
+    """What a landing system is told before take-off.
+
+    ``gps_position_m`` (x, y) is the approximate place of the marker, which lies up to
+    7.5 m off it.  ``home_m`` (x, y, z) is where the UAV stands at the start, motors off.
+    """
+
+    gps_position_m: tuple[float, float]
+    home_m: tuple[float, float, float]
+    search_altitude_m: float
+    marker_id: int
+    marker_side_m: float
+    marker_dictionary: str
+    camera: Camera
+    time_limit_s: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Observation:
+    """What the UAV's sensors say at one camera frame.
+
+    ``position_m`` and ``velocity_mps`` are shape (3,) in the world frame, ``attitude``
+    is the quaternion (4,); ``image`` is RGB uint8 (H, W, 3) and ``depth_m`` is planar
+    depth float32 (H, W) in metres.  The arrays are read-only.
+    """
+
+    time_s: float
+    position_m: NDArray[np.float64]
+    velocity_mps: NDArray[np.float64]
+    attitude: NDArray[np.float64]
+    image: NDArray[np.uint8]
+    depth_m: NDArray[np.float32]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Detection:
+    """One marker that the landing system believes it saw.
+
+    ``position_m`` is the estimate of its centre in the world frame; ``corners_px`` are
+    (u, v) pairs clockwise from the top left.
+    """
+
+    marker_id: int
+    confidence: float
+    position_m: tuple[float, float, float]
+    corners_px: tuple[tuple[float, float], ...] = ()
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Diagnostics:
+    """What a landing system may tell about its thoughts; no system is obliged to.
+
+    ``phase`` is the system's own name of what it is doing; ``target_m`` (x, y, z) is what
+    it takes for the marker; ``planned_path_m`` are the (x, y, z) points that it means to
+    fly; ``note`` is a sentence for a reader.
+    """
+
+    phase: str = ""
+    detections: tuple[Detection, ...] = ()
+    target_m: tuple[float, float, float] | None = None
+    planned_path_m: tuple[tuple[float, float, float], ...] = ()
+    note: str = ""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PositionSetpoint:
+    """Fly to ``position_m`` (x, y, z), no faster than ``speed_mps``, nose at ``yaw_rad``."""
+
+    position_m: tuple[float, float, float]
+    speed_mps: float = 3.0
+    yaw_rad: float = 0.0
+    diagnostics: Diagnostics | None = None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class VelocitySetpoint:
+    """Fly at ``velocity_mps`` (vx, vy, vz) in the world frame, nose at ``yaw_rad``."""
+
+    velocity_mps: tuple[float, float, float]
+    yaw_rad: float = 0.0
+    diagnostics: Diagnostics | None = None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class AttitudeSetpoint:
+    """Hold ``attitude`` (x, y, z, w) with collective ``thrust`` as a share of the maximum."""
+
+    attitude: tuple[float, float, float, float]
+    thrust: float
+    diagnostics: Diagnostics | None = None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Land:
+    """Descend straight down at ``speed_mps`` and stop the motors on the ground."""
+
+    speed_mps: float = 0.5
+    diagnostics: Diagnostics | None = None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Abort:
+    """Give the landing up: the flight control climbs away and the flight ends when clear."""
+
+    diagnostics: Diagnostics | None = None
+
+
+Command = PositionSetpoint | VelocitySetpoint | AttitudeSetpoint | Land | Abort
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class VehicleState:
+    """What the inertial sensors know at the control rate.
+
+    ``position_m``, ``velocity_mps`` (world) and ``angular_velocity_radps`` (body) are
+    (3,) tuples, ``attitude`` is a quaternion.  ``thrusts_n`` are the four motors' present
+    thrusts in newtons.
+    """
+
+    time_s: float
+    position_m: tuple[float, float, float]
+    velocity_mps: tuple[float, float, float]
+    attitude: tuple[float, float, float, float]
+    angular_velocity_radps: tuple[float, float, float]
+    thrusts_n: tuple[float, float, float, float]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class MotorThrusts:
+    """Wanted thrust of each motor in newtons: front left, front right, rear right, rear left."""
+
+    newtons: tuple[float, float, float, float]
+
+
+@runtime_checkable
+class LandingSystem(Protocol):
+    """Any class with these two methods; see the module's docstring.
+
+    A class may also declare ``airframe: Airframe``.  One that flies the motors itself
+    declares ``Airframe(control_rate_hz=...)`` and offers
+    ``control(state: VehicleState) -> MotorThrusts``.
+    """
+
+    def reset(self, mission: Mission) -> None:
+        """Prepare for one flight; called once, on the ground."""
+
+    def step(self, observation: Observation) -> Command:
+        """Answer one camera frame with what the UAV shall do until the next."""
+
+
+def airframe_of(system: object) -> Airframe:
+    """Return the airframe that a landing system (class or instance) declares, or the default."""
+    airframe = getattr(system, "airframe", None)
+    return airframe if isinstance(airframe, Airframe) else Airframe()

@@ -1,0 +1,1 @@
+"""What is flown: genes, chromosomes, scenarios, maps and their files."""

@@ -1,0 +1,41 @@
+"""Solid bodies as parts: the one source of what collides and what the camera draws."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+Shape = Literal["box", "cylinder", "sphere", "ellipsoid"]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Part:
+    """One convex primitive of a body.
+
+    ``size_m`` is (x, y, z) full extents for every shape: a cylinder stands along its own
+    z axis with x = y = diameter; a sphere has three equal extents; an ellipsoid any.
+    ``position_m`` is the part's centre in the body's frame, ``rotation`` the quaternion
+    (x, y, z, w) that turns the part's axes into the body's; ``colour`` is RGB 0-255.
+    """
+
+    shape: Shape
+    size_m: tuple[float, float, float]
+    position_m: tuple[float, float, float]
+    rotation: tuple[float, float, float, float] = (0.0, 0.0, 0.0, 1.0)
+    colour: tuple[int, int, int] = (128, 128, 128)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Body:
+    """A named solid of several parts; ``kind`` is what people call it (tree, bench, dog).
+
+    ``position_m`` places the body's frame (on the ground, z up) in the world;
+    ``yaw_rad`` turns it about z.  Static bodies stay there; a dynamic object's body is
+    moved by the simulator, facing along +x of its own frame.
+    """
+
+    name: str
+    kind: str
+    parts: tuple[Part, ...]
+    position_m: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    yaw_rad: float = 0.0

@@ -1,0 +1,77 @@
+"""Maps: where a scenario takes place, as data (TOML files)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+from pytest_garl.scenarios.bodies import Body
+
+LayerKind = Literal["rectangle", "line", "circle", "arc", "polygon", "roots", "patches", "marker"]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Layer:
+    """One thing painted on the ground, in the order of the file.
+
+    ``points_m`` are world (x, y) pairs: opposite corners of a rectangle, the ends (or
+    corners) of a line, the centre of a circle, arc or decoy marker, the corners of a
+    polygon, the middle of roots or patches.  ``size_m`` is the line's width, the circle's
+    or arc's radius, the marker's side, the spread of roots or patches; ``width_m`` the
+    stroke of circles and arcs (0: filled); ``angles_rad`` an arc's start and end;
+    ``marker_id`` the decoy's id; ``colour`` RGB 0-255.
+    """
+
+    kind: LayerKind
+    points_m: tuple[tuple[float, float], ...]
+    colour: tuple[int, int, int] = (255, 255, 255)
+    size_m: float = 0.0
+    width_m: float = 0.0
+    angles_rad: tuple[float, float] = (0.0, 0.0)
+    yaw_rad: float = 0.0
+    marker_id: int = -1
+    name: str = ""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Ground:
+    """The planar ground: a procedural base texture of its own seed, and layers over it."""
+
+    texture: Literal["concrete", "grass", "asphalt", "sand", "soil"]
+    texture_seed: int
+    colour: tuple[int, int, int]
+    layers: tuple[Layer, ...] = ()
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Map:
+    """One place: ground, static bodies, the objects that live there, bounds and mission.
+
+    ``bounds_m`` is (x_min, x_max, y_min, y_max); ``objects`` are (type, count) pairs;
+    ``sha256`` is that of the file, part of a run's identity.
+    """
+
+    name: str
+    title: str
+    bounds_m: tuple[float, float, float, float]
+    gps_position_m: tuple[float, float]
+    uav_start_m: tuple[float, float, float]
+    ground: Ground
+    bodies: tuple[Body, ...]
+    objects: tuple[tuple[str, int], ...]
+    sha256: str
+
+    @property
+    def object_names(self) -> tuple[tuple[str, str], ...]:
+        """(name, type) of each dynamic object: ``("person-1", "person")``, in order."""
+        return tuple(
+            (f"{kind}-{index}", kind)
+            for kind, count in self.objects
+            for index in range(1, count + 1)
+        )
+
+    @property
+    def diagonal_m(self) -> float:
+        """Length of the map's diagonal."""
+        x_min, x_max, y_min, y_max = self.bounds_m
+        return float(((x_max - x_min) ** 2 + (y_max - y_min) ** 2) ** 0.5)

@@ -1,0 +1,45 @@
+"""What is flown: one point of the search space, with everything that it needs to repeat."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from pytest_garl.errors import ScenarioError
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Scenario:
+    """One scenario: a map, a value for each property of its genes, and a seed of its own.
+
+    ``genes`` holds (key, value) pairs in the genome's order, values in gene units: for
+    example ``("environment.fog", 0.05)``, ``("marker.x", -0.3)``,
+    ``("person-1.velocity", 0.8)``.  What a value means in metres or lux is said by the
+    genome's properties and the simulator.  ``seed`` feeds the sensor noise, the falling
+    particles and the undirected object moves; it does not depend on the scenario's slot.
+    """
+
+    map: str
+    seed: int
+    genes: tuple[tuple[str, float], ...]
+
+    def __getitem__(self, key: str) -> float:
+        """Return the value of a property; raise ScenarioError for one that is not there."""
+        for name, value in self.genes:
+            if name == key:
+                return value
+        raise ScenarioError(
+            f"the scenario on map {self.map!r} has no gene {key!r}; "
+            f"it has {', '.join(name for name, _ in self.genes)}"
+        )
+
+    def get(self, key: str, default: float) -> float:
+        """Return the value of a property, or ``default`` where the genome lacks it."""
+        return next((value for name, value in self.genes if name == key), default)
+
+    def replace(self, values: Mapping[str, float]) -> Scenario:
+        """Return a copy in which the named properties have other values."""
+        for key in values:
+            self[key]
+        genes = tuple((name, float(values.get(name, value))) for name, value in self.genes)
+        return Scenario(map=self.map, seed=self.seed, genes=genes)

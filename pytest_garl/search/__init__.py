@@ -1,0 +1,1 @@
+"""Which scenario next: the search methods, the ledger and the flight pool."""

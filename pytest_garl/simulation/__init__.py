@@ -1,0 +1,1 @@
+"""Where it flies: the world, the vehicle, the camera, the flight."""

@@ -1,0 +1,100 @@
+"""Who moves the dynamic objects: the protocol, and the specification that names a policy."""
+
+from __future__ import annotations
+
+import importlib
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Protocol
+
+from pytest_garl.errors import GarlError
+
+if TYPE_CHECKING:
+    import numpy as np
+
+    from pytest_garl.scenarios.maps import Map
+    from pytest_garl.scenarios.object_types import ObjectType
+
+DECISION_STEP_S = 0.5
+"""Time between two decisions of a policy (paper, section 3.4: "0.5 seconds")."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ObjectState:
+    """Ground truth about one dynamic object at a decision; positions (x, y, z) in metres.
+
+    ``speed_mps`` is how fast this object may move: its velocity gene times its type's
+    top speed.  ``position_m`` is that of the body's frame.
+    """
+
+    name: str
+    type: ObjectType
+    position_m: tuple[float, float, float]
+    velocity_mps: tuple[float, float]
+    speed_mps: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Situation:
+    """What a policy may see when it decides for one object: everything, exactly."""
+
+    time_s: float
+    self: ObjectState
+    others: tuple[ObjectState, ...]
+    uav_position_m: tuple[float, float, float]
+    uav_velocity_mps: tuple[float, float, float]
+    marker_position_m: tuple[float, float]
+    map: Map
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Move:
+    """The wanted velocity until the next decision, as a share (x, y) of the object's speed.
+
+    Its length is at most 1; the paper's five actions are (0, 1), (0, -1), (-1, 0), (1, 0)
+    and (0, 0).
+    """
+
+    x: float
+    y: float
+
+
+STAY = Move(x=0.0, y=0.0)
+
+
+class ObjectPolicy(Protocol):
+    """Decides every 0.5 s where one object goes; one instance serves one object.
+
+    ``rng`` is the object's own generator, derived from the scenario's seed.
+    """
+
+    def reset(self, situation: Situation, rng: np.random.Generator) -> None:
+        """Prepare for one flight."""
+
+    def decide(self, situation: Situation) -> Move:
+        """Return the wanted velocity until the next decision."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PolicySpec:
+    """Names a policy so that a child process can make it and a ledger can compare it.
+
+    ``factory`` is "module:attribute", called with ``arguments`` as keyword arguments for
+    each object.
+    """
+
+    name: str
+    factory: str
+    arguments: tuple[tuple[str, str | int | float], ...] = ()
+
+    def make(self) -> ObjectPolicy:
+        """Return a fresh policy for one object; raise GarlError where there is none."""
+        module, _, attribute = self.factory.partition(":")
+        try:
+            factory = getattr(importlib.import_module(module), attribute)
+        except (ImportError, AttributeError) as error:
+            raise GarlError(
+                f"object policy {self.name!r}: {self.factory!r} cannot be loaded ({error}); "
+                "expected 'module:attribute' of an importable module"
+            ) from error
+        policy: ObjectPolicy = factory(**dict(self.arguments))
+        return policy

@@ -1,0 +1,1 @@
+"""What went wrong: properties and margins, violation types, signatures, metrics."""
