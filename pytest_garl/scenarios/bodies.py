@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import Literal
 
@@ -39,3 +40,24 @@ class Body:
     parts: tuple[Part, ...]
     position_m: tuple[float, float, float] = (0.0, 0.0, 0.0)
     yaw_rad: float = 0.0
+
+
+def tilted(*, pitch_rad: float = 0.0, yaw_rad: float = 0.0) -> tuple[float, float, float, float]:
+    """Return the quaternion that first pitches about +y (z towards +x), then yaws about +z."""
+    sin_p, cos_p = math.sin(pitch_rad / 2), math.cos(pitch_rad / 2)
+    sin_y, cos_y = math.sin(yaw_rad / 2), math.cos(yaw_rad / 2)
+    return (-sin_y * sin_p, cos_y * sin_p, sin_y * cos_p, cos_y * cos_p)
+
+
+def rotate(
+    quaternion: tuple[float, float, float, float], vector: tuple[float, float, float]
+) -> tuple[float, float, float]:
+    """Turn a vector by a quaternion (x, y, z, w)."""
+    x, y, z, w = quaternion
+    vx, vy, vz = vector
+    tx, ty, tz = 2 * (y * vz - z * vy), 2 * (z * vx - x * vz), 2 * (x * vy - y * vx)
+    return (
+        vx + w * tx + y * tz - z * ty,
+        vy + w * ty + z * tx - x * tz,
+        vz + w * tz + x * ty - y * tx,
+    )

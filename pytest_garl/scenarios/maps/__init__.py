@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Literal
 
+from pytest_garl.errors import ScenarioError
 from pytest_garl.scenarios.bodies import Body
 
 LayerKind = Literal["rectangle", "line", "circle", "arc", "polygon", "roots", "patches", "marker"]
+Texture = Literal["concrete", "grass", "asphalt", "sand", "soil"]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -37,7 +41,7 @@ class Layer:
 class Ground:
     """The planar ground: a procedural base texture of its own seed, and layers over it."""
 
-    texture: Literal["concrete", "grass", "asphalt", "sand", "soil"]
+    texture: Texture
     texture_seed: int
     colour: tuple[int, int, int]
     layers: tuple[Layer, ...] = ()
@@ -75,3 +79,36 @@ class Map:
         """Length of the map's diagonal."""
         x_min, x_max, y_min, y_max = self.bounds_m
         return float(((x_max - x_min) ** 2 + (y_max - y_min) ** 2) ** 0.5)
+
+
+def map_names(search_path: Sequence[Path] = ()) -> tuple[str, ...]:
+    """Names of all maps that can be found: the package's and the user's."""
+    return tuple(
+        sorted({file.stem for folder in _folders(search_path) for file in _maps_in(folder)})
+    )
+
+
+def load_map(name: str, search_path: Sequence[Path] = ()) -> Map:
+    """Return the map ``<name>.toml`` from the search path, or else from the package.
+
+    Raises ScenarioError for an unknown name or a broken file; the message names file and
+    key.
+    """
+    from pytest_garl.scenarios.maps.reader import read_map
+
+    for folder in _folders(search_path):
+        file = folder / f"{name}.toml"
+        if file in _maps_in(folder):
+            return read_map(file)
+    raise ScenarioError(
+        f"unknown map {name!r}; expected one of {', '.join(map_names(search_path))}. "
+        "A map of your own is a file scenarios/maps/<name>.toml"
+    )
+
+
+def _folders(search_path: Sequence[Path]) -> tuple[Path, ...]:
+    return (*search_path, Path(__file__).parent)
+
+
+def _maps_in(folder: Path) -> tuple[Path, ...]:
+    return tuple(sorted(folder.glob("*.toml"))) if folder.is_dir() else ()

@@ -1,0 +1,75 @@
+"""Scenarios as small, sorted, commented TOML files."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from pytest_garl.errors import ScenarioError
+from pytest_garl.scenarios.genes import EXTRAS, genome_for
+from pytest_garl.scenarios.maps import Map
+from pytest_garl.scenarios.scenario import Scenario
+from pytest_garl.scenarios.toml_reader import Table, parse
+
+SCHEMA = 1
+
+
+def dumps(scenario: Scenario) -> str:
+    """Return the scenario as TOML: the same bytes for equal scenarios."""
+    lines = [
+        "# A scenario of pytest-garl. Genes are without unit: weather 0 to 1, places -1 to 1,",
+        "# velocity as a share of the type's top speed.",
+        f"schema = {SCHEMA}",
+        f'map = "{scenario.map}"',
+        f"seed = {scenario.seed}",
+    ]
+    section = ""
+    for key, value in scenario.genes:
+        head, _, name = key.partition(".")
+        if head != section:
+            lines += ["", f"[genes.{head}]"]
+            section = head
+        lines.append(f"{name} = {value!r}")
+    return "\n".join(lines) + "\n"
+
+
+def loads(text: str, map: Map, *, source: str = "scenario") -> Scenario:
+    """Return the scenario in ``text``, which must name exactly the genes of its map.
+
+    Weather may use the full range.  Raises ScenarioError that names source and key.
+    """
+    top = Table(parse(text, source), source)
+    top.only({"schema", "map", "seed", "genes"})
+    if top.integer("schema") != SCHEMA:
+        raise top.error("schema", f"found {top.get('schema')}, expected {SCHEMA}")
+    if top.text("map") != map.name:
+        raise top.error("map", f"found {top.text('map')!r}, expected {map.name!r}")
+    sections = top.table("genes")
+    extras = tuple(gene for name, gene in EXTRAS.items() if name in sections.values)
+    genome = genome_for(map, weather="full", extras=extras)
+    heads = {key.partition(".")[0] for key in genome.keys}
+    sections.only(heads)
+    tables = {head: sections.table(head) for head in heads}
+    for head, table in tables.items():
+        table.only({key.partition(".")[2] for key in genome.keys if key.startswith(f"{head}.")})
+    genes = []
+    for item in genome.properties:
+        head, _, name = item.key.partition(".")
+        genes.append((item.key, tables[head].number(name, low=item.low, high=item.high)))
+    return Scenario(map=map.name, seed=top.integer("seed"), genes=tuple(genes))
+
+
+def map_name_in(text: str, *, source: str = "scenario") -> str:
+    """Return the name of the map that a scenario file wants."""
+    return Table(parse(text, source), source).text("map")
+
+
+def load(path: Path, search_path: tuple[Path, ...] = ()) -> Scenario:
+    """Return the scenario in a file."""
+    from pytest_garl.scenarios.maps import load_map
+
+    try:
+        text = path.read_text(encoding="utf-8")
+    except (OSError, UnicodeDecodeError) as error:
+        raise ScenarioError(f"{path}: cannot be read: {error}") from error
+    map = load_map(map_name_in(text, source=str(path)), search_path)
+    return loads(text, map, source=str(path))

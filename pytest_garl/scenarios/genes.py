@@ -1,0 +1,213 @@
+"""The genome as data: composite genes of nuclear genes of properties."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pytest_garl.errors import ScenarioError
+
+if TYPE_CHECKING:
+    from pytest_garl.scenarios.maps import Map
+
+WeatherRange = Literal["confined", "full"]
+CONFINED_WEATHER = 0.15
+"""Upper end of a weather gene unless the full range is asked for (paper, section 4.2.3)."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Property:
+    """One scalar of a gene: its key in scenarios and files, range, nominal value, meaning."""
+
+    key: str
+    low: float
+    high: float
+    nominal: float
+    meaning: str
+
+    def __post_init__(self) -> None:
+        if not self.low <= self.nominal <= self.high or self.low == self.high:
+            raise ScenarioError(
+                f"property {self.key!r}: expected low <= nominal <= high and low < high, "
+                f"found {self.low}, {self.nominal}, {self.high}"
+            )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class NuclearGene:
+    """Properties that crossover never tears apart: a fog density, or a place (x, y)."""
+
+    name: str
+    properties: tuple[Property, ...]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class CompositeGene:
+    """Nuclear genes of one subject: the environment, the marker, the dynamic objects."""
+
+    name: str
+    genes: tuple[NuclearGene, ...]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Genome:
+    """Everything that may vary in a scenario on one map, in a fixed order."""
+
+    composites: tuple[CompositeGene, ...]
+
+    def __post_init__(self) -> None:
+        twice = sorted({key for key in self.keys if self.keys.count(key) > 1})
+        if twice:
+            raise ScenarioError(
+                f"genome: {', '.join(twice)} occurs more than once; keys must be unique"
+            )
+
+    @property
+    def genes(self) -> tuple[NuclearGene, ...]:
+        """All nuclear genes in order."""
+        return tuple(gene for composite in self.composites for gene in composite.genes)
+
+    @property
+    def properties(self) -> tuple[Property, ...]:
+        """All properties in order: the columns of a chromosome."""
+        return tuple(item for gene in self.genes for item in gene.properties)
+
+    @property
+    def keys(self) -> tuple[str, ...]:
+        """The properties' keys in order."""
+        return tuple(item.key for item in self.properties)
+
+    @property
+    def size(self) -> int:
+        """Number of properties."""
+        return len(self.properties)
+
+    @property
+    def lower(self) -> NDArray[np.float64]:
+        """Lower bounds, shape (size,)."""
+        return np.array([item.low for item in self.properties])
+
+    @property
+    def upper(self) -> NDArray[np.float64]:
+        """Upper bounds, shape (size,)."""
+        return np.array([item.high for item in self.properties])
+
+    @property
+    def nominal(self) -> NDArray[np.float64]:
+        """Nominal values, shape (size,): clear weather, noon, a marker where GPS says."""
+        return np.array([item.nominal for item in self.properties])
+
+    @property
+    def borders(self) -> tuple[int, ...]:
+        """Columns at which a nuclear gene begins, without 0: where crossover may cut."""
+        starts = np.cumsum([len(gene.properties) for gene in self.genes])
+        return tuple(int(start) for start in starts[:-1])
+
+    def random(self, rng: np.random.Generator) -> NDArray[np.float64]:
+        """Draw a chromosome uniformly from the whole range, shape (size,)."""
+        return rng.uniform(self.lower, self.upper)
+
+    def normalise(self, chromosome: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Map gene units onto [0, 1], for distances between chromosomes."""
+        scaled: NDArray[np.float64] = (chromosome - self.lower) / (self.upper - self.lower)
+        return scaled
+
+
+def _scalar(composite: str, name: str, high: float, nominal: float, meaning: str) -> NuclearGene:
+    key = f"{composite}.{name}"
+    return NuclearGene(
+        name=name,
+        properties=(Property(key=key, low=0.0, high=high, nominal=nominal, meaning=meaning),),
+    )
+
+
+def _place(prefix: str, name: str, meaning: str) -> NuclearGene:
+    return NuclearGene(
+        name=name,
+        properties=tuple(
+            Property(
+                key=f"{prefix}.{axis}",
+                low=-1.0,
+                high=1.0,
+                nominal=0.0,
+                meaning=f"{meaning}, {axis}",
+            )
+            for axis in ("x", "y")
+        ),
+    )
+
+
+WEATHER = (
+    ("dust", "dust in the air (1: visibility 20 m)"),
+    ("fog", "fog (1: visibility 10 m)"),
+    ("rain", "falling rain (1: 100 mm/h)"),
+    ("snow", "falling snow (1: 10 mm/h water equivalent)"),
+    ("road_wetness", "wetness of the ground (1: soaked)"),
+    ("maple_leaf", "falling maple leaves (1: 2 per cubic metre)"),
+    ("road_leaf", "share of the ground under leaves"),
+    ("road_snow", "share of the ground under snow"),
+)
+"""The paper's eight weather genes; ``simulation/weather.py`` gives them their meaning."""
+
+WIND = CompositeGene(
+    name="wind", genes=(_place("wind", "wind", "wind as a share of 10 m/s, towards"),)
+)
+GPS_ERROR = CompositeGene(
+    name="gps_error",
+    genes=(_place("gps_error", "gps_error", "error of the told coordinate, share of 2.5 m"),),
+)
+EXTRAS = {"wind": WIND, "gps_error": GPS_ERROR}
+"""Genes that exist but are off by default."""
+
+
+def genome_for(
+    map: Map, *, weather: WeatherRange = "confined", extras: Iterable[CompositeGene] = ()
+) -> Genome:
+    """Return the genome of scenarios on ``map``: environment, marker, its objects, extras."""
+    top = CONFINED_WEATHER if weather == "confined" else 1.0
+    environment = CompositeGene(
+        name="environment",
+        genes=(
+            *(_scalar("environment", name, top, 0.0, meaning) for name, meaning in WEATHER),
+            _scalar(
+                "environment",
+                "sun_position",
+                1.0,
+                0.5,
+                "position of the sun (0: dawn in the east, 0.5: noon, 1: dusk in the west)",
+            ),
+        ),
+    )
+    marker = CompositeGene(
+        name="marker",
+        genes=(_place("marker", "position", "place of the marker in its disc of 7.5 m"),),
+    )
+    objects = CompositeGene(
+        name="objects", genes=tuple(_object_gene(name) for name, _ in map.object_names)
+    )
+    return Genome(composites=(environment, marker, objects, *extras))
+
+
+def _object_gene(name: str) -> NuclearGene:
+    start = tuple(
+        Property(
+            key=f"{name}.start_{axis}",
+            low=-1.0,
+            high=1.0,
+            nominal=nominal,
+            meaning=f"start over the map's bounds, {axis}",
+        )
+        for axis, nominal in (("x", 0.9), ("y", 0.9))
+    )
+    velocity = Property(
+        key=f"{name}.velocity",
+        low=0.0,
+        high=1.0,
+        nominal=0.0,
+        meaning="speed as a share of the type's top speed",
+    )
+    return NuclearGene(name=name, properties=(*start, velocity))

@@ -1,0 +1,137 @@
+"""Reads a map file strictly."""
+
+from __future__ import annotations
+
+import hashlib
+import inspect
+import math
+from pathlib import Path
+from typing import cast, get_args
+
+from pytest_garl.errors import ScenarioError
+from pytest_garl.scenarios.bodies import Body
+from pytest_garl.scenarios.furniture import FURNITURE
+from pytest_garl.scenarios.maps import Ground, Layer, LayerKind, Map, Texture
+from pytest_garl.scenarios.object_types import OBJECT_TYPES
+from pytest_garl.scenarios.toml_reader import Table, parse
+
+_GPS_DISC_M = 7.5
+
+
+def read_map(file: Path) -> Map:
+    """Return the map in ``file``; raise ScenarioError that names file and key."""
+    try:
+        content = file.read_bytes()
+        text = content.decode()
+    except (OSError, UnicodeDecodeError) as error:
+        raise ScenarioError(f"{file}: cannot be read: {error}") from error
+    top = Table(parse(text, str(file)), str(file))
+    top.only(
+        {
+            "title",
+            "bounds_m",
+            "gps_position_m",
+            "uav_start_m",
+            "ground",
+            "layers",
+            "bodies",
+            "objects",
+        }
+    )
+    x_min, x_max, y_min, y_max = top.numbers("bounds_m", 4)
+    gps_x, gps_y = top.numbers("gps_position_m", 2, (0.0, 0.0))
+    start_x, start_y, start_z = top.numbers("uav_start_m", 3)
+    if min(gps_x - x_min, x_max - gps_x, gps_y - y_min, y_max - gps_y) < _GPS_DISC_M:
+        raise top.error(
+            "bounds_m", f"the disc of {_GPS_DISC_M} m about the GPS coordinate sticks out"
+        )
+    if not (x_min <= start_x <= x_max and y_min <= start_y <= y_max and start_z == 0):
+        raise top.error("uav_start_m", "expected a place on the ground (z = 0) inside the bounds")
+    bodies = _bodies(top)
+    return Map(
+        name=file.stem,
+        title=top.text("title", file.stem),
+        bounds_m=(x_min, x_max, y_min, y_max),
+        gps_position_m=(gps_x, gps_y),
+        uav_start_m=(start_x, start_y, start_z),
+        ground=_ground(top),
+        bodies=bodies,
+        objects=_objects(top),
+        sha256=hashlib.sha256(content).hexdigest(),
+    )
+
+
+def _ground(top: Table) -> Ground:
+    ground = top.table("ground")
+    ground.only({"texture", "seed", "colour"})
+    texture = ground.text("texture", among=get_args(Texture))
+    return Ground(
+        texture=cast(Texture, texture),
+        texture_seed=ground.integer("seed"),
+        colour=ground.colour("colour"),
+        layers=tuple(_layer(layer) for layer in top.tables("layers")),
+    )
+
+
+def _layer(table: Table) -> Layer:
+    table.only(
+        {
+            "kind",
+            "points_m",
+            "colour",
+            "size_m",
+            "width_m",
+            "angles_deg",
+            "yaw_deg",
+            "marker_id",
+            "name",
+        }
+    )
+    kind = table.text("kind", among=get_args(LayerKind))
+    start, end = table.numbers("angles_deg", 2, (0.0, 0.0))
+    return Layer(
+        kind=cast(LayerKind, kind),
+        points_m=table.points("points_m"),
+        colour=table.colour("colour", (255, 255, 255)),
+        size_m=table.number("size_m", 0.0, low=0.0),
+        width_m=table.number("width_m", 0.0, low=0.0),
+        angles_rad=(math.radians(start), math.radians(end)),
+        yaw_rad=math.radians(table.number("yaw_deg", 0.0)),
+        marker_id=table.integer("marker_id", low=1) if kind == "marker" else -1,
+        name=table.text("name", f"marker-{table.get('marker_id')}" if kind == "marker" else kind),
+    )
+
+
+def _bodies(top: Table) -> tuple[Body, ...]:
+    counts: dict[str, int] = {}
+    bodies = []
+    for table in top.tables("bodies"):
+        kind = table.text("kind", among=FURNITURE)
+        build = FURNITURE[kind]
+        arguments = set(inspect.signature(build).parameters)
+        table.only({"kind", "position_m", "yaw_deg"} | arguments)
+        values = {
+            key: table.integer(key, low=1)
+            if key == "branches"
+            else table.number(key, low=0.01, high=100.0)
+            for key in table.values
+            if key in arguments
+        }
+        counts[kind] = counts.get(kind, 0) + 1
+        x, y = table.numbers("position_m", 2)
+        bodies.append(
+            Body(
+                name=f"{kind}-{counts[kind]}",
+                kind=kind,
+                parts=build(**values),
+                position_m=(x, y, 0.0),
+                yaw_rad=math.radians(table.number("yaw_deg", 0.0)),
+            )
+        )
+    return tuple(bodies)
+
+
+def _objects(top: Table) -> tuple[tuple[str, int], ...]:
+    objects = top.table("objects")
+    objects.only(OBJECT_TYPES)
+    return tuple((kind, objects.integer(kind)) for kind in objects.values)

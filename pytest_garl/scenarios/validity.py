@@ -1,0 +1,179 @@
+"""Whether a scenario makes sense, and the nearest one that does."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+
+from pytest_garl.scenarios.bodies import Body, Part, rotate
+from pytest_garl.scenarios.maps import Map
+from pytest_garl.scenarios.object_types import OBJECT_TYPES
+from pytest_garl.scenarios.placement import (
+    MARKER_RADIUS_M,
+    MARKER_SIDE_M,
+    marker_genes,
+    marker_position_m,
+    object_start_m,
+    start_genes,
+)
+from pytest_garl.scenarios.scenario import Scenario
+
+MARKER_HALF_DIAGONAL_M = MARKER_SIDE_M / math.sqrt(2)
+MARKER_CLEARANCE_M = MARKER_HALF_DIAGONAL_M + 0.25
+"""No static part stands or hangs nearer to the marker's centre than this, so that a UAV
+of 1 m can reach it with a quarter of a metre to spare beyond the marker's corners."""
+UAV_CLEARANCE_M = 2.0
+OBJECT_CLEARANCE_M = 0.3
+_RING_STEP_M = 0.1
+_DIRECTIONS = 32
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Disc:
+    """What a part covers, seen from above: a bounding disc, with its height band."""
+
+    name: str
+    x_m: float
+    y_m: float
+    radius_m: float
+    low_m: float
+    high_m: float
+
+
+def discs_of(body: Body) -> tuple[Disc, ...]:
+    """Return discs that cover the body's parts; long parts are cut into several."""
+    return tuple(disc for part in body.parts for disc in _discs(body, part))
+
+
+def _discs(body: Body, part: Part) -> Iterable[Disc]:
+    axis = max(range(3), key=lambda index: part.size_m[index])
+    length = part.size_m[axis]
+    others = [part.size_m[index] for index in range(3) if index != axis]
+    thickness = math.hypot(*others) if part.shape == "box" else max(others)
+    pieces = max(1, math.ceil(length / max(thickness, 0.2)))
+    for piece in range(pieces):
+        along = [0.0, 0.0, 0.0]
+        along[axis] = length * ((piece + 0.5) / pieces - 0.5)
+        dx, dy, dz = rotate(part.rotation, (along[0], along[1], along[2]))
+        x, y, z = (part.position_m[0] + dx, part.position_m[1] + dy, part.position_m[2] + dz)
+        cos, sin = math.cos(body.yaw_rad), math.sin(body.yaw_rad)
+        half = math.hypot(length / pieces, thickness) / 2
+        yield Disc(
+            name=body.name,
+            x_m=body.position_m[0] + cos * x - sin * y,
+            y_m=body.position_m[1] + sin * x + cos * y,
+            radius_m=half,
+            low_m=z - half,
+            high_m=z + half,
+        )
+
+
+def problems(scenario: Scenario, map: Map) -> tuple[str, ...]:
+    """Return what is wrong with the scenario, one sentence each; nothing if it is valid."""
+    discs = tuple(disc for body in map.bodies for disc in discs_of(body))
+    marker = marker_position_m(scenario, map)
+    found = list(_marker_problems(marker, map, discs))
+    for index, (name, _) in enumerate(map.object_names):
+        found += _start_problems(
+            scenario, map, discs, marker, index, object_start_m(scenario, map, name)
+        )
+    return tuple(found)
+
+
+def repair(scenario: Scenario, map: Map) -> Scenario:
+    """Return the scenario with each offending place moved to the nearest valid one.
+
+    A valid scenario comes back unchanged.  The marker is mended first, then the objects
+    in order, each against what is settled already.
+    """
+    discs = tuple(disc for body in map.bodies for disc in discs_of(body))
+    marker = marker_position_m(scenario, map)
+    if any(_marker_problems(marker, map, discs)):
+        place = _nearest(marker, lambda at: not any(_marker_problems(at, map, discs)))
+        scenario = scenario.replace(marker_genes(place, map))
+    for index, (name, _) in enumerate(map.object_names):
+        marker = marker_position_m(scenario, map)
+        start = object_start_m(scenario, map, name)
+
+        def free(
+            at: tuple[float, float],
+            scenario: Scenario = scenario,
+            marker: tuple[float, float] = marker,
+            index: int = index,
+        ) -> bool:
+            return not any(_start_problems(scenario, map, discs, marker, index, at))
+
+        if not free(start):
+            scenario = scenario.replace(start_genes(name, _nearest(start, free), map))
+    return scenario
+
+
+def _nearest(
+    origin: tuple[float, float], valid: Callable[[tuple[float, float]], bool]
+) -> tuple[float, float]:
+    """Search rings of growing radius; a hundredth of a ring beyond so that rounding is harmless."""
+    ring = 0
+    while True:
+        ring += 1
+        for step in range(_DIRECTIONS):
+            angle = 2 * math.pi * step / _DIRECTIONS
+            radius = ring * _RING_STEP_M
+            at = (origin[0] + radius * math.cos(angle), origin[1] + radius * math.sin(angle))
+            if valid(at):
+                return at
+        if ring * _RING_STEP_M > 200:
+            from pytest_garl.errors import ScenarioError
+
+            raise ScenarioError("no valid place within 200 m; the map leaves no room")
+
+
+def _marker_problems(marker: tuple[float, float], map: Map, discs: Iterable[Disc]) -> Iterable[str]:
+    x, y = marker
+    if math.dist(marker, map.gps_position_m) > MARKER_RADIUS_M + 1e-9:
+        yield "the marker lies outside its disc of 7.5 m"
+    for disc in discs:
+        if math.hypot(x - disc.x_m, y - disc.y_m) < disc.radius_m + MARKER_CLEARANCE_M:
+            yield f"the marker is under or too near {disc.name}"
+            break
+    for layer in map.ground.layers:
+        if layer.kind == "marker":
+            reach = MARKER_HALF_DIAGONAL_M + layer.size_m / math.sqrt(2)
+            if math.dist(marker, layer.points_m[0]) < reach:
+                yield f"the marker overlaps {layer.name}"
+    if math.dist(marker, map.uav_start_m[:2]) < UAV_CLEARANCE_M:
+        yield "the marker lies under the UAV's start"
+
+
+def _start_problems(
+    scenario: Scenario,
+    map: Map,
+    discs: Iterable[Disc],
+    marker: tuple[float, float],
+    index: int,
+    at: tuple[float, float],
+) -> Iterable[str]:
+    name, kind_name = map.object_names[index]
+    kind = OBJECT_TYPES[kind_name]
+    reach = kind.radius_m + OBJECT_CLEARANCE_M
+    x_min, x_max, y_min, y_max = map.bounds_m
+    tolerance = 1e-9
+    if not (
+        x_min - tolerance <= at[0] <= x_max + tolerance
+        and y_min - tolerance <= at[1] <= y_max + tolerance
+    ):
+        yield f"{name} starts outside the map"
+    low, high = kind.altitude_m - kind.height_m / 2, kind.altitude_m + kind.height_m
+    for disc in discs:
+        overlaps = disc.low_m < high and low < disc.high_m
+        if overlaps and math.hypot(at[0] - disc.x_m, at[1] - disc.y_m) < disc.radius_m + reach:
+            yield f"{name} starts in or at {disc.name}"
+            break
+    if math.dist(at, map.uav_start_m[:2]) < UAV_CLEARANCE_M:
+        yield f"{name} starts at the UAV"
+    if kind.altitude_m == 0 and math.dist(at, marker) < MARKER_HALF_DIAGONAL_M + kind.radius_m:
+        yield f"{name} starts on the marker"
+    for other, other_kind in map.object_names[:index]:
+        near = kind.radius_m + OBJECT_TYPES[other_kind].radius_m
+        if math.dist(at, object_start_m(scenario, map, other)) < near:
+            yield f"{name} starts inside {other}"
