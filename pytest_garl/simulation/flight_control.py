@@ -1,0 +1,138 @@
+"""The simple flight control: a cascade from setpoints to motor thrusts.
+
+Structure as in AirSim's simple_flight: position P, velocity PI, attitude P, rate P.
+"""
+
+from __future__ import annotations
+
+import math
+
+from pytest_garl.landing_system import (
+    Abort,
+    AttitudeSetpoint,
+    Command,
+    Land,
+    PositionSetpoint,
+    VehicleState,
+    VelocitySetpoint,
+)
+from pytest_garl.simulation.vehicle import GRAVITY_MPS2, Thrusts, Vector, VehicleModel, mix
+
+POSITION_P = 1.0
+VELOCITY_P = 2.2
+VELOCITY_I = 0.6
+ATTITUDE_P = 8.0
+RATE_P = 22.0
+YAW_RATE_P = 6.0
+"""Bandwidths in 1/s, each loop about a third of the next inner one, the innermost close to
+the motors' 20 1/s."""
+MAX_TILT_RAD = math.radians(25)
+MAX_ACCELERATION_MPS2 = 4.0
+MAX_RATE_RADPS = 3.5
+MAX_CLIMB_MPS = 5.0
+MAX_DESCENT_MPS = 4.0
+"""The Matrice 100 may tilt 35 degrees; a landing controller keeps below it."""
+MAX_INTEGRAL_MPS2 = 4.0
+ABORT_CLIMB_MPS = 3.0
+
+
+class FlightControl:
+    """Turns the latest command into motor thrusts; one instance per flight."""
+
+    def __init__(self, model: VehicleModel) -> None:
+        self._model = model
+        self._integral = [0.0, 0.0, 0.0]
+        self._hold: Vector | None = None
+        self._command: Command | None = None
+
+    def thrusts(self, state: VehicleState, command: Command | None, dt_s: float) -> Thrusts:
+        """Return wanted motor thrusts (front left, front right, rear right, rear left)."""
+        if command is None:
+            return 0.0, 0.0, 0.0, 0.0
+        if isinstance(command, AttitudeSetpoint):
+            thrust = command.thrust * 4 * self._model.max_thrust_n
+            return self._attitude(state, _z_axis(command.attitude), _yaw(command.attitude), thrust)
+        if type(command) is not type(self._command):
+            self._hold = state.position_m
+        self._command = command
+        wanted, yaw = self._velocity(state, command)
+        acceleration = self._acceleration(state, wanted, dt_s)
+        force = (acceleration[0], acceleration[1], acceleration[2] + GRAVITY_MPS2)
+        vertical = max(2.0, force[2])
+        tilt = math.hypot(force[0], force[1]) / vertical
+        scale = min(1.0, math.tan(MAX_TILT_RAD) / tilt) if tilt > 0 else 1.0
+        direction = _unit((force[0] * scale, force[1] * scale, vertical))
+        up = _z_axis(state.attitude)
+        thrust = self._model.mass_kg * vertical / max(0.5, up[2])
+        return self._attitude(state, direction, yaw, thrust)
+
+    def _velocity(self, state: VehicleState, command: Command) -> tuple[Vector, float]:
+        position = state.position_m
+        hold = self._hold or position
+        if isinstance(command, VelocitySetpoint):
+            return command.velocity_mps, command.yaw_rad
+        if isinstance(command, PositionSetpoint):
+            target, top, yaw = command.position_m, command.speed_mps, command.yaw_rad
+            error = [aim - at for aim, at in zip(target, position, strict=True)]
+            velocity = [POSITION_P * value for value in error]
+            length = math.sqrt(sum(value * value for value in velocity))
+            factor = min(1.0, top / length) if length > 0 else 1.0
+            return (velocity[0] * factor, velocity[1] * factor, velocity[2] * factor), yaw
+        climb = ABORT_CLIMB_MPS if isinstance(command, Abort) else 0.0
+        if isinstance(command, Land):
+            climb = -command.speed_mps
+        vx, vy = (POSITION_P * (hold[axis] - position[axis]) for axis in (0, 1))
+        return (vx, vy, climb), 0.0
+
+    def _acceleration(self, state: VehicleState, wanted: Vector, dt_s: float) -> Vector:
+        bounded = (wanted[0], wanted[1], min(MAX_CLIMB_MPS, max(-MAX_DESCENT_MPS, wanted[2])))
+        result = []
+        for axis in range(3):
+            error = bounded[axis] - state.velocity_mps[axis]
+            proportional = VELOCITY_P * error
+            # Integrating while the output is saturated would wind up and overshoot.
+            if abs(proportional) < MAX_ACCELERATION_MPS2:
+                total = self._integral[axis] + VELOCITY_I * error * dt_s
+                self._integral[axis] = min(MAX_INTEGRAL_MPS2, max(-MAX_INTEGRAL_MPS2, total))
+            limited = min(MAX_ACCELERATION_MPS2, max(-MAX_ACCELERATION_MPS2, proportional))
+            result.append(limited + self._integral[axis])
+        return result[0], result[1], result[2]
+
+    def _attitude(
+        self, state: VehicleState, direction: Vector, yaw_rad: float, thrust_n: float
+    ) -> Thrusts:
+        # The tilt error as a rotation vector in the body frame: z x wanted direction.
+        wx, wy, _ = _to_body(state.attitude, direction)
+        yaw_error = math.remainder(yaw_rad - _yaw(state.attitude), 2 * math.pi)
+        rates = (-wy * ATTITUDE_P, wx * ATTITUDE_P, yaw_error * ATTITUDE_P / 4)
+        torque = []
+        for axis, gain in enumerate((RATE_P, RATE_P, YAW_RATE_P)):
+            wanted = min(MAX_RATE_RADPS, max(-MAX_RATE_RADPS, rates[axis]))
+            error = wanted - state.angular_velocity_radps[axis]
+            torque.append(self._model.inertia[axis] * gain * error)
+        return mix(thrust_n, (torque[0], torque[1], torque[2]), self._model)
+
+
+def _z_axis(q: tuple[float, float, float, float]) -> Vector:
+    x, y, z, w = q
+    return 2 * (x * z + w * y), 2 * (y * z - w * x), 1 - 2 * (x * x + y * y)
+
+
+def _yaw(q: tuple[float, float, float, float]) -> float:
+    x, y, z, w = q
+    return math.atan2(2 * (w * z + x * y), 1 - 2 * (y * y + z * z))
+
+
+def _unit(v: Vector) -> Vector:
+    length = math.sqrt(v[0] * v[0] + v[1] * v[1] + v[2] * v[2])
+    return v[0] / length, v[1] / length, v[2] / length
+
+
+def _to_body(q: tuple[float, float, float, float], v: Vector) -> Vector:
+    x, y, z, w = -q[0], -q[1], -q[2], q[3]
+    tx, ty, tz = 2 * (y * v[2] - z * v[1]), 2 * (z * v[0] - x * v[2]), 2 * (x * v[1] - y * v[0])
+    return (
+        v[0] + w * tx + y * tz - z * ty,
+        v[1] + w * ty + z * tx - x * tz,
+        v[2] + w * tz + x * ty - y * tx,
+    )

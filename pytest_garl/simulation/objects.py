@@ -1,0 +1,125 @@
+"""Dynamic objects in motion: continuous, bounded in speed and acceleration, around solids."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+from pytest_garl.errors import GarlError
+from pytest_garl.scenarios.bodies import Body
+from pytest_garl.scenarios.maps import Map
+from pytest_garl.scenarios.object_types import OBJECT_TYPES
+from pytest_garl.scenarios.placement import object_speed_mps, object_start_m
+from pytest_garl.scenarios.scenario import Scenario
+from pytest_garl.scenarios.validity import Disc, discs_of
+from pytest_garl.simulation.policy import Move, ObjectPolicy, ObjectState
+
+TURN_RATE_RADPS = 2 * math.pi
+"""A being turns on the spot within about a second: engineering estimate."""
+
+
+class MovingObject:
+    """One dynamic object of one flight."""
+
+    def __init__(self, scenario: Scenario, map: Map, name: str, policy: ObjectPolicy) -> None:
+        kind = dict(map.object_names)[name]
+        self.name = name
+        self.type = OBJECT_TYPES[kind]
+        self.policy = policy
+        self.speed_mps = object_speed_mps(scenario, map, name)
+        self.x_m, self.y_m = object_start_m(scenario, map, name)
+        self.vx_mps = self.vy_mps = 0.0
+        self.yaw_rad = 0.0
+        self.moves: list[tuple[float, float]] = []
+        self._wanted = (0.0, 0.0)
+        self._bounds = map.bounds_m
+        self._solids = _solids_at(map.bodies, self)
+
+    @property
+    def position_m(self) -> tuple[float, float, float]:
+        """Place of the body's frame."""
+        return self.x_m, self.y_m, self.type.altitude_m
+
+    @property
+    def body(self) -> Body:
+        """The body to put into the world at the start."""
+        return Body(
+            name=self.name,
+            kind=self.type.name,
+            parts=self.type.parts,
+            position_m=self.position_m,
+            yaw_rad=self.yaw_rad,
+        )
+
+    @property
+    def state(self) -> ObjectState:
+        """What a policy may know of it."""
+        return ObjectState(
+            name=self.name,
+            type=self.type,
+            position_m=self.position_m,
+            velocity_mps=(self.vx_mps, self.vy_mps),
+            speed_mps=self.speed_mps,
+        )
+
+    def take(self, move: Move) -> None:
+        """Accept a policy's decision; raise GarlError for one that is none."""
+        length = math.hypot(move.x, move.y)
+        if not math.isfinite(length) or length > 1 + 1e-9:
+            raise GarlError(
+                f"object policy of {self.name}: found the move ({move.x}, {move.y}), "
+                "expected a share (x, y) of its speed, no longer than 1"
+            )
+        self.moves.append((move.x, move.y))
+        self._wanted = (move.x * self.speed_mps, move.y * self.speed_mps)
+
+    def advance(self, dt_s: float) -> None:
+        """Move on: towards the wanted velocity, along solids, never through them."""
+        dvx, dvy = self._wanted[0] - self.vx_mps, self._wanted[1] - self.vy_mps
+        change = math.hypot(dvx, dvy)
+        most = self.type.acceleration_mps2 * dt_s
+        share = min(1.0, most / change) if change > 0 else 0.0
+        vx, vy = self.vx_mps + share * dvx, self.vy_mps + share * dvy
+        vx, vy = self._slide(vx, vy, dt_s)
+        x_min, x_max, y_min, y_max = self._bounds
+        x, y = self.x_m + vx * dt_s, self.y_m + vy * dt_s
+        self.x_m, self.y_m = min(x_max, max(x_min, x)), min(y_max, max(y_min, y))
+        self.vx_mps = vx if self.x_m == x else 0.0
+        self.vy_mps = vy if self.y_m == y else 0.0
+        if math.hypot(vx, vy) > 0.05:
+            turn = math.remainder(math.atan2(vy, vx) - self.yaw_rad, 2 * math.pi)
+            most = TURN_RATE_RADPS * dt_s
+            self.yaw_rad += min(most, max(-most, turn))
+
+    def _slide(self, vx: float, vy: float, dt_s: float) -> tuple[float, float]:
+        for solid in self._solids:
+            x, y = self.x_m + vx * dt_s, self.y_m + vy * dt_s
+            reach = solid.radius_m + self.type.radius_m
+            nx, ny = x - solid.x_m, y - solid.y_m
+            distance = math.hypot(nx, ny)
+            if distance < reach and distance > 0:
+                inward = (vx * nx + vy * ny) / distance
+                if inward < 0:
+                    vx, vy = vx - inward * nx / distance, vy - inward * ny / distance
+        x, y = self.x_m + vx * dt_s, self.y_m + vy * dt_s
+        if any(
+            _gap(solid, x, y) < min(_gap(solid, self.x_m, self.y_m), self.type.radius_m)
+            for solid in self._solids
+        ):
+            return 0.0, 0.0
+        return vx, vy
+
+
+def _gap(solid: Disc, x: float, y: float) -> float:
+    return math.hypot(x - solid.x_m, y - solid.y_m) - solid.radius_m - 1e-9
+
+
+def _solids_at(bodies: Sequence[Body], thing: MovingObject) -> tuple[Disc, ...]:
+    low = thing.type.altitude_m - thing.type.height_m / 2
+    high = thing.type.altitude_m + thing.type.height_m
+    return tuple(
+        disc
+        for body in bodies
+        for disc in discs_of(body)
+        if disc.low_m < high and low < disc.high_m
+    )

@@ -1,0 +1,109 @@
+"""The quadrotor: mass, inertia, motors and drag, in plain floats for the 240 Hz loop.
+
+Figures are those of the DJI Matrice 100: 650 mm diagonal wheelbase and 13-inch
+propellers, which make 1 m from tip to tip; 2,355 g with its TB47D battery.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from pytest_garl.landing_system import Airframe
+
+GRAVITY_MPS2 = 9.81
+AIR_DENSITY_KGPM3 = 1.225
+"""International Standard Atmosphere at sea level."""
+REFERENCE_MASS_KG = 2.355
+THRUST_PER_MOTOR_N = 20.6
+"""2.1 kg per rotor: DJI's figure for the E800 propulsion of this class."""
+MOTOR_LAG_S = 0.05
+"""Engineering estimate for 13-inch propellers; small racing propellers take about 0.02 s."""
+YAW_TORQUE_PER_THRUST_M = 0.016
+"""Torque over thrust of a propeller of 0.33 m: c_Q/c_T times the diameter, about 0.05 D."""
+DRAG_AREA_M2 = 0.05
+"""Drag coefficient 1 on a frontal area of 0.05 m²: engineering estimate for body and arms."""
+ROTOR_DRAG_PER_S = 0.10
+"""Linear drag of the rotors per unit mass: quadrotor identifications give about 0.1 to 0.3
+1/s (Faessler, Franchi and Scaramuzza 2018)."""
+BODY_ABOVE_FEET_M = 0.20
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class VehicleModel:
+    """One airframe's rigid-body constants; inertia is the diagonal, in kg m²."""
+
+    mass_kg: float
+    size_m: float
+    arm_m: float
+    inertia: tuple[float, float, float]
+    max_thrust_n: float
+
+
+def vehicle_model(airframe: Airframe) -> VehicleModel:
+    """Scale the reference vehicle to an airframe; the thrust-to-weight ratio is kept.
+
+    Inertia: 60 % of the mass as a solid cylinder of a quarter of the span, 40 % as four
+    motors at the arms' ends.
+    """
+    mass, size = airframe.mass_kg, airframe.size_m
+    arm = 0.325 * size
+    hub, motors = 0.6 * mass, 0.4 * mass
+    radius, height = size / 8, 0.12 * size
+    roll = hub * (3 * radius**2 + height**2) / 12 + motors * arm**2 / 2
+    yaw = hub * radius**2 / 2 + motors * arm**2
+    return VehicleModel(
+        mass_kg=mass,
+        size_m=size,
+        arm_m=arm,
+        inertia=(roll, roll, yaw),
+        max_thrust_n=THRUST_PER_MOTOR_N * mass / REFERENCE_MASS_KG,
+    )
+
+
+Thrusts = tuple[float, float, float, float]
+Vector = tuple[float, float, float]
+
+
+def lag(thrusts: Thrusts, wanted: Thrusts, model: VehicleModel, dt_s: float) -> Thrusts:
+    """Return the motors' thrusts after ``dt_s``: first order, within [0, maximum]."""
+    share = 1 - math.exp(-dt_s / MOTOR_LAG_S)
+    top = model.max_thrust_n
+    a, b, c, d = (
+        now + (min(top, max(0.0, aim)) - now) * share
+        for now, aim in zip(thrusts, wanted, strict=True)
+    )
+    return a, b, c, d
+
+
+def wrench(thrusts: Thrusts, model: VehicleModel) -> tuple[float, Vector]:
+    """Return the thrust along body z and the body torques of motors FL, FR, RR, RL."""
+    fl, fr, rr, rl = thrusts
+    lever = model.arm_m / math.sqrt(2)
+    roll = lever * (fl + rl - fr - rr)
+    pitch = lever * (rr + rl - fl - fr)
+    yaw = YAW_TORQUE_PER_THRUST_M * (fr + rl - fl - rr)
+    return fl + fr + rr + rl, (roll, pitch, yaw)
+
+
+def mix(thrust_n: float, torque: Vector, model: VehicleModel) -> Thrusts:
+    """Return the motor thrusts for a wanted collective thrust and body torque."""
+    lever = model.arm_m / math.sqrt(2)
+    base = thrust_n / 4
+    roll, pitch = torque[0] / (4 * lever), torque[1] / (4 * lever)
+    yaw = torque[2] / (4 * YAW_TORQUE_PER_THRUST_M)
+    return (
+        base + roll - pitch - yaw,
+        base - roll - pitch + yaw,
+        base - roll + pitch - yaw,
+        base + roll + pitch + yaw,
+    )
+
+
+def drag(air_velocity: Vector, model: VehicleModel) -> Vector:
+    """Return the drag force for a velocity relative to the air: linear plus quadratic."""
+    vx, vy, vz = air_velocity
+    speed = math.sqrt(vx * vx + vy * vy + vz * vz)
+    area = DRAG_AREA_M2 * model.size_m**2
+    factor = -(ROTOR_DRAG_PER_S * model.mass_kg + 0.5 * AIR_DENSITY_KGPM3 * area * speed)
+    return factor * vx, factor * vy, factor * vz

@@ -1,0 +1,219 @@
+"""The physical world: the only module that knows pybullet."""
+
+from __future__ import annotations
+
+import contextlib
+import ctypes
+import math
+import os
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+from pytest_garl.scenarios.bodies import Body, Part
+from pytest_garl.simulation.vehicle import (
+    BODY_ABOVE_FEET_M,
+    GRAVITY_MPS2,
+    Vector,
+    VehicleModel,
+)
+
+
+@contextlib.contextmanager
+def _quiet() -> Iterator[None]:
+    """Silence file descriptor 1: pybullet's C code announces its build time on import."""
+    saved = os.dup(1)
+    null = os.open(os.devnull, os.O_WRONLY)
+    try:
+        os.dup2(null, 1)
+        yield
+    finally:
+        ctypes.CDLL(None).fflush(None)
+        os.dup2(saved, 1)
+        os.close(saved)
+        os.close(null)
+
+
+with _quiet():
+    import pybullet
+
+PHYSICS_RATE_HZ = 240
+_RANGE_M = 3.0
+"""Distances beyond this are bounded by spheres instead of asked of the engine."""
+Quaternion = tuple[float, float, float, float]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Touch:
+    """A contact of the UAV's hull with a body, or with "ground"."""
+
+    body: str
+    position_m: Vector
+
+
+class World:
+    """One flight's physics: ground, static bodies, dynamic objects and the UAV's hull.
+
+    A world is built for one flight and closed after it: saving and restoring a pybullet
+    state is not deterministic, building it anew is.
+    """
+
+    def __init__(
+        self,
+        model: VehicleModel,
+        start_m: Vector,
+        bodies: Sequence[Body],
+        objects: Sequence[Body],
+    ) -> None:
+        self._client = pybullet.connect(pybullet.DIRECT)
+        self._p = pybullet
+        self._call = {"physicsClientId": self._client}
+        self._p.setGravity(0, 0, -GRAVITY_MPS2, **self._call)
+        self._p.setTimeStep(1 / PHYSICS_RATE_HZ, **self._call)
+        self._p.setPhysicsEngineParameter(deterministicOverlappingPairs=1, **self._call)
+        plane = self._p.createCollisionShape(self._p.GEOM_PLANE, **self._call)
+        ground = self._p.createMultiBody(0, plane, **self._call)
+        self._names = {ground: "ground"}
+        self._spheres: dict[int, tuple[Vector, float]] = {}
+        self._ids: dict[str, int] = {}
+        for body in (*bodies, *objects):
+            self._add(body)
+        self._uav = self._add_uav(model, start_m)
+        self._reach = model.size_m * 0.6
+
+    def close(self) -> None:
+        """Free the physics client."""
+        self._p.disconnect(**self._call)
+
+    def step(self, force: Vector, torque: Vector) -> None:
+        """Advance by 1/240 s under a force and a torque on the UAV, in the world frame."""
+        position, _ = self._p.getBasePositionAndOrientation(self._uav, **self._call)
+        self._p.applyExternalForce(
+            self._uav, -1, force, position, self._p.WORLD_FRAME, **self._call
+        )
+        self._p.applyExternalTorque(self._uav, -1, torque, self._p.WORLD_FRAME, **self._call)
+        self._p.stepSimulation(**self._call)
+
+    def uav(self) -> tuple[Vector, Quaternion, Vector, Vector]:
+        """Position, attitude, velocity and angular velocity of the UAV, in the world frame."""
+        position, attitude = self._p.getBasePositionAndOrientation(self._uav, **self._call)
+        velocity, spin = self._p.getBaseVelocity(self._uav, **self._call)
+        return position, attitude, velocity, spin
+
+    def move(self, name: str, position_m: Vector, yaw_rad: float, velocity: Vector) -> None:
+        """Put a dynamic object somewhere; its velocity makes contacts feel right."""
+        body = self._ids[name]
+        attitude = (0.0, 0.0, math.sin(yaw_rad / 2), math.cos(yaw_rad / 2))
+        self._p.resetBasePositionAndOrientation(body, position_m, attitude, **self._call)
+        self._p.resetBaseVelocity(body, velocity, (0, 0, 0), **self._call)
+        self._spheres[body] = (position_m, self._spheres[body][1])
+
+    def touches(self) -> tuple[Touch, ...]:
+        """Return the UAV's present contacts, one per body."""
+        found: dict[str, Touch] = {}
+        for contact in self._p.getContactPoints(bodyA=self._uav, **self._call):
+            if contact[8] <= 0:
+                name = self._names[contact[2]]
+                found.setdefault(name, Touch(body=name, position_m=contact[6]))
+        return tuple(found.values())
+
+    def separations(self) -> dict[str, float]:
+        """Distance in metres from the UAV's hull to each body but the ground.
+
+        Exact within 3 m; beyond, the distance of bounding spheres, which is smaller.
+        """
+        x, y, z = self._p.getBasePositionAndOrientation(self._uav, **self._call)[0]
+        result = {}
+        for name, body in self._ids.items():
+            (cx, cy, cz), radius = self._spheres[body]
+            bound = math.dist((x, y, z), (cx, cy, cz)) - radius - self._reach
+            if bound < _RANGE_M:
+                points = self._p.getClosestPoints(self._uav, body, _RANGE_M, **self._call)
+                bound = min((point[8] for point in points), default=max(bound, _RANGE_M))
+            result[name] = bound
+        return result
+
+    def _add_uav(self, model: VehicleModel, start_m: Vector) -> int:
+        # The rotors' disc, and below it the landing gear on which the body stands.
+        disc, gear = 0.10, BODY_ABOVE_FEET_M - 0.02
+        shape = self._p.createCollisionShapeArray(
+            shapeTypes=[self._p.GEOM_CYLINDER, self._p.GEOM_BOX],
+            radii=[model.size_m / 2, 0.0],
+            lengths=[disc, 0.0],
+            halfExtents=[[0, 0, 0], [0.18 * model.size_m, 0.18 * model.size_m, gear / 2]],
+            collisionFramePositions=[[0, 0, 0.03], [0, 0, -0.02 - gear / 2]],
+            **self._call,
+        )
+        x, y, _ = start_m
+        uav: int = self._p.createMultiBody(
+            model.mass_kg, shape, basePosition=(x, y, BODY_ABOVE_FEET_M), **self._call
+        )
+        self._p.changeDynamics(
+            uav,
+            -1,
+            localInertiaDiagonal=model.inertia,
+            linearDamping=0,
+            angularDamping=0,
+            lateralFriction=0.5,
+            restitution=0.0,
+            activationState=self._p.ACTIVATION_STATE_DISABLE_SLEEPING,
+            **self._call,
+        )
+        self._names[uav] = "uav"
+        return uav
+
+    def _add(self, body: Body) -> None:
+        shapes = [self._shape(part) for part in body.parts]
+        count = len(shapes)
+        attitude = (0.0, 0.0, math.sin(body.yaw_rad / 2), math.cos(body.yaw_rad / 2))
+        number: int = self._p.createMultiBody(
+            0,
+            -1,
+            basePosition=body.position_m,
+            baseOrientation=attitude,
+            linkMasses=[0] * count,
+            linkCollisionShapeIndices=shapes,
+            linkVisualShapeIndices=[-1] * count,
+            linkPositions=[part.position_m for part in body.parts],
+            linkOrientations=[part.rotation for part in body.parts],
+            linkInertialFramePositions=[[0, 0, 0]] * count,
+            linkInertialFrameOrientations=[[0, 0, 0, 1]] * count,
+            linkParentIndices=[0] * count,
+            linkJointTypes=[self._p.JOINT_FIXED] * count,
+            linkJointAxis=[[0, 0, 1]] * count,
+            **self._call,
+        )
+        radius = max(
+            math.hypot(*part.position_m) + math.hypot(*part.size_m) / 2 for part in body.parts
+        )
+        self._ids[body.name] = number
+        self._names[number] = body.name
+        self._spheres[number] = (body.position_m, radius)
+
+    def _shape(self, part: Part) -> int:
+        p = self._p
+        x, y, z = part.size_m
+        if part.shape == "box":
+            kind = {"shapeType": p.GEOM_BOX, "halfExtents": [x / 2, y / 2, z / 2]}
+        elif part.shape == "cylinder":
+            kind = {"shapeType": p.GEOM_CYLINDER, "radius": x / 2, "height": z}
+        elif part.shape == "sphere":
+            kind = {"shapeType": p.GEOM_SPHERE, "radius": x / 2}
+        else:
+            kind = {"shapeType": p.GEOM_MESH, "vertices": _ellipsoid(part.size_m)}
+        shape: int = p.createCollisionShape(**kind, **self._call)
+        return shape
+
+
+def _ellipsoid(size_m: Vector, rings: int = 5, sides: int = 10) -> list[list[float]]:
+    points = [[0.0, 0.0, size_m[2] / 2], [0.0, 0.0, -size_m[2] / 2]]
+    for ring in range(1, rings):
+        polar = math.pi * ring / rings
+        for side in range(sides):
+            angle = 2 * math.pi * side / sides
+            unit = (
+                math.sin(polar) * math.cos(angle),
+                math.sin(polar) * math.sin(angle),
+                math.cos(polar),
+            )
+            points.append([unit[axis] * size_m[axis] / 2 for axis in range(3)])
+    return points
