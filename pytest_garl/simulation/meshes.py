@@ -1,0 +1,157 @@
+"""Parts as triangles, and triangles clipped before the rasteriser sees them."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pytest_garl.scenarios.bodies import Part
+
+Array = NDArray[np.float32]
+_SIDES = 10
+_RINGS = 5
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Mesh:
+    """Triangles of a body: ``corners`` (n, 3, 3), ``normals`` (n, 3), ``colours`` (n, 3)."""
+
+    corners: Array
+    normals: Array
+    colours: Array
+    radius_m: float
+    hulls: tuple[Array, ...]
+    """Each part's vertices, for its shadow."""
+
+
+def mesh_of(parts: Sequence[Part]) -> Mesh:
+    """Return the triangles of convex parts, wound outwards, in the body's frame."""
+    corners, normals, colours, hulls = [], [], [], []
+    for part in parts:
+        vertices, faces = _primitive(part)
+        turned = vertices @ rotation_matrix(part.rotation).T + np.array(part.position_m)
+        triangles = turned[faces]
+        normal = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
+        outward = ((triangles.mean(axis=1) - np.array(part.position_m)) * normal).sum(axis=1) > 0
+        normal[~outward] *= -1
+        triangles[~outward] = triangles[~outward][:, ::-1]
+        corners.append(triangles)
+        normals.append(normal / np.linalg.norm(normal, axis=1, keepdims=True))
+        colours.append(np.tile(np.array(part.colour, dtype=np.float64), (len(faces), 1)))
+        hulls.append(turned.astype(np.float32))
+    every = np.concatenate(corners)
+    return Mesh(
+        corners=every.astype(np.float32),
+        normals=np.concatenate(normals).astype(np.float32),
+        colours=np.concatenate(colours).astype(np.float32),
+        radius_m=float(np.linalg.norm(every.reshape(-1, 3), axis=1).max()),
+        hulls=tuple(hulls),
+    )
+
+
+def placed(
+    mesh: Mesh, position_m: tuple[float, float, float], yaw_rad: float
+) -> tuple[Array, Array]:
+    """Return corners and normals of a mesh at a place in the world."""
+    turn = _yaw_matrix(yaw_rad)
+    corners = mesh.corners @ turn.T + np.array(position_m, dtype=np.float32)
+    return corners, mesh.normals @ turn.T
+
+
+def placed_hulls(mesh: Mesh, position_m: tuple[float, float, float], yaw_rad: float) -> list[Array]:
+    """Return the parts' vertices of a mesh at a place in the world."""
+    turn, at = _yaw_matrix(yaw_rad).T, np.array(position_m, dtype=np.float32)
+    return [hull @ turn + at for hull in mesh.hulls]
+
+
+def clip_near(triangles: Array, near_m: float) -> tuple[Array, NDArray[np.intp]]:
+    """Clip camera-frame triangles (n, 3, 3) at forward depth ``near_m`` (third coordinate).
+
+    Returns the triangles that remain and the index of the one that each came from.
+    """
+    inside = triangles[:, :, 2] > near_m
+    count = inside.sum(axis=1)
+    whole = np.flatnonzero(count == 3)
+    cut = np.flatnonzero((count == 1) | (count == 2))
+    if len(cut) == 0:
+        return triangles[whole], whole
+    extra, origin = [], []
+    for index in cut:
+        polygon = _clip_polygon(triangles[index], near_m)
+        for second in range(1, len(polygon) - 1):
+            extra.append(polygon[[0, second, second + 1]])
+            origin.append(index)
+    return (
+        np.concatenate([triangles[whole], np.array(extra, dtype=np.float32)]),
+        np.concatenate([whole, np.array(origin, dtype=np.intp)]),
+    )
+
+
+def clip_polygon(points: Array, near_m: float) -> Array:
+    """Clip a camera-frame polygon (n, 3) at forward depth ``near_m``; may be empty."""
+    if (points[:, 2] > near_m).all():
+        return points
+    return _clip_polygon(points, near_m)
+
+
+def _clip_polygon(points: Array, near_m: float) -> Array:
+    kept = []
+    for start, end in zip(points, np.roll(points, -1, axis=0), strict=True):
+        if start[2] > near_m:
+            kept.append(start)
+        if (start[2] > near_m) != (end[2] > near_m):
+            share = (near_m - start[2]) / (end[2] - start[2])
+            kept.append(start + share * (end - start))
+    return np.array(kept, dtype=np.float32).reshape(-1, 3)
+
+
+def _primitive(part: Part) -> tuple[NDArray[np.float64], NDArray[np.intp]]:
+    half = np.array(part.size_m) / 2
+    if part.shape == "box":
+        signs = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)], float)
+        quads = ((0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3))
+        faces = [(a, b, c) for a, b, c, _ in quads] + [(a, c, d) for a, _, c, d in quads]
+        return signs * half, np.array(faces)
+    angles = 2 * np.pi * np.arange(_SIDES) / _SIDES
+    circle = np.stack([np.cos(angles), np.sin(angles)], axis=1)
+    if part.shape == "cylinder":
+        rims = [np.column_stack([circle, np.full(_SIDES, z)]) for z in (-1.0, 1.0)]
+        vertices = np.concatenate([*rims, [[0, 0, -1.0], [0, 0, 1.0]]]) * half
+        faces = []
+        for a in range(_SIDES):
+            b = (a + 1) % _SIDES
+            faces += [(a, b, a + _SIDES), (b, b + _SIDES, a + _SIDES)]
+            faces += [(a, b, 2 * _SIDES), (a + _SIDES, b + _SIDES, 2 * _SIDES + 1)]
+        return vertices, np.array(faces)
+    polar = math.pi * np.arange(1, _RINGS) / _RINGS
+    rings = [np.column_stack([circle * math.sin(p), np.full(_SIDES, math.cos(p))]) for p in polar]
+    vertices = np.concatenate([*rings, [[0, 0, 1.0], [0, 0, -1.0]]]) * half
+    top, bottom = len(vertices) - 2, len(vertices) - 1
+    faces = []
+    for a in range(_SIDES):
+        b = (a + 1) % _SIDES
+        faces += [(top, a, b), (bottom, a + (_RINGS - 2) * _SIDES, b + (_RINGS - 2) * _SIDES)]
+        for ring in range(_RINGS - 2):
+            i, j = ring * _SIDES, (ring + 1) * _SIDES
+            faces += [(a + i, b + i, a + j), (b + i, b + j, a + j)]
+    return vertices, np.array(faces)
+
+
+def rotation_matrix(q: tuple[float, float, float, float]) -> NDArray[np.float64]:
+    x, y, z, w = q
+    return np.array(
+        [
+            [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
+            [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
+            [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
+        ]
+    )
+
+
+def _yaw_matrix(yaw_rad: float) -> Array:
+    cos, sin = math.cos(yaw_rad), math.sin(yaw_rad)
+    return np.array([[cos, -sin, 0], [sin, cos, 0], [0, 0, 1]], dtype=np.float32)

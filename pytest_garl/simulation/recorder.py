@@ -1,0 +1,209 @@
+"""Gathers a flight's record while it is flown."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from pytest_garl.landing_system import Command, Detection, Diagnostics
+from pytest_garl.scenarios.maps import Map
+from pytest_garl.simulation.camera import Frame, Renderer
+from pytest_garl.simulation.flight import (
+    BodyClass,
+    Contact,
+    Crash,
+    Event,
+    Flight,
+    ObjectRecord,
+    Outcome,
+    Separation,
+    Step,
+    Track,
+)
+from pytest_garl.simulation.objects import MovingObject
+
+Vector = tuple[float, float, float]
+Quaternion = tuple[float, float, float, float]
+Sight = tuple[float, float, tuple[str, ...]]
+
+
+class Recorder:
+    """Collects poses, contacts, events and steps; ``time_s`` is the flight's present time."""
+
+    def __init__(
+        self, map: Map, objects: Sequence[MovingObject], marker: tuple[float, float]
+    ) -> None:
+        self.time_s = 0.0
+        self.touched_ground = False
+        self._map, self._objects, self._marker = map, objects, marker
+        self._kinds: dict[str, tuple[str, BodyClass]] = {"ground": ("ground", "ground")}
+        self._kinds |= {body.name: (body.kind, "static") for body in map.bodies}
+        self._kinds |= {item.name: (item.type.name, "dynamic") for item in objects}
+        self._times: list[float] = []
+        self._uav: list[tuple[float, ...]] = []
+        self._tracks: list[list[tuple[float, ...]]] = [[] for _ in objects]
+        self._nearest: dict[str, tuple[float, float]] = {}
+        self._contacts: list[Contact] = []
+        self._events: list[Event] = []
+        self._steps: list[Step] = []
+        self._phase = ""
+
+    def begin(self, position: Vector, attitude: Quaternion, velocity: Vector) -> None:
+        """Note the pose at time zero, so that even a flight that never began has a track."""
+        self.pose(0.0, position, attitude, velocity, {})
+
+    def pose(
+        self,
+        time_s: float,
+        position: Vector,
+        attitude: Quaternion,
+        velocity: Vector,
+        gaps: Mapping[str, float],
+    ) -> None:
+        """Add one sample to every track; a second one at the same time replaces the first."""
+        if self._times and self._times[-1] == time_s:
+            self._times.pop()
+            self._uav.pop()
+            for track in self._tracks:
+                track.pop()
+        self._times.append(time_s)
+        self._uav.append((*position, *attitude, *velocity))
+        for track, item in zip(self._tracks, self._objects, strict=True):
+            turn = (0.0, 0.0, math.sin(item.yaw_rad / 2), math.cos(item.yaw_rad / 2))
+            track.append((*item.position_m, *turn, item.vx_mps, item.vy_mps, 0.0))
+        for name, gap in gaps.items():
+            if gap < self._nearest.get(name, (math.inf, 0.0))[0]:
+                self._nearest[name] = (gap, time_s)
+
+    def contact(self, body: str, position_m: Vector, speed_mps: float, tilt_rad: float) -> None:
+        """Note a contact; the flight's loop decides what it means."""
+        kind, body_class = self._kinds[body]
+        self.touched_ground |= body == "ground"
+        self._contacts.append(
+            Contact(
+                time_s=self.time_s,
+                body=body,
+                kind=kind,
+                body_class=body_class,
+                position_m=position_m,
+                speed_mps=speed_mps,
+                tilt_rad=tilt_rad,
+            )
+        )
+        self.event("contact", f"touched {body} at {speed_mps:.1f} m/s")
+
+    def event(self, name: str, text: str) -> None:
+        """Note something worth telling."""
+        self._events.append(Event(time_s=self.time_s, name=name, text=text))
+
+    def sight(self, frame: Frame, renderer: Renderer, eye: Vector, attitude: Quaternion) -> Sight:
+        """Work out what of the marker and the objects a frame shows."""
+        ids = renderer.segment_ids
+        counts = np.bincount(frame.segmentation.ravel() + 1, minlength=len(ids) + 1)
+        area = renderer.marker_area_px(eye, attitude)
+        share = min(1.0, float(counts[ids["marker"] + 1]) / area) if area >= 1 else 0.0
+        height = max(0.1, eye[2])
+        side = renderer.marker_side_px(height)
+        seen = tuple(item.name for item in self._objects if counts[ids[item.name] + 1] > 0)
+        return share, side, seen
+
+    def step(self, command: Command, sight: Sight) -> None:
+        """Note one answer of the landing system with what there was to see."""
+        thoughts = _plain(command.diagnostics)
+        if thoughts and thoughts.phase != self._phase:
+            self._phase = thoughts.phase
+            self.event("phase", thoughts.phase)
+        share, side, seen = sight
+        self._steps.append(
+            Step(
+                time_s=self.time_s,
+                command=type(command).__name__,
+                marker_visible=share,
+                marker_px=side,
+                objects_visible=seen,
+                diagnostics=thoughts,
+            )
+        )
+
+    def flight(self, outcome: Outcome, crash: Crash | None) -> Flight:
+        """Return the record; hash, CPU and versions are added by the caller."""
+        times = np.array(self._times)
+        x, y = self._uav[-1][:2]
+        return Flight(
+            outcome=outcome,
+            final_distance_m=math.dist((x, y), self._marker),
+            elapsed_s=self.time_s,
+            marker_position_m=self._marker,
+            uav=_track(times, self._uav),
+            objects=tuple(
+                ObjectRecord(
+                    name=item.name,
+                    type=item.type.name,
+                    track=_track(times, samples),
+                    moves=np.array(item.moves, dtype=np.float64).reshape(-1, 2),
+                )
+                for item, samples in zip(self._objects, self._tracks, strict=True)
+            ),
+            contacts=tuple(self._contacts),
+            separations=tuple(
+                Separation(
+                    body=name,
+                    kind=self._kinds[name][0],
+                    body_class=self._kinds[name][1],
+                    distance_m=gap,
+                    time_s=at,
+                )
+                for name, (gap, at) in sorted(self._nearest.items())
+            ),
+            events=tuple(self._events),
+            steps=tuple(self._steps),
+            decoys=tuple(
+                (layer.name, *layer.points_m[0])
+                for layer in self._map.ground.layers
+                if layer.kind == "marker"
+            ),
+            crash=crash,
+        )
+
+
+def _track(times: Any, samples: list[tuple[float, ...]]) -> Track:
+    table = np.array(samples, dtype=np.float64)
+    return Track(
+        time_s=times,
+        position_m=table[:, 0:3],
+        attitude=table[:, 3:7],
+        velocity_mps=table[:, 7:10],
+    )
+
+
+def _plain(thoughts: Diagnostics | None) -> Diagnostics | None:
+    """Copy diagnostics into plain, finite Python values: what is not finite is absent."""
+    if thoughts is None:
+        return None
+    target = thoughts.target_m
+    return Diagnostics(
+        phase=str(thoughts.phase),
+        detections=tuple(
+            Detection(
+                marker_id=int(seen.marker_id),
+                confidence=float(seen.confidence),
+                position_m=_vector(seen.position_m),
+                corners_px=tuple((float(u), float(v)) for u, v in seen.corners_px),
+            )
+            for seen in thoughts.detections
+            if np.isfinite(np.array(seen.position_m, dtype=float)).all()
+        ),
+        target_m=_vector(target)
+        if target is not None and np.isfinite(np.array(target, dtype=float)).all()
+        else None,
+        planned_path_m=tuple(_vector(point) for point in thoughts.planned_path_m),
+        note=str(thoughts.note),
+    )
+
+
+def _vector(value: Sequence[float]) -> Vector:
+    x, y, z = (float(item) for item in value)
+    return x, y, z
