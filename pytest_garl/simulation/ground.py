@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+import itertools
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -114,7 +115,7 @@ class _Canvas:
         cv2.fillPoly(self.image, [self.points(world)], colour, cv2.LINE_AA, _SHIFT)
 
     def stroke(self, world: NDArray[np.float64], width_m: float, colour: Sequence[float]) -> None:
-        for start, end in zip(world, world[1:], strict=False):
+        for start, end in itertools.pairwise(world):
             along = end - start
             length = float(np.hypot(*along))
             if length > 0:
@@ -235,7 +236,7 @@ def _roots(
             heading += rng.normal(0, 0.35)
             at = at + spread_m / 12 * np.array([math.cos(heading), math.sin(heading)])
             path.append(at)
-        for start, end in zip(path, path[1:], strict=False):
+        for start, end in itertools.pairwise(path):
             canvas.stroke(np.array([start, end]), width, colour)
             width *= 0.88
 

@@ -142,6 +142,7 @@ def _primitive(part: Part) -> tuple[NDArray[np.float64], NDArray[np.intp]]:
 
 
 def rotation_matrix(q: tuple[float, float, float, float]) -> NDArray[np.float64]:
+    """Matrix (3, 3) of a quaternion x, y, z, w."""
     x, y, z, w = q
     return np.array(
         [

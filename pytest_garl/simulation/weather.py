@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from dataclasses import dataclass
 
@@ -121,7 +122,7 @@ def rain_speed_mps(diameter_mm: float) -> float:
 
 
 def _illuminance(elevation_deg: float) -> float:
-    for (low, dim), (high, bright) in zip(_LUX, _LUX[1:], strict=False):
+    for (low, dim), (high, bright) in itertools.pairwise(_LUX):
         if elevation_deg <= high:
             share = (elevation_deg - low) / (high - low)
             return float(math.exp(math.log(dim) + share * (math.log(bright) - math.log(dim))))

@@ -1,0 +1,92 @@
+"""Marker detection with OpenCV's ArUco detector, with the pose from the corners."""
+
+from __future__ import annotations
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from pytest_garl import Camera, Detection, Mission, Observation
+
+_CAMERA_FROM_BODY = np.array([[0.0, -1.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 0.0, -1.0]])
+"""Image right is the body's -y, image down its -x, the optical axis its -z."""
+MAX_REPROJECTION_PX = 2.0
+HEIGHT_TOLERANCE = 0.35
+"""A marker on the ground lies as far below as the altimeter says, give or take a third; what
+does not is no marker."""
+
+
+class OpenCvDetector:
+    """Finds markers in frames and places them in the world."""
+
+    def __init__(self, mission: Mission) -> None:
+        dictionary = cv2.aruco.getPredefinedDictionary(
+            getattr(cv2.aruco, mission.marker_dictionary)
+        )
+        parameters = cv2.aruco.DetectorParameters()
+        # 24 px of side at 10 m in 320x240 is a perimeter rate of 0.3; half of that is noise.
+        parameters.minMarkerPerimeterRate = 0.12
+        parameters.adaptiveThreshWinSizeMin = 5
+        parameters.adaptiveThreshWinSizeMax = 25
+        parameters.adaptiveThreshWinSizeStep = 10
+        parameters.cornerRefinementMethod = cv2.aruco.CORNER_REFINE_SUBPIX
+        self._detector = cv2.aruco.ArucoDetector(dictionary, parameters)
+        self._camera: Camera = mission.camera
+        half = mission.marker_side_m / 2
+        self._corners = np.array(
+            [[-half, half, 0], [half, half, 0], [half, -half, 0], [-half, -half, 0]]
+        )
+
+    def detect(self, observation: Observation) -> tuple[Detection, ...]:
+        """Return all markers in the frame whose pose is plausible."""
+        grey = cv2.cvtColor(observation.image, cv2.COLOR_RGB2GRAY)
+        corners, ids, _ = self._detector.detectMarkers(grey)
+        if ids is None:
+            return ()
+        found = []
+        for quad, marker_id in zip(corners, ids.ravel(), strict=True):
+            position = self._place(quad.reshape(4, 2), observation)
+            if position is not None:
+                found.append(
+                    Detection(
+                        marker_id=int(marker_id),
+                        confidence=1.0,
+                        position_m=position,
+                        corners_px=tuple((float(u), float(v)) for u, v in quad.reshape(4, 2)),
+                    )
+                )
+        return tuple(found)
+
+    def _place(
+        self, quad: NDArray[np.float32], observation: Observation
+    ) -> tuple[float, float, float] | None:
+        ok, turn, shift = cv2.solvePnP(
+            self._corners, quad, self._camera.matrix, None, flags=cv2.SOLVEPNP_IPPE_SQUARE
+        )
+        if not ok:
+            return None
+        back, _ = cv2.projectPoints(self._corners, turn, shift, self._camera.matrix, None)
+        if np.abs(back.reshape(4, 2) - quad).max() > MAX_REPROJECTION_PX:
+            return None
+        in_body = _CAMERA_FROM_BODY.T @ shift.ravel()
+        offset = rotation_matrix(observation.attitude) @ in_body
+        height = float(observation.position_m[2])
+        if abs(-offset[2] - height) > HEIGHT_TOLERANCE * height + 0.3:
+            return None
+        # The altimeter knows the height better than a few pixels do: keep the direction of
+        # the ray and let it end on the ground.
+        scale = height / -offset[2]
+        x, y = observation.position_m[:2] + scale * offset[:2]
+        return float(x), float(y), 0.0
+
+
+def rotation_matrix(attitude: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Matrix (3, 3) of a quaternion x, y, z, w."""
+    x, y, z, w = attitude
+    return np.array(
+        [
+            [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
+            [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
+            [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
+        ]
+    )
