@@ -41,11 +41,11 @@ class OpenCvDetector:
         """Return all markers in the frame whose pose is plausible."""
         grey = cv2.cvtColor(observation.image, cv2.COLOR_RGB2GRAY)
         corners, ids, _ = self._detector.detectMarkers(grey)
-        if ids is None:
-            return ()
         found = []
-        for quad, marker_id in zip(corners, ids.ravel(), strict=True):
-            position = self._place(quad.reshape(4, 2), observation)
+        # OpenCV gives None, not an empty array, where it finds nothing.
+        numbers = () if not len(corners) else ids.ravel()
+        for quad, marker_id in zip(corners, numbers, strict=True):
+            position = self._place(np.asarray(quad, np.float32).reshape(4, 2), observation)
             if position is not None:
                 found.append(
                     Detection(

@@ -165,7 +165,8 @@ class Renderer:
         if horizon:
             depth[slope > -1e-3] = FAR_M
         np.minimum(depth, np.float32(FAR_M), out=depth)
-        return depth.astype(np.float32), horizon
+        exact: Array = depth.astype(np.float32)
+        return exact, horizon
 
     def _world_of_pixel(
         self, eye: NDArray[np.float64], axes: NDArray[np.float64]
@@ -217,7 +218,8 @@ class Renderer:
             return np.zeros((0, 2), np.float32)
         (cx, cy), focal = self.camera.centre_px, self.camera.focal_px
         pixels = focal * seen[:, :2] / seen[:, 2:] + np.array([cx, cy])
-        return np.clip(pixels, -2e4, 2e4).astype(np.float32)
+        bounded: Array = np.clip(pixels, -2e4, 2e4).astype(np.float32)
+        return bounded
 
     def _marker_segment(
         self, segmentation: NDArray[np.int32], eye: NDArray[np.float64], axes: NDArray[np.float64]
@@ -356,8 +358,8 @@ class Renderer:
         self._particles.draw(image, depth, axes, eye, time_s)
         if self.conditions.extinction_per_m > 0:
             length = cv2.multiply(depth, self._stretch)
-            through = cv2.exp(cv2.multiply(length, -self.conditions.extinction_per_m))
-            cv2.blendLinear(image, self._air, through, cv2.subtract(1.0, through), image)
+            through = np.asarray(cv2.exp(length * np.float32(-self.conditions.extinction_per_m)))
+            cv2.blendLinear(image, self._air, through, np.float32(1.0) - through, image)
 
 
 def _camera_axes(attitude: Quaternion) -> NDArray[np.float64]:

@@ -109,7 +109,8 @@ class _Canvas:
         pixels = np.empty_like(world)
         pixels[:, 0] = (world[:, 0] - self.box[0]) / self.resolution - 0.5
         pixels[:, 1] = (self.box[3] - world[:, 1]) / self.resolution - 0.5
-        return np.round(pixels * 2**_SHIFT).astype(np.int32)
+        fixed: NDArray[np.int32] = np.round(pixels * 2**_SHIFT).astype(np.int32)
+        return fixed
 
     def polygon(self, world: NDArray[np.float64], colour: Sequence[float]) -> None:
         cv2.fillPoly(self.image, [self.points(world)], colour, cv2.LINE_AA, _SHIFT)

@@ -43,7 +43,7 @@ class Sensor:
     def expose(self, image: NDArray[np.uint8], time_s: float) -> NDArray[np.uint8]:
         """Return the exposed picture with this frame's noise; ``image`` may be overwritten."""
         if not self._neutral:
-            image = cv2.LUT(image, self._table)
+            image = np.asarray(cv2.LUT(image, self._table), dtype=np.uint8)
         digest = hashlib.blake2b(struct.pack("<Id", self._salt, time_s), digest_size=2).digest()
         down, across = digest[0] % _SPARE, digest[1] % _SPARE
         height, width = image.shape[:2]

@@ -108,7 +108,7 @@ _GENES = (
 
 def rain_extinction_per_m(rate_mmph: float) -> float:
     """Optical extinction of rain: 0.312 R^0.67 per km (Atlas 1953, continuous rain)."""
-    return 0.312e-3 * rate_mmph**0.67
+    return 0.312e-3 * float(rate_mmph**0.67)
 
 
 def snow_extinction_per_m(rate_mmph: float) -> float:

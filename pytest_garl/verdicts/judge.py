@@ -1,0 +1,214 @@
+"""Judge a flight: a pure function from its record and the limits to a verdict."""
+
+from __future__ import annotations
+
+import math
+
+from pytest_garl.simulation.flight import Contact, Flight
+from pytest_garl.verdicts.moments import last_sighting_s, moment, speaks, was_in_view
+from pytest_garl.verdicts.verdict import (
+    Limits,
+    Margin,
+    PropertyName,
+    Verdict,
+    ViolationType,
+)
+
+LOST_S = 3.0
+"""A target not seen for this long before the end counts as no longer detected."""
+DECOY_M = 1.5
+
+
+def judge(flight: Flight, limits: Limits) -> Verdict:
+    """Return the verdict; the first event of the flight decides, and there is only one."""
+    primary, kind, signature, what = _mechanism(flight, limits)
+    far = flight.final_distance_m > 1.5
+    paper = (
+        flight.outcome == "collision"
+        or flight.outcome == "not_landed"
+        or (flight.outcome == "landed" and far)
+    )
+    return Verdict(
+        outcome=flight.outcome,
+        primary=primary,
+        violation_type=kind,
+        signature=signature,
+        paper_violation=paper,
+        margins=_margins(flight, limits),
+        story=f"{what} {_where(flight)}".strip(),
+    )
+
+
+def undecided(flight: Flight) -> str:
+    """Say why distance and time were not decided, or nothing if they were."""
+    if flight.outcome == "landed":
+        return ""
+    when = f"at {flight.elapsed_s:.1f} s"
+    if flight.outcome == "collision":
+        return f"collision with {flight.contacts[-1].body} {when}"
+    if flight.outcome == "aborted":
+        return f"aborted {when}"
+    if flight.outcome == "crashed":
+        return f"the landing system crashed {when}"
+    return f"not landed after {flight.elapsed_s:.0f} s"
+
+
+def _margins(flight: Flight, limits: Limits) -> tuple[Margin, ...]:
+    reason = undecided(flight)
+    landed = flight.outcome == "landed"
+    timed = landed or flight.outcome == "not_landed"
+    solid = [gap.distance_m for gap in flight.separations if gap.body_class != "ground"]
+    hit = flight.outcome == "collision"
+    nearest = 0.0 if hit else min(solid, default=math.hypot(*flight.marker_position_m) + 1e3)
+    return (
+        Margin(
+            property="distance",
+            value=limits.distance_m - flight.final_distance_m,
+            unit="m",
+            decided=landed,
+            reason=reason,
+        ),
+        Margin(
+            property="time",
+            value=limits.time_s - flight.elapsed_s
+            if landed
+            else min(0.0, limits.time_s - flight.elapsed_s),
+            unit="s",
+            decided=timed,
+            reason="" if timed else reason,
+        ),
+        Margin(property="collision", value=nearest, unit="m"),
+        Margin(property="crash", value=0.0 if flight.outcome == "crashed" else 1.0, unit="1"),
+    )
+
+
+def _mechanism(
+    flight: Flight, limits: Limits
+) -> tuple[PropertyName | None, ViolationType | None, str, str]:
+    if flight.outcome == "crashed" and flight.crash:
+        crash = flight.crash
+        text = f"The landing system {_VERBS[crash.kind]}: {crash.error}: {crash.message}".rstrip(
+            ": "
+        )
+        return "crash", "V", f"V:{crash.error}@{crash.where}", text + "."
+    if flight.outcome == "collision":
+        return _collision(flight, flight.contacts[-1])
+    if flight.outcome == "aborted":
+        when = moment(flight, _abort_time(flight))
+        if limits.abort == "violation":
+            return "abort", "abort", f"abort:{when}", "The landing was aborted."
+        return None, None, "", "The landing was aborted and the UAV climbed clear."
+    if flight.outcome == "not_landed":
+        return _not_landed(flight)
+    if flight.final_distance_m > limits.distance_m:
+        return _missed(flight)
+    if flight.elapsed_s > limits.time_s:
+        when = moment(flight, limits.time_s)
+        return "time", "late", f"late:{when}", f"Landed late, after {flight.elapsed_s:.1f} s."
+    return None, None, "", f"Landed after {flight.elapsed_s:.1f} s."
+
+
+_VERBS = {"raised": "raised", "nonsense": "returned nonsense", "died": "died", "hung": "hung"}
+
+
+def _collision(flight: Flight, contact: Contact) -> tuple[PropertyName, ViolationType, str, str]:
+    when = moment(flight, contact.time_s)
+    speed = f"at {contact.speed_mps:.1f} m/s"
+    if contact.body_class == "ground":
+        tilted = contact.tilt_rad > math.radians(20)
+        how = "tilted" if tilted else "fast"
+        return "collision", "hard", f"hard:{how}", f"Touched down too {how}, {speed}."
+    if contact.body_class == "static":
+        return "collision", "III", f"III:{contact.kind}:{when}", f"Hit {contact.body} {speed}."
+    seen = was_in_view(flight, contact.body, contact.time_s)
+    sight = "seen" if seen else "unseen"
+    view = (
+        "The camera had it in view within the last 2 s."
+        if seen
+        else "The camera had not had it in view for 2 s."
+    )
+    text = f"Collided with {contact.body} {speed}. {view}"
+    return "collision", "IV", f"IV:{contact.kind}:{when}:{sight}", text
+
+
+def _not_landed(flight: Flight) -> tuple[PropertyName, ViolationType, str, str]:
+    """Tell a target that was never or no longer seen (II) from one that was not landed on."""
+    when = moment(flight, flight.elapsed_s)
+    if speaks(flight) or not flight.steps:
+        last = last_sighting_s(flight)
+    else:
+        last = max((s.time_s for s in flight.steps if s.marker_visible > 0.5), default=None)
+    if last is None:
+        return "time", "II", f"II:never-seen:{when}", "Not landed; the marker was never detected."
+    if flight.elapsed_s - last > LOST_S:
+        text = f"Not landed; the marker was last detected at {last:.1f} s."
+        return "time", "II", f"II:lost:{when}", text
+    text = "Not landed although the marker was detected to the end."
+    return "time", "late", f"late:not-landed:{when}", text
+
+
+def _missed(flight: Flight) -> tuple[PropertyName, ViolationType, str, str]:
+    """Tell what a system took for the marker that it did not land on."""
+    x, y = (float(value) for value in flight.uav.position_m[-1, :2])
+    off = f"Landed {flight.final_distance_m:.1f} m off the marker"
+    target = next(
+        (
+            s.diagnostics.target_m
+            for s in reversed(flight.steps)
+            if s.diagnostics and s.diagnostics.target_m
+        ),
+        None,
+    )
+    if target is not None and math.dist(target[:2], flight.marker_position_m) <= DECOY_M:
+        return "distance", "off", "off:knew-better", f"{off}, though its target was right."
+    place = target[:2] if target is not None else (x, y)
+    near = [
+        (math.dist(place, (dx, dy)), name)
+        for name, dx, dy in flight.decoys
+        if math.dist(place, (dx, dy)) <= DECOY_M
+    ]
+    if near:
+        name = min(near)[1]
+        return "distance", "I", f"I:{name}:{_taken_at(flight, place)}", f"{off}, on {name}."
+    if target is None:
+        return "distance", "I", "I?:unknown", f"{off}; it does not say on what."
+    text = f"{off}, on something that it took for the marker."
+    return "distance", "I", f"I:phantom:{_taken_at(flight, place)}", text
+
+
+def _taken_at(flight: Flight, place: tuple[float, ...]) -> str:
+    for step in flight.steps:
+        target = step.diagnostics.target_m if step.diagnostics else None
+        if target is not None and math.dist(target[:2], place) <= DECOY_M:
+            return moment(flight, step.time_s)
+    return moment(flight, flight.elapsed_s)
+
+
+def _abort_time(flight: Flight) -> float:
+    return next((e.time_s for e in flight.events if e.name == "abort_command"), flight.elapsed_s)
+
+
+_COMPASS = (
+    "east",
+    "north-east",
+    "north",
+    "north-west",
+    "west",
+    "south-west",
+    "south",
+    "south-east",
+)
+
+
+def _where(flight: Flight) -> str:
+    x, y, z = (float(value) for value in flight.uav.position_m[-1])
+    mx, my = flight.marker_position_m
+    distance = math.hypot(x - mx, y - my)
+    point = _COMPASS[round(math.atan2(y - my, x - mx) / (math.pi / 4)) % 8]
+    place = f"{distance:.1f} m {point} of the marker" if distance > 0.3 else "over the marker"
+    recent = [s for s in flight.steps if s.time_s > flight.elapsed_s - 2.0]
+    hidden = ""
+    if recent and min(s.marker_visible for s in recent) < 0.99 and flight.outcome != "landed":
+        share = 100 * (1 - sum(s.marker_visible for s in recent) / len(recent))
+        hidden = f" In the last 2 s {share:.0f} % of the marker was hidden or out of the frame."
+    return f"At {flight.elapsed_s:.1f} s the UAV was {max(0.0, z - 0.2):.1f} m up, {place}.{hidden}"
