@@ -1,1 +1,138 @@
 """The pytest hooks of pytest-garl, and nothing else."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Generator
+from typing import Any
+
+import pytest
+
+from pytest_garl import hookspecs
+from pytest_garl.errors import GarlError
+from pytest_garl.fixtures import garl_slot, landing, npcs, scenario
+from pytest_garl.options import add_options, read_options
+from pytest_garl.run import RUN, Run, target_of, targets_for
+
+__all__ = ["garl_slot", "landing", "npcs", "scenario"]
+
+NOTHING_TO_FLY = "nothing to fly: no --garl-budget given and no committed cases"
+
+
+def pytest_addoption(parser: pytest.Parser) -> None:
+    """Register options and ini keys."""
+    add_options(parser)
+
+
+def pytest_addhooks(pluginmanager: pytest.PytestPluginManager) -> None:
+    """Register the hooks that users may implement."""
+    pluginmanager.add_hookspecs(hookspecs)
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    """Register the marker, and join or begin a run if anything is to be flown."""
+    config.addinivalue_line(
+        "markers",
+        "garl(system, maps, limits): search for violations of a landing system on maps",
+    )
+    options = read_options(config)
+    if options.active and not config.option.collectonly:
+        from pytest_garl.reports.session import begin_run
+
+        try:
+            config.stash[RUN] = begin_run(config, options)
+        except GarlError as error:
+            raise pytest.UsageError(str(error)) from error
+
+
+def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
+    """Turn a marked test into its slots."""
+    if "garl_slot" not in metafunc.fixturenames:
+        return
+    marker = metafunc.definition.get_closest_marker("garl")
+    if marker is None:
+        raise pytest.Collector.CollectError(
+            f"{metafunc.definition.nodeid} uses a landing fixture without "
+            "@pytest.mark.garl(system=..., maps=[...])"
+        )
+    options = read_options(metafunc.config)
+    try:
+        targets: list[Any] = list(targets_for(marker, options))
+    except GarlError as error:
+        raise pytest.Collector.CollectError(f"{metafunc.definition.nodeid}: {error}") from error
+    ids = [target.name for target in targets]
+    if not targets:
+        reason = f"--garl-repeat={options.repeat}: not of this test" if options.repeat else ""
+        reason = reason or (NOTHING_TO_FLY if not options.budget else "no map selected")
+        targets, ids = [reason], ["nothing"]
+    metafunc.parametrize("garl_slot", targets, ids=ids, indirect=True)
+
+
+def pytest_collection_finish(session: pytest.Session) -> None:
+    """Tell the run which slots are wanted."""
+    run = session.config.stash.get(RUN, None)
+    if run is not None:
+        run.select(session.items)
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_pyfunc_call(pyfuncitem: pytest.Function) -> Generator[None, Any, Any]:
+    """Fail the first test of a slot whose system crashed, before its body runs."""
+    subject: Any = pyfuncitem.funcargs.get("landing")
+    if subject is not None and target_of(pyfuncitem) is not None:
+        verdict = subject.verdict
+        if verdict.primary in ("crash", "abort"):
+            from pytest_garl.reports.explain import crash_text
+
+            pytest.fail(crash_text(subject), pytrace=False)
+    return (yield)
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_runtest_makereport(
+    item: pytest.Item, call: pytest.CallInfo[None]
+) -> Generator[None, pytest.TestReport, pytest.TestReport]:
+    """Explain a violation, and report a known one as xfailed."""
+    report = yield
+    target = target_of(item)
+    run: Run | None = item.config.stash.get(RUN, None)
+    if target is not None and run is not None and report.when == "call" and report.failed:
+        from pytest_garl.reports.explain import explain
+
+        explain(report, item, run, target)
+    return report
+
+
+def pytest_report_header(config: pytest.Config) -> str | None:
+    """Say what will be searched, and how long it will probably take."""
+    run = config.stash.get(RUN, None)
+    if run is None:
+        return None
+    from pytest_garl.reports.terminal import header
+
+    return header(run)
+
+
+def pytest_terminal_summary(terminalreporter: Any, config: pytest.Config) -> None:
+    """Show what was found, per system and map."""
+    run = config.stash.get(RUN, None)
+    if run is not None:
+        from pytest_garl.reports.terminal import summary
+
+        summary(terminalreporter, run)
+
+
+def pytest_sessionfinish(session: pytest.Session) -> None:
+    """End the flying children."""
+    run = session.config.stash.get(RUN, None)
+    if run is not None:
+        run.pool.close()
+
+
+@pytest.hookimpl(optionalhook=True)
+def pytest_configure_node(node: Any) -> None:
+    """Give an xdist worker the run's seed, so that a random one is drawn once."""
+    run = node.config.stash.get(RUN, None)
+    if run is not None:
+        node.workerinput["garl_seed"] = str(run.options.seed)
+        node.workerinput["garl_controller"] = str(os.getpid())

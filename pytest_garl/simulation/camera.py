@@ -277,7 +277,8 @@ class Renderer:
         facing = np.clip(normals @ np.array(self.conditions.sun, np.float32), 0, 1)
         sky = 0.75 + 0.25 * normals[:, 2]
         light = (1 - share) * sky + share * facing / max(0.35, self.conditions.sun[2])
-        return (colours * np.clip(light, 0, 1.15)[:, None]).astype(np.float32)
+        lit: Array = (colours * np.clip(light, 0, 1.15)[:, None]).astype(np.float32)
+        return lit
 
     def _solids(
         self,

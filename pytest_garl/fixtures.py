@@ -1,0 +1,132 @@
+"""The fixtures of a landing test: landing, scenario, npcs."""
+
+from __future__ import annotations
+
+import functools
+import math
+from typing import TYPE_CHECKING, Any
+
+import pytest
+
+from pytest_garl.run import RUN, Run, Target
+
+if TYPE_CHECKING:
+    from pytest_garl.scenarios.scenario import Scenario
+    from pytest_garl.simulation.flight import Flight
+    from pytest_garl.simulation.policy import PolicySpec
+    from pytest_garl.verdicts.verdict import Limits, Verdict
+
+
+class Landing:
+    """One flown landing, as a test sees it.
+
+    Reading a property that the flight did not decide skips the test with the reason;
+    ``final_distance_m`` and ``elapsed_s`` can always be read.
+    """
+
+    def __init__(self, target: Target, result: dict[str, Any], run: Run) -> None:
+        self._target, self.result, self._run = target, result, run
+        self.slot: str = target.name
+        self.outcome: str = result["outcome"]
+        self.final_distance_m: float = result["final_distance_m"]
+        self.elapsed_s: float = result["elapsed_s"]
+
+    @property
+    def limits(self) -> Limits:
+        """The limits of the marker."""
+        return self._target.limits
+
+    @property
+    def distance_to_landing_m(self) -> float:
+        """Horizontal distance from the UAV to the marker's centre where it landed."""
+        if self.outcome != "landed":
+            self._undecided()
+        return self.final_distance_m
+
+    @property
+    def time_to_landing_s(self) -> float:
+        """Time from the mission's start to the landing; infinite if it never landed."""
+        if self.outcome == "not_landed":
+            return math.inf
+        if self.outcome != "landed":
+            self._undecided()
+        if self.verdict.primary == "distance":
+            # One event, one failing test: what landed elsewhere is not late as well.
+            return min(self.elapsed_s, self.limits.time_s)
+        return self.elapsed_s
+
+    @property
+    def collisions(self) -> tuple[str, ...]:
+        """Names of the bodies that the UAV hit; "ground" for a hard touchdown."""
+        return tuple(self.result["collisions"])
+
+    @functools.cached_property
+    def verdict(self) -> Verdict:
+        """The built-in judgement."""
+        from pytest_garl.verdicts.serialise import from_dict
+
+        return from_dict(self.result["verdict"])
+
+    @functools.cached_property
+    def flight(self) -> Flight:
+        """The flight's whole record, loaded from its file."""
+        from pytest_garl.simulation.record import load
+
+        name = f"{self._target.search[:8]}-{self._target.slot.id(self._target.map)}.npz"
+        return load(self._run.options.folder / "flights" / name)
+
+    def _undecided(self) -> None:
+        pytest.skip(f"not decided: {self.result['undecided']}")
+
+
+@pytest.fixture
+def garl_slot(request: pytest.FixtureRequest) -> Target:
+    """Return the slot that the item tests."""
+    target = request.param
+    if not isinstance(target, Target):
+        pytest.skip(str(target))
+    return target
+
+
+@pytest.fixture(scope="session")
+def npcs(request: pytest.FixtureRequest) -> PolicySpec:
+    """Return who moves the dynamic objects; override it in a conftest.py to change that."""
+    from pytest_garl.adversary.policies import policy_spec
+
+    run = request.config.stash.get(RUN, None)
+    return policy_spec(run.options.npcs if run else "waypoint")
+
+
+@pytest.fixture
+def landing(request: pytest.FixtureRequest, garl_slot: Target, npcs: PolicySpec) -> Landing:
+    """Return the slot's landing, flown when it is first asked for."""
+    run = request.config.stash[RUN]
+    result = run.fly(garl_slot, npcs)
+    landing = Landing(garl_slot, result, run)
+    verdict = result["verdict"]
+    request.node.user_properties += [
+        ("garl.slot", garl_slot.name),
+        ("garl.outcome", result["outcome"]),
+        ("garl.signature", verdict["signature"]),
+        ("garl.final_distance_m", result["final_distance_m"]),
+        ("garl.elapsed_s", result["elapsed_s"]),
+    ]
+    first = run.first_item(garl_slot) == request.node.nodeid
+    if result["outcome"] == "inconclusive":
+        pytest.skip(f"inconclusive: {result['undecided']}")
+    if result["outcome"] == "crashed" and not first:
+        pytest.skip(f"not decided: {verdict['story']}")
+    if verdict["primary"] == "abort" and not first:
+        pytest.skip("not decided: the landing was aborted")
+    return landing
+
+
+@pytest.fixture
+def scenario(request: pytest.FixtureRequest, garl_slot: Target) -> Scenario:
+    """Return the scenario that the slot holds."""
+    from pytest_garl.search.job import load_scenario
+
+    run = request.config.stash[RUN]
+    request.getfixturevalue("landing")
+    texts = run.ledger.scenarios(garl_slot.slot.generation, garl_slot.slot.index, garl_slot.map)
+    return load_scenario(texts[f"{garl_slot.system.__module__}:{garl_slot.system.__qualname__}"])

@@ -1,0 +1,180 @@
+"""Every command-line option and ini key, validated once into one frozen object."""
+
+from __future__ import annotations
+
+import os
+import re
+import secrets
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Literal, cast
+
+import pytest
+
+if TYPE_CHECKING:
+    from pytest_garl.scenarios.genes import WeatherRange
+
+METHODS = ("random",)
+POLICIES = ("waypoint", "random_walk", "stationary")
+SLOT_ID = re.compile(r"(?P<map>.+)-g(?P<generation>\d{2,})-s(?P<slot>\d{2,})")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Option:
+    """One option: its name without ``garl-``, default, and help."""
+
+    name: str
+    default: str
+    help: str
+
+
+OPTIONS = (
+    Option(
+        name="budget",
+        default="",
+        help="flights per landing system and map; without it only committed cases run",
+    ),
+    Option(
+        name="seed", default="0", help="seed of the search, or 'random' (printed in the header)"
+    ),
+    Option(name="method", default="random", help=f"search method: {', '.join(METHODS)}"),
+    Option(name="map", default="", help="fly only on these maps (comma separated)"),
+    Option(
+        name="workers",
+        default="",
+        help="child processes that fly; default one per core; "
+        "0 flies in the pytest process, for a debugger",
+    ),
+    Option(
+        name="weather",
+        default="confined",
+        help="'confined' keeps weather genes in [0, 0.15], 'full' lets them reach 1",
+    ),
+    Option(
+        name="timeout",
+        default="10",
+        help="wall-clock limit in seconds of one call of the landing system",
+    ),
+    Option(
+        name="repeat",
+        default="",
+        help="fly one scenario again: a slot of the last run such as "
+        "court-g03-s17, or a scenario file",
+    ),
+    Option(
+        name="duplicates",
+        default="xfail",
+        help="'xfail' reports later violations with a known "
+        "signature as xfailed, 'fail' as failures",
+    ),
+    Option(name="npcs", default="waypoint", help=f"who moves the objects: {', '.join(POLICIES)}"),
+)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Options:
+    """What the user wants, checked."""
+
+    budget: int
+    seed: int
+    method: str
+    maps: tuple[str, ...]
+    workers: int
+    weather: WeatherRange
+    timeout_s: float
+    repeat: str
+    duplicates: Literal["xfail", "fail"]
+    npcs: str
+    folder: Path
+    root: Path
+
+    @property
+    def active(self) -> bool:
+        """Whether anything will be flown."""
+        return self.budget > 0 or bool(self.repeat)
+
+    @property
+    def map_folders(self) -> tuple[Path, ...]:
+        """Where a user's own maps lie."""
+        return (self.root / "scenarios" / "maps",)
+
+    @property
+    def ledger(self) -> Path:
+        """The ledger of this run; repeating writes one of its own and keeps the search's."""
+        return self.folder / ("repeat.sqlite" if self.repeat else "ledger.sqlite")
+
+
+def add_options(parser: pytest.Parser) -> None:
+    """Register all options and ini keys."""
+    group = parser.getgroup("garl", "search for violations of landing systems (pytest-garl)")
+    for option in OPTIONS:
+        group.addoption(f"--garl-{option.name}", default=None, metavar="X", help=option.help)
+        parser.addini(f"garl_{option.name}", help=option.help, default=option.default)
+    parser.addini("garl_dir", help="folder of ledgers and flights", default=".garl")
+
+
+def read_options(config: pytest.Config) -> Options:
+    """Return the options; raise UsageError that says what was found and what is expected."""
+    text = {option.name: _value(config, option) for option in OPTIONS}
+    return Options(
+        budget=_integer("budget", text["budget"], 1) if text["budget"] else 0,
+        seed=_seed(config, text["seed"]),
+        method=_among("method", text["method"], METHODS),
+        maps=tuple(part.strip() for part in text["map"].split(",") if part.strip()),
+        workers=_integer("workers", text["workers"], 0) if text["workers"] else os.cpu_count() or 1,
+        weather=cast("WeatherRange", _among("weather", text["weather"], ("confined", "full"))),
+        timeout_s=_seconds(text["timeout"]),
+        repeat=_repeat(text["repeat"]),
+        duplicates=cast(
+            Literal["xfail", "fail"], _among("duplicates", text["duplicates"], ("xfail", "fail"))
+        ),
+        npcs=_among("npcs", text["npcs"], POLICIES),
+        folder=config.rootpath / str(config.getini("garl_dir")),
+        root=config.rootpath,
+    )
+
+
+def _value(config: pytest.Config, option: Option) -> str:
+    given = config.getoption(f"--garl-{option.name}")
+    return str(config.getini(f"garl_{option.name}") if given is None else given)
+
+
+def _wrong(name: str, found: str, expected: str) -> pytest.UsageError:
+    return pytest.UsageError(f"--garl-{name}: found {found!r}, expected {expected}")
+
+
+def _integer(name: str, text: str, low: int) -> int:
+    if not re.fullmatch(r"\d+", text) or int(text) < low:
+        raise _wrong(name, text, f"a whole number of at least {low}")
+    return int(text)
+
+
+def _seconds(text: str) -> float:
+    try:
+        value = float(text)
+    except ValueError:
+        value = -1.0
+    if not 0 < value < 1e6:
+        raise _wrong("timeout", text, "a positive number of seconds")
+    return value
+
+
+def _among(name: str, text: str, known: tuple[str, ...]) -> str:
+    if text not in known:
+        raise _wrong(name, text, f"one of {', '.join(known)}")
+    return text
+
+
+def _seed(config: pytest.Config, text: str) -> int:
+    given: dict[str, Any] = getattr(config, "workerinput", {})
+    if "garl_seed" in given:
+        return int(given["garl_seed"])
+    if text == "random":
+        return secrets.randbelow(2**32)
+    return _integer("seed", text, 0)
+
+
+def _repeat(text: str) -> str:
+    if text and not SLOT_ID.fullmatch(text) and not Path(text).is_file():
+        raise _wrong("repeat", text, "a slot such as court-g03-s17, or an existing scenario file")
+    return text

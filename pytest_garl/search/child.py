@@ -1,0 +1,82 @@
+"""A flying child process: claim, note in flight, fly, record, until the parent is gone."""
+
+from __future__ import annotations
+
+import ctypes
+import faulthandler
+import os
+import signal
+import sys
+import time
+from pathlib import Path
+from typing import TextIO
+
+from pytest_garl.search.ledger import Ledger
+from pytest_garl.search.slots import Slot
+
+THREADS = dict.fromkeys(
+    ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "OPENCV_FOR_THREADS_NUM"), "1"
+)
+IDLE_S = 0.02
+ALONE_FACTOR = 3.0
+_PR_SET_PDEATHSIG = 1
+
+
+class Watchdog:
+    """Ends the process when a call of the landing system takes too long.
+
+    faulthandler's timer is a C thread: it works while the system holds the interpreter.
+    """
+
+    def __init__(self, file: TextIO) -> None:
+        self._file = file
+        self.limit_s = 10.0
+
+    def step_begins(self) -> None:
+        """Arm the timer."""
+        faulthandler.dump_traceback_later(self.limit_s, exit=True, file=self._file)
+
+    def step_ends(self) -> None:
+        """Disarm it."""
+        faulthandler.cancel_dump_traceback_later()
+
+
+def dump_file(folder: Path, pid: int) -> Path:
+    """Where a child leaves its last words."""
+    return folder / f"child-{pid}.txt"
+
+
+def main(path: str) -> None:
+    """Fly until the parent process is gone."""
+    parent = os.getppid()
+    ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGTERM)
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    import cv2
+
+    from pytest_garl.search.job import broken_result, fly_job, load_scenario, loads
+
+    cv2.setNumThreads(1)
+    assert all(os.environ.get(name) == value for name, value in THREADS.items())
+    ledger = Ledger(Path(path))
+    with dump_file(Path(path).parent, os.getpid()).open("w") as words:
+        watchdog = Watchdog(words)
+        while os.getppid() == parent:
+            claim = ledger.claim()
+            if claim is None:
+                time.sleep(IDLE_S)
+                continue
+            job = loads(claim.job)
+            watchdog.limit_s = job.timeout_s * (ALONE_FACTOR if claim.alone else 1.0)
+            name = Slot(generation=claim.generation, index=claim.slot).id(job.map)
+            slot_id = f"{claim.search[:8]}-{name}"
+            result, sha256, wall_s = fly_job(job, load_scenario(claim.scenario), slot_id, watchdog)
+            if claim.alone:
+                # It hung once and not again: the machine's doing as likely as the system's.
+                text = f"one call took longer than {job.timeout_s:g} s once, but not again"
+                distance = float(result["final_distance_m"])
+                result = broken_result("hung", "Timeout", text, "", distance, inconclusive=True)
+            ledger.record(claim, result, sha256, wall_s)
+
+
+if __name__ == "__main__":
+    main(sys.argv[1])

@@ -1,0 +1,129 @@
+"""What a child must know to fly a slot: system, map, policy, limits, simulator."""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from pytest_garl.scenarios.maps import load_map
+from pytest_garl.scenarios.scenario import Scenario
+from pytest_garl.search.reference import Reference
+from pytest_garl.simulation.policy import PolicySpec
+from pytest_garl.verdicts.verdict import Limits
+
+PAPER_LIMIT_S = 120.0
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Job:
+    """Everything but the scenario, as it stands in the ledger."""
+
+    system: Reference
+    simulator: Reference
+    map: str
+    map_sha256: str
+    map_folders: tuple[str, ...]
+    npcs: PolicySpec
+    limits: Limits
+    timeout_s: float
+    path: tuple[str, ...]
+    flights: str
+
+    def dumps(self) -> str:
+        """Return it as JSON."""
+        return json.dumps(dataclasses.asdict(self), sort_keys=True)
+
+
+def loads(text: str) -> Job:
+    """Return the job in ``text``."""
+    values = json.loads(text)
+    npcs = values.pop("npcs")
+    arguments = tuple((key, value) for key, value in npcs["arguments"])
+    return Job(
+        system=Reference(**values.pop("system")),
+        simulator=Reference(**values.pop("simulator")),
+        npcs=PolicySpec(name=npcs["name"], factory=npcs["factory"], arguments=arguments),
+        limits=Limits(**values.pop("limits")),
+        map_folders=tuple(values.pop("map_folders")),
+        path=tuple(values.pop("path")),
+        **values,
+    )
+
+
+def dump_scenario(scenario: Scenario) -> str:
+    """Return a scenario as one line of JSON."""
+    return json.dumps({"map": scenario.map, "seed": scenario.seed, "genes": scenario.genes})
+
+
+def load_scenario(text: str) -> Scenario:
+    """Return the scenario in a line of JSON."""
+    values = json.loads(text)
+    genes = tuple((key, float(value)) for key, value in values["genes"])
+    return Scenario(map=values["map"], seed=values["seed"], genes=genes)
+
+
+def fly_job(
+    job: Job, scenario: Scenario, slot_id: str, guard: Any
+) -> tuple[dict[str, Any], str, float]:
+    """Fly, judge and save; return the result for the ledger, the flight's hash, its cost."""
+    from pytest_garl.simulation.record import save
+    from pytest_garl.verdicts.judge import judge, undecided
+    from pytest_garl.verdicts.serialise import to_dict
+
+    for entry in job.path:
+        if entry not in sys.path:
+            sys.path.append(entry)
+    map = load_map(job.map, tuple(Path(folder) for folder in job.map_folders))
+    flight = job.simulator.load()(
+        scenario,
+        job.system.load(),
+        job.npcs,
+        map=map,
+        time_limit_s=max(PAPER_LIMIT_S, job.limits.time_s),
+        guard=guard,
+    )
+    file = Path(job.flights) / f"{slot_id}.npz"
+    save(flight, file)
+    result = {
+        "outcome": flight.outcome,
+        "final_distance_m": flight.final_distance_m,
+        "elapsed_s": flight.elapsed_s,
+        "collisions": [contact.body for contact in flight.contacts]
+        if flight.outcome == "collision"
+        else [],
+        "undecided": undecided(flight),
+        "verdict": to_dict(judge(flight, job.limits)),
+        "crash": dataclasses.asdict(flight.crash) if flight.crash else None,
+    }
+    return result, flight.sha256, flight.wall_s
+
+
+def broken_result(
+    kind: str, error: str, message: str, text: str, diagonal_m: float, *, inconclusive: bool = False
+) -> dict[str, Any]:
+    """Return the result of a flight whose process did not live to record it."""
+    story = f"The landing system {kind}: {message}."
+    signature = "" if inconclusive else f"V:{kind}:{error}"
+    verdict: dict[str, Any] = {
+        "outcome": "crashed",
+        "primary": None if inconclusive else "crash",
+        "violation_type": None if inconclusive else "V",
+        "signature": signature,
+        "paper_violation": False,
+        "margins": [],
+        "story": story,
+    }
+    crash = {"kind": kind, "error": error, "message": message, "where": "", "traceback": text}
+    return {
+        "outcome": "inconclusive" if inconclusive else "crashed",
+        "final_distance_m": diagonal_m,
+        "elapsed_s": PAPER_LIMIT_S,
+        "collisions": [],
+        "undecided": message,
+        "verdict": verdict,
+        "crash": crash,
+    }

@@ -1,0 +1,118 @@
+"""The pool: starts flying children, looks after them, and waits for slots."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+from pytest_garl.errors import LedgerError
+from pytest_garl.scenarios.maps import load_map
+from pytest_garl.search.child import THREADS, dump_file
+from pytest_garl.search.job import broken_result, fly_job, load_scenario, loads
+from pytest_garl.search.ledger import Ledger
+from pytest_garl.search.slots import Slot
+
+POLL_S = 0.02
+MOST_LOSSES = 3
+"""Children that may die without a flight before the pool gives up."""
+
+
+class Pool:
+    """The children of this process; several pools share a ledger and its seats."""
+
+    def __init__(self, ledger: Ledger, workers: int) -> None:
+        self._ledger, self._workers = ledger, workers
+        self._children: dict[int, subprocess.Popen[str]] = {}
+        self._losses = 0
+
+    def wait(self, search: str, slot: Slot, tick: Callable[[], None]) -> None:
+        """Return when a slot is flown; ``tick`` is called while waiting."""
+        while self._ledger.result(search, slot.generation, slot.index) is None:
+            if self._workers == 0:
+                self._fly_here()
+            else:
+                self._look_after()
+                time.sleep(POLL_S)
+            tick()
+
+    def close(self) -> None:
+        """End this process's children and give back what they had in flight."""
+        for pid, child in self._children.items():
+            child.terminate()
+            child.communicate()
+            self._ledger.release(pid, "waiting")
+            self._ledger.leave_seat(pid)
+            dump_file(self._ledger.path.parent, pid).unlink(missing_ok=True)
+        self._children.clear()
+
+    def _fly_here(self) -> None:
+        claim = self._ledger.claim()
+        if claim is None:
+            self._ledger.release_dead()
+            time.sleep(POLL_S)
+            return
+        job = loads(claim.job)
+        name = Slot(generation=claim.generation, index=claim.slot).id(job.map)
+        slot_id = f"{claim.search[:8]}-{name}"
+        result, sha256, wall_s = fly_job(job, load_scenario(claim.scenario), slot_id, None)
+        self._ledger.record(claim, result, sha256, wall_s)
+
+    def _look_after(self) -> None:
+        for pid, child in list(self._children.items()):
+            if child.poll() is not None:
+                del self._children[pid]
+                self._bury(pid, child)
+        self._ledger.release_dead()
+        while len(self._children) < self._workers and self._ledger.take_seat(
+            self._workers, self._spawn
+        ):
+            pass
+
+    def _spawn(self) -> int:
+        environment = {**os.environ, **THREADS}
+        child = subprocess.Popen(
+            [sys.executable, "-m", "pytest_garl.search.child", str(self._ledger.path)],
+            env=environment,
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.DEVNULL,
+            stderr=subprocess.PIPE,
+            text=True,
+            start_new_session=True,
+        )
+        self._children[child.pid] = child
+        return child.pid
+
+    def _bury(self, pid: int, child: subprocess.Popen[str]) -> None:
+        """Decide what a child's death means for the slot that it had in flight."""
+        self._ledger.leave_seat(pid)
+        file = dump_file(self._ledger.path.parent, pid)
+        words = file.read_text() if file.exists() else ""
+        file.unlink(missing_ok=True)
+        complaint = child.communicate()[1]
+        found = self._ledger.claim_of(pid)
+        if found is None:
+            self._losses += 1
+            if self._losses > MOST_LOSSES:
+                raise LedgerError(f"flying children die before they fly:\n{complaint.strip()}")
+            return
+        claim, attempts = found
+        job = loads(claim.job)
+        if "Traceback (most recent call last)" in complaint:
+            raise LedgerError(f"the simulator failed in a child process:\n{complaint.strip()}")
+        diagonal = load_map(job.map, tuple(Path(f) for f in job.map_folders)).diagonal_m
+        if words.startswith("Timeout"):
+            if attempts == 1:
+                self._ledger.release(pid, "hung")
+                return
+            text = f"one call took longer than {3 * job.timeout_s:g} s of wall time, twice"
+            result = broken_result("hung", "Timeout", text, words, diagonal)
+        else:
+            status = child.returncode
+            how = f"signal {-status}" if status < 0 else f"exit status {status}"
+            text = f"its process ended with {how}"
+            result = broken_result("died", how.replace(" ", "-"), text, complaint, diagonal)
+        self._ledger.record(claim, result, "", 0.0)

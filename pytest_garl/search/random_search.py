@@ -1,0 +1,29 @@
+"""Random search: every scenario drawn uniformly and repaired."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Sequence
+
+import numpy as np
+
+from pytest_garl.scenarios.chromosome import decode
+from pytest_garl.scenarios.genes import Genome
+from pytest_garl.scenarios.maps import Map
+from pytest_garl.scenarios.scenario import Scenario
+from pytest_garl.scenarios.validity import repair
+
+
+def propose(map: Map, genome: Genome, seed: int, generation: int, size: int) -> Sequence[Scenario]:
+    """Return a generation; it depends on the seed, the map and the generation alone.
+
+    All landing systems meet the same scenarios, so that they can be compared.
+    """
+    place = int.from_bytes(hashlib.sha256(f"random {map.name}".encode()).digest()[:4], "big")
+    rng = np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(place, generation)))
+    scenarios = []
+    for _ in range(size):
+        chromosome = genome.random(rng)
+        own_seed = int(rng.integers(2**32))
+        scenarios.append(repair(decode(chromosome, genome, map=map.name, seed=own_seed), map))
+    return scenarios

@@ -1,0 +1,70 @@
+"""Classes and functions by name, so that a child process can load them."""
+
+from __future__ import annotations
+
+import importlib
+import importlib.util
+import inspect
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from pytest_garl.errors import LandingSystemError
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Reference:
+    """Where a class or function is defined."""
+
+    module: str
+    file: str
+    qualname: str
+
+    def load(self) -> Any:
+        """Return the object, imported by name, or from its file where the name fails."""
+        try:
+            module = importlib.import_module(self.module)
+            if self.file and Path(module.__file__ or "").resolve() != Path(self.file):
+                raise ImportError(f"{self.module} is another file: {module.__file__}")
+        except ImportError:
+            spec = importlib.util.spec_from_file_location(self.module, self.file)
+            if spec is None or spec.loader is None:
+                raise
+            module = importlib.util.module_from_spec(spec)
+            sys.modules[self.module] = module
+            spec.loader.exec_module(module)
+        found: Any = module
+        for name in self.qualname.split("."):
+            found = getattr(found, name)
+        return found
+
+
+def reference_to(thing: Any) -> Reference:
+    """Return where ``thing`` is defined; raise LandingSystemError if no child can find it."""
+    qualname = getattr(thing, "__qualname__", "")
+    if not qualname or "<locals>" in qualname or "<lambda>" in qualname:
+        raise LandingSystemError(
+            f"{thing!r} is defined inside a function; child processes cannot import it. "
+            "Move it to the top level of a module."
+        )
+    try:
+        file = str(Path(inspect.getfile(thing)).resolve())
+    except (TypeError, OSError):
+        file = ""
+    return Reference(module=thing.__module__, file=file, qualname=qualname)
+
+
+def check_system(system: Any) -> None:
+    """Raise LandingSystemError for what can be no landing system."""
+    if not inspect.isclass(system):
+        raise LandingSystemError(
+            f"system={system!r}: expected a class, found {type(system).__name__}"
+        )
+    for method in ("reset", "step"):
+        if not callable(getattr(system, method, None)):
+            raise LandingSystemError(
+                f"system={system.__name__} has no method {method!r}; a landing system has "
+                "reset(mission) and step(observation)"
+            )
+    reference_to(system)

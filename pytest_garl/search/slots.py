@@ -1,0 +1,32 @@
+"""Slots: the names of a search's flights, known before any of them is bred."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+LARGEST_POPULATION = 20
+SMALLEST_POPULATION = 8
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, order=True)
+class Slot:
+    """One place in a search: ``court-g03-s17`` is slot 17 of generation 3 on the court."""
+
+    generation: int
+    index: int
+
+    def id(self, map: str) -> str:
+        """Return the slot's name in item ids."""
+        return f"{map}-g{self.generation:02d}-s{self.index:02d}"
+
+
+def population(budget: int) -> int:
+    """Return 20, or less for small budgets: a tenth of the budget, at least 8."""
+    wanted = min(LARGEST_POPULATION, max(SMALLEST_POPULATION, budget // 10))
+    return min(wanted, budget)
+
+
+def slots(budget: int) -> tuple[Slot, ...]:
+    """Return exactly ``budget`` slots; the last generation may be shorter."""
+    size = population(budget)
+    return tuple(Slot(generation=n // size, index=n % size) for n in range(budget))
