@@ -52,15 +52,6 @@ class Frame:
     segmentation: NDArray[np.int32]
 
 
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class _Solid:
-    name: str
-    segment: int
-    mesh: Mesh
-    lit: Array
-    """Face colours in the sun for a body that does not turn."""
-
-
 class Renderer:
     """Draws what the camera sees in one scenario; a frame is a pure function of its arguments.
 
@@ -86,6 +77,7 @@ class Renderer:
         self._objects = [
             (name, mesh_of(OBJECT_TYPES[kind].parts)) for name, kind in map.object_names
         ]
+        self._outlines: dict[str, tuple[float, list[NDArray[np.float64]]]] = {}
         width, height = camera.width_px, camera.height_px
         (cx, cy), focal = camera.centre_px, camera.focal_px
         u, v = np.meshgrid(np.arange(width), np.arange(height))
@@ -240,13 +232,12 @@ class Renderer:
         if share <= 0.01 or sun[2] <= 0.02:
             return
         outlines = []
-        for (_, mesh), (at, yaw) in zip(self._objects, objects, strict=True):
-            middle = np.array([at]) - np.array([[sun[0], sun[1], 0.0]]) / sun[2] * at[2]
-            if np.hypot(*(middle[0, :2] - eye[:2])) > 3 * max(2.0, eye[2]) + mesh.radius_m:
+        for (name, mesh), (at, yaw) in zip(self._objects, objects, strict=True):
+            middle = np.array(at[:2]) - np.array(sun[:2]) / sun[2] * at[2]
+            if np.hypot(*(middle - eye[:2])) > 3 * max(2.0, eye[2]) + mesh.radius_m:
                 continue
-            for hull in placed_hulls(mesh, at, yaw):
-                outline = cv2.convexHull(shadow_of(hull, sun)).reshape(-1, 2)
-                pixels = self._project_ground(outline.astype(np.float64), eye, axes)
+            for outline in self._shadow_outlines(name, mesh, yaw):
+                pixels = self._project_ground(outline + middle, eye, axes)
                 if len(pixels) >= 3:
                     outlines.append(np.round(pixels * 2**_SHIFT).astype(np.int32))
         if outlines:
@@ -255,6 +246,16 @@ class Renderer:
                 cv2.fillConvexPoly(mask, outline, (255.0,), cv2.LINE_8, _SHIFT)
             if mask.any():
                 cv2.copyTo(cv2.convertScaleAbs(image, alpha=1 - share), mask, image)
+
+    def _shadow_outlines(self, name: str, mesh: Mesh, yaw_rad: float) -> list[NDArray[np.float64]]:
+        """Return the parts' shadows about the object's own; kept until it turns."""
+        kept = self._outlines.get(name)
+        if kept is None or kept[0] != yaw_rad:
+            hulls = placed_hulls(mesh, (0.0, 0.0, 0.0), yaw_rad)
+            shadows = (shadow_of(hull, self.conditions.sun) for hull in hulls)
+            outlines = [cv2.convexHull(s).reshape(-1, 2).astype(np.float64) for s in shadows]
+            self._outlines[name] = kept = (yaw_rad, outlines)
+        return kept[1]
 
     def _gloss(self, image: NDArray[np.uint8], axes: NDArray[np.float64]) -> None:
         """Add the sun's reflection on wet ground, where the mirrored ray meets the sun."""

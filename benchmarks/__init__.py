@@ -1,0 +1,1 @@
+"""Measurements of speed, as ratios where machines are noisy; run with python -m benchmarks."""
