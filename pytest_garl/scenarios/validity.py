@@ -171,8 +171,8 @@ def _start_problems(
             break
     if math.dist(at, map.uav_start_m[:2]) < UAV_CLEARANCE_M:
         yield f"{name} starts at the UAV"
-    if kind.altitude_m == 0 and math.dist(at, marker) < MARKER_HALF_DIAGONAL_M + kind.radius_m:
-        yield f"{name} starts on the marker"
+    if math.dist(at, marker) < MARKER_HALF_DIAGONAL_M + kind.radius_m:
+        yield f"{name} starts on or over the marker"
     for other, other_kind in map.object_names[:index]:
         near = kind.radius_m + OBJECT_TYPES[other_kind].radius_m
         if math.dist(at, object_start_m(scenario, map, other)) < near:

@@ -353,7 +353,7 @@ class _Loop:
         try:
             return call()
         except Exception as error:
-            raise _BrokenError(_crash_of(error, method)) from error
+            raise _BrokenError(crash_of(error, method)) from error
         finally:
             if self.guard:
                 self.guard.step_ends()
@@ -372,7 +372,8 @@ class _Loop:
             )
 
 
-def _crash_of(error: Exception, method: str) -> Crash:
+def crash_of(error: Exception, method: str) -> Crash:
+    """Return the record of what a landing system raised in one of its methods."""
     frames = traceback.extract_tb(error.__traceback__)
     theirs = [frame for frame in frames if Path(frame.filename).resolve() != Path(__file__)]
     where = f"{Path(theirs[-1].filename).stem}.{theirs[-1].name}" if theirs else method

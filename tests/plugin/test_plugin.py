@@ -1,0 +1,279 @@
+from __future__ import annotations
+
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from pytest_garl.search.ledger import Ledger
+from pytest_garl.search.slots import population, slots
+
+SYSTEMS = """
+import os, time, math
+from pytest_garl import Land, VelocitySetpoint
+
+class Good:
+    def reset(self, mission): pass
+    def step(self, observation): return Land()
+
+class Raises(Good):
+    def step(self, observation): raise ZeroDivisionError("no plan")
+
+class Exits(Good):
+    def step(self, observation): os._exit(3)
+
+class Sleeps(Good):
+    def step(self, observation): time.sleep(60)
+
+class NoStep:
+    def reset(self, mission): pass
+"""
+CONFTEST = """
+import tiny_simulator
+def pytest_garl_fly(config):
+    return tiny_simulator.fly
+"""
+TESTS = """
+import pytest
+from systems import *
+pytestmark = pytest.mark.garl(system={system}, maps={maps})
+
+def test_distance(landing):
+    assert landing.distance_to_landing_m <= 1.5
+
+def test_time(landing):
+    assert landing.time_to_landing_s <= 120
+
+def test_collisions(landing):
+    assert not landing.collisions
+"""
+
+
+def project(pytester: pytest.Pytester, system: str = "Good", maps: str = "['lawn']") -> None:
+    tiny = Path(__file__).with_name("tiny_simulator.py")
+    shutil.copy(tiny, pytester.path / "tiny_simulator.py")
+    pytester.makepyfile(systems=SYSTEMS)
+    pytester.makepyfile(test_it=TESTS.format(system=system, maps=maps))
+    pytester.makeconftest(CONFTEST)
+
+
+def run(pytester: pytest.Pytester, *args: str) -> pytest.RunResult:
+    return pytester.runpytest_subprocess("-p", "no:cacheprovider", *args)
+
+
+def result_hash(pytester: pytest.Pytester) -> str:
+    ledger = Ledger(pytester.path / ".garl" / "ledger.sqlite")
+    try:
+        return ledger.result_hash()
+    finally:
+        ledger.close()
+
+
+@pytest.mark.parametrize("budget", [1, 7, 8, 9, 40, 79, 80, 160, 200, 400, 401])
+def test_slots_are_exactly_the_budget(budget: int) -> None:
+    names = slots(budget)
+    assert len(set(names)) == budget
+    assert max(slot.index for slot in names) < population(budget) <= 20
+
+
+@pytest.mark.parametrize("parallel", [(), ("-n2",)])
+def test_one_event_fails_one_test_and_its_twins_are_xfailed(
+    pytester: pytest.Pytester, parallel: tuple[str, ...]
+) -> None:
+    project(pytester)
+    result = run(pytester, "--garl-budget=24", "--garl-workers=1", *parallel)
+    outcomes = result.parseoutcomes()
+    # Two mechanisms (a dog, and fog that misleads) fail once each.
+    assert outcomes["failed"] == 2
+    assert outcomes["xfailed"] >= 2
+    assert outcomes["passed"] + outcomes["skipped"] + outcomes["xfailed"] + 2 == 72
+    result.stdout.fnmatch_lines(
+        ["*garl: what happened*", "*Collided with dog-1*", "*Repeat: pytest*"]
+    )
+    result.stdout.fnmatch_lines(["*Good on lawn: 24 flown*"])
+
+
+def test_the_same_seed_gives_the_same_results_for_any_workers(pytester: pytest.Pytester) -> None:
+    project(pytester)
+    hashes = set()
+    for args in (("0",), ("1",), ("2",), ("2", "-n2"), ("2", "-n2", "--dist=worksteal")):
+        run(pytester, "--garl-budget=16", f"--garl-workers={args[0]}", *args[1:])
+        hashes.add(result_hash(pytester))
+    assert len(hashes) == 1
+    run(pytester, "--garl-budget=16", "--garl-workers=0", "--garl-seed=1")
+    assert result_hash(pytester) not in hashes
+
+
+def test_duplicates_can_be_shown_as_failures(pytester: pytest.Pytester) -> None:
+    project(pytester)
+    result = run(pytester, "--garl-budget=24", "--garl-workers=0", "--garl-duplicates=fail")
+    outcomes = result.parseoutcomes()
+    assert outcomes["failed"] > 2
+    assert "xfailed" not in outcomes
+
+
+def test_the_lowest_slot_fails_whatever_the_order(pytester: pytest.Pytester) -> None:
+    project(pytester)
+    straight = run(pytester, "--garl-budget=24", "--garl-workers=0", "-rf")
+    backwards = CONFTEST + "\ndef pytest_collection_modifyitems(items): items.reverse()\n"
+    pytester.makeconftest(backwards)
+    reverse = run(pytester, "--garl-budget=24", "--garl-workers=0", "-rf")
+
+    def failed(result: pytest.RunResult) -> set[str]:
+        return {line.split(" - ")[0] for line in result.outlines if line.startswith("FAILED")}
+
+    assert failed(straight) == failed(reverse)
+    assert len(failed(straight)) == 2
+
+
+@pytest.mark.parametrize("parallel", [(), ("-n2",)])
+@pytest.mark.parametrize(
+    ("system", "words"),
+    [
+        ("Raises", "*ZeroDivisionError: no plan*"),
+        ("Exits", "*its process ended with exit status 3*"),
+        ("Sleeps", "*one call took longer than*"),
+    ],
+)
+def test_a_broken_system_is_a_finding_and_the_run_goes_on(
+    pytester: pytest.Pytester, system: str, words: str, parallel: tuple[str, ...]
+) -> None:
+    project(pytester, system)
+    result = run(pytester, "--garl-budget=2", "--garl-workers=1", "--garl-timeout=0.3", *parallel)
+    result.assert_outcomes(failed=1, skipped=4, xfailed=1)
+    result.stdout.fnmatch_lines([words])
+    result.stdout.fnmatch_lines(["*2 flown*crashed 100.0 %*"])
+
+
+def test_collecting_flies_nothing(pytester: pytest.Pytester) -> None:
+    project(pytester)
+    result = run(pytester, "--garl-budget=40", "--collect-only", "-q")
+    result.stdout.fnmatch_lines(["test_it.py::test_distance[[]lawn-g00-s00[]]"])
+    assert not (pytester.path / ".garl").exists()
+
+
+def test_a_selected_slot_is_flown_alone(pytester: pytest.Pytester) -> None:
+    project(pytester)
+    result = run(pytester, "--garl-budget=40", "--garl-workers=0", "-k", "lawn-g02-s03")
+    result.stdout.fnmatch_lines(["*1 flown*"])
+
+
+def test_without_a_budget_the_tests_say_why_they_skip(pytester: pytest.Pytester) -> None:
+    project(pytester)
+    result = run(pytester, "-rs")
+    result.assert_outcomes(skipped=3)
+    result.stdout.fnmatch_lines(["*no --garl-budget given*"])
+
+
+def test_a_slot_is_repeated_from_the_ledger(pytester: pytest.Pytester) -> None:
+    project(pytester)
+    run(pytester, "--garl-budget=16", "--garl-workers=0")
+    before = result_hash(pytester)
+    result = run(pytester, "--garl-workers=0", "--garl-repeat=lawn-g01-s05")
+    result.stdout.fnmatch_lines(["*1 flown*"])
+    assert result_hash(pytester) == before
+
+
+def test_stops_at_the_first_failure_with_x(pytester: pytest.Pytester) -> None:
+    project(pytester)
+    result = run(pytester, "--garl-budget=24", "--garl-workers=1", "-x")
+    assert result.parseoutcomes()["failed"] == 1
+
+
+def test_junit_carries_the_signature(pytester: pytest.Pytester) -> None:
+    project(pytester)
+    run(pytester, "--garl-budget=24", "--garl-workers=0", "--junitxml=out.xml")
+    text = (pytester.path / "out.xml").read_text()
+    assert 'name="garl.signature" value="IV:dog:' in text
+
+
+def test_importlib_mode_reaches_the_children(pytester: pytest.Pytester) -> None:
+    project(pytester)
+    inline = SYSTEMS + TESTS.format(system="Good", maps="['lawn']").replace(
+        "from systems import *", ""
+    )
+    pytester.makepyfile(test_it=inline)
+    (pytester.path / "systems.py").unlink()
+    result = run(
+        pytester,
+        "--garl-budget=8",
+        "--garl-workers=1",
+        "--import-mode=importlib",
+        "-o",
+        "pythonpath=.",
+    )
+    result.stdout.fnmatch_lines(["*8 flown*"])
+
+
+@pytest.mark.parametrize(
+    ("args", "words"),
+    [
+        (("--garl-budget=0",), "*--garl-budget: found '0', expected a whole number*"),
+        (("--garl-budget=many",), "*--garl-budget: found 'many'*"),
+        (
+            ("--garl-budget=8", "--garl-method=magic"),
+            "*--garl-method: found 'magic', expected one*",
+        ),
+        (("--garl-budget=8", "--garl-repeat=nowhere"), "*--garl-repeat: found 'nowhere'*"),
+        (("--garl-budget=8", "-o", "garl_dir=/proc/garl"), "*cannot be written*garl_dir*"),
+    ],
+)
+def test_nonsense_on_the_command_line_is_one_clear_error(
+    pytester: pytest.Pytester, args: tuple[str, ...], words: str
+) -> None:
+    project(pytester)
+    result = run(pytester, *args)
+    assert result.ret == pytest.ExitCode.USAGE_ERROR
+    result.stderr.fnmatch_lines([words])
+
+
+@pytest.mark.parametrize(
+    ("system", "maps", "words"),
+    [
+        ("Good", "['moon']", "*unknown map 'moon'; expected one of court, lawn*"),
+        ("NoStep", "['lawn']", "*NoStep has no method 'step'*"),
+        ("Good()", "['lawn']", "*expected a class*"),
+        ("(lambda: type('Local', (Good,), {}))()", "['lawn'], limits=dict(mass=1)", "*mass*"),
+    ],
+)
+def test_a_bad_marker_is_one_clear_error_and_other_tests_run(
+    pytester: pytest.Pytester, system: str, maps: str, words: str
+) -> None:
+    project(pytester, system, maps)
+    pytester.makepyfile(test_other="def test_fine(): pass")
+    result = run(pytester, "--garl-budget=8", "--continue-on-collection-errors")
+    result.stdout.fnmatch_lines([words])
+    result.assert_outcomes(passed=1, errors=1)
+
+
+def test_a_class_inside_a_function_is_refused(pytester: pytest.Pytester) -> None:
+    project(pytester)
+    pytester.makepyfile(
+        test_it=TESTS.format(system="make()", maps="['lawn']").replace(
+            "pytestmark", "def make():\n    class Inner(Good): pass\n    return Inner\npytestmark"
+        )
+    )
+    result = run(pytester, "--garl-budget=8")
+    result.stdout.fnmatch_lines(["*is defined inside a function*"])
+
+
+def test_a_run_without_landing_tests_imports_nothing_heavy(pytester: pytest.Pytester) -> None:
+    pytester.makepyfile(test_plain="def test_plain(): pass")
+    code = (
+        "import sys, pytest\n"
+        "pytest.main(['-q', '-p', 'no:hypothesispytest', '-p', 'no:cacheprovider'])\n"
+        "heavy = {'numpy', 'cv2', 'pybullet', 'pymoo', 'torch', 'hypothesis', 'scipy'}\n"
+        "print('HEAVY', sorted(heavy & set(sys.modules)))\n"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, check=True, cwd=pytester.path
+    )
+    assert "HEAVY []" in done.stdout
+
+
+def test_the_plugin_can_be_left_out(pytester: pytest.Pytester) -> None:
+    pytester.makepyfile(test_plain="def test_plain(): pass")
+    result = run(pytester, "-p", "no:garl")
+    result.assert_outcomes(passed=1)
