@@ -327,10 +327,12 @@ class Renderer:
             FAR_M,
             self._settings,
         )
-        rows, columns = np.nonzero(drawn[..., 0])
-        face = origin[drawn[rows, columns, 0].astype(np.int64) - 1]
-        segmentation[rows, columns] = segments[face]
-        image[rows, columns] = np.clip(colours[face], 0, 255).astype(np.uint8)
+        code = np.asarray(cv2.extractChannel(drawn, 0)).ravel()
+        covered = np.flatnonzero(code)
+        face = origin[code[covered].astype(np.int64) - 1]
+        segmentation.ravel()[covered] = segments[face]
+        painted = np.clip(colours, 0, 255).astype(np.uint8)
+        image.reshape(-1, 3)[covered] = painted[face]
 
     def _in_view(
         self,
