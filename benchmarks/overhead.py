@@ -1,0 +1,32 @@
+"""What the plugin costs a test run that has no landing tests."""
+
+from __future__ import annotations
+
+import statistics
+import subprocess
+import sys
+import tempfile
+import time
+from pathlib import Path
+
+
+def main(repeats: int = 15) -> None:
+    """Print the median time of a run with and without the plugin, taken in turns."""
+    with tempfile.TemporaryDirectory() as folder:
+        (Path(folder) / "test_plain.py").write_text("def test_plain(): pass\n")
+        times: dict[str, list[float]] = {"no:garl": [], "garl": []}
+        for _ in range(repeats):
+            for name, taken in times.items():
+                switch = ["-p", name] if name.startswith("no:") else []
+                command = [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", *switch]
+                began = time.perf_counter()
+                subprocess.run(command, cwd=folder, check=True, capture_output=True)
+                taken.append(time.perf_counter() - began)
+        without, with_it = (statistics.median(times[name]) for name in times)
+        print(
+            f"plugin overhead: {1000 * (with_it - without):.1f} ms ({with_it / without:.3f} times)"
+        )
+
+
+if __name__ == "__main__":
+    main()
