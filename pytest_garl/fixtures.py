@@ -8,9 +8,10 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
-from pytest_garl.run import RUN, Run, Target
+from pytest_garl.options import RUN
 
 if TYPE_CHECKING:
+    from pytest_garl.run import Run, Target
     from pytest_garl.scenarios.scenario import Scenario
     from pytest_garl.simulation.flight import Flight
     from pytest_garl.simulation.policy import PolicySpec
@@ -82,9 +83,9 @@ class Landing:
 @pytest.fixture
 def garl_slot(request: pytest.FixtureRequest) -> Target:
     """Return the slot that the item tests."""
-    target = request.param
-    if not isinstance(target, Target):
-        pytest.skip(str(target))
+    target: Target | str = request.param
+    if isinstance(target, str):
+        pytest.skip(target)
     return target
 
 

@@ -12,8 +12,11 @@ from typing import TYPE_CHECKING, Any, Literal, cast
 import pytest
 
 if TYPE_CHECKING:
+    from pytest_garl.run import Target
     from pytest_garl.scenarios.genes import WeatherRange
 
+RUN = pytest.StashKey["Run"]()
+"""Where a session keeps its run; none if nothing is to be flown."""
 METHODS = ("random",)
 POLICIES = ("waypoint", "random_walk", "stationary")
 SLOT_ID = re.compile(r"(?P<map>.+)-g(?P<generation>\d{2,})-s(?P<slot>\d{2,})")
@@ -132,6 +135,14 @@ def read_options(config: pytest.Config) -> Options:
         folder=config.rootpath / str(config.getini("garl_dir")),
         root=config.rootpath,
     )
+
+
+def target_of(item: pytest.Item) -> Target | None:
+    """Return what an item tests, or None for an item that is not ours."""
+    callspec = getattr(item, "callspec", None)
+    target = callspec.params.get("garl_slot") if callspec else None
+    # Where there is nothing to fly the parameter is the reason, a string.
+    return None if isinstance(target, str) else target
 
 
 def _value(config: pytest.Config, option: Option) -> str:

@@ -11,8 +11,7 @@ import pytest
 from pytest_garl import hookspecs
 from pytest_garl.errors import GarlError
 from pytest_garl.fixtures import garl_slot, landing, npcs, scenario
-from pytest_garl.options import add_options, read_options
-from pytest_garl.run import RUN, Run, target_of, targets_for
+from pytest_garl.options import RUN, add_options, read_options, target_of
 
 __all__ = ["garl_slot", "landing", "npcs", "scenario"]
 
@@ -55,6 +54,8 @@ def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
             f"{metafunc.definition.nodeid} uses a landing fixture without "
             "@pytest.mark.garl(system=..., maps=[...])"
         )
+    from pytest_garl.run import targets_for
+
     options = read_options(metafunc.config)
     try:
         targets: list[Any] = list(targets_for(marker, options))
@@ -95,7 +96,7 @@ def pytest_runtest_makereport(
     """Explain a violation, and report a known one as xfailed."""
     report = yield
     target = target_of(item)
-    run: Run | None = item.config.stash.get(RUN, None)
+    run = item.config.stash.get(RUN, None)
     if target is not None and run is not None and report.when == "call" and report.failed:
         from pytest_garl.reports.explain import explain
 

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 import pytest
 
 from pytest_garl.errors import GarlError
-from pytest_garl.options import SLOT_ID, Options
+from pytest_garl.options import SLOT_ID, Options, target_of
 from pytest_garl.search.ledger import Ledger
 from pytest_garl.search.pool import Pool
 from pytest_garl.search.reference import Reference, check_system, reference_to
@@ -25,7 +25,6 @@ if TYPE_CHECKING:
     from pytest_garl.simulation.policy import PolicySpec
     from pytest_garl.verdicts.verdict import Limits
 
-RUN = pytest.StashKey["Run"]()
 FLIGHT_S = 3.0
 """Wall time of one flight on one core where no earlier run tells: OpenCV-MLS, measured by
 ``python -m benchmarks``."""
@@ -152,13 +151,6 @@ class Run:
             for generation in sorted({slot.generation for slot in wanted})
         }
         return {slot: bred[slot.generation][slot.index] for slot in sorted(wanted)}
-
-
-def target_of(item: pytest.Item) -> Target | None:
-    """Return what an item tests, or None for an item that is not ours."""
-    callspec = getattr(item, "callspec", None)
-    target = callspec.params.get("garl_slot") if callspec else None
-    return target if isinstance(target, Target) else None
 
 
 def targets_for(marker: pytest.Mark, options: Options) -> list[Target]:
