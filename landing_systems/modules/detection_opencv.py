@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import cv2
 import numpy as np
 from numpy.typing import NDArray
@@ -10,6 +12,8 @@ from pytest_garl import Camera, Detection, Mission, Observation
 
 _CAMERA_FROM_BODY = np.array([[0.0, -1.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 0.0, -1.0]])
 """Image right is the body's -y, image down its -x, the optical axis its -z."""
+CELLS = 7
+MEDIAN_SHARE = 0.7
 MAX_REPROJECTION_PX = 2.0
 HEIGHT_TOLERANCE = 0.35
 """A marker on the ground lies as far below as the altimeter says, give or take a third; what
@@ -29,9 +33,14 @@ class OpenCvDetector:
         parameters.adaptiveThreshWinSizeMin = 5
         parameters.adaptiveThreshWinSizeMax = 25
         parameters.adaptiveThreshWinSizeStep = 10
+        # Leaves and snow on the border bend its outline and flip its bits.
+        parameters.polygonalApproxAccuracyRate = 0.06
+        parameters.maxErroneousBitsInBorderRate = 0.5
         parameters.cornerRefinementMethod = cv2.aruco.CORNER_REFINE_SUBPIX
         self._detector = cv2.aruco.ArucoDetector(dictionary, parameters)
         self._camera: Camera = mission.camera
+        self._wanted = mission.marker_id
+        self._side_m = mission.marker_side_m
         half = mission.marker_side_m / 2
         self._corners = np.array(
             [[-half, half, 0], [half, half, 0], [half, -half, 0], [-half, -half, 0]]
@@ -39,7 +48,19 @@ class OpenCvDetector:
 
     def detect(self, observation: Observation) -> tuple[Detection, ...]:
         """Return all markers in the frame whose pose is plausible."""
-        grey = cv2.cvtColor(observation.image, cv2.COLOR_RGB2GRAY)
+        grey = np.asarray(cv2.cvtColor(observation.image, cv2.COLOR_RGB2GRAY))
+        found = self._find(grey, observation)
+        if not any(item.marker_id == self._wanted for item in found):
+            found += self._find(cv2.medianBlur(grey, self._kernel(observation)), observation)
+        return tuple(found)
+
+    def _kernel(self, observation: Observation) -> int:
+        """Size of a median that removes leaves and flakes but keeps the marker's cells."""
+        height = max(0.5, float(observation.position_m[2]))
+        cell_px = self._camera.focal_px * self._side_m / height / CELLS
+        return min(11, max(3, 2 * int(MEDIAN_SHARE * cell_px / 2) + 1))
+
+    def _find(self, grey: NDArray[Any], observation: Observation) -> list[Detection]:
         corners, ids, _ = self._detector.detectMarkers(grey)
         found = []
         # OpenCV gives None, not an empty array, where it finds nothing.
@@ -55,7 +76,7 @@ class OpenCvDetector:
                         corners_px=tuple((float(u), float(v)) for u, v in quad.reshape(4, 2)),
                     )
                 )
-        return tuple(found)
+        return found
 
     def _place(
         self, quad: NDArray[np.float32], observation: Observation
