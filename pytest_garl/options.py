@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from pytest_garl.run import Target
     from pytest_garl.scenarios.genes import WeatherRange
 
-RUN = pytest.StashKey["Run"]()
+RUN = pytest.StashKey[Any]()
 """Where a session keeps its run; none if nothing is to be flown."""
 METHODS = ("random",)
 POLICIES = ("waypoint", "random_walk", "stationary")
