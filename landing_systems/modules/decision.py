@@ -40,8 +40,10 @@ class DecisionParameters:
     commit_offset_m: float = 0.3
     confirm_patience_s: float = 3.0
     """How long to fly towards a fleeting sighting before going on with the search."""
-    lost_hold_s: float = 2.0
-    """PLND_TIMEOUT's idea: hold before climbing to look again."""
+    fresh_s: float = 1.0
+    """Descend through gaps of up to a second: at 1.2 m/s the estimate is still good."""
+    lost_hold_s: float = 4.0
+    """PLND_TIMEOUT's default: hold before climbing to look again."""
     regain_climb_m: float = 3.0
     max_retries: int = 4
     """PLND_RET_MAX's default."""
@@ -197,7 +199,7 @@ class DecisionModule:
             self._regain_height = min(self._mission.search_altitude_m, z + p.regain_climb_m)
             return self._go("regain", (*target, self._regain_height), "marker lost")
         inside = offset <= p.cone_floor_m + p.cone * z
-        fresh = unseen_s < 0.5
+        fresh = unseen_s < p.fresh_s
         if z <= p.commit_height_m and offset <= p.commit_offset_m and fresh:
             return self._go("commit", (*target, 0.0), "below the height at which the marker fits")
         if inside and fresh and z > p.commit_height_m:
