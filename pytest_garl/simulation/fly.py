@@ -397,4 +397,5 @@ def _blank(height: int, width: int) -> Frame:
         image=np.zeros((height, width, 3), np.uint8),
         depth_m=np.zeros((height, width), np.float32),
         segmentation=np.zeros((height, width), np.int32),
+        pixels=np.zeros(2, np.intp),
     )

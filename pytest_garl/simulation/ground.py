@@ -30,9 +30,11 @@ _CELLS = 7
 _SHIFT = 4
 
 
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+@dataclass(frozen=True, kw_only=True, eq=False)
 class Raster:
     """A picture of a piece of ground as a mip pyramid: ``levels[k]`` has 2^k m_per_px.
+
+    Levels have four channels, of which the last is unused: they are warped faster so.
 
     Row 0 lies at ``y_max``, column 0 at ``x_min`` (pixel edges).
     """
@@ -41,6 +43,21 @@ class Raster:
     m_per_px: float
     x_min: float
     y_max: float
+
+    @functools.cached_property
+    def outline(self) -> NDArray[np.float64]:
+        """Corners (4, 2) in the world."""
+        rows, columns = self.levels[0].shape[:2]
+        x, y = self.x_min + columns * self.m_per_px, self.y_max - rows * self.m_per_px
+        return np.array([[self.x_min, self.y_max], [x, self.y_max], [x, y], [self.x_min, y]])
+
+    def holds(self, points: NDArray[np.float64]) -> bool:
+        """Whether homogeneous world points (3, n) of equal sign all lie well inside."""
+        places = points[:2] / points[2]
+        slack = 4 * self.m_per_px * 2 ** len(self.levels)
+        low, high = self.outline.min(axis=0) + slack, self.outline.max(axis=0) - slack
+        inside = (places >= low[:, None]) & (places <= high[:, None])
+        return bool(inside.all())
 
     def pixel_of_world(self, level: int) -> NDArray[np.float64]:
         """Matrix (3, 3) from homogeneous world (x, y) to pixel centres of a level."""
@@ -89,7 +106,7 @@ def paint_ground(
 
 
 def _raster(image: Image, box: tuple[float, float, float, float], resolution: float) -> Raster:
-    levels = [image]
+    levels = [np.asarray(cv2.cvtColor(image, cv2.COLOR_RGB2RGBA), dtype=np.uint8)]
     for _ in range(_LEVELS - 1):
         rows, columns = levels[-1].shape[:2]
         size = (max(1, columns // 2), max(1, rows // 2))

@@ -12,27 +12,35 @@ from numpy.typing import NDArray
 from pytest_garl.scenarios.bodies import Part
 
 Array = NDArray[np.float32]
-_SIDES = 10
-_RINGS = 5
+_FINE, _COARSE = (10, 5), (6, 3)
+"""Sides and rings of round parts."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Mesh:
-    """Triangles of a body: ``corners`` (n, 3, 3), ``normals`` (n, 3), ``colours`` (n, 3)."""
+    """Triangles of a body: ``corners`` (n, 3, 3), ``normals`` (n, 3), ``colours`` (n, 3).
+
+    A triangle faces a point p if ``normals @ p > offsets``.
+    """
 
     corners: Array
     normals: Array
+    offsets: Array
     colours: Array
     radius_m: float
     hulls: tuple[Array, ...]
     """Each part's vertices, for its shadow."""
 
 
-def mesh_of(parts: Sequence[Part]) -> Mesh:
-    """Return the triangles of convex parts, wound outwards, in the body's frame."""
+def mesh_of(parts: Sequence[Part], *, coarse_below_m: float = 0.0) -> Mesh:
+    """Return the triangles of convex parts, wound outwards, in the body's frame.
+
+    Round parts with a radius of at most ``coarse_below_m`` get fewer triangles.
+    """
     corners, normals, colours, hulls = [], [], [], []
     for part in parts:
-        vertices, faces = _primitive(part)
+        coarse = max(part.size_m[:2]) / 2 <= coarse_below_m
+        vertices, faces = _primitive(part, *(_COARSE if coarse else _FINE))
         turned = vertices @ rotation_matrix(part.rotation).T + np.array(part.position_m)
         triangles = turned[faces]
         normal = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
@@ -44,9 +52,11 @@ def mesh_of(parts: Sequence[Part]) -> Mesh:
         colours.append(np.tile(np.array(part.colour, dtype=np.float64), (len(faces), 1)))
         hulls.append(turned.astype(np.float32))
     every = np.concatenate(corners)
+    outwards = np.concatenate(normals)
     return Mesh(
         corners=every.astype(np.float32),
-        normals=np.concatenate(normals).astype(np.float32),
+        normals=outwards.astype(np.float32),
+        offsets=(every[:, 0] * outwards).sum(axis=1).astype(np.float32),
         colours=np.concatenate(colours).astype(np.float32),
         radius_m=float(np.linalg.norm(every.reshape(-1, 3), axis=1).max()),
         hulls=tuple(hulls),
@@ -57,14 +67,14 @@ def placed(
     mesh: Mesh, position_m: tuple[float, float, float], yaw_rad: float
 ) -> tuple[Array, Array]:
     """Return corners and normals of a mesh at a place in the world."""
-    turn = _yaw_matrix(yaw_rad)
+    turn = yaw_matrix(yaw_rad)
     corners = mesh.corners @ turn.T + np.array(position_m, dtype=np.float32)
     return corners, mesh.normals @ turn.T
 
 
 def placed_hulls(mesh: Mesh, position_m: tuple[float, float, float], yaw_rad: float) -> list[Array]:
     """Return the parts' vertices of a mesh at a place in the world."""
-    turn, at = _yaw_matrix(yaw_rad).T, np.array(position_m, dtype=np.float32)
+    turn, at = yaw_matrix(yaw_rad).T, np.array(position_m, dtype=np.float32)
     return [hull @ turn + at for hull in mesh.hulls]
 
 
@@ -109,34 +119,34 @@ def _clip_polygon(points: Array, near_m: float) -> Array:
     return np.array(kept, dtype=np.float32).reshape(-1, 3)
 
 
-def _primitive(part: Part) -> tuple[NDArray[np.float64], NDArray[np.intp]]:
+def _primitive(part: Part, sides: int, rings: int) -> tuple[NDArray[np.float64], NDArray[np.intp]]:
     half = np.array(part.size_m) / 2
     if part.shape == "box":
         signs = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)], float)
         quads = ((0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3))
         faces = [(a, b, c) for a, b, c, _ in quads] + [(a, c, d) for a, _, c, d in quads]
         return signs * half, np.array(faces)
-    angles = 2 * np.pi * np.arange(_SIDES) / _SIDES
+    angles = 2 * np.pi * np.arange(sides) / sides
     circle = np.stack([np.cos(angles), np.sin(angles)], axis=1)
     if part.shape == "cylinder":
-        rims = [np.column_stack([circle, np.full(_SIDES, z)]) for z in (-1.0, 1.0)]
+        rims = [np.column_stack([circle, np.full(sides, z)]) for z in (-1.0, 1.0)]
         vertices = np.concatenate([*rims, [[0, 0, -1.0], [0, 0, 1.0]]]) * half
         faces = []
-        for a in range(_SIDES):
-            b = (a + 1) % _SIDES
-            faces += [(a, b, a + _SIDES), (b, b + _SIDES, a + _SIDES)]
-            faces += [(a, b, 2 * _SIDES), (a + _SIDES, b + _SIDES, 2 * _SIDES + 1)]
+        for a in range(sides):
+            b = (a + 1) % sides
+            faces += [(a, b, a + sides), (b, b + sides, a + sides)]
+            faces += [(a, b, 2 * sides), (a + sides, b + sides, 2 * sides + 1)]
         return vertices, np.array(faces)
-    polar = math.pi * np.arange(1, _RINGS) / _RINGS
-    rings = [np.column_stack([circle * math.sin(p), np.full(_SIDES, math.cos(p))]) for p in polar]
-    vertices = np.concatenate([*rings, [[0, 0, 1.0], [0, 0, -1.0]]]) * half
+    polar = math.pi * np.arange(1, rings) / rings
+    circles = [np.column_stack([circle * math.sin(p), np.full(sides, math.cos(p))]) for p in polar]
+    vertices = np.concatenate([*circles, [[0, 0, 1.0], [0, 0, -1.0]]]) * half
     top, bottom = len(vertices) - 2, len(vertices) - 1
     faces = []
-    for a in range(_SIDES):
-        b = (a + 1) % _SIDES
-        faces += [(top, a, b), (bottom, a + (_RINGS - 2) * _SIDES, b + (_RINGS - 2) * _SIDES)]
-        for ring in range(_RINGS - 2):
-            i, j = ring * _SIDES, (ring + 1) * _SIDES
+    for a in range(sides):
+        b = (a + 1) % sides
+        faces += [(top, a, b), (bottom, a + (rings - 2) * sides, b + (rings - 2) * sides)]
+        for ring in range(rings - 2):
+            i, j = ring * sides, (ring + 1) * sides
             faces += [(a + i, b + i, a + j), (b + i, b + j, a + j)]
     return vertices, np.array(faces)
 
@@ -153,6 +163,7 @@ def rotation_matrix(q: tuple[float, float, float, float]) -> NDArray[np.float64]
     )
 
 
-def _yaw_matrix(yaw_rad: float) -> Array:
+def yaw_matrix(yaw_rad: float) -> Array:
+    """Matrix (3, 3) of a turn about z."""
     cos, sin = math.cos(yaw_rad), math.sin(yaw_rad)
     return np.array([[cos, -sin, 0], [sin, cos, 0], [0, 0, 1]], dtype=np.float32)

@@ -5,8 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
-import numpy as np
-
 from pytest_garl.errors import GarlError
 from pytest_garl.scenarios.bodies import Body
 from pytest_garl.scenarios.maps import Map
@@ -14,7 +12,7 @@ from pytest_garl.scenarios.object_types import OBJECT_TYPES
 from pytest_garl.scenarios.placement import object_speed_mps, object_start_m
 from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.scenarios.validity import Disc, discs_of
-from pytest_garl.simulation.policy import Move, ObjectPolicy, ObjectState
+from pytest_garl.simulation.policy import DECISION_STEP_S, Move, ObjectPolicy, ObjectState
 
 _LOOK_AHEAD_M = 0.5
 TURN_RATE_RADPS = 2 * math.pi
@@ -37,9 +35,7 @@ class MovingObject:
         self._wanted = (0.0, 0.0)
         self._bounds = map.bounds_m
         self._solids = _solids_at(map.bodies, self)
-        self._centres = np.array([(d.x_m, d.y_m) for d in self._solids]).reshape(-1, 2)
-        radii = np.array([disc.radius_m for disc in self._solids])
-        self._reaches = radii + self.type.radius_m + _LOOK_AHEAD_M
+        self._near: list[Disc] = []
 
     @property
     def position_m(self) -> tuple[float, float, float]:
@@ -78,6 +74,9 @@ class MovingObject:
             )
         self.moves.append((move.x, move.y))
         self._wanted = (move.x * self.speed_mps, move.y * self.speed_mps)
+        # What it can reach before the next decision; few, and mostly none.
+        reach = self.type.radius_m + self.speed_mps * DECISION_STEP_S + _LOOK_AHEAD_M
+        self._near = [solid for solid in self._solids if _gap(solid, self.x_m, self.y_m) < reach]
 
     def advance(self, dt_s: float) -> None:
         """Move on: towards the wanted velocity, along solids, never through them."""
@@ -98,8 +97,7 @@ class MovingObject:
             self.yaw_rad += min(most, max(-most, turn))
 
     def _slide(self, vx: float, vy: float, dt_s: float) -> tuple[float, float]:
-        near = self._near()
-        for solid in near:
+        for solid in self._near:
             x, y = self.x_m + vx * dt_s, self.y_m + vy * dt_s
             reach = solid.radius_m + self.type.radius_m
             nx, ny = x - solid.x_m, y - solid.y_m
@@ -109,15 +107,10 @@ class MovingObject:
                 if inward < 0:
                     vx, vy = vx - inward * nx / distance, vy - inward * ny / distance
         x, y = self.x_m + vx * dt_s, self.y_m + vy * dt_s
-        for solid in near:
+        for solid in self._near:
             if _gap(solid, x, y) < min(_gap(solid, self.x_m, self.y_m), self.type.radius_m):
                 return 0.0, 0.0
         return vx, vy
-
-    def _near(self) -> list[Disc]:
-        """Return the solids within reach of the next steps; few, and mostly none."""
-        away = np.hypot(self._centres[:, 0] - self.x_m, self._centres[:, 1] - self.y_m)
-        return [self._solids[index] for index in np.flatnonzero(away < self._reaches)]
 
 
 def _gap(solid: Disc, x: float, y: float) -> float:

@@ -102,12 +102,11 @@ class Recorder:
     def sight(self, frame: Frame, renderer: Renderer, eye: Vector, attitude: Quaternion) -> Sight:
         """Work out what of the marker and the objects a frame shows."""
         ids = renderer.segment_ids
-        counts = np.bincount(frame.segmentation.ravel() + 1, minlength=len(ids) + 1)
         area = renderer.marker_area_px(eye, attitude)
-        share = min(1.0, float(counts[ids["marker"] + 1]) / area) if area >= 1 else 0.0
+        share = min(1.0, float(frame.pixels[ids["marker"]]) / area) if area >= 1 else 0.0
         height = max(0.1, eye[2])
         side = renderer.marker_side_px(height)
-        seen = tuple(item.name for item in self._objects if counts[ids[item.name] + 1] > 0)
+        seen = tuple(item.name for item in self._objects if frame.pixels[ids[item.name]])
         return share, side, seen
 
     def step(self, command: Command, sight: Sight) -> None:

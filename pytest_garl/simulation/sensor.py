@@ -37,7 +37,9 @@ class Sensor:
         self._neutral = bool(exposure == 1.0 and low == 0.0)
         shape = (camera.height_px + _SPARE, camera.width_px + _SPARE, 3)
         noise = rng.standard_normal(shape, dtype=np.float32) * READ_NOISE * gain**0.5
-        self._noise = np.clip(np.round(noise), -127, 127).astype(np.int8)
+        # Two pictures of bytes: adding signed noise to bytes is five times as slow.
+        self._more = np.clip(np.round(noise), 0, 127).astype(np.uint8)
+        self._less = np.clip(np.round(-noise), 0, 127).astype(np.uint8)
         self._salt = int(rng.integers(2**32))
 
     def expose(self, image: NDArray[np.uint8], time_s: float) -> NDArray[np.uint8]:
@@ -47,6 +49,6 @@ class Sensor:
         digest = hashlib.blake2b(struct.pack("<Id", self._salt, time_s), digest_size=2).digest()
         down, across = digest[0] % _SPARE, digest[1] % _SPARE
         height, width = image.shape[:2]
-        noise = self._noise[down : down + height, across : across + width]
-        result = cv2.add(image, noise, dtype=cv2.CV_8U)
+        here = np.s_[down : down + height, across : across + width]
+        result = cv2.subtract(cv2.add(image, self._more[here]), self._less[here])
         return np.asarray(result, dtype=np.uint8)

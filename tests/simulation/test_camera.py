@@ -17,8 +17,9 @@ from pytest_garl.scenarios.maps import load_map
 from pytest_garl.scenarios.object_types import OBJECT_TYPES
 from pytest_garl.scenarios.placement import marker_position_m
 from pytest_garl.scenarios.validity import discs_of, repair
-from pytest_garl.simulation.camera import FAR_M, Frame, Renderer
+from pytest_garl.simulation.camera import Frame, Renderer
 from pytest_garl.simulation.meshes import mesh_of, placed
+from pytest_garl.simulation.view import FAR_M
 
 CAMERA = Camera()
 FINE = Camera(width_px=1280, height_px=960)

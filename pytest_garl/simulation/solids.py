@@ -1,0 +1,239 @@
+"""Bodies and objects in a frame: their triangles, and their shadows on the ground."""
+
+from __future__ import annotations
+
+import functools
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from pytest_garl.scenarios.bodies import Part
+from pytest_garl.scenarios.maps import Map
+from pytest_garl.scenarios.object_types import OBJECT_TYPES
+from pytest_garl.simulation.ground import shadow_of
+from pytest_garl.simulation.meshes import (
+    Mesh,
+    clip_near,
+    mesh_of,
+    placed_hulls,
+    yaw_matrix,
+)
+from pytest_garl.simulation.view import FAR_M, NEAR_M, View
+from pytest_garl.simulation.weather import Conditions
+
+Array = NDArray[np.float32]
+Place = tuple[tuple[float, float, float], float]
+"""Position and yaw."""
+_SHIFT = 4
+_TO_GL = np.diag([1.0, -1.0, -1.0, 1.0]).astype(np.float32)
+"""From camera axes (right, down, forward) to those of the rasteriser."""
+_COARSE_PX = 4.0
+"""A part of this radius in pixels is off by half a pixel if drawn with 6 sides for 10."""
+_COARSE_M = (0.0, 0.12, 0.3, 1.0)
+"""Parts up to these radii are coarse in the levels of detail."""
+
+
+@dataclass(slots=True, kw_only=True, eq=False)
+class _Solid:
+    """One body as triangles, with what stays the same while it does not turn."""
+
+    segment: int
+    meshes: tuple[Mesh, ...]
+    at: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    yaw_rad: float = math.nan
+    turn: Array = field(default_factory=lambda: np.eye(3, dtype=np.float32))
+    shades: dict[int, NDArray[np.uint8]] = field(default_factory=dict)
+    shadows: NDArray[np.float64] = field(default_factory=lambda: np.zeros((0, 2)))
+    """The outlines of the parts' shadows about the body's own, one after the other."""
+    lengths: list[int] = field(default_factory=list)
+    """Corners of each outline."""
+
+    def put(self, place: Place, conditions: Conditions) -> None:
+        at, yaw = place
+        self.at = at
+        if yaw == self.yaw_rad:
+            return
+        self.yaw_rad, self.turn = yaw, yaw_matrix(yaw)
+        self.shades = {}
+        if _sun_shines(conditions):
+            hulls = placed_hulls(self.meshes[0], (0.0, 0.0, 0.0), yaw)
+            flat = (shadow_of(hull, conditions.sun) for hull in hulls)
+            outlines = [cv2.convexHull(s).reshape(-1, 2) for s in flat]
+            self.shadows = np.concatenate(outlines).astype(np.float64)
+            self.lengths = [len(outline) for outline in outlines]
+
+
+class Solids:
+    """Draws static bodies and dynamic objects into frames."""
+
+    def __init__(self, map: Map, conditions: Conditions, segment_ids: Mapping[str, int]) -> None:
+        self._conditions = conditions
+        self._static = [
+            _Solid(segment=segment_ids[body.name], meshes=_levels(body.parts))
+            for body in map.bodies
+        ]
+        for solid, body in zip(self._static, map.bodies, strict=True):
+            solid.put((body.position_m, body.yaw_rad), conditions)
+        self._moving = [
+            _Solid(segment=segment_ids[name], meshes=_levels(OBJECT_TYPES[kind].parts))
+            for name, kind in map.object_names
+        ]
+        self._segments = len(segment_ids)
+        self._settings = cv2.TriangleRasterizeSettings()
+        self._settings.setShadingType(cv2.RASTERIZE_SHADING_FLAT)
+        self._settings.setCullingMode(cv2.RASTERIZE_CULLING_NONE)
+
+    def place(self, objects: Sequence[Place]) -> None:
+        """Put the dynamic objects, in the map's order, where they are now."""
+        for solid, place in zip(self._moving, objects, strict=True):
+            solid.put(place, self._conditions)
+
+    def draw_shadows(self, image: NDArray[np.uint8], view: View) -> None:
+        """Darken the ground where the dynamic objects keep the sun from it."""
+        if not _sun_shines(self._conditions):
+            return
+        sun = self._conditions.sun
+        reach = 3 * max(2.0, float(view.eye[2]))
+        outlines, lengths = [], []
+        for solid in self._moving:
+            x = solid.at[0] - sun[0] / sun[2] * solid.at[2]
+            y = solid.at[1] - sun[1] / sun[2] * solid.at[2]
+            if math.hypot(x - view.eye[0], y - view.eye[1]) < reach + solid.meshes[0].radius_m:
+                outlines.append(solid.shadows + np.array([x, y]))
+                lengths += solid.lengths
+        if not outlines:
+            return
+        points, lengths = view.ground_polygons(np.concatenate(outlines), lengths)
+        rows, columns = view.box(points)
+        part = image[rows, columns]
+        if part.size == 0:
+            return
+        mask = np.zeros(part.shape[:2], np.uint8)
+        fixed = np.round((points - (columns.start, rows.start)) * 2**_SHIFT).astype(np.int32)
+        start = 0
+        for length in lengths:
+            cv2.fillConvexPoly(mask, fixed[start : start + length], (255.0,), cv2.LINE_8, _SHIFT)
+            start += length
+        share = self._conditions.direct_share
+        cv2.copyTo(cv2.convertScaleAbs(part, alpha=1 - share), mask, part)
+
+    def draw(
+        self,
+        image: NDArray[np.uint8],
+        depth: Array,
+        segmentation: NDArray[np.int32],
+        view: View,
+    ) -> NDArray[np.intp]:
+        """Draw all solids over the ground; return how many pixels each segment got."""
+        axes = view.axes.astype(np.float32)
+        pixels = np.zeros(self._segments, np.intp)
+        for solid in (*self._static, *self._moving):
+            at = np.array(solid.at)
+            x, y, z = (float(value) for value in view.axes @ (at - view.eye))
+            radius = solid.meshes[0].radius_m
+            if not view.shows(x, y, z, radius):
+                continue
+            level = _level_at(max(NEAR_M, z - radius) / view.camera.focal_px * _COARSE_PX)
+            mesh = solid.meshes[level]
+            # In the solid's own frame, so that only what faces the camera is turned.
+            eye = solid.turn.T @ (view.eye - at).astype(np.float32)
+            facing = np.flatnonzero(mesh.normals @ eye > mesh.offsets)
+            corners = mesh.corners[facing].reshape(-1, 3)
+            seen = corners @ (axes @ solid.turn).T + np.array([x, y, z], np.float32)
+            if z - radius <= NEAR_M:
+                triangles, origin = clip_near(seen.reshape(-1, 3, 3), NEAR_M)
+                seen, facing = triangles.reshape(-1, 3), facing[origin]
+            if len(seen):
+                paint = self._shade(solid, level)[facing]
+                frame = (image, depth, segmentation)
+                pixels[solid.segment] = self._rasterise(seen, paint, solid.segment, frame, view)
+        return pixels
+
+    def _rasterise(
+        self,
+        corners: Array,
+        paint: NDArray[np.uint8],
+        segment: int,
+        frame: tuple[NDArray[np.uint8], Array, NDArray[np.int32]],
+        view: View,
+    ) -> int:
+        """Draw camera-frame triangles (corners (3 n, 3), paint (n, 3)) where they are nearest.
+
+        OpenCV's rasteriser costs by the area of its target, so it gets only the window
+        that holds the triangles; a shear along the depth moves the optical axis there.
+        Returns the number of pixels drawn.
+        """
+        image, depth, segmentation = frame
+        rows, columns = view.box(view.pixels(corners))
+        height, width = rows.stop - rows.start, columns.stop - columns.start
+        if height <= 0 or width <= 0:
+            return 0
+        (cx, cy), focal = view.camera.centre_px, view.camera.focal_px
+        across = (columns.start + (width - 1) / 2 - cx) / focal
+        down = (rows.start + (height - 1) / 2 - cy) / focal
+        sheared = corners - corners[:, 2:] * np.array([across, down, 0.0], np.float32)
+        codes, order = _numbers(len(paint))
+        drawn = np.zeros((height, width, 3), np.float32)
+        window = depth[rows, columns]
+        cv2.triangleRasterize(
+            sheared,
+            order,
+            codes,
+            drawn,
+            window,
+            _TO_GL,
+            2 * math.atan(height / 2 / focal),
+            NEAR_M,
+            FAR_M,
+            self._settings,
+        )
+        code = np.asarray(cv2.extractChannel(drawn, 0))
+        covered = code > 0
+        segmentation[rows, columns][covered] = segment
+        image[rows, columns][covered] = paint[code[covered].astype(np.intp) - 1]
+        return int(np.count_nonzero(covered))
+
+    def _shade(self, solid: _Solid, level: int) -> NDArray[np.uint8]:
+        """Return the mesh's colours in this light, kept until the solid turns."""
+        kept = solid.shades.get(level)
+        if kept is None:
+            mesh, conditions = solid.meshes[level], self._conditions
+            normals = mesh.normals @ solid.turn.T
+            share = conditions.direct_share
+            facing = np.clip(normals @ np.array(conditions.sun, np.float32), 0, 1)
+            sky = 0.75 + 0.25 * normals[:, 2]
+            light = (1 - share) * sky + share * facing / max(0.35, conditions.sun[2])
+            lit = mesh.colours * np.clip(light, 0, 1.15)[:, None]
+            kept = solid.shades[level] = np.clip(lit, 0, 255).astype(np.uint8)
+        return kept
+
+
+def _sun_shines(conditions: Conditions) -> bool:
+    return conditions.direct_share > 0.01 and conditions.sun[2] > 0.02
+
+
+@functools.cache
+def _levels(parts: tuple[Part, ...]) -> tuple[Mesh, ...]:
+    return tuple(mesh_of(parts, coarse_below_m=radius) for radius in _COARSE_M)
+
+
+def _level_at(radius_m: float) -> int:
+    """Return the level of detail in which parts up to ``radius_m`` may be coarse."""
+    return max(level for level, limit in enumerate(_COARSE_M) if limit <= radius_m)
+
+
+@functools.lru_cache(maxsize=4)
+def _most_numbers(most: int) -> tuple[Array, NDArray[np.int32]]:
+    codes = np.zeros((3 * most, 3), np.float32)
+    codes[:, 0] = np.repeat(np.arange(1, most + 1, dtype=np.float32), 3)
+    return codes, np.arange(3 * most, dtype=np.int32).reshape(-1, 3)
+
+
+def _numbers(count: int) -> tuple[Array, NDArray[np.int32]]:
+    """Return each triangle's number as the colour of its corners, and its corners' indices."""
+    codes, order = _most_numbers(max(4096, 1 << count.bit_length()))
+    return codes[: 3 * count], order[:count]
