@@ -49,10 +49,13 @@ class DecisionParameters:
     """PLND_RET_MAX's default."""
     abort_reserve_s: float = 12.0
     """Time kept to climb away before the mission's limit."""
-    search_spacing_m: float = 5.0
-    """At 10 m the frame covers 20 m by 15 m: rings of 5 m leave no gap, even tilted."""
-    search_radius_m: float = 7.5
+    search_rings_m: tuple[float, ...] = (4.0, 7.0)
+    """From 10 m the frame covers 20 m by 15 m, so the disc of 7.5 m in which the marker lies is
+    just in view from its centre; the rings show each place again, nearer to the middle."""
+    search_spacing_m: float = 4.5
     arrive_m: float = 0.6
+    pass_m: float = 1.5
+    """Points of the search are passed by, not stopped at."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -155,23 +158,21 @@ class DecisionModule:
             if math.dist((x, y), (gps_x, gps_y)) > p.arrive_m:
                 return self._go("transit", (gps_x, gps_y, mission.search_altitude_m))
             self._searched = self._pattern()
-        while self._searched and math.dist((x, y), self._searched[0]) < p.arrive_m:
+        if math.dist((x, y), self._searched[0]) < p.pass_m:
             self._searched.pop(0)
             if not self._searched:
-                self._searched = self._pattern()
+                return self._go("abort", position, "the marker was not found")
         return self._go("search", (*self._searched[0], mission.search_altitude_m))
 
     def _pattern(self) -> list[Place]:
         """Rings about the told coordinate, out to where the marker may lie at most."""
         gps_x, gps_y = self._mission.gps_position_m
         places = []
-        radius = self._p.search_spacing_m
-        while radius <= self._p.search_radius_m + self._p.search_spacing_m / 2:
-            count = max(4, math.ceil(2 * math.pi * radius / self._p.search_spacing_m))
-            for index in range(count):
+        for radius in self._p.search_rings_m:
+            count = math.ceil(2 * math.pi * radius / self._p.search_spacing_m)
+            for index in range(count + 1):
                 angle = 2 * math.pi * index / count
                 places.append((gps_x + radius * math.cos(angle), gps_y + radius * math.sin(angle)))
-            radius += self._p.search_spacing_m
         return places
 
     def _land(self, time_s: float, position: tuple[float, float, float]) -> Decision:

@@ -13,7 +13,15 @@ from pytest_garl import Camera, Detection, Mission, Observation
 _CAMERA_FROM_BODY = np.array([[0.0, -1.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 0.0, -1.0]])
 """Image right is the body's -y, image down its -x, the optical axis its -z."""
 CELLS = 7
-MEDIAN_SHARE = 0.7
+LOOKS: tuple[tuple[float, float, float], ...] = (
+    (0.0, 0.0, 0.0),
+    (0.0, 0.0, 3.0),
+    (0.3, 0.0, 3.0),
+    (0.5, 0.5, 3.0),
+)
+"""Ways to look at a frame, as sizes in marker cells: of an opening, which removes flakes and
+other bright specks; of a closing, which removes leaves and other dark ones; and of the
+neighbourhood whose brightest grey counts as white, which removes the edges of shadows."""
 MAX_REPROJECTION_PX = 2.0
 HEIGHT_TOLERANCE = 0.35
 """A marker on the ground lies as far below as the altimeter says, give or take a third; what
@@ -32,33 +40,56 @@ class OpenCvDetector:
         parameters.minMarkerPerimeterRate = 0.12
         parameters.adaptiveThreshWinSizeMin = 5
         parameters.adaptiveThreshWinSizeMax = 25
-        parameters.adaptiveThreshWinSizeStep = 10
-        # Leaves and snow on the border bend its outline and flip its bits.
+        parameters.adaptiveThreshWinSizeStep = 20
+        # Leaves and snow on the marker bend its outline and flip its bits.  Correcting as many
+        # bits as the dictionary allows lets through a wrong id now and then, which neither the
+        # pose nor the agreement of several frames would.
         parameters.polygonalApproxAccuracyRate = 0.06
         parameters.maxErroneousBitsInBorderRate = 0.5
+        parameters.errorCorrectionRate = 1.0
+        parameters.perspectiveRemovePixelPerCell = 8
         parameters.cornerRefinementMethod = cv2.aruco.CORNER_REFINE_SUBPIX
         self._detector = cv2.aruco.ArucoDetector(dictionary, parameters)
         self._camera: Camera = mission.camera
         self._wanted = mission.marker_id
         self._side_m = mission.marker_side_m
+        self._look = 0
+        self._other = 0
         half = mission.marker_side_m / 2
         self._corners = np.array(
             [[-half, half, 0], [half, half, 0], [half, -half, 0], [-half, -half, 0]]
         )
 
     def detect(self, observation: Observation) -> tuple[Detection, ...]:
-        """Return all markers in the frame whose pose is plausible."""
+        """Return all markers in the frame whose pose is plausible.
+
+        The look that found the wanted marker last comes first; where it fails, one of the
+        others, in turn, has a try.
+        """
         grey = np.asarray(cv2.cvtColor(observation.image, cv2.COLOR_RGB2GRAY))
-        found = self._find(grey, observation)
+        found = self._find(self._cleaned(grey, self._look, observation), observation)
         if not any(item.marker_id == self._wanted for item in found):
-            found += self._find(cv2.medianBlur(grey, self._kernel(observation)), observation)
+            self._other = (self._other + 1) % len(LOOKS)
+            if self._other == self._look:
+                self._other = (self._other + 1) % len(LOOKS)
+            more = self._find(self._cleaned(grey, self._other, observation), observation)
+            if any(item.marker_id == self._wanted for item in more):
+                self._look = self._other
+            found += more
         return tuple(found)
 
-    def _kernel(self, observation: Observation) -> int:
-        """Size of a median that removes leaves and flakes but keeps the marker's cells."""
+    def _cleaned(self, grey: NDArray[Any], look: int, observation: Observation) -> NDArray[Any]:
         height = max(0.5, float(observation.position_m[2]))
         cell_px = self._camera.focal_px * self._side_m / height / CELLS
-        return min(11, max(3, 2 * int(MEDIAN_SHARE * cell_px / 2) + 1))
+        opening, closing, white = LOOKS[look]
+        if opening:
+            grey = _morphology(grey, cv2.MORPH_OPEN, opening * cell_px)
+        if closing:
+            grey = _morphology(grey, cv2.MORPH_CLOSE, closing * cell_px)
+        if white:
+            lightest = _morphology(grey, cv2.MORPH_CLOSE, white * cell_px)
+            grey = np.asarray(cv2.divide(grey, lightest, scale=255))
+        return grey
 
     def _find(self, grey: NDArray[Any], observation: Observation) -> list[Detection]:
         corners, ids, _ = self._detector.detectMarkers(grey)
@@ -99,6 +130,11 @@ class OpenCvDetector:
         scale = height / -offset[2]
         x, y = observation.position_m[:2] + scale * offset[:2]
         return float(x), float(y), 0.0
+
+
+def _morphology(grey: NDArray[Any], operation: int, size_px: float) -> NDArray[Any]:
+    size = min(151, max(3, 2 * int(size_px / 2) + 1))
+    return np.asarray(cv2.morphologyEx(grey, operation, np.ones((size, size), np.uint8)))
 
 
 def rotation_matrix(attitude: NDArray[np.float64]) -> NDArray[np.float64]:

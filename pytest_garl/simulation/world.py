@@ -119,7 +119,9 @@ class World:
         """Return the UAV's present contacts, one per body."""
         found: dict[str, Touch] = {}
         for contact in self._p.getContactPoints(bodyA=self._uav, **self._call):
-            if contact[8] <= 0:
+            # Bullet pushes bodies apart a step before they overlap: force without overlap is
+            # a contact as well.
+            if contact[8] <= 0 or contact[9] > 0:
                 name = self._names[contact[2]]
                 found.setdefault(name, Touch(body=name, position_m=contact[6]))
         return tuple(found.values())
