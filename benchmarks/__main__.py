@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from benchmarks import overhead, speed
+from benchmarks import overhead, speed, throughput
 
 speed.main()
 overhead.main()
+throughput.main()

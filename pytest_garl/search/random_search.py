@@ -12,6 +12,24 @@ from pytest_garl.scenarios.genes import Genome
 from pytest_garl.scenarios.maps import Map
 from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.scenarios.validity import repair
+from pytest_garl.search.method import Flown, Plan
+
+
+class RandomSearch:
+    """Learns nothing; generation g is the same whatever came before."""
+
+    def __init__(self, plan: Plan) -> None:
+        self._plan, self._generation = plan, 0
+
+    def ask(self) -> Sequence[Scenario]:
+        """Return the next generation."""
+        plan = self._plan
+        self._generation += 1
+        return propose(plan.map, plan.genome, plan.seed, self._generation - 1, plan.population)
+
+    def tell(self, flown: Sequence[Flown]) -> Sequence[tuple[float, ...]]:
+        """Return each flight's distance and time to landing."""
+        return [(item.result["final_distance_m"], item.result["elapsed_s"]) for item in flown]
 
 
 def propose(map: Map, genome: Genome, seed: int, generation: int, size: int) -> Sequence[Scenario]:

@@ -1,0 +1,43 @@
+"""The search methods' interface: propose a generation, learn from what it came to."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any, Protocol
+
+from pytest_garl.scenarios.genes import Genome
+from pytest_garl.scenarios.maps import Map
+from pytest_garl.scenarios.scenario import Scenario
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Plan:
+    """What a search is given: where, over which genes, from which seed, how many at a time."""
+
+    map: Map
+    genome: Genome
+    seed: int
+    population: int
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Flown:
+    """A scenario with the result of its flight, as the ledger holds it."""
+
+    scenario: Scenario
+    result: dict[str, Any]
+
+
+class Method(Protocol):
+    """Breeds whole generations, so that the outcome does not depend on the workers.
+
+    ``ask`` and ``tell`` alternate.  What ``ask`` returns depends on the plan and on what
+    was told alone.
+    """
+
+    def ask(self) -> Sequence[Scenario]:
+        """Return the next generation, ``population`` scenarios of which none came before."""
+
+    def tell(self, flown: Sequence[Flown]) -> Sequence[tuple[float, ...]]:
+        """Learn from the generation; return each flight's objectives, for the ledger."""

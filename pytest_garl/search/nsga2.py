@@ -1,0 +1,126 @@
+"""NSGA-II by pymoo's ask and tell, with the paper's operators (DESIGN 7)."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from pymoo.algorithms.base.genetic import GeneticAlgorithm
+from pymoo.core.duplicate import NoDuplicateElimination
+from pymoo.core.infill import InfillCriterion
+from pymoo.core.population import Population
+from pymoo.core.problem import Problem
+from pymoo.operators.survival.rank_and_crowding import RankAndCrowding
+
+from pytest_garl.scenarios.chromosome import decode, encode
+from pytest_garl.scenarios.scenario import Scenario
+from pytest_garl.scenarios.validity import repair
+from pytest_garl.search.method import Flown, Plan
+from pytest_garl.search.operators import Choice, nuclear_gene_crossover, property_mutation
+
+Matrix = NDArray[np.float64]
+Objectives = Callable[[Matrix, Sequence[Flown]], Matrix]
+"""From normalised chromosomes (k, d) and their flights to objectives (k, m), all maximised."""
+_TRIES = 100
+
+
+class Nsga2:
+    """A genetic search; ``objectives`` and the mutation's ``choose`` make the method."""
+
+    def __init__(self, name: str, plan: Plan, objectives: Objectives, choose: Choice) -> None:
+        self._plan, self._objectives, self._choose = plan, objectives, choose
+        place = hashlib.sha256(f"{name} {plan.map.name}".encode()).digest()
+        sequence = np.random.SeedSequence(plan.seed, spawn_key=(int.from_bytes(place[:4], "big"),))
+        variation, survival = sequence.spawn(2)
+        self._rng = np.random.default_rng(variation)
+        self._seen: set[bytes] = set()
+        self._flown: dict[bytes, Flown] = {}
+        self._asked: Any = None
+        genome = plan.genome
+        first = np.array([self._valid(genome.random(self._rng)) for _ in range(plan.population)])
+        probe = len(objectives(np.zeros((0, genome.size)), ()).T)
+        self._algorithm = GeneticAlgorithm(
+            pop_size=plan.population,
+            sampling=first,
+            mating=_Mating(self),
+            survival=_Survival(self),
+            eliminate_duplicates=NoDuplicateElimination(),
+            advance_after_initial_infill=True,
+        )
+        problem = Problem(n_var=genome.size, n_obj=probe, xl=genome.lower, xu=genome.upper)
+        self._algorithm.setup(problem, seed=int(survival.generate_state(1)[0]), verbose=False)
+
+    def ask(self) -> Sequence[Scenario]:
+        """Return the next generation."""
+        self._asked = self._algorithm.ask()
+        return [
+            decode(row, self._plan.genome, map=self._plan.map.name, seed=self._seed(row))
+            for row in self._asked.get("X")
+        ]
+
+    def tell(self, flown: Sequence[Flown]) -> Sequence[tuple[float, ...]]:
+        """Learn from the generation; survivors are the best of parents and offspring."""
+        rows = self._asked.get("X")
+        for row, item in zip(rows, flown, strict=True):
+            self._flown[row.tobytes()] = item
+        values = self.values(rows)
+        self._asked.set("F", -values)
+        self._algorithm.tell(infills=self._asked)
+        return [tuple(float(value) for value in row) for row in values]
+
+    def values(self, rows: Matrix) -> Matrix:
+        """Return the objectives of flown chromosomes, each measured against all the others."""
+        flown = [self._flown[row.tobytes()] for row in rows]
+        return self._objectives(self._plan.genome.normalise(rows), flown)
+
+    def offspring(self, parents: Matrix) -> Matrix:
+        """Return as many valid, new chromosomes as there are parents."""
+        genome, rng = self._plan.genome, self._rng
+        children = nuclear_gene_crossover(parents, genome.borders, rng)
+        children = self._mutate(children)
+        return np.array([self._valid(row) for row in children])
+
+    def _mutate(self, rows: Matrix) -> Matrix:
+        genome = self._plan.genome
+        return property_mutation(rows, genome.lower, genome.upper, self._rng, choose=self._choose)
+
+    def _valid(self, row: Matrix) -> Matrix:
+        """Repair a chromosome; mutate one that came before until it is new."""
+        genome, map = self._plan.genome, self._plan.map
+        for _ in range(_TRIES):
+            mended = encode(repair(decode(row, genome, map=map.name, seed=0), map), genome)
+            key = mended.tobytes()
+            if key not in self._seen:
+                self._seen.add(key)
+                return mended
+            row = self._mutate(row[None])[0]
+        return self._valid(genome.random(self._rng))
+
+    def _seed(self, row: Matrix) -> int:
+        """Return the scenario's own seed: of its genes and the search's seed, not of its slot."""
+        digest = hashlib.sha256(row.tobytes() + str(self._plan.seed).encode()).digest()
+        return int.from_bytes(digest[:4], "big")
+
+
+class _Mating(InfillCriterion):  # type: ignore[misc]
+    def __init__(self, search: Nsga2) -> None:
+        super().__init__()
+        self._search = search
+
+    def do(self, problem: Any, pop: Any, n_offsprings: int, **_: Any) -> Any:
+        return Population.new("X", self._search.offspring(pop.get("X")))
+
+
+class _Survival(RankAndCrowding):  # type: ignore[misc]
+    """Rank and crowding over objectives measured anew in the union of P and O."""
+
+    def __init__(self, search: Nsga2) -> None:
+        super().__init__()
+        self._search = search
+
+    def _do(self, problem: Any, pop: Any, *args: Any, **kwargs: Any) -> Any:
+        pop.set("F", -self._search.values(pop.get("X")))
+        return super()._do(problem, pop, *args, **kwargs)
