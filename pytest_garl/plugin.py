@@ -76,6 +76,18 @@ def pytest_collection_finish(session: pytest.Session) -> None:
         run.select(session.items)
 
 
+@pytest.hookimpl(wrapper=True, trylast=True)
+def pytest_runtestloop(session: pytest.Session) -> Generator[None, object, object]:
+    """Show the progress line while the tests run."""
+    run = session.config.stash.get(RUN, None)
+    if run is None:
+        return (yield)
+    from pytest_garl.reports.progress import live
+
+    with live(run, session.config):
+        return (yield)
+
+
 @pytest.hookimpl(wrapper=True)
 def pytest_pyfunc_call(pyfuncitem: pytest.Function) -> Generator[None, Any, Any]:
     """Fail the first test of a slot whose system crashed, before its body runs."""

@@ -64,6 +64,9 @@ class Run:
     simulator: Reference
     flight_s: float = FLIGHT_S
     tick: Callable[[], None] = field(default=lambda: None)
+    """Called while a flight is waited for."""
+    waited: Callable[[], None] = field(default=lambda: None)
+    """Called when the waiting is over."""
     items: dict[str, dict[Slot, list[str]]] = field(default_factory=dict)
     targets: dict[str, dict[Slot, Target]] = field(default_factory=dict)
     registered: set[str] = field(default_factory=set)
@@ -84,9 +87,12 @@ class Run:
     def fly(self, target: Target, npcs: PolicySpec) -> dict[str, Any]:
         """Return the slot's result after it and all lower selected slots are flown."""
         self._register(target, npcs)
-        for slot in sorted(self.items[target.search]):
-            if slot <= target.slot:
-                self.pool.wait(target.search, slot, self.tick)
+        try:
+            for slot in sorted(self.items[target.search]):
+                if slot <= target.slot:
+                    self.pool.wait(target.search, slot, self.tick)
+        finally:
+            self.waited()
         result = self.ledger.result(target.search, target.slot.generation, target.slot.index)
         assert result is not None
         return result

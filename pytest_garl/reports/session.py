@@ -9,7 +9,6 @@ from typing import Any
 import pytest
 
 from pytest_garl.options import Options
-from pytest_garl.reports.terminal import Progress
 from pytest_garl.run import Run
 from pytest_garl.search.ledger import Ledger
 from pytest_garl.search.pool import Pool
@@ -44,8 +43,6 @@ def begin_run(config: pytest.Config, options: Options) -> Run:
         simulator=reference_to(own) if own else BUILT_IN,
     )
     run.flight_s = _or_default(ledger)
-    if sys.stdout.isatty() and not hasattr(config, "workerinput"):
-        run.tick = Progress(run, sys.stdout)
     return run
 
 

@@ -1,19 +1,14 @@
-"""The terminal: header, live progress line and summary."""
+"""The terminal: header and summary."""
 
 from __future__ import annotations
 
-import shutil
-import time
-from collections import Counter
-from typing import Any, TextIO
+from typing import Any
 
 from pytest_garl.run import Run
 from pytest_garl.search.slots import Slot
 from pytest_garl.verdicts.metrics import share_interval, top_k
 from pytest_garl.verdicts.serialise import from_dict
 from pytest_garl.verdicts.verdict import Verdict
-
-REFRESH_S = 0.2
 
 
 def header(run: Run) -> str:
@@ -25,51 +20,8 @@ def header(run: Run) -> str:
     return (
         f"garl: budget {options.budget} per system and map, method {options.method}, "
         f"seed {options.seed}, objects {options.npcs}, weather {options.weather}, "
-        f"{options.workers} workers; about {_duration(each)} per system and map"
+        f"{options.workers} workers; about {duration(each)} per system and map"
     )
-
-
-class Progress:
-    """One line below the dots while the session waits for a flight."""
-
-    def __init__(self, run: Run, file: TextIO) -> None:
-        self._run, self._file = run, file
-        self._began = self._last = time.monotonic()
-
-    def __call__(self) -> None:
-        """Redraw the line if it is old."""
-        now = time.monotonic()
-        if now - self._last < REFRESH_S:
-            return
-        self._last = now
-        line = self._line(now)[: shutil.get_terminal_size().columns - 1]
-        # Make room below without leaving the column, save the place, write, come back.
-        self._file.write(f"\x1bD\x1bM\x1b7\r\n\x1b[2K{line}\x1b8")
-        self._file.flush()
-
-    def clear(self) -> None:
-        """Remove the line."""
-        self._file.write("\x1bD\x1bM\x1b7\r\n\x1b[2K\x1b8")
-        self._file.flush()
-
-    def _line(self, now: float) -> str:
-        searches = self._run.ledger.progress()
-        flown, total = sum(s[2] for s in searches), sum(s[3] for s in searches)
-        rate = flown / max(1e-3, now - self._began)
-        left = _duration((total - flown) / rate) if flown else "?"
-        types = Counter(
-            result["verdict"]["violation_type"]
-            for *_, result in self._run.ledger.results()
-            if result["verdict"]["violation_type"]
-        )
-        now_flying = next((s for s in searches if s[2] < s[3]), None)
-        what = (
-            f"{now_flying[0].split(':')[-1]} {now_flying[1]} {now_flying[2]}/{now_flying[3]}"
-            if now_flying
-            else ""
-        )
-        kinds = " ".join(f"{kind}:{count}" for kind, count in sorted(types.items()))
-        return f"  {what}  all {flown}/{total}  {kinds}  {rate:.2f} flights/s  {left} left"
 
 
 def summary(reporter: Any, run: Run) -> None:
@@ -115,5 +67,6 @@ def _percent(count: int, total: int) -> str:
     return f"{100 * count / total:.1f} %"
 
 
-def _duration(seconds: float) -> str:
+def duration(seconds: float) -> str:
+    """Return a duration in words."""
     return f"{seconds:.0f} s" if seconds < 90 else f"{seconds / 60:.0f} min"

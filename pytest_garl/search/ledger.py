@@ -215,6 +215,14 @@ class Ledger:
             )
         )
 
+    def violations(self) -> dict[str, int]:
+        """Return how often each type of violation was found."""
+        rows = self._db.execute(
+            "SELECT json_extract(result, '$.verdict.violation_type') AS type, count(*) FROM slot "
+            "WHERE state = 'flown' AND type IS NOT NULL GROUP BY type ORDER BY type"
+        )
+        return dict(rows.fetchall())
+
     def scenarios(self, generation: int, slot: int, map: str) -> dict[str, str]:
         """Return the scenario of a slot for each system that has one."""
         rows = self._db.execute(

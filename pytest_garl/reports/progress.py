@@ -1,0 +1,171 @@
+"""The live progress line below pytest's own output."""
+
+from __future__ import annotations
+
+import os
+import sqlite3
+import sys
+import threading
+import time
+from collections.abc import Generator, Iterator, Mapping, Sequence
+from contextlib import closing, contextmanager
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from pytest_garl.errors import LedgerError
+from pytest_garl.reports.terminal import duration
+from pytest_garl.run import Run
+from pytest_garl.search.ledger import Ledger
+
+REFRESH_S = 0.5
+
+
+@contextmanager
+def live(run: Run, config: pytest.Config) -> Iterator[None]:
+    """Show the line while the tests run, where standard output is a terminal.
+
+    A process that runs items draws only while it waits for a flight, when nobody else writes.
+    xdist's controller runs no item; there a thread draws, and steps aside when pytest writes.
+    """
+    if not _shown(config):
+        yield
+    elif config.pluginmanager.hasplugin("dsession"):
+        with closing(Line()) as line, Watch(line).watching(run.ledger.path, config):
+            yield
+    elif run.options.workers == 0:
+        # The system flies in this process, where it may print or stop in a debugger.
+        yield
+    else:
+        with closing(Line()) as line:
+            run.tick, run.waited = partial(line.refresh, run.ledger), line.clear
+            yield
+
+
+def text(searches: Sequence[tuple[str, str, int, int]], kinds: Mapping[str, int], s: float) -> str:
+    """Return the line's words after ``s`` seconds, what matters most first."""
+    flown, total = sum(each[2] for each in searches), sum(each[3] for each in searches)
+    words = [f"garl: {flown}/{total} flown"]
+    if 0 < flown < total:
+        words.append(f"{duration((total - flown) * s / flown)} left")
+    if kinds:
+        words.append(" ".join(f"{kind}:{count}" for kind, count in kinds.items()))
+    flying = next((each for each in searches if each[2] < each[3]), None)
+    if flying and len(searches) > 1:
+        words.append(f"{flying[0].split(':')[-1]} on {flying[1]} {flying[2]}/{flying[3]}")
+    if flown and s > 0:
+        words.append(f"{flown / s:.2f} flights/s")
+    return "  ".join(words)
+
+
+def _shown(config: pytest.Config) -> bool:
+    """Say whether this process has a terminal that understands how the line is drawn."""
+    worker = hasattr(config, "workerinput")
+    return not worker and sys.stdout.isatty() and os.environ.get("TERM", "dumb") != "dumb"
+
+
+class Line:
+    """One line below the cursor, on a copy of standard output that pytest does not capture."""
+
+    def __init__(self) -> None:
+        self._terminal = os.dup(sys.stdout.fileno())
+        self._began = self._read = 0.0
+        self._text = ""
+        self._visible = False
+
+    def refresh(self, ledger: Ledger) -> None:
+        """Draw the line if it is not there, or old."""
+        if self.read(ledger) or not self._visible:
+            self.draw()
+
+    def read(self, ledger: Ledger) -> bool:
+        """Read the ledger again if it is time; say whether it was."""
+        now = time.monotonic()
+        if now - self._read < REFRESH_S:
+            return False
+        self._read = now
+        searches = ledger.progress()
+        if searches:
+            self._began = self._began or now
+            self._text = text(searches, ledger.violations(), now - self._began)
+        return True
+
+    def draw(self) -> None:
+        """Draw what was read last."""
+        if self._text:
+            # Make room below without leaving the column, save the place, write, come back.
+            columns = os.get_terminal_size(self._terminal).columns or 80
+            self._write(f"\x1bD\x1bM\x1b7\r\n{self._text[: columns - 1]}\x1b[J\x1b8")
+            self._visible = True
+
+    def clear(self) -> None:
+        """Remove the line, and whatever a resized terminal made of it."""
+        if self._visible:
+            self._write("\x1b[J")
+            self._visible = False
+
+    def close(self) -> None:
+        """Remove the line for good."""
+        self.clear()
+        os.close(self._terminal)
+
+    def _write(self, text: str) -> None:
+        sys.stdout.flush()
+        os.write(self._terminal, text.encode())
+
+
+class Watch:
+    """Draws the line from a thread in xdist's controller."""
+
+    def __init__(self, line: Line) -> None:
+        self._line = line
+        self._lock = threading.Lock()
+        self._stop = threading.Event()
+        self._quiet = False
+
+    @contextmanager
+    def watching(self, ledger: Path, config: pytest.Config) -> Iterator[None]:
+        """Draw until the block ends."""
+        thread = threading.Thread(target=self._draw, args=(ledger,), daemon=True)
+        config.pluginmanager.register(self)
+        thread.start()
+        try:
+            yield
+        finally:
+            self._stop.set()
+            thread.join()
+            config.pluginmanager.unregister(self)
+
+    def _draw(self, path: Path) -> None:
+        try:
+            with closing(Ledger(path)) as ledger:
+                while not self._stop.wait(REFRESH_S):
+                    self._line.read(ledger)
+                    with self._lock:
+                        if not self._quiet:
+                            self._line.draw()
+        except (LedgerError, sqlite3.Error, OSError):
+            return  # a session without the line is better than none
+
+    @pytest.hookimpl(wrapper=True, tryfirst=True)
+    def _step_aside(self) -> Generator[None, Any, Any]:
+        with self._lock:
+            self._line.clear()
+            try:
+                return (yield)
+            finally:
+                self._quiet = False
+                self._line.draw()
+
+    pytest_runtest_logstart = pytest_runtest_logreport = pytest_runtest_logfinish = _step_aside
+
+    @pytest.hookimpl(tryfirst=True, optionalhook=True)
+    def pytest_testnodedown(self) -> None:
+        """Be quiet until the next report: xdist writes of a dead worker outside of any hook."""
+        with self._lock:
+            self._quiet = True
+            self._line.clear()
+
+    pytest_internalerror = pytest_testnodedown
