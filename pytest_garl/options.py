@@ -24,53 +24,79 @@ SLOT_ID = re.compile(r"(?P<map>.+)-g(?P<generation>\d{2,})-s(?P<slot>\d{2,})")
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Option:
-    """One option: its name without ``garl-``, default, and help."""
+    """One option: its name without ``garl-``, default, and what ``--help`` says."""
 
     name: str
-    default: str
+    metavar: str
     help: str
+    default: str = ""
 
 
 OPTIONS = (
     Option(
         name="budget",
-        default="",
-        help="flights per landing system and map; without it only committed cases run",
+        metavar="N",
+        help="Search: fly N scenarios per landing system and map. Without it only committed "
+        "cases are flown, and other tests of landings are skipped.",
     ),
     Option(
-        name="seed", default="0", help="seed of the search, or 'random' (printed in the header)"
+        name="seed",
+        metavar="SEED",
+        default="0",
+        help="Seed of the search; the same seed finds the same. A whole number, or 'random' to "
+        "draw one, which the header prints (default: 0).",
     ),
-    Option(name="method", default="random", help=f"search method: {', '.join(METHODS)}"),
-    Option(name="map", default="", help="fly only on these maps (comma separated)"),
+    Option(
+        name="method",
+        metavar="METHOD",
+        default="random",
+        help=f"How scenarios are proposed: {', '.join(METHODS)} (default: random).",
+    ),
+    Option(
+        name="map",
+        metavar="MAPS",
+        help="Fly only on these of the tests' maps, separated by commas, such as court,lawn "
+        "(default: all).",
+    ),
     Option(
         name="workers",
-        default="",
-        help="child processes that fly; default one per core; "
-        "0 flies in the pytest process, for a debugger",
+        metavar="N",
+        help="Fly in N child processes, whatever the -n of pytest-xdist; 0 flies inside pytest, "
+        "for a debugger (default: one per CPU core).",
     ),
     Option(
         name="weather",
+        metavar="RANGE",
         default="confined",
-        help="'confined' keeps weather genes in [0, 0.15], 'full' lets them reach 1",
+        help="How bad the weather may get: 'confined' keeps its genes in [0, 0.15], 'full' lets "
+        "them reach 1 (default: confined).",
     ),
     Option(
         name="timeout",
+        metavar="SECONDS",
         default="10",
-        help="wall-clock limit in seconds of one call of the landing system",
+        help="Wall-clock time that one call of the landing system may take; beyond that it "
+        "counts as hung (default: 10).",
     ),
     Option(
         name="repeat",
-        default="",
-        help="fly one scenario again: a slot of the last run such as "
-        "court-g03-s17, or a scenario file",
+        metavar="SLOT|FILE",
+        help="Fly one scenario again instead of searching: a slot of the last run, such as "
+        "court-g03-s17, or a scenario file.",
     ),
     Option(
         name="duplicates",
+        metavar="HOW",
         default="xfail",
-        help="'xfail' reports later violations with a known "
-        "signature as xfailed, 'fail' as failures",
+        help="Report further violations with a signature already found in the same search as "
+        "'xfail' or as 'fail' (default: xfail).",
     ),
-    Option(name="npcs", default="waypoint", help=f"who moves the objects: {', '.join(POLICIES)}"),
+    Option(
+        name="npcs",
+        metavar="POLICY",
+        default="waypoint",
+        help=f"Who moves people, dogs and birds: {', '.join(POLICIES)} (default: waypoint).",
+    ),
 )
 
 
@@ -109,11 +135,17 @@ class Options:
 
 def add_options(parser: pytest.Parser) -> None:
     """Register all options and ini keys."""
-    group = parser.getgroup("garl", "search for violations of landing systems (pytest-garl)")
+    group = parser.getgroup("garl", "pytest-garl: search for violations of landing systems")
     for option in OPTIONS:
-        group.addoption(f"--garl-{option.name}", default=None, metavar="X", help=option.help)
-        parser.addini(f"garl_{option.name}", help=option.help, default=option.default)
-    parser.addini("garl_dir", help="folder of ledgers and flights", default=".garl")
+        group.addoption(
+            f"--garl-{option.name}", default=None, metavar=option.metavar, help=option.help
+        )
+        parser.addini(
+            f"garl_{option.name}",
+            help=f"What --garl-{option.name} is where it is not given.",
+            default=option.default,
+        )
+    parser.addini("garl_dir", help="Folder of the ledger and the flights.", default=".garl")
 
 
 def read_options(config: pytest.Config) -> Options:

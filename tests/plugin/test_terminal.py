@@ -1,0 +1,171 @@
+from __future__ import annotations
+
+import fcntl
+import os
+import pty
+import re
+import struct
+import subprocess
+import sys
+import termios
+import xml.etree.ElementTree as ElementTree
+from pathlib import Path
+
+import pytest
+
+from pytest_garl.reports.progress import text
+from pytest_garl.search.ledger import Ledger
+from tests.plugin.test_plugin import project, run
+
+SLOW = """
+import time
+from systems import Good
+
+class Slow(Good):
+    def step(self, observation):
+        time.sleep(0.4)
+        return super().step(observation)
+"""
+LINE = re.compile(r"garl: \d+/5 flown")
+PARALLEL = pytest.mark.parametrize("parallel", [(), ("-n2",)])
+WIDTH = 60
+
+
+def on_a_terminal(pytester: pytest.Pytester, *args: str, term: str = "xterm") -> str:
+    """Run pytest on a terminal of 60 columns; return what it wrote."""
+    ours, theirs = pty.openpty()
+    fcntl.ioctl(theirs, termios.TIOCSWINSZ, struct.pack("HHHH", 24, WIDTH, 0, 0))
+    command = [sys.executable, "-m", "pytest", "-p", "no:cacheprovider", "--tb=no", *args]
+    environment = {k: v for k, v in os.environ.items() if k not in ("COLUMNS", "LINES")}
+    child = subprocess.Popen(
+        command,
+        cwd=pytester.path,
+        env={**environment, "TERM": term},
+        stdin=subprocess.DEVNULL,
+        stdout=theirs,
+        stderr=subprocess.STDOUT,
+    )
+    os.close(theirs)
+    written = b""
+    try:
+        while data := os.read(ours, 4096):
+            written += data
+    except OSError:
+        pass  # how Linux tells that the other end is closed
+    finally:
+        os.close(ours)
+        child.wait()
+    return written.decode()
+
+
+def screen(written: str) -> list[str]:
+    """Return the rows that a terminal shows, which is long enough never to scroll."""
+    rows: dict[int, str] = {}
+    row = column = 0
+    saved = (0, 0)
+    for token in re.findall(r"\x1b\[[0-9;]*[A-Za-z]|\x1b.|.", written, re.DOTALL):
+        if token == "\r":
+            column = 0
+        elif token in ("\n", "\x1bD"):
+            row += 1
+        elif token == "\x1bM":
+            row -= 1
+        elif token == "\x1b7":
+            saved = row, column
+        elif token == "\x1b8":
+            row, column = saved
+        elif token == "\x1b[J":
+            rows = {at: line for at, line in rows.items() if at <= row}
+            rows[row] = rows.get(row, "")[:column]
+        elif not token.startswith("\x1b"):
+            line = rows.get(row, "").ljust(column)
+            rows[row] = line[:column] + token + line[column + 1 :]
+            column += 1
+        else:
+            assert token.endswith("m"), f"not modelled: {token!r}"
+    return [rows.get(at, "") for at in range(max(rows) + 1)]
+
+
+def slow_project(pytester: pytest.Pytester) -> None:
+    project(pytester, "Slow")
+    pytester.makepyfile(slow=SLOW)
+    test = pytester.path / "test_it.py"
+    test.write_text(test.read_text().replace("from systems import *", "from slow import Slow"))
+
+
+@pytest.mark.parametrize("args", [("-q",), ("-v",), ("-q", "-n2"), ("-v", "-n2")])
+def test_the_progress_line_comes_and_goes(pytester: pytest.Pytester, args: tuple[str, ...]) -> None:
+    slow_project(pytester)
+    written = on_a_terminal(pytester, "--garl-budget=5", "--garl-workers=1", "--no-summary", *args)
+    during = screen(written[: [match.end() for match in LINE.finditer(written)][-1]])
+    assert LINE.match(during[-1]), "the line is the last on the screen"
+    drawn = re.findall(r"\r\n(garl: [^\x1b\r\n]*)\x1b", written)
+    assert len(set(drawn)) > 2
+    assert all(len(line) < WIDTH for line in drawn)
+    after = "\n".join(screen(written))
+    assert not LINE.search(after)
+    assert "flights/s" not in after
+    assert re.search(r"^=* ?.*\d+ passed.* in [\d.]+s", after, re.MULTILINE)
+
+
+@pytest.mark.parametrize(
+    ("args", "term"),
+    [(("--garl-workers=1",), "dumb"), (("--garl-workers=0",), "xterm")],
+    ids=["dumb", "in-process"],
+)
+def test_no_line_where_it_would_disturb(
+    pytester: pytest.Pytester, args: tuple[str, ...], term: str
+) -> None:
+    slow_project(pytester)
+    written = on_a_terminal(pytester, "--garl-budget=2", "-q", *args, term=term)
+    assert "garl: violations" in written
+    assert not re.search(r"\d flown  ", written)
+    assert "\x1b7" not in written
+
+
+def test_the_line_names_what_matters_first() -> None:
+    two = [("m:A", "court", 3, 4), ("m:B", "lawn", 1, 4)]
+    assert text(two, {"I": 2, "IV": 1}, 8.0) == (
+        "garl: 4/8 flown  8 s left  I:2 IV:1  A on court 3/4  0.50 flights/s"
+    )
+    assert text([("m:A", "court", 0, 4)], {}, 0.0) == "garl: 0/4 flown"
+
+
+@PARALLEL
+def test_lf_flies_exactly_the_failing_slots_again(
+    pytester: pytest.Pytester, parallel: tuple[str, ...]
+) -> None:
+    project(pytester)
+    args = ("--garl-budget=24", "--garl-workers=1", "-rf", *parallel)
+
+    def failed(result: pytest.RunResult) -> set[str]:
+        return {line.split(" - ")[0] for line in result.outlines if line.startswith("FAILED")}
+
+    first = failed(pytester.runpytest_subprocess(*args))
+    assert len(first) == 2
+    result = pytester.runpytest_subprocess(*args, "--lf")
+    result.assert_outcomes(failed=2)
+    assert failed(result) == first
+    ledger = Ledger(pytester.path / ".garl" / "ledger.sqlite")
+    flown = {f"lawn-g{each[2]:02d}-s{each[3]:02d}" for each in ledger.results()}
+    ledger.close()
+    assert flown == {re.findall(r"\[(.+)\]", line)[0] for line in first}
+
+
+@PARALLEL
+def test_junit_carries_what_was_found(pytester: pytest.Pytester, parallel: tuple[str, ...]) -> None:
+    project(pytester)
+    run(pytester, "--garl-budget=8", "--garl-workers=1", "--junitxml=out.xml", *parallel)
+    cases = list(ElementTree.parse(Path(pytester.path) / "out.xml").iter("testcase"))
+    assert len(cases) == 24
+    for case in cases:
+        found = {each.get("name"): each.get("value", "") for each in case.iter("property")}
+        assert set(found) == {
+            "garl.slot",
+            "garl.outcome",
+            "garl.signature",
+            "garl.final_distance_m",
+            "garl.elapsed_s",
+        }
+        assert f"[{found['garl.slot']}]" in str(case.get("name"))
+        assert float(found["garl.elapsed_s"]) == 14.2
