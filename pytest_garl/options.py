@@ -135,14 +135,14 @@ class Options:
 
 def add_options(parser: pytest.Parser) -> None:
     """Register all options and ini keys."""
-    group = parser.getgroup("garl", "pytest-garl: search for violations of landing systems")
+    group = parser.getgroup("garl", "search for violations of landing systems (pytest-garl)")
     for option in OPTIONS:
         group.addoption(
             f"--garl-{option.name}", default=None, metavar=option.metavar, help=option.help
         )
         parser.addini(
             f"garl_{option.name}",
-            help=f"What --garl-{option.name} is where it is not given.",
+            help=f"Value of --garl-{option.name} where the command line gives none.",
             default=option.default,
         )
     parser.addini("garl_dir", help="Folder of the ledger and the flights.", default=".garl")
