@@ -121,7 +121,7 @@ class Watch:
 
     def __init__(self, line: Line) -> None:
         self._line = line
-        self._lock = threading.Lock()
+        self._lock = threading.RLock()
         self._stop = threading.Event()
         self._quiet = False
 
@@ -144,8 +144,7 @@ class Watch:
                 while not self._stop.wait(REFRESH_S):
                     self._line.read(ledger)
                     with self._lock:
-                        if not self._quiet:
-                            self._line.draw()
+                        self._redraw()
         except (LedgerError, sqlite3.Error, OSError):
             return  # a session without the line is better than none
 
@@ -156,16 +155,26 @@ class Watch:
             try:
                 return (yield)
             finally:
-                self._quiet = False
-                self._line.draw()
+                self._redraw()
 
     pytest_runtest_logstart = pytest_runtest_logreport = pytest_runtest_logfinish = _step_aside
 
     @pytest.hookimpl(tryfirst=True, optionalhook=True)
-    def pytest_testnodedown(self) -> None:
-        """Be quiet until the next report: xdist writes of a dead worker outside of any hook."""
+    def pytest_testnodedown(self, error: object) -> None:
+        """Do without the line once a worker died: xdist then writes outside of any hook."""
+        if error:
+            self._give_up()
+
+    @pytest.hookimpl(tryfirst=True)
+    def pytest_internalerror(self) -> None:
+        """Do without the line from here on."""
+        self._give_up()
+
+    def _give_up(self) -> None:
         with self._lock:
             self._quiet = True
             self._line.clear()
 
-    pytest_internalerror = pytest_testnodedown
+    def _redraw(self) -> None:
+        if not self._quiet:
+            self._line.draw()

@@ -123,6 +123,21 @@ def test_no_line_where_it_would_disturb(
     assert "\x1b7" not in written
 
 
+def test_a_dead_worker_leaves_no_litter(pytester: pytest.Pytester) -> None:
+    slow_project(pytester)
+    pytester.makeconftest(
+        "import os\nfrom tiny_simulator import fly\n"
+        "def pytest_garl_fly(config): return fly\n"
+        "def pytest_runtest_teardown(item): 's02' in item.name and os._exit(4)\n"
+    )
+    only = ("-k", "test_time", "--max-worker-restart=1")
+    written = on_a_terminal(pytester, "--garl-budget=5", "--garl-workers=1", "-n2", *only)
+    assert LINE.search(written)
+    rows = [row.rstrip() for row in screen(written)]
+    assert any(re.fullmatch(r"replacing crashed worker gw\d", row) for row in rows)
+    assert not any(LINE.search(row) for row in rows)
+
+
 def test_the_line_names_what_matters_first() -> None:
     two = [("m:A", "court", 3, 4), ("m:B", "lawn", 1, 4)]
     assert text(two, {"I": 2, "IV": 1}, 8.0) == (
