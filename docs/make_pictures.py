@@ -53,7 +53,7 @@ def main() -> None:
     folder = Path(__file__).parent / "pictures"
     folder.mkdir(exist_ok=True)
     for name in ("court", "lawn"):
-        picture = cv2.cvtColor(sheet(name), cv2.COLOR_RGB2BGR)
+        picture = cv2.cvtColor(sheet(name) & 0xF8, cv2.COLOR_RGB2BGR)  # five bits pack better
         cv2.imwrite(str(folder / f"{name}.png"), picture, [cv2.IMWRITE_PNG_COMPRESSION, 9])
 
 

@@ -65,7 +65,7 @@ class Airframe:
     ``latency_s`` is the delay between an image and the command that it leads to.
     ``control_rate_hz`` is how often ``control`` is asked for motor thrusts; ``None``
     means that the simulator's own simple flight control follows the commands.  The
-    defaults are those of the DJI Matrice 100 (see ``simulation/vehicle.py``).
+    mass and size are those of the DJI Matrice 100 (see ``simulation/vehicle.py``).
     """
 
     mass_kg: float = 2.355

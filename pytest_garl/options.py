@@ -11,13 +11,15 @@ from typing import TYPE_CHECKING, Any, Literal, cast
 
 import pytest
 
+from pytest_garl.search.slots import population
+
 if TYPE_CHECKING:
     from pytest_garl.run import Target
     from pytest_garl.scenarios.genes import WeatherRange
 
 RUN = pytest.StashKey[Any]()
 """Where a session keeps its run; none if nothing is to be flown."""
-METHODS = ("random",)
+METHODS = ("garl", "garl-paper", "random")
 POLICIES = ("waypoint", "random_walk", "stationary")
 SLOT_ID = re.compile(r"(?P<map>.+)-g(?P<generation>\d{2,})-s(?P<slot>\d{2,})")
 
@@ -49,8 +51,13 @@ OPTIONS = (
     Option(
         name="method",
         metavar="METHOD",
-        default="random",
-        help=f"How scenarios are proposed: {', '.join(METHODS)} (default: random).",
+        default="garl",
+        help=f"How scenarios are proposed: {', '.join(METHODS)} (default: garl).",
+    ),
+    Option(
+        name="population",
+        metavar="N",
+        help="Scenarios that are bred at a time (default: a tenth of the budget, 8 to 20).",
     ),
     Option(
         name="map",
@@ -107,6 +114,8 @@ class Options:
     budget: int
     seed: int
     method: str
+    population: int
+    resume: bool
     maps: tuple[str, ...]
     workers: int
     weather: WeatherRange
@@ -145,14 +154,23 @@ def add_options(parser: pytest.Parser) -> None:
             help=f"Value of --garl-{option.name} where the command line gives none.",
             default=option.default,
         )
+    group.addoption(
+        "--garl-resume",
+        action="store_true",
+        help="Continue the interrupted run in the ledger; everything else must be as it was.",
+    )
     parser.addini("garl_dir", help="Folder of the ledger and the flights.", default=".garl")
 
 
 def read_options(config: pytest.Config) -> Options:
     """Return the options; raise UsageError that says what was found and what is expected."""
     text = {option.name: _value(config, option) for option in OPTIONS}
+    budget = _integer("budget", text["budget"], 1) if text["budget"] else 0
+    size = _integer("population", text["population"], 1) if text["population"] else 0
     return Options(
-        budget=_integer("budget", text["budget"], 1) if text["budget"] else 0,
+        budget=budget,
+        population=min(size, budget) if size else population(budget),
+        resume=bool(config.getoption("--garl-resume")),
         seed=_seed(config, text["seed"]),
         method=_among("method", text["method"], METHODS),
         maps=tuple(part.strip() for part in text["map"].split(",") if part.strip()),

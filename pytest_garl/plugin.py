@@ -74,6 +74,11 @@ def pytest_collection_finish(session: pytest.Session) -> None:
     run = session.config.stash.get(RUN, None)
     if run is not None:
         run.select(session.items)
+        if run.options.resume:
+            try:
+                run.check_resumed()
+            except GarlError as error:
+                raise pytest.UsageError(str(error)) from error
 
 
 @pytest.hookimpl(wrapper=True, trylast=True)
@@ -140,6 +145,13 @@ def pytest_sessionfinish(session: pytest.Session) -> None:
     run = session.config.stash.get(RUN, None)
     if run is not None:
         run.pool.close()
+
+
+def pytest_unconfigure(config: pytest.Config) -> None:
+    """Leave the ledger to others."""
+    run = config.stash.get(RUN, None)
+    if run is not None:
+        run.close()
 
 
 @pytest.hookimpl(optionalhook=True)

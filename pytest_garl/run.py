@@ -6,22 +6,25 @@ import dataclasses
 import hashlib
 import json
 import sys
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TextIO
 
 import pytest
 
-from pytest_garl.errors import GarlError
+from pytest_garl.errors import GarlError, LedgerError
 from pytest_garl.options import SLOT_ID, Options, target_of
 from pytest_garl.search.ledger import Ledger
 from pytest_garl.search.pool import Pool
-from pytest_garl.search.reference import Reference, check_system, reference_to
-from pytest_garl.search.slots import Slot, population, slots
+from pytest_garl.search.reference import Reference, check_system, reference_to, sources_sha256
+from pytest_garl.search.slots import Slot, slots
 
 if TYPE_CHECKING:
     from pytest_garl.scenarios.scenario import Scenario
+    from pytest_garl.search.breeder import Breeder
+    from pytest_garl.search.job import Job
+    from pytest_garl.search.method import Flown, Method
     from pytest_garl.simulation.policy import PolicySpec
     from pytest_garl.verdicts.verdict import Limits
 
@@ -69,7 +72,8 @@ class Run:
     """Called when the waiting is over."""
     items: dict[str, dict[Slot, list[str]]] = field(default_factory=dict)
     targets: dict[str, dict[Slot, Target]] = field(default_factory=dict)
-    registered: set[str] = field(default_factory=set)
+    breeders: dict[str, Breeder] = field(default_factory=dict)
+    lock: TextIO | None = None
 
     def select(self, items: list[pytest.Item]) -> None:
         """Remember which slots the selected items want."""
@@ -79,6 +83,30 @@ class Run:
                 wanted = self.items.setdefault(target.search, {})
                 wanted.setdefault(target.slot, []).append(item.nodeid)
                 self.targets.setdefault(target.search, {})[target.slot] = target
+
+    def check_resumed(self) -> None:
+        """Raise LedgerError if a search to resume flew something else."""
+        from pytest_garl.search.job import loads
+
+        for search, wanted in self.targets.items():
+            target = next(iter(wanted.values()))
+            text = self.ledger.job(search)
+            if text is not None:
+                then = loads(text)
+                differing = self._job(target, then.npcs).differences(then)
+                if differing:
+                    raise LedgerError(
+                        f"--garl-resume: {target.system.__qualname__} on {target.map} is not what "
+                        f"it was: {', '.join(differing)} changed; run without --garl-resume to "
+                        "begin anew"
+                    )
+
+    def close(self) -> None:
+        """End the flying children and let others have the ledger."""
+        self.pool.close()
+        self.ledger.close()
+        if self.lock is not None:
+            self.lock.close()
 
     def first_item(self, target: Target) -> str:
         """Return the node id of the first selected item of a slot."""
@@ -90,7 +118,7 @@ class Run:
         try:
             for slot in sorted(self.items[target.search]):
                 if slot <= target.slot:
-                    self.pool.wait(target.search, slot, self.tick)
+                    self.pool.wait(target.search, slot, self._advance)
         finally:
             self.waited()
         result = self.ledger.result(target.search, target.slot.generation, target.slot.index)
@@ -107,22 +135,50 @@ class Run:
                 return slot.id(target.map)
         return ""
 
+    def _advance(self) -> None:
+        """Breed what can be bred, so that the pool has work ahead of the items."""
+        for breeder in self.breeders.values():
+            breeder.advance()
+        self.tick()
+
     def _register(self, target: Target, npcs: PolicySpec) -> None:
         """Put this search, and the others of the same system, into the ledger."""
         for search, wanted in self.targets.items():
             sample = next(iter(wanted.values()))
-            if search not in self.registered and sample.system is target.system:
-                self.registered.add(search)
+            if search not in self.breeders and sample.system is target.system:
                 self._add(search, wanted, npcs)
 
     def _add(self, search: str, wanted: Mapping[Slot, Target], npcs: PolicySpec) -> None:
-        from pytest_garl.scenarios.maps import load_map
-        from pytest_garl.search.job import Job, dump_scenario
+        from pytest_garl.search.breeder import Breeder
+        from pytest_garl.search.job import loads
 
         target = next(iter(wanted.values()))
+        job = self._job(target, npcs)
+        name = f"{job.system.module}:{job.system.qualname}"
+        slots: dict[int, list[int]] = {}
+        for slot in sorted(wanted):
+            slots.setdefault(slot.generation, []).append(slot.index)
+        method = self._method(wanted)
+        flights = len(wanted)
+        if method.learns:
+            flights = max(slots) * self.options.population + len(slots[max(slots)])
+        self.ledger.add_search(search, name, target.map, flights, job.dumps())
+        known = self.ledger.job(search)
+        if known is not None and job.differences(loads(known)):
+            raise LedgerError(
+                f"{name} on {target.map}: two sets of tests fly the same search with different "
+                f"{', '.join(job.differences(loads(known)))}"
+            )
+        self.breeders[search] = Breeder(self.ledger, search, method, slots)
+
+    def _job(self, target: Target, npcs: PolicySpec) -> Job:
+        from pytest_garl.scenarios.maps import load_map
+        from pytest_garl.search.job import Job
+
         map = load_map(target.map, self.options.map_folders)
-        job = Job(
+        return Job(
             system=reference_to(target.system),
+            system_sha256=sources_sha256(target.system),
             simulator=self.simulator,
             map=map.name,
             map_sha256=map.sha256,
@@ -133,30 +189,42 @@ class Run:
             path=tuple(_path()),
             flights=str(self.options.folder / "flights"),
         )
-        scenarios = self._scenarios(wanted)
-        rows = [
-            (slot.generation, slot.index, dump_scenario(scenario))
-            for slot, scenario in scenarios.items()
-        ]
-        name = f"{job.system.module}:{job.system.qualname}"
-        self.ledger.add_search(search, name, map.name, self.options.budget, job.dumps(), rows)
 
-    def _scenarios(self, wanted: Mapping[Slot, Target]) -> dict[Slot, Scenario]:
+    def _method(self, wanted: Mapping[Slot, Target]) -> Method:
         from pytest_garl.scenarios.genes import genome_for
         from pytest_garl.scenarios.maps import load_map
-        from pytest_garl.search.random_search import propose
+        from pytest_garl.search.method import Plan
+        from pytest_garl.search.methods import make_method
 
-        target = next(iter(wanted.values()))
         if self.options.repeat:
-            return {slot: repeated(self.options, each) for slot, each in wanted.items()}
-        map = load_map(target.map, self.options.map_folders)
-        genome = genome_for(map, weather=self.options.weather)
-        size = population(self.options.budget)
-        bred = {
-            generation: propose(map, genome, self.options.seed, generation, size)
-            for generation in sorted({slot.generation for slot in wanted})
-        }
-        return {slot: bred[slot.generation][slot.index] for slot in sorted(wanted)}
+            return _Repeat({slot: repeated(self.options, each) for slot, each in wanted.items()})
+        map = load_map(next(iter(wanted.values())).map, self.options.map_folders)
+        plan = Plan(
+            map=map,
+            genome=genome_for(map, weather=self.options.weather),
+            seed=self.options.seed,
+            population=self.options.population,
+        )
+        return make_method(self.options.method, plan)
+
+
+class _Repeat:
+    """Proposes the one scenario that is repeated, in whatever slot it has."""
+
+    learns = False
+
+    def __init__(self, scenarios: Mapping[Slot, Scenario]) -> None:
+        self._scenarios, self._generation = scenarios, -1
+
+    def ask(self) -> Sequence[Scenario]:
+        self._generation += 1
+        first = next(iter(self._scenarios.values()))
+        size = 1 + max(slot.index for slot in self._scenarios)
+        slots = [Slot(generation=self._generation, index=index) for index in range(size)]
+        return [self._scenarios.get(slot, first) for slot in slots]
+
+    def tell(self, flown: Sequence[Flown]) -> Sequence[tuple[float, ...]]:
+        return ()
 
 
 def targets_for(marker: pytest.Mark, options: Options) -> list[Target]:
@@ -169,7 +237,7 @@ def targets_for(marker: pytest.Mark, options: Options) -> list[Target]:
         else:
             found += [
                 Target(system=system, map=map, limits=limits, slot=slot)
-                for slot in slots(options.budget)
+                for slot in slots(options.budget, options.population)
             ]
     return found
 

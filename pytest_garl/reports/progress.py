@@ -18,7 +18,7 @@ import pytest
 from pytest_garl.errors import LedgerError
 from pytest_garl.reports.terminal import duration
 from pytest_garl.run import Run
-from pytest_garl.search.ledger import Ledger
+from pytest_garl.search.ledger import Ledger, Progress
 
 REFRESH_S = 0.5
 
@@ -44,20 +44,32 @@ def live(run: Run, config: pytest.Config) -> Iterator[None]:
             yield
 
 
-def text(searches: Sequence[tuple[str, str, int, int]], kinds: Mapping[str, int], s: float) -> str:
+def text(
+    searches: Sequence[Progress],
+    kinds: Mapping[str, int],
+    nearest: Mapping[str, tuple[float, str]],
+    s: float,
+) -> str:
     """Return the line's words after ``s`` seconds, what matters most first."""
-    flown, total = sum(each[2] for each in searches), sum(each[3] for each in searches)
+    flown, total = sum(each.flown for each in searches), sum(each.all for each in searches)
     words = [f"garl: {flown}/{total} flown"]
     if 0 < flown < total:
         words.append(f"{duration((total - flown) * s / flown)} left")
     if kinds:
         words.append(" ".join(f"{kind}:{count}" for kind, count in kinds.items()))
-    flying = next((each for each in searches if each[2] < each[3]), None)
-    if flying and len(searches) > 1:
-        words.append(f"{flying[0].split(':')[-1]} on {flying[1]} {flying[2]}/{flying[3]}")
+    flying = next((each for each in searches if each.flown < each.all), None)
+    if flying:
+        where = f"{flying.system.split(':')[-1]} on {flying.map}"
+        words.append(f"{where} g{flying.generation:02d} {flying.flown}/{flying.all}")
     if flown and s > 0:
         words.append(f"{flown / s:.2f} flights/s")
+    margins = [f"{name} {nearest[name][0]:.2g} {nearest[name][1]}" for name in _SHOWN & {*nearest}]
+    if margins:
+        words.append("nearest " + ", ".join(sorted(margins)))
     return "  ".join(words)
+
+
+_SHOWN = {"distance", "time", "collision"}
 
 
 def _shown(config: pytest.Config) -> bool:
@@ -89,7 +101,7 @@ class Line:
         searches = ledger.progress()
         if searches:
             self._began = self._began or now
-            self._text = text(searches, ledger.violations(), now - self._began)
+            self._text = text(searches, ledger.violations(), ledger.nearest(), now - self._began)
         return True
 
     def draw(self) -> None:

@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+import fcntl
+import os
 import sys
 from importlib.metadata import version
-from typing import Any
+from pathlib import Path
+from typing import Any, TextIO
 
 import pytest
 
+from pytest_garl.errors import LedgerError
 from pytest_garl.options import Options
 from pytest_garl.run import Run
 from pytest_garl.search.ledger import Ledger
@@ -19,31 +23,66 @@ BUILT_IN = Reference(module="pytest_garl.simulation.fly", file="", qualname="fly
 
 def begin_run(config: pytest.Config, options: Options) -> Run:
     """Return this process's part of the run; the ledger is made by the first process alone."""
+    lock = None
     if hasattr(config, "workerinput"):
         ledger = Ledger(options.ledger)
     else:
+        lock = _lock(options.ledger)
         facts: dict[str, Any] = {
             "version": version("pytest-garl"),
             "python": sys.version.split()[0],
             "seed": options.seed,
             "budget": options.budget,
             "method": options.method,
+            "population": options.population,
+            "map": ",".join(options.maps),
             "weather": options.weather,
             "npcs": options.npcs,
         }
         earlier = _seconds_per_flight(options)
+        if options.resume:
+            ledger = Ledger.resume(options.ledger, facts)
+        else:
+            ledger = Ledger.create(options.ledger, facts)
         if earlier:
-            facts["seconds_per_flight"] = earlier
-        ledger = Ledger.create(options.ledger, facts)
+            ledger.note_fact("seconds_per_flight", earlier)
     own = config.hook.pytest_garl_fly(config=config)
     run = Run(
         options=options,
         ledger=ledger,
         pool=Pool(ledger, options.workers),
         simulator=reference_to(own) if own else BUILT_IN,
+        lock=lock,
     )
     run.flight_s = _or_default(ledger)
     return run
+
+
+def _lock(ledger: Path) -> TextIO:
+    """Keep other runs out of the folder until the file is closed, or this process is gone."""
+    path = ledger.with_suffix(".lock")
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        file = path.open("a+", encoding="utf-8")
+    except OSError as error:
+        raise LedgerError(
+            f"{ledger}: cannot be written ({error}); choose another folder with the ini key "
+            "garl_dir"
+        ) from error
+    try:
+        fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except OSError as error:
+        file.seek(0)
+        owner = file.read().strip() or "unknown"
+        file.close()
+        raise LedgerError(
+            f"{ledger}: another run is using this folder (process {owner}); wait for it, or choose "
+            "another folder with the ini key garl_dir"
+        ) from error
+    file.truncate(0)
+    file.write(str(os.getpid()))
+    file.flush()
+    return file
 
 
 def _seconds_per_flight(options: Options) -> float | None:

@@ -35,6 +35,7 @@ def summary(reporter: Any, run: Run) -> None:
     reporter.section("garl: violations", sep="=")
     for (system, map), flown in groups.items():
         _table(reporter, system, map, flown)
+    reporter.write_line(_spent(run.ledger.meters()))
     reporter.write_line(f"ledger: {run.ledger.path}  results {run.ledger.result_hash()[:16]}")
 
 
@@ -61,6 +62,15 @@ def _table(reporter: Any, system: str, map: str, flown: list[tuple[Slot, dict[st
     for signature, cases in sorted(found.items(), key=lambda item: (-len(item[1]), item[0])):
         first = cases[0][0].id(map)
         reporter.write_line(f"  {len(cases):4d}  {signature:<40}  --garl-repeat={first}")
+
+
+def _spent(meters: dict[str, float]) -> str:
+    """Return what the run cost beside the budget."""
+    flying, idle = meters.get("flying_s", 0.0), meters.get("idle_s", 0.0)
+    words = f"flights: {meters.get('flights', 0):.0f}, flown again {meters.get('retried', 0):.0f}"
+    if flying + idle > 0:
+        words += f", workers idle {100 * idle / (flying + idle):.0f} %"
+    return words
 
 
 def _percent(count: int, total: int) -> str:

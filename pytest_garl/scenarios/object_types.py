@@ -52,7 +52,7 @@ def _blob(
 
 _JACKET, _TROUSERS, _SKIN, _HAIR = (178, 44, 40), (42, 50, 78), (214, 170, 140), (60, 42, 30)
 _PERSON = (
-    # Segment lengths as shares of a stature of 1.75 m (Drillis and Contini 1966).
+    # Segment lengths roughly after Drillis and Contini (1966), stature 1.75 m.
     _limb(0.86, 0.15, (0.13, 0.10, 0.44), _TROUSERS, pitch_rad=-0.30),
     _limb(0.86, 0.15, (-0.13, -0.10, 0.44), _TROUSERS, pitch_rad=0.30),
     Part(shape="box", size_m=(0.24, 0.42, 0.60), position_m=(0.0, 0.0, 1.15), colour=_JACKET),
@@ -105,10 +105,11 @@ OBJECT_TYPES: Mapping[str, ObjectType] = MappingProxyType(
             ),
             ObjectType(
                 name="dog",
-                # Between a fast trot and a slow gallop of a medium dog, whose
-                # trot-to-gallop transition lies near 4 m/s (Heglund and Taylor 1988).
+                # A slow gallop of a medium dog; trot turns to gallop at some 3 to 4 m/s
+                # (it scales with mass^0.2: Heglund and Taylor 1988).
                 top_speed_mps=5.0,
-                # Engineering estimate: a quarter of a dog's sprinting start.
+                # Engineering estimate: well below a sprinting start, which pitching limits
+                # (Williams et al. 2009).
                 acceleration_mps2=5.0,
                 radius_m=0.58,
                 height_m=0.70,
@@ -117,9 +118,10 @@ OBJECT_TYPES: Mapping[str, ObjectType] = MappingProxyType(
             ),
             ObjectType(
                 name="bird",
-                # Slow flight of a gull; its cruise is about 11 to 13 m/s
+                # Slow flight of a gull; its cruise is about 12 to 13 m/s
                 # (Alerstam et al. 2007), which no bird keeps up circling over a court.
                 top_speed_mps=8.0,
+                # Engineering estimate: a turn of 10 m radius at top speed.
                 acceleration_mps2=6.0,
                 radius_m=0.72,
                 height_m=0.20,

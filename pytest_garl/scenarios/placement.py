@@ -16,7 +16,7 @@ MARKER_DICTIONARY = "DICT_5X5_50"
 TOP_WIND_MPS = 10.0
 """The DJI Matrice 100's rated wind resistance."""
 TOP_GPS_ERROR_M = 2.5
-"""Horizontal accuracy (CEP) that u-blox states for its M8 standard-precision receivers."""
+"""Horizontal accuracy (CEP) that u-blox states for its M8 receivers; here a bound per axis."""
 
 
 def square_to_disc(x: float, y: float) -> tuple[float, float]:

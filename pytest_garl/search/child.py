@@ -7,6 +7,7 @@ import faulthandler
 import os
 import signal
 import sys
+import threading
 import time
 from pathlib import Path
 from typing import TextIO
@@ -18,6 +19,7 @@ THREADS = dict.fromkeys(
     ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "OPENCV_FOR_THREADS_NUM"), "1"
 )
 IDLE_S = 0.02
+BEAT_S = 5.0
 ALONE_FACTOR = 3.0
 _PR_SET_PDEATHSIG = 1
 
@@ -46,6 +48,14 @@ def dump_file(folder: Path, pid: int) -> Path:
     return folder / f"child-{pid}.txt"
 
 
+def _beat(path: Path) -> None:
+    """Renew this process's claims for ever; the process's end ends it."""
+    ledger = Ledger(path)
+    while True:
+        time.sleep(BEAT_S)
+        ledger.renew()
+
+
 def main(path: str) -> None:
     """Fly until the parent process is gone."""
     parent = os.getppid()
@@ -58,6 +68,8 @@ def main(path: str) -> None:
     cv2.setNumThreads(1)
     assert all(os.environ.get(name) == value for name, value in THREADS.items())
     ledger = Ledger(Path(path))
+    threading.Thread(target=_beat, args=(Path(path),), daemon=True).start()
+    idle_since = time.monotonic()
     with dump_file(Path(path).parent, os.getpid()).open("w") as words:
         watchdog = Watchdog(words)
         while os.getppid() == parent:
@@ -65,17 +77,19 @@ def main(path: str) -> None:
             if claim is None:
                 time.sleep(IDLE_S)
                 continue
+            ledger.count("idle_s", time.monotonic() - idle_since)
             job = loads(claim.job)
-            watchdog.limit_s = job.timeout_s * (ALONE_FACTOR if claim.alone else 1.0)
+            watchdog.limit_s = job.timeout_s * (ALONE_FACTOR if claim.after else 1.0)
             name = Slot(generation=claim.generation, index=claim.slot).id(job.map)
             slot_id = f"{claim.search[:8]}-{name}"
             result, sha256, wall_s = fly_job(job, load_scenario(claim.scenario), slot_id, watchdog)
-            if claim.alone:
+            if claim.after == "hung":
                 # It hung once and not again: the machine's doing as likely as the system's.
                 text = f"one call took longer than {job.timeout_s:g} s once, but not again"
                 distance = float(result["final_distance_m"])
                 result = broken_result("hung", "Timeout", text, "", distance, inconclusive=True)
             ledger.record(claim, result, sha256, wall_s)
+            idle_since = time.monotonic()
 
 
 if __name__ == "__main__":

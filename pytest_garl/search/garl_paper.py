@@ -14,7 +14,7 @@ from pytest_garl.search.operators import farthest_from_all
 
 def method(plan: Plan) -> Nsga2:
     """Return the search; populations of 20 and rates of 0.2 as in the paper."""
-    return Nsga2("garl-paper", plan, objectives, farthest_from_all)
+    return Nsga2("garl-paper", plan, objectives, 3, farthest_from_all)
 
 
 def objectives(chromosomes: Matrix, flown: Sequence[Flown]) -> Matrix:

@@ -23,6 +23,7 @@ class Job:
     """Everything but the scenario, as it stands in the ledger."""
 
     system: Reference
+    system_sha256: str
     simulator: Reference
     map: str
     map_sha256: str
@@ -32,6 +33,13 @@ class Job:
     timeout_s: float
     path: tuple[str, ...]
     flights: str
+
+    def differences(self, other: Job) -> tuple[str, ...]:
+        """Return what makes results of ``other`` not comparable to this one's."""
+        mine, theirs = dataclasses.asdict(self), dataclasses.asdict(other)
+        # Where things lie may change; what is flown may not.
+        indifferent = {"path", "flights", "map_folders"}
+        return tuple(key for key in mine if key not in indifferent and mine[key] != theirs[key])
 
     def dumps(self) -> str:
         """Return it as JSON."""

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import contextlib
 import hashlib
 import json
 import os
+import re
 import sqlite3
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -15,32 +17,54 @@ from typing import Any
 
 from pytest_garl.errors import LedgerError
 
+VERSION = 2
+"""Of the tables below; a ledger of another version is not continued."""
 SCHEMA = """
 CREATE TABLE run (key TEXT PRIMARY KEY, value TEXT NOT NULL);
 CREATE TABLE search (
-    id TEXT PRIMARY KEY, system TEXT NOT NULL, map TEXT NOT NULL, budget INTEGER NOT NULL,
+    id TEXT PRIMARY KEY, system TEXT NOT NULL, map TEXT NOT NULL, wanted INTEGER NOT NULL,
     job TEXT NOT NULL
 );
 CREATE TABLE slot (
     search TEXT NOT NULL, generation INTEGER NOT NULL, slot INTEGER NOT NULL,
-    scenario TEXT NOT NULL, state TEXT NOT NULL DEFAULT 'waiting', pid INTEGER,
-    attempts INTEGER NOT NULL DEFAULT 0, result TEXT, sha256 TEXT, wall_s REAL,
+    scenario TEXT NOT NULL, state TEXT NOT NULL DEFAULT 'waiting', pid INTEGER, lease REAL,
+    attempts INTEGER NOT NULL DEFAULT 0, result TEXT, objectives TEXT, sha256 TEXT, wall_s REAL,
     PRIMARY KEY (search, generation, slot)
 );
-CREATE TABLE seat (pid INTEGER PRIMARY KEY);
+CREATE TABLE seat (pid INTEGER PRIMARY KEY, owner INTEGER NOT NULL);
+CREATE TABLE meter (name TEXT PRIMARY KEY, value REAL NOT NULL);
 """
+_ADDRESS = re.compile(r"0x[0-9a-f]+")
+LEASE_S = 30.0
+"""A claim that is not renewed for so long is free again: its process hangs or its id was given
+to another."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Claim:
-    """One slot that this process shall fly; ``alone`` after it hung once."""
+    """One slot that this process shall fly.
+
+    ``after`` is what its first flight did to its process, "hung" or "died"; then it is
+    flown once more, alone.
+    """
 
     search: str
     generation: int
     slot: int
     scenario: str
     job: str
-    alone: bool
+    after: str
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Progress:
+    """How far a search is: slots flown of all, and the latest generation bred."""
+
+    system: str
+    map: str
+    flown: int
+    all: int
+    generation: int
 
 
 class Ledger:
@@ -56,21 +80,59 @@ class Ledger:
             raise LedgerError(f"{path}: cannot be opened as a ledger: {error}") from error
 
     @classmethod
-    def create(cls, path: Path, run: dict[str, Any]) -> Ledger:
-        """Begin a new run; an older ledger at the same place is replaced."""
+    def create(cls, path: Path, run: Mapping[str, Any]) -> Ledger:
+        """Begin a new run; an older ledger at the same place is kept as ``previous``."""
         try:
             path.parent.mkdir(parents=True, exist_ok=True)
-            for suffix in ("", "-wal", "-shm"):
-                path.with_name(path.name + suffix).unlink(missing_ok=True)
+            if path.is_file():
+                _set_aside(path)
             ledger = cls(path)
             ledger._db.executescript(SCHEMA)
+            rows = [
+                (key, json.dumps(value))
+                for key, value in sorted({**run, "ledger": VERSION}.items())
+            ]
+            ledger._db.executemany("INSERT INTO run VALUES (?, ?)", rows)
         except (OSError, sqlite3.Error) as error:
             raise LedgerError(
-                f"{path}: cannot be written ({error}); choose another folder with the ini key "
-                "garl_dir"
+                f"{path}: cannot be written ({error}); free space, or choose another folder with "
+                "the ini key garl_dir"
             ) from error
-        rows = [(key, json.dumps(value)) for key, value in sorted(run.items())]
-        ledger._db.executemany("INSERT INTO run VALUES (?, ?)", rows)
+        return ledger
+
+    @classmethod
+    def resume(cls, path: Path, run: Mapping[str, Any]) -> Ledger:
+        """Continue an interrupted run; raise LedgerError if it was another one.
+
+        Nobody else may be using it: what was in flight is given back.
+        """
+        if not path.is_file():
+            raise LedgerError(f"--garl-resume: there is no ledger at {path}; run without it first")
+        ledger = cls(path)
+        try:
+            version = ledger.fact("ledger")
+            problem = ledger._db.execute("PRAGMA quick_check").fetchone()[0]
+        except (sqlite3.Error, json.JSONDecodeError) as error:
+            problem, version = str(error), VERSION
+        if problem != "ok":
+            raise LedgerError(
+                f"--garl-resume: {path} is damaged or no ledger ({problem}); run without "
+                "--garl-resume to begin anew"
+            )
+        wanted = {**run, "ledger": VERSION}
+        found = {"ledger": version, **{key: ledger.fact(key) for key in run}}
+        differing = [key for key in wanted if wanted[key] != found[key]]
+        if differing:
+            facts = "; ".join(f"{key} was {found[key]}, is {wanted[key]}" for key in differing)
+            raise LedgerError(
+                f"--garl-resume: {path} belongs to another run: {facts}. Give the same options, or "
+                "run without --garl-resume to begin anew"
+            )
+        ledger._db.execute("DELETE FROM seat")
+        ledger._db.execute(
+            "UPDATE slot SET state = 'waiting', pid = NULL, lease = NULL, "
+            "attempts = max(0, attempts - 1) WHERE state = 'claimed'"
+        )
         return ledger
 
     def close(self) -> None:
@@ -88,34 +150,79 @@ class Ledger:
             raise
         self._db.execute("COMMIT")
 
+    def note_fact(self, key: str, value: Any) -> None:
+        """Write down a fact about the run."""
+        self._db.execute("INSERT OR REPLACE INTO run VALUES (?, ?)", (key, json.dumps(value)))
+
     def fact(self, key: str) -> Any:
         """Return a fact about the run, or None."""
         row = self._db.execute("SELECT value FROM run WHERE key = ?", (key,)).fetchone()
         return None if row is None else json.loads(row[0])
 
-    def add_search(
-        self,
-        search: str,
-        system: str,
-        map: str,
-        budget: int,
-        job: str,
-        rows: Sequence[tuple[int, int, str]],
-    ) -> None:
-        """Register a search with its (generation, slot, scenario) rows; once is enough."""
+    def add_search(self, search: str, system: str, map: str, wanted: int, job: str) -> None:
+        """Register a search that will fly ``wanted`` slots; once is enough."""
+        self._db.execute(
+            "INSERT OR IGNORE INTO search VALUES (?, ?, ?, ?, ?)",
+            (search, system, map, wanted, job),
+        )
+
+    def job(self, search: str) -> str | None:
+        """Return what was registered for a search, or None."""
+        row = self._db.execute("SELECT job FROM search WHERE id = ?", (search,)).fetchone()
+        return None if row is None else str(row[0])
+
+    def add_slots(self, search: str, generation: int, scenarios: Mapping[int, str]) -> None:
+        """Hand out a generation's slots; once is enough, and twice must be the same."""
         with self.transaction():
-            self._db.execute(
-                "INSERT OR IGNORE INTO search VALUES (?, ?, ?, ?, ?)",
-                (search, system, map, budget, job),
-            )
             self._db.executemany(
                 "INSERT OR IGNORE INTO slot (search, generation, slot, scenario) "
                 "VALUES (?, ?, ?, ?)",
-                [(search, *row) for row in rows],
+                [(search, generation, slot, text) for slot, text in scenarios.items()],
+            )
+            rows = self._db.execute(
+                "SELECT slot, scenario FROM slot WHERE search = ? AND generation = ?",
+                (search, generation),
+            ).fetchall()
+        if any(scenarios.get(slot, text) != text for slot, text in rows):
+            raise LedgerError(
+                f"{self.path}: generation {generation} was bred in another way before; run without "
+                "--garl-resume to begin anew"
             )
 
-    def claim(self) -> Claim | None:
-        """Take the next unflown slot; one that hung is handed out while nobody else flies."""
+    def generation(self, search: str, generation: int) -> list[tuple[str, dict[str, Any] | None]]:
+        """Return (scenario, result or None) of a generation's slots in order."""
+        rows = self._db.execute(
+            "SELECT scenario, result FROM slot WHERE search = ? AND generation = ? ORDER BY slot",
+            (search, generation),
+        )
+        return [(text, None if result is None else json.loads(result)) for text, result in rows]
+
+    def unflown(self, search: str, generation: int) -> int:
+        """Return how many of a generation's slots have no result yet."""
+        row = self._db.execute(
+            "SELECT count(*) FROM slot WHERE search = ? AND generation = ? AND result IS NULL",
+            (search, generation),
+        ).fetchone()
+        return int(row[0])
+
+    def note_objectives(
+        self, search: str, generation: int, objectives: Sequence[Sequence[float]]
+    ) -> None:
+        """Write down a generation's objectives, slot by slot."""
+        with self.transaction():
+            self._db.executemany(
+                "UPDATE slot SET objectives = ? WHERE search = ? AND generation = ? AND slot = ?",
+                [
+                    (json.dumps(list(values)), search, generation, slot)
+                    for slot, values in enumerate(objectives)
+                ],
+            )
+
+    def claim(self, lease_s: float | None = LEASE_S) -> Claim | None:
+        """Take the next unflown slot; one that hung or died is handed out while nobody flies.
+
+        The claim lapses after ``lease_s`` unless it is renewed; None: while the process lives.
+        """
         with self.transaction():
             flying, alone = self._db.execute(
                 "SELECT count(*), coalesce(sum(attempts > 1), 0) FROM slot WHERE state = 'claimed'"
@@ -124,15 +231,15 @@ class Ledger:
                 return None
             row = self._db.execute(
                 "SELECT search, generation, slot, scenario, state FROM slot "
-                "WHERE state = 'hung' OR state = 'waiting' "
+                "WHERE state IN ('died', 'hung', 'waiting') "
                 "ORDER BY state, generation, slot, search LIMIT 1"
             ).fetchone()
-            if row is None or (row[4] == "hung" and flying):
+            if row is None or (row[4] != "waiting" and flying):
                 return None
             self._db.execute(
-                "UPDATE slot SET state = 'claimed', pid = ?, attempts = attempts + 1 "
+                "UPDATE slot SET state = 'claimed', pid = ?, lease = ?, attempts = attempts + 1 "
                 "WHERE search = ? AND generation = ? AND slot = ?",
-                (os.getpid(), *row[:3]),
+                (os.getpid(), None if lease_s is None else time.time() + lease_s, *row[:3]),
             )
             job = self._db.execute("SELECT job FROM search WHERE id = ?", row[:1]).fetchone()[0]
         return Claim(
@@ -141,23 +248,41 @@ class Ledger:
             slot=row[2],
             scenario=row[3],
             job=job,
-            alone=row[4] == "hung",
+            after="" if row[4] == "waiting" else row[4],
         )
 
-    def record(self, claim: Claim, result: dict[str, Any], sha256: str, wall_s: float) -> None:
-        """Write down what a flight came to."""
+    def renew(self) -> None:
+        """Prolong this process's claims."""
         self._db.execute(
-            "UPDATE slot SET state = 'flown', pid = NULL, result = ?, sha256 = ?, wall_s = ? "
-            "WHERE search = ? AND generation = ? AND slot = ? AND state = 'claimed'",
-            (
-                json.dumps(result, sort_keys=True, allow_nan=False),
-                sha256,
-                wall_s,
-                claim.search,
-                claim.generation,
-                claim.slot,
-            ),
+            "UPDATE slot SET lease = ? WHERE pid = ? AND state = 'claimed'",
+            (time.time() + LEASE_S, os.getpid()),
         )
+
+    def count(self, meter: str, amount: float = 1.0) -> None:
+        """Add to a meter: what the run spent, beside its results."""
+        self._db.execute(
+            "INSERT INTO meter VALUES (?, ?) "
+            "ON CONFLICT (name) DO UPDATE SET value = value + excluded.value",
+            (meter, amount),
+        )
+
+    def meters(self) -> dict[str, float]:
+        """Return what the run spent so far."""
+        return dict(self._db.execute("SELECT name, value FROM meter ORDER BY name").fetchall())
+
+    def record(self, claim: Claim, result: dict[str, Any], sha256: str, wall_s: float) -> None:
+        """Write down what a flight came to; a slot that has a result keeps it."""
+        text = json.dumps(result, sort_keys=True, allow_nan=False)
+        with self.transaction():
+            done = self._db.execute(
+                "UPDATE slot SET state = 'flown', pid = NULL, lease = NULL, "
+                "result = ?, sha256 = ?, wall_s = ? "
+                "WHERE search = ? AND generation = ? AND slot = ? AND state = 'claimed'",
+                (text, sha256, wall_s, claim.search, claim.generation, claim.slot),
+            )
+            if done.rowcount:
+                self.count("flights")
+                self.count("flying_s", wall_s)
 
     def claim_of(self, pid: int) -> tuple[Claim, int] | None:
         """Return the slot that a process has in flight, and which attempt it is."""
@@ -174,14 +299,15 @@ class Ledger:
             slot=row[2],
             scenario=row[3],
             job=row[4],
-            alone=row[5] > 1,
+            after="",
         )
         return claim, row[5]
 
     def release(self, pid: int, state: str) -> None:
-        """Give back what a dead process had in flight: 'waiting', or 'hung' to fly it alone."""
+        """Give back what a process had in flight: 'waiting', or 'hung' or 'died' to fly alone."""
         self._db.execute(
-            "UPDATE slot SET state = ?, pid = NULL, attempts = attempts - (? = 'waiting') "
+            "UPDATE slot SET state = ?, pid = NULL, lease = NULL, "
+            "attempts = attempts - (? = 'waiting') "
             "WHERE pid = ? AND state = 'claimed'",
             (state, state, pid),
         )
@@ -206,14 +332,27 @@ class Ledger:
         )
         return [(*row[:4], json.loads(row[4])) for row in rows]
 
-    def progress(self) -> list[tuple[str, str, int, int]]:
-        """Return (system, map, flown, all) per search."""
-        return list(
-            self._db.execute(
-                "SELECT system, map, sum(state = 'flown'), count(*) FROM slot "
-                "JOIN search ON search.id = slot.search GROUP BY search.id ORDER BY system, map"
-            )
+    def progress(self) -> list[Progress]:
+        """Return how far each search is."""
+        rows = self._db.execute(
+            "SELECT system, map, coalesce(sum(state = 'flown'), 0), wanted, "
+            "coalesce(max(generation), 0) FROM search "
+            "LEFT JOIN slot ON search.id = slot.search GROUP BY search.id ORDER BY system, map"
         )
+        return [
+            Progress(system=system, map=map, flown=flown, all=wanted, generation=generation)
+            for system, map, flown, wanted, generation in rows
+        ]
+
+    def nearest(self) -> dict[str, tuple[float, str]]:
+        """Return each property's smallest decided margin so far, with its unit."""
+        rows = self._db.execute(
+            "SELECT json_extract(m.value, '$.property') AS name, "
+            "min(json_extract(m.value, '$.value')), json_extract(m.value, '$.unit') "
+            "FROM slot, json_each(slot.result, '$.verdict.margins') AS m "
+            "WHERE state = 'flown' AND json_extract(m.value, '$.decided') GROUP BY name"
+        )
+        return {name: (value, unit) for name, value, unit in rows}
 
     def violations(self) -> dict[str, int]:
         """Return how often each type of violation was found."""
@@ -236,11 +375,12 @@ class Ledger:
         """Return a hash of all results that two equal runs share."""
         digest = hashlib.sha256()
         rows = self._db.execute(
-            "SELECT system, map, generation, slot, scenario, result, sha256 FROM slot "
+            "SELECT system, map, generation, slot, scenario, result, objectives, sha256 FROM slot "
             "JOIN search ON search.id = slot.search ORDER BY system, map, generation, slot"
         )
         for row in rows:
-            digest.update(json.dumps(row).encode())
+            # Addresses in a traceback differ from run to run and mean nothing.
+            digest.update(_ADDRESS.sub("0x", json.dumps(row)).encode())
         return digest.hexdigest()
 
     def seconds_per_flight(self) -> float | None:
@@ -251,13 +391,13 @@ class Ledger:
     def take_seat(self, limit: int, spawn: Any) -> bool:
         """Start a child by ``spawn() -> pid`` unless ``limit`` of them live already."""
         with self.transaction():
-            for (pid,) in self._db.execute("SELECT pid FROM seat").fetchall():
-                if not _alive(pid):
+            for pid, owner in self._db.execute("SELECT pid, owner FROM seat").fetchall():
+                if not _alive(pid) and not _alive(owner):
                     self._db.execute("DELETE FROM seat WHERE pid = ?", (pid,))
             taken = self._db.execute("SELECT count(*) FROM seat").fetchone()[0]
             if taken >= limit:
                 return False
-            self._db.execute("INSERT INTO seat VALUES (?)", (spawn(),))
+            self._db.execute("INSERT INTO seat VALUES (?, ?)", (spawn(), os.getpid()))
         return True
 
     def leave_seat(self, pid: int) -> None:
@@ -265,12 +405,28 @@ class Ledger:
         self._db.execute("DELETE FROM seat WHERE pid = ?", (pid,))
 
     def release_dead(self) -> None:
-        """Give back the slots of processes that are gone and that nobody else looks after."""
-        rows = self._db.execute("SELECT pid FROM slot WHERE state = 'claimed'").fetchall()
-        for (pid,) in rows:
-            if pid is not None and not _alive(pid):
-                time.sleep(0.05)
+        """Give back the slots of processes that are silent, or gone with those who watched them.
+
+        A dead child whose pool lives is left to it: it knows what the death means.
+        """
+        rows = self._db.execute(
+            "SELECT slot.pid, lease, owner FROM slot LEFT JOIN seat ON seat.pid = slot.pid "
+            "WHERE state = 'claimed'"
+        ).fetchall()
+        for pid, lease, owner in rows:
+            silent = lease is not None and lease < time.time()
+            watched = owner is not None and _alive(owner)
+            if silent or not (_alive(pid) or watched):
                 self.release(pid, "waiting")
+
+
+def _set_aside(path: Path) -> None:
+    """Keep one older ledger, whole, before a new one takes its place."""
+    with contextlib.suppress(sqlite3.Error), contextlib.closing(sqlite3.connect(path)) as old:
+        old.execute("PRAGMA wal_checkpoint(TRUNCATE)")
+    for suffix in ("-wal", "-shm"):
+        path.with_name(path.name + suffix).unlink(missing_ok=True)
+    path.replace(path.with_name(f"{path.stem}-previous{path.suffix}"))
 
 
 def _alive(pid: int) -> bool:
@@ -280,4 +436,9 @@ def _alive(pid: int) -> bool:
         return False
     except PermissionError:
         return True
-    return True
+    try:
+        fields = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()
+    except OSError:
+        return True
+    # A dead process that nobody has asked about yet.
+    return fields[0] != "Z"

@@ -33,8 +33,12 @@ class Method(Protocol):
     """Breeds whole generations, so that the outcome does not depend on the workers.
 
     ``ask`` and ``tell`` alternate.  What ``ask`` returns depends on the plan and on what
-    was told alone.
+    was told alone.  A method that does not learn is never told.
     """
+
+    @property
+    def learns(self) -> bool:
+        """Whether a generation depends on the results of the one before."""
 
     def ask(self) -> Sequence[Scenario]:
         """Return the next generation, ``population`` scenarios of which none came before."""

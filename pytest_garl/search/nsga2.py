@@ -28,9 +28,16 @@ _TRIES = 100
 
 
 class Nsga2:
-    """A genetic search; ``objectives`` and the mutation's ``choose`` make the method."""
+    """A genetic search; ``objectives`` and the mutation's ``choose`` make the method.
 
-    def __init__(self, name: str, plan: Plan, objectives: Objectives, choose: Choice) -> None:
+    ``width`` is the number of objectives.
+    """
+
+    learns = True
+
+    def __init__(
+        self, name: str, plan: Plan, objectives: Objectives, width: int, choose: Choice
+    ) -> None:
         self._plan, self._objectives, self._choose = plan, objectives, choose
         place = hashlib.sha256(f"{name} {plan.map.name}".encode()).digest()
         sequence = np.random.SeedSequence(plan.seed, spawn_key=(int.from_bytes(place[:4], "big"),))
@@ -41,7 +48,6 @@ class Nsga2:
         self._asked: Any = None
         genome = plan.genome
         first = np.array([self._valid(genome.random(self._rng)) for _ in range(plan.population)])
-        probe = len(objectives(np.zeros((0, genome.size)), ()).T)
         self._algorithm = GeneticAlgorithm(
             pop_size=plan.population,
             sampling=first,
@@ -50,7 +56,7 @@ class Nsga2:
             eliminate_duplicates=NoDuplicateElimination(),
             advance_after_initial_infill=True,
         )
-        problem = Problem(n_var=genome.size, n_obj=probe, xl=genome.lower, xu=genome.upper)
+        problem = Problem(n_var=genome.size, n_obj=width, xl=genome.lower, xu=genome.upper)
         self._algorithm.setup(problem, seed=int(survival.generate_state(1)[0]), verbose=False)
 
     def ask(self) -> Sequence[Scenario]:

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -18,3 +21,28 @@ def diversity(generation: Matrix) -> Matrix:
     distances: Matrix = np.sqrt((differences**2).sum(axis=2))
     means: Matrix = distances.mean(axis=1)
     return means
+
+
+SEPARATION_SCALE_M = 3.0
+"""Bodies farther away than this threaten nobody; exact separations end here as well."""
+
+
+def threat(result: Mapping[str, Any]) -> float:
+    """Return how near a flight came to a violation: 1 for a violation, 0 for none in sight.
+
+    Each decided property contributes its margin as a share of its limit; the smallest
+    counts.  A flight that aborted decided neither distance nor time: the distance to the
+    nearest body is what is left.
+    """
+    verdict = result["verdict"]
+    if verdict["primary"] is not None:
+        return 1.0
+    shares = []
+    for margin in verdict["margins"]:
+        if margin["property"] == "collision":
+            shares.append(margin["value"] / SEPARATION_SCALE_M)
+        elif margin["property"] == "distance" and margin["decided"]:
+            shares.append(margin["value"] / (margin["value"] + result["final_distance_m"]))
+        elif margin["property"] == "time" and margin["decided"]:
+            shares.append(margin["value"] / (margin["value"] + result["elapsed_s"]))
+    return 1.0 - min(1.0, max(0.0, min(shares, default=1.0)))

@@ -30,7 +30,8 @@ class Pool:
         self._losses = 0
 
     def wait(self, search: str, slot: Slot, tick: Callable[[], None]) -> None:
-        """Return when a slot is flown; ``tick`` is called while waiting."""
+        """Return when a slot is flown; ``tick`` is called before and while waiting."""
+        tick()
         while self._ledger.result(search, slot.generation, slot.index) is None:
             if self._workers == 0:
                 self._fly_here()
@@ -50,7 +51,7 @@ class Pool:
         self._children.clear()
 
     def _fly_here(self) -> None:
-        claim = self._ledger.claim()
+        claim = self._ledger.claim(lease_s=None)
         if claim is None:
             self._ledger.release_dead()
             time.sleep(POLL_S)
@@ -88,7 +89,12 @@ class Pool:
 
     def _bury(self, pid: int, child: subprocess.Popen[str]) -> None:
         """Decide what a child's death means for the slot that it had in flight."""
-        self._ledger.leave_seat(pid)
+        try:
+            self._settle(pid, child)
+        finally:
+            self._ledger.leave_seat(pid)
+
+    def _settle(self, pid: int, child: subprocess.Popen[str]) -> None:
         file = dump_file(self._ledger.path.parent, pid)
         words = file.read_text() if file.exists() else ""
         file.unlink(missing_ok=True)
@@ -104,15 +110,18 @@ class Pool:
         if "Traceback (most recent call last)" in complaint:
             raise LedgerError(f"the simulator failed in a child process:\n{complaint.strip()}")
         diagonal = load_map(job.map, tuple(Path(f) for f in job.map_folders)).diagonal_m
-        if words.startswith("Timeout"):
-            if attempts == 1:
-                self._ledger.release(pid, "hung")
-                return
+        hung = words.startswith("Timeout")
+        if attempts == 1:
+            # A slow machine, or its lack of memory, is no violation: once more, alone.
+            self._ledger.release(pid, "hung" if hung else "died")
+            self._ledger.count("retried")
+            return
+        if hung:
             text = f"one call took longer than {3 * job.timeout_s:g} s of wall time, twice"
             result = broken_result("hung", "Timeout", text, words, diagonal)
         else:
             status = child.returncode
             how = f"signal {-status}" if status < 0 else f"exit status {status}"
-            text = f"its process ended with {how}"
+            text = f"its process ended with {how}, twice"
             result = broken_result("died", how.replace(" ", "-"), text, complaint, diagonal)
         self._ledger.record(claim, result, "", 0.0)

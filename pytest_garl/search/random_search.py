@@ -18,6 +18,8 @@ from pytest_garl.search.method import Flown, Plan
 class RandomSearch:
     """Learns nothing; generation g is the same whatever came before."""
 
+    learns = False
+
     def __init__(self, plan: Plan) -> None:
         self._plan, self._generation = plan, 0
 

@@ -26,7 +26,6 @@ def population(budget: int) -> int:
     return min(wanted, budget)
 
 
-def slots(budget: int) -> tuple[Slot, ...]:
-    """Return exactly ``budget`` slots; the last generation may be shorter."""
-    size = population(budget)
+def slots(budget: int, size: int) -> tuple[Slot, ...]:
+    """Return exactly ``budget`` slots in generations of ``size``; the last may be shorter."""
     return tuple(Slot(generation=n // size, index=n % size) for n in range(budget))

@@ -45,8 +45,8 @@ class ObjectRecord:
 class Contact:
     """A contact of the UAV: with which body, when, how fast.
 
-    ``body`` is "dog-1", "tree-3" or "ground"; ``speed_mps`` the UAV's speed just before
-    (for the ground its vertical speed), ``tilt_rad`` its tilt.
+    ``body`` is "dog-1", "tree-3" or "ground"; ``speed_mps`` the UAV's speed relative to it
+    (for the ground the vertical speed), ``tilt_rad`` its tilt.
     """
 
     time_s: float

@@ -1,6 +1,7 @@
 """The simple flight control: a cascade from setpoints to motor thrusts.
 
-Structure as in AirSim's simple_flight: position P, velocity PI, attitude P, rate P.
+A cascade like AirSim's simple_flight: position P, velocity PI, attitude P, rate P; but with an
+integral on all axes of velocity, which AirSim has on the vertical one alone.
 """
 
 from __future__ import annotations
@@ -24,14 +25,15 @@ VELOCITY_I = 0.6
 ATTITUDE_P = 8.0
 RATE_P = 22.0
 YAW_RATE_P = 6.0
-"""Bandwidths in 1/s, each loop about a third of the next inner one, the innermost close to
+"""Bandwidths in 1/s, each loop a half to a quarter of the next inner one, the innermost close to
 the motors' 20 1/s."""
 MAX_TILT_RAD = math.radians(25)
 MAX_ACCELERATION_MPS2 = 4.0
 MAX_RATE_RADPS = 3.5
 MAX_CLIMB_MPS = 5.0
 MAX_DESCENT_MPS = 4.0
-"""The Matrice 100 may tilt 35 degrees; a landing controller keeps below it."""
+"""Climb and descent are the Matrice 100's ratings; it may tilt 35 degrees, a landing
+controller keeps below it."""
 MAX_INTEGRAL_MPS2 = 4.0
 ABORT_CLIMB_MPS = 3.0
 

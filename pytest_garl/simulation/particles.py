@@ -13,6 +13,7 @@ from pytest_garl.simulation.view import View
 from pytest_garl.simulation.weather import Conditions, rain_speed_mps
 
 _EXPOSURE_S = 0.005
+"""A mean of the 2 to 10 ms of the sensor."""
 _DROPS_BOX_M = (3.0, 3.0, 3.0)
 _LEAVES_BOX_M = (6.0, 6.0, 8.0)
 """Falling things live in boxes below the camera that repeat in space; those beyond are below
@@ -22,7 +23,7 @@ _SNOW_SPEED_MPS = 1.2
 _LEAF_SPEED_MPS = 1.5
 """Engineering estimate of a tumbling leaf."""
 _DROP_MM = 3.0
-"""Smaller drops, and flakes that melt to smaller drops, are below a pixel."""
+"""Smaller drops, and flakes that melt to smaller drops, are left to the extinction."""
 
 
 def _drops_per_m3(rate_mmph: float) -> float:
@@ -56,7 +57,8 @@ class Particles:
         leaves = conditions.leaves_per_m3
         wanted = (
             ("rain", rain, _DROPS_BOX_M, 1300, rain_speed_mps(_DROP_MM), 0.003),
-            # An aggregate is about four times as wide as the drop to which it melts.
+            # An aggregate of 12 mm is about four times as wide as the drop to which it melts
+            # (density after Brandes et al. 2007).
             ("snow", snow, _DROPS_BOX_M, 1300, _SNOW_SPEED_MPS, 0.012),
             ("leaf", leaves, _LEAVES_BOX_M, 600, _LEAF_SPEED_MPS, 0.11),
         )

@@ -17,8 +17,9 @@ MAX_EXPOSURE_STEPS = 5.0
 MAX_GAIN = 16.0
 """From 2 ms in full sun to 10 ms, beyond which a moving UAV blurs, then 24 dB of gain:
 engineering estimate of a small machine-vision camera."""
-READ_NOISE = 1.2
-"""Noise in grey levels at unit gain, small machine-vision sensors: engineering estimate."""
+NOISE_LEVELS = 1.2
+"""In grey levels at unit gain, mostly shot noise, hence growing with the root of the gain:
+engineering estimate of a small machine-vision sensor."""
 _SPARE = 64
 
 
@@ -36,7 +37,7 @@ class Sensor:
         self._table = np.clip(levels, 0, 255).astype(np.uint8)
         self._neutral = bool(exposure == 1.0 and low == 0.0)
         shape = (camera.height_px + _SPARE, camera.width_px + _SPARE, 3)
-        noise = rng.standard_normal(shape, dtype=np.float32) * READ_NOISE * gain**0.5
+        noise = rng.standard_normal(shape, dtype=np.float32) * NOISE_LEVELS * gain**0.5
         # Two pictures of bytes: adding signed noise to bytes is five times as slow.
         self._more = np.clip(np.round(noise), 0, 127).astype(np.uint8)
         self._less = np.clip(np.round(-noise), 0, 127).astype(np.uint8)

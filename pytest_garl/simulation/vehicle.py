@@ -20,12 +20,13 @@ THRUST_PER_MOTOR_N = 20.6
 MOTOR_LAG_S = 0.05
 """Engineering estimate for 13-inch propellers; small racing propellers take about 0.02 s."""
 YAW_TORQUE_PER_THRUST_M = 0.016
-"""Torque over thrust of a propeller of 0.33 m: c_Q/c_T times the diameter, about 0.05 D."""
+"""Torque over thrust of a propeller of 0.33 m: c_Q/c_T times the diameter.  Engineering
+estimate: about 0.05 D; AirSim's default propeller has 0.058 D."""
 DRAG_AREA_M2 = 0.05
 """Drag coefficient 1 on a frontal area of 0.05 m²: engineering estimate for body and arms."""
 ROTOR_DRAG_PER_S = 0.10
-"""Linear drag of the rotors per unit mass: quadrotor identifications give about 0.1 to 0.3
-1/s (Faessler, Franchi and Scaramuzza 2018)."""
+"""Linear drag of the rotors per unit mass.  Engineering estimate, at the low end: Faessler,
+Franchi and Scaramuzza (2018) identify some 0.2 to 0.5 1/s on a small agile quadrotor."""
 BODY_ABOVE_FEET_M = 0.20
 
 

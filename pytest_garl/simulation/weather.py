@@ -9,22 +9,24 @@ from dataclasses import dataclass
 from pytest_garl.scenarios.scenario import Scenario
 
 KOSCHMIEDER = 3.912
-"""Visibility = 3.912 / extinction: contrast 2 % (Koschmieder 1924)."""
+"""Visibility = 3.912 / extinction: Koschmieder's law (1924) at a contrast threshold of 2 %."""
 FOG_VISIBILITY_M = 10.0
 """Gene 1: below 10 m were reported in the Great Smog of London, 1952."""
 DUST_VISIBILITY_M = 20.0
-"""Gene 1: a dust storm in which the WMO's "severe" (below 200 m) is long passed."""
+"""Gene 1: engineering estimate, far below the 500 m at which a dust storm counts as heavy
+(ICAO 2009)."""
 RAIN_MMPH = 100.0
 """Gene 1: twice the 50 mm/h from which the WMO calls rain violent."""
 SNOW_MMPH = 10.0
-"""Gene 1: water equivalent; heavy snowfall is over 2.5 mm/h (American Meteorological Society)."""
+"""Gene 1: water equivalent; twice the 5 mm/h from which the WMO calls snow heavy."""
 LEAVES_PER_M3 = 2.0
 """Gene 1: engineering estimate of a gust through an autumn maple."""
 WET_ALBEDO_LOSS = 0.45
-"""Gene 1: a soaked rough ground reflects roughly half as much (Lekner and Dorf 1988)."""
+"""Gene 1: engineering estimate; soaked rough ground is markedly darker (theory: Lekner and
+Dorf 1988)."""
 TWILIGHT_DEG = -6.0
-"""Elevation at gene 0 and 1: the end of civil twilight, until which FAA Part 107.29 lets
-drones fly."""
+"""Elevation at gene 0 and 1: the end of civil twilight (AMS Glossary); darker than that is
+night."""
 NOON_DEG = 60.0
 _LUX = (
     (-6.0, 3.4),
@@ -35,7 +37,8 @@ _LUX = (
     (60.0, 100000.0),
 )
 """Horizontal illuminance of a clear sky by elevation in degrees: 3.4 lux is the end of civil
-twilight, 400 lux sunrise, 100,000 lux a high sun; between them interpolated in its logarithm."""
+twilight, 400 lux sunrise (AMS Glossary), 100,000 lux a high sun, the rest rounded engineering
+estimates; between them interpolated in its logarithm."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -107,12 +110,15 @@ _GENES = (
 
 
 def rain_extinction_per_m(rate_mmph: float) -> float:
-    """Optical extinction of rain: 0.312 R^0.67 per km (Atlas 1953, continuous rain)."""
+    """Optical extinction of rain: 0.312 R^0.67 per km (as in rain rendering: Weber et al. 2015)."""
     return 0.312e-3 * float(rate_mmph**0.67)
 
 
 def snow_extinction_per_m(rate_mmph: float) -> float:
-    """Optical extinction of snow: visibility about 1 km at 1 mm/h (Rasmussen et al. 1999)."""
+    """Optical extinction of snow: visibility about 1 km at 1 mm/h, inverse to the rate.
+
+    A simplification: Rasmussen et al. (1999) find a scatter of 3 to 10 times.
+    """
     return KOSCHMIEDER / 1000.0 * rate_mmph
 
 

@@ -73,7 +73,7 @@ def result_hash(pytester: pytest.Pytester) -> str:
 
 @pytest.mark.parametrize("budget", [1, 7, 8, 9, 40, 79, 80, 160, 200, 400, 401])
 def test_slots_are_exactly_the_budget(budget: int) -> None:
-    names = slots(budget)
+    names = slots(budget, population(budget))
     assert len(set(names)) == budget
     assert max(slot.index for slot in names) < population(budget) <= 20
 
@@ -98,7 +98,7 @@ def test_one_event_fails_one_test_and_its_twins_are_xfailed(
 def test_the_same_seed_gives_the_same_results_for_any_workers(pytester: pytest.Pytester) -> None:
     project(pytester)
     hashes = set()
-    for args in (("0",), ("1",), ("2",), ("2", "-n2"), ("2", "-n2", "--dist=worksteal")):
+    for args in (("0",), ("1",), ("2",), ("4",), ("2", "-n2"), ("2", "-n2", "--dist=worksteal")):
         run(pytester, "--garl-budget=16", f"--garl-workers={args[0]}", *args[1:])
         hashes.add(result_hash(pytester))
     assert len(hashes) == 1
@@ -133,7 +133,7 @@ def test_the_lowest_slot_fails_whatever_the_order(pytester: pytest.Pytester) -> 
     ("system", "words"),
     [
         ("Raises", "*ZeroDivisionError: no plan*"),
-        ("Exits", "*its process ended with exit status 3*"),
+        ("Exits", "*its process ended with exit status 3, twice*"),
         ("Sleeps", "*one call took longer than*"),
     ],
 )
@@ -156,8 +156,12 @@ def test_collecting_flies_nothing(pytester: pytest.Pytester) -> None:
 
 def test_a_selected_slot_is_flown_alone(pytester: pytest.Pytester) -> None:
     project(pytester)
-    result = run(pytester, "--garl-budget=40", "--garl-workers=0", "-k", "lawn-g02-s03")
-    result.stdout.fnmatch_lines(["*1 flown*"])
+    selected = ("--garl-budget=40", "--garl-workers=0", "-k", "lawn-g02-s03")
+    result = run(pytester, *selected, "--garl-method=random")
+    result.stdout.fnmatch_lines(["*lawn: 1 flown*"])
+    # A bred slot needs its parents: two generations of eight.
+    result = run(pytester, *selected, "--garl-method=garl-paper")
+    result.stdout.fnmatch_lines(["*lawn: 17 flown*"])
 
 
 def test_without_a_budget_the_tests_say_why_they_skip(pytester: pytest.Pytester) -> None:

@@ -14,7 +14,7 @@ from pathlib import Path
 import pytest
 
 from pytest_garl.reports.progress import text
-from pytest_garl.search.ledger import Ledger
+from pytest_garl.search.ledger import Ledger, Progress
 from tests.plugin.test_plugin import project, run
 
 SLOW = """
@@ -139,11 +139,17 @@ def test_a_dead_worker_leaves_no_litter(pytester: pytest.Pytester) -> None:
 
 
 def test_the_line_names_what_matters_first() -> None:
-    two = [("m:A", "court", 3, 4), ("m:B", "lawn", 1, 4)]
-    assert text(two, {"I": 2, "IV": 1}, 8.0) == (
-        "garl: 4/8 flown  8 s left  I:2 IV:1  A on court 3/4  0.50 flights/s"
+    two = [
+        Progress(system="m:A", map="court", flown=3, all=4, generation=1),
+        Progress(system="m:A", map="lawn", flown=1, all=4, generation=0),
+    ]
+    nearest = {"time": (90.3, "s"), "collision": (0.25, "m"), "crash": (1.0, "1")}
+    assert text(two, {"I": 2, "IV": 1}, nearest, 8.0) == (
+        "garl: 4/8 flown  8 s left  I:2 IV:1  A on court g01 3/4  0.50 flights/s  "
+        "nearest collision 0.25 m, time 90 s"
     )
-    assert text([("m:A", "court", 0, 4)], {}, 0.0) == "garl: 0/4 flown"
+    new = Progress(system="m:A", map="court", flown=0, all=4, generation=0)
+    assert text([new], {}, {}, 0.0) == "garl: 0/4 flown  A on court g00 0/4"
 
 
 @PARALLEL

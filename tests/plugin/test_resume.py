@@ -1,0 +1,198 @@
+"""What a run survives: kill -9 of any of its processes, Ctrl-C, a second run beside it."""
+
+from __future__ import annotations
+
+import os
+import random
+import signal
+import sqlite3
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+from tests.plugin.test_plugin import project, result_hash, run
+
+SLOW = """
+import time
+from pytest_garl import Land
+
+class Slow:
+    def reset(self, mission): time.sleep(0.03)
+    def step(self, observation): return Land()
+"""
+BUDGET = ("--garl-budget=30", "--garl-population=6", "--garl-workers=2", "--garl-map=lawn")
+
+
+def slow_project(pytester: pytest.Pytester) -> None:
+    project(pytester, "Slow", "['lawn']")
+    pytester.makepyfile(systems=SLOW)
+
+
+def start(pytester: pytest.Pytester, *args: str) -> subprocess.Popen[str]:
+    command = [sys.executable, "-m", "pytest", "-p", "no:cacheprovider", *BUDGET, *args]
+    return subprocess.Popen(
+        command,
+        cwd=pytester.path,
+        env={**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)},
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        text=True,
+    )
+
+
+def query(path: Path, sql: str) -> list[tuple[int, ...]]:
+    """Read the ledger from outside; nothing while there is none."""
+    if not path.exists():
+        return []
+    database = sqlite3.connect(f"file:{path}?mode=ro", uri=True, timeout=10)
+    try:
+        return database.execute(sql).fetchall()
+    except sqlite3.Error:
+        return []
+    finally:
+        database.close()
+
+
+def wait_for(path: Path, flights: int, process: subprocess.Popen[str]) -> None:
+    for _ in range(3000):
+        done = query(path, "SELECT count(*) FROM slot WHERE state = 'flown'")
+        if process.poll() is not None or (done and done[0][0] >= flights):
+            return
+        time.sleep(0.01)
+    raise AssertionError("nothing was flown in 30 s")
+
+
+def children_of(pid: int) -> list[int]:
+    found = []
+    for folder in Path("/proc").iterdir():
+        try:
+            fields = (folder / "stat").read_text().rpartition(")")[2].split()
+        except OSError:
+            continue
+        if folder.name.isdigit() and int(fields[1]) == pid:
+            found.append(int(folder.name))
+    return found
+
+
+def alive(pid: int) -> bool:
+    try:
+        state = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0]
+    except OSError:
+        return False
+    return state != "Z"
+
+
+@pytest.fixture(scope="module")
+def undisturbed() -> dict[str, str]:
+    """Return the hash of the run that nobody disturbed, made by the first test."""
+    return {}
+
+
+@pytest.mark.parametrize("moment", range(20))
+def test_a_killed_run_resumes_as_if_nothing_had_happened(
+    pytester: pytest.Pytester, undisturbed: dict[str, str], moment: int
+) -> None:
+    slow_project(pytester)
+    ledger = pytester.path / ".garl" / "ledger.sqlite"
+    if not undisturbed:
+        run(pytester, *BUDGET)
+        undisturbed["hash"] = result_hash(pytester)
+        assert query(ledger, "SELECT count(*) FROM slot WHERE state = 'flown'") == [(30,)]
+    victim = ("pytest", "child", "worker")[moment % 3]
+    rng = random.Random(moment)
+    process = start(pytester, *(["-n2"] if victim == "worker" else []))
+    wait_for(ledger, rng.randrange(28), process)
+    time.sleep(rng.uniform(0, 0.1))
+    seats = [pid for (pid,) in query(ledger, "SELECT pid FROM seat")]
+    prey = {
+        "pytest": [process.pid],
+        "child": seats,
+        "worker": children_of(process.pid),
+    }[victim]
+    if prey and process.poll() is None:
+        os.kill(rng.choice(prey), signal.SIGKILL)
+    # A child that is killed does not end the run: its slot is flown once more.
+    process.communicate(timeout=60)
+    for _ in range(200):
+        if not any(alive(pid) for pid in seats):
+            break
+        time.sleep(0.05)
+    assert not any(alive(pid) for pid in seats), "orphans"
+    before = query(ledger, "SELECT generation, slot, sha256 FROM slot WHERE state = 'flown'")
+    resumed = run(pytester, *BUDGET, "--garl-resume")
+    assert resumed.ret in (0, 1)
+    after = query(ledger, "SELECT generation, slot, sha256 FROM slot WHERE state = 'flown'")
+    assert len(after) == 30
+    assert set(before) <= set(after)
+    assert query(ledger, "SELECT CAST(value AS INT) FROM meter WHERE name = 'flights'") == [(30,)]
+    assert result_hash(pytester) == undisturbed["hash"]
+
+
+def test_ctrl_c_leaves_no_orphan_and_a_ledger_that_resumes(pytester: pytest.Pytester) -> None:
+    slow_project(pytester)
+    ledger = pytester.path / ".garl" / "ledger.sqlite"
+    process = start(pytester)
+    wait_for(ledger, 5, process)
+    seats = [pid for (pid,) in query(ledger, "SELECT pid FROM seat")]
+    process.send_signal(signal.SIGINT)
+    output, _ = process.communicate(timeout=60)
+    assert process.returncode == pytest.ExitCode.INTERRUPTED, output
+    assert seats
+    assert not any(alive(pid) for pid in seats)
+    assert run(pytester, *BUDGET, "--garl-resume").ret in (0, 1)
+    assert query(ledger, "SELECT count(*) FROM slot WHERE state = 'flown'") == [(30,)]
+
+
+def test_a_second_run_in_the_same_folder_is_refused(pytester: pytest.Pytester) -> None:
+    slow_project(pytester)
+    process = start(pytester)
+    wait_for(pytester.path / ".garl" / "ledger.sqlite", 1, process)
+    second = run(pytester, *BUDGET)
+    assert second.ret == pytest.ExitCode.USAGE_ERROR
+    second.stderr.fnmatch_lines([f"*another run is using this folder (process {process.pid})*"])
+    process.communicate(timeout=60)
+    assert process.returncode in (0, 1)
+
+
+@pytest.mark.parametrize(
+    ("args", "words"),
+    [
+        (("--garl-seed=1",), "*seed was 0, is 1*"),
+        (("--garl-method=random",), "*method was garl, is random*"),
+        (("--garl-weather=full",), "*weather was confined, is full*"),
+    ],
+)
+def test_another_search_is_not_resumed(
+    pytester: pytest.Pytester, args: tuple[str, ...], words: str
+) -> None:
+    slow_project(pytester)
+    run(pytester, *BUDGET)
+    before = result_hash(pytester)
+    result = run(pytester, *BUDGET, "--garl-resume", *args)
+    assert result.ret == pytest.ExitCode.USAGE_ERROR
+    result.stderr.fnmatch_lines([words])
+    assert result_hash(pytester) == before
+
+
+def test_a_changed_system_is_not_resumed(pytester: pytest.Pytester) -> None:
+    slow_project(pytester)
+    run(pytester, *BUDGET)
+    before = result_hash(pytester)
+    pytester.makepyfile(systems=SLOW.replace("0.03", "0.04"))
+    result = run(pytester, *BUDGET, "--garl-resume")
+    assert result.ret == pytest.ExitCode.USAGE_ERROR
+    result.stderr.fnmatch_lines(["*Slow on lawn is not what it was: system_sha256 changed*"])
+    assert result_hash(pytester) == before
+
+
+@pytest.mark.parametrize("budget", [1, 2, 7, 19, 60])
+def test_the_budget_is_exact(pytester: pytest.Pytester, budget: int) -> None:
+    project(pytester)
+    run(pytester, f"--garl-budget={budget}", "--garl-workers=0")
+    ledger = pytester.path / ".garl" / "ledger.sqlite"
+    assert query(ledger, "SELECT count(*), count(DISTINCT scenario) FROM slot") == [
+        (budget, budget)
+    ]

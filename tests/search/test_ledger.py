@@ -1,0 +1,131 @@
+from __future__ import annotations
+
+import os
+import sqlite3
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from pytest_garl.errors import LedgerError
+from pytest_garl.search.ledger import Ledger
+
+FACTS = {"seed": 3, "version": "1"}
+
+
+def made(path: Path) -> Ledger:
+    ledger = Ledger.create(path, FACTS)
+    ledger.add_search("s", "systems:Good", "court", 3, "{}")
+    ledger.add_slots("s", 0, {0: "a", 1: "b", 2: "c"})
+    return ledger
+
+
+def test_a_slot_is_handed_out_once_and_recorded_once(tmp_path: Path) -> None:
+    ledger = made(tmp_path / "ledger.sqlite")
+    claims = [ledger.claim() for _ in range(4)]
+    assert [claim.slot if claim else None for claim in claims] == [0, 1, 2, None]
+    assert claims[0] is not None
+    ledger.record(claims[0], {"n": 1}, "hash", 0.1)
+    ledger.record(claims[0], {"n": 2}, "other", 0.1)
+    assert ledger.result("s", 0, 0) == {"n": 1}
+    assert ledger.meters()["flights"] == 1
+
+
+def test_slots_are_bred_the_same_way_or_not_at_all(tmp_path: Path) -> None:
+    ledger = made(tmp_path / "ledger.sqlite")
+    ledger.add_slots("s", 0, {0: "a", 1: "b"})
+    with pytest.raises(LedgerError, match="generation 0 was bred in another way"):
+        ledger.add_slots("s", 0, {1: "other"})
+
+
+def test_a_claim_of_a_silent_process_lapses(tmp_path: Path) -> None:
+    ledger = made(tmp_path / "ledger.sqlite")
+    first = ledger.claim(lease_s=-1.0)
+    assert first is not None
+    ledger.release_dead()
+    again = ledger.claim()
+    assert again is not None
+    assert again.slot == first.slot
+    ledger.renew()
+    ledger.release_dead()
+    other = ledger.claim(lease_s=None)
+    assert other is not None
+    assert other.slot == 1
+
+
+def test_resuming_gives_back_what_was_in_flight(tmp_path: Path) -> None:
+    ledger = made(tmp_path / "ledger.sqlite")
+    claim = ledger.claim()
+    assert claim is not None
+    ledger.record(claim, {"n": 1}, "", 0.0)
+    ledger.claim()
+    ledger.close()
+    ledger = Ledger.resume(tmp_path / "ledger.sqlite", FACTS)
+    assert ledger.result("s", 0, 0) == {"n": 1}
+    again = ledger.claim()
+    assert again is not None
+    assert (again.slot, again.after) == (1, "")
+
+
+def test_a_new_run_keeps_the_ledger_before_it(tmp_path: Path) -> None:
+    first = made(tmp_path / "ledger.sqlite")
+    first.close()
+    Ledger.create(tmp_path / "ledger.sqlite", FACTS).close()
+    kept = Ledger(tmp_path / "ledger-previous.sqlite")
+    assert kept.unflown("s", 0) == 3
+
+
+@pytest.mark.parametrize(
+    ("facts", "words"),
+    [
+        ({"seed": 4, "version": "1"}, "seed was 3, is 4"),
+        ({"seed": 3, "version": "2"}, "version was 1, is 2"),
+    ],
+)
+def test_another_run_is_not_resumed(tmp_path: Path, facts: dict[str, Any], words: str) -> None:
+    made(tmp_path / "ledger.sqlite").close()
+    with pytest.raises(LedgerError, match=words):
+        Ledger.resume(tmp_path / "ledger.sqlite", facts)
+
+
+def test_a_ledger_of_another_version_is_not_resumed(tmp_path: Path) -> None:
+    made(tmp_path / "ledger.sqlite").close()
+    database = sqlite3.connect(tmp_path / "ledger.sqlite")
+    database.execute("UPDATE run SET value = '1' WHERE key = 'ledger'")
+    database.commit()
+    database.close()
+    with pytest.raises(LedgerError, match="ledger was 1, is 2"):
+        Ledger.resume(tmp_path / "ledger.sqlite", FACTS)
+
+
+@pytest.mark.parametrize("damage", ["text", "middle", "empty"])
+def test_a_damaged_ledger_is_one_clear_error(tmp_path: Path, damage: str) -> None:
+    path = tmp_path / "ledger.sqlite"
+    made(path).close()
+    whole = path.read_bytes()
+    broken = {
+        "text": b"not a database, surely" * 50,
+        "middle": whole[:4096] + os.urandom(len(whole) - 8192) + whole[-4096:],
+        "empty": b"",
+    }
+    path.write_bytes(broken[damage])
+    with pytest.raises(LedgerError, match=r"ledger\.sqlite"):
+        Ledger.resume(path, FACTS)
+
+
+def test_a_missing_ledger_is_not_resumed(tmp_path: Path) -> None:
+    with pytest.raises(LedgerError, match="there is no ledger"):
+        Ledger.resume(tmp_path / "ledger.sqlite", FACTS)
+
+
+def test_the_hash_covers_results_not_costs(tmp_path: Path) -> None:
+    hashes = set()
+    for wall_s in (0.1, 0.2):
+        ledger = made(tmp_path / "ledger.sqlite")
+        claim = ledger.claim()
+        assert claim is not None
+        where = f"Thread 0x{os.getpid() + int(10 * wall_s):x}"
+        ledger.record(claim, {"traceback": where}, "hash", wall_s)
+        hashes.add(ledger.result_hash())
+        ledger.close()
+    assert len(hashes) == 1
