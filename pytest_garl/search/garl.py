@@ -12,7 +12,7 @@ from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.search.method import Flown, Plan
 from pytest_garl.search.nsga2 import Matrix, Nsga2
 from pytest_garl.search.objectives import diversity, threat
-from pytest_garl.search.operators import farthest_from_nearest
+from pytest_garl.search.operators import farthest_from_nearest, local_steps, property_mutation
 
 
 class _Garl:
@@ -38,4 +38,12 @@ class _Garl:
 
 def method(plan: Plan) -> Nsga2:
     """Return the search."""
-    return Nsga2("garl", plan, _Garl().objectives, 2, farthest_from_nearest)
+    return Nsga2("garl", plan, _Garl().objectives, 2, mutation)
+
+
+def mutation(offspring: Matrix, lower: Matrix, upper: Matrix, rng: np.random.Generator) -> Matrix:
+    """Step nearby in every second child, into the emptiest places in the others."""
+    near = local_steps(offspring, lower, upper, rng)
+    far = property_mutation(offspring, lower, upper, rng, choose=farthest_from_nearest)
+    stays = rng.random(len(offspring)) < 0.5
+    return np.where(stays[:, None], near, far)

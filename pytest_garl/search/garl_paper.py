@@ -9,12 +9,12 @@ import numpy as np
 from pytest_garl.search.method import Flown, Plan
 from pytest_garl.search.nsga2 import Matrix, Nsga2
 from pytest_garl.search.objectives import diversity
-from pytest_garl.search.operators import farthest_from_all
+from pytest_garl.search.operators import property_mutation
 
 
 def method(plan: Plan) -> Nsga2:
     """Return the search; populations of 20 and rates of 0.2 as in the paper."""
-    return Nsga2("garl-paper", plan, objectives, 3, farthest_from_all)
+    return Nsga2("garl-paper", plan, objectives, 3, property_mutation)
 
 
 def objectives(chromosomes: Matrix, flown: Sequence[Flown]) -> Matrix:

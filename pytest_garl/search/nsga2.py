@@ -19,35 +19,44 @@ from pytest_garl.scenarios.chromosome import decode, encode
 from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.scenarios.validity import repair
 from pytest_garl.search.method import Flown, Plan
-from pytest_garl.search.operators import Choice, nuclear_gene_crossover, property_mutation
+from pytest_garl.search.operators import nuclear_gene_crossover
 
 Matrix = NDArray[np.float64]
 Objectives = Callable[[Matrix, Sequence[Flown]], Matrix]
 """From normalised chromosomes (k, d) and their flights to objectives (k, m), all maximised."""
+Mutation = Callable[[Matrix, Matrix, Matrix, np.random.Generator], Matrix]
+"""From offspring (n, d), lower and upper bounds (d,) and a generator to mutated offspring."""
 _TRIES = 100
 
 
 class Nsga2:
-    """A genetic search; ``objectives`` and the mutation's ``choose`` make the method.
+    """A genetic search; objectives and mutation make the method.
 
-    ``width`` is the number of objectives.
+    ``width`` is the number of objectives.  A scenario's own seed is inherited with the tail
+    of the chromosome, where the objects are: what they do by chance is part of what a parent
+    was selected for.
     """
 
     learns = True
 
     def __init__(
-        self, name: str, plan: Plan, objectives: Objectives, width: int, choose: Choice
+        self, name: str, plan: Plan, objectives: Objectives, width: int, mutation: Mutation
     ) -> None:
-        self._plan, self._objectives, self._choose = plan, objectives, choose
+        self._plan, self._objectives, self._mutation = plan, objectives, mutation
         place = hashlib.sha256(f"{name} {plan.map.name}".encode()).digest()
         sequence = np.random.SeedSequence(plan.seed, spawn_key=(int.from_bytes(place[:4], "big"),))
         variation, survival = sequence.spawn(2)
         self._rng = np.random.default_rng(variation)
-        self._seen: set[bytes] = set()
+        self._seeds: dict[bytes, int] = {}
         self._flown: dict[bytes, Flown] = {}
         self._asked: Any = None
         genome = plan.genome
-        first = np.array([self._valid(genome.random(self._rng)) for _ in range(plan.population)])
+        first = np.array(
+            [
+                self._valid(genome.random(self._rng), int(self._rng.integers(2**32)))
+                for _ in range(plan.population)
+            ]
+        )
         self._algorithm = GeneticAlgorithm(
             pop_size=plan.population,
             sampling=first,
@@ -63,7 +72,12 @@ class Nsga2:
         """Return the next generation."""
         self._asked = self._algorithm.ask()
         return [
-            decode(row, self._plan.genome, map=self._plan.map.name, seed=self._seed(row))
+            decode(
+                row,
+                self._plan.genome,
+                map=self._plan.map.name,
+                seed=self._seeds[row.tobytes()],
+            )
             for row in self._asked.get("X")
         ]
 
@@ -84,31 +98,32 @@ class Nsga2:
 
     def offspring(self, parents: Matrix) -> Matrix:
         """Return as many valid, new chromosomes as there are parents."""
-        genome, rng = self._plan.genome, self._rng
-        children = nuclear_gene_crossover(parents, genome.borders, rng)
-        children = self._mutate(children)
-        return np.array([self._valid(row) for row in children])
+        seeds = np.array([[self._seeds[row.tobytes()]] for row in parents], dtype=np.float64)
+        whole = np.concatenate([parents, seeds], axis=1)
+        crossed = nuclear_gene_crossover(whole, self._plan.genome.borders, self._rng)
+        children = self._mutate(crossed[:, :-1])
+        return np.array(
+            [
+                self._valid(row, int(seed))
+                for row, seed in zip(children, crossed[:, -1], strict=True)
+            ]
+        )
 
     def _mutate(self, rows: Matrix) -> Matrix:
         genome = self._plan.genome
-        return property_mutation(rows, genome.lower, genome.upper, self._rng, choose=self._choose)
+        return self._mutation(rows, genome.lower, genome.upper, self._rng)
 
-    def _valid(self, row: Matrix) -> Matrix:
+    def _valid(self, row: Matrix, seed: int) -> Matrix:
         """Repair a chromosome; mutate one that came before until it is new."""
         genome, map = self._plan.genome, self._plan.map
         for _ in range(_TRIES):
             mended = encode(repair(decode(row, genome, map=map.name, seed=0), map), genome)
             key = mended.tobytes()
-            if key not in self._seen:
-                self._seen.add(key)
+            if key not in self._seeds:
+                self._seeds[key] = seed
                 return mended
             row = self._mutate(row[None])[0]
-        return self._valid(genome.random(self._rng))
-
-    def _seed(self, row: Matrix) -> int:
-        """Return the scenario's own seed: of its genes and the search's seed, not of its slot."""
-        digest = hashlib.sha256(row.tobytes() + str(self._plan.seed).encode()).digest()
-        return int.from_bytes(digest[:4], "big")
+        return self._valid(genome.random(self._rng), seed)
 
 
 class _Mating(InfillCriterion):  # type: ignore[misc]

@@ -80,3 +80,21 @@ def property_mutation(
                 drawn = rng.uniform(lower[column], upper[column], candidates)
                 mutated[row, column] = drawn[choose(drawn, mutated[:, column])]
     return mutated
+
+
+LOCAL_STEP = 0.1
+"""Standard deviation of a local step, as a share of the property's range."""
+
+
+def local_steps(
+    offspring: Matrix,
+    lower: Matrix,
+    upper: Matrix,
+    rng: np.random.Generator,
+    *,
+    probability: float = MUTATION_PROBABILITY,
+) -> Matrix:
+    """Return a copy in which each property moves a little with ``probability``."""
+    steps = rng.normal(0.0, LOCAL_STEP, offspring.shape) * (upper - lower)
+    moved = np.where(rng.random(offspring.shape) < probability, offspring + steps, offspring)
+    return np.clip(moved, lower, upper)
