@@ -4,14 +4,11 @@ from __future__ import annotations
 
 import os
 import re
-import secrets
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, cast
 
 import pytest
-
-from pytest_garl.search.slots import population
 
 if TYPE_CHECKING:
     from pytest_garl.run import Target
@@ -169,7 +166,7 @@ def read_options(config: pytest.Config) -> Options:
     size = _integer("population", text["population"], 1) if text["population"] else 0
     return Options(
         budget=budget,
-        population=min(size, budget) if size else population(budget),
+        population=min(size, budget) if size else _population(budget),
         resume=bool(config.getoption("--garl-resume")),
         seed=_seed(config, text["seed"]),
         method=_among("method", text["method"], METHODS),
@@ -210,6 +207,14 @@ def _integer(name: str, text: str, low: int) -> int:
     return int(text)
 
 
+def _population(budget: int) -> int:
+    if not budget:
+        return 0
+    from pytest_garl.search.slots import population
+
+    return population(budget)
+
+
 def _seconds(text: str) -> float:
     try:
         value = float(text)
@@ -231,6 +236,8 @@ def _seed(config: pytest.Config, text: str) -> int:
     if "garl_seed" in given:
         return int(given["garl_seed"])
     if text == "random":
+        import secrets
+
         return secrets.randbelow(2**32)
     return _integer("seed", text, 0)
 
