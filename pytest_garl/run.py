@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from pytest_garl.simulation.policy import PolicySpec
     from pytest_garl.verdicts.verdict import Limits
 
-FLIGHT_S = 3.0
+FLIGHT_S = 2.2
 """Wall time of one flight on one core where no earlier run tells: OpenCV-MLS, measured by
 ``python -m benchmarks``."""
 
@@ -107,6 +107,17 @@ class Run:
         self.ledger.close()
         if self.lock is not None:
             self.lock.close()
+
+    def files(self, system: str, map: str) -> str:
+        """Return the test files that fly a search, for a command line."""
+        found = {
+            nodes[0].partition("::")[0]
+            for search, wanted in self.items.items()
+            for slot, nodes in wanted.items()
+            if _name(self.targets[search][slot].system) == system
+            and self.targets[search][slot].map == map
+        }
+        return " ".join(sorted(found))
 
     def first_item(self, target: Target) -> str:
         """Return the node id of the first selected item of a slot."""

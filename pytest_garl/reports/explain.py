@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import textwrap
 from typing import Any
 
 import pytest
@@ -28,12 +29,9 @@ def explain(report: pytest.TestReport, item: pytest.Item, run: Run, target: Targ
         report.outcome = "skipped"
         report.wasxfail = f"same violation as {twin} ({verdict['signature']})"
         return
-    lines = [
-        verdict["signature"],
-        verdict["story"],
-        *_unusual(run, target),
-        repeat_line(item, run, target),
-    ]
+    told = [verdict["story"], *_unusual(run, target)]
+    wrapped = [textwrap.fill(text, 98, subsequent_indent="  ") for text in told]
+    lines = [verdict["signature"], *wrapped, repeat_line(item, run, target)]
     report.sections.append(("garl: what happened", "\n".join(lines)))
 
 

@@ -34,12 +34,14 @@ def summary(reporter: Any, run: Run) -> None:
         return
     reporter.section("garl: violations", sep="=")
     for (system, map), flown in groups.items():
-        _table(reporter, system, map, flown)
+        _table(reporter, system, map, flown, run.files(system, map))
     reporter.write_line(_spent(run.ledger.meters()))
     reporter.write_line(f"ledger: {run.ledger.path}  results {run.ledger.result_hash()[:16]}")
 
 
-def _table(reporter: Any, system: str, map: str, flown: list[tuple[Slot, dict[str, Any]]]) -> None:
+def _table(
+    reporter: Any, system: str, map: str, flown: list[tuple[Slot, dict[str, Any]]], files: str
+) -> None:
     total = len(flown)
     verdicts = [from_dict(result["verdict"]) for _, result in flown]
     bad = sum(verdict.paper_violation for verdict in verdicts)
@@ -61,7 +63,8 @@ def _table(reporter: Any, system: str, map: str, flown: list[tuple[Slot, dict[st
             found.setdefault(verdict.signature, []).append((slot, verdict))
     for signature, cases in sorted(found.items(), key=lambda item: (-len(item[1]), item[0])):
         first = cases[0][0].id(map)
-        reporter.write_line(f"  {len(cases):4d}  {signature:<40}  --garl-repeat={first}")
+        again = " ".join(filter(None, ["pytest", files, f"--garl-repeat={first}"]))
+        reporter.write_line(f"  {len(cases):4d}  {signature:<32}  {again}")
 
 
 def _spent(meters: dict[str, float]) -> str:
