@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from benchmarks import overhead, speed, throughput
+from benchmarks import ledger, overhead, speed, throughput
 
 speed.main()
 overhead.main()
+ledger.main()
 throughput.main()

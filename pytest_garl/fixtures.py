@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
-from pytest_garl.options import RUN
+from pytest_garl.errors import LedgerError
+from pytest_garl.options import FATAL, RUN
 
 if TYPE_CHECKING:
     from pytest_garl.run import Run, Target
@@ -102,7 +103,14 @@ def npcs(request: pytest.FixtureRequest) -> PolicySpec:
 def landing(request: pytest.FixtureRequest, garl_slot: Target, npcs: PolicySpec) -> Landing:
     """Return the slot's landing, flown when it is first asked for."""
     run = request.config.stash[RUN]
-    result = run.fly(garl_slot, npcs)
+    try:
+        result = run.fly(garl_slot, npcs)
+    except LedgerError as error:
+        # Without its ledger a run cannot go on, and no other item would fare better.
+        if not hasattr(request.config, "workerinput"):
+            pytest.exit(f"garl: {error}", returncode=pytest.ExitCode.INTERNAL_ERROR)
+        request.node.user_properties.append((FATAL, str(error)))
+        pytest.fail(f"garl: {error}", pytrace=False)
     landing = Landing(garl_slot, result, run)
     verdict = result["verdict"]
     request.node.user_properties += [

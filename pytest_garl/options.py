@@ -16,6 +16,8 @@ if TYPE_CHECKING:
 
 RUN = pytest.StashKey[Any]()
 """Where a session keeps its run; none if nothing is to be flown."""
+FATAL = "garl.fatal"
+"""The user property by which an xdist worker tells the controller that the run cannot go on."""
 METHODS = ("garl", "garl-paper", "random")
 POLICIES = ("waypoint", "random_walk", "stationary")
 SLOT_ID = re.compile(r"(?P<map>.+)-g(?P<generation>\d{2,})-s(?P<slot>\d{2,})")

@@ -11,7 +11,7 @@ import pytest
 from pytest_garl import hookspecs
 from pytest_garl.errors import GarlError
 from pytest_garl.fixtures import garl_slot, landing, npcs, scenario
-from pytest_garl.options import RUN, add_options, read_options, target_of
+from pytest_garl.options import FATAL, RUN, add_options, read_options, target_of
 
 __all__ = ["garl_slot", "landing", "npcs", "scenario"]
 
@@ -119,6 +119,13 @@ def pytest_runtest_makereport(
 
         explain(report, item, run, target)
     return report
+
+
+def pytest_runtest_logreport(report: pytest.TestReport) -> None:
+    """End an xdist session whose workers have lost their ledger."""
+    for key, value in report.user_properties:
+        if key == FATAL:
+            raise pytest.exit.Exception(f"garl: {value}", pytest.ExitCode.INTERNAL_ERROR)
 
 
 def pytest_report_header(config: pytest.Config) -> str | None:

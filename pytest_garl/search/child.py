@@ -12,12 +12,15 @@ import time
 from pathlib import Path
 from typing import TextIO
 
+from pytest_garl.errors import LedgerError
 from pytest_garl.search.ledger import Ledger
 from pytest_garl.search.slots import Slot
 
 THREADS = dict.fromkeys(
     ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "OPENCV_FOR_THREADS_NUM"), "1"
 )
+CANNOT_WRITE = "garl cannot write: "
+"""With this a child says on stderr that it ended for want of a place to write."""
 IDLE_S = 0.02
 BEAT_S = 5.0
 ALONE_FACTOR = 3.0
@@ -82,7 +85,13 @@ def main(path: str) -> None:
             watchdog.limit_s = job.timeout_s * (ALONE_FACTOR if claim.after else 1.0)
             name = Slot(generation=claim.generation, index=claim.slot).id(job.map)
             slot_id = f"{claim.search[:8]}-{name}"
-            result, sha256, wall_s = fly_job(job, load_scenario(claim.scenario), slot_id, watchdog)
+            try:
+                result, sha256, wall_s = fly_job(
+                    job, load_scenario(claim.scenario), slot_id, watchdog
+                )
+            except OSError as error:
+                # The landing system's own are part of its flight; this one is of the record.
+                raise LedgerError(f"{job.flights}: {error.strerror or error}") from error
             if claim.after == "hung":
                 # It hung once and not again: the machine's doing as likely as the system's.
                 text = f"one call took longer than {job.timeout_s:g} s once, but not again"
@@ -93,4 +102,7 @@ def main(path: str) -> None:
 
 
 if __name__ == "__main__":
-    main(sys.argv[1])
+    try:
+        main(sys.argv[1])
+    except LedgerError as error:
+        sys.exit(f"{CANNOT_WRITE}{error}")

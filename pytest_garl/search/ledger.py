@@ -31,6 +31,7 @@ CREATE TABLE slot (
     attempts INTEGER NOT NULL DEFAULT 0, result TEXT, objectives TEXT, sha256 TEXT, wall_s REAL,
     PRIMARY KEY (search, generation, slot)
 );
+CREATE INDEX slot_state ON slot (state, generation, slot);
 CREATE TABLE seat (pid INTEGER PRIMARY KEY, owner INTEGER NOT NULL);
 CREATE TABLE meter (name TEXT PRIMARY KEY, value REAL NOT NULL);
 """
@@ -67,17 +68,51 @@ class Progress:
     generation: int
 
 
+_REMEDY = (
+    "Is it a ledger, is there space, may it be written? Mend that and go on with --garl-resume, or "
+    "choose another folder with the ini key garl_dir"
+)
+
+
+class _Database:
+    """A connection whose errors are those of the ledger."""
+
+    def __init__(self, path: Path) -> None:
+        self._path = path
+        with self._explained():
+            self._connection = sqlite3.connect(path, timeout=30, isolation_level=None)
+
+    def execute(self, sql: str, values: Sequence[Any] = ()) -> sqlite3.Cursor:
+        with self._explained():
+            return self._connection.execute(sql, values)
+
+    def executemany(self, sql: str, rows: Sequence[Sequence[Any]]) -> None:
+        with self._explained():
+            self._connection.executemany(sql, rows)
+
+    def executescript(self, sql: str) -> None:
+        with self._explained():
+            self._connection.executescript(sql)
+
+    def close(self) -> None:
+        self._connection.close()
+
+    @contextmanager
+    def _explained(self) -> Iterator[None]:
+        try:
+            yield
+        except sqlite3.Error as error:
+            raise LedgerError(f"{self._path}: {error}. {_REMEDY}") from error
+
+
 class Ledger:
     """A run's searches, slots and results; safe for several processes."""
 
     def __init__(self, path: Path) -> None:
         self.path = path
-        try:
-            self._db = sqlite3.connect(path, timeout=30, isolation_level=None)
-            self._db.execute("PRAGMA journal_mode=WAL")
-            self._db.execute("PRAGMA synchronous=NORMAL")
-        except sqlite3.Error as error:
-            raise LedgerError(f"{path}: cannot be opened as a ledger: {error}") from error
+        self._db = _Database(path)
+        self._db.execute("PRAGMA journal_mode=WAL")
+        self._db.execute("PRAGMA synchronous=NORMAL")
 
     @classmethod
     def create(cls, path: Path, run: Mapping[str, Any]) -> Ledger:
@@ -86,18 +121,13 @@ class Ledger:
             path.parent.mkdir(parents=True, exist_ok=True)
             if path.is_file():
                 _set_aside(path)
-            ledger = cls(path)
-            ledger._db.executescript(SCHEMA)
-            rows = [
-                (key, json.dumps(value))
-                for key, value in sorted({**run, "ledger": VERSION}.items())
-            ]
-            ledger._db.executemany("INSERT INTO run VALUES (?, ?)", rows)
-        except (OSError, sqlite3.Error) as error:
-            raise LedgerError(
-                f"{path}: cannot be written ({error}); free space, or choose another folder with "
-                "the ini key garl_dir"
-            ) from error
+        except OSError as error:
+            raise LedgerError(f"{path}: {error.strerror}. {_REMEDY}") from error
+        ledger = cls(path)
+        ledger._db.executescript(SCHEMA)
+        facts = {**run, "ledger": VERSION}
+        rows = [(key, json.dumps(value)) for key, value in sorted(facts.items())]
+        ledger._db.executemany("INSERT INTO run VALUES (?, ?)", rows)
         return ledger
 
     @classmethod
@@ -108,12 +138,12 @@ class Ledger:
         """
         if not path.is_file():
             raise LedgerError(f"--garl-resume: there is no ledger at {path}; run without it first")
-        ledger = cls(path)
         try:
+            ledger = cls(path)
             version = ledger.fact("ledger")
             problem = ledger._db.execute("PRAGMA quick_check").fetchone()[0]
-        except (sqlite3.Error, json.JSONDecodeError) as error:
-            problem, version = str(error), VERSION
+        except (LedgerError, json.JSONDecodeError) as error:
+            problem, version = str(error.__cause__ or error), VERSION
         if problem != "ok":
             raise LedgerError(
                 f"--garl-resume: {path} is damaged or no ledger ({problem}); run without "
@@ -146,7 +176,8 @@ class Ledger:
         try:
             yield
         except BaseException:
-            self._db.execute("ROLLBACK")
+            with contextlib.suppress(LedgerError):
+                self._db.execute("ROLLBACK")
             raise
         self._db.execute("COMMIT")
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
 import subprocess
 import sys
@@ -11,7 +12,7 @@ from pathlib import Path
 
 from pytest_garl.errors import LedgerError
 from pytest_garl.scenarios.maps import load_map
-from pytest_garl.search.child import THREADS, dump_file
+from pytest_garl.search.child import CANNOT_WRITE, THREADS, dump_file
 from pytest_garl.search.job import broken_result, fly_job, load_scenario, loads
 from pytest_garl.search.ledger import Ledger
 from pytest_garl.search.slots import Slot
@@ -45,8 +46,10 @@ class Pool:
         for pid, child in self._children.items():
             child.terminate()
             child.communicate()
-            self._ledger.release(pid, "waiting")
-            self._ledger.leave_seat(pid)
+            with contextlib.suppress(LedgerError):
+                # What cannot be given back is given back when the run is resumed.
+                self._ledger.release(pid, "waiting")
+                self._ledger.leave_seat(pid)
             dump_file(self._ledger.path.parent, pid).unlink(missing_ok=True)
         self._children.clear()
 
@@ -99,6 +102,9 @@ class Pool:
         words = file.read_text() if file.exists() else ""
         file.unlink(missing_ok=True)
         complaint = child.communicate()[1]
+        if CANNOT_WRITE in complaint:
+            self._ledger.release(pid, "waiting")
+            raise LedgerError(complaint.partition(CANNOT_WRITE)[2].strip())
         found = self._ledger.claim_of(pid)
         if found is None:
             self._losses += 1

@@ -196,3 +196,30 @@ def test_the_budget_is_exact(pytester: pytest.Pytester, budget: int) -> None:
     assert query(ledger, "SELECT count(*), count(DISTINCT scenario) FROM slot") == [
         (budget, budget)
     ]
+
+
+@pytest.mark.parametrize("parallel", [(), ("-n2",)])
+def test_a_full_disk_ends_the_run_with_one_clear_error(
+    pytester: pytest.Pytester, parallel: tuple[str, ...]
+) -> None:
+    """A limit on the size of files stands for the full disk."""
+    slow_project(pytester)
+    limited = "ulimit -f 400; exec " + " ".join(
+        [sys.executable, "-m", "pytest", "-p", "no:cacheprovider", *BUDGET, *parallel]
+    )
+    done = subprocess.run(
+        ["bash", "-c", limited],
+        cwd=pytester.path,
+        env={**os.environ, "PYTHONPATH": os.pathsep.join(sys.path), "PYTHONDONTWRITEBYTECODE": "1"},
+        capture_output=True,
+        text=True,
+        timeout=120,
+    )
+    assert done.returncode not in (0, 1), done.stdout
+    assert "is there space" in done.stdout + done.stderr
+    assert "Traceback" not in done.stdout
+    ledger = pytester.path / ".garl" / "ledger.sqlite"
+    flown = query(ledger, "SELECT count(*) FROM slot WHERE state = 'flown'")[0][0]
+    assert 0 < flown < 30
+    assert run(pytester, *BUDGET, "--garl-resume").ret in (0, 1)
+    assert query(ledger, "SELECT count(*) FROM slot WHERE state = 'flown'") == [(30,)]

@@ -1,0 +1,30 @@
+"""What the ledger costs per flight: claim and record, with a result of usual size."""
+
+from __future__ import annotations
+
+import tempfile
+import time
+from pathlib import Path
+
+from pytest_garl.search.ledger import Ledger
+
+
+def main(flights: int = 2000) -> None:
+    """Print the mean time of one flight's bookkeeping."""
+    result = {"verdict": {"story": "x" * 300, "signature": "", "margins": [{"value": 1.0}] * 4}}
+    with tempfile.TemporaryDirectory() as folder:
+        ledger = Ledger.create(Path(folder) / "ledger.sqlite", {})
+        ledger.add_search("s", "system", "court", flights, "{}" * 500)
+        ledger.add_slots("s", 0, dict.fromkeys(range(flights), "x" * 900))
+        began = time.perf_counter()
+        for _ in range(flights):
+            claim = ledger.claim()
+            assert claim is not None
+            ledger.count("idle_s", 0.001)
+            ledger.record(claim, result, "0" * 64, 1.0)
+        each = (time.perf_counter() - began) / flights
+        print(f"ledger: {1e3 * each:.2f} ms per flight")
+
+
+if __name__ == "__main__":
+    main()
