@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import functools
 import hashlib
 import json
 import sys
@@ -33,7 +34,7 @@ FLIGHT_S = 2.2
 ``python -m benchmarks``."""
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, kw_only=True)
 class Target:
     """What an item tests: which system on which map, and what it flies."""
 
@@ -49,7 +50,7 @@ class Target:
         """The slot's id in the item's name."""
         return f"file-{Path(self.file).stem}" if self.file else self.slot.id(self.map)
 
-    @property
+    @functools.cached_property
     def search(self) -> str:
         """Key of the search that the slot belongs to."""
         reference = reference_to(self.system)
@@ -73,6 +74,7 @@ class Run:
     items: dict[str, dict[Slot, list[str]]] = field(default_factory=dict)
     targets: dict[str, dict[Slot, Target]] = field(default_factory=dict)
     breeders: dict[str, Breeder] = field(default_factory=dict)
+    results: dict[tuple[str, Slot], dict[str, Any]] = field(default_factory=dict)
     lock: TextIO | None = None
 
     def select(self, items: list[pytest.Item]) -> None:
@@ -126,25 +128,31 @@ class Run:
     def fly(self, target: Target, npcs: PolicySpec) -> dict[str, Any]:
         """Return the slot's result after it and all lower selected slots are flown."""
         self._register(target, npcs)
+        search = target.search
         try:
-            for slot in sorted(self.items[target.search]):
-                if slot <= target.slot:
-                    self.pool.wait(target.search, slot, self._advance)
+            for slot in self._lower(search, target.slot):
+                self._wait(search, slot)
+            return self._wait(search, target.slot)
         finally:
             self.waited()
-        result = self.ledger.result(target.search, target.slot.generation, target.slot.index)
-        assert result is not None
-        return result
 
     def twin(self, target: Target, signature: str) -> str:
         """Return the lowest selected slot below with the same signature, or nothing."""
-        for slot in sorted(self.items[target.search]):
-            if slot >= target.slot:
-                break
-            result = self.ledger.result(target.search, slot.generation, slot.index)
-            if result and result["verdict"]["signature"] == signature:
+        search = target.search
+        for slot in self._lower(search, target.slot):
+            if self._wait(search, slot)["verdict"]["signature"] == signature:
                 return slot.id(target.map)
         return ""
+
+    def _lower(self, search: str, below: Slot) -> list[Slot]:
+        return [slot for slot in sorted(self.items[search]) if slot < below]
+
+    def _wait(self, search: str, slot: Slot) -> dict[str, Any]:
+        """Return a slot's result; what is flown never changes and is asked for once."""
+        known = self.results.get((search, slot))
+        if known is None:
+            known = self.results[search, slot] = self.pool.wait(search, slot, self._advance)
+        return known
 
     def _advance(self) -> None:
         """Breed what can be bred, so that the pool has work ahead of the items."""

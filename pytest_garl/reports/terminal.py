@@ -17,8 +17,10 @@ def header(run: Run) -> str:
     if options.repeat:
         return f"garl: repeating {options.repeat}"
     each = options.budget * run.flight_s / max(1, options.workers)
+    done = sum(search.flown for search in run.ledger.progress()) if options.resume else 0
+    before = f"resuming after {done} flights; " if options.resume else ""
     return (
-        f"garl: budget {options.budget} per system and map, method {options.method}, "
+        f"garl: {before}budget {options.budget} per system and map, method {options.method}, "
         f"seed {options.seed}, objects {options.npcs}, weather {options.weather}, "
         f"{options.workers} workers; about {duration(each)} per system and map"
     )
@@ -36,6 +38,12 @@ def summary(reporter: Any, run: Run) -> None:
     for (system, map), flown in groups.items():
         _table(reporter, system, map, flown, run.files(system, map))
     reporter.write_line(_spent(run.ledger.meters()))
+    searches = run.ledger.progress()
+    done, total = sum(each.flown for each in searches), sum(each.all for each in searches)
+    if done < total and not run.options.repeat:
+        reporter.write_line(
+            f"not finished: {done} of {total} flown; the same command with --garl-resume goes on"
+        )
     reporter.write_line(f"ledger: {run.ledger.path}  results {run.ledger.result_hash()[:16]}")
 
 

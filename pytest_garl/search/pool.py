@@ -9,6 +9,7 @@ import sys
 import time
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 from pytest_garl.errors import LedgerError
 from pytest_garl.scenarios.maps import load_map
@@ -30,16 +31,17 @@ class Pool:
         self._children: dict[int, subprocess.Popen[str]] = {}
         self._losses = 0
 
-    def wait(self, search: str, slot: Slot, tick: Callable[[], None]) -> None:
-        """Return when a slot is flown; ``tick`` is called before and while waiting."""
+    def wait(self, search: str, slot: Slot, tick: Callable[[], None]) -> dict[str, Any]:
+        """Return a slot's result when it is flown; ``tick`` is called before and while waiting."""
         tick()
-        while self._ledger.result(search, slot.generation, slot.index) is None:
+        while (result := self._ledger.result(search, slot.generation, slot.index)) is None:
             if self._workers == 0:
                 self._fly_here()
             else:
                 self._look_after()
                 time.sleep(POLL_S)
             tick()
+        return result
 
     def close(self) -> None:
         """End this process's children and give back what they had in flight."""

@@ -140,9 +140,12 @@ def test_ctrl_c_leaves_no_orphan_and_a_ledger_that_resumes(pytester: pytest.Pyte
     process.send_signal(signal.SIGINT)
     output, _ = process.communicate(timeout=60)
     assert process.returncode == pytest.ExitCode.INTERRUPTED, output
+    assert "of 30 flown; the same command with --garl-resume goes on" in output
     assert seats
     assert not any(alive(pid) for pid in seats)
-    assert run(pytester, *BUDGET, "--garl-resume").ret in (0, 1)
+    resumed = run(pytester, *BUDGET, "--garl-resume")
+    assert resumed.ret in (0, 1)
+    resumed.stdout.fnmatch_lines(["garl: resuming after * flights; budget 30*"])
     assert query(ledger, "SELECT count(*) FROM slot WHERE state = 'flown'") == [(30,)]
 
 
