@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from benchmarks import ledger, overhead, speed, throughput
+from benchmarks import collect, ledger, overhead, speed, throughput
 
 speed.main()
 overhead.main()
+collect.main()
 ledger.main()
 throughput.main()

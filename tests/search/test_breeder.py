@@ -1,0 +1,78 @@
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from pytest_garl.scenarios.genes import genome_for
+from pytest_garl.scenarios.maps import load_map
+from pytest_garl.search.breeder import Breeder
+from pytest_garl.search.job import load_scenario
+from pytest_garl.search.ledger import Ledger
+from pytest_garl.search.method import Plan
+from pytest_garl.search.methods import METHODS, make_method
+from pytest_garl.search.slots import Slot, population, slots
+from tests.search.test_nsga2 import result
+
+MAP = load_map("court")
+GENOME = genome_for(MAP)
+
+
+def searched(path: Path, name: str, budget: int, wanted: tuple[Slot, ...] = ()) -> Ledger:
+    """Breed and fly, by a formula, until nothing is left to do."""
+    size = population(budget)
+    plan = Plan(map=MAP, genome=GENOME, seed=1, population=size)
+    generations: dict[int, list[int]] = {}
+    for slot in wanted or slots(budget, size):
+        generations.setdefault(slot.generation, []).append(slot.index)
+    ledger = Ledger.create(path, {})
+    ledger.add_search("s", "m:S", "court", budget, "{}")
+    breeder = Breeder(ledger, "s", make_method(name, plan), generations)
+    while True:
+        breeder.advance()
+        claim = ledger.claim()
+        if claim is None:
+            return ledger
+        ledger.record(claim, result(load_scenario(claim.scenario)), "", 0.0)
+
+
+@pytest.mark.parametrize("name", METHODS)
+def test_every_budget_is_flown_exactly(tmp_path: Path, name: str) -> None:
+    for budget in range(1, 61):
+        ledger = searched(tmp_path / f"{budget}.sqlite", name, budget)
+        texts = [
+            text
+            for generation in range(60)
+            for text, flown in ledger.generation("s", generation)
+            if flown is not None
+        ]
+        assert len(texts) == len(set(texts)) == budget
+        assert ledger.meters()["flights"] == budget
+        ledger.close()
+
+
+def test_a_method_that_learns_flies_the_parents_of_what_is_wanted(tmp_path: Path) -> None:
+    wanted = (Slot(generation=2, index=3),)
+    ledger = searched(tmp_path / "garl.sqlite", "garl", 40, wanted)
+    assert [len(ledger.generation("s", generation)) for generation in range(4)] == [8, 8, 1, 0]
+    ledger = searched(tmp_path / "random.sqlite", "random", 40, wanted)
+    assert [len(ledger.generation("s", generation)) for generation in range(4)] == [0, 0, 1, 0]
+
+
+def test_selecting_changes_nothing_of_what_is_bred(tmp_path: Path) -> None:
+    whole = searched(tmp_path / "whole.sqlite", "garl", 40)
+    part = searched(tmp_path / "part.sqlite", "garl", 40, (Slot(generation=2, index=3),))
+    assert part.generation("s", 2)[0] == whole.generation("s", 2)[3]
+
+
+def test_objectives_of_every_learned_generation_are_noted(tmp_path: Path) -> None:
+    import sqlite3
+
+    searched(tmp_path / "ledger.sqlite", "garl-paper", 40).close()
+    database = sqlite3.connect(tmp_path / "ledger.sqlite")
+    rows = database.execute(
+        "SELECT generation, count(objectives) FROM slot GROUP BY generation ORDER BY generation"
+    ).fetchall()
+    database.close()
+    # The last generation has no successor that would learn from it.
+    assert rows == [(0, 8), (1, 8), (2, 8), (3, 8), (4, 0)]
