@@ -46,7 +46,7 @@ class _Solid:
     at: tuple[float, float, float] = (0.0, 0.0, 0.0)
     yaw_rad: float = math.nan
     turn: Array = field(default_factory=lambda: np.eye(3, dtype=np.float32))
-    shades: dict[int, NDArray[np.uint8]] = field(default_factory=dict)
+    shades: dict[int, Array] = field(default_factory=dict)
     shadows: NDArray[np.float64] = field(default_factory=lambda: np.zeros((0, 2)))
     """The outlines of the parts' shadows about the body's own, one after the other."""
     lengths: list[int] = field(default_factory=list)
@@ -156,7 +156,7 @@ class Solids:
     def _rasterise(
         self,
         corners: Array,
-        paint: NDArray[np.uint8],
+        paint: Array,
         segment: int,
         frame: tuple[NDArray[np.uint8], Array, NDArray[np.int32]],
         view: View,
@@ -176,29 +176,29 @@ class Solids:
         across = (columns.start + (width - 1) / 2 - cx) / focal
         down = (rows.start + (height - 1) / 2 - cy) / focal
         sheared = corners - corners[:, 2:] * np.array([across, down, 0.0], np.float32)
-        codes, order = _numbers(len(paint))
         drawn = np.zeros((height, width, 3), np.float32)
-        window = depth[rows, columns]
         cv2.triangleRasterize(
             sheared,
-            order,
-            codes,
+            _order(len(paint)),
+            np.repeat(paint, 3, axis=0),
             drawn,
-            window,
+            depth[rows, columns],
             _TO_GL,
             2 * math.atan(height / 2 / focal),
             NEAR_M,
             FAR_M,
             self._settings,
         )
-        code = np.asarray(cv2.extractChannel(drawn, 0))
-        covered = code > 0
+        covered = cv2.extractChannel(drawn, 0) > 0
         segmentation[rows, columns][covered] = segment
-        image[rows, columns][covered] = paint[code[covered].astype(np.intp) - 1]
+        cv2.copyTo(cv2.convertScaleAbs(drawn), covered.view(np.uint8), image[rows, columns])
         return int(np.count_nonzero(covered))
 
-    def _shade(self, solid: _Solid, level: int) -> NDArray[np.uint8]:
-        """Return the mesh's colours in this light, kept until the solid turns."""
+    def _shade(self, solid: _Solid, level: int) -> Array:
+        """Return the mesh's colours in this light, kept until the solid turns.
+
+        None is black: what is black was not drawn.
+        """
         kept = solid.shades.get(level)
         if kept is None:
             mesh, conditions = solid.meshes[level], self._conditions
@@ -208,7 +208,7 @@ class Solids:
             sky = 0.75 + 0.25 * normals[:, 2]
             light = (1 - share) * sky + share * facing / max(0.35, conditions.sun[2])
             lit = mesh.colours * np.clip(light, 0, 1.15)[:, None]
-            kept = solid.shades[level] = np.clip(lit, 0, 255).astype(np.uint8)
+            kept = solid.shades[level] = np.clip(np.round(lit), 1, 255).astype(np.float32)
         return kept
 
 
@@ -227,13 +227,10 @@ def _level_at(radius_m: float) -> int:
 
 
 @functools.lru_cache(maxsize=4)
-def _most_numbers(most: int) -> tuple[Array, NDArray[np.int32]]:
-    codes = np.zeros((3 * most, 3), np.float32)
-    codes[:, 0] = np.repeat(np.arange(1, most + 1, dtype=np.float32), 3)
-    return codes, np.arange(3 * most, dtype=np.int32).reshape(-1, 3)
+def _corner_numbers(most: int) -> NDArray[np.int32]:
+    return np.arange(3 * most, dtype=np.int32).reshape(-1, 3)
 
 
-def _numbers(count: int) -> tuple[Array, NDArray[np.int32]]:
-    """Return each triangle's number as the colour of its corners, and its corners' indices."""
-    codes, order = _most_numbers(max(4096, 1 << count.bit_length()))
-    return codes[: 3 * count], order[:count]
+def _order(count: int) -> NDArray[np.int32]:
+    """Return the numbers of the corners of ``count`` triangles, one after the other."""
+    return _corner_numbers(max(4096, 1 << count.bit_length()))[:count]
