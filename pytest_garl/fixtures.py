@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import pytest
 
 from pytest_garl.errors import LedgerError
-from pytest_garl.options import FATAL, RUN
+from pytest_garl.switches import FATAL, RUN
 
 if TYPE_CHECKING:
     from pytest_garl.run import Run, Target

@@ -10,100 +10,12 @@ from typing import TYPE_CHECKING, Any, Literal, cast
 
 import pytest
 
+from pytest_garl.switches import METHODS, OPTIONS, POLICIES, Option
+
 if TYPE_CHECKING:
-    from pytest_garl.run import Target
     from pytest_garl.scenarios.genes import WeatherRange
 
-RUN = pytest.StashKey[Any]()
-"""Where a session keeps its run; none if nothing is to be flown."""
-FATAL = "garl.fatal"
-"""The user property by which an xdist worker tells the controller that the run cannot go on."""
-METHODS = ("garl", "garl-paper", "random")
-POLICIES = ("waypoint", "random_walk", "stationary")
 SLOT_ID = re.compile(r"(?P<map>.+)-g(?P<generation>\d{2,})-s(?P<slot>\d{2,})")
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Option:
-    """One option: its name without ``garl-``, default, and what ``--help`` says."""
-
-    name: str
-    metavar: str
-    help: str
-    default: str = ""
-
-
-OPTIONS = (
-    Option(
-        name="budget",
-        metavar="N",
-        help="Search: fly N scenarios per landing system and map. Without it only committed "
-        "cases are flown, and other tests of landings are skipped.",
-    ),
-    Option(
-        name="seed",
-        metavar="SEED",
-        default="0",
-        help="Seed of the search; the same seed finds the same. A whole number, or 'random' to "
-        "draw one, which the header prints (default: 0).",
-    ),
-    Option(
-        name="method",
-        metavar="METHOD",
-        default="garl",
-        help=f"How scenarios are proposed: {', '.join(METHODS)} (default: garl).",
-    ),
-    Option(
-        name="population",
-        metavar="N",
-        help="Scenarios that are bred at a time (default: a tenth of the budget, 8 to 20).",
-    ),
-    Option(
-        name="map",
-        metavar="MAPS",
-        help="Fly only on these of the tests' maps, separated by commas, such as court,lawn "
-        "(default: all).",
-    ),
-    Option(
-        name="workers",
-        metavar="N",
-        help="Fly in N child processes, whatever the -n of pytest-xdist; 0 flies inside pytest, "
-        "for a debugger (default: one per CPU core).",
-    ),
-    Option(
-        name="weather",
-        metavar="RANGE",
-        default="confined",
-        help="How bad the weather may get: 'confined' keeps its genes in [0, 0.15], 'full' lets "
-        "them reach 1 (default: confined).",
-    ),
-    Option(
-        name="timeout",
-        metavar="SECONDS",
-        default="10",
-        help="Wall-clock time that one call of the landing system may take; beyond that it "
-        "counts as hung (default: 10).",
-    ),
-    Option(
-        name="repeat",
-        metavar="SLOT|FILE",
-        help="Fly one scenario again instead of searching: a slot of the last run, such as "
-        "court-g03-s17, or a scenario file.",
-    ),
-    Option(
-        name="duplicates",
-        metavar="HOW",
-        default="xfail",
-        help="Report further violations with a signature already found in the same search as "
-        "'xfail' or as 'fail' (default: xfail).",
-    ),
-    Option(
-        name="npcs",
-        metavar="POLICY",
-        default="waypoint",
-        help=f"Who moves people, dogs and birds: {', '.join(POLICIES)} (default: waypoint).",
-    ),
-)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -141,26 +53,6 @@ class Options:
         return self.folder / ("repeat.sqlite" if self.repeat else "ledger.sqlite")
 
 
-def add_options(parser: pytest.Parser) -> None:
-    """Register all options and ini keys."""
-    group = parser.getgroup("garl", "search for violations of landing systems (pytest-garl)")
-    for option in OPTIONS:
-        group.addoption(
-            f"--garl-{option.name}", default=None, metavar=option.metavar, help=option.help
-        )
-        parser.addini(
-            f"garl_{option.name}",
-            help=f"Value of --garl-{option.name} where the command line gives none.",
-            default=option.default,
-        )
-    group.addoption(
-        "--garl-resume",
-        action="store_true",
-        help="Continue the interrupted run in the ledger; everything else must be as it was.",
-    )
-    parser.addini("garl_dir", help="Folder of the ledger and the flights.", default=".garl")
-
-
 def read_options(config: pytest.Config) -> Options:
     """Return the options; raise UsageError that says what was found and what is expected."""
     text = {option.name: _value(config, option) for option in OPTIONS}
@@ -184,14 +76,6 @@ def read_options(config: pytest.Config) -> Options:
         folder=config.rootpath / str(config.getini("garl_dir")),
         root=config.rootpath,
     )
-
-
-def target_of(item: pytest.Item) -> Target | None:
-    """Return what an item tests, or None for an item that is not ours."""
-    callspec = getattr(item, "callspec", None)
-    target = callspec.params.get("garl_slot") if callspec else None
-    # Where there is nothing to fly the parameter is the reason, a string.
-    return None if isinstance(target, str) else target
 
 
 def _value(config: pytest.Config, option: Option) -> str:

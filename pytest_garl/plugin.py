@@ -11,7 +11,7 @@ import pytest
 from pytest_garl import hookspecs
 from pytest_garl.errors import GarlError
 from pytest_garl.fixtures import garl_slot, landing, npcs, scenario
-from pytest_garl.options import FATAL, RUN, add_options, read_options, target_of
+from pytest_garl.switches import FATAL, RUN, add_options, asked, target_of
 
 __all__ = ["garl_slot", "landing", "npcs", "scenario"]
 
@@ -34,6 +34,10 @@ def pytest_configure(config: pytest.Config) -> None:
         "markers",
         "garl(system, maps, limits): search for violations of a landing system on maps",
     )
+    if not asked(config):
+        return
+    from pytest_garl.options import read_options
+
     options = read_options(config)
     if options.active and not config.option.collectonly:
         from pytest_garl.reports.session import begin_run
@@ -54,6 +58,7 @@ def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
             f"{metafunc.definition.nodeid} uses a landing fixture without "
             "@pytest.mark.garl(system=..., maps=[...])"
         )
+    from pytest_garl.options import read_options
     from pytest_garl.run import targets_for
 
     options = read_options(metafunc.config)

@@ -15,11 +15,12 @@ from typing import TYPE_CHECKING, Any, TextIO
 import pytest
 
 from pytest_garl.errors import GarlError, LedgerError
-from pytest_garl.options import SLOT_ID, Options, target_of
+from pytest_garl.options import SLOT_ID, Options
 from pytest_garl.search.ledger import Ledger
 from pytest_garl.search.pool import Pool
 from pytest_garl.search.reference import Reference, check_system, reference_to, sources_sha256
 from pytest_garl.search.slots import Slot, slots
+from pytest_garl.switches import target_of
 
 if TYPE_CHECKING:
     from pytest_garl.scenarios.scenario import Scenario
