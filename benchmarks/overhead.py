@@ -24,9 +24,7 @@ def main(repeats: int = 30) -> None:
                 switch = ["-p", name] if name.startswith("no:") else []
                 command = [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", *switch]
                 began = time.perf_counter()
-                subprocess.run(
-                    command, cwd=folder, check=True, capture_output=True, env=environment
-                )
+                subprocess.run(command, cwd=folder, check=True, capture_output=True, env=own)
                 taken.append(time.perf_counter() - began)
         without, with_it = (statistics.mean(sorted(times[name])[: repeats // 4]) for name in times)
         print(
