@@ -111,17 +111,6 @@ class Run:
         if self.lock is not None:
             self.lock.close()
 
-    def files(self, system: str, map: str) -> str:
-        """Return the test files that fly a search, for a command line."""
-        found = {
-            nodes[0].partition("::")[0]
-            for search, wanted in self.items.items()
-            for slot, nodes in wanted.items()
-            if _name(self.targets[search][slot].system) == system
-            and self.targets[search][slot].map == map
-        }
-        return " ".join(sorted(found))
-
     def first_item(self, target: Target) -> str:
         """Return the node id of the first selected item of a slot."""
         return self.items[target.search][target.slot][0]
@@ -183,6 +172,10 @@ class Run:
         if method.learns:
             flights = max(slots) * self.options.population + len(slots[max(slots)])
         self.ledger.add_search(search, name, target.map, flights, job.dumps())
+        nodes = [node for each in self.items[search].values() for node in each]
+        files = sorted({node.partition("::")[0] for node in nodes})
+        # For the summary, which xdist's controller writes without having had the items.
+        self.ledger.note_fact(f"files of {name} on {target.map}", " ".join(files))
         known = self.ledger.job(search)
         if known is not None and job.differences(loads(known)):
             raise LedgerError(

@@ -36,7 +36,8 @@ def summary(reporter: Any, run: Run) -> None:
         return
     reporter.section("garl: violations", sep="=")
     for (system, map), flown in groups.items():
-        _table(reporter, system, map, flown, run.files(system, map))
+        files = run.ledger.fact(f"files of {system} on {map}") or ""
+        _table(reporter, system, map, flown, files)
     reporter.write_line(_spent(run.ledger.meters()))
     searches = run.ledger.progress()
     done, total = sum(each.flown for each in searches), sum(each.all for each in searches)

@@ -93,6 +93,7 @@ def test_one_event_fails_one_test_and_its_twins_are_xfailed(
         ["*garl: what happened*", "*Collided with dog-1*", "*Repeat: pytest*"]
     )
     result.stdout.fnmatch_lines(["*Good on lawn: 24 flown*"])
+    result.stdout.fnmatch_lines(["* IV:dog:* pytest test_it.py --garl-repeat=lawn-g*"])
 
 
 def test_the_same_seed_gives_the_same_results_for_any_workers(pytester: pytest.Pytester) -> None:
