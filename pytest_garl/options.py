@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any, Literal, cast
 
 import pytest
 
+from pytest_garl.errors import GarlError
 from pytest_garl.switches import METHODS, OPTIONS, POLICIES, Option
 
 if TYPE_CHECKING:
@@ -63,7 +64,7 @@ def read_options(config: pytest.Config) -> Options:
         population=min(size, budget) if size else _population(budget),
         resume=bool(config.getoption("--garl-resume")),
         seed=_seed(config, text["seed"]),
-        method=_among("method", text["method"], METHODS),
+        method=_method(text["method"]),
         maps=tuple(part.strip() for part in text["map"].split(",") if part.strip()),
         workers=_integer("workers", text["workers"], 0) if text["workers"] else os.cpu_count() or 1,
         weather=cast("WeatherRange", _among("weather", text["weather"], ("confined", "full"))),
@@ -114,6 +115,18 @@ def _seconds(text: str) -> float:
 def _among(name: str, text: str, known: tuple[str, ...]) -> str:
     if text not in known:
         raise _wrong(name, text, f"one of {', '.join(known)}")
+    return text
+
+
+def _method(text: str) -> str:
+    if ":" not in text:
+        return _among("method", text, METHODS)
+    from pytest_garl.search.methods import find_method
+
+    try:
+        find_method(text)
+    except GarlError as error:
+        raise pytest.UsageError(f"--garl-method: {error}") from error
     return text
 
 

@@ -41,7 +41,8 @@ OPTIONS = (
         name="method",
         metavar="METHOD",
         default="garl",
-        help=f"How scenarios are proposed: {', '.join(METHODS)} (default: garl).",
+        help=f"How scenarios are proposed: {', '.join(METHODS)}, or a search of your own as "
+        "module:factory (default: garl).",
     ),
     Option(
         name="population",

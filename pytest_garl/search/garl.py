@@ -1,44 +1,46 @@
-"""garl: the paper's search, pulled towards violations and away from known ones."""
+"""garl: the paper's search, pulled towards violations and spread over their kinds."""
 
 from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
 
-from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.search.method import Flown, Plan
 from pytest_garl.search.nsga2 import Matrix, Nsga2
 from pytest_garl.search.objectives import diversity, threat
 from pytest_garl.search.operators import farthest_from_nearest, local_steps, property_mutation
 
-
-class _Garl:
-    """The archive of signatures, and the objectives that it bends."""
-
-    def __init__(self) -> None:
-        self._archive: Counter[str] = Counter()
-        self._known: set[Scenario] = set()
-
-    def objectives(self, chromosomes: Matrix, flown: Sequence[Flown]) -> Matrix:
-        """Threat and diversity, both maximised; shape (k, 2)."""
-        for item in flown:
-            if item.scenario not in self._known:
-                self._known.add(item.scenario)
-                self._archive[item.result["verdict"]["signature"]] += 1
-        values = [self._threat(item.result) for item in flown]
-        return np.column_stack([values, diversity(chromosomes)])
-
-    def _threat(self, result: dict[str, Any]) -> float:
-        signature = result["verdict"]["signature"]
-        return threat(result) + (1.0 / self._archive[signature] if signature else 0.0)
+FIRST_OF_ITS_KIND = 2.0
 
 
 def method(plan: Plan) -> Nsga2:
     """Return the search."""
-    return Nsga2("garl", plan, _Garl().objectives, 2, mutation)
+    return Nsga2("garl", plan, objectives, 2, mutation)
+
+
+def objectives(chromosomes: Matrix, flown: Sequence[Flown]) -> Matrix:
+    """Shared threat and diversity, both maximised; shape (k, 2)."""
+    spread = diversity(chromosomes)
+    return np.column_stack([shared_threat(flown, spread), spread])
+
+
+def shared_threat(flown: Sequence[Flown], spread: Matrix) -> Matrix:
+    """Return threats (k,) in which scenarios that violate alike share what that is worth.
+
+    The k-th violation of a signature counts 2/k, the most remote (``spread``) being the
+    first: a second kind is worth more than one more of the first, and from the third on a
+    violation of a known kind is worth less than a near miss.
+    """
+    threats = np.array([threat(item.result) for item in flown])
+    kinds: Counter[str] = Counter()
+    for index in np.argsort(-spread, kind="stable"):
+        signature = flown[index].result["verdict"]["signature"]
+        if signature:
+            kinds[signature] += 1
+            threats[index] = FIRST_OF_ITS_KIND / kinds[signature]
+    return threats
 
 
 def mutation(offspring: Matrix, lower: Matrix, upper: Matrix, rng: np.random.Generator) -> Matrix:

@@ -6,6 +6,7 @@ import importlib
 from collections.abc import Callable, Mapping
 from types import MappingProxyType
 
+from pytest_garl.errors import GarlError
 from pytest_garl.search.method import Method, Plan
 
 METHODS: Mapping[str, str] = MappingProxyType(
@@ -18,8 +19,19 @@ METHODS: Mapping[str, str] = MappingProxyType(
 """Where each method is made, so that only the one in use is imported."""
 
 
+def find_method(name: str) -> Callable[[Plan], Method]:
+    """Return the factory of a shipped method, or of one named "module:factory"."""
+    module, _, attribute = METHODS.get(name, name).partition(":")
+    try:
+        make: Callable[[Plan], Method] = getattr(importlib.import_module(module), attribute)
+    except (ImportError, AttributeError, ValueError) as error:
+        raise GarlError(
+            f"search method {name!r}: cannot be loaded ({error}); expected one of "
+            f"{', '.join(METHODS)}, or 'module:factory' of an importable module"
+        ) from error
+    return make
+
+
 def make_method(name: str, plan: Plan) -> Method:
     """Return a fresh search by the method called ``name``."""
-    module, _, attribute = METHODS[name].partition(":")
-    make: Callable[[Plan], Method] = getattr(importlib.import_module(module), attribute)
-    return make(plan)
+    return find_method(name)(plan)

@@ -221,6 +221,10 @@ def test_importlib_mode_reaches_the_children(pytester: pytest.Pytester) -> None:
             ("--garl-budget=8", "--garl-method=magic"),
             "*--garl-method: found 'magic', expected one*",
         ),
+        (
+            ("--garl-budget=8", "--garl-method=nowhere:search"),
+            "*--garl-method: search method 'nowhere:search': cannot be loaded*",
+        ),
         (("--garl-budget=8", "--garl-repeat=nowhere"), "*--garl-repeat: found 'nowhere'*"),
         (("--garl-budget=8", "-o", "garl_dir=/proc/garl"), "*cannot be written*garl_dir*"),
     ],

@@ -6,11 +6,13 @@ from typing import Any
 import numpy as np
 import pytest
 
+from pytest_garl.errors import GarlError
 from pytest_garl.scenarios.chromosome import encode
 from pytest_garl.scenarios.genes import genome_for
 from pytest_garl.scenarios.maps import load_map
 from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.scenarios.validity import problems
+from pytest_garl.search.garl import shared_threat
 from pytest_garl.search.method import Flown, Method, Plan
 from pytest_garl.search.methods import METHODS, make_method
 from pytest_garl.search.operators import property_mutation
@@ -108,15 +110,23 @@ def test_survivors_are_measured_against_parents_and_offspring_together() -> None
     assert widths == [8, 8, 8, 16]
 
 
-def test_a_second_kind_of_violation_is_worth_more_than_one_more_of_the_first() -> None:
-    method = make_method("garl", plan(population=20))
-    scenarios = method.ask()
-    values = method.tell([Flown(scenario=each, result=result(each)) for each in scenarios])
-    threats: dict[str, list[float]] = {}
-    for scenario, value in zip(scenarios, values, strict=True):
-        threats.setdefault(result(scenario)["verdict"]["signature"], []).append(value[0])
-    for signature, found in threats.items():
-        if signature:
-            assert found == pytest.approx([1 + 1 / len(found)] * len(found))
-        else:
-            assert max(found) < 1
+def test_violations_of_one_kind_share_what_a_violation_is_worth() -> None:
+    def flown(primary: str | None, signature: str, gap_m: float) -> Flown:
+        margins = [{"property": "collision", "value": gap_m, "unit": "m", "decided": True}]
+        verdict = {"primary": primary, "signature": signature, "margins": margins}
+        return Flown(scenario=scenario, result={"verdict": verdict})
+
+    scenario = make_method("garl", plan()).ask()[0]
+    dog = flown("collision", "IV:dog:descent:seen", 0.0)
+    bird = flown("collision", "IV:bird:approach:unseen", 0.0)
+    near, far = flown(None, "", 0.6), flown(None, "", 5.0)
+    worth = shared_threat([dog, near, dog, bird, dog, far], np.array([0.1, 0.2, 0.3, 0.0, 0.2, 0]))
+    # The most remote of its kind counts most; the third of a kind less than a near miss.
+    assert list(worth) == pytest.approx([2 / 3, 0.8, 2.0, 2.0, 1.0, 0.0])
+
+
+def test_a_search_of_ones_own_is_named_by_its_module() -> None:
+    own = make_method("pytest_garl.search.garl_paper:method", plan())
+    assert bred(own, 2) == bred(make_method("garl-paper", plan()), 2)
+    with pytest.raises(GarlError, match=r"'nowhere:method'.*cannot be loaded"):
+        make_method("nowhere:method", plan())
