@@ -1,0 +1,383 @@
+"""The 240 Hz loop of one flight: everything that happens in a simulated second."""
+
+from __future__ import annotations
+
+import math
+import traceback
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, Protocol, TypeVar
+
+import numpy as np
+
+from pytest_garl.landing_system import (
+    Abort,
+    Airframe,
+    Command,
+    Land,
+    MotorThrusts,
+    Observation,
+    VehicleState,
+    airframe_of,
+)
+from pytest_garl.scenarios.bodies import rotate
+from pytest_garl.scenarios.maps import Map
+from pytest_garl.scenarios.placement import marker_position_m, wind_mps
+from pytest_garl.scenarios.scenario import Scenario
+from pytest_garl.simulation.camera import Frame, Renderer
+from pytest_garl.simulation.commands import problem_with_command, problem_with_thrusts
+from pytest_garl.simulation.flight import Crash, Flight, Outcome
+from pytest_garl.simulation.flight_control import FlightControl
+from pytest_garl.simulation.mission import mission_for
+from pytest_garl.simulation.objects import MovingObject
+from pytest_garl.simulation.policy import DECISION_STEP_S, ObjectPolicy, Situation
+from pytest_garl.simulation.randomness import generator
+from pytest_garl.simulation.recorder import Recorder
+from pytest_garl.simulation.truth import Truth, TruthObject
+from pytest_garl.simulation.vehicle import Thrusts, Vector, drag, lag, vehicle_model, wrench
+from pytest_garl.simulation.world import PHYSICS_RATE_HZ, Quaternion, World
+
+TRACK_EVERY = 10
+OBJECTS_EVERY = 4
+LANDED_SPEED_MPS = 0.2
+LANDED_TILT_RAD = math.radians(20)
+LANDED_AFTER_S = 1.0
+AIRBORNE_M = 1.0
+HARD_TOUCHDOWN_MPS = 2.0
+"""Contact speed of a drop from 0.2 m: the least drop height of EASA CS 27.725."""
+ABORT_CLEAR_M = 2.0
+ABORT_HEIGHT_M = 5.0
+CAMERA_BELOW_M = 0.05
+POSITION_NOISE_M = 0.02
+VELOCITY_NOISE_MPS = 0.05
+"""Engineering estimate: RTK gives centimetres; 0.05 m/s is u-blox's stated accuracy (M8)."""
+
+Array = TypeVar("Array", bound=np.ndarray[Any, Any])
+
+
+class StepGuard(Protocol):
+    """Told before and after each call of the landing system's code; the pool's watchdog."""
+
+    def step_begins(self) -> None:
+        """User code is about to run."""
+
+    def step_ends(self) -> None:
+        """User code has returned or raised."""
+
+
+class BrokenError(Exception):
+    """The landing system broke down; carries what the flight records."""
+
+    def __init__(self, crash: Crash) -> None:
+        self.crash = crash
+
+
+class Loop:
+    """One flight under way; ``begin`` it, then ``tick`` until there is an outcome."""
+
+    def __init__(
+        self,
+        scenario: Scenario,
+        system: Callable[[], Any],
+        policy: Callable[[], ObjectPolicy],
+        map: Map,
+        time_limit_s: float,
+        guard: StepGuard | None,
+    ) -> None:
+        self.scenario, self.map, self.guard = scenario, map, guard
+        self.time_limit_s = time_limit_s
+        self.make_system = system
+        self.airframe: Airframe = airframe_of(system)
+        self.marker = marker_position_m(scenario, map)
+        self.model = vehicle_model(self.airframe)
+        self.objects = [MovingObject(scenario, map, name, policy()) for name, _ in map.object_names]
+        self.world = World(
+            self.model, map.uav_start_m, map.bodies, [item.body for item in self.objects]
+        )
+        self.recorder = Recorder(map, self.objects, self.marker)
+        self.control = FlightControl(self.model)
+        self.wind = wind_mps(scenario)
+        self.pose_rng = generator(scenario.seed, "pose")
+        self.thrusts: Thrusts = (0.0, 0.0, 0.0, 0.0)
+        self.pending: list[tuple[int, Command]] = []
+        self.command: Command | None = None
+        self.airborne = False
+        self.landed_since: float | None = None
+        self.gaps: dict[str, float] = {}
+        self.ticks = 0
+
+    def run(self) -> Flight:
+        """Fly to the end and return the record, without hash and versions."""
+        crash = None
+        try:
+            self.begin()
+            outcome = self.tick()
+            while outcome is None:
+                outcome = self.tick()
+        except BrokenError as broken:
+            self._record_pose(self.recorder.time_s)
+            self.recorder.event("crashed", broken.crash.message)
+            outcome, crash = "crashed", broken.crash
+        finally:
+            self.close()
+        return self.recorder.flight(outcome, crash)
+
+    def begin(self) -> None:
+        """Reset policies and landing system."""
+        for index, item in enumerate(self.objects):
+            rng = generator(self.scenario.seed, "objects", index)
+            item.policy.reset(self._situation(item, 0.0), rng)
+        self._start_system()
+
+    def close(self) -> None:
+        """Free the physics."""
+        self.world.close()
+
+    def _start_system(self) -> None:
+        self.recorder.begin(*self.world.uav()[:3])
+        self.system = self._ask("reset", lambda: self.make_system())
+        mission = mission_for(self.scenario, self.map, self.airframe, self.time_limit_s)
+        self._ask("reset", lambda: self.system.reset(mission))
+        self.sees = bool(getattr(self.system, "needs_camera", True))
+        self.tells_truth = getattr(self.system, "observe_truth", None)
+        camera = self.airframe.camera
+        self.renderer = (
+            Renderer(self.scenario, self.map, camera, generator(self.scenario.seed, "sensor"))
+            if self.sees
+            else None
+        )
+        self.camera_every = max(1, round(PHYSICS_RATE_HZ / camera.rate_hz))
+        rate = self.airframe.control_rate_hz
+        self.control_every = max(1, round(PHYSICS_RATE_HZ / rate)) if rate else 1
+        self.motors: Thrusts = (0.0, 0.0, 0.0, 0.0)
+
+    def tick(self) -> Outcome | None:
+        """Advance by 1/240 s; return the outcome once there is one."""
+        tick = self.ticks
+        if tick >= round(self.time_limit_s * PHYSICS_RATE_HZ):
+            self.recorder.event("time_out", f"not landed after {self.time_limit_s:g} s")
+            return "not_landed"
+        self.ticks += 1
+        now = tick / PHYSICS_RATE_HZ
+        self.recorder.time_s = now
+        position, attitude, velocity, spin = self.world.uav()
+        if tick % OBJECTS_EVERY == 0:
+            self._move_objects(tick)
+        if tick % TRACK_EVERY == 0:
+            self._record_pose(now)
+            if isinstance(self.command, Abort) and self._clear(position):
+                self.recorder.event("aborted", "gave up and climbed clear of everything")
+                return "aborted"
+        if tick % self.camera_every == 0:
+            self._see(tick, position, attitude, velocity)
+        while self.pending and self.pending[0][0] <= tick:
+            self._take(self.pending.pop(0)[1])
+        x, y, z, w = attitude
+        state = VehicleState(
+            time_s=now,
+            position_m=position,
+            velocity_mps=velocity,
+            attitude=attitude,
+            angular_velocity_radps=rotate((-x, -y, -z, w), spin),
+            thrusts_n=self.thrusts,
+        )
+        self._drive(tick, state)
+        return self._contacts(now, position, attitude, velocity)
+
+    def _drive(self, tick: int, state: VehicleState) -> None:
+        dt = 1 / PHYSICS_RATE_HZ
+        resting = isinstance(self.command, Land) and self.landed_since is not None
+        if resting:
+            wanted: Thrusts = (0.0, 0.0, 0.0, 0.0)
+        elif self.airframe.control_rate_hz and not isinstance(self.command, Abort):
+            if tick % self.control_every == 0:
+                answer: MotorThrusts = self._ask("control", lambda: self.system.control(state))
+                self._refuse(problem_with_thrusts(answer), "control")
+                a, b, c, d = (float(value) for value in answer.newtons)
+                self.motors = (a, b, c, d)
+            wanted = self.motors
+        else:
+            wanted = self.control.thrusts(state, self.command, dt)
+        self.thrusts = lag(self.thrusts, wanted, self.model, dt)
+        total, torque = wrench(self.thrusts, self.model)
+        fx, fy, fz = rotate(state.attitude, (0.0, 0.0, total))
+        vx, vy, vz = state.velocity_mps
+        dx, dy, dz = drag((vx - self.wind[0], vy - self.wind[1], vz), self.model)
+        self.world.step((fx + dx, fy + dy, fz + dz), rotate(state.attitude, torque))
+
+    def _contacts(
+        self, now: float, position: Vector, attitude: Quaternion, velocity: Vector
+    ) -> Outcome | None:
+        x, y, _, _ = attitude
+        tilt = math.acos(max(-1.0, min(1.0, 1 - 2 * (x * x + y * y))))
+        speed = math.sqrt(sum(value * value for value in velocity))
+        if not self.airborne and position[2] > AIRBORNE_M:
+            self.airborne = True
+            self.recorder.event("took_off", "left the ground")
+        grounded = False
+        for touch in self.world.touches():
+            if touch.body != "ground":
+                approach = self._approach_mps(touch.body, velocity)
+                self.recorder.contact(touch.body, touch.position_m, approach, tilt)
+                self.gaps[touch.body] = 0.0
+                self._record_pose(now)
+                return "collision"
+            grounded = True
+            if self.airborne and not self.recorder.touched_ground:
+                self.recorder.contact("ground", touch.position_m, abs(velocity[2]), tilt)
+                if abs(velocity[2]) > HARD_TOUCHDOWN_MPS or tilt > LANDED_TILT_RAD:
+                    self._record_pose(now)
+                    return "collision"
+        still = speed < LANDED_SPEED_MPS and tilt < LANDED_TILT_RAD
+        if not (self.airborne and grounded and still):
+            self.landed_since = None
+            return None
+        if self.landed_since is None:
+            self.landed_since = now
+        if now - self.landed_since >= LANDED_AFTER_S:
+            self._record_pose(now)
+            self.recorder.event("landed", "at rest on the ground")
+            return "landed"
+        return None
+
+    def _approach_mps(self, body: str, velocity: Vector) -> float:
+        """Return the UAV's speed relative to a body: what walks may hit what hovers."""
+        moving = next((item for item in self.objects if item.name == body), None)
+        vx, vy = (moving.vx_mps, moving.vy_mps) if moving else (0.0, 0.0)
+        return math.dist(velocity, (vx, vy, 0.0))
+
+    def _move_objects(self, tick: int) -> None:
+        now = tick / PHYSICS_RATE_HZ
+        if tick % round(DECISION_STEP_S * PHYSICS_RATE_HZ) == 0:
+            for item in self.objects:
+                item.take(item.policy.decide(self._situation(item, now)))
+        for item in self.objects:
+            item.advance(OBJECTS_EVERY / PHYSICS_RATE_HZ)
+            self.world.move(
+                item.name, item.position_m, item.yaw_rad, (item.vx_mps, item.vy_mps, 0.0)
+            )
+
+    def _situation(self, item: MovingObject, now: float) -> Situation:
+        position, _, velocity, _ = self.world.uav()
+        return Situation(
+            time_s=now,
+            self=item.state,
+            others=tuple(other.state for other in self.objects if other is not item),
+            uav_position_m=position,
+            uav_velocity_mps=velocity,
+            marker_position_m=self.marker,
+            map=self.map,
+        )
+
+    def _see(self, tick: int, position: Vector, attitude: Quaternion, velocity: Vector) -> None:
+        now = tick / PHYSICS_RATE_HZ
+        poses = [(item.position_m, item.yaw_rad) for item in self.objects]
+        if self.tells_truth:
+            truth = Truth(
+                marker_m=self.marker,
+                objects=tuple(
+                    TruthObject(
+                        position_m=item.position_m,
+                        velocity_mps=(item.vx_mps, item.vy_mps),
+                        type=item.type,
+                    )
+                    for item in self.objects
+                ),
+                map=self.map,
+            )
+            self._ask("observe_truth", lambda: self.system.observe_truth(truth))
+        camera = self.airframe.camera
+        if self.renderer:
+            offset = rotate(attitude, (0.0, 0.0, -CAMERA_BELOW_M))
+            eye = (position[0] + offset[0], position[1] + offset[1], position[2] + offset[2])
+            frame = self.renderer.render(eye, attitude, now, poses)
+            visible = self.recorder.sight(frame, self.renderer, eye, attitude)
+        else:
+            frame, visible = _blank(camera.height_px, camera.width_px), (0.0, 0.0, ())
+        noise = self.pose_rng.standard_normal(6)
+        observation = Observation(
+            time_s=now,
+            position_m=_frozen(np.array(position) + POSITION_NOISE_M * noise[:3]),
+            velocity_mps=_frozen(np.array(velocity) + VELOCITY_NOISE_MPS * noise[3:]),
+            attitude=_frozen(np.array(attitude)),
+            image=_frozen(frame.image),
+            depth_m=_frozen(frame.depth_m),
+        )
+        command: Command = self._ask("step", lambda: self.system.step(observation))
+        self._refuse(problem_with_command(command), "step")
+        self.recorder.step(command, visible)
+        delay = round(self.airframe.latency_s * PHYSICS_RATE_HZ)
+        self.pending.append((tick + delay, command))
+
+    def _take(self, command: Command) -> None:
+        if isinstance(self.command, Abort):
+            return
+        if type(command) is not type(self.command) and isinstance(command, Abort | Land):
+            word = "abort_command" if isinstance(command, Abort) else "land_command"
+            self.recorder.event(word, f"the system said {type(command).__name__}()")
+        self.command = command
+
+    def _clear(self, position: Vector) -> bool:
+        return position[2] >= ABORT_HEIGHT_M and all(
+            gap >= ABORT_CLEAR_M for gap in self.gaps.values()
+        )
+
+    def _record_pose(self, now: float) -> None:
+        position, attitude, velocity, _ = self.world.uav()
+        gaps = self.world.separations()
+        gaps.update({name: 0.0 for name, gap in self.gaps.items() if gap == 0.0})
+        self.gaps = gaps
+        self.recorder.pose(now, position, attitude, velocity, gaps)
+
+    def _ask(self, method: str, call: Callable[[], Any]) -> Any:
+        if self.guard:
+            self.guard.step_begins()
+        try:
+            return call()
+        except Exception as error:
+            raise BrokenError(crash_of(error, method)) from error
+        finally:
+            if self.guard:
+                self.guard.step_ends()
+
+    def _refuse(self, problem: str | None, method: str) -> None:
+        if problem:
+            name = getattr(self.make_system, "__name__", "system")
+            raise BrokenError(
+                Crash(
+                    kind="nonsense",
+                    error="BadCommand",
+                    message=problem,
+                    where=f"{name}.{method}",
+                    traceback="",
+                )
+            )
+
+
+def crash_of(error: Exception, method: str) -> Crash:
+    """Return the record of what a landing system raised in one of its methods."""
+    frames = traceback.extract_tb(error.__traceback__)
+    theirs = [frame for frame in frames if Path(frame.filename).resolve() != Path(__file__)]
+    where = f"{Path(theirs[-1].filename).stem}.{theirs[-1].name}" if theirs else method
+    text = "".join(traceback.format_list(theirs)) + "".join(traceback.format_exception_only(error))
+    return Crash(
+        kind="raised",
+        error=type(error).__name__,
+        message=str(error),
+        where=where,
+        traceback=text,
+    )
+
+
+def _frozen(array: Array) -> Array:
+    array.flags.writeable = False
+    return array
+
+
+def _blank(height: int, width: int) -> Frame:
+    return Frame(
+        image=np.zeros((height, width, 3), np.uint8),
+        depth_m=np.zeros((height, width), np.float32),
+        segmentation=np.zeros((height, width), np.int32),
+        pixels=np.zeros(2, np.intp),
+    )
