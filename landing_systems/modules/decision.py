@@ -102,6 +102,11 @@ class DecisionModule:
             return self._look(time_s, position_m)
         return self._land(time_s, position_m)
 
+    def interrupt(self) -> None:
+        """Take a commitment to land back: something is in the way."""
+        if self._phase == "commit":
+            self._phase = "approach"
+
     def _spot(self, seen: Iterable[Detection]) -> Place | None:
         """Pick the detection of the wanted marker, the one nearest to the target if several."""
         good = [

@@ -1,4 +1,4 @@
-"""Unlearned policies: objects that stand, walk to destinations, or wander."""
+"""Unlearned policies: objects that stand, wander, walk to destinations or over the marker."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from types import MappingProxyType
 import numpy as np
 
 from pytest_garl.errors import GarlError
-from pytest_garl.simulation.policy import STAY, Move, PolicySpec, Situation
+from pytest_garl.simulation.policy import DECISION_STEP_S, STAY, Move, PolicySpec, Situation
 
 ARRIVED_M = 0.5
 
@@ -69,6 +69,45 @@ class RandomWalk:
         return Move(x=x, y=y)
 
 
+class Greedy:
+    """Walks across the marker, turns, and walks across it again; it never stops.
+
+    A rival of learned policies: most of what they do can be had this way.
+    """
+
+    def reset(self, situation: Situation, rng: np.random.Generator) -> None:
+        """Start towards the marker."""
+        self._move = _towards_marker(situation)
+
+    def decide(self, situation: Situation) -> Move:
+        """Go straight to the marker, and on beyond it by one decision."""
+        stride = situation.self.speed_mps * DECISION_STEP_S
+        if math.dist(situation.self.position_m[:2], situation.marker_position_m) > stride:
+            self._move = _towards_marker(situation)
+        return self._move
+
+
+class Stand:
+    """Walks to the marker and stands on it."""
+
+    def reset(self, situation: Situation, rng: np.random.Generator) -> None:
+        """Nothing to prepare."""
+
+    def decide(self, situation: Situation) -> Move:
+        """Go to the marker, slower over the last step, and stay."""
+        stride = situation.self.speed_mps * DECISION_STEP_S
+        distance = math.dist(situation.self.position_m[:2], situation.marker_position_m)
+        move = _towards_marker(situation)
+        share = min(1.0, distance / stride) if stride > 0 else 0.0
+        return Move(x=share * move.x, y=share * move.y)
+
+
+def _towards_marker(situation: Situation) -> Move:
+    (x, y, _), (mx, my) = situation.self.position_m, situation.marker_position_m
+    length = math.dist((x, y), (mx, my))
+    return Move(x=(mx - x) / length, y=(my - y) / length) if length > 0 else STAY
+
+
 POLICIES: Mapping[str, PolicySpec] = MappingProxyType(
     {
         name: PolicySpec(name=name, factory=f"{__name__}:{factory.__name__}")
@@ -76,13 +115,28 @@ POLICIES: Mapping[str, PolicySpec] = MappingProxyType(
             ("stationary", Stationary),
             ("waypoint", Waypoint),
             ("random_walk", RandomWalk),
+            ("greedy", Greedy),
+            ("stand", Stand),
         )
     }
 )
 
 
+LEARNED = ("dqn", "dqn-paper")
+
+
 def policy_spec(name: str) -> PolicySpec:
-    """Return the specification of a shipped policy; raise GarlError for an unknown name."""
-    if name not in POLICIES:
-        raise GarlError(f"unknown object policy {name!r}; expected one of {', '.join(POLICIES)}")
-    return POLICIES[name]
+    """Return the specification of a shipped policy, or of weights in a file.
+
+    Raises GarlError for an unknown name, and for weights that cannot be trusted.
+    """
+    if name in POLICIES:
+        return POLICIES[name]
+    if name not in LEARNED and not name.endswith(".npz"):
+        raise GarlError(
+            f"unknown object policy {name!r}; expected one of {', '.join((*LEARNED, *POLICIES))}, "
+            "or the path of weights (.npz) that `garl train` wrote"
+        )
+    from pytest_garl.adversary.network import learned_spec
+
+    return learned_spec(name)

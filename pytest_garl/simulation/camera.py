@@ -10,6 +10,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from pytest_garl.errors import GarlError
 from pytest_garl.landing_system import Camera
 from pytest_garl.scenarios.maps import Map
 from pytest_garl.scenarios.placement import MARKER_SIDE_M, marker_position_m
@@ -48,10 +49,17 @@ class Renderer:
     """Draws what the camera sees in one scenario; a frame is a pure function of its arguments.
 
     ``segment_ids`` numbers ground (0), marker (1), static bodies and dynamic objects.
+    With ``colour=False`` nothing is painted: such a renderer gives frames without colour.
     """
 
     def __init__(
-        self, scenario: Scenario, map: Map, camera: Camera, rng: np.random.Generator
+        self,
+        scenario: Scenario,
+        map: Map,
+        camera: Camera,
+        rng: np.random.Generator,
+        *,
+        colour: bool = True,
     ) -> None:
         self.camera = camera
         self.conditions = conditions_of(scenario)
@@ -59,7 +67,7 @@ class Renderer:
         names = ["ground", "marker", *(body.name for body in map.bodies)]
         names += [name for name, _ in map.object_names]
         self.segment_ids: Mapping[str, int] = {name: index for index, name in enumerate(names)}
-        self._ground = paint_ground(scenario, map, self.conditions, rng)
+        self._ground = paint_ground(scenario, map, self.conditions, rng) if colour else None
         self._solids = Solids(map, self.conditions, self.segment_ids)
         self._sensor = Sensor(camera, self.conditions, rng)
         self._particles = Particles(camera, self.conditions, rng)
@@ -114,6 +122,13 @@ class Renderer:
             image = self._sensor.expose(image, time_s)
         return Frame(image=image, depth_m=depth, segmentation=segmentation, pixels=pixels)
 
+    def marker_pixels(self, position_m: Vector, attitude: Quaternion) -> int:
+        """Count the marker's pixels in a frame with nothing in front of it."""
+        shape = self.camera.height_px, self.camera.width_px
+        segmentation = np.zeros(shape, np.int32)
+        self._marker_segment(segmentation, View.of(self.camera, position_m, attitude))
+        return int(np.count_nonzero(segmentation))
+
     def marker_area_px(self, position_m: Vector, attitude: Quaternion) -> float:
         """Projected area of the marker, clipped to the frame, with nothing in front."""
         polygon = self._marker_polygon(View.of(self.camera, position_m, attitude))
@@ -149,6 +164,8 @@ class Renderer:
         footprint = float(depth[height // 2, width // 2]) / self.camera.focal_px
         # Four channels: warpPerspective is 2.5 times as fast as with three.
         image = np.empty((height, width, 4), np.uint8)
+        if self._ground is None:
+            raise GarlError("this renderer was made with colour=False; it has no ground to show")
         inset = self._ground.inset
         rows, columns = slice(0, height), slice(0, width)
         if horizon or not inset.holds(world @ self._corners):

@@ -126,7 +126,7 @@ class Loop:
         """Reset policies and landing system."""
         for index, item in enumerate(self.objects):
             rng = generator(self.scenario.seed, "objects", index)
-            item.policy.reset(self._situation(item, 0.0), rng)
+            item.policy.reset(self.situation(item), rng)
         self._start_system()
 
     def close(self) -> None:
@@ -247,20 +247,20 @@ class Loop:
         return math.dist(velocity, (vx, vy, 0.0))
 
     def _move_objects(self, tick: int) -> None:
-        now = tick / PHYSICS_RATE_HZ
         if tick % round(DECISION_STEP_S * PHYSICS_RATE_HZ) == 0:
             for item in self.objects:
-                item.take(item.policy.decide(self._situation(item, now)))
+                item.take(item.policy.decide(self.situation(item)))
         for item in self.objects:
             item.advance(OBJECTS_EVERY / PHYSICS_RATE_HZ)
             self.world.move(
                 item.name, item.position_m, item.yaw_rad, (item.vx_mps, item.vy_mps, 0.0)
             )
 
-    def _situation(self, item: MovingObject, now: float) -> Situation:
+    def situation(self, item: MovingObject) -> Situation:
+        """Return what the policy of an object may see at this moment."""
         position, _, velocity, _ = self.world.uav()
         return Situation(
-            time_s=now,
+            time_s=self.recorder.time_s,
             self=item.state,
             others=tuple(other.state for other in self.objects if other is not item),
             uav_position_m=position,
@@ -268,6 +268,11 @@ class Loop:
             marker_position_m=self.marker,
             map=self.map,
         )
+
+    def eye(self) -> tuple[Vector, Quaternion]:
+        """Return the camera's place and the UAV's attitude."""
+        position, attitude, _, _ = self.world.uav()
+        return _below(position, attitude), attitude
 
     def _see(self, tick: int, position: Vector, attitude: Quaternion, velocity: Vector) -> None:
         now = tick / PHYSICS_RATE_HZ
@@ -288,8 +293,7 @@ class Loop:
             self._ask("observe_truth", lambda: self.system.observe_truth(truth))
         camera = self.airframe.camera
         if self.renderer:
-            offset = rotate(attitude, (0.0, 0.0, -CAMERA_BELOW_M))
-            eye = (position[0] + offset[0], position[1] + offset[1], position[2] + offset[2])
+            eye = _below(position, attitude)
             frame = self.renderer.render(eye, attitude, now, poses)
             visible = self.recorder.sight(frame, self.renderer, eye, attitude)
         else:
@@ -367,6 +371,12 @@ def crash_of(error: Exception, method: str) -> Crash:
         where=where,
         traceback=text,
     )
+
+
+def _below(position: Vector, attitude: Quaternion) -> Vector:
+    """Return the camera's place under a UAV."""
+    dx, dy, dz = rotate(attitude, (0.0, 0.0, -CAMERA_BELOW_M))
+    return position[0] + dx, position[1] + dy, position[2] + dz
 
 
 def _frozen(array: Array) -> Array:

@@ -95,6 +95,11 @@ class Recorder:
         )
         self.event("contact", f"touched {body} at {speed_mps:.1f} m/s")
 
+    @property
+    def last_contact(self) -> str | None:
+        """Name of the body that the UAV touched last."""
+        return self._contacts[-1].body if self._contacts else None
+
     def event(self, name: str, text: str) -> None:
         """Note something worth telling."""
         self._events.append(Event(time_s=self.time_s, name=name, text=text))

@@ -1,0 +1,291 @@
+"""DQN, readable from top to bottom (Mnih et al. 2015; double: van Hasselt et al. 2016)."""
+
+from __future__ import annotations
+
+import dataclasses
+import functools
+import itertools
+import json
+from collections import deque
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import gymnasium
+import numpy as np
+import torch
+from numpy.typing import NDArray
+
+from pytest_garl.adversary.network import Network
+from pytest_garl.adversary.states import ACTIONS, VIEWS
+from pytest_garl.adversary.surrogate import Surrogate, SurrogateEnv
+from pytest_garl.errors import GarlError
+
+Array = NDArray[np.float32]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Training:
+    """Every hyper-parameter; the paper's where it gives one (its supplement, table 1)."""
+
+    seed: int = 0
+    episodes: int = 800
+    hidden: tuple[int, ...] = (24, 24)
+    learning_rate: float = 1e-3
+    epsilon: float = 0.99
+    epsilon_least: float = 0.01
+    epsilon_decay: float = 0.995
+    """Per episode."""
+    discount: float = 0.99
+    batch: int = 64
+    replay: int = 50_000
+    warm_up: int = 500
+    """Decisions before the first update."""
+    target_every: int = 500
+    """Updates after which the target network is the network again."""
+    double: bool = True
+    steps: int = 3
+    """Rewards that are summed before a value is taken for the rest."""
+    environments: int = 2
+    """Episodes flown at the same time, each in a process of its own."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class EpisodeRecord:
+    """What one training episode came to."""
+
+    episode: int
+    reward: float
+    decisions: int
+    collided: bool
+    epsilon: float
+
+
+class Learner:
+    """The network, its target, its memory: ``act``, ``remember``, ``update``."""
+
+    def __init__(self, state: str, training: Training) -> None:
+        self.state, self.training = state, training
+        size = VIEWS[state].size
+        torch.manual_seed(training.seed)
+        self.rng = np.random.default_rng(training.seed)
+        self.network, self.target = (_mlp(size, training.hidden) for _ in range(2))
+        self.target.load_state_dict(self.network.state_dict())
+        self.optimiser = torch.optim.Adam(self.network.parameters(), lr=training.learning_rate)
+        self.updates = 0
+        # Ring buffers: state, action, sum of rewards, the state after, its discount (0: ended).
+        room = training.replay
+        self.states, self.afters = (np.zeros((room, size), np.float32) for _ in range(2))
+        self.actions = np.zeros(room, np.int64)
+        self.sums, self.discounts = (np.zeros(room, np.float32) for _ in range(2))
+        self.stored = 0
+
+    def act(self, states: Array, epsilon: float) -> NDArray[np.int64]:
+        """Return an action for each state (n, size): at random with probability ``epsilon``."""
+        with torch.no_grad():
+            best = self.network(torch.from_numpy(states)).argmax(dim=1).numpy()
+        explores = self.rng.random(len(states)) < epsilon
+        chance = self.rng.integers(len(ACTIONS), size=len(states))
+        return np.where(explores, chance, best)
+
+    def remember(
+        self, state: Array, action: int, total: float, after: Array, discount: float
+    ) -> None:
+        """Keep one experience."""
+        place = self.stored % self.training.replay
+        self.states[place], self.afters[place] = state, after
+        self.actions[place], self.sums[place], self.discounts[place] = action, total, discount
+        self.stored += 1
+
+    def update(self) -> None:
+        """Take one step of gradient descent on a batch from the memory."""
+        training = self.training
+        if self.stored < training.warm_up:
+            return
+        chosen = self.rng.integers(min(self.stored, training.replay), size=training.batch)
+        states, afters = (torch.from_numpy(each[chosen]) for each in (self.states, self.afters))
+        actions = torch.from_numpy(self.actions[chosen])
+        with torch.no_grad():
+            judged = self.target(afters)
+            picks = (self.network(afters) if training.double else judged).argmax(dim=1)
+            rest = judged.gather(1, picks[:, None]).squeeze(1)
+            wanted = torch.from_numpy(self.sums[chosen])
+            wanted = wanted + torch.from_numpy(self.discounts[chosen]) * rest
+        values = self.network(states).gather(1, actions[:, None]).squeeze(1)
+        loss = torch.nn.functional.smooth_l1_loss(values, wanted)
+        self.optimiser.zero_grad()
+        loss.backward()  # type: ignore[no-untyped-call]
+        self.optimiser.step()
+        self.updates += 1
+        if self.updates % training.target_every == 0:
+            self.target.load_state_dict(self.network.state_dict())
+
+    def policy(self) -> Network:
+        """Return the network as NumPy arrays."""
+        linear = [layer for layer in self.network if isinstance(layer, torch.nn.Linear)]
+        return Network(
+            state=self.state,
+            layers=tuple(
+                (
+                    layer.weight.detach().numpy().astype(np.float64),
+                    layer.bias.detach().numpy().astype(np.float64),
+                )
+                for layer in linear
+            ),
+        )
+
+
+class Experience:
+    """Sums rewards over several steps of one episode before they are remembered."""
+
+    def __init__(self, learner: Learner) -> None:
+        self._learner = learner
+        self._open: deque[tuple[Array, int, float]] = deque()
+
+    def add(
+        self, state: Array, action: int, reward: float, after: Array, *, ended: bool, cut: bool
+    ) -> None:
+        """Take in one step; ``ended`` leaves nothing to come, ``cut`` is a time-out."""
+        training = self._learner.training
+        self._open.append((state, action, reward))
+        if len(self._open) == training.steps or ended or cut:
+            self._close(after, ended)
+        while self._open and (ended or cut):
+            self._close(after, ended)
+
+    def _close(self, after: Array, ended: bool) -> None:
+        gamma = self._learner.training.discount
+        total = sum(gamma**index * reward for index, (_, _, reward) in enumerate(self._open))
+        discount = 0.0 if ended else gamma ** len(self._open)
+        state, action, _ = self._open.popleft()
+        self._learner.remember(state, action, total, after, discount)
+
+
+def train(
+    surrogate: Surrogate,
+    training: Training,
+    checkpoint: Path | None = None,
+    every: int = 100,
+) -> Iterator[tuple[Learner, EpisodeRecord]]:
+    """Train; yield the learner and what each episode came to.
+
+    Episodes are flown in rounds of ``environments``, each from a seed of its own, so that a
+    training that goes on from its ``checkpoint``, written about ``every`` so many episodes,
+    ends with the same weights as one that was never interrupted.
+    """
+    threads = torch.get_num_threads()
+    torch.set_num_threads(1)
+    learner = Learner(surrogate.state, training)
+    first = _restore(learner, checkpoint) if checkpoint and checkpoint.exists() else 0
+    make = functools.partial(SurrogateEnv, surrogate)
+    envs = gymnasium.vector.AsyncVectorEnv(
+        [make] * training.environments,
+        context="spawn",
+        autoreset_mode=gymnasium.vector.AutoresetMode.DISABLED,
+    )
+    try:
+        for episode in range(first, training.episodes, training.environments):
+            for record in _round(envs, learner, episode):
+                if record.episode < training.episodes:
+                    yield learner, record
+            done = episode + training.environments
+            if checkpoint and (done // every > episode // every or done >= training.episodes):
+                _keep(learner, done, checkpoint)
+    finally:
+        envs.close()
+        torch.set_num_threads(threads)
+
+
+def _round(envs: Any, learner: Learner, first: int) -> Iterator[EpisodeRecord]:
+    """Fly one episode per environment to its end, learning meanwhile."""
+    training, count = learner.training, learner.training.environments
+    decayed = training.epsilon * training.epsilon_decay**first
+    epsilon = max(training.epsilon_least, decayed)
+    seeds = np.random.SeedSequence((training.seed, first)).generate_state(count)
+    states, _ = envs.reset(seed=[int(seed) for seed in seeds])
+    experiences = [Experience(learner) for _ in range(count)]
+    flying = np.ones(count, dtype=bool)
+    totals, decisions = np.zeros(count), np.zeros(count, dtype=int)
+    collided = np.zeros(count, dtype=bool)
+    while flying.any():
+        actions = learner.act(states, epsilon)
+        envs.step_async(actions)
+        # The simulator flies in other processes: time to learn, once for each decision.
+        for _ in range(int(flying.sum())):
+            learner.update()
+        afters, rewards, ended, cut, info = envs.step_wait()
+        for index in range(count):
+            if not flying[index]:
+                continue
+            experiences[index].add(
+                states[index],
+                int(actions[index]),
+                float(rewards[index]),
+                afters[index],
+                ended=bool(ended[index]),
+                cut=bool(cut[index]),
+            )
+            totals[index] += rewards[index]
+            decisions[index] += 1
+            collided[index] = bool(info["collided"][index])
+        flying &= ~(ended | cut)
+        states = afters
+    for index in range(count):
+        yield EpisodeRecord(
+            episode=first + index,
+            reward=float(totals[index]),
+            decisions=int(decisions[index]),
+            collided=bool(collided[index]),
+            epsilon=epsilon,
+        )
+
+
+def _mlp(size: int, hidden: tuple[int, ...]) -> torch.nn.Sequential:
+    sizes = (size, *hidden)
+    layers: list[torch.nn.Module] = []
+    for wide, narrow in itertools.pairwise(sizes):
+        layers += [torch.nn.Linear(wide, narrow), torch.nn.ReLU()]
+    return torch.nn.Sequential(*layers, torch.nn.Linear(sizes[-1], len(ACTIONS)))
+
+
+_MEMORY = ("states", "afters", "actions", "sums", "discounts")
+
+
+def _keep(learner: Learner, episodes: int, path: Path) -> None:
+    filled = min(learner.stored, learner.training.replay)
+    path.parent.mkdir(parents=True, exist_ok=True)
+    half = path.with_suffix(".part")
+    torch.save(
+        {
+            "episodes": episodes,
+            "training": str(dataclasses.asdict(learner.training)),
+            "network": learner.network.state_dict(),
+            "target": learner.target.state_dict(),
+            "optimiser": learner.optimiser.state_dict(),
+            "updates": learner.updates,
+            "stored": learner.stored,
+            "rng": json.dumps(learner.rng.bit_generator.state),
+            **{name: torch.from_numpy(getattr(learner, name)[:filled]) for name in _MEMORY},
+        },
+        half,
+    )
+    half.replace(path)
+
+
+def _restore(learner: Learner, path: Path) -> int:
+    kept = torch.load(path, weights_only=True)
+    if kept["training"] != str(dataclasses.asdict(learner.training)):
+        raise GarlError(
+            f"{path}: is the checkpoint of another training ({kept['training']}); "
+            "delete it, or train with the same options"
+        )
+    learner.network.load_state_dict(kept["network"])
+    learner.target.load_state_dict(kept["target"])
+    learner.optimiser.load_state_dict(kept["optimiser"])
+    learner.updates, learner.stored = kept["updates"], kept["stored"]
+    learner.rng.bit_generator.state = json.loads(kept["rng"])
+    for name in _MEMORY:
+        rows = kept[name].numpy()
+        getattr(learner, name)[: len(rows)] = rows
+    return int(kept["episodes"])

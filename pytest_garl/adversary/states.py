@@ -1,0 +1,169 @@
+"""What a learned policy sees and what it may do: situations as numbers, actions as moves."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from types import MappingProxyType
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pytest_garl.simulation.policy import DECISION_STEP_S, Move, Situation
+
+State = NDArray[np.float32]
+
+ACTIONS: tuple[Move, ...] = (
+    Move(x=0.0, y=1.0),
+    Move(x=0.0, y=-1.0),
+    Move(x=-1.0, y=0.0),
+    Move(x=1.0, y=0.0),
+    Move(x=0.0, y=0.0),
+)
+"""The paper's actions: up, down, left, right, stationary (up is north)."""
+
+PLACE_SCALE_M = 10.0
+SPEED_SCALE_MPS = 3.0
+STEP_SCALE_M = 4.0
+BODY_SCALE_M = 3.0
+"""What each kind of number is divided by, so that all are of the order of one."""
+LIMIT = 10.0
+"""No number is beyond this, however large the map."""
+
+
+def paper(situation: Situation) -> State:
+    """Return object - marker and UAV - marker in the plane (4,), in metres / 10.
+
+    Paper, section 3.4: the state S.
+    """
+    return _vector(_places(situation))
+
+
+def extended(situation: Situation) -> State:
+    """Return nine numbers: the paper's four, and what timing needs.
+
+    The UAV's height and vertical speed, how far the object can go in one decision, and the
+    heights of its top and bottom.
+    """
+    return _vector(
+        (
+            *_places(situation),
+            situation.uav_position_m[2] / PLACE_SCALE_M,
+            situation.uav_velocity_mps[2] / SPEED_SCALE_MPS,
+            *_being(situation),
+        )
+    )
+
+
+def relative(situation: Situation) -> State:
+    """Return ten numbers in the frame of the object, whose x axis points to the UAV's column.
+
+    Distance to the column; UAV - marker; the UAV's height and vertical speed; the object's
+    step, top and bottom; its velocity.  A landing looks the same from all sides, so what
+    is learned on one side need not be learned again on the others.
+    """
+    ox, oy, _ = situation.self.position_m
+    ux, uy, height = situation.uav_position_m
+    mx, my = situation.marker_position_m
+    ahead, aside = _turn(situation, ux - mx, uy - my)
+    forward, sideways = _turn(situation, *situation.self.velocity_mps)
+    return _vector(
+        (
+            math.dist((ox, oy), (ux, uy)) / PLACE_SCALE_M,
+            ahead / PLACE_SCALE_M,
+            aside / PLACE_SCALE_M,
+            height / PLACE_SCALE_M,
+            situation.uav_velocity_mps[2] / SPEED_SCALE_MPS,
+            *_being(situation),
+            forward / SPEED_SCALE_MPS,
+            sideways / SPEED_SCALE_MPS,
+        )
+    )
+
+
+def fellow(situation: Situation) -> State:
+    """Return the relative state and where the nearest fellow is, (12,).
+
+    Fellow - object in the object's frame; one 20 m behind where there is none.
+    """
+    x, y, _ = situation.self.position_m
+    near = min(
+        (other.position_m for other in situation.others),
+        key=lambda place: math.dist(place[:2], (x, y)),
+        default=None,
+    )
+    ahead, aside = _turn(situation, near[0] - x, near[1] - y) if near else (-20.0, 0.0)
+    offset = _vector((ahead / PLACE_SCALE_M, aside / PLACE_SCALE_M))
+    return np.concatenate([relative(situation), offset])
+
+
+def compass_moves(situation: Situation) -> tuple[Move, ...]:
+    """Return what the paper's actions mean: north, south, west, east, stay."""
+    return ACTIONS
+
+
+def relative_moves(situation: Situation) -> tuple[Move, ...]:
+    """Return what actions mean in the object's frame: left, right, back, ahead, stay."""
+    cos, sin = _heading(situation)
+    return tuple(Move(x=cos * m.x - sin * m.y, y=sin * m.x + cos * m.y) for m in ACTIONS)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class View:
+    """How a policy sees: the state's size, the state, and what the five actions mean."""
+
+    size: int
+    state: Callable[[Situation], State]
+    moves: Callable[[Situation], tuple[Move, ...]]
+
+
+VIEWS: Mapping[str, View] = MappingProxyType(
+    {
+        "paper": View(size=4, state=paper, moves=compass_moves),
+        "extended": View(size=9, state=extended, moves=compass_moves),
+        "relative": View(size=10, state=relative, moves=relative_moves),
+        "fellow": View(size=12, state=fellow, moves=relative_moves),
+    }
+)
+"""Each view by the name that a policy's manifest gives."""
+
+
+def _heading(situation: Situation) -> tuple[float, float]:
+    """Cosine and sine of the direction from the object to the UAV's column."""
+    ox, oy, _ = situation.self.position_m
+    ux, uy, _ = situation.uav_position_m
+    length = math.dist((ox, oy), (ux, uy))
+    return ((ux - ox) / length, (uy - oy) / length) if length > 0 else (1.0, 0.0)
+
+
+def _turn(situation: Situation, x: float, y: float) -> tuple[float, float]:
+    cos, sin = _heading(situation)
+    return cos * x + sin * y, cos * y - sin * x
+
+
+def _being(situation: Situation) -> tuple[float, float, float]:
+    """How far the object can go in one decision, and the heights of its top and bottom."""
+    kind = situation.self.type
+    bottom = kind.altitude_m - kind.height_m / 2 if kind.altitude_m > 0 else 0.0
+    return (
+        situation.self.speed_mps * DECISION_STEP_S / STEP_SCALE_M,
+        (bottom + kind.height_m) / BODY_SCALE_M,
+        bottom / BODY_SCALE_M,
+    )
+
+
+def _vector(numbers: Sequence[float]) -> State:
+    return np.clip(np.array(numbers, dtype=np.float32), -LIMIT, LIMIT)
+
+
+def _places(situation: Situation) -> tuple[float, float, float, float]:
+    mx, my = situation.marker_position_m
+    ox, oy, _ = situation.self.position_m
+    ux, uy, _ = situation.uav_position_m
+    return (
+        (ox - mx) / PLACE_SCALE_M,
+        (oy - my) / PLACE_SCALE_M,
+        (ux - mx) / PLACE_SCALE_M,
+        (uy - my) / PLACE_SCALE_M,
+    )
