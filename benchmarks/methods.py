@@ -47,7 +47,8 @@ def search(method: str, seed: int, budget: int) -> Path:
     ledger = folder / "ledger.sqlite"
     command = [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", "--tb=no", "-r", ""]
     command += [f"--garl-budget={budget}", f"--garl-method={method}", f"--garl-seed={seed}"]
-    command += ["-o", f"garl_dir={folder}", "landing_systems/test_opencv_mls.py"]
+    command += ["--garl-npcs=waypoint", "-o", f"garl_dir={folder}"]
+    command += ["landing_systems/test_opencv_mls.py"]
     command += ["--garl-resume"] * ledger.exists()
     done = subprocess.run(command, check=False)
     if done.returncode not in (0, 1):

@@ -12,7 +12,8 @@ from pytest_garl.search.nsga2 import Matrix, Nsga2
 from pytest_garl.search.objectives import diversity, threat
 from pytest_garl.search.operators import farthest_from_nearest, local_steps, property_mutation
 
-FIRST_OF_ITS_KIND = 2.0
+VIOLATION = 2.0
+"""What a violation is worth; the nearest miss is worth less than 1."""
 
 
 def method(plan: Plan) -> Nsga2:
@@ -27,19 +28,29 @@ def objectives(chromosomes: Matrix, flown: Sequence[Flown]) -> Matrix:
 
 
 def shared_threat(flown: Sequence[Flown], spread: Matrix) -> Matrix:
-    """Return threats (k,) in which scenarios that violate alike share what that is worth.
+    """Return threats (k,) in which scenarios that threaten alike share what that is worth.
 
-    The k-th violation of a signature counts 2/k, the most remote (``spread``) being the
-    first: a second kind is worth more than one more of the first, and from the third on a
-    violation of a known kind is worth less than a near miss.
+    Alike are flights whose closest call was to the same kind of body in the same part of the
+    landing.  The k-th of them counts 1/k of its threat, which is 2 for a violation: first
+    come violations of signatures that no other has, then other violations, the most remote
+    (``spread``) first, then near misses.  So a near miss of a kind that was never hit is
+    worth more than the third hit of a kind that is known.
     """
-    threats = np.array([threat(item.result) for item in flown])
-    kinds: Counter[str] = Counter()
+    results = [item.result for item in flown]
+    threats = np.array([threat(result) for result in results])
+    hits = np.array([bool(result["verdict"]["signature"]) for result in results])
+    threats[hits] = VIOLATION
+    signatures: set[str] = set()
+    repeats = np.zeros(len(results), dtype=bool)
     for index in np.argsort(-spread, kind="stable"):
-        signature = flown[index].result["verdict"]["signature"]
-        if signature:
-            kinds[signature] += 1
-            threats[index] = FIRST_OF_ITS_KIND / kinds[signature]
+        signature = results[index]["verdict"]["signature"]
+        repeats[index] = signature in signatures
+        signatures.add(signature)
+    places: Counter[str] = Counter()
+    for index in np.lexsort((-spread, repeats, -threats)):
+        alike = results[index]["closest"] or results[index]["outcome"]
+        places[alike] += 1
+        threats[index] /= places[alike]
     return threats
 
 
