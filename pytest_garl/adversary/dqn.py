@@ -6,8 +6,9 @@ import dataclasses
 import functools
 import itertools
 import json
+import pickle
 from collections import deque
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -65,9 +66,10 @@ class EpisodeRecord:
 class Learner:
     """The network, its target, its memory: ``act``, ``remember``, ``update``."""
 
-    def __init__(self, state: str, training: Training) -> None:
-        self.state, self.training = state, training
-        size = VIEWS[state].size
+    def __init__(self, surrogate: Surrogate, training: Training) -> None:
+        self.surrogate, self.training = surrogate, training
+        self.history: list[EpisodeRecord] = []
+        size = VIEWS[surrogate.state].size
         torch.manual_seed(training.seed)
         self.rng = np.random.default_rng(training.seed)
         self.network, self.target = (_mlp(size, training.hidden) for _ in range(2))
@@ -125,7 +127,7 @@ class Learner:
         """Return the network as NumPy arrays."""
         linear = [layer for layer in self.network if isinstance(layer, torch.nn.Linear)]
         return Network(
-            state=self.state,
+            state=self.surrogate.state,
             layers=tuple(
                 (
                     layer.weight.detach().numpy().astype(np.float64),
@@ -166,9 +168,10 @@ def train(
     surrogate: Surrogate,
     training: Training,
     checkpoint: Path | None = None,
-    every: int = 100,
-) -> Iterator[tuple[Learner, EpisodeRecord]]:
-    """Train; yield the learner and what each episode came to.
+    report: Callable[[EpisodeRecord], None] = lambda record: None,
+    every: int = 50,
+) -> Learner:
+    """Train, telling ``report`` of each episode; return the learner.
 
     Episodes are flown in rounds of ``environments``, each from a seed of its own, so that a
     training that goes on from its ``checkpoint``, written about ``every`` so many episodes,
@@ -176,8 +179,9 @@ def train(
     """
     threads = torch.get_num_threads()
     torch.set_num_threads(1)
-    learner = Learner(surrogate.state, training)
-    first = _restore(learner, checkpoint) if checkpoint and checkpoint.exists() else 0
+    learner = Learner(surrogate, training)
+    if checkpoint and checkpoint.exists():
+        _restore(learner, checkpoint)
     make = functools.partial(SurrogateEnv, surrogate)
     envs = gymnasium.vector.AsyncVectorEnv(
         [make] * training.environments,
@@ -185,16 +189,21 @@ def train(
         autoreset_mode=gymnasium.vector.AutoresetMode.DISABLED,
     )
     try:
-        for episode in range(first, training.episodes, training.environments):
-            for record in _round(envs, learner, episode):
+        kept = len(learner.history)
+        while len(learner.history) < training.episodes:
+            for record in _round(envs, learner, len(learner.history)):
+                # The last round may fly more than was asked for.
                 if record.episode < training.episodes:
-                    yield learner, record
-            done = episode + training.environments
-            if checkpoint and (done // every > episode // every or done >= training.episodes):
-                _keep(learner, done, checkpoint)
+                    report(record)
+                    learner.history.append(record)
+            done = len(learner.history)
+            if checkpoint and (done - kept >= every or done >= training.episodes):
+                _keep(learner, checkpoint)
+                kept = done
     finally:
         envs.close()
         torch.set_num_threads(threads)
+    return learner
 
 
 def _round(envs: Any, learner: Learner, first: int) -> Iterator[EpisodeRecord]:
@@ -252,20 +261,27 @@ def _mlp(size: int, hidden: tuple[int, ...]) -> torch.nn.Sequential:
 _MEMORY = ("states", "afters", "actions", "sums", "discounts")
 
 
-def _keep(learner: Learner, episodes: int, path: Path) -> None:
+def _identity(learner: Learner) -> str:
+    """Everything on which the weights depend, as text."""
+    surrogate = learner.surrogate
+    maps = [map.sha256 for map in surrogate.maps]
+    return repr((dataclasses.replace(surrogate, maps=()), maps, learner.training))
+
+
+def _keep(learner: Learner, path: Path) -> None:
     filled = min(learner.stored, learner.training.replay)
     path.parent.mkdir(parents=True, exist_ok=True)
     half = path.with_suffix(".part")
     torch.save(
         {
-            "episodes": episodes,
-            "training": str(dataclasses.asdict(learner.training)),
+            "identity": _identity(learner),
             "network": learner.network.state_dict(),
             "target": learner.target.state_dict(),
             "optimiser": learner.optimiser.state_dict(),
             "updates": learner.updates,
             "stored": learner.stored,
             "rng": json.dumps(learner.rng.bit_generator.state),
+            "history": json.dumps([dataclasses.astuple(record) for record in learner.history]),
             **{name: torch.from_numpy(getattr(learner, name)[:filled]) for name in _MEMORY},
         },
         half,
@@ -273,12 +289,18 @@ def _keep(learner: Learner, episodes: int, path: Path) -> None:
     half.replace(path)
 
 
-def _restore(learner: Learner, path: Path) -> int:
-    kept = torch.load(path, weights_only=True)
-    if kept["training"] != str(dataclasses.asdict(learner.training)):
+def _restore(learner: Learner, path: Path) -> None:
+    try:
+        kept = torch.load(path, weights_only=True)
+        identity = kept["identity"]
+    except (OSError, RuntimeError, KeyError, TypeError, pickle.UnpicklingError) as error:
         raise GarlError(
-            f"{path}: is the checkpoint of another training ({kept['training']}); "
-            "delete it, or train with the same options"
+            f"{path}: is no checkpoint that can be read ({error}); delete it"
+        ) from error
+    if identity != _identity(learner):
+        raise GarlError(
+            f"{path}: is the checkpoint of another training, {identity}; this one is "
+            f"{_identity(learner)}. Delete it, choose another folder, or train as before"
         )
     learner.network.load_state_dict(kept["network"])
     learner.target.load_state_dict(kept["target"])
@@ -288,4 +310,8 @@ def _restore(learner: Learner, path: Path) -> int:
     for name in _MEMORY:
         rows = kept[name].numpy()
         getattr(learner, name)[: len(rows)] = rows
-    return int(kept["episodes"])
+    fields = [field.name for field in dataclasses.fields(EpisodeRecord)]
+    learner.history = [
+        EpisodeRecord(**dict(zip(fields, values, strict=True)))
+        for values in json.loads(kept["history"])
+    ]

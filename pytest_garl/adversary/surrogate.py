@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import functools
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any, Literal
 
 import gymnasium
@@ -15,8 +15,8 @@ from pytest_garl.adversary import rewards
 from pytest_garl.adversary.episode import Episode, draw_episode
 from pytest_garl.adversary.pilots import AvoidingPilot, Caution, Habits, StraightPilot
 from pytest_garl.adversary.states import ACTIONS, LIMIT, VIEWS
-from pytest_garl.landing_system import Camera
-from pytest_garl.scenarios.maps import Map, load_map
+from pytest_garl.landing_system import Airframe
+from pytest_garl.scenarios.maps import Map
 
 Observation = NDArray[np.float32]
 
@@ -35,6 +35,7 @@ class Surrogate:
     state: str = "relative"
     reward: Literal["collision-first", "paper"] = "collision-first"
     discount: float = 0.99
+    airframe: Airframe = field(default_factory=Airframe)
 
 
 class SurrogateEnv(gymnasium.Env[Observation, np.int64]):
@@ -70,7 +71,8 @@ class SurrogateEnv(gymnasium.Env[Observation, np.int64]):
         pilot: Any = functools.partial(StraightPilot, habits)
         if avoiding:
             pilot = functools.partial(AvoidingPilot, habits, Caution.drawn(rng))
-        camera = Camera() if surrogate.reward == "paper" else None
+        pilot.airframe = surrogate.airframe
+        camera = surrogate.airframe.camera if surrogate.reward == "paper" else None
         self._episode = Episode(scenario, place, pilot, camera=camera)
         return self._observe()
 
@@ -120,8 +122,3 @@ class SurrogateEnv(gymnasium.Env[Observation, np.int64]):
     def _distance_m(self) -> float:
         situation = self._current().situations[0]
         return math.dist(situation.self.position_m[:2], situation.uav_position_m[:2])
-
-
-def surrogate_for(names: tuple[str, ...], **wishes: Any) -> Surrogate:
-    """Return the surrogate on maps called ``names``."""
-    return Surrogate(maps=tuple(load_map(name) for name in names), **wishes)

@@ -1,0 +1,202 @@
+"""``garl train``: train the policy that steers people, dogs and birds."""
+
+from __future__ import annotations
+
+import dataclasses
+import importlib
+import os
+import sys
+from collections import deque
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from pytest_garl.errors import GarlError
+from pytest_garl.landing_system import Airframe, airframe_of
+from pytest_garl.scenarios.object_types import OBJECT_TYPES
+
+if TYPE_CHECKING:
+    from pytest_garl.adversary.training import Plan
+
+RECENT = 50
+
+
+@click.command(epilog="Example: garl train --map=court --type=dog --out=scenarios/dogs.npz")
+@click.option(
+    "--policy",
+    type=click.Choice(["dqn", "dqn-paper"]),
+    default="dqn",
+    show_default=True,
+    help="What is learned: to collide with a UAV that avoids what it sees (dqn), or the paper's "
+    "state and reward against a UAV that flies straight down (dqn-paper).",
+)
+@click.option(
+    "--map",
+    "maps",
+    default="court,lawn",
+    show_default=True,
+    help="Maps to train on, separated by commas; your own lie in scenarios/maps/.",
+)
+@click.option(
+    "--type",
+    "kinds",
+    default=",".join(OBJECT_TYPES),
+    show_default=True,
+    help="Types of objects that will be steered, separated by commas.",
+)
+@click.option(
+    "--system",
+    metavar="MODULE:CLASS",
+    help="Landing system whose airframe the surrogate's UAV has (default: a Matrice 100).",
+)
+@click.option("--episodes", type=click.IntRange(1), default=800, show_default=True)
+@click.option(
+    "--seeds",
+    type=click.IntRange(1),
+    default=5,
+    show_default=True,
+    help="Trainings from different seeds; the best in validation is kept.",
+)
+@click.option("--seed", type=click.IntRange(0), default=0, show_default=True, help="First seed.")
+@click.option(
+    "--validation",
+    type=click.IntRange(1),
+    default=200,
+    show_default=True,
+    help="Episodes on which the trained policies are compared.",
+)
+@click.option(
+    "--folder",
+    type=click.Path(path_type=Path, file_okay=False),
+    default=Path(".garl/train"),
+    show_default=True,
+    help="Checkpoints and curves; an interrupted training goes on from there.",
+)
+@click.option(
+    "--out",
+    type=click.Path(path_type=Path, dir_okay=False),
+    default=Path("policy.npz"),
+    show_default=True,
+    help="Where the best weights go; the manifest (.json) and the curve (.png) go beside them.",
+)
+def train(**asked: Any) -> None:
+    """Train a policy in the surrogate and write its weights.
+
+    The surrogate is a landing on the project's own simulator: one object, a marker at a fixed
+    place, a UAV that knows where it is. It takes some four minutes per seed on two cores.
+    Then steer with it: pytest --garl-budget=40 --garl-npcs=policy.npz
+    """
+    if asked["out"].suffix != ".npz":
+        raise GarlError(f"--out: found {str(asked['out'])!r}, expected a name that ends in .npz")
+    try:
+        from pytest_garl.adversary.training import train_best
+    except ImportError as error:
+        raise GarlError(
+            f"training needs more than flying does ({error}): pip install 'pytest-garl[train]'"
+        ) from error
+    plan = _plan(asked)
+    with _Progress(plan) as progress:
+        outcome = train_best(plan, progress.episode, progress.validated)
+    rates = ", ".join(f"seed {seed}: {100 * rate:.0f} %" for seed, rate in outcome.rates.items())
+    click.echo(f"collisions in {plan.validation} validation episodes: {rates}")
+    click.echo(f"kept seed {outcome.best}: {plan.out} (with {plan.out.with_suffix('.json').name})")
+
+
+def _plan(asked: dict[str, Any]) -> Plan:
+    from pytest_garl.adversary.training import PRESETS, Plan
+    from pytest_garl.scenarios.maps import load_map
+
+    kinds = _words(asked["kinds"])
+    for kind in kinds:
+        if kind not in OBJECT_TYPES:
+            raise GarlError(f"--type: found {kind!r}, expected some of {', '.join(OBJECT_TYPES)}")
+    folders = (Path.cwd() / "scenarios" / "maps",)
+    wishes, training = PRESETS[asked["policy"]]
+    return Plan(
+        name=asked["policy"],
+        surrogate=dataclasses.replace(
+            wishes,
+            maps=tuple(load_map(name, folders) for name in _words(asked["maps"])),
+            kinds=kinds,
+            airframe=_airframe(asked["system"]),
+        ),
+        training=dataclasses.replace(training, episodes=asked["episodes"]),
+        seeds=tuple(range(asked["seed"], asked["seed"] + asked["seeds"])),
+        validation=asked["validation"],
+        folder=asked["folder"],
+        out=asked["out"],
+        processes=os.cpu_count() or 1,
+    )
+
+
+def _words(text: str) -> tuple[str, ...]:
+    return tuple(part.strip() for part in text.split(",") if part.strip())
+
+
+def _airframe(reference: str | None) -> Airframe:
+    if not reference:
+        return Airframe()
+    module, _, name = reference.partition(":")
+    sys.path.insert(0, str(Path.cwd()))
+    try:
+        system = getattr(importlib.import_module(module), name)
+    except (ImportError, AttributeError, ValueError) as error:
+        raise GarlError(
+            f"--system: found {reference!r}, which cannot be loaded ({error}); "
+            "expected MODULE:CLASS of a landing system"
+        ) from error
+    # The surrogate's UAV is flown by the simple flight control.
+    return dataclasses.replace(airframe_of(system), control_rate_hz=None)
+
+
+class _Progress:
+    """A bar per seed with the recent reward and collision rate."""
+
+    def __init__(self, plan: Plan) -> None:
+        from rich.progress import (
+            BarColumn,
+            MofNCompleteColumn,
+            Progress,
+            TextColumn,
+            TimeRemainingColumn,
+        )
+
+        self._plan = plan
+        self._bar = Progress(
+            TextColumn("{task.description}"),
+            BarColumn(bar_width=20),
+            MofNCompleteColumn(),
+            TextColumn("{task.fields[note]}"),
+            TimeRemainingColumn(),
+        )
+        self._tasks: dict[int, Any] = {}
+        self._recent: deque[Any] = deque(maxlen=RECENT)
+
+    def __enter__(self) -> _Progress:
+        self._bar.start()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._bar.stop()
+
+    def episode(self, seed: int, record: Any) -> None:
+        """Show what an episode came to."""
+        if seed not in self._tasks:
+            self._recent.clear()
+            self._tasks[seed] = self._bar.add_task(
+                f"seed {seed}", total=self._plan.training.episodes, note=""
+            )
+        self._recent.append(record)
+        reward = sum(each.reward for each in self._recent) / len(self._recent)
+        hits = sum(each.collided for each in self._recent) / len(self._recent)
+        note = f"reward {reward:.2f}, collisions {100 * hits:.0f} %"
+        self._bar.update(self._tasks[seed], completed=record.episode + 1, note=note)
+
+    def validated(self, seed: int, rate: float) -> None:
+        """Show how a trained policy fared."""
+        note = f"validated: collisions {100 * rate:.0f} %"
+        done = self._plan.training.episodes
+        if seed not in self._tasks:
+            self._tasks[seed] = self._bar.add_task(f"seed {seed}", total=done, note="")
+        self._bar.update(self._tasks[seed], completed=done, note=note)
