@@ -12,13 +12,14 @@ from pytest_garl.search.nsga2 import Matrix, Nsga2
 from pytest_garl.search.objectives import diversity, threat
 from pytest_garl.search.operators import farthest_from_nearest, local_steps, property_mutation
 
-VIOLATION = 2.0
-"""What a violation is worth; the nearest miss is worth less than 1."""
+IMMIGRANTS = 0.25
+"""Share of each generation that is drawn at random (Grefenstette 1992), so that kinds of failure
+that no survivor resembles can still be found."""
 
 
 def method(plan: Plan) -> Nsga2:
     """Return the search."""
-    return Nsga2("garl", plan, objectives, 2, mutation)
+    return Nsga2("garl", plan, objectives, 2, mutation, immigrants=IMMIGRANTS)
 
 
 def objectives(chromosomes: Matrix, flown: Sequence[Flown]) -> Matrix:
@@ -28,29 +29,19 @@ def objectives(chromosomes: Matrix, flown: Sequence[Flown]) -> Matrix:
 
 
 def shared_threat(flown: Sequence[Flown], spread: Matrix) -> Matrix:
-    """Return threats (k,) in which scenarios that threaten alike share what that is worth.
+    """Return threats (k,) in which violations of one signature share what that is worth.
 
-    Alike are flights whose closest call was to the same kind of body in the same part of the
-    landing.  The k-th of them counts 1/k of its threat, which is 2 for a violation: first
-    come violations of signatures that no other has, then other violations, the most remote
-    (``spread``) first, then near misses.  So a near miss of a kind that was never hit is
-    worth more than the third hit of a kind that is known.
+    The k-th counts 1 + 1/k, the most remote (``spread``) being the first: the only one of
+    its kind is worth more than one more of a kind that the generation has, and any violation
+    is worth more than a near miss.
     """
-    results = [item.result for item in flown]
-    threats = np.array([threat(result) for result in results])
-    hits = np.array([bool(result["verdict"]["signature"]) for result in results])
-    threats[hits] = VIOLATION
-    signatures: set[str] = set()
-    repeats = np.zeros(len(results), dtype=bool)
-    for index in np.argsort(-spread, kind="stable"):
-        signature = results[index]["verdict"]["signature"]
-        repeats[index] = signature in signatures
-        signatures.add(signature)
+    threats = np.array([threat(item.result) for item in flown])
     places: Counter[str] = Counter()
-    for index in np.lexsort((-spread, repeats, -threats)):
-        alike = results[index]["closest"] or results[index]["outcome"]
-        places[alike] += 1
-        threats[index] /= places[alike]
+    for index in np.argsort(-spread, kind="stable"):
+        signature = flown[index].result["verdict"]["signature"]
+        if signature:
+            places[signature] += 1
+            threats[index] = 1 + 1 / places[signature]
     return threats
 
 

@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import itertools
 from collections.abc import Sequence
 from typing import Any
 
@@ -36,14 +37,7 @@ def result(scenario: Scenario) -> dict[str, Any]:
     ]
     signature = {"collision": "IV:dog", "distance": "off"}.get(primary or "", "")
     verdict = {"primary": primary, "signature": signature, "margins": margins}
-    closest = "dog:descent" if hit else ""
-    return {
-        "outcome": "collision" if hit else "landed",
-        "closest": closest,
-        "final_distance_m": far,
-        "elapsed_s": 30.0,
-        "verdict": verdict,
-    }
+    return {"final_distance_m": far, "elapsed_s": 30.0, "verdict": verdict}
 
 
 def bred(method: Method, generations: int) -> list[list[Scenario]]:
@@ -117,25 +111,27 @@ def test_survivors_are_measured_against_parents_and_offspring_together() -> None
     assert widths == [8, 8, 8, 16]
 
 
-def test_scenarios_that_threaten_alike_share_what_that_is_worth() -> None:
-    def flown(closest: str, signature: str, gap_m: float) -> Flown:
+def test_violations_of_one_signature_share_what_that_is_worth() -> None:
+    def flown(signature: str, gap_m: float) -> Flown:
         margins = [{"property": "collision", "value": gap_m, "unit": "m", "decided": True}]
         primary = "collision" if signature else None
         verdict = {"primary": primary, "signature": signature, "margins": margins}
-        result = {"outcome": "landed", "closest": closest, "verdict": verdict}
-        return Flown(scenario=scenario, result=result)
+        return Flown(scenario=scenario, result={"verdict": verdict})
 
     scenario = make_method("garl", plan()).ask()[0]
-    dogs = [
-        flown("dog:descent", "IV:dog:descent:seen", 0.0),
-        flown("dog:descent", "IV:dog:descent:seen", 0.0),
-        flown("dog:descent", "IV:dog:descent:unseen", 0.0),
-        flown("dog:descent", "", 0.6),
-    ]
-    others = [flown("bird:approach", "", 0.6), flown("bird:approach", "", 1.5), flown("", "", 5.0)]
-    worth = shared_threat([*dogs, *others], np.array([0.3, 0.1, 0.2, 0.9, 0.5, 0.6, 0.4]))
-    # The third hit of a dog is worth less than the first near miss of a bird.
-    assert list(worth) == pytest.approx([2, 2 / 3, 1, 0.8 / 4, 0.8, 0.5 / 2, 0])
+    dog, bird = flown("IV:dog:descent:seen", 0.0), flown("IV:bird:approach:unseen", 0.0)
+    near, far = flown("", 0.6), flown("", 5.0)
+    worth = shared_threat([dog, near, dog, bird, dog, far], np.array([0.1, 0.2, 0.3, 0.0, 0.2, 0]))
+    # The most remote of its kind is worth most; any violation more than a near miss.
+    assert list(worth) == pytest.approx([1 + 1 / 3, 0.8, 2.0, 2.0, 1.5, 0.0])
+
+
+def test_a_quarter_of_each_generation_has_no_parents() -> None:
+    generations = bred(make_method("garl", plan(population=20)), 5)
+    for before, after in itertools.pairwise(generations):
+        known = {each.seed for made in generations[: generations.index(after)] for each in made}
+        assert len(before) == len(after) == 20
+        assert sum(each.seed not in known for each in after) == 5
 
 
 def test_a_search_of_ones_own_is_named_by_its_module() -> None:
