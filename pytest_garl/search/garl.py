@@ -12,6 +12,8 @@ from pytest_garl.search.nsga2 import Matrix, Nsga2
 from pytest_garl.search.objectives import diversity, threat
 from pytest_garl.search.operators import farthest_from_nearest, local_steps, property_mutation
 
+VIOLATION = 2.0
+"""What a violation is worth; the nearest miss is worth less than 1."""
 IMMIGRANTS = 0.25
 """Share of each generation that is drawn at random (Grefenstette 1992), so that kinds of failure
 that no survivor resembles can still be found."""
@@ -29,19 +31,32 @@ def objectives(chromosomes: Matrix, flown: Sequence[Flown]) -> Matrix:
 
 
 def shared_threat(flown: Sequence[Flown], spread: Matrix) -> Matrix:
-    """Return threats (k,) in which violations of one signature share what that is worth.
+    """Return threats (k,) in which scenarios that threaten alike share what that is worth.
 
-    The k-th counts 1 + 1/k, the most remote (``spread``) being the first: the only one of
-    its kind is worth more than one more of a kind that the generation has, and any violation
-    is worth more than a near miss.
+    Alike are flights whose closest call was to the same kind of body in the same part of the
+    landing.  The k-th of them counts 1/k of its threat, which is 2 for a violation: first
+    come violations of signatures that no other has, then other violations, the most remote
+    (``spread``) first, then near misses.  So the nearest miss of a kind that was never hit is
+    worth more than the third hit of a kind that is known.
     """
-    threats = np.array([threat(item.result) for item in flown])
-    places: Counter[str] = Counter()
+    results = [item.result for item in flown]
+    signatures = [result["verdict"]["signature"] for result in results]
+    threats = np.array(
+        [
+            VIOLATION if signature else threat(result)
+            for signature, result in zip(signatures, results, strict=True)
+        ]
+    )
+    known: set[str] = set()
+    repeats = np.zeros(len(results), dtype=bool)
     for index in np.argsort(-spread, kind="stable"):
-        signature = flown[index].result["verdict"]["signature"]
-        if signature:
-            places[signature] += 1
-            threats[index] = 1 + 1 / places[signature]
+        repeats[index] = signatures[index] in known
+        known.add(signatures[index])
+    places: Counter[str] = Counter()
+    for index in np.lexsort((-spread, repeats, -threats)):
+        alike = results[index]["closest_call"] or results[index]["outcome"]
+        places[alike] += 1
+        threats[index] /= places[alike]
     return threats
 
 

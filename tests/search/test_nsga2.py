@@ -37,7 +37,13 @@ def result(scenario: Scenario) -> dict[str, Any]:
     ]
     signature = {"collision": "IV:dog", "distance": "off"}.get(primary or "", "")
     verdict = {"primary": primary, "signature": signature, "margins": margins}
-    return {"final_distance_m": far, "elapsed_s": 30.0, "verdict": verdict}
+    return {
+        "outcome": "collision" if hit else "landed",
+        "closest_call": "dog:descent" if hit else "",
+        "final_distance_m": far,
+        "elapsed_s": 30.0,
+        "verdict": verdict,
+    }
 
 
 def bred(method: Method, generations: int) -> list[list[Scenario]]:
@@ -111,19 +117,25 @@ def test_survivors_are_measured_against_parents_and_offspring_together() -> None
     assert widths == [8, 8, 8, 16]
 
 
-def test_violations_of_one_signature_share_what_that_is_worth() -> None:
-    def flown(signature: str, gap_m: float) -> Flown:
+def test_scenarios_that_threaten_alike_share_what_that_is_worth() -> None:
+    def flown(call: str, signature: str, gap_m: float) -> Flown:
         margins = [{"property": "collision", "value": gap_m, "unit": "m", "decided": True}]
         primary = "collision" if signature else None
         verdict = {"primary": primary, "signature": signature, "margins": margins}
-        return Flown(scenario=scenario, result={"verdict": verdict})
+        result = {"outcome": "landed", "closest_call": call, "verdict": verdict}
+        return Flown(scenario=scenario, result=result)
 
     scenario = make_method("garl", plan()).ask()[0]
-    dog, bird = flown("IV:dog:descent:seen", 0.0), flown("IV:bird:approach:unseen", 0.0)
-    near, far = flown("", 0.6), flown("", 5.0)
-    worth = shared_threat([dog, near, dog, bird, dog, far], np.array([0.1, 0.2, 0.3, 0.0, 0.2, 0]))
-    # The most remote of its kind is worth most; any violation more than a near miss.
-    assert list(worth) == pytest.approx([1 + 1 / 3, 0.8, 2.0, 2.0, 1.5, 0.0])
+    dogs = [
+        flown("dog:descent", "IV:dog:descent:seen", 0.0),
+        flown("dog:descent", "IV:dog:descent:seen", 0.0),
+        flown("dog:descent", "IV:dog:descent:unseen", 0.0),
+        flown("dog:descent", "", 0.6),
+    ]
+    others = [flown("bird:approach", "", 0.6), flown("bird:approach", "", 1.5), flown("", "", 5.0)]
+    worth = shared_threat([*dogs, *others], np.array([0.3, 0.1, 0.2, 0.9, 0.5, 0.6, 0.4]))
+    # The third hit of a dog is worth less than the first near miss of a bird.
+    assert list(worth) == pytest.approx([2, 2 / 3, 1, 0.8 / 4, 0.8, 0.5 / 2, 0])
 
 
 def test_a_quarter_of_each_generation_has_no_parents() -> None:
