@@ -249,7 +249,7 @@ class Loop:
     def _move_objects(self, tick: int) -> None:
         if tick % round(DECISION_STEP_S * PHYSICS_RATE_HZ) == 0:
             for item in self.objects:
-                item.take(item.policy.decide(self.situation(item)))
+                item.decide(self.situation(item))
         for item in self.objects:
             item.advance(OBJECTS_EVERY / PHYSICS_RATE_HZ)
             self.world.move(

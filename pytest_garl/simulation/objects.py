@@ -5,14 +5,20 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
-from pytest_garl.errors import GarlError
 from pytest_garl.scenarios.bodies import Body
 from pytest_garl.scenarios.maps import Map
 from pytest_garl.scenarios.object_types import OBJECT_TYPES
 from pytest_garl.scenarios.placement import object_speed_mps, object_start_m
 from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.scenarios.validity import Disc, discs_of
-from pytest_garl.simulation.policy import DECISION_STEP_S, Move, ObjectPolicy, ObjectState
+from pytest_garl.simulation.policy import (
+    DECISION_STEP_S,
+    Move,
+    ObjectPolicy,
+    ObjectState,
+    Situation,
+    decision,
+)
 
 _LOOK_AHEAD_M = 0.5
 TURN_RATE_RADPS = 2 * math.pi
@@ -64,14 +70,12 @@ class MovingObject:
             speed_mps=self.speed_mps,
         )
 
+    def decide(self, situation: Situation) -> None:
+        """Ask the policy where to go; raise PolicyError if it fails or answers nonsense."""
+        self.take(decision(self.policy, situation))
+
     def take(self, move: Move) -> None:
-        """Accept a policy's decision; raise GarlError for one that is none."""
-        length = math.hypot(move.x, move.y)
-        if not math.isfinite(length) or length > 1 + 1e-9:
-            raise GarlError(
-                f"object policy of {self.name}: found the move ({move.x}, {move.y}), "
-                "expected a share (x, y) of its speed, no longer than 1"
-            )
+        """Go where ``move`` says until the next decision."""
         self.moves.append((move.x, move.y))
         self._wanted = (move.x * self.speed_mps, move.y * self.speed_mps)
         # What it can reach before the next decision; few, and mostly none.
