@@ -72,7 +72,7 @@ def train_best(
         training = dataclasses.replace(plan.training, seed=seed)
         checkpoint = plan.folder / f"{plan.name}-{seed}.pt"
         learner = train(plan.surrogate, training, checkpoint, functools.partial(episode, seed))
-        curves[seed], networks[seed] = learner.history, learner.policy()
+        curves[seed], networks[seed] = learner.history, learner.policy(plan.surrogate.state)
         scores[seed] = validate(networks[seed], plan.surrogate, plan.validation, plan.processes)
         validated(seed, scores[seed].rate)
     best = max(plan.seeds, key=lambda seed: (scores[seed].rate, -seed))

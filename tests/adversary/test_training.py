@@ -94,7 +94,7 @@ def test_the_papers_reward_pays_for_hiding_the_marker() -> None:
 
 
 def test_rewards_of_several_steps_are_summed_and_cut_rightly() -> None:
-    learner = Learner(OURS, Training(steps=3, discount=0.5, replay=10))
+    learner = Learner(10, 5, Training(steps=3, discount=0.5, replay=10))
     step = Experience(learner)
     states = [np.full(10, index, np.float32) for index in range(6)]
     for index in range(4):
@@ -112,7 +112,7 @@ def test_rewards_of_several_steps_are_summed_and_cut_rightly() -> None:
 
 
 def test_a_learner_learns_which_action_pays() -> None:
-    learner = Learner(PAPERS, Training(steps=1, warm_up=64, target_every=50))
+    learner = Learner(4, 5, Training(steps=1, warm_up=64, target_every=50))
     rng = np.random.default_rng(0)
     for _ in range(600):
         state = rng.normal(size=4).astype(np.float32)
@@ -122,7 +122,7 @@ def test_a_learner_learns_which_action_pays() -> None:
     states = rng.normal(size=(200, 4)).astype(np.float32)
     best = learner.act(states, epsilon=0.0)
     assert (best == np.where(states[:, 0] > 0, 0, 2)).mean() > 0.95
-    policy = learner.policy()
+    policy = learner.policy("paper")
     assert [int(policy.values(state).argmax()) for state in states] == best.tolist()
 
 
@@ -145,7 +145,9 @@ def test_a_killed_training_goes_on_to_the_same_weights(tmp_path: Path) -> None:
     resumed = train(OURS, training, checkpoint, every=2)
     assert whole.updates == resumed.updates > 0
     assert whole.history == resumed.history
-    for ours, theirs in zip(whole.policy().layers, resumed.policy().layers, strict=True):
+    for ours, theirs in zip(
+        whole.policy("relative").layers, resumed.policy("relative").layers, strict=True
+    ):
         assert (ours[0] == theirs[0]).all()
         assert (ours[1] == theirs[1]).all()
     with pytest.raises(GarlError, match="checkpoint of another training"):
