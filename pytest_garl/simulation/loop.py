@@ -251,7 +251,7 @@ class Loop:
             for item in self.objects:
                 item.decide(self.situation(item))
         for item in self.objects:
-            item.advance(OBJECTS_EVERY / PHYSICS_RATE_HZ)
+            item.advance(OBJECTS_EVERY / PHYSICS_RATE_HZ, self.objects)
             self.world.move(
                 item.name, item.position_m, item.yaw_rad, (item.vx_mps, item.vy_mps, 0.0)
             )
