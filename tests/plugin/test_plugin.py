@@ -240,6 +240,23 @@ def test_nonsense_on_the_command_line_is_one_clear_error(
     result.stderr.fnmatch_lines([words])
 
 
+@pytest.mark.parametrize(
+    ("args", "words"),
+    [
+        ((), "*method garl, seed 0, objects dqn,*"),
+        (("--garl-method=garl-paper",), "*objects dqn-paper,*"),
+        (("--garl-method=random",), "*objects waypoint,*"),
+        (("--garl-method=random", "--garl-npcs=stand"), "*objects stand,*"),
+    ],
+)
+def test_who_moves_objects_depends_on_the_method_unless_one_says(
+    pytester: pytest.Pytester, args: tuple[str, ...], words: str
+) -> None:
+    project(pytester)
+    result = run(pytester, "--garl-budget=1", "--garl-workers=0", *args)
+    result.stdout.fnmatch_lines([words])
+
+
 POLICY = """
 from pytest_garl.simulation.policy import PolicySpec
 
