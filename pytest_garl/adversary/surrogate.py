@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import functools
-import math
 from dataclasses import dataclass, field
 from typing import Any, Literal
 
@@ -126,4 +125,4 @@ class SurrogateEnv(gymnasium.Env[Observation, np.int64]):
 
     def _distance_m(self) -> float:
         situation = self._current().situations[0]
-        return math.dist(situation.self.position_m[:2], situation.uav_position_m[:2])
+        return rewards.column_distance_m(situation.self.position_m, situation.uav_position_m)

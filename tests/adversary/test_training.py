@@ -161,13 +161,20 @@ def test_a_killed_training_goes_on_to_the_same_weights(tmp_path: Path) -> None:
 def test_garl_train_writes_weights_that_can_be_flown(tmp_path: Path) -> None:
     out = tmp_path / "dogs.npz"
     arguments = ["train", "--map=court", "--type=dog", "--episodes=2", "--seeds=2"]
-    arguments += ["--validation=2", f"--folder={tmp_path / 'folder'}", f"--out={out}"]
+    arguments += [
+        "--state=extended",
+        "--uav=both",
+        "--validation=2",
+        f"--folder={tmp_path / 'folder'}",
+        f"--out={out}",
+    ]
     result = CliRunner().invoke(main, arguments)
     assert result.exit_code == 0, result.output
     assert "kept seed" in result.output
     assert learned_spec(str(out)).make()
     manifest = json.loads(out.with_suffix(".json").read_text())
     assert manifest["surrogate"]["types"] == ["dog"]
+    assert (manifest["state"], manifest["surrogate"]["uav"]) == ("extended", "both")
     assert manifest["validation"].keys() == {"0", "1"}
     assert out.with_suffix(".png").stat().st_size > 1000
 
