@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import dataclasses
 import functools
+import hashlib
 import itertools
 import json
 import pickle
 from collections import deque
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
@@ -187,7 +189,7 @@ def train(
         size, actions = envs.single_observation_space.shape[0], envs.single_action_space.n
         learner = Learner(size, int(actions), training)
         if checkpoint and checkpoint.exists():
-            _restore(learner, checkpoint, _identity(surrogate, training))
+            _restore(learner, checkpoint, identity(surrogate, training))
         kept = len(learner.history)
         while len(learner.history) < training.episodes:
             for record in _round(envs, learner, len(learner.history)):
@@ -197,7 +199,7 @@ def train(
                     learner.history.append(record)
             done = len(learner.history)
             if checkpoint and (done - kept >= every or done >= training.episodes):
-                _keep(learner, checkpoint, _identity(surrogate, training))
+                _keep(learner, checkpoint, identity(surrogate, training))
                 kept = done
     finally:
         envs.close()
@@ -260,19 +262,20 @@ def _mlp(size: int, hidden: tuple[int, ...], actions: int) -> torch.nn.Sequentia
 _MEMORY = ("states", "afters", "actions", "sums", "discounts")
 
 
-def _identity(surrogate: Surrogate, training: Training) -> str:
-    """Everything on which the weights depend, as text."""
+def identity(surrogate: Surrogate, training: Training) -> str:
+    """Return a hash of what is trained and how; another training has another."""
     maps = [map.sha256 for map in surrogate.maps]
-    return repr((dataclasses.replace(surrogate, maps=()), maps, training))
+    text = repr((version("pytest-garl"), dataclasses.replace(surrogate, maps=()), maps, training))
+    return hashlib.sha256(text.encode()).hexdigest()
 
 
-def _keep(learner: Learner, path: Path, identity: str) -> None:
+def _keep(learner: Learner, path: Path, known: str) -> None:
     filled = min(learner.stored, learner.training.replay)
     path.parent.mkdir(parents=True, exist_ok=True)
     half = path.with_suffix(".part")
     torch.save(
         {
-            "identity": identity,
+            "identity": known,
             "network": learner.network.state_dict(),
             "target": learner.target.state_dict(),
             "optimiser": learner.optimiser.state_dict(),
@@ -287,18 +290,18 @@ def _keep(learner: Learner, path: Path, identity: str) -> None:
     half.replace(path)
 
 
-def _restore(learner: Learner, path: Path, identity: str) -> None:
+def _restore(learner: Learner, path: Path, known: str) -> None:
     try:
         kept = torch.load(path, weights_only=True)
         found = kept["identity"]
-    except (OSError, RuntimeError, KeyError, TypeError, pickle.UnpicklingError) as error:
+    except (OSError, EOFError, RuntimeError, LookupError, TypeError, pickle.PickleError) as error:
         raise GarlError(
             f"{path}: is no checkpoint that can be read ({error}); delete it"
         ) from error
-    if found != identity:
+    if found != known:
         raise GarlError(
-            f"{path}: is the checkpoint of another training, {found}; this one is "
-            f"{identity}. Delete it, choose another folder, or train as before"
+            f"{path}: is the checkpoint of another training; delete it, choose another folder, "
+            "or train as before"
         )
     learner.network.load_state_dict(kept["network"])
     learner.target.load_state_dict(kept["target"])

@@ -110,7 +110,7 @@ def read_manifest(path: Path) -> dict[str, Any]:
         raise _wrong(file, f"is no readable manifest ({error})") from error
     if not known or manifest["format"] != FORMAT:
         raise _wrong(file, f"is not a manifest of format {FORMAT}")
-    if manifest["state"] not in VIEWS:
+    if str(manifest["state"]) not in VIEWS:
         raise _wrong(file, f"names the state {manifest['state']!r}; known: {', '.join(VIEWS)}")
     return dict(manifest)
 
@@ -133,7 +133,7 @@ def _load(weights: str, sha256: str) -> Network:
                 )
                 for index in range(count)
             ]
-    except (ValueError, KeyError, BadZipFile, EOFError) as error:
+    except (ValueError, KeyError, TypeError, BadZipFile, EOFError) as error:
         raise _wrong(path, f"is no file of weights ({error})") from error
     _check(path, layers, VIEWS[manifest["state"]].size)
     return Network(state=manifest["state"], layers=tuple(layers))

@@ -149,7 +149,10 @@ def _plan(asked: dict[str, Any]) -> Plan:
 
 
 def _words(text: str) -> tuple[str, ...]:
-    return tuple(part.strip() for part in text.split(",") if part.strip())
+    words = tuple(part.strip() for part in text.split(",") if part.strip())
+    if not words:
+        raise GarlError(f"found {text!r}, expected names separated by commas")
+    return words
 
 
 def _airframe(reference: str | None) -> Airframe:

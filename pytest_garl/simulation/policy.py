@@ -82,7 +82,10 @@ def decision(policy: ObjectPolicy, situation: Situation) -> Move:
         move = policy.decide(situation)
     except Exception as error:
         raise PolicyError(f"{name}: raised {type(error).__name__}: {error}") from error
-    length = math.hypot(move.x, move.y) if isinstance(move, Move) else math.nan
+    try:
+        length = math.hypot(move.x, move.y)
+    except (AttributeError, TypeError):
+        length = math.nan
     if not length <= 1 + 1e-9:
         raise PolicyError(
             f"{name}: found {move!r}; expected Move(x=…, y=…), a share of the object's speed "
@@ -113,5 +116,13 @@ class PolicySpec:
                 f"object policy {self.name!r}: {self.factory!r} cannot be loaded ({error}); "
                 "expected 'module:attribute' of an importable module"
             ) from error
-        policy: ObjectPolicy = factory(**dict(self.arguments))
+        try:
+            policy: ObjectPolicy = factory(**dict(self.arguments))
+        except PolicyError:
+            raise
+        except Exception as error:
+            raise PolicyError(
+                f"object policy {self.name!r}: {self.factory} with {dict(self.arguments)} raised "
+                f"{type(error).__name__}: {error}"
+            ) from error
         return policy

@@ -72,6 +72,12 @@ def _list(path: Path) -> None:
     path.with_suffix(".json").write_text("[]")
 
 
+def _array(path: Path) -> None:
+    with path.open("wb") as file:
+        np.save(file, np.zeros(3))
+    _restamp(path)
+
+
 def _other_state(path: Path) -> None:
     file = path.with_suffix(".json")
     file.write_text(json.dumps({**json.loads(file.read_text()), "state": "extended"}))
@@ -89,6 +95,7 @@ def _unknown_state(path: Path) -> None:
         (_truncate, "has the hash"),
         (_foreign, "is no file of weights"),
         (lambda path: path.with_suffix(".json").unlink(), "no readable manifest"),
+        (_array, "is no file of weights"),
         (_list, "no readable manifest"),
         (lambda path: path.with_suffix(".json").write_text("{}"), "not a manifest of format 1"),
         (_other_state, "where 9 numbers go in"),

@@ -56,7 +56,12 @@ class Wild:
     def reset(self, situation: Situation, rng: np.random.Generator) -> None: ...
 
     def decide(self, situation: Situation) -> Move:
-        answers = {"far": Move(x=1.0, y=1.0), "nan": Move(x=math.nan, y=0.0), "number": 7}
+        answers: dict[str, object] = {
+            "far": Move(x=1.0, y=1.0),
+            "nan": Move(x=math.nan, y=0.0),
+            "words": Move(x="up", y=0.0),  # type: ignore[arg-type]
+            "number": 7,
+        }
         return answers[self._answer]  # type: ignore[return-value]
 
 
@@ -66,6 +71,7 @@ class Wild:
         ("far", r"deciding for person-1: found Move\(x=1.0, y=1.0\); expected"),
         ("nan", "found Move"),
         ("number", "found 7; expected Move"),
+        ("words", "found Move"),
         ("missing", "raised KeyError"),
     ],
 )
@@ -74,4 +80,10 @@ def test_a_policy_that_answers_nonsense_is_refused_before_any_flight(
 ) -> None:
     spec = PolicySpec(name="wild", factory=f"{__name__}:Wild", arguments=(("answer", answer),))
     with pytest.raises(PolicyError, match=words):
+        check_policy(spec, MAP)
+
+
+def test_a_policy_that_cannot_be_made_is_refused() -> None:
+    spec = PolicySpec(name="wild", factory=f"{__name__}:Wild", arguments=(("colour", "red"),))
+    with pytest.raises(PolicyError, match=r"'wild': .*raised TypeError"):
         check_policy(spec, MAP)

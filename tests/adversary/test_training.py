@@ -152,9 +152,10 @@ def test_a_killed_training_goes_on_to_the_same_weights(tmp_path: Path) -> None:
         assert (ours[1] == theirs[1]).all()
     with pytest.raises(GarlError, match="checkpoint of another training"):
         train(OURS, dataclasses.replace(training, seed=1), checkpoint)
-    checkpoint.write_bytes(b"nonsense")
-    with pytest.raises(GarlError, match="no checkpoint that can be read"):
-        train(OURS, training, checkpoint)
+    for nonsense in (b"", b"nonsense"):
+        checkpoint.write_bytes(nonsense)
+        with pytest.raises(GarlError, match="no checkpoint that can be read"):
+            train(OURS, training, checkpoint)
 
 
 @pytest.mark.sim
@@ -184,6 +185,7 @@ def test_garl_train_writes_weights_that_can_be_flown(tmp_path: Path) -> None:
     [
         (["--type=cat"], "--type: found 'cat', expected some of person, dog, bird"),
         (["--map=moon"], "unknown map 'moon'"),
+        (["--type=,"], "found ',', expected names"),
         (["--out=policy.pt"], "expected a name that ends in .npz"),
         (["--system=nowhere:System"], "--system: found 'nowhere:System', which cannot be loaded"),
     ],
