@@ -23,5 +23,9 @@ class LandingSystemError(GarlError):
     """A landing system that cannot be loaded or does not keep the contract."""
 
 
+class PolicyError(GarlError):
+    """A policy of moving objects that cannot be loaded, or does what no policy may."""
+
+
 class LedgerError(GarlError):
     """A ledger that cannot be opened, written or continued."""

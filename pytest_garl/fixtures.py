@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import functools
 import math
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NoReturn
 
 import pytest
 
-from pytest_garl.errors import LedgerError
+from pytest_garl.errors import GarlError
 from pytest_garl.switches import FATAL, RUN
 
 if TYPE_CHECKING:
@@ -96,7 +96,15 @@ def npcs(request: pytest.FixtureRequest) -> PolicySpec:
     from pytest_garl.adversary.policies import policy_spec
 
     run = request.config.stash.get(RUN, None)
-    return policy_spec(run.options.npcs if run else "waypoint")
+    return policy_spec(run.options.npcs if run else "dqn")
+
+
+def _stop(request: pytest.FixtureRequest, error: GarlError) -> NoReturn:
+    """End the session: without ledger or policy no other item would fare better."""
+    if not hasattr(request.config, "workerinput"):
+        pytest.exit(f"garl: {error}", returncode=pytest.ExitCode.INTERNAL_ERROR)
+    request.node.user_properties.append((FATAL, str(error)))
+    pytest.fail(f"garl: {error}", pytrace=False)
 
 
 @pytest.fixture
@@ -105,12 +113,8 @@ def landing(request: pytest.FixtureRequest, garl_slot: Target, npcs: PolicySpec)
     run = request.config.stash[RUN]
     try:
         result = run.fly(garl_slot, npcs)
-    except LedgerError as error:
-        # Without its ledger a run cannot go on, and no other item would fare better.
-        if not hasattr(request.config, "workerinput"):
-            pytest.exit(f"garl: {error}", returncode=pytest.ExitCode.INTERNAL_ERROR)
-        request.node.user_properties.append((FATAL, str(error)))
-        pytest.fail(f"garl: {error}", pytrace=False)
+    except GarlError as error:
+        _stop(request, error)
     landing = Landing(garl_slot, result, run)
     verdict = result["verdict"]
     request.node.user_properties += [

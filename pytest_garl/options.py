@@ -73,7 +73,7 @@ def read_options(config: pytest.Config) -> Options:
         duplicates=cast(
             Literal["xfail", "fail"], _among("duplicates", text["duplicates"], ("xfail", "fail"))
         ),
-        npcs=_among("npcs", text["npcs"], POLICIES),
+        npcs=_npcs(text["npcs"], text["method"]),
         folder=config.rootpath / str(config.getini("garl_dir")),
         root=config.rootpath,
     )
@@ -127,6 +127,21 @@ def _method(text: str) -> str:
         find_method(text)
     except GarlError as error:
         raise pytest.UsageError(f"--garl-method: {error}") from error
+    return text
+
+
+POLICY_OF = {"garl-paper": "dqn-paper", "random": "waypoint"}
+"""Who moves objects where nobody says: the paper's policy for its method, none for chance."""
+
+
+def _npcs(text: str, method: str) -> str:
+    if not text:
+        return POLICY_OF.get(method, "dqn")
+    if text in POLICIES:
+        return text
+    if not text.endswith(".npz"):
+        expected = f"one of {', '.join(POLICIES)}, or weights (.npz) that `garl train` wrote"
+        raise _wrong("npcs", text, expected)
     return text
 
 

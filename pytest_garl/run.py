@@ -158,11 +158,14 @@ class Run:
                 self._add(search, wanted, npcs)
 
     def _add(self, search: str, wanted: Mapping[Slot, Target], npcs: PolicySpec) -> None:
+        from pytest_garl.adversary.policies import check_policy
+        from pytest_garl.scenarios.maps import load_map
         from pytest_garl.search.breeder import Breeder
         from pytest_garl.search.job import loads
 
         target = next(iter(wanted.values()))
         job = self._job(target, npcs)
+        check_policy(npcs, load_map(job.map, self.options.map_folders))
         name = f"{job.system.module}:{job.system.qualname}"
         slots: dict[int, list[int]] = {}
         for slot in sorted(wanted):

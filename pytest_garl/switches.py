@@ -19,7 +19,7 @@ RUN = pytest.StashKey[Any]()
 FATAL = "garl.fatal"
 """The user property by which an xdist worker tells the controller that the run cannot go on."""
 METHODS = ("garl", "garl-paper", "random")
-POLICIES = ("waypoint", "random_walk", "stationary")
+POLICIES = ("dqn", "dqn-paper", "greedy", "stand", "waypoint", "random_walk", "stationary")
 Option = namedtuple("Option", ["name", "metavar", "help", "default"], defaults=[""])
 """One option: its name without ``garl-``, default, and what ``--help`` says."""
 
@@ -91,8 +91,9 @@ OPTIONS = (
     Option(
         name="npcs",
         metavar="POLICY",
-        default="waypoint",
-        help=f"Who moves people, dogs and birds: {', '.join(POLICIES)} (default: waypoint).",
+        help=f"Who moves people, dogs and birds: {', '.join(POLICIES)}, or weights (.npz) that "
+        "`garl train` wrote (default: dqn; dqn-paper for the method garl-paper, waypoint for "
+        "random).",
     ),
 )
 

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import dataclasses
 import functools
+import hashlib
 import itertools
 import json
 import pickle
 from collections import deque
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
@@ -19,7 +21,6 @@ import torch
 from numpy.typing import NDArray
 
 from pytest_garl.adversary.network import Network
-from pytest_garl.adversary.states import ACTIONS, VIEWS
 from pytest_garl.adversary.surrogate import Surrogate, SurrogateEnv
 from pytest_garl.errors import GarlError
 
@@ -66,13 +67,12 @@ class EpisodeRecord:
 class Learner:
     """The network, its target, its memory: ``act``, ``remember``, ``update``."""
 
-    def __init__(self, surrogate: Surrogate, training: Training) -> None:
-        self.surrogate, self.training = surrogate, training
+    def __init__(self, size: int, actions: int, training: Training) -> None:
+        self.choices, self.training = actions, training
         self.history: list[EpisodeRecord] = []
-        size = VIEWS[surrogate.state].size
         torch.manual_seed(training.seed)
         self.rng = np.random.default_rng(training.seed)
-        self.network, self.target = (_mlp(size, training.hidden) for _ in range(2))
+        self.network, self.target = (_mlp(size, training.hidden, actions) for _ in range(2))
         self.target.load_state_dict(self.network.state_dict())
         self.optimiser = torch.optim.Adam(self.network.parameters(), lr=training.learning_rate)
         self.updates = 0
@@ -88,7 +88,7 @@ class Learner:
         with torch.no_grad():
             best = self.network(torch.from_numpy(states)).argmax(dim=1).numpy()
         explores = self.rng.random(len(states)) < epsilon
-        chance = self.rng.integers(len(ACTIONS), size=len(states))
+        chance = self.rng.integers(self.choices, size=len(states))
         return np.where(explores, chance, best)
 
     def remember(
@@ -123,11 +123,11 @@ class Learner:
         if self.updates % training.target_every == 0:
             self.target.load_state_dict(self.network.state_dict())
 
-    def policy(self) -> Network:
-        """Return the network as NumPy arrays."""
+    def policy(self, state: str) -> Network:
+        """Return the network as NumPy arrays; ``state`` names what goes in."""
         linear = [layer for layer in self.network if isinstance(layer, torch.nn.Linear)]
         return Network(
-            state=self.surrogate.state,
+            state=state,
             layers=tuple(
                 (
                     layer.weight.detach().numpy().astype(np.float64),
@@ -170,6 +170,7 @@ def train(
     checkpoint: Path | None = None,
     report: Callable[[EpisodeRecord], None] = lambda record: None,
     every: int = 50,
+    env: Callable[[Surrogate], SurrogateEnv] = SurrogateEnv,
 ) -> Learner:
     """Train, telling ``report`` of each episode; return the learner.
 
@@ -179,16 +180,16 @@ def train(
     """
     threads = torch.get_num_threads()
     torch.set_num_threads(1)
-    learner = Learner(surrogate, training)
-    if checkpoint and checkpoint.exists():
-        _restore(learner, checkpoint)
-    make = functools.partial(SurrogateEnv, surrogate)
-    envs = gymnasium.vector.AsyncVectorEnv(
-        [make] * training.environments,
+    envs: Any = gymnasium.vector.AsyncVectorEnv(
+        [functools.partial(env, surrogate)] * training.environments,
         context="spawn",
         autoreset_mode=gymnasium.vector.AutoresetMode.DISABLED,
     )
     try:
+        size, actions = envs.single_observation_space.shape[0], envs.single_action_space.n
+        learner = Learner(size, int(actions), training)
+        if checkpoint and checkpoint.exists():
+            _restore(learner, checkpoint, identity(surrogate, training))
         kept = len(learner.history)
         while len(learner.history) < training.episodes:
             for record in _round(envs, learner, len(learner.history)):
@@ -198,7 +199,7 @@ def train(
                     learner.history.append(record)
             done = len(learner.history)
             if checkpoint and (done - kept >= every or done >= training.episodes):
-                _keep(learner, checkpoint)
+                _keep(learner, checkpoint, identity(surrogate, training))
                 kept = done
     finally:
         envs.close()
@@ -250,31 +251,31 @@ def _round(envs: Any, learner: Learner, first: int) -> Iterator[EpisodeRecord]:
         )
 
 
-def _mlp(size: int, hidden: tuple[int, ...]) -> torch.nn.Sequential:
+def _mlp(size: int, hidden: tuple[int, ...], actions: int) -> torch.nn.Sequential:
     sizes = (size, *hidden)
     layers: list[torch.nn.Module] = []
     for wide, narrow in itertools.pairwise(sizes):
         layers += [torch.nn.Linear(wide, narrow), torch.nn.ReLU()]
-    return torch.nn.Sequential(*layers, torch.nn.Linear(sizes[-1], len(ACTIONS)))
+    return torch.nn.Sequential(*layers, torch.nn.Linear(sizes[-1], actions))
 
 
 _MEMORY = ("states", "afters", "actions", "sums", "discounts")
 
 
-def _identity(learner: Learner) -> str:
-    """Everything on which the weights depend, as text."""
-    surrogate = learner.surrogate
+def identity(surrogate: Surrogate, training: Training) -> str:
+    """Return a hash of what is trained and how; another training has another."""
     maps = [map.sha256 for map in surrogate.maps]
-    return repr((dataclasses.replace(surrogate, maps=()), maps, learner.training))
+    text = repr((version("pytest-garl"), dataclasses.replace(surrogate, maps=()), maps, training))
+    return hashlib.sha256(text.encode()).hexdigest()
 
 
-def _keep(learner: Learner, path: Path) -> None:
+def _keep(learner: Learner, path: Path, known: str) -> None:
     filled = min(learner.stored, learner.training.replay)
     path.parent.mkdir(parents=True, exist_ok=True)
     half = path.with_suffix(".part")
     torch.save(
         {
-            "identity": _identity(learner),
+            "identity": known,
             "network": learner.network.state_dict(),
             "target": learner.target.state_dict(),
             "optimiser": learner.optimiser.state_dict(),
@@ -289,18 +290,18 @@ def _keep(learner: Learner, path: Path) -> None:
     half.replace(path)
 
 
-def _restore(learner: Learner, path: Path) -> None:
+def _restore(learner: Learner, path: Path, known: str) -> None:
     try:
         kept = torch.load(path, weights_only=True)
-        identity = kept["identity"]
-    except (OSError, RuntimeError, KeyError, TypeError, pickle.UnpicklingError) as error:
+        found = kept["identity"]
+    except (OSError, EOFError, RuntimeError, LookupError, TypeError, pickle.PickleError) as error:
         raise GarlError(
             f"{path}: is no checkpoint that can be read ({error}); delete it"
         ) from error
-    if identity != _identity(learner):
+    if found != known:
         raise GarlError(
-            f"{path}: is the checkpoint of another training, {identity}; this one is "
-            f"{_identity(learner)}. Delete it, choose another folder, or train as before"
+            f"{path}: is the checkpoint of another training; delete it, choose another folder, "
+            "or train as before"
         )
     learner.network.load_state_dict(kept["network"])
     learner.target.load_state_dict(kept["target"])

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pytest_garl.adversary.states import ACTIONS, VIEWS
-from pytest_garl.errors import GarlError
+from pytest_garl.errors import PolicyError
 from pytest_garl.simulation.policy import Move, PolicySpec, Situation
 
 Array = NDArray[np.float64]
@@ -63,7 +63,7 @@ def learned_spec(name: str) -> PolicySpec:
     """Return the specification of a shipped policy, or of one in a file.
 
     ``name`` is "dqn", "dqn-paper", or the path of weights (``.npz``) that ``garl train``
-    wrote, with their manifest (``.json``) beside them.  Raises GarlError for a file that is
+    wrote, with their manifest (``.json``) beside them.  Raises PolicyError for a file that is
     missing, damaged, or not what its manifest says.
     """
     path = _path(name)
@@ -97,9 +97,9 @@ def save(path: Path, network: Network, about: Mapping[str, Any]) -> None:
 
 
 def read_manifest(path: Path) -> dict[str, Any]:
-    """Return the manifest of weights at ``path``; raise GarlError where it is no manifest."""
+    """Return the manifest of weights at ``path``; raise PolicyError where it is no manifest."""
     if not path.is_file():
-        raise GarlError(
+        raise PolicyError(
             f"object policy: there are no weights at {path}; expected a file of `garl train`"
         )
     file = path.with_suffix(".json")
@@ -110,7 +110,7 @@ def read_manifest(path: Path) -> dict[str, Any]:
         raise _wrong(file, f"is no readable manifest ({error})") from error
     if not known or manifest["format"] != FORMAT:
         raise _wrong(file, f"is not a manifest of format {FORMAT}")
-    if manifest["state"] not in VIEWS:
+    if str(manifest["state"]) not in VIEWS:
         raise _wrong(file, f"names the state {manifest['state']!r}; known: {', '.join(VIEWS)}")
     return dict(manifest)
 
@@ -133,7 +133,7 @@ def _load(weights: str, sha256: str) -> Network:
                 )
                 for index in range(count)
             ]
-    except (ValueError, KeyError, BadZipFile, EOFError) as error:
+    except (ValueError, KeyError, TypeError, BadZipFile, EOFError) as error:
         raise _wrong(path, f"is no file of weights ({error})") from error
     _check(path, layers, VIEWS[manifest["state"]].size)
     return Network(state=manifest["state"], layers=tuple(layers))
@@ -154,7 +154,7 @@ def _path(name: str) -> Path:
     return WEIGHTS / f"{name}.npz" if "/" not in name and "." not in name else Path(name)
 
 
-def _wrong(path: Path, problem: str) -> GarlError:
-    return GarlError(
+def _wrong(path: Path, problem: str) -> PolicyError:
+    return PolicyError(
         f"object policy: {path} {problem}; train it again with `garl train`, or restore the file"
     )

@@ -117,6 +117,7 @@ class AvoidingPilot(StraightPilot):
     def reset(self, mission: Mission) -> None:
         """Start on the ground, with nothing in sight."""
         super().reset(mission)
+        self._camera = mission.camera
         self._seen_since: float | None = None
         self._clear_since = -math.inf
         self._climbing = False
@@ -154,7 +155,7 @@ class AvoidingPilot(StraightPilot):
             return False
         # The camera covers as much to each side along x as the frame is high, along y as it
         # is wide, seen from a level UAV with its nose east.
-        camera = self.airframe.camera
+        camera = self._camera
         wide = math.tan(camera.field_of_view_rad / 2)
         high = wide * camera.height_px / camera.width_px
         return dx - reach < below * high and dy - reach < below * wide

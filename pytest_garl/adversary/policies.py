@@ -8,8 +8,18 @@ from types import MappingProxyType
 
 import numpy as np
 
-from pytest_garl.errors import GarlError
-from pytest_garl.simulation.policy import DECISION_STEP_S, STAY, Move, PolicySpec, Situation
+from pytest_garl.errors import PolicyError
+from pytest_garl.scenarios.maps import Map
+from pytest_garl.scenarios.object_types import OBJECT_TYPES
+from pytest_garl.simulation.policy import (
+    DECISION_STEP_S,
+    STAY,
+    Move,
+    ObjectState,
+    PolicySpec,
+    Situation,
+    decision,
+)
 
 ARRIVED_M = 0.5
 
@@ -128,15 +138,51 @@ LEARNED = ("dqn", "dqn-paper")
 def policy_spec(name: str) -> PolicySpec:
     """Return the specification of a shipped policy, or of weights in a file.
 
-    Raises GarlError for an unknown name, and for weights that cannot be trusted.
+    Raises PolicyError for an unknown name, and for weights that cannot be trusted.
     """
     if name in POLICIES:
         return POLICIES[name]
     if name not in LEARNED and not name.endswith(".npz"):
-        raise GarlError(
+        raise PolicyError(
             f"unknown object policy {name!r}; expected one of {', '.join((*LEARNED, *POLICIES))}, "
             "or the path of weights (.npz) that `garl train` wrote"
         )
     from pytest_garl.adversary.network import learned_spec
 
     return learned_spec(name)
+
+
+def check_policy(spec: PolicySpec, map: Map) -> None:
+    """Let a policy decide once for each object of a map, before anything is flown.
+
+    Raises PolicyError if it cannot be made, raises, or answers what is no move.
+    """
+    x_min, x_max, y_min, y_max = map.bounds_m
+    states = [
+        ObjectState(
+            name=name,
+            type=OBJECT_TYPES[kind],
+            position_m=(x_min, y_min, OBJECT_TYPES[kind].altitude_m),
+            velocity_mps=(0.0, 0.0),
+            speed_mps=OBJECT_TYPES[kind].top_speed_mps,
+        )
+        for name, kind in map.object_names
+    ]
+    for state in states:
+        situation = Situation(
+            time_s=0.0,
+            self=state,
+            others=tuple(other for other in states if other is not state),
+            uav_position_m=map.uav_start_m,
+            uav_velocity_mps=(0.0, 0.0, 0.0),
+            marker_position_m=((x_min + x_max) / 2, (y_min + y_max) / 2),
+            map=map,
+        )
+        policy = spec.make()
+        try:
+            policy.reset(situation, np.random.default_rng(0))
+        except Exception as error:
+            raise PolicyError(
+                f"object policy {spec.name!r}: reset raised {type(error).__name__}: {error}"
+            ) from error
+        decision(policy, situation)

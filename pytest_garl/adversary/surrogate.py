@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import functools
-import math
 from dataclasses import dataclass, field
 from typing import Any, Literal
 
@@ -17,6 +16,7 @@ from pytest_garl.adversary.pilots import AvoidingPilot, Caution, Habits, Straigh
 from pytest_garl.adversary.states import ACTIONS, LIMIT, VIEWS
 from pytest_garl.landing_system import Airframe
 from pytest_garl.scenarios.maps import Map
+from pytest_garl.scenarios.scenario import Scenario
 
 Observation = NDArray[np.float32]
 
@@ -64,7 +64,7 @@ class SurrogateEnv(gymnasium.Env[Observation, np.int64]):
         rng, surrogate = self.np_random, self.surrogate
         map = surrogate.maps[int(rng.integers(len(surrogate.maps)))]
         kind = surrogate.kinds[int(rng.integers(len(surrogate.kinds)))]
-        scenario, place = draw_episode(map, [kind], rng)
+        scenario, place = self._draw(map, kind)
         avoiding = rng.random() < {"straight": 0.0, "both": 0.5, "avoiding": 1.0}[surrogate.uav]
         # The paper's UAV always flies alike; ours as differently as landing systems do.
         habits = Habits() if surrogate.uav == "straight" else Habits.drawn(rng)
@@ -109,6 +109,10 @@ class SurrogateEnv(gymnasium.Env[Observation, np.int64]):
             self._episode.close()
             self._episode = None
 
+    def _draw(self, map: Map, kind: str) -> tuple[Scenario, Map]:
+        """Return where an episode begins."""
+        return draw_episode(map, [kind], self.np_random)
+
     def _current(self) -> Episode:
         if self._episode is None:
             raise gymnasium.error.ResetNeeded("reset() comes before the first step()")
@@ -121,4 +125,4 @@ class SurrogateEnv(gymnasium.Env[Observation, np.int64]):
 
     def _distance_m(self) -> float:
         situation = self._current().situations[0]
-        return math.dist(situation.self.position_m[:2], situation.uav_position_m[:2])
+        return rewards.column_distance_m(situation.self.position_m, situation.uav_position_m)

@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from pytest_garl.adversary.dqn import EpisodeRecord, Training, train
+from pytest_garl.adversary.dqn import EpisodeRecord, Training, identity, train
 from pytest_garl.adversary.network import save
 from pytest_garl.adversary.surrogate import Surrogate
 from pytest_garl.adversary.validation import Score, validate
@@ -70,9 +70,9 @@ def train_best(
     networks, scores = {}, {}
     for seed in plan.seeds:
         training = dataclasses.replace(plan.training, seed=seed)
-        checkpoint = plan.folder / f"{plan.name}-{seed}.pt"
+        checkpoint = plan.folder / f"{plan.name}-{identity(plan.surrogate, training)[:12]}.pt"
         learner = train(plan.surrogate, training, checkpoint, functools.partial(episode, seed))
-        curves[seed], networks[seed] = learner.history, learner.policy()
+        curves[seed], networks[seed] = learner.history, learner.policy(plan.surrogate.state)
         scores[seed] = validate(networks[seed], plan.surrogate, plan.validation, plan.processes)
         validated(seed, scores[seed].rate)
     best = max(plan.seeds, key=lambda seed: (scores[seed].rate, -seed))

@@ -50,6 +50,22 @@ RECENT = 50
     metavar="MODULE:CLASS",
     help="Landing system whose airframe the surrogate's UAV has (default: a Matrice 100).",
 )
+@click.option(
+    "--state",
+    type=click.Choice(["paper", "extended", "relative"]),
+    help="What the policy sees, instead of what --policy says: the paper's four numbers, nine "
+    "with the paper's actions, or ten in the object's own frame.",
+)
+@click.option(
+    "--uav",
+    type=click.Choice(["straight", "avoiding", "both"]),
+    help="What it learns against, instead of what --policy says.",
+)
+@click.option(
+    "--reward",
+    type=click.Choice(["paper", "collision-first"]),
+    help="What it is rewarded for, instead of what --policy says.",
+)
 @click.option("--episodes", type=click.IntRange(1), default=800, show_default=True)
 @click.option(
     "--seeds",
@@ -111,6 +127,7 @@ def _plan(asked: dict[str, Any]) -> Plan:
     for kind in kinds:
         if kind not in OBJECT_TYPES:
             raise GarlError(f"--type: found {kind!r}, expected some of {', '.join(OBJECT_TYPES)}")
+    given = {name: asked[name] for name in ("state", "uav", "reward") if asked[name]}
     folders = (Path.cwd() / "scenarios" / "maps",)
     wishes, training = PRESETS[asked["policy"]]
     return Plan(
@@ -120,6 +137,7 @@ def _plan(asked: dict[str, Any]) -> Plan:
             maps=tuple(load_map(name, folders) for name in _words(asked["maps"])),
             kinds=kinds,
             airframe=_airframe(asked["system"]),
+            **given,
         ),
         training=dataclasses.replace(training, episodes=asked["episodes"]),
         seeds=tuple(range(asked["seed"], asked["seed"] + asked["seeds"])),
@@ -131,7 +149,10 @@ def _plan(asked: dict[str, Any]) -> Plan:
 
 
 def _words(text: str) -> tuple[str, ...]:
-    return tuple(part.strip() for part in text.split(",") if part.strip())
+    words = tuple(part.strip() for part in text.split(",") if part.strip())
+    if not words:
+        raise GarlError(f"found {text!r}, expected names separated by commas")
+    return words
 
 
 def _airframe(reference: str | None) -> Airframe:
@@ -168,7 +189,7 @@ class _Progress:
             BarColumn(bar_width=20),
             MofNCompleteColumn(),
             TextColumn("{task.fields[note]}"),
-            TimeRemainingColumn(),
+            TimeRemainingColumn(elapsed_when_finished=True),
         )
         self._tasks: dict[int, Any] = {}
         self._recent: deque[Any] = deque(maxlen=RECENT)

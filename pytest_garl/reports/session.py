@@ -11,6 +11,7 @@ from typing import Any, TextIO
 
 import pytest
 
+from pytest_garl.adversary.policies import policy_spec
 from pytest_garl.errors import LedgerError
 from pytest_garl.options import Options
 from pytest_garl.run import Run
@@ -23,6 +24,8 @@ BUILT_IN = Reference(module="pytest_garl.simulation.fly", file="", qualname="fly
 
 def begin_run(config: pytest.Config, options: Options) -> Run:
     """Return this process's part of the run; the ledger is made by the first process alone."""
+    # Weights that cannot be trusted end the session before there is a ledger.
+    policy_spec(options.npcs)
     lock = None
     if hasattr(config, "workerinput"):
         ledger = Ledger(options.ledger)

@@ -12,15 +12,16 @@ import time
 from pathlib import Path
 from typing import TextIO
 
-from pytest_garl.errors import LedgerError
+from pytest_garl.errors import LedgerError, PolicyError
 from pytest_garl.search.ledger import Ledger
 from pytest_garl.search.slots import Slot
 
 THREADS = dict.fromkeys(
     ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "OPENCV_FOR_THREADS_NUM"), "1"
 )
-CANNOT_WRITE = "garl cannot write: "
-"""With this a child says on stderr that it ended for want of a place to write."""
+CANNOT_GO_ON = "garl cannot go on: "
+"""With this a child says on stderr that neither it nor another can fly: no place to write, or
+a policy of objects that fails."""
 IDLE_S = 0.02
 BEAT_S = 5.0
 ALONE_FACTOR = 3.0
@@ -104,5 +105,5 @@ def main(path: str) -> None:
 if __name__ == "__main__":
     try:
         main(sys.argv[1])
-    except LedgerError as error:
-        sys.exit(f"{CANNOT_WRITE}{error}")
+    except (LedgerError, PolicyError) as error:
+        sys.exit(f"{CANNOT_GO_ON}{error}")

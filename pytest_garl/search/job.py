@@ -80,7 +80,6 @@ def fly_job(
     """Fly, judge and save; return the result for the ledger, the flight's hash, its cost."""
     from pytest_garl.simulation.record import save
     from pytest_garl.verdicts.judge import judge, undecided
-    from pytest_garl.verdicts.moments import closest_call
     from pytest_garl.verdicts.serialise import to_dict
 
     for entry in job.path:
@@ -105,7 +104,6 @@ def fly_job(
         if flight.outcome == "collision"
         else [],
         "undecided": undecided(flight),
-        "closest_call": closest_call(flight),
         "verdict": to_dict(judge(flight, job.limits)),
         "crash": dataclasses.asdict(flight.crash) if flight.crash else None,
     }
@@ -134,7 +132,6 @@ def broken_result(
         "elapsed_s": PAPER_LIMIT_S,
         "collisions": [],
         "undecided": message,
-        "closest_call": "",
         "verdict": verdict,
         "crash": crash,
     }

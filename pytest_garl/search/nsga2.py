@@ -32,8 +32,7 @@ _TRIES = 100
 class Nsga2:
     """A genetic search; objectives and mutation make the method.
 
-    ``width`` is the number of objectives; ``immigrants`` the share of each generation that has
-    no parents.  A scenario's own seed is inherited with the tail
+    ``width`` is the number of objectives.  A scenario's own seed is inherited with the tail
     of the chromosome, where the objects are: what they do by chance is part of what a parent
     was selected for.
     """
@@ -41,17 +40,9 @@ class Nsga2:
     learns = True
 
     def __init__(
-        self,
-        name: str,
-        plan: Plan,
-        objectives: Objectives,
-        width: int,
-        mutation: Mutation,
-        *,
-        immigrants: float = 0.0,
+        self, name: str, plan: Plan, objectives: Objectives, width: int, mutation: Mutation
     ) -> None:
         self._plan, self._objectives, self._mutation = plan, objectives, mutation
-        self._immigrants = round(immigrants * plan.population)
         place = hashlib.sha256(f"{name} {plan.map.name}".encode()).digest()
         sequence = np.random.SeedSequence(plan.seed, spawn_key=(int.from_bytes(place[:4], "big"),))
         variation, survival = sequence.spawn(2)
@@ -60,7 +51,12 @@ class Nsga2:
         self._flown: dict[bytes, Flown] = {}
         self._asked: Any = None
         genome = plan.genome
-        first = np.array([self._immigrant() for _ in range(plan.population)])
+        first = np.array(
+            [
+                self._valid(genome.random(self._rng), int(self._rng.integers(2**32)))
+                for _ in range(plan.population)
+            ]
+        )
         self._algorithm = GeneticAlgorithm(
             pop_size=plan.population,
             sampling=first,
@@ -106,17 +102,12 @@ class Nsga2:
         whole = np.concatenate([parents, seeds], axis=1)
         crossed = nuclear_gene_crossover(whole, self._plan.genome.borders, self._rng)
         children = self._mutate(crossed[:, :-1])
-        born = [
-            self._valid(row, int(seed)) for row, seed in zip(children, crossed[:, -1], strict=True)
-        ]
-        # The last children make room: parents come best first.
-        born[len(born) - self._immigrants :] = [self._immigrant() for _ in range(self._immigrants)]
-        return np.array(born)
-
-    def _immigrant(self) -> Matrix:
-        """Return a new chromosome from anywhere, with a seed of its own."""
-        drawn = self._plan.genome.random(self._rng)
-        return self._valid(drawn, int(self._rng.integers(2**32)))
+        return np.array(
+            [
+                self._valid(row, int(seed))
+                for row, seed in zip(children, crossed[:, -1], strict=True)
+            ]
+        )
 
     def _mutate(self, rows: Matrix) -> Matrix:
         genome = self._plan.genome

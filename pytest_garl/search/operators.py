@@ -82,9 +82,8 @@ def property_mutation(
     return mutated
 
 
-LOCAL_STEPS = (0.003, 0.1)
-"""Least and greatest standard deviation of local steps, as shares of a property's range: from
-a tenth of a metre in where an object starts to several metres."""
+LOCAL_STEP = 0.1
+"""Standard deviation of a local step, as a share of the property's range."""
 
 
 def local_steps(
@@ -95,13 +94,7 @@ def local_steps(
     *,
     probability: float = MUTATION_PROBABILITY,
 ) -> Matrix:
-    """Return a copy in which each property moves with ``probability``.
-
-    How far is drawn for each chromosome, log-uniformly over ``LOCAL_STEPS``: a near miss
-    becomes a hit by a step of the size of the miss, which nobody knows beforehand.
-    """
-    least, most = np.log(LOCAL_STEPS)
-    scale = np.exp(rng.uniform(least, most, (len(offspring), 1)))
-    steps = rng.normal(0.0, 1.0, offspring.shape) * scale * (upper - lower)
+    """Return a copy in which each property moves a little with ``probability``."""
+    steps = rng.normal(0.0, LOCAL_STEP, offspring.shape) * (upper - lower)
     moved = np.where(rng.random(offspring.shape) < probability, offspring + steps, offspring)
     return np.clip(moved, lower, upper)

@@ -13,7 +13,7 @@ from typing import Any
 
 from pytest_garl.errors import LedgerError
 from pytest_garl.scenarios.maps import load_map
-from pytest_garl.search.child import CANNOT_WRITE, THREADS, dump_file
+from pytest_garl.search.child import CANNOT_GO_ON, THREADS, dump_file
 from pytest_garl.search.job import broken_result, fly_job, load_scenario, loads
 from pytest_garl.search.ledger import Ledger
 from pytest_garl.search.slots import Slot
@@ -104,9 +104,9 @@ class Pool:
         words = file.read_text() if file.exists() else ""
         file.unlink(missing_ok=True)
         complaint = child.communicate()[1]
-        if CANNOT_WRITE in complaint:
+        if CANNOT_GO_ON in complaint:
             self._ledger.release(pid, "waiting")
-            raise LedgerError(complaint.partition(CANNOT_WRITE)[2].strip())
+            raise LedgerError(complaint.partition(CANNOT_GO_ON)[2].strip())
         found = self._ledger.claim_of(pid)
         if found is None:
             self._losses += 1

@@ -249,9 +249,9 @@ class Loop:
     def _move_objects(self, tick: int) -> None:
         if tick % round(DECISION_STEP_S * PHYSICS_RATE_HZ) == 0:
             for item in self.objects:
-                item.take(item.policy.decide(self.situation(item)))
+                item.decide(self.situation(item))
         for item in self.objects:
-            item.advance(OBJECTS_EVERY / PHYSICS_RATE_HZ)
+            item.advance(OBJECTS_EVERY / PHYSICS_RATE_HZ, self.objects)
             self.world.move(
                 item.name, item.position_m, item.yaw_rad, (item.vx_mps, item.vy_mps, 0.0)
             )

@@ -1,20 +1,28 @@
-"""Dynamic objects in motion: continuous, bounded in speed and acceleration, around solids."""
+"""Dynamic objects in motion: continuous, bounded in speed and acceleration, around bodies."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
 
-from pytest_garl.errors import GarlError
 from pytest_garl.scenarios.bodies import Body
 from pytest_garl.scenarios.maps import Map
 from pytest_garl.scenarios.object_types import OBJECT_TYPES
 from pytest_garl.scenarios.placement import object_speed_mps, object_start_m
 from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.scenarios.validity import Disc, discs_of
-from pytest_garl.simulation.policy import DECISION_STEP_S, Move, ObjectPolicy, ObjectState
+from pytest_garl.simulation.policy import (
+    DECISION_STEP_S,
+    Move,
+    ObjectPolicy,
+    ObjectState,
+    Situation,
+    decision,
+)
 
 _LOOK_AHEAD_M = 0.5
+_MEETING_M = 2.0
+"""More than any two bodies' radii and a sixtieth of a second's way together."""
 TURN_RATE_RADPS = 2 * math.pi
 """A being turns on the spot within about a second: engineering estimate."""
 
@@ -34,6 +42,8 @@ class MovingObject:
         self.moves: list[tuple[float, float]] = []
         self._wanted = (0.0, 0.0)
         self._bounds = map.bounds_m
+        self.low_m = self.type.altitude_m - self.type.height_m / 2
+        self.high_m = self.type.altitude_m + self.type.height_m
         self._solids = _solids_at(map.bodies, self)
         self._near: list[Disc] = []
 
@@ -64,28 +74,26 @@ class MovingObject:
             speed_mps=self.speed_mps,
         )
 
+    def decide(self, situation: Situation) -> None:
+        """Ask the policy where to go; raise PolicyError if it fails or answers nonsense."""
+        self.take(decision(self.policy, situation))
+
     def take(self, move: Move) -> None:
-        """Accept a policy's decision; raise GarlError for one that is none."""
-        length = math.hypot(move.x, move.y)
-        if not math.isfinite(length) or length > 1 + 1e-9:
-            raise GarlError(
-                f"object policy of {self.name}: found the move ({move.x}, {move.y}), "
-                "expected a share (x, y) of its speed, no longer than 1"
-            )
+        """Go where ``move`` says until the next decision."""
         self.moves.append((move.x, move.y))
         self._wanted = (move.x * self.speed_mps, move.y * self.speed_mps)
         # What it can reach before the next decision; few, and mostly none.
         reach = self.type.radius_m + self.speed_mps * DECISION_STEP_S + _LOOK_AHEAD_M
         self._near = [solid for solid in self._solids if _gap(solid, self.x_m, self.y_m) < reach]
 
-    def advance(self, dt_s: float) -> None:
-        """Move on: towards the wanted velocity, along solids, never through them."""
+    def advance(self, dt_s: float, others: Sequence[MovingObject] = ()) -> None:
+        """Move on: towards the wanted velocity, along solids and ``others``, never through them."""
         dvx, dvy = self._wanted[0] - self.vx_mps, self._wanted[1] - self.vy_mps
         change = math.hypot(dvx, dvy)
         most = self.type.acceleration_mps2 * dt_s
         share = min(1.0, most / change) if change > 0 else 0.0
         vx, vy = self.vx_mps + share * dvx, self.vy_mps + share * dvy
-        vx, vy = self._slide(vx, vy, dt_s)
+        vx, vy = self._slide(vx, vy, dt_s, [*self._near, *self._met(others)])
         x_min, x_max, y_min, y_max = self._bounds
         x, y = self.x_m + vx * dt_s, self.y_m + vy * dt_s
         self.x_m, self.y_m = min(x_max, max(x_min, x)), min(y_max, max(y_min, y))
@@ -96,8 +104,29 @@ class MovingObject:
             most = TURN_RATE_RADPS * dt_s
             self.yaw_rad += min(most, max(-most, turn))
 
-    def _slide(self, vx: float, vy: float, dt_s: float) -> tuple[float, float]:
-        for solid in self._near:
+    def _met(self, others: Sequence[MovingObject]) -> list[Disc]:
+        """Return the others that are near enough, and as high, to be bumped into."""
+        return [
+            Disc(
+                name=other.name,
+                x_m=other.x_m,
+                y_m=other.y_m,
+                radius_m=other.type.radius_m,
+                low_m=other.low_m,
+                high_m=other.high_m,
+            )
+            for other in others
+            if other is not self
+            and other.low_m < self.high_m
+            and self.low_m < other.high_m
+            and abs(other.x_m - self.x_m) < _MEETING_M
+            and abs(other.y_m - self.y_m) < _MEETING_M
+        ]
+
+    def _slide(
+        self, vx: float, vy: float, dt_s: float, solids: Sequence[Disc]
+    ) -> tuple[float, float]:
+        for solid in solids:
             x, y = self.x_m + vx * dt_s, self.y_m + vy * dt_s
             reach = solid.radius_m + self.type.radius_m
             nx, ny = x - solid.x_m, y - solid.y_m
@@ -107,7 +136,7 @@ class MovingObject:
                 if inward < 0:
                     vx, vy = vx - inward * nx / distance, vy - inward * ny / distance
         x, y = self.x_m + vx * dt_s, self.y_m + vy * dt_s
-        for solid in self._near:
+        for solid in solids:
             if _gap(solid, x, y) < min(_gap(solid, self.x_m, self.y_m), self.type.radius_m):
                 return 0.0, 0.0
         return vx, vy
@@ -118,11 +147,9 @@ def _gap(solid: Disc, x: float, y: float) -> float:
 
 
 def _solids_at(bodies: Sequence[Body], thing: MovingObject) -> tuple[Disc, ...]:
-    low = thing.type.altitude_m - thing.type.height_m / 2
-    high = thing.type.altitude_m + thing.type.height_m
     return tuple(
         disc
         for body in bodies
         for disc in discs_of(body)
-        if disc.low_m < high and low < disc.high_m
+        if disc.low_m < thing.high_m and thing.low_m < disc.high_m
     )

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import importlib
+import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Protocol
 
-from pytest_garl.errors import GarlError
+from pytest_garl.errors import PolicyError
 
 if TYPE_CHECKING:
     import numpy as np
@@ -74,6 +75,25 @@ class ObjectPolicy(Protocol):
         """Return the wanted velocity until the next decision."""
 
 
+def decision(policy: ObjectPolicy, situation: Situation) -> Move:
+    """Return the policy's move; raise PolicyError if it raises or answers what is no move."""
+    name = f"object policy {type(policy).__name__}, deciding for {situation.self.name}"
+    try:
+        move = policy.decide(situation)
+    except Exception as error:
+        raise PolicyError(f"{name}: raised {type(error).__name__}: {error}") from error
+    try:
+        length = math.hypot(move.x, move.y)
+    except (AttributeError, TypeError):
+        length = math.nan
+    if not length <= 1 + 1e-9:
+        raise PolicyError(
+            f"{name}: found {move!r}; expected Move(x=…, y=…), a share of the object's speed "
+            "no longer than 1"
+        )
+    return move
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PolicySpec:
     """Names a policy so that a child process can make it and a ledger can compare it.
@@ -87,14 +107,22 @@ class PolicySpec:
     arguments: tuple[tuple[str, str | int | float], ...] = ()
 
     def make(self) -> ObjectPolicy:
-        """Return a fresh policy for one object; raise GarlError where there is none."""
+        """Return a fresh policy for one object; raise PolicyError where there is none."""
         module, _, attribute = self.factory.partition(":")
         try:
             factory = getattr(importlib.import_module(module), attribute)
         except (ImportError, AttributeError) as error:
-            raise GarlError(
+            raise PolicyError(
                 f"object policy {self.name!r}: {self.factory!r} cannot be loaded ({error}); "
                 "expected 'module:attribute' of an importable module"
             ) from error
-        policy: ObjectPolicy = factory(**dict(self.arguments))
+        try:
+            policy: ObjectPolicy = factory(**dict(self.arguments))
+        except PolicyError:
+            raise
+        except Exception as error:
+            raise PolicyError(
+                f"object policy {self.name!r}: {self.factory} with {dict(self.arguments)} raised "
+                f"{type(error).__name__}: {error}"
+            ) from error
         return policy

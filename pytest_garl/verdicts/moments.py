@@ -32,22 +32,6 @@ def moment(flight: Flight, time_s: float) -> str:
     return "search" if seen else "transit"
 
 
-def closest_call(flight: Flight, within_m: float = 3.0) -> str:
-    """Name the closest call, "dog:descent": to what the UAV came nearest, and when.
-
-    Empty if it came nowhere nearer than ``within_m`` to anything but the ground.
-    """
-    near = [
-        (gap.distance_m, gap.kind, gap.time_s)
-        for gap in flight.separations
-        if gap.body_class != "ground" and gap.distance_m < within_m
-    ]
-    if not near:
-        return ""
-    _, kind, time_s = min(near)
-    return f"{kind}:{moment(flight, time_s)}"
-
-
 def was_in_view(flight: Flight, body: str, time_s: float) -> bool:
     """Whether the camera showed a dynamic object within the last two seconds."""
     return any(

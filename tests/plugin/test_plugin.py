@@ -225,6 +225,8 @@ def test_importlib_mode_reaches_the_children(pytester: pytest.Pytester) -> None:
             ("--garl-budget=8", "--garl-method=nowhere:search"),
             "*--garl-method: search method 'nowhere:search': cannot be loaded*",
         ),
+        (("--garl-budget=8", "--garl-npcs=magic"), "*--garl-npcs: found 'magic', expected one of*"),
+        (("--garl-budget=8", "--garl-npcs=mine.npz"), "*there are no weights at mine.npz*"),
         (("--garl-budget=8", "--garl-repeat=nowhere"), "*--garl-repeat: found 'nowhere'*"),
         (("--garl-budget=8", "-o", "garl_dir=/proc/garl"), "*cannot be written*garl_dir*"),
     ],
@@ -236,6 +238,51 @@ def test_nonsense_on_the_command_line_is_one_clear_error(
     result = run(pytester, *args)
     assert result.ret == pytest.ExitCode.USAGE_ERROR
     result.stderr.fnmatch_lines([words])
+
+
+@pytest.mark.parametrize(
+    ("args", "words"),
+    [
+        ((), "*method garl, seed 0, objects dqn,*"),
+        (("--garl-method=garl-paper",), "*objects dqn-paper,*"),
+        (("--garl-method=random",), "*objects waypoint,*"),
+        (("--garl-method=random", "--garl-npcs=stand"), "*objects stand,*"),
+    ],
+)
+def test_who_moves_objects_depends_on_the_method_unless_one_says(
+    pytester: pytest.Pytester, args: tuple[str, ...], words: str
+) -> None:
+    project(pytester)
+    result = run(pytester, "--garl-budget=1", "--garl-workers=0", *args)
+    result.stdout.fnmatch_lines([words])
+
+
+POLICY = """
+from pytest_garl.simulation.policy import PolicySpec
+
+class Wild:
+    def reset(self, situation, rng): pass
+    def decide(self, situation): return 7
+
+@pytest.fixture(scope="session")
+def npcs():
+    return PolicySpec(name="wild", factory="systems_and_policy:Wild")
+"""
+
+
+@pytest.mark.parametrize("args", [(), ("-n2",)], ids=["alone", "xdist"])
+def test_a_policy_of_ones_own_that_answers_nonsense_ends_the_run_before_a_flight(
+    pytester: pytest.Pytester, args: tuple[str, ...]
+) -> None:
+    project(pytester)
+    pytester.makepyfile(systems_and_policy="import pytest\n" + POLICY)
+    conftest = CONFTEST + "\nfrom systems_and_policy import npcs"
+    pytester.makeconftest(conftest)
+    result = run(pytester, "--garl-budget=8", *args)
+    assert result.ret == pytest.ExitCode.INTERNAL_ERROR
+    words = "*object policy Wild, deciding for person-1: found 7; expected Move*"
+    result.stdout.fnmatch_lines([words])
+    assert not list((pytester.path / ".garl").glob("flights/*"))
 
 
 @pytest.mark.parametrize(

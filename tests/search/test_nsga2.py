@@ -1,6 +1,5 @@
 from __future__ import annotations
 
-import itertools
 from collections.abc import Sequence
 from typing import Any
 
@@ -13,7 +12,6 @@ from pytest_garl.scenarios.genes import genome_for
 from pytest_garl.scenarios.maps import load_map
 from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.scenarios.validity import problems
-from pytest_garl.search.garl import shared_threat
 from pytest_garl.search.method import Flown, Method, Plan
 from pytest_garl.search.methods import METHODS, make_method
 from pytest_garl.search.operators import property_mutation
@@ -37,13 +35,7 @@ def result(scenario: Scenario) -> dict[str, Any]:
     ]
     signature = {"collision": "IV:dog", "distance": "off"}.get(primary or "", "")
     verdict = {"primary": primary, "signature": signature, "margins": margins}
-    return {
-        "outcome": "collision" if hit else "landed",
-        "closest_call": "dog:descent" if hit else "",
-        "final_distance_m": far,
-        "elapsed_s": 30.0,
-        "verdict": verdict,
-    }
+    return {"final_distance_m": far, "elapsed_s": 30.0, "verdict": verdict}
 
 
 def bred(method: Method, generations: int) -> list[list[Scenario]]:
@@ -117,33 +109,18 @@ def test_survivors_are_measured_against_parents_and_offspring_together() -> None
     assert widths == [8, 8, 8, 16]
 
 
-def test_scenarios_that_threaten_alike_share_what_that_is_worth() -> None:
-    def flown(call: str, signature: str, gap_m: float) -> Flown:
-        margins = [{"property": "collision", "value": gap_m, "unit": "m", "decided": True}]
-        primary = "collision" if signature else None
-        verdict = {"primary": primary, "signature": signature, "margins": margins}
-        result = {"outcome": "landed", "closest_call": call, "verdict": verdict}
-        return Flown(scenario=scenario, result=result)
-
-    scenario = make_method("garl", plan()).ask()[0]
-    dogs = [
-        flown("dog:descent", "IV:dog:descent:seen", 0.0),
-        flown("dog:descent", "IV:dog:descent:seen", 0.0),
-        flown("dog:descent", "IV:dog:descent:unseen", 0.0),
-        flown("dog:descent", "", 0.6),
-    ]
-    others = [flown("bird:approach", "", 0.6), flown("bird:approach", "", 1.5), flown("", "", 5.0)]
-    worth = shared_threat([*dogs, *others], np.array([0.3, 0.1, 0.2, 0.9, 0.5, 0.6, 0.4]))
-    # The third hit of a dog is worth less than the first near miss of a bird.
-    assert list(worth) == pytest.approx([2, 2 / 3, 1, 0.8 / 4, 0.8, 0.5 / 2, 0])
-
-
-def test_a_quarter_of_each_generation_has_no_parents() -> None:
-    generations = bred(make_method("garl", plan(population=20)), 5)
-    for before, after in itertools.pairwise(generations):
-        known = {each.seed for made in generations[: generations.index(after)] for each in made}
-        assert len(before) == len(after) == 20
-        assert sum(each.seed not in known for each in after) == 5
+def test_a_second_kind_of_violation_is_worth_more_than_one_more_of_the_first() -> None:
+    method = make_method("garl", plan(population=20))
+    scenarios = method.ask()
+    values = method.tell([Flown(scenario=each, result=result(each)) for each in scenarios])
+    threats: dict[str, list[float]] = {}
+    for scenario, value in zip(scenarios, values, strict=True):
+        threats.setdefault(result(scenario)["verdict"]["signature"], []).append(value[0])
+    for signature, found in threats.items():
+        if signature:
+            assert found == pytest.approx([1 + 1 / len(found)] * len(found))
+        else:
+            assert max(found) < 1
 
 
 def test_a_search_of_ones_own_is_named_by_its_module() -> None:

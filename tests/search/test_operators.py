@@ -8,7 +8,6 @@ from hypothesis import strategies as st
 from pytest_garl.search.operators import (
     farthest_from_all,
     farthest_from_nearest,
-    local_steps,
     nuclear_gene_crossover,
     property_mutation,
 )
@@ -81,16 +80,3 @@ def test_mutation_happens_at_the_stated_rate() -> None:
         generation, np.zeros(10), np.ones(10), np.random.default_rng(4), probability=0.2
     )
     assert (mutated != generation).mean() == pytest.approx(0.2, abs=0.03)
-
-
-def test_local_steps_are_small_large_and_never_outside() -> None:
-    rng = np.random.default_rng(0)
-    lower, upper = np.array([0.0, -1.0]), np.array([0.15, 1.0])
-    start = np.tile([0.07, 0.0], (4000, 1))
-    moved = local_steps(start, lower, upper, rng, probability=0.5)
-    assert ((moved >= lower) & (moved <= upper)).all()
-    assert (moved != start).mean() == pytest.approx(0.5, abs=0.02)
-    steps = np.abs(moved - start)[moved != start]
-    shares = (np.abs(moved - start) / (upper - lower))[moved != start]
-    assert np.quantile(shares, 0.1) < 0.003 < 0.05 < np.quantile(shares, 0.97)
-    assert steps.max() < 1.0

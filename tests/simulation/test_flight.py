@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import dataclasses
+import itertools
 import math
 import subprocess
 import sys
@@ -215,6 +216,23 @@ def test_objects_keep_their_limits_and_out_of_solids(policy: str) -> None:
             for (x, y, _), radius in trunks:
                 away = np.hypot(item.track.position_m[:, 0] - x, item.track.position_m[:, 1] - y)
                 assert away.min() > radius
+
+
+@pytest.mark.parametrize("policy", ["greedy", "stand", "dqn"])
+def test_objects_that_all_want_to_be_in_one_place_keep_out_of_each_other(policy: str) -> None:
+    scenario = propose(LAWN, genome_for(LAWN), 11, 0, 1)[0]
+    top = {key: 1.0 for key, _ in scenario.genes if key.endswith("velocity")}
+    flight = fly(scenario.replace(top), Hovers, policy_spec(policy), time_limit_s=20)
+    gaps = []
+    for one, other in itertools.combinations(flight.objects, 2):
+        kinds = OBJECT_TYPES[one.type], OBJECT_TYPES[other.type]
+        if kinds[0].altitude_m == kinds[1].altitude_m:
+            away = one.track.position_m[:, :2] - other.track.position_m[:, :2]
+            radii = kinds[0].radius_m + kinds[1].radius_m
+            gaps.append(np.linalg.norm(away, axis=1).min() - radii)
+    assert min(gaps) > -0.02
+    if policy != "dqn":
+        assert min(gaps) < 0.1
 
 
 @pytest.mark.sim
