@@ -18,6 +18,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from scipy.stats import t
 
 from pytest_garl.adversary.pilots import StraightPilot
 from pytest_garl.adversary.policies import policy_spec
@@ -39,7 +40,7 @@ from pytest_garl.search.operators import (
 from pytest_garl.simulation.flight import Flight
 from pytest_garl.simulation.fly import fly
 from pytest_garl.verdicts.judge import judge, undecided
-from pytest_garl.verdicts.metrics import share_interval, top_k
+from pytest_garl.verdicts.metrics import top_k
 from pytest_garl.verdicts.moments import moment
 from pytest_garl.verdicts.serialise import from_dict, to_dict
 from pytest_garl.verdicts.verdict import Limits
@@ -192,25 +193,34 @@ def search(name: str, seed: int, map: str, pool: Executor) -> dict[str, Any]:
 
 
 def report(rows: list[dict[str, str]]) -> str:
-    """Return a Markdown table over both maps and all seeds."""
+    """Return a Markdown table: means over searches, the flights of one being no sample."""
     lines = [
-        "| variant | searches | violations | Top-10 (mean) | signatures (mean) |",
+        "| variant | searches | violations, % | Top-10 | signatures |",
         "| --- | --- | --- | --- | --- |",
     ]
     for name in VARIANTS:
         own = [row for row in rows if row["variant"] == name]
         if not own:
             continue
-        count, total = (sum(int(row[key]) for row in own) for key in ("violations", "budget"))
-        low, high = share_interval(count, total)
         # A search that found fewer than ten counts as one more than its budget.
-        tops = np.mean([int(row["top10"] or BUDGET + 1) for row in own])
-        kinds = np.mean([int(row["signatures"]) for row in own])
-        lines.append(
-            f"| {name} | {len(own)} | {100 * count / total:.1f} % "
-            f"[{100 * low:.1f}, {100 * high:.1f}] | {tops:.0f} | {kinds:.1f} |"
+        figures = (
+            [100 * int(row["violations"]) / int(row["budget"]) for row in own],
+            [float(row["top10"] or BUDGET + 1) for row in own],
+            [float(row["signatures"]) for row in own],
         )
+        cells = " | ".join(_mean(values) for values in figures)
+        lines.append(f"| {name} | {len(own)} | {cells} |")
     return "\n".join(lines)
+
+
+def _mean(values: Sequence[float]) -> str:
+    """Return the mean with its 95 % interval (Student's t)."""
+    mean = float(np.mean(values))
+    if len(values) < 2:
+        return f"{mean:.1f}"
+    error = float(np.std(values, ddof=1)) / len(values) ** 0.5
+    half = float(t.ppf(0.975, len(values) - 1)) * error
+    return f"{mean:.1f} ± {half:.1f}"
 
 
 def main() -> None:

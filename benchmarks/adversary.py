@@ -42,12 +42,30 @@ MOVERS = (
 SYSTEMS = ("opencv", "avoiding")
 MAPS = ("court", "lawn")
 KINDS = ("person", "dog", "bird")
-FIELDS = ("mover", "system", "map", "chunk", "flights", "collided", *KINDS, "blocked", "violations")
+FIELDS = (
+    "mover",
+    "sha256",
+    "system",
+    "map",
+    "chunk",
+    "flights",
+    "collided",
+    *KINDS,
+    "blocked",
+    "violations",
+    "crashed",
+)
+KEY = FIELDS[:5]
 
 
 def spec_of(mover: str) -> PolicySpec:
     """Return a mover's specification."""
     return oracle_spec() if mover == "oracle" else policy_spec(mover)
+
+
+def sha256_of(mover: str) -> str:
+    """Return the start of the hash of a learned mover's weights; nothing for the others."""
+    return str(dict(spec_of(mover).arguments).get("sha256", ""))[:16]
 
 
 def scenarios(map: str, chunk: int) -> list[Scenario]:
@@ -83,6 +101,7 @@ def row_of(mover: str, system: str, map: str, chunk: int, pool: Any) -> dict[str
     hits = Counter(kind for _, kind, _ in ends if kind)
     return {
         "mover": mover,
+        "sha256": sha256_of(mover),
         "system": system,
         "map": map,
         "chunk": chunk,
@@ -91,6 +110,7 @@ def row_of(mover: str, system: str, map: str, chunk: int, pool: Any) -> dict[str
         **{kind: hits[kind] for kind in KINDS},
         "blocked": sum(outcome in ("aborted", "not_landed") for outcome, _, _ in ends),
         "violations": sum(violation for _, _, violation in ends),
+        "crashed": sum(outcome == "crashed" for outcome, _, _ in ends),
     }
 
 
@@ -103,11 +123,13 @@ def report(rows: list[dict[str, str]]) -> str:
     for system in SYSTEMS:
         for map in MAPS:
             for mover in MOVERS:
-                key = (system, map, mover)
-                own = [row for row in rows if (row["system"], row["map"], row["mover"]) == key]
+                # Rows of weights that are not shipped any more count for nothing.
+                key = (system, map, mover, sha256_of(mover))
+                names = ("system", "map", "mover", "sha256")
+                own = [row for row in rows if tuple(row[name] for name in names) == key]
                 if not own:
                     continue
-                total = {name: sum(int(row[name]) for row in own) for name in FIELDS[4:]}
+                total = {name: sum(int(row[name]) for row in own) for name in FIELDS[5:]}
                 cells = [
                     _share(total[name], total["flights"])
                     for name in ("collided", "blocked", "violations")
@@ -138,14 +160,15 @@ def main() -> None:
     if arguments.report:
         print(report(known))
         return
-    done = {(row["mover"], row["system"], row["map"], int(row["chunk"])) for row in known}
+    done = {tuple(row[name] for name in KEY) for row in known}
     os.environ.update(THREADS)
     with ProcessPoolExecutor(arguments.workers) as pool:
         for chunk in range(-(-arguments.flights // CHUNK)):
             for system in arguments.systems:
                 for map in MAPS:
                     for mover in arguments.movers:
-                        if (mover, system, map, chunk) not in done:
+                        key = (mover, sha256_of(mover), system, map, str(chunk))
+                        if key not in done:
                             _append(row_of(mover, system, map, chunk, pool))
 
 

@@ -2,7 +2,9 @@
 
 The reduced space is the surrogate's: one object, a fixed marker, five actions.  The full one
 adds what the paper's online rival controls: weather and light, which every action may change a
-little instead of moving the object, and a marker anywhere.  Both learn by the paper's reward.
+little instead of moving the object, and a marker anywhere.  Both learn by the paper's reward,
+which comes from the segmentation: as in the paper's own surrogate, weather changes nothing that is
+rewarded there, and the learner has to find that out.
 ``python -m benchmarks.learning_space`` trains both and draws ``docs/pictures/learning-space.png``.
 """
 

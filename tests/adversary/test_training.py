@@ -78,6 +78,22 @@ def test_an_avoiding_uav_does_not_land_on_who_stands_there() -> None:
 
 
 @pytest.mark.sim
+def test_the_papers_reward_pays_nothing_to_who_stands_aside() -> None:
+    env = SurrogateEnv(dataclasses.replace(PAPERS, kinds=("person",)))
+    for seed in range(3):
+        state, _ = env.reset(seed=seed)
+        while np.hypot(*state[:2]) * 10 < 4.0:  # nearer to the marker than four metres
+            seed += 10
+            state, _ = env.reset(seed=seed)
+        over = False
+        while not over:
+            _, reward, ended, cut, info = env.step(np.int64(4))
+            assert (reward, info["hidden"]) == (0.0, 0.0)
+            over = ended or cut
+    env.close()
+
+
+@pytest.mark.sim
 def test_the_papers_reward_pays_for_hiding_the_marker() -> None:
     env = SurrogateEnv(dataclasses.replace(PAPERS, kinds=("person",), state="relative"))
     paid = [
