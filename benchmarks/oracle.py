@@ -1,7 +1,8 @@
-"""A policy that looks ahead with the true state: the bound in tables of movers.
+"""A policy that looks ahead with the true state: the reference in tables of movers.
 
 It knows what no learned policy is told: how the UAV's descent goes on, and about when an
 avoiding one would notice.  It waits outside of that range and strikes when its forecast hits.
+Its forecast is simple, with a UAV that stays in its column, so that it is no strict bound.
 """
 
 from __future__ import annotations
@@ -39,7 +40,7 @@ class Oracle:
         plans = [wait for wait in WAITS_S if self._hits(situation, wait)]
         if plans:
             return self._towards(situation, 1.0) if plans[0] == 0 else STAY
-        top = situation.self.type.altitude_m + situation.self.type.height_m
+        top = situation.self.type.top_m
         # Be as far away as it takes to arrive when the UAV has come down.
         falls_s = max(0.0, height - UAV_BOTTOM_M - top) / max(0.5, -situation.uav_velocity_mps[2])
         wanted = max(LURK_M, 0.8 * situation.self.speed_mps * falls_s)
@@ -61,8 +62,7 @@ class Oracle:
     def _hits(self, situation: Situation, wait_s: float) -> bool:
         """Forecast a straight run at the UAV after a wait."""
         me = situation.self
-        top = me.type.altitude_m + me.type.height_m
-        bottom = me.type.altitude_m - me.type.height_m / 2 if me.type.altitude_m else 0.0
+        top, bottom = me.type.top_m, me.type.bottom_m
         ux, uy, height = situation.uav_position_m
         climb = situation.uav_velocity_mps[2]
         gap = math.dist(me.position_m[:2], (ux, uy))

@@ -11,7 +11,6 @@ import pickle
 from collections import deque
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
@@ -189,7 +188,7 @@ def train(
         size, actions = envs.single_observation_space.shape[0], envs.single_action_space.n
         learner = Learner(size, int(actions), training)
         if checkpoint and checkpoint.exists():
-            _restore(learner, checkpoint, identity(surrogate, training))
+            _restore(learner, checkpoint, identity(surrogate, training, env))
         kept = len(learner.history)
         while len(learner.history) < training.episodes:
             for record in _round(envs, learner, len(learner.history)):
@@ -199,7 +198,7 @@ def train(
                     learner.history.append(record)
             done = len(learner.history)
             if checkpoint and (done - kept >= every or done >= training.episodes):
-                _keep(learner, checkpoint, identity(surrogate, training))
+                _keep(learner, checkpoint, identity(surrogate, training, env))
                 kept = done
     finally:
         envs.close()
@@ -262,11 +261,27 @@ def _mlp(size: int, hidden: tuple[int, ...], actions: int) -> torch.nn.Sequentia
 _MEMORY = ("states", "afters", "actions", "sums", "discounts")
 
 
-def identity(surrogate: Surrogate, training: Training) -> str:
+@functools.cache
+def sources_sha256() -> str:
+    """Return the hash of the code that a training depends on: adversary, simulation, scenarios."""
+    digest = hashlib.sha256()
+    package = Path(__file__).parents[1]
+    for folder in ("adversary", "simulation", "scenarios"):
+        for file in sorted((package / folder).glob("*.py")):
+            digest.update(f"{folder}/{file.name}".encode() + b"\0" + file.read_bytes())
+    return digest.hexdigest()
+
+
+def identity(
+    surrogate: Surrogate,
+    training: Training,
+    env: Callable[[Surrogate], SurrogateEnv] = SurrogateEnv,
+) -> str:
     """Return a hash of what is trained and how; another training has another."""
     maps = [map.sha256 for map in surrogate.maps]
-    text = repr((version("pytest-garl"), dataclasses.replace(surrogate, maps=()), maps, training))
-    return hashlib.sha256(text.encode()).hexdigest()
+    place = f"{env.__module__}.{getattr(env, '__qualname__', env)}"
+    what = (sources_sha256(), place, dataclasses.replace(surrogate, maps=()), maps, training)
+    return hashlib.sha256(repr(what).encode()).hexdigest()
 
 
 def _keep(learner: Learner, path: Path, known: str) -> None:

@@ -86,6 +86,9 @@ class Episode:
             self.outcome = self._loop.tick()
             if self.outcome is not None:
                 return
+        if self._loop.out_of_time:
+            # Said at once: one more decision would move nothing.
+            self.outcome = self._loop.tick()
 
     def marker_pixels(self) -> tuple[int, int]:
         """Return S_gt and S_d: the marker's pixels with nothing in front, and those seen."""

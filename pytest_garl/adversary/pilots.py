@@ -145,8 +145,7 @@ class AvoidingPilot(StraightPilot):
 
     def _threatens(self, item: TruthObject, place: tuple[float, ...]) -> bool:
         """Whether an object is near the column below, and inside the camera's view."""
-        top = item.position_m[2] + item.type.height_m
-        below = place[2] - top
+        below = place[2] - item.type.top_m
         dx, dy = abs(item.position_m[0] - place[0]), abs(item.position_m[1] - place[1])
         reach = item.type.radius_m
         if not 0 < below < self._caution.below_m:

@@ -145,11 +145,10 @@ def _turn(situation: Situation, x: float, y: float) -> tuple[float, float]:
 def _being(situation: Situation) -> tuple[float, float, float]:
     """How far the object can go in one decision, and the heights of its top and bottom."""
     kind = situation.self.type
-    bottom = kind.altitude_m - kind.height_m / 2 if kind.altitude_m > 0 else 0.0
     return (
         situation.self.speed_mps * DECISION_STEP_S / STEP_SCALE_M,
-        (bottom + kind.height_m) / BODY_SCALE_M,
-        bottom / BODY_SCALE_M,
+        kind.top_m / BODY_SCALE_M,
+        kind.bottom_m / BODY_SCALE_M,
     )
 
 

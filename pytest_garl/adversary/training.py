@@ -14,10 +14,16 @@ from typing import Any
 
 import numpy as np
 
-from pytest_garl.adversary.dqn import EpisodeRecord, Training, identity, train
+from pytest_garl.adversary.dqn import (
+    EpisodeRecord,
+    Training,
+    identity,
+    sources_sha256,
+    train,
+)
 from pytest_garl.adversary.network import save
 from pytest_garl.adversary.surrogate import Surrogate
-from pytest_garl.adversary.validation import Score, validate
+from pytest_garl.adversary.validation import REPORT_SEEDS_FROM, Score, validate
 
 PRESETS: Mapping[str, tuple[Surrogate, Training]] = MappingProxyType(
     {
@@ -51,10 +57,11 @@ class Plan:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Outcome:
-    """Which seed was kept, and each seed's collision rate in validation."""
+    """Which seed was kept, each seed's collision rate in validation, the kept one's in others."""
 
     best: int
     rates: Mapping[int, float]
+    report: Score
 
 
 def train_best(
@@ -76,13 +83,21 @@ def train_best(
         scores[seed] = validate(networks[seed], plan.surrogate, plan.validation, plan.processes)
         validated(seed, scores[seed].rate)
     best = max(plan.seeds, key=lambda seed: (scores[seed].rate, -seed))
-    save(plan.out, networks[best], _about(plan, best, curves[best], scores))
+    report = validate(
+        networks[best], plan.surrogate, plan.validation, plan.processes, REPORT_SEEDS_FROM
+    )
+    save(plan.out, networks[best], _about(plan, best, curves[best], scores, report))
     draw_curves(curves, plan.out.with_suffix(".png"))
-    return Outcome(best=best, rates={seed: score.rate for seed, score in scores.items()})
+    rates = {seed: score.rate for seed, score in scores.items()}
+    return Outcome(best=best, rates=rates, report=report)
 
 
 def _about(
-    plan: Plan, best: int, curve: Sequence[EpisodeRecord], scores: Mapping[int, Score]
+    plan: Plan,
+    best: int,
+    curve: Sequence[EpisodeRecord],
+    scores: Mapping[int, Score],
+    report: Score,
 ) -> dict[str, Any]:
     surrogate, last = plan.surrogate, curve[-100:]
     return {
@@ -100,14 +115,9 @@ def _about(
             "reward": round(float(np.mean([record.reward for record in last])), 4),
             "collided": round(float(np.mean([record.collided for record in last])), 4),
         },
-        "validation": {
-            str(seed): {
-                "episodes": score.episodes,
-                "collided": score.collided,
-                "blocked": score.blocked,
-            }
-            for seed, score in scores.items()
-        },
+        "validation": {str(seed): dataclasses.asdict(score) for seed, score in scores.items()},
+        "other_episodes": dataclasses.asdict(report),
+        "sources": sources_sha256(),
         "versions": {
             "python": platform.python_version(),
             **{name: version(name) for name in PACKAGES},

@@ -116,7 +116,10 @@ def train(**asked: Any) -> None:
         outcome = train_best(plan, progress.episode, progress.validated)
     rates = ", ".join(f"seed {seed}: {100 * rate:.0f} %" for seed, rate in outcome.rates.items())
     click.echo(f"collisions in {plan.validation} validation episodes: {rates}")
-    click.echo(f"kept seed {outcome.best}: {plan.out} (with {plan.out.with_suffix('.json').name})")
+    click.echo(
+        f"kept seed {outcome.best}: {100 * outcome.report.rate:.0f} % in {plan.validation} others; "
+        f"{plan.out} (with {plan.out.with_suffix('.json').name})"
+    )
 
 
 def _plan(asked: dict[str, Any]) -> Plan:

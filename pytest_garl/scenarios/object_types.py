@@ -14,7 +14,7 @@ class ObjectType:
     """One kind of moving being.
 
     ``altitude_m`` is the height of the body's frame above the ground (0 for those that
-    walk); ``radius_m`` and ``height_m`` bound the parts.
+    walk, the body's middle for those that fly); ``radius_m`` and ``height_m`` bound the parts.
     """
 
     name: str
@@ -24,6 +24,16 @@ class ObjectType:
     height_m: float
     altitude_m: float
     parts: tuple[Part, ...]
+
+    @property
+    def bottom_m(self) -> float:
+        """Height of the lowest point above the ground."""
+        return self.altitude_m - self.height_m / 2 if self.altitude_m > 0 else 0.0
+
+    @property
+    def top_m(self) -> float:
+        """Height of the highest point above the ground."""
+        return self.bottom_m + self.height_m
 
 
 def _limb(

@@ -163,9 +163,8 @@ def _start_problems(
         and y_min - tolerance <= at[1] <= y_max + tolerance
     ):
         yield f"{name} starts outside the map"
-    low, high = kind.altitude_m - kind.height_m / 2, kind.altitude_m + kind.height_m
     for disc in discs:
-        overlaps = disc.low_m < high and low < disc.high_m
+        overlaps = disc.low_m < kind.top_m and kind.bottom_m < disc.high_m
         if overlaps and math.hypot(at[0] - disc.x_m, at[1] - disc.y_m) < disc.radius_m + reach:
             yield f"{name} starts in or at {disc.name}"
             break

@@ -151,10 +151,15 @@ class Loop:
         self.control_every = max(1, round(PHYSICS_RATE_HZ / rate)) if rate else 1
         self.motors: Thrusts = (0.0, 0.0, 0.0, 0.0)
 
+    @property
+    def out_of_time(self) -> bool:
+        """Whether the next ``tick`` is the one that says so."""
+        return self.ticks >= round(self.time_limit_s * PHYSICS_RATE_HZ)
+
     def tick(self) -> Outcome | None:
         """Advance by 1/240 s; return the outcome once there is one."""
         tick = self.ticks
-        if tick >= round(self.time_limit_s * PHYSICS_RATE_HZ):
+        if self.out_of_time:
             self.recorder.event("time_out", f"not landed after {self.time_limit_s:g} s")
             return "not_landed"
         self.ticks += 1

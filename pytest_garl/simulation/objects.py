@@ -42,8 +42,7 @@ class MovingObject:
         self.moves: list[tuple[float, float]] = []
         self._wanted = (0.0, 0.0)
         self._bounds = map.bounds_m
-        self.low_m = self.type.altitude_m - self.type.height_m / 2
-        self.high_m = self.type.altitude_m + self.type.height_m
+        self.low_m, self.high_m = self.type.bottom_m, self.type.top_m
         self._solids = _solids_at(map.bodies, self)
         self._near: list[Disc] = []
 

@@ -12,12 +12,23 @@ from click.testing import CliRunner
 pytest.importorskip("torch")
 from gymnasium.utils.env_checker import check_env
 
-from pytest_garl.adversary.dqn import EpisodeRecord, Experience, Learner, Training, train
+from pytest_garl.adversary.dqn import (
+    EpisodeRecord,
+    Experience,
+    Learner,
+    Training,
+    identity,
+    train,
+)
+from pytest_garl.adversary.episode import Episode, draw_episode
 from pytest_garl.adversary.network import learned_spec
+from pytest_garl.adversary.pilots import StraightPilot
 from pytest_garl.adversary.surrogate import Surrogate, SurrogateEnv
+from pytest_garl.adversary.validation import validate
 from pytest_garl.cli import main
 from pytest_garl.errors import GarlError
 from pytest_garl.scenarios.maps import load_map
+from pytest_garl.simulation.policy import STAY
 
 COURT = (load_map("court"),)
 OURS = Surrogate(maps=COURT)
@@ -142,6 +153,41 @@ def test_a_learner_learns_which_action_pays() -> None:
     assert [int(policy.values(state).argmax()) for state in states] == best.tolist()
 
 
+@pytest.mark.sim
+def test_a_time_out_ends_with_the_last_decision() -> None:
+    scenario, place = draw_episode(COURT[0], ["dog"], np.random.default_rng(0))
+    episode = Episode(scenario, place, StraightPilot, time_limit_s=3.0)
+    ends = []
+    for _ in range(6):
+        episode.step([STAY])
+        ends.append(episode.outcome)
+    episode.close()
+    assert ends == [None] * 5 + ["not_landed"]
+
+
+@pytest.mark.sim
+def test_validation_is_the_same_for_any_number_of_processes() -> None:
+    network = Learner(10, 5, Training()).policy("relative")
+    blind = dataclasses.replace(OURS, uav="straight")
+    one, two = (validate(network, blind, 6, processes) for processes in (1, 2))
+    assert one == two
+    assert one.episodes == 6
+
+
+def test_another_kind_of_episode_is_another_training() -> None:
+    class Other(SurrogateEnv):
+        pass
+
+    first = identity(OURS, Training())
+    assert first == identity(OURS, Training(), SurrogateEnv)
+    others = (
+        identity(OURS, Training(), Other),
+        identity(OURS, Training(seed=1)),
+        identity(PAPERS, Training()),
+    )
+    assert len({first, *others}) == 4
+
+
 class _StopError(Exception):
     pass
 
@@ -193,6 +239,8 @@ def test_garl_train_writes_weights_that_can_be_flown(tmp_path: Path) -> None:
     assert manifest["surrogate"]["types"] == ["dog"]
     assert (manifest["state"], manifest["surrogate"]["uav"]) == ("extended", "both")
     assert manifest["validation"].keys() == {"0", "1"}
+    assert manifest["other_episodes"]["episodes"] == 2
+    assert len(manifest["sources"]) == 64
     assert out.with_suffix(".png").stat().st_size > 1000
 
 
