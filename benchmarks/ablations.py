@@ -10,8 +10,8 @@ from __future__ import annotations
 
 import argparse
 import csv
+import functools
 import os
-from collections import Counter
 from collections.abc import Callable, Sequence
 from concurrent.futures import Executor, ProcessPoolExecutor
 from pathlib import Path
@@ -25,23 +25,13 @@ from pytest_garl.adversary.policies import policy_spec
 from pytest_garl.scenarios.genes import genome_for
 from pytest_garl.scenarios.maps import load_map
 from pytest_garl.scenarios.scenario import Scenario
-from pytest_garl.search import garl
 from pytest_garl.search.child import THREADS
+from pytest_garl.search.garl import Garl
 from pytest_garl.search.method import Flown, Method, Plan
 from pytest_garl.search.methods import find_method
-from pytest_garl.search.nsga2 import Matrix, Mutation, Nsga2, Objectives
-from pytest_garl.search.objectives import diversity, threat
-from pytest_garl.search.operators import (
-    MUTATION_PROBABILITY,
-    farthest_from_nearest,
-    local_steps,
-    property_mutation,
-)
-from pytest_garl.simulation.flight import Flight
 from pytest_garl.simulation.fly import fly
-from pytest_garl.verdicts.judge import judge, undecided
+from pytest_garl.verdicts.judge import closest_call, judge, undecided
 from pytest_garl.verdicts.metrics import top_k
-from pytest_garl.verdicts.moments import moment
 from pytest_garl.verdicts.serialise import from_dict, to_dict
 from pytest_garl.verdicts.verdict import Limits
 
@@ -51,122 +41,39 @@ BUDGET, POPULATION = 400, 20
 FIELDS = ("variant", "seed", "map", "budget", "violations", "top10", "signatures")
 
 
-def plain_threat(chromosomes: Matrix, flown: Sequence[Flown]) -> Matrix:
-    """Threat and diversity; nothing remembers which signatures are known."""
-    return np.column_stack([[threat(item.result) for item in flown], diversity(chromosomes)])
+def found(result: dict[str, Any]) -> str:
+    """Name the cell by the violation alone: near misses of all kinds share one."""
+    return str(result["verdict"]["signature"] or result["outcome"])
 
 
-def niches(chromosomes: Matrix, flown: Sequence[Flown]) -> Matrix:
-    """Threat that flights share whose closest call was with the same kind at the same moment.
-
-    The k-th of a niche counts 1/k of its threat, which is 2 for a violation; first come those
-    of signatures that no other has.
-    """
-    spread = diversity(chromosomes)
-    results = [item.result for item in flown]
-    signatures = [result["verdict"]["signature"] for result in results]
-    threats = np.array(
-        [2.0 if sign else threat(result) for sign, result in zip(signatures, results, strict=True)]
-    )
-    known: set[str] = set()
-    repeats = np.zeros(len(results), dtype=bool)
-    for index in np.argsort(-spread, kind="stable"):
-        repeats[index] = signatures[index] in known
-        known.add(signatures[index])
-    places: Counter[str] = Counter()
-    for index in np.lexsort((-spread, repeats, -threats)):
-        alike = results[index]["closest_call"] or results[index]["outcome"]
-        places[alike] += 1
-        threats[index] /= places[alike]
-    return np.column_stack([threats, spread])
-
-
-def only_far(rows: Matrix, lower: Matrix, upper: Matrix, rng: np.random.Generator) -> Matrix:
-    """No local steps."""
-    return property_mutation(rows, lower, upper, rng, choose=farthest_from_nearest)
-
-
-def papers_candidates(
-    rows: Matrix, lower: Matrix, upper: Matrix, rng: np.random.Generator
-) -> Matrix:
-    """Local steps, and the paper's candidate rule instead of maximin."""
-    near = local_steps(rows, lower, upper, rng)
-    far = property_mutation(rows, lower, upper, rng)
-    return np.where((rng.random(len(rows)) < 0.5)[:, None], near, far)
-
-
-def steps_of_all_sizes(
-    rows: Matrix, lower: Matrix, upper: Matrix, rng: np.random.Generator
-) -> Matrix:
-    """Local steps from 0.3 % to 10 % of a range, as large as drawn for each chromosome."""
-    scale = np.exp(rng.uniform(np.log(0.003), np.log(0.1), (len(rows), 1)))
-    steps = rng.normal(0.0, 1.0, rows.shape) * scale * (upper - lower)
-    near = np.where(rng.random(rows.shape) < MUTATION_PROBABILITY, rows + steps, rows)
-    far = only_far(rows, lower, upper, rng)
-    return np.clip(np.where((rng.random(len(rows)) < 0.5)[:, None], near, far), lower, upper)
-
-
-class Immigrants(Nsga2):
-    """A quarter of each generation has no parents (Grefenstette 1992)."""
-
-    def offspring(self, parents: Matrix) -> Matrix:
-        """Return children, the last quarter replaced: parents come best first."""
-        born = super().offspring(parents)
-        for index in range(len(born) - round(0.25 * len(born)), len(born)):
-            drawn = self._plan.genome.random(self._rng)
-            born[index] = self._valid(drawn, int(self._rng.integers(2**32)))
-        return born
-
-
-def variant(
-    objectives: Objectives | None = None,
-    mutation: Mutation = garl.mutation,
-    search: type[Nsga2] = Nsga2,
-) -> Callable[[Plan], Method]:
-    """Return garl with parts replaced."""
-
-    def method(plan: Plan) -> Method:
-        return search("garl", plan, objectives or garl.Archive().objectives, 2, mutation)
-
-    return method
+def one(result: dict[str, Any]) -> str:
+    """Name one cell for all: what comes nearest to a violation is bred from, whatever it is."""
+    return ""
 
 
 VARIANTS: dict[str, Callable[[Plan], Method]] = {
     "garl": find_method("garl"),
-    "without the archive": variant(objectives=plain_threat),
-    "without local steps": variant(mutation=only_far),
-    "paper's candidates": variant(mutation=papers_candidates),
-    "niches instead of the archive": variant(objectives=niches),
-    "with steps of all sizes": variant(mutation=steps_of_all_sizes),
-    "with immigrants": variant(search=Immigrants),
-    "niches, all sizes, immigrants": variant(niches, steps_of_all_sizes, Immigrants),
+    "one cell": functools.partial(Garl, cell=one),
+    "cells of violations only": functools.partial(Garl, cell=found),
+    "without exploring": functools.partial(Garl, explores=0.0),
+    "without aimed steps": functools.partial(Garl, aims=0.0),
+    "without crossover": functools.partial(Garl, crossover=0.0),
     "garl-paper": find_method("garl-paper"),
     "random": find_method("random"),
 }
 
 
-def closest_call(flight: Flight, within_m: float = 3.0) -> str:
-    """Name to what the UAV came nearest, and when: "dog:descent"."""
-    near = [
-        (gap.distance_m, gap.kind, gap.time_s)
-        for gap in flight.separations
-        if gap.body_class != "ground" and gap.distance_m < within_m
-    ]
-    if not near:
-        return ""
-    _, kind, time_s = min(near)
-    return f"{kind}:{moment(flight, time_s)}"
-
-
 def fly_one(scenario: Scenario) -> dict[str, Any]:
     """Return the result of one flight, as a ledger holds it."""
     flight = fly(scenario, StraightPilot, policy_spec("waypoint"))
+    call, body = closest_call(flight)
     return {
         "outcome": flight.outcome,
         "final_distance_m": flight.final_distance_m,
         "elapsed_s": flight.elapsed_s,
         "undecided": undecided(flight),
-        "closest_call": closest_call(flight),
+        "closest_call": call,
+        "closest_body": body,
         "verdict": to_dict(judge(flight, Limits())),
     }
 

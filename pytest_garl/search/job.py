@@ -79,7 +79,7 @@ def fly_job(
 ) -> tuple[dict[str, Any], str, float]:
     """Fly, judge and save; return the result for the ledger, the flight's hash, its cost."""
     from pytest_garl.simulation.record import save
-    from pytest_garl.verdicts.judge import judge, undecided
+    from pytest_garl.verdicts.judge import closest_call, judge, undecided
     from pytest_garl.verdicts.serialise import to_dict
 
     for entry in job.path:
@@ -96,6 +96,7 @@ def fly_job(
     )
     file = Path(job.flights) / f"{slot_id}.npz"
     save(flight, file)
+    call, body = closest_call(flight)
     result = {
         "outcome": flight.outcome,
         "final_distance_m": flight.final_distance_m,
@@ -104,6 +105,8 @@ def fly_job(
         if flight.outcome == "collision"
         else [],
         "undecided": undecided(flight),
+        "closest_call": call,
+        "closest_body": body,
         "verdict": to_dict(judge(flight, job.limits)),
         "crash": dataclasses.asdict(flight.crash) if flight.crash else None,
     }
@@ -132,6 +135,8 @@ def broken_result(
         "elapsed_s": PAPER_LIMIT_S,
         "collisions": [],
         "undecided": message,
+        "closest_call": "",
+        "closest_body": "",
         "verdict": verdict,
         "crash": crash,
     }

@@ -11,7 +11,7 @@ from pytest_garl.search.method import Method, Plan
 
 METHODS: Mapping[str, str] = MappingProxyType(
     {
-        "garl": "pytest_garl.search.garl:method",
+        "garl": "pytest_garl.search.garl:Garl",
         "garl-paper": "pytest_garl.search.garl_paper:method",
         "random": "pytest_garl.search.random_search:RandomSearch",
     }

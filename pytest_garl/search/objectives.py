@@ -8,6 +8,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from pytest_garl.verdicts.judge import CLOSE_CALL_M
+
 Matrix = NDArray[np.float64]
 
 
@@ -23,10 +25,6 @@ def diversity(generation: Matrix) -> Matrix:
     return means
 
 
-SEPARATION_SCALE_M = 3.0
-"""Bodies farther away than this threaten nobody; exact separations end here as well."""
-
-
 def threat(result: Mapping[str, Any]) -> float:
     """Return how near a flight came to a violation: 1 for a violation, 0 for none in sight.
 
@@ -40,7 +38,7 @@ def threat(result: Mapping[str, Any]) -> float:
     shares = []
     for margin in verdict["margins"]:
         if margin["property"] == "collision":
-            shares.append(margin["value"] / SEPARATION_SCALE_M)
+            shares.append(margin["value"] / CLOSE_CALL_M)
         elif margin["property"] == "distance" and margin["decided"]:
             shares.append(margin["value"] / (margin["value"] + result["final_distance_m"]))
         elif margin["property"] == "time" and margin["decided"]:

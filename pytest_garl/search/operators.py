@@ -5,14 +5,12 @@ A generation is a matrix: one chromosome a row, one property a column, in gene u
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
 Matrix = NDArray[np.float64]
-Choice = Callable[[Matrix, Matrix], int]
-"""Given candidates (m,) and a property's values in the generation (k,), the index to take."""
 
 CROSSOVER_PROBABILITY = 0.2
 MUTATION_PROBABILITY = 0.2
@@ -51,11 +49,6 @@ def farthest_from_all(candidates: Matrix, values: Matrix) -> int:
     return int(np.argmax(np.abs(candidates[:, None] - values[None, :]).sum(axis=1)))
 
 
-def farthest_from_nearest(candidates: Matrix, values: Matrix) -> int:
-    """Index of the candidate whose nearest neighbour among ``values`` is farthest (maximin)."""
-    return int(np.argmax(np.abs(candidates[:, None] - values[None, :]).min(axis=1)))
-
-
 def property_mutation(
     offspring: Matrix,
     lower: Matrix,
@@ -64,13 +57,12 @@ def property_mutation(
     *,
     probability: float = MUTATION_PROBABILITY,
     candidates: int = CANDIDATES,
-    choose: Choice = farthest_from_all,
 ) -> Matrix:
     """Return a copy of ``offspring`` in which each property mutates with ``probability``.
 
     A mutating property draws ``candidates`` values uniformly from its range and takes
-    the one that ``choose`` prefers, given that property's values in the generation as it
-    stands at that moment: earlier rows have mutated already, as in Algorithm 1.
+    the one farthest from all of that property's values in the generation as it stands at
+    that moment: earlier rows have mutated already, as in Algorithm 1.
     """
     mutated = offspring.copy()
     rows, columns = mutated.shape
@@ -78,12 +70,12 @@ def property_mutation(
         for column in range(columns):
             if rng.random() < probability:
                 drawn = rng.uniform(lower[column], upper[column], candidates)
-                mutated[row, column] = drawn[choose(drawn, mutated[:, column])]
+                mutated[row, column] = drawn[farthest_from_all(drawn, mutated[:, column])]
     return mutated
 
 
-LOCAL_STEP = 0.1
-"""Standard deviation of a local step, as a share of the property's range."""
+LOCAL_STEPS = (0.003, 0.3)
+"""Least and largest standard deviation of a local step, as shares of the property's range."""
 
 
 def local_steps(
@@ -94,7 +86,14 @@ def local_steps(
     *,
     probability: float = MUTATION_PROBABILITY,
 ) -> Matrix:
-    """Return a copy in which each property moves a little with ``probability``."""
-    steps = rng.normal(0.0, LOCAL_STEP, offspring.shape) * (upper - lower)
-    moved = np.where(rng.random(offspring.shape) < probability, offspring + steps, offspring)
-    return np.clip(moved, lower, upper)
+    """Return a copy in which each property moves a little with ``probability``, at least one.
+
+    How far is drawn for each chromosome, log-uniformly: a collision may hang on centimetres.
+    """
+    rows, columns = offspring.shape
+    low, high = np.log(LOCAL_STEPS)
+    scale = np.exp(rng.uniform(low, high, (rows, 1)))
+    moves = rng.random(offspring.shape) < probability
+    moves[np.arange(rows), rng.integers(columns, size=rows)] = True
+    steps = rng.normal(0.0, 1.0, offspring.shape) * scale * (upper - lower)
+    return np.clip(np.where(moves, offspring + steps, offspring), lower, upper)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from pytest_garl.simulation.flight import Contact, Flight
+from pytest_garl.simulation.flight import Contact, Flight, Separation
 from pytest_garl.verdicts.moments import last_sighting_s, moment, speaks, was_in_view
 from pytest_garl.verdicts.verdict import (
     Limits,
@@ -17,6 +17,8 @@ from pytest_garl.verdicts.verdict import (
 LOST_S = 3.0
 """A target not seen for this long before the end counts as no longer detected."""
 DECOY_M = 1.5
+CLOSE_CALL_M = 3.0
+"""Bodies farther away than this threaten nobody; exact separations end here as well."""
 
 
 def judge(flight: Flight, limits: Limits) -> Verdict:
@@ -37,6 +39,22 @@ def judge(flight: Flight, limits: Limits) -> Verdict:
         margins=_margins(flight, limits),
         story=f"{what} {_where(flight)}".strip(),
     )
+
+
+def closest_call(flight: Flight) -> tuple[str, str]:
+    """Return the signature of the flight, had it hit what it came nearest to, and that body.
+
+    Both are empty where no body but the ground came within 3 m.
+    """
+    near = [
+        gap
+        for gap in flight.separations
+        if gap.body_class != "ground" and gap.distance_m < CLOSE_CALL_M
+    ]
+    if not near:
+        return "", ""
+    nearest = min(near, key=lambda gap: (gap.distance_m, gap.body))
+    return _collision_signature(flight, nearest), nearest.body
 
 
 def undecided(flight: Flight) -> str:
@@ -112,23 +130,30 @@ _VERBS = {"raised": "raised", "nonsense": "returned nonsense", "died": "died", "
 
 
 def _collision(flight: Flight, contact: Contact) -> tuple[PropertyName, ViolationType, str, str]:
-    when = moment(flight, contact.time_s)
     speed = f"at {contact.speed_mps:.1f} m/s"
     if contact.body_class == "ground":
         tilted = contact.tilt_rad > math.radians(20)
         how = "tilted" if tilted else "fast"
         return "collision", "hard", f"hard:{how}", f"Touched down too {how}, {speed}."
+    signature = _collision_signature(flight, contact)
     if contact.body_class == "static":
-        return "collision", "III", f"III:{contact.kind}:{when}", f"Hit {contact.body} {speed}."
+        return "collision", "III", signature, f"Hit {contact.body} {speed}."
     seen = was_in_view(flight, contact.body, contact.time_s)
-    sight = "seen" if seen else "unseen"
     view = (
         "The camera had it in view within the last 2 s."
         if seen
         else "The camera had not had it in view for 2 s."
     )
     text = f"Collided with {contact.body} {speed}. {view}"
-    return "collision", "IV", f"IV:{contact.kind}:{when}:{sight}", text
+    return "collision", "IV", signature, text
+
+
+def _collision_signature(flight: Flight, met: Contact | Separation) -> str:
+    when = moment(flight, met.time_s)
+    if met.body_class == "static":
+        return f"III:{met.kind}:{when}"
+    sight = "seen" if was_in_view(flight, met.body, met.time_s) else "unseen"
+    return f"IV:{met.kind}:{when}:{sight}"
 
 
 def _not_landed(flight: Flight) -> tuple[PropertyName, ViolationType, str, str]:

@@ -35,7 +35,14 @@ def result(scenario: Scenario) -> dict[str, Any]:
     ]
     signature = {"collision": "IV:dog", "distance": "off"}.get(primary or "", "")
     verdict = {"primary": primary, "signature": signature, "margins": margins}
-    return {"final_distance_m": far, "elapsed_s": 30.0, "verdict": verdict}
+    return {
+        "outcome": "collision" if hit else "landed",
+        "final_distance_m": far,
+        "elapsed_s": 30.0,
+        "closest_call": "",
+        "closest_body": "",
+        "verdict": verdict,
+    }
 
 
 def bred(method: Method, generations: int) -> list[list[Scenario]]:
@@ -67,12 +74,11 @@ def test_any_population_breeds_its_like(name: str, population: int) -> None:
     assert [len(generation) for generation in made] == [population] * 4
 
 
-@pytest.mark.parametrize("name", ["garl", "garl-paper"])
-def test_selection_finds_more_of_what_it_wants(name: str) -> None:
+def test_selection_finds_more_of_what_it_wants() -> None:
     def share(made: Sequence[Sequence[Scenario]]) -> float:
         return float(np.mean([result(s)["final_distance_m"] > 1.0 for made in made for s in made]))
 
-    runs = [bred(make_method(name, plan(seed, population=20)), 15) for seed in range(4)]
+    runs = [bred(make_method("garl-paper", plan(seed, population=20)), 15) for seed in range(4)]
     early = float(np.mean([share(generations[:2]) for generations in runs]))
     late = float(np.mean([share(generations[-5:]) for generations in runs]))
     assert late > early + 0.1
@@ -107,20 +113,6 @@ def test_survivors_are_measured_against_parents_and_offspring_together() -> None
     bred(method, 2)
     # The first generation, alone twice; then the offspring alone, then the union.
     assert widths == [8, 8, 8, 16]
-
-
-def test_a_second_kind_of_violation_is_worth_more_than_one_more_of_the_first() -> None:
-    method = make_method("garl", plan(population=20))
-    scenarios = method.ask()
-    values = method.tell([Flown(scenario=each, result=result(each)) for each in scenarios])
-    threats: dict[str, list[float]] = {}
-    for scenario, value in zip(scenarios, values, strict=True):
-        threats.setdefault(result(scenario)["verdict"]["signature"], []).append(value[0])
-    for signature, found in threats.items():
-        if signature:
-            assert found == pytest.approx([1 + 1 / len(found)] * len(found))
-        else:
-            assert max(found) < 1
 
 
 def test_a_search_of_ones_own_is_named_by_its_module() -> None:

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from pytest_garl.search.operators import (
     farthest_from_all,
-    farthest_from_nearest,
+    local_steps,
     nuclear_gene_crossover,
     property_mutation,
 )
@@ -48,9 +48,17 @@ def test_paper_candidate_rule_takes_the_largest_sum_of_distances() -> None:
     assert farthest_from_all(np.array([0.5, 0.9, 0.1]), np.array([0.0, 0.2, 1.0])) == 1
 
 
-def test_maximin_rule_takes_the_emptiest_place() -> None:
-    # Nearest neighbours in {0, 0.2, 1}: 0.5 -> 0.3; 0.9 -> 0.1; 0.1 -> 0.1.
-    assert farthest_from_nearest(np.array([0.5, 0.9, 0.1]), np.array([0.0, 0.2, 1.0])) == 0
+def test_local_steps_are_of_all_sizes_and_never_none() -> None:
+    lower, upper = np.full(5, -1.0), np.full(5, 1.0)
+    parents = np.zeros((2000, 5))
+    moved = local_steps(parents, lower, upper, np.random.default_rng(5))
+    sizes = np.abs(moved - parents).max(axis=1)
+    assert (sizes > 0).all()
+    assert (np.abs(moved) <= 1).all()
+    # One of five properties always moves, the other four with probability 0.2 each.
+    assert (moved != parents).mean() == pytest.approx(0.2 + 0.8 * 0.2, abs=0.02)
+    assert (sizes < 0.02).mean() > 0.2
+    assert (sizes > 0.1).mean() > 0.15
 
 
 def test_mutation_keeps_every_property_in_its_range() -> None:

@@ -1,0 +1,37 @@
+"""How long the training of a policy takes: 800 episodes of one seed, and what a decision costs.
+
+``python -m benchmarks.training`` trains the default policy from nothing, without validation.
+"""
+
+from __future__ import annotations
+
+import argparse
+import dataclasses
+import time
+
+from pytest_garl.adversary.dqn import train
+from pytest_garl.adversary.training import PRESETS
+from pytest_garl.scenarios.maps import load_map
+
+
+def main() -> None:
+    """Train and print the time."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--policy", choices=list(PRESETS), default="dqn")
+    parser.add_argument("--episodes", type=int, default=800)
+    arguments = parser.parse_args()
+    surrogate, training = PRESETS[arguments.policy]
+    surrogate = dataclasses.replace(surrogate, maps=(load_map("court"), load_map("lawn")))
+    training = dataclasses.replace(training, episodes=arguments.episodes)
+    began = time.perf_counter()
+    learner = train(surrogate, training)
+    took = time.perf_counter() - began
+    decisions = sum(record.decisions for record in learner.history)
+    print(
+        f"{arguments.policy}: {arguments.episodes} episodes in {took:.0f} s, {decisions} decisions "
+        f"of {1000 * took / decisions:.1f} ms, {learner.updates} updates"
+    )
+
+
+if __name__ == "__main__":
+    main()

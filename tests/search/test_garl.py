@@ -1,0 +1,80 @@
+from __future__ import annotations
+
+from collections import Counter
+from typing import Any
+
+from pytest_garl.scenarios.genes import genome_for
+from pytest_garl.scenarios.maps import load_map
+from pytest_garl.scenarios.scenario import Scenario
+from pytest_garl.search.garl import EXPLORES, Garl, cell_of
+from pytest_garl.search.method import Flown, Plan
+from pytest_garl.search.random_search import RandomSearch
+
+MAP = load_map("court")
+PLAN = Plan(map=MAP, genome=genome_for(MAP), seed=0, population=20)
+
+
+def result(signature: str, closest_call: str = "", distance_m: float = 0.0) -> dict[str, Any]:
+    margin = {"property": "collision", "value": distance_m, "unit": "m", "decided": True}
+    return {
+        "outcome": "collision" if signature else "landed",
+        "final_distance_m": 0.1,
+        "elapsed_s": 30.0,
+        "closest_call": closest_call,
+        "closest_body": "",
+        "verdict": {
+            "primary": "collision" if signature else None,
+            "signature": signature,
+            "margins": [margin],
+        },
+    }
+
+
+def common_and_rare(scenario: Scenario) -> dict[str, Any]:
+    """Hit a fast dog in a fifth of all scenarios; what needs three genes is rare."""
+    if scenario["dog-1.velocity"] > 0.8:
+        return result("common")
+    keys = ("environment.rain", "environment.fog")
+    low = [scenario[key] / 0.15 for key in keys] + [scenario["environment.sun_position"]]
+    far = max(low)
+    if far < 0.1:
+        return result("rare")
+    return result("", "rare" if far < 0.4 else "", 3 * far)
+
+
+def search(method: Any, generations: int = 20) -> Counter[str]:
+    found: Counter[str] = Counter()
+    for _ in range(generations):
+        flown = [Flown(scenario=s, result=common_and_rare(s)) for s in method.ask()]
+        method.tell(flown)
+        found.update(item.result["verdict"]["signature"] for item in flown)
+    return found
+
+
+def test_a_rare_way_to_fail_is_found_by_way_of_its_near_misses() -> None:
+    found, by_chance = search(Garl(PLAN)), search(RandomSearch(PLAN))
+    assert by_chance["rare"] <= 1
+    assert found["rare"] >= 5
+    assert found["common"] >= by_chance["common"] / 2
+
+
+def test_every_cell_is_bred_from_alike() -> None:
+    search_ = Garl(PLAN)
+    first = search_.ask()
+    cells = ["a"] * 17 + ["b", "c", ""]
+    search_.tell([Flown(scenario=s, result=result(c)) for s, c in zip(first, cells, strict=True)])
+    seeds = {scenario.seed: cell for scenario, cell in zip(first, cells, strict=True)}
+    bred: Counter[str] = Counter()
+    for _ in range(30):
+        bred.update(seeds[each.seed] for each in search_.ask() if each.seed in seeds)
+    share = 30 * 20 * (1 - EXPLORES) / 4
+    for cell in ("a", "b", "c", ""):
+        assert 0.7 * share < bred[cell] < 1.3 * share
+
+
+def test_a_flights_cell_is_how_it_failed_or_nearly_did() -> None:
+    assert cell_of(result("IV:dog:descent:seen", "IV:person:take-off:seen")) == (
+        "IV:dog:descent:seen"
+    )
+    assert cell_of(result("", "IV:person:take-off:seen")) == "IV:person:take-off:seen"
+    assert cell_of(result("")) == "landed"
