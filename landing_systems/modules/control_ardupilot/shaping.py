@@ -1,0 +1,134 @@
+"""Target shaping: how fast an error may be closed with bounded acceleration and jerk."""
+
+from __future__ import annotations
+
+import math
+
+Pair = tuple[float, float]
+
+
+def clamped(value: float, low: float, high: float) -> float:
+    """Return ``value`` within [low, high]."""
+    return low if value < low else high if value > high else value
+
+
+def sqrt_controller(error: float, p: float, limit: float, dt_s: float = 0.0) -> float:
+    """Return the rate at which to close ``error``: linear near zero, a square root beyond.
+
+    Up to ``limit / p²`` the rate is ``p * error``; beyond it is the rate from which a constant
+    deceleration ``limit`` still ends at zero, sqrt(2 * limit * (error - limit / (2 p²))).  With
+    ``dt_s`` it never oversteps the error in one step.
+    """
+    size = abs(error)
+    linear = limit / (p * p)
+    rate = p * size if size <= linear else math.sqrt(2 * limit * (size - linear / 2))
+    if dt_s > 0 and rate * dt_s > size:
+        rate = size / dt_s
+    return rate if error > 0 else -rate
+
+
+def stopping_distance(speed: float, p: float, limit: float) -> float:
+    """Return the error at which :func:`sqrt_controller` asks for ``speed``: its inverse."""
+    if speed <= limit / p:
+        return speed / p
+    return limit / (2 * p * p) + speed * speed / (2 * limit)
+
+
+class ShapedAxis:
+    """A target on one axis that moves with bounded speed, acceleration and jerk.
+
+    Nested square-root controllers: position to velocity with half the acceleration, so that
+    the jerk-limited loop inside can follow, velocity to acceleration with the jerk.
+    """
+
+    def __init__(self, acceleration_max: float, jerk: float, dt_s: float) -> None:
+        self._acceleration_max, self._jerk, self._dt = acceleration_max, jerk, dt_s
+        self._inner = jerk / acceleration_max
+        self.reset(0.0)
+
+    def reset(self, position: float, velocity: float = 0.0) -> None:
+        """Put the target somewhere, unaccelerated."""
+        self.position, self.velocity, self.acceleration = position, velocity, 0.0
+
+    def towards(self, goal: float, feed_forward: float, down: float, up: float) -> None:
+        """Advance one step towards a goal that moves at ``feed_forward``; down <= v <= up."""
+        error = goal - self.position
+        rate = sqrt_controller(error, 0.5 * self._inner, 0.5 * self._acceleration_max, self._dt)
+        self.at_velocity(clamped(rate + feed_forward, down, up))
+
+    def at_velocity(self, velocity: float) -> None:
+        """Advance one step towards a velocity."""
+        top, dt = self._acceleration_max, self._dt
+        wanted = sqrt_controller(velocity - self.velocity, self._inner, self._jerk, dt)
+        change = self._jerk * dt
+        wanted = clamped(wanted, -top, top)
+        acceleration = clamped(wanted, self.acceleration - change, self.acceleration + change)
+        self.acceleration = acceleration
+        self.position += self.velocity * dt + 0.5 * acceleration * dt * dt
+        self.velocity += acceleration * dt
+
+
+class ShapedPlane:
+    """The same in the horizontal plane, on lengths, so that a diagonal is no faster."""
+
+    def __init__(self, acceleration_max: float, jerk: float, dt_s: float) -> None:
+        self._acceleration_max, self._jerk, self._dt = acceleration_max, jerk, dt_s
+        self._inner = jerk / acceleration_max
+        self.reset((0.0, 0.0))
+
+    def reset(self, position: Pair, velocity: Pair = (0.0, 0.0)) -> None:
+        """Put the target somewhere, unaccelerated."""
+        self.position, self.velocity, self.acceleration = position, velocity, (0.0, 0.0)
+
+    def stopping_point(self) -> Pair:
+        """Return the nearest goal at which the target stops without turning back."""
+        (x, y), (vx, vy) = self.position, self.velocity
+        speed = math.sqrt(vx * vx + vy * vy)
+        if speed == 0:
+            return x, y
+        far = stopping_distance(speed, 0.5 * self._inner, 0.5 * self._acceleration_max) / speed
+        return x + vx * far, y + vy * far
+
+    def towards(
+        self,
+        goal: Pair,
+        velocity: Pair = (0.0, 0.0),
+        acceleration: Pair = (0.0, 0.0),
+        *,
+        top: float,
+    ) -> None:
+        """Advance one step towards a goal that moves; no faster than ``top``."""
+        ex, ey = goal[0] - self.position[0], goal[1] - self.position[1]
+        error = math.sqrt(ex * ex + ey * ey)
+        vx, vy = velocity
+        if error > 0:
+            share = (
+                sqrt_controller(error, 0.5 * self._inner, 0.5 * self._acceleration_max, self._dt)
+                / error
+            )
+            vx, vy = vx + share * ex, vy + share * ey
+        speed = math.sqrt(vx * vx + vy * vy)
+        if speed > top:
+            vx, vy = vx * top / speed, vy * top / speed
+        self.at_velocity((vx, vy), acceleration)
+
+    def at_velocity(self, velocity: Pair, feed_forward: Pair = (0.0, 0.0)) -> None:
+        """Advance one step towards a velocity that changes at ``feed_forward``."""
+        dt, (vx, vy), (ax, ay) = self._dt, self.velocity, self.acceleration
+        ex, ey = velocity[0] - vx, velocity[1] - vy
+        error = math.sqrt(ex * ex + ey * ey)
+        wx, wy = feed_forward
+        if error > 0:
+            share = sqrt_controller(error, self._inner, self._jerk, dt) / error
+            wx, wy = wx + share * ex, wy + share * ey
+        size = math.sqrt(wx * wx + wy * wy)
+        if size > self._acceleration_max:
+            wx, wy = wx * self._acceleration_max / size, wy * self._acceleration_max / size
+        dx, dy = wx - ax, wy - ay
+        size, change = math.sqrt(dx * dx + dy * dy), self._jerk * dt
+        if size > change:
+            dx, dy = dx * change / size, dy * change / size
+        ax, ay = ax + dx, ay + dy
+        x, y = self.position
+        self.position = x + vx * dt + 0.5 * ax * dt * dt, y + vy * dt + 0.5 * ay * dt * dt
+        self.velocity, self.acceleration = (vx + ax * dt, vy + ay * dt), (ax, ay)
