@@ -43,9 +43,13 @@ def fly_bare(
     *,
     parameters: ArduPilotParameters | None = None,
     wind_mps: tuple[float, float] = (0.0, 0.0),
+    wind_from_s: float = 0.0,
     control_rate_hz: float = PHYSICS_RATE_HZ,
 ) -> Trace:
-    """Fly from the ground at the origin; ``orders(time, controller)`` is called each step."""
+    """Fly from the ground at the origin; ``orders(time, controller)`` is called each step.
+
+    The wind blows towards ``wind_mps`` from ``wind_from_s`` on.
+    """
     airframe = Airframe(control_rate_hz=control_rate_hz)
     control = ArduPilotControl(airframe, parameters)
     model = vehicle_model(airframe)
@@ -73,13 +77,12 @@ def fly_bare(
                 wanted = control.control(state).newtons
             modes.append(control.mode)
             target = control.target_position_m
-            rows.append(
-                (state.time_s, *position, *velocity, *attitude, *rates, *thrusts, *target)
-            )
+            rows.append((state.time_s, *position, *velocity, *attitude, *rates, *thrusts, *target))
             thrusts = lag(thrusts, wanted, model, 1 / PHYSICS_RATE_HZ)
             total, torque = wrench(thrusts, model)
             fx, fy, fz = rotate(attitude, (0.0, 0.0, total))
-            air = velocity[0] - wind_mps[0], velocity[1] - wind_mps[1], velocity[2]
+            wind = wind_mps if state.time_s >= wind_from_s else (0.0, 0.0)
+            air = velocity[0] - wind[0], velocity[1] - wind[1], velocity[2]
             dx, dy, dz = drag(air, model)
             world.step((fx + dx, fy + dy, fz + dz), rotate(attitude, torque))
     finally:

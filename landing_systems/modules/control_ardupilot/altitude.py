@@ -21,7 +21,8 @@ class VerticalControl:
 
     def __init__(self, parameters: ArduPilotParameters, dt_s: float) -> None:
         p = parameters
-        self._p, self._dt = p, dt_s
+        self._p = p
+        self._pull = sqrt_controller(p.psc_posz_p, p.wpnav_accel_z)
         self._of_error = smoothing(p.psc_velz_flte, dt_s)
         self._error_up = stopping_distance(p.wpnav_speed_up, p.psc_posz_p, p.wpnav_accel_z)
         self._error_down = stopping_distance(p.wpnav_speed_dn, p.psc_posz_p, p.wpnav_accel_z)
@@ -49,8 +50,7 @@ class VerticalControl:
         p, target = self._p, self.target
         error = clamped(target.position - height, -self._error_down, self._error_up)
         target.position = height + error
-        correction = sqrt_controller(error, p.psc_posz_p, p.wpnav_accel_z, self._dt)
-        self.velocity_target = target.velocity + correction
+        self.velocity_target = target.velocity + self._pull(error)
         self._error += self._of_error * (self.velocity_target - velocity - self._error)
         wanted = target.acceleration + p.psc_velz_p * self._error
         return p.mot_thst_hover + self._accelerator.update(wanted, acceleration, limited)

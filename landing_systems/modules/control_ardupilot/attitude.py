@@ -32,12 +32,18 @@ class AttitudeControl:
     def __init__(self, parameters: ArduPilotParameters, dt_s: float) -> None:
         p = parameters
         self._p, self._dt = p, dt_s
-        self._brake = (
-            clamped(p.atc_accel_r_max / 2, *TILT_DECELERATION_RADPS2),
-            clamped(p.atc_accel_p_max / 2, *TILT_DECELERATION_RADPS2),
-            clamped(p.atc_accel_y_max / 2, *YAW_DECELERATION_RADPS2),
+        tilt, turn = TILT_DECELERATION_RADPS2, YAW_DECELERATION_RADPS2
+        self._correct = (
+            sqrt_controller(p.atc_ang_rll_p, clamped(p.atc_accel_r_max / 2, *tilt)),
+            sqrt_controller(p.atc_ang_pit_p, clamped(p.atc_accel_p_max / 2, *tilt)),
+            sqrt_controller(p.atc_ang_yaw_p, clamped(p.atc_accel_y_max / 2, *turn)),
         )
-        self._quickness = 1 / max(0.01, p.atc_input_tc)
+        quick = 1 / max(0.01, p.atc_input_tc)
+        self._approach = (
+            sqrt_controller(quick, p.atc_accel_r_max),
+            sqrt_controller(quick, p.atc_accel_p_max),
+            sqrt_controller(quick, p.atc_accel_y_max),
+        )
         self.reset((0.0, 0.0, 0.0, 1.0))
 
     def reset(self, attitude: Quaternion) -> None:
@@ -49,7 +55,6 @@ class AttitudeControl:
 
     def rates(self, thrust: Vector, yaw_rad: float, attitude: Quaternion) -> Vector:
         """Return wanted body rates for a thrust direction (world) and a heading."""
-        p = self._p
         self._shape(heading_quaternion(thrust, yaw_rad))
         error = between(attitude, self.target)
         ex, ey, ez = tilt_and_turn(error)
@@ -59,11 +64,9 @@ class AttitudeControl:
             ez -= excess
         tilt = math.sqrt(ex * ex + ey * ey)
         self.tilt_error_rad = tilt
-        brake_x, brake_y, brake_z = self._brake
-        wx = sqrt_controller(ex, p.atc_ang_rll_p, brake_x, self._dt)
-        wy = sqrt_controller(ey, p.atc_ang_pit_p, brake_y, self._dt)
-        wz = sqrt_controller(ez, p.atc_ang_yaw_p, brake_z, self._dt)
-        if p.atc_rate_ff_enab:
+        correct_x, correct_y, correct_z = self._correct
+        wx, wy, wz = correct_x(ex), correct_y(ey), correct_z(ez)
+        if self._p.atc_rate_ff_enab:
             fx, fy, fz = rotated(error, self._rates)
             wx, wy, wz = wx + fx, wy + fy, wz + fz
         if tilt > LARGE_TILT_ERROR_RAD:
@@ -78,13 +81,12 @@ class AttitudeControl:
             return
         ex, ey, ez = tilt_and_turn(between(self.target, wanted))
         wx, wy, wz = self._rates
-        quick = self._quickness
-        slew, top = p.atc_slew_yaw, p.atc_accel_r_max
-        x = clamped(sqrt_controller(ex, quick, top, dt), wx - top * dt, wx + top * dt)
-        top = p.atc_accel_p_max
-        y = clamped(sqrt_controller(ey, quick, top, dt), wy - top * dt, wy + top * dt)
-        top = p.atc_accel_y_max
-        z = clamped(sqrt_controller(ez, quick, top, dt), -slew, slew)
-        z = clamped(z, wz - top * dt, wz + top * dt)
+        approach_x, approach_y, approach_z = self._approach
+        slew, change = p.atc_slew_yaw, p.atc_accel_r_max * dt
+        x = clamped(approach_x(ex), wx - change, wx + change)
+        change = p.atc_accel_p_max * dt
+        y = clamped(approach_y(ey), wy - change, wy + change)
+        change = p.atc_accel_y_max * dt
+        z = clamped(clamped(approach_z(ez), -slew, slew), wz - change, wz + change)
         self._rates = x, y, z
         self.target = turned(self.target, self._rates, dt)

@@ -230,7 +230,7 @@ class ArduPilotControl:
         p, horizontal, vertical = self.parameters, self._horizontal, self._vertical
         x, y, z = state.position_m
         height = z - self._ground_m
-        rate = descent_rate(height, p, self._dt)
+        rate = descent_rate(height, p)
         order = None
         if p.plnd_enabled:
             order = self.precision.update(state.time_s, state.position_m, height)
@@ -264,9 +264,10 @@ class ArduPilotControl:
             throttle = self._lift(state)
         rates = self._attitude.rates((ax, ay, GRAVITY_MPS2), self._yaw, state.attitude)
         roll, pitch, yaw = self._rates.outputs(rates, state.angular_velocity_radps, limits)
-        request = math.atan2(math.sqrt(ax * ax + ay * ay), GRAVITY_MPS2)
+        tangent = math.sqrt(ax * ax + ay * ay) / GRAVITY_MPS2
+        request = math.atan(tangent)
         if p.atc_angle_boost:
-            throttle /= math.cos(request)
+            throttle *= math.sqrt(1 + tangent * tangent)
         self._favour(request, acceleration)
         weight = max(0.0, throttle)
         shares, self._limits = mixed(

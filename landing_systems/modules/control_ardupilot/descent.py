@@ -13,7 +13,7 @@ SLOWEST_MPS = 0.10
 0.15 m, and descends with half of LAND_SPEED where there is none."""
 
 
-def descent_rate(height_m: float, parameters: ArduPilotParameters, dt_s: float) -> float:
+def descent_rate(height_m: float, parameters: ArduPilotParameters) -> float:
     """Return the climb rate (negative) of a landing at a height above the ground.
 
     Fast above ``LAND_ALT_LOW``, then slowing down as a square-root controller of the height
@@ -22,7 +22,7 @@ def descent_rate(height_m: float, parameters: ArduPilotParameters, dt_s: float) 
     p = parameters
     fast = p.land_speed_high or p.wpnav_speed_dn
     low = max(1.0, p.land_alt_low)
-    rate = sqrt_controller(low - height_m, p.psc_posz_p, p.wpnav_accel_z, dt_s)
+    rate = sqrt_controller(p.psc_posz_p, p.wpnav_accel_z)(low - height_m)
     return clamped(rate, -max(fast, p.land_speed), -p.land_speed)
 
 

@@ -28,12 +28,14 @@ class Setpoint:
 
         After ``timeout_s`` without renewal the motion stops where it then is.
         """
+        if self.velocity_mps is ZERO and self.acceleration_mps2 is ZERO:
+            return self.position_m, ZERO, ZERO
         age = time_s - self.time_s
         over = age > timeout_s
         age = min(age, timeout_s)
         (vx, vy, vz), (ax, ay, az) = self.velocity_mps, self.acceleration_mps2
         place = self.position_m
-        if place is not None and (self.velocity_mps != ZERO or self.acceleration_mps2 != ZERO):
+        if place is not None:
             half = 0.5 * age * age
             place = (
                 place[0] + vx * age + ax * half,

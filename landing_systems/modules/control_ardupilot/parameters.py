@@ -138,19 +138,24 @@ class ArduPilotParameters:
 
 
 def tuned(hover_throttle: float, base: ArduPilotParameters | None = None) -> ArduPilotParameters:
-    """Return the parameters that an operator changes before and after the first flights.
+    """Return the parameters that an operator changes on this vehicle, the rest as in ``base``.
 
-    ``MOT_THST_HOVER`` is what ArduPilot learns in a hover; ArduPilot's tuning instructions set
-    ``PSC_ACCZ_P`` to it and ``PSC_ACCZ_I`` to twice it.  The default of ``ATC_RAT_YAW_P`` is
-    low for propellers of 13 inches, whose torque is all that turns the vehicle: the yaw gains
-    are those that AutoTune found for ArduPilot's published parameter file of the nearest
-    airframe, the Holybro X500 v2 (``ATC_RAT_YAW_P`` 1.2, ``_I`` 0.12, ``_D`` 0.022, ``_FLTD``
-    10 Hz).  ``docs/control.md`` shows the steps with and without.
+    ``MOT_THST_HOVER`` is what ArduPilot learns in a hover; its tuning instructions then set
+    ``PSC_ACCZ_P`` to that and ``PSC_ACCZ_I`` to twice that.  The yaw gains' defaults are too low
+    for a vehicle that only the drag of its propellers turns: a turn of 90 degrees overshoots by
+    44 and rings.  ``ATC_RAT_YAW_P`` is raised to where the linear yaw loop answers as fast as
+    roll's does, with ``_I`` a tenth of it (AutoTune's ratio); ``_D``, ``_FLTD`` and ``_FLTE``
+    are set, within their documented ranges, to damp it (gyros are without noise here, so the
+    error needs no filter of 2.5 Hz).  AutoTune's results for vehicles of this kind in ArduPilot's
+    published parameter files are a P of 1.2 and a D of 0.022 (Holybro X500 v2) and a P of 1.0
+    (Parrot Bebop).  ``ATC_ACCEL_Y_MAX`` is half of the 190 degrees/s² that the motors can give in
+    a hover.  ``docs/control.md`` has the step responses of both.
     """
     return replace(
         base or ArduPilotParameters(),
         mot_thst_hover=hover_throttle,
         psc_accz_p=hover_throttle,
         psc_accz_i=2 * hover_throttle,
-        atc_rat_yaw=RatePid(p=1.2, i=0.12, d=0.022, flte=2.5, fltd=10.0),
+        atc_accel_y_max=math.radians(100),
+        atc_rat_yaw=RatePid(p=1.8, i=0.18, d=0.02, flte=20.0, fltd=20.0),
     )

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from landing_systems.modules.control_ardupilot.filters import smoothing
-from landing_systems.modules.control_ardupilot.shaping import clamped
 
 
 class Pid:
@@ -51,6 +50,6 @@ class Pid:
             self._derivative += self._of_derivative * (slope - self._derivative)
         error = self._error
         if not limited or self.integral * error < 0:
-            total = self.integral + self._i * error * self._dt
-            self.integral = clamped(total, -self._imax, self._imax)
+            total, most = self.integral + self._i * error * self._dt, self._imax
+            self.integral = most if total > most else -most if total < -most else total
         return self._p * error + self.integral + self._d * self._derivative

@@ -20,6 +20,7 @@ class HorizontalControl:
         self._p, self._dt = p, dt_s
         self._of_error = smoothing(p.psc_velxy_flte, dt_s)
         self._of_derivative = smoothing(p.psc_velxy_fltd, dt_s)
+        self._pull = sqrt_controller(p.psc_posxy_p, p.wpnav_accel)
         self._most = GRAVITY_MPS2 * math.tan(p.angle_max)
         self.target = ShapedPlane(p.wpnav_accel, p.psc_jerk_xy, dt_s)
         self.reset((0.0, 0.0), (0.0, 0.0))
@@ -42,7 +43,7 @@ class HorizontalControl:
         ex, ey = tx - position[0], ty - position[1]
         distance = math.sqrt(ex * ex + ey * ey)
         if distance > 0:
-            share = sqrt_controller(distance, p.psc_posxy_p, p.wpnav_accel, dt) / distance
+            share = self._pull(distance) / distance
             wx, wy = wx + share * ex, wy + share * ey
         old_x, old_y = self._error
         part = self._of_error

@@ -8,21 +8,16 @@ Vector = tuple[float, float, float]
 Quaternion = tuple[float, float, float, float]
 
 
-def product(a: Quaternion, b: Quaternion) -> Quaternion:
-    """Return the rotation b followed by a."""
+def between(a: Quaternion, b: Quaternion) -> Quaternion:
+    """Return the rotation from a to b as seen in a's body frame: inverse of a, times b."""
     ax, ay, az, aw = a
     bx, by, bz, bw = b
     return (
-        aw * bx + ax * bw + ay * bz - az * by,
-        aw * by - ax * bz + ay * bw + az * bx,
-        aw * bz + ax * by - ay * bx + az * bw,
-        aw * bw - ax * bx - ay * by - az * bz,
+        aw * bx - ax * bw - ay * bz + az * by,
+        aw * by + ax * bz - ay * bw - az * bx,
+        aw * bz - ax * by + ay * bx - az * bw,
+        aw * bw + ax * bx + ay * by + az * bz,
     )
-
-
-def between(a: Quaternion, b: Quaternion) -> Quaternion:
-    """Return the rotation from a to b as seen in a's body frame: inverse of a, times b."""
-    return product((-a[0], -a[1], -a[2], a[3]), b)
 
 
 def rotated(q: Quaternion, v: Vector) -> Vector:
@@ -40,7 +35,12 @@ def rotated(q: Quaternion, v: Vector) -> Vector:
 def turned(q: Quaternion, rates: Vector, dt_s: float) -> Quaternion:
     """Return q after turning with body rates for a short time, normalised."""
     half = 0.5 * dt_s
-    x, y, z, w = product(q, (rates[0] * half, rates[1] * half, rates[2] * half, 1.0))
+    qx, qy, qz, qw = q
+    rx, ry, rz = rates[0] * half, rates[1] * half, rates[2] * half
+    x = qx + qw * rx + qy * rz - qz * ry
+    y = qy + qw * ry - qx * rz + qz * rx
+    z = qz + qw * rz + qx * ry - qy * rx
+    w = qw - qx * rx - qy * ry - qz * rz
     size = math.sqrt(x * x + y * y + z * z + w * w)
     return x / size, y / size, z / size, w / size
 

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 
 Pair = tuple[float, float]
+Rate = Callable[[float], float]
 
 
 def clamped(value: float, low: float, high: float) -> float:
@@ -12,19 +14,22 @@ def clamped(value: float, low: float, high: float) -> float:
     return low if value < low else high if value > high else value
 
 
-def sqrt_controller(error: float, p: float, limit: float, dt_s: float = 0.0) -> float:
-    """Return the rate at which to close ``error``: linear near zero, a square root beyond.
+def sqrt_controller(p: float, limit: float) -> Rate:
+    """Return the function from an error to the rate at which to close it.
 
-    Up to ``limit / p²`` the rate is ``p * error``; beyond it is the rate from which a constant
-    deceleration ``limit`` still ends at zero, sqrt(2 * limit * (error - limit / (2 p²))).  With
-    ``dt_s`` it never oversteps the error in one step.
+    Up to an error of ``limit / p²`` the rate is ``p * error``; beyond it is the rate from which
+    a constant deceleration ``limit`` still ends at zero, sqrt(2 limit (error - limit / (2 p²))).
+    ``p`` must be below the rate of the steps in Hz, else a step passes the goal.
     """
-    size = abs(error)
     linear = limit / (p * p)
-    rate = p * size if size <= linear else math.sqrt(2 * limit * (size - linear / 2))
-    if dt_s > 0 and rate * dt_s > size:
-        rate = size / dt_s
-    return rate if error > 0 else -rate
+    half, double = linear / 2, 2 * limit
+
+    def rate(error: float) -> float:
+        size = -error if error < 0 else error
+        value = p * size if size <= linear else math.sqrt(double * (size - half))
+        return value if error > 0 else -value
+
+    return rate
 
 
 def stopping_distance(speed: float, p: float, limit: float) -> float:
@@ -43,7 +48,8 @@ class ShapedAxis:
 
     def __init__(self, acceleration_max: float, jerk: float, dt_s: float) -> None:
         self._acceleration_max, self._jerk, self._dt = acceleration_max, jerk, dt_s
-        self._inner = jerk / acceleration_max
+        self._rate = sqrt_controller(0.5 * jerk / acceleration_max, 0.5 * acceleration_max)
+        self._pull = sqrt_controller(jerk / acceleration_max, jerk)
         self.reset(0.0)
 
     def reset(self, position: float, velocity: float = 0.0) -> None:
@@ -52,16 +58,14 @@ class ShapedAxis:
 
     def towards(self, goal: float, feed_forward: float, down: float, up: float) -> None:
         """Advance one step towards a goal that moves at ``feed_forward``; down <= v <= up."""
-        error = goal - self.position
-        rate = sqrt_controller(error, 0.5 * self._inner, 0.5 * self._acceleration_max, self._dt)
+        rate = self._rate(goal - self.position)
         self.at_velocity(clamped(rate + feed_forward, down, up))
 
     def at_velocity(self, velocity: float) -> None:
         """Advance one step towards a velocity."""
         top, dt = self._acceleration_max, self._dt
-        wanted = sqrt_controller(velocity - self.velocity, self._inner, self._jerk, dt)
+        wanted = clamped(self._pull(velocity - self.velocity), -top, top)
         change = self._jerk * dt
-        wanted = clamped(wanted, -top, top)
         acceleration = clamped(wanted, self.acceleration - change, self.acceleration + change)
         self.acceleration = acceleration
         self.position += self.velocity * dt + 0.5 * acceleration * dt * dt
@@ -73,7 +77,8 @@ class ShapedPlane:
 
     def __init__(self, acceleration_max: float, jerk: float, dt_s: float) -> None:
         self._acceleration_max, self._jerk, self._dt = acceleration_max, jerk, dt_s
-        self._inner = jerk / acceleration_max
+        self._rate = sqrt_controller(0.5 * jerk / acceleration_max, 0.5 * acceleration_max)
+        self._pull = sqrt_controller(jerk / acceleration_max, jerk)
         self.reset((0.0, 0.0))
 
     def reset(self, position: Pair, velocity: Pair = (0.0, 0.0)) -> None:
@@ -86,7 +91,8 @@ class ShapedPlane:
         speed = math.sqrt(vx * vx + vy * vy)
         if speed == 0:
             return x, y
-        far = stopping_distance(speed, 0.5 * self._inner, 0.5 * self._acceleration_max) / speed
+        top = self._acceleration_max
+        far = stopping_distance(speed, 0.5 * self._jerk / top, 0.5 * top) / speed
         return x + vx * far, y + vy * far
 
     def towards(
@@ -102,10 +108,7 @@ class ShapedPlane:
         error = math.sqrt(ex * ex + ey * ey)
         vx, vy = velocity
         if error > 0:
-            share = (
-                sqrt_controller(error, 0.5 * self._inner, 0.5 * self._acceleration_max, self._dt)
-                / error
-            )
+            share = self._rate(error) / error
             vx, vy = vx + share * ex, vy + share * ey
         speed = math.sqrt(vx * vx + vy * vy)
         if speed > top:
@@ -119,7 +122,7 @@ class ShapedPlane:
         error = math.sqrt(ex * ex + ey * ey)
         wx, wy = feed_forward
         if error > 0:
-            share = sqrt_controller(error, self._inner, self._jerk, dt) / error
+            share = self._pull(error) / error
             wx, wy = wx + share * ex, wy + share * ey
         size = math.sqrt(wx * wx + wy * wy)
         if size > self._acceleration_max:
