@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,6 +29,12 @@ class Trace:
     thrusts_n: NDArray[np.float64]
     target_m: NDArray[np.float64]
     modes: tuple[str, ...]
+
+    def since(self, time_s: float) -> Trace:
+        """Return the part from a time on, with that time as zero."""
+        first = int(np.searchsorted(self.time_s, time_s))
+        rows = {field.name: getattr(self, field.name)[first:] for field in fields(self)}
+        return Trace(**(rows | {"time_s": rows["time_s"] - time_s}))
 
     @property
     def yaw_rad(self) -> NDArray[np.float64]:

@@ -140,8 +140,7 @@ class ArduPilotParameters:
 def tuned(hover_throttle: float, base: ArduPilotParameters | None = None) -> ArduPilotParameters:
     """Return the parameters that an operator changes on this vehicle, the rest as in ``base``.
 
-    ``MOT_THST_HOVER`` is what ArduPilot learns in a hover; its tuning instructions then set
-    ``PSC_ACCZ_P`` to that and ``PSC_ACCZ_I`` to twice that.  The yaw gains' defaults are too low
+    ``MOT_THST_HOVER`` is what ArduPilot learns in a hover.  The yaw gains' defaults are too low
     for a vehicle that only the drag of its propellers turns: a turn of 90 degrees overshoots by
     44 and rings.  ``ATC_RAT_YAW_P`` is raised to where the linear yaw loop answers as fast as
     roll's does, with ``_I`` a tenth of it (AutoTune's ratio); ``_D``, ``_FLTD`` and ``_FLTE``
@@ -154,8 +153,6 @@ def tuned(hover_throttle: float, base: ArduPilotParameters | None = None) -> Ard
     return replace(
         base or ArduPilotParameters(),
         mot_thst_hover=hover_throttle,
-        psc_accz_p=hover_throttle,
-        psc_accz_i=2 * hover_throttle,
         atc_accel_y_max=math.radians(100),
         atc_rat_yaw=RatePid(p=1.8, i=0.18, d=0.02, flte=20.0, fltd=20.0),
     )
