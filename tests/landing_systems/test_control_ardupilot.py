@@ -397,6 +397,18 @@ def test_take_off_idles_then_raises_the_throttle_slowly() -> None:
     assert all(after >= before for before, after in itertools.pairwise(totals))
 
 
+def test_a_landing_order_before_lift_off_stops_the_motors() -> None:
+    control = ArduPilotControl(Airframe(control_rate_hz=240))
+    control.control(state(0.0))
+    control.take_off(5.0)
+    for step in range(1, 400):
+        thrusts = control.control(state(step * DT))
+    assert min(thrusts.newtons) > 0
+    control.land()
+    assert control.control(state(2.0)).newtons == (0.0, 0.0, 0.0, 0.0)
+    assert control.mode == "stopped"
+
+
 def test_an_airframe_without_control_rate_is_refused() -> None:
     with pytest.raises(ValueError, match="control_rate_hz"):
         ArduPilotControl(Airframe())

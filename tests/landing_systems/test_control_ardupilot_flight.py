@@ -124,32 +124,33 @@ def test_the_same_flight_flies_the_same_bytes() -> None:
 def hover_then(
     order: Callable[[ArduPilotControl], None], seconds: float, rate_hz: float = 240.0
 ) -> Trace:
-    """Take off to 3 m, give an order at 12 s; return the flight from there on."""
+    """Take off to 3 m, give an order at 9 s; return the flight from there on."""
 
     def orders(time_s: float, control: ArduPilotControl) -> None:
         if time_s == 0.5:
             control.take_off(3.0)
-        if time_s == 12.0:
+        if time_s == 9.0:
             order(control)
 
-    return fly_bare(orders, 12.0 + seconds, control_rate_hz=rate_hz).since(12.0)
+    return fly_bare(orders, 9.0 + seconds, control_rate_hz=rate_hz).since(9.0)
 
 
 @pytest.mark.parametrize("rate_hz", [240.0, 120.0])
 def test_a_position_step_follows_its_shaped_target(rate_hz: float) -> None:
-    trace = hover_then(lambda c: c.guide(position=(5.0, 0.0, 3.2)), 10.0, rate_hz)
+    trace = hover_then(lambda c: c.guide(position=(5.0, 0.0, 3.2)), 8.0, rate_hz)
     x = trace.position_m[:, 0]
-    # The shaped target itself is a pair of poles with damping 0.7, which overshoots by 4 %.
-    assert x.max() <= 5.0 * 1.043
-    assert x.max() <= trace.target_m[:, 0].max() + 0.02
+    # The shaped target is a pair of poles with damping 0.87, which overshoots by 0.4 %; the
+    # velocity loop's integral adds what it learnt of the drag under way.
+    assert trace.target_m[:, 0].max() <= 5.0 * 1.005
+    assert x.max() <= 5.0 * 1.02
     assert abs(trace.position_m[:, 2] - 3.2).max() < 0.05
-    assert abs(x[-240:] - 5.0).max() < 0.02
+    assert abs(x[-240:] - 5.0).max() < 0.05
     settled = x[6 * 240 :]
     assert np.count_nonzero(np.diff(np.sign(settled - 5.0))) <= 1
 
 
 def test_a_turn_overshoots_by_less_than_its_poles_imply() -> None:
-    trace = hover_then(lambda c: c.guide(position=(0.0, 0.0, 3.2), yaw=math.pi / 2), 6.0)
+    trace = hover_then(lambda c: c.guide(position=(0.0, 0.0, 3.2), yaw=math.pi / 2), 5.0)
     yaw = np.degrees(trace.yaw_rad)
     assert yaw.max() < 90 * 1.03
     assert yaw[3 * 240 :].min() > 89
@@ -157,7 +158,7 @@ def test_a_turn_overshoots_by_less_than_its_poles_imply() -> None:
 
 
 def test_a_landing_is_gentle_and_stops_the_motors() -> None:
-    trace = hover_then(lambda c: c.land(), 14.0)
+    trace = hover_then(lambda c: c.land(), 11.0)
     grounded = int(np.argmax(trace.position_m[:, 2] < STANDING_M + 0.002))
     assert -trace.velocity_mps[:grounded, 2].min() < 0.65
     assert -trace.velocity_mps[grounded - 2, 2] < 0.52
@@ -171,9 +172,9 @@ def test_it_holds_its_place_in_a_wind_of_five_metres_per_second() -> None:
         if time_s == 0.5:
             control.take_off(3.0)
 
-    trace = fly_bare(orders, 24.0, wind_mps=(3.0, -4.0), wind_from_s=10.0)
+    trace = fly_bare(orders, 20.0, wind_mps=(3.0, -4.0), wind_from_s=9.0)
     away = np.linalg.norm(trace.position_m - np.array([0.0, 0.0, 3.2]), axis=1)
-    assert away[10 * 240 :].max() < 0.4
+    assert away[9 * 240 :].max() < 0.4
     assert away[-480:].max() < 0.02
 
 
@@ -188,12 +189,12 @@ def test_landing_from_speed_stops_first() -> None:
     def orders(time_s: float, control: ArduPilotControl) -> None:
         if time_s == 0.5:
             control.take_off(3.0)
-        if time_s in (10.0, 12.0):
+        if time_s == 8.0:
             control.guide(velocity=(4.0, 0.0, 0.0))
-        if time_s == 13.0:
+        if time_s == 10.5:
             control.land()
 
-    trace = fly_bare(orders, 26.0)
-    late = trace.position_m[19 * 240 :]
+    trace = fly_bare(orders, 22.0)
+    late = trace.position_m[16 * 240 :]
     assert np.ptp(late[:, 0]) < 0.05
     assert trace.modes[-1] == "stopped"

@@ -24,6 +24,9 @@ headings counter-clockwise from east, where ArduPilot has north, east, down.
     control.guide(position=(5.0, 0.0, 10.0), yaw=0.0)
     control.land()
     thrusts = control.control(state)         # at the control rate, from the first moment on
+
+Orders act at the next control step.  A landing system whose airframe declares a ``latency_s``
+holds its own orders back for so long, since the simulator delays commands only.
 """
 
 from landing_systems.modules.control_ardupilot.controller import ArduPilotControl, Mode

@@ -42,8 +42,6 @@ MOVING_MPS2 = 3.0
 MIX_UP_PER_S = 2.0
 MIX_DOWN_PER_S = 0.5
 """ArduPilot's slew rates of the priority of attitude over throttle."""
-MIN_LEVEL_THRUST_MPS2 = 1.0
-"""A thrust vector is never asked to lie down."""
 
 
 class ArduPilotControl:
@@ -66,7 +64,7 @@ class ArduPilotControl:
         self.reset()
 
     def reset(self) -> None:
-        """Stand on the ground with the motors off; the next ``control`` call sets the datum."""
+        """Stand on the ground with the motors off."""
         p, dt = self.parameters, self._dt
         self.mode: Mode = "stopped"
         self.precision = PrecisionLanding(p)
@@ -82,9 +80,8 @@ class ArduPilotControl:
         self._time_s = 0.0
         self._ground_m = 0.0
         self._hold: Pair = (0.0, 0.0)
-        self._hold_height = 0.0
+        self._take_off_m = 0.0
         self._yaw = 0.0
-        self._speed_mps = p.wpnav_speed
         self._setpoint: Setpoint | None = None
         self._state: VehicleState | None = None
 
@@ -113,7 +110,7 @@ class ArduPilotControl:
         """
         if self.mode == "stopped":
             self.mode = "take-off"
-            self._hold_height = height_m
+            self._take_off_m = height_m
             self._ramp, self._lifted = 0.0, False
 
     def guide(
@@ -148,19 +145,24 @@ class ArduPilotControl:
         self.mode = "guided"
 
     def land(self) -> None:
-        """Enter LAND: stop, come down, and stop the motors; again while landing is no order.
+        """Enter LAND: stop, come down, and stop the motors; no order while it is landing.
 
-        With ``PLND_ENABLED`` and measurements by ``landing_target`` it lands on the target.
+        On the ground it stops the motors.  With ``PLND_ENABLED`` it lands on the target that
+        ``landing_target`` tells of.
         """
+        if not self._lifted:
+            self.mode = "stopped"
         if self.mode in ("stopped", "land"):
             return
         self.mode = "land"
         self._hold = self._horizontal.target.stopping_point()
-        self._hold_height = self._vertical.target.position
         self.precision.begin()
 
     def landing_target(self, position_m: Vector, time_s: float) -> None:
-        """Take a detector's measurement of the target's place in the world, as of ``time_s``."""
+        """Take a detector's measurement of the target's place in the world, as of ``time_s``.
+
+        It is told before and during LAND; what counts is known 2 s after the first.
+        """
         state = self._state
         if state is None:
             return
@@ -177,8 +179,6 @@ class ArduPilotControl:
     def control(self, state: VehicleState) -> MotorThrusts:
         """Return the motor thrusts for the next control step."""
         velocity = state.velocity_mps
-        if self._state is None:
-            self._begin(state)
         self._state, self._time_s = state, state.time_s
         before = self._before or velocity
         self._before = velocity
@@ -190,18 +190,16 @@ class ArduPilotControl:
         )
         spool = self._spool.update(self.mode != "stopped")
         if self.mode == "stopped" or spool == "ground idle":
+            # ArduPilot disarms when it has landed: the motors stop at once, not by a ramp.
             self._stand(state)
             return STANDSTILL
         self._aim(state)
         return self._fly(state, acceleration)
 
-    def _begin(self, state: VehicleState) -> None:
-        self._ground_m = state.position_m[2]
-        self._yaw = yaw_of(state.attitude)
-
     def _stand(self, state: VehicleState) -> None:
-        """Keep every loop ready while the vehicle stands with idling motors."""
+        """Keep every loop ready while the vehicle stands; where it stands is the ground."""
         x, y, z = state.position_m
+        self._ground_m = z
         self._horizontal.reset((x, y), (0.0, 0.0))
         self._vertical.reset(z, 0.0, 0.0)
         self._attitude.reset(state.attitude)
@@ -223,7 +221,7 @@ class ArduPilotControl:
             follow(self._setpoint, state.time_s, horizontal, vertical, p)
         else:
             horizontal.target.towards(self._hold, top=p.wpnav_speed)
-            height = self._ground_m + self._hold_height
+            height = self._ground_m + self._take_off_m
             vertical.target.towards(height, 0.0, -p.wpnav_speed_dn, p.wpnav_speed_up)
 
     def _descend(self, state: VehicleState) -> None:
@@ -236,8 +234,8 @@ class ArduPilotControl:
             order = self.precision.update(state.time_s, state.position_m, height)
         self.instruction = order
         if order is not None and order.goal_m is not None:
-            self._hold, self._hold_height = order.goal_m[:2], order.goal_m[2]
-            vertical.target.towards(self._hold_height, 0.0, -p.wpnav_speed_dn, p.wpnav_speed_up)
+            self._hold = order.goal_m[:2]
+            vertical.target.towards(order.goal_m[2], 0.0, -p.wpnav_speed_dn, p.wpnav_speed_up)
         else:
             if order is not None and order.target_m is not None:
                 self._hold = order.target_m
@@ -269,13 +267,13 @@ class ArduPilotControl:
         if p.atc_angle_boost:
             throttle *= math.sqrt(1 + tangent * tangent)
         self._favour(request, acceleration)
-        weight = max(0.0, throttle)
+        lift = max(0.0, throttle)
         shares, self._limits = mixed(
             roll,
             pitch,
             yaw,
             throttle,
-            average_max=weight * (1 - self._mix) + p.mot_thst_hover * self._mix,
+            average_max=lift * (1 - self._mix) + p.mot_thst_hover * self._mix,
             yaw_headroom=p.mot_yaw_headroom,
             top=self._spool.top,
         )
