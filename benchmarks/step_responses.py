@@ -214,7 +214,9 @@ def draw(traces: dict[str, Trace], file: Path) -> None:
     panel.plot(land.time_s, height, label="height (m)")
     panel.plot(land.time_s, land.velocity_mps[:, 2], label="climb rate (m/s)")
     panel.plot(land.time_s, land.thrusts_n.sum(axis=1) / 10, label="thrust (10 N)")
-    panel.axvline(land.time_s[land.modes.index("stopped")], color="k", linestyle=":")
+    panel.axvline(
+        land.time_s[land.modes.index("stopped")], color="k", linestyle=":", label="motors off"
+    )
     panel.legend(loc="upper right")
     panel = axes[1, 1]
     panel.set_title("a wind of 5 m/s towards the east sets in")

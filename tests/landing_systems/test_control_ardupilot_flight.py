@@ -198,3 +198,25 @@ def test_landing_from_speed_stops_first() -> None:
     late = trace.position_m[16 * 240 :]
     assert np.ptp(late[:, 0]) < 0.05
     assert trace.modes[-1] == "stopped"
+
+
+def test_a_target_that_vanishes_is_looked_for_from_higher_up_and_landed_on() -> None:
+    retries = []
+
+    def orders(time_s: float, control: ArduPilotControl) -> None:
+        if time_s == 0.5:
+            control.take_off(6.0)
+        if time_s == 10.0:
+            control.land()
+        hidden = 14.0 < time_s < 20.0
+        if time_s > 7.0 and not hidden and round(time_s * 240) % 24 == 0:
+            control.landing_target((1.0, 0.5, 0.0), time_s)
+        retries.append(control.precision.retries)
+
+    trace = fly_bare(orders, 46.0, parameters=PARAMETERS)
+    height = trace.position_m[:, 2]
+    assert height[18 * 240] < height[15 * 240] - 1.0
+    assert height[20 * 240] > height[18 * 240] + 1.0
+    assert max(retries) == 1
+    assert trace.modes[-1] == "stopped"
+    assert trace.position_m[-1, :2] == pytest.approx((1.0, 0.5), abs=0.02)

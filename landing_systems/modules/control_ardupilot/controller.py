@@ -285,8 +285,7 @@ class ArduPilotControl:
 
     def _lift(self, state: VehicleState) -> float:
         """Raise the throttle until the vehicle leaves the ground, then hand it over."""
-        p = self.parameters
-        self._ramp += self._dt * p.mot_thst_hover / p.tkoff_slew_time
+        self._ramp += self._dt / self.parameters.tkoff_slew_time
         throttle = self._ramp
         _, _, z = state.position_m
         climb = state.velocity_mps[2]

@@ -103,7 +103,7 @@ class ArduPilotParameters:
     mot_spool_time: float = 0.5
     """s."""
     tkoff_slew_time: float = 2.0
-    """s: in which the throttle rises to the hover throttle before it leaves the ground."""
+    """s: from no throttle to all of it, until the vehicle leaves the ground."""
 
     land_speed: float = 0.5
     land_speed_high: float = 0.0
@@ -142,8 +142,8 @@ def tuned(hover_throttle: float, base: ArduPilotParameters | None = None) -> Ard
 
     ``MOT_THST_HOVER`` is what ArduPilot learns in a hover.  The yaw gains' defaults are too low
     for a vehicle that only the drag of its propellers turns: a turn of 90 degrees overshoots by
-    44 and rings.  ``ATC_RAT_YAW_P`` is raised to where the linear yaw loop answers as fast as
-    roll's does, with ``_I`` a tenth of it (AutoTune's ratio); ``_D``, ``_FLTD`` and ``_FLTE``
+    44 and rings.  ``ATC_RAT_YAW_P`` is raised tenfold, which makes the yaw rate loop half as
+    fast as roll's, with ``_I`` a tenth of it (AutoTune's ratio); ``_D``, ``_FLTD`` and ``_FLTE``
     are set, within their documented ranges, to damp it (gyros are without noise here, so the
     error needs no filter of 2.5 Hz).  AutoTune's results for vehicles of this kind in ArduPilot's
     published parameter files are a P of 1.2 and a D of 0.022 (Holybro X500 v2) and a P of 1.0
