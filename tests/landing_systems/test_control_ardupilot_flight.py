@@ -213,10 +213,10 @@ def test_a_target_that_vanishes_is_looked_for_from_higher_up_and_landed_on() -> 
             control.landing_target((1.0, 0.5, 0.0), time_s)
         retries.append(control.precision.retries)
 
-    trace = fly_bare(orders, 46.0, parameters=PARAMETERS)
+    trace = fly_bare(orders, 38.0, parameters=PARAMETERS)
     height = trace.position_m[:, 2]
     assert height[18 * 240] < height[15 * 240] - 1.0
-    assert height[20 * 240] > height[18 * 240] + 1.0
+    assert height[18 * 240 : 22 * 240].max() > height[18 * 240] + 0.7
     assert max(retries) == 1
     assert trace.modes[-1] == "stopped"
     assert trace.position_m[-1, :2] == pytest.approx((1.0, 0.5), abs=0.02)

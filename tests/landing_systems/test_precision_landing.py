@@ -141,6 +141,7 @@ def test_a_place_that_was_never_measured_cannot_be_asked_for() -> None:
 def test_a_target_in_sight_is_landed_on() -> None:
     flight = Descent(9.0)
     flight.run(2.5, seen=True)
+    assert flight.landing.status == "in sight"
     assert flight.run(3.0, seen=True) == ["land on target"]
     assert flight.place == pytest.approx(PLACE, abs=0.01)
 
@@ -157,6 +158,7 @@ def test_a_strictness_of_0_lands_without_a_target() -> None:
     flight = Descent(7.0, replace(P, plnd_strict=0))
     flight.run(4.0, seen=True)
     assert flight.run(8.0) == ["land on target", "descend"]
+    assert flight.landing.status == "lost"
 
 
 @pytest.mark.parametrize(("strict", "then"), [(1, ["hold", "descend"]), (2, ["hold"])])

@@ -60,6 +60,7 @@ class PrecisionLanding:
         self._retry: Literal["", "climb", "sink"] = ""
         self._goal: Vector = (0.0, 0.0, 0.0)
         self._failed_s: float | None = None
+        self._now_s = 0.0
         self._seen_s: float | None = None
         self._seen_at: Pair = (0.0, 0.0)
         self._seen_from: Vector = (0.0, 0.0, 0.0)
@@ -71,10 +72,13 @@ class PrecisionLanding:
             return "failed"
         if self._retry:
             return f"retry {self.retries}: {self._retry}"
-        return "never seen" if self._seen_s is None else "in sight or lost lately"
+        if self._seen_s is None:
+            return "never seen"
+        return "in sight" if self._seen_s == self._now_s else "lost"
 
     def update(self, time_s: float, position_m: Vector, height_m: float) -> Instruction:
         """Return the instruction for a vehicle at ``position_m``, ``height_m`` above ground."""
+        self._now_s = time_s
         if self.target.found(time_s):
             place = self.target.place(time_s)
             self._seen_s, self._seen_at, self._seen_from = time_s, place, position_m
