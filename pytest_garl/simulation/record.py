@@ -33,9 +33,16 @@ _TRACK = ("time_s", "position_m", "attitude", "velocity_mps")
 
 def cpu_class() -> str:
     """Name the class of CPU on which equal flights have equal bytes."""
-    features = cv2.getCPUFeaturesLine()
-    best = "avx512" if "AVX512" in features.replace("?AVX512", "") else "avx2"
-    return f"{platform.machine()}-{best if 'AVX2' in features else 'base'}"
+    return f"{platform.machine()}-{_instructions(cv2.getCPUFeaturesLine())}"
+
+
+def _instructions(features: str) -> str:
+    """Name the best instructions of OpenCV's list, in which "?" follows what the CPU lacks."""
+    there = [word for word in features.split() if not word.endswith("?")]
+    for name in ("AVX512", "AVX2"):
+        if any(name in word for word in there):
+            return name.lower()
+    return "base"
 
 
 def hash_of(flight: Flight) -> str:

@@ -9,6 +9,8 @@ import sys
 
 import pytest
 
+from pytest_garl.simulation.record import _instructions
+
 OLD = {
     "OPENCV_CPU_DISABLE": "AVX512-SKX,AVX2,FMA3,AVX",
     "NPY_DISABLE_CPU_FEATURES": "AVX512F AVX512CD AVX512_SKX AVX512_CLX AVX512_CNL AVX512_ICL "
@@ -51,3 +53,15 @@ def test_the_verdict_does_not_depend_on_the_instructions() -> None:
     new, old = flown({}), flown(OLD)
     assert [each[:2] for each in new] == [each[:2] for each in old]
     assert {each[0] for each in new} == {"aborted", "collision"}
+
+
+@pytest.mark.parametrize(
+    ("features", "name"),
+    [
+        ("SSE SSE2 SSE3 *SSE4.1 *SSE4.2 *AVX *FP16 *AVX2 *AVX512-SKX", "avx512"),
+        ("SSE SSE2 SSE3 *SSE4.1 *SSE4.2 *AVX *FP16 *AVX2 *AVX512-SKX?", "avx2"),
+        ("SSE SSE2 SSE3 *SSE4.1 *SSE4.2 *AVX? *FP16? *AVX2? *AVX512-SKX?", "base"),
+    ],
+)
+def test_instructions_that_the_cpu_lacks_make_no_class(features: str, name: str) -> None:
+    assert _instructions(features) == name

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from pytest_garl.landing_system import Diagnostics
-from pytest_garl.simulation.flight import Contact, Crash, Flight, Step, Track
-from pytest_garl.verdicts.judge import judge, undecided
+from pytest_garl.simulation.flight import Contact, Crash, Flight, Separation, Step, Track
+from pytest_garl.verdicts.judge import closest_call, judge, undecided
 from pytest_garl.verdicts.metrics import share_interval, top_k
 from pytest_garl.verdicts.serialise import from_dict, to_dict
 from pytest_garl.verdicts.verdict import Limits
@@ -168,3 +168,34 @@ def test_top_k_counts_flights_up_to_the_kth_violation() -> None:
     bad = judge(flight("landed", (5.0, 0.0, 0.2)), Limits())
     assert top_k([good, bad, good, bad], k=2) == 4
     assert top_k([good, bad], k=2) is None
+
+
+def gap(body: str, kind: str, body_class: Any, distance_m: float, time_s: float) -> Separation:
+    return Separation(
+        body=body, kind=kind, body_class=body_class, distance_m=distance_m, time_s=time_s
+    )
+
+
+def test_a_closest_call_is_named_as_the_collision_that_it_nearly_was() -> None:
+    near = flight(
+        "landed",
+        (0.0, 0.0, 0.2),
+        steps=(step(29.5, seen=("dog-1",)),),
+        separations=(
+            gap("ground", "ground", "ground", 0.0, 30.0),
+            gap("tree-1", "tree", "static", 2.0, 10.0),
+            gap("dog-1", "dog", "dynamic", 0.4, 30.0),
+        ),
+    )
+    assert closest_call(near) == ("IV:dog:last-metre:seen", "dog-1")
+    collided = dataclasses.replace(
+        near, outcome="collision", contacts=hit("dog-1", "dog", "dynamic")
+    )
+    assert judge(collided, Limits()).signature == closest_call(near)[0]
+
+
+def test_what_stays_three_metres_away_is_no_close_call() -> None:
+    far = flight(
+        "landed", (0.0, 0.0, 0.2), separations=(gap("tree-1", "tree", "static", 3.0, 10.0),)
+    )
+    assert closest_call(far) == ("", "")
