@@ -90,7 +90,7 @@ def fly_bare(
             wind = wind_mps if state.time_s >= wind_from_s else (0.0, 0.0)
             air = velocity[0] - wind[0], velocity[1] - wind[1], velocity[2]
             dx, dy, dz = drag(air, model)
-            world.step((fx + dx, fy + dy, fz + dz), rotate(attitude, torque))
+            world.step(position, (fx + dx, fy + dy, fz + dz), rotate(attitude, torque))
     finally:
         world.close()
     table = np.array(rows)

@@ -28,6 +28,7 @@ YAW_RATE_P = 6.0
 """Bandwidths in 1/s, each loop a half to a quarter of the next inner one, the innermost close to
 the motors' 20 1/s."""
 MAX_TILT_RAD = math.radians(25)
+_MAX_SLOPE = math.tan(MAX_TILT_RAD)
 MAX_ACCELERATION_MPS2 = 4.0
 MAX_RATE_RADPS = 3.5
 MAX_CLIMB_MPS = 5.0
@@ -62,7 +63,7 @@ class FlightControl:
         force = (acceleration[0], acceleration[1], acceleration[2] + GRAVITY_MPS2)
         vertical = max(2.0, force[2])
         tilt = math.hypot(force[0], force[1]) / vertical
-        scale = min(1.0, math.tan(MAX_TILT_RAD) / tilt) if tilt > 0 else 1.0
+        scale = _MAX_SLOPE / tilt if tilt > _MAX_SLOPE else 1.0
         direction = _unit((force[0] * scale, force[1] * scale, vertical))
         up = _z_axis(state.attitude)
         thrust = self._model.mass_kg * vertical / max(0.5, up[2])
@@ -74,31 +75,36 @@ class FlightControl:
         if isinstance(command, VelocitySetpoint):
             return command.velocity_mps, command.yaw_rad
         if isinstance(command, PositionSetpoint):
-            target, top, yaw = command.position_m, command.speed_mps, command.yaw_rad
-            error = [aim - at for aim, at in zip(target, position, strict=True)]
-            velocity = [POSITION_P * value for value in error]
-            length = math.sqrt(sum(value * value for value in velocity))
-            factor = min(1.0, top / length) if length > 0 else 1.0
-            return (velocity[0] * factor, velocity[1] * factor, velocity[2] * factor), yaw
+            (ax, ay, az), (x, y, z) = command.position_m, position
+            vx, vy, vz = POSITION_P * (ax - x), POSITION_P * (ay - y), POSITION_P * (az - z)
+            length = math.sqrt(vx * vx + vy * vy + vz * vz)
+            factor = command.speed_mps / length if length > command.speed_mps else 1.0
+            return (vx * factor, vy * factor, vz * factor), command.yaw_rad
         climb = ABORT_CLIMB_MPS if isinstance(command, Abort) else 0.0
         if isinstance(command, Land):
             climb = -command.speed_mps
-        vx, vy = (POSITION_P * (hold[axis] - position[axis]) for axis in (0, 1))
+        vx, vy = POSITION_P * (hold[0] - position[0]), POSITION_P * (hold[1] - position[1])
         return (vx, vy, climb), 0.0
 
     def _acceleration(self, state: VehicleState, wanted: Vector, dt_s: float) -> Vector:
-        bounded = (wanted[0], wanted[1], min(MAX_CLIMB_MPS, max(-MAX_DESCENT_MPS, wanted[2])))
-        result = []
-        for axis in range(3):
-            error = bounded[axis] - state.velocity_mps[axis]
-            proportional = VELOCITY_P * error
-            # Integrating while the output is saturated would wind up and overshoot.
-            if abs(proportional) < MAX_ACCELERATION_MPS2:
-                total = self._integral[axis] + VELOCITY_I * error * dt_s
-                self._integral[axis] = min(MAX_INTEGRAL_MPS2, max(-MAX_INTEGRAL_MPS2, total))
-            limited = min(MAX_ACCELERATION_MPS2, max(-MAX_ACCELERATION_MPS2, proportional))
-            result.append(limited + self._integral[axis])
-        return result[0], result[1], result[2]
+        (wx, wy, wz), (vx, vy, vz) = wanted, state.velocity_mps
+        climb = _bounded(wz, -MAX_DESCENT_MPS, MAX_CLIMB_MPS)
+        return (
+            self._axis(0, wx - vx, dt_s),
+            self._axis(1, wy - vy, dt_s),
+            self._axis(2, climb - vz, dt_s),
+        )
+
+    def _axis(self, axis: int, error: float, dt_s: float) -> float:
+        proportional = VELOCITY_P * error
+        integral = self._integral[axis]
+        # Integrating while the output is saturated would wind up and overshoot.
+        if -MAX_ACCELERATION_MPS2 < proportional < MAX_ACCELERATION_MPS2:
+            total = integral + VELOCITY_I * error * dt_s
+            integral = _bounded(total, -MAX_INTEGRAL_MPS2, MAX_INTEGRAL_MPS2)
+            self._integral[axis] = integral
+            return proportional + integral
+        return _bounded(proportional, -MAX_ACCELERATION_MPS2, MAX_ACCELERATION_MPS2) + integral
 
     def _attitude(
         self, state: VehicleState, direction: Vector, yaw_rad: float, thrust_n: float
@@ -106,13 +112,21 @@ class FlightControl:
         # The tilt error as a rotation vector in the body frame: z x wanted direction.
         wx, wy, _ = _to_body(state.attitude, direction)
         yaw_error = math.remainder(yaw_rad - _yaw(state.attitude), 2 * math.pi)
-        rates = (-wy * ATTITUDE_P, wx * ATTITUDE_P, yaw_error * ATTITUDE_P / 4)
-        torque = []
-        for axis, gain in enumerate((RATE_P, RATE_P, YAW_RATE_P)):
-            wanted = min(MAX_RATE_RADPS, max(-MAX_RATE_RADPS, rates[axis]))
-            error = wanted - state.angular_velocity_radps[axis]
-            torque.append(self._model.inertia[axis] * gain * error)
-        return mix(thrust_n, (torque[0], torque[1], torque[2]), self._model)
+        roll = _bounded(-wy * ATTITUDE_P, -MAX_RATE_RADPS, MAX_RATE_RADPS)
+        pitch = _bounded(wx * ATTITUDE_P, -MAX_RATE_RADPS, MAX_RATE_RADPS)
+        yaw = _bounded(yaw_error * ATTITUDE_P / 4, -MAX_RATE_RADPS, MAX_RATE_RADPS)
+        (p, q, r), (ix, iy, iz) = state.angular_velocity_radps, self._model.inertia
+        torque = (
+            ix * RATE_P * (roll - p),
+            iy * RATE_P * (pitch - q),
+            iz * YAW_RATE_P * (yaw - r),
+        )
+        return mix(thrust_n, torque, self._model)
+
+
+def _bounded(value: float, low: float, high: float) -> float:
+    # Half the time of min(high, max(low, value)), in the innermost loop.
+    return low if value < low else high if value > high else value
 
 
 def _z_axis(q: tuple[float, float, float, float]) -> Vector:

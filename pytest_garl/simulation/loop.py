@@ -208,19 +208,24 @@ class Loop:
         fx, fy, fz = rotate(state.attitude, (0.0, 0.0, total))
         vx, vy, vz = state.velocity_mps
         dx, dy, dz = drag((vx - self.wind[0], vy - self.wind[1], vz), self.model)
-        self.world.step((fx + dx, fy + dy, fz + dz), rotate(state.attitude, torque))
+        force = (fx + dx, fy + dy, fz + dz)
+        self.world.step(state.position_m, force, rotate(state.attitude, torque))
 
     def _contacts(
         self, now: float, position: Vector, attitude: Quaternion, velocity: Vector
     ) -> Outcome | None:
-        x, y, _, _ = attitude
-        tilt = math.acos(max(-1.0, min(1.0, 1 - 2 * (x * x + y * y))))
-        speed = math.sqrt(sum(value * value for value in velocity))
         if not self.airborne and position[2] > AIRBORNE_M:
             self.airborne = True
             self.recorder.event("took_off", "left the ground")
+        touches = self.world.touches()
+        if not touches:
+            self.landed_since = None
+            return None
+        x, y, _, _ = attitude
+        tilt = math.acos(max(-1.0, min(1.0, 1 - 2 * (x * x + y * y))))
+        speed = math.sqrt(sum(value * value for value in velocity))
         grounded = False
-        for touch in self.world.touches():
+        for touch in touches:
             if touch.body != "ground":
                 approach = self._approach_mps(touch.body, velocity)
                 self.recorder.contact(touch.body, touch.position_m, approach, tilt)

@@ -92,7 +92,9 @@ class MovingObject:
         most = self.type.acceleration_mps2 * dt_s
         share = min(1.0, most / change) if change > 0 else 0.0
         vx, vy = self.vx_mps + share * dvx, self.vy_mps + share * dvy
-        vx, vy = self._slide(vx, vy, dt_s, [*self._near, *self._met(others)])
+        solids = [*self._near, *self._met(others)]
+        if solids:
+            vx, vy = self._slide(vx, vy, dt_s, solids)
         x_min, x_max, y_min, y_max = self._bounds
         x, y = self.x_m + vx * dt_s, self.y_m + vy * dt_s
         self.x_m, self.y_m = min(x_max, max(x_min, x)), min(y_max, max(y_min, y))
@@ -115,11 +117,11 @@ class MovingObject:
                 high_m=other.high_m,
             )
             for other in others
-            if other is not self
+            if abs(other.x_m - self.x_m) < _MEETING_M
+            and abs(other.y_m - self.y_m) < _MEETING_M
+            and other is not self
             and other.low_m < self.high_m
             and self.low_m < other.high_m
-            and abs(other.x_m - self.x_m) < _MEETING_M
-            and abs(other.y_m - self.y_m) < _MEETING_M
         ]
 
     def _slide(

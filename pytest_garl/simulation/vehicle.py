@@ -6,6 +6,7 @@ propellers, which make 1 m from tip to tip; 2,355 g with its TB47D battery.
 
 from __future__ import annotations
 
+import functools
 import math
 from dataclasses import dataclass
 
@@ -68,13 +69,20 @@ Vector = tuple[float, float, float]
 
 def lag(thrusts: Thrusts, wanted: Thrusts, model: VehicleModel, dt_s: float) -> Thrusts:
     """Return the motors' thrusts after ``dt_s``: first order, within [0, maximum]."""
-    share = 1 - math.exp(-dt_s / MOTOR_LAG_S)
+    share = _lag_share(dt_s)
     top = model.max_thrust_n
-    a, b, c, d = (
-        now + (min(top, max(0.0, aim)) - now) * share
-        for now, aim in zip(thrusts, wanted, strict=True)
+    (a, b, c, d), (wa, wb, wc, wd) = thrusts, wanted
+    return (
+        a + ((0.0 if wa < 0.0 else top if wa > top else wa) - a) * share,
+        b + ((0.0 if wb < 0.0 else top if wb > top else wb) - b) * share,
+        c + ((0.0 if wc < 0.0 else top if wc > top else wc) - c) * share,
+        d + ((0.0 if wd < 0.0 else top if wd > top else wd) - d) * share,
     )
-    return a, b, c, d
+
+
+@functools.cache
+def _lag_share(dt_s: float) -> float:
+    return 1 - math.exp(-dt_s / MOTOR_LAG_S)
 
 
 def wrench(thrusts: Thrusts, model: VehicleModel) -> tuple[float, Vector]:

@@ -92,19 +92,20 @@ class World:
         """Free the physics client."""
         self._p.disconnect(**self._call)
 
-    def step(self, force: Vector, torque: Vector) -> None:
-        """Advance by 1/240 s under a force and a torque on the UAV, in the world frame."""
-        position, _ = self._p.getBasePositionAndOrientation(self._uav, **self._call)
-        self._p.applyExternalForce(
-            self._uav, -1, force, position, self._p.WORLD_FRAME, **self._call
-        )
-        self._p.applyExternalTorque(self._uav, -1, torque, self._p.WORLD_FRAME, **self._call)
-        self._p.stepSimulation(**self._call)
+    def step(self, position: Vector, force: Vector, torque: Vector) -> None:
+        """Advance by 1/240 s under a force and a torque on the UAV, which is at ``position``.
+
+        All are in the world frame.
+        """
+        client, uav = self._client, self._uav
+        pybullet.applyExternalForce(uav, -1, force, position, pybullet.WORLD_FRAME, client)
+        pybullet.applyExternalTorque(uav, -1, torque, pybullet.WORLD_FRAME, client)
+        pybullet.stepSimulation(client)
 
     def uav(self) -> tuple[Vector, Quaternion, Vector, Vector]:
         """Position, attitude, velocity and angular velocity of the UAV, in the world frame."""
-        position, attitude = self._p.getBasePositionAndOrientation(self._uav, **self._call)
-        velocity, spin = self._p.getBaseVelocity(self._uav, **self._call)
+        position, attitude = pybullet.getBasePositionAndOrientation(self._uav, self._client)
+        velocity, spin = pybullet.getBaseVelocity(self._uav, self._client)
         return position, attitude, velocity, spin
 
     def move(self, name: str, position_m: Vector, yaw_rad: float, velocity: Vector) -> None:
