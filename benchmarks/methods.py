@@ -10,6 +10,7 @@ import argparse
 import csv
 import subprocess
 import sys
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -44,12 +45,15 @@ FIELDS = (
 def search(method: str, seed: int, budget: int) -> Path:
     """Fly both maps, or go on with it; return the ledger."""
     folder = Path(f".garl/methods/{method}-{seed}-{budget}")
+    options = [f"--garl-budget={budget}", f"--garl-method={method}", f"--garl-seed={seed}"]
+    return run(folder, "landing_systems/test_opencv_mls.py", [*options, "--garl-npcs=waypoint"])
+
+
+def run(folder: Path, tests: str, options: Sequence[str]) -> Path:
+    """Run a search with its files in ``folder``, or go on with it; return the ledger."""
     ledger = folder / "ledger.sqlite"
     command = [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", "--tb=no", "-r", ""]
-    command += [f"--garl-budget={budget}", f"--garl-method={method}", f"--garl-seed={seed}"]
-    command += ["--garl-npcs=waypoint", "-o", f"garl_dir={folder}"]
-    command += ["landing_systems/test_opencv_mls.py"]
-    command += ["--garl-resume"] * ledger.exists()
+    command += [*options, "-o", f"garl_dir={folder}", tests, *["--garl-resume"] * ledger.exists()]
     done = subprocess.run(command, check=False)
     if done.returncode not in (0, 1):
         raise SystemExit(done.returncode)
