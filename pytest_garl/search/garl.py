@@ -1,9 +1,10 @@
-"""garl: a search that takes every way to fail as seriously as any other.
+"""garl: a search that looks for every way to fail.
 
 MAP-Elites (Mouret and Clune 2015, "Illuminating search spaces by mapping elites") with the
 paper's chromosomes and crossover.  A cell is a way to fail: a violation's signature, or that which
-a near miss would have had.  Each cell is bred from as often as any other, from its worst flights,
-so that the twentieth violation of a kind takes nothing from the first of another.
+a near miss would have had.  Which cell is bred from is decided by Thompson sampling (Thompson
+1933) of what its children came to: a first violation of a kind counts most, the twentieth little,
+so that near misses of another kind are worth more than one more of the same.
 """
 
 from __future__ import annotations
@@ -22,7 +23,6 @@ from pytest_garl.search.method import Flown, Plan
 from pytest_garl.search.objectives import threat
 from pytest_garl.search.operators import (
     CROSSOVER_PROBABILITY,
-    MUTATION_PROBABILITY,
     Matrix,
     local_steps,
     nuclear_gene_crossover,
@@ -31,16 +31,26 @@ from pytest_garl.search.operators import (
 EXPLORES = 0.25
 """Share of scenarios that have no parents, so that cells are still found late in a search."""
 AIMS = 0.5
-"""Share of children that differ from a parent in nothing but the object that it came nearest to:
-what decides whether centimetres are missing."""
+"""Share of children that differ from a parent in the object that it came nearest to, by a small
+step: what decides whether centimetres are missing."""
+WEATHERS = 0.5
+"""Share of these that also meet in another weather, that of a flight that was not aborted."""
+PROGRESS = 0.01
+"""A child that raises its cell's threat by so much has succeeded."""
+MEMORY = 0.9
+"""What a trial still counts for after one more of its cell: cells change as they are searched."""
+
+
+Genes = tuple[tuple[str, float], ...]
 
 
 class Garl:
     """The archive of cells, and how it is bred from.
 
     ``explores`` is the share of scenarios without parents, ``aims`` that of children whose
-    steps are aimed, ``crossover`` the paper's probability for the others, ``cell`` names the
-    cell of a flight's result.
+    steps are aimed, ``weathers`` that of these in another weather, ``crossover`` the paper's
+    probability for the others, ``cell`` names the cell of a flight's result; ``learns_cells``
+    is whether cells are chosen by their success instead of in turn.
     """
 
     learns = True
@@ -51,18 +61,24 @@ class Garl:
         *,
         explores: float = EXPLORES,
         aims: float = AIMS,
+        weathers: float = WEATHERS,
+        learns_cells: bool = True,
         crossover: float = CROSSOVER_PROBABILITY,
         cell: Callable[[dict[str, Any]], str] | None = None,
     ) -> None:
         self._plan, self._explores, self._aims = plan, explores, aims
+        self._weathers, self._learns_cells = weathers, learns_cells
         self._crossover = crossover
         self._cell = cell or cell_of
         place = hashlib.sha256(f"garl {plan.map.name}".encode()).digest()
         key = int.from_bytes(place[:4], "big")
         self._rng = np.random.default_rng(np.random.SeedSequence(plan.seed, spawn_key=(key,)))
         self._cells: defaultdict[str, list[Flown]] = defaultdict(list)
-        self._bred: Counter[str] = Counter()
-        self._asked: set[tuple[tuple[str, float], ...]] = set()
+        self._trials: defaultdict[str, tuple[float, float]] = defaultdict(lambda: (0.0, 0.0))
+        self._parents: dict[Genes, str] = {}
+        self._signatures: Counter[str] = Counter()
+        keys = plan.genome.keys
+        self._weather = np.array([key.startswith("environment.") for key in keys])
 
     def ask(self) -> Sequence[Scenario]:
         """Return the next generation."""
@@ -71,50 +87,73 @@ class Garl:
     def tell(self, flown: Sequence[Flown]) -> Sequence[tuple[float, ...]]:
         """Put each flight into its cell; return its threat."""
         for item in flown:
-            self._cells[self._cell(item.result)].append(item)
+            name = self._cell(item.result)
+            worth = self._worth(name, item)
+            parent = self._parents[item.scenario.genes]
+            wins, losses = self._trials[parent]
+            self._trials[parent] = MEMORY * wins + worth, MEMORY * losses + 1 - worth
+            self._cells[name].append(item)
         return [(threat(item.result),) for item in flown]
+
+    def _worth(self, name: str, item: Flown) -> float:
+        """Return how much of a success a flight is, 0 to 1."""
+        signature = item.result["verdict"]["signature"]
+        if signature:
+            self._signatures[signature] += 1
+            return float(self._signatures[signature] ** -0.5)
+        best = max((threat(other.result) for other in self._cells[name]), default=-1.0)
+        return float(threat(item.result) > best + PROGRESS)
 
     def _new(self) -> Scenario:
         """Return a scenario that was not asked for before."""
         while True:
             explores = not self._cells or self._rng.random() < self._explores
-            scenario = self._random() if explores else self._child()
-            if scenario.genes not in self._asked:
-                self._asked.add(scenario.genes)
+            name = "" if explores else self._choose()
+            scenario = self._child(name) if name else self._random()
+            if scenario.genes not in self._parents:
+                self._parents[scenario.genes] = name
                 return scenario
+
+    def _choose(self) -> str:
+        """Return the cell that looks most promising in a draw from what is known of each."""
+        names = sorted(self._cells)
+        if not self._learns_cells:
+            bred = Counter(self._parents.values())
+            return min(names, key=lambda name: bred[name])
+        trials = np.array([self._trials[name] for name in names])
+        return names[int(np.argmax(self._rng.beta(1 + trials[:, 0], 1 + trials[:, 1])))]
 
     def _random(self) -> Scenario:
         row = self._plan.genome.random(self._rng)
         return self._scenario(row, int(self._rng.integers(2**32)))
 
-    def _child(self) -> Scenario:
-        """Return a child of a flight from the cell that was bred from least.
+    def _child(self, name: str) -> Scenario:
+        """Return a child of one of a cell's flights.
 
         A scenario's own seed is inherited with the tail of the chromosome, where the objects
         are: what they do by chance is part of what a parent was selected for.
         """
         rng, genome = self._rng, self._plan.genome
-        names = sorted(self._cells)
-        least = min(self._bred[name] for name in names)
-        name = str(rng.choice([name for name in names if self._bred[name] == least]))
-        self._bred[name] += 1
-        pair = [self._elite(name), self._elite(str(rng.choice(names)))]
-        rows = np.array([[*encode(each.scenario, genome), each.scenario.seed] for each in pair])
-        aim = np.array(
-            [key.startswith(f"{pair[0].result['closest_body']}.") for key in genome.keys]
-        )
-        aims = rng.random() < self._aims and aim.any()
-        if not aims:
-            rows = nuclear_gene_crossover(rows, genome.borders, rng, self._crossover)
-        parent = rows[:1, :-1]
-        moved = local_steps(
-            parent,
-            genome.lower,
-            genome.upper,
-            rng,
-            probability=1.0 if aims else MUTATION_PROBABILITY,
-        )
-        return self._scenario(np.where(aim | (not aims), moved, parent)[0], int(rows[0, -1]))
+        first = self._elite(name)
+        row, seed = encode(first.scenario, genome), first.scenario.seed
+        body = f"{first.result['closest_body']}."
+        aim = np.array([key.startswith(body) for key in genome.keys])
+        if aim.any() and rng.random() < self._aims:
+            moved = local_steps(row[None], genome.lower, genome.upper, rng, probability=1.0)[0]
+            if rng.random() < self._weathers:
+                row = np.where(self._weather, encode(self._in_other_weather(), genome), row)
+            return self._scenario(np.where(aim, moved, row), seed)
+        second = self._elite(str(rng.choice(sorted(self._cells)))).scenario
+        pair = np.array([[*row, seed], [*encode(second, genome), second.seed]])
+        crossed = nuclear_gene_crossover(pair, genome.borders, rng, self._crossover)[:1]
+        moved = local_steps(crossed[:, :-1], genome.lower, genome.upper, rng)[0]
+        return self._scenario(moved, int(crossed[0, -1]))
+
+    def _in_other_weather(self) -> Scenario:
+        """Return a flight that was not aborted, or any where all were."""
+        every = [item for name in sorted(self._cells) for item in self._cells[name]]
+        good = [item for item in every if item.result["outcome"] != "aborted"] or every
+        return good[int(self._rng.integers(len(good)))].scenario
 
     def _elite(self, name: str) -> Flown:
         """Return one of a cell's flights that came nearest to a violation, or violated."""
