@@ -58,7 +58,7 @@ def test_a_rare_way_to_fail_is_found_by_way_of_its_near_misses() -> None:
     assert found["common"] >= by_chance["common"] / 2
 
 
-def test_every_cell_is_bred_from_alike() -> None:
+def test_cells_of_which_nothing_is_known_are_bred_from_alike() -> None:
     search_ = Garl(PLAN)
     first = search_.ask()
     cells = ["a"] * 17 + ["b", "c", ""]
@@ -70,6 +70,29 @@ def test_every_cell_is_bred_from_alike() -> None:
     share = 30 * 20 * (1 - EXPLORES) / 4
     for cell in ("a", "b", "c", ""):
         assert 0.7 * share < bred[cell] < 1.3 * share
+
+
+def test_a_cell_whose_children_succeed_is_bred_from_more_often() -> None:
+    method = Garl(PLAN, explores=0.0, crossover=0.0)
+    lines: dict[int, str] = {}
+    bred: Counter[str] = Counter()
+    for _ in range(5):
+        flown = []
+        for index, scenario in enumerate(method.ask()):
+            line = lines.setdefault(scenario.seed, "ab"[index % 2])
+            # The line of b comes nearer with every child, that of a never does.
+            far = 2.9 if line == "a" else 2.9 - 0.035 * bred["b"]
+            flown.append(Flown(scenario=scenario, result=result("", line, far)))
+            bred[line] += 1
+        method.tell(flown)
+    # Ten of each were there at first.
+    assert bred["b"] - 10 > 3 * (bred["a"] - 10) > 0
+
+
+def test_the_first_violation_of_a_kind_is_worth_more_than_the_fourth() -> None:
+    method = Garl(PLAN)
+    items = [Flown(scenario=each, result=result("IV:dog")) for each in method.ask()]
+    assert [method._worth("IV:dog", item) for item in items[:4]] == [1.0, 0.5**0.5, 3**-0.5, 0.5]
 
 
 def test_a_flights_cell_is_how_it_failed_or_nearly_did() -> None:
