@@ -35,7 +35,7 @@ def find_guide(
     paths.
     """
     start, goal = (int(cell) for cell in grid.index(np.stack([start_m, goal_m])))
-    occupied = memoryview(grid.occupancy)
+    occupied = grid.occupancy.data
     if occupied[start] or occupied[goal]:
         return None
     lines, line = (int(stride) for stride in grid.strides[:2])

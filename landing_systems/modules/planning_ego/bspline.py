@@ -100,4 +100,4 @@ def fit(samples: Array, start: Array, end: Array, span_s: float) -> UniformSplin
 def _inner_fit(samples: int) -> tuple[Array, Array]:
     """Matrices: all control points to the inner knots, and inner knots to free points."""
     matrix = sampling_matrix(samples + 2, 1)[1:-1]
-    return matrix, np.linalg.pinv(matrix[:, FIXED:-FIXED])
+    return matrix, np.asarray(np.linalg.pinv(matrix[:, FIXED:-FIXED]), np.float64)

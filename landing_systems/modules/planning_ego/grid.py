@@ -23,6 +23,8 @@ class OccupancyGrid:
       stands beside the UAV unless it was seen from higher up or from afar.
     - A cell with a hit in a frame is hit, whatever passes through it as well (OctoMap's
       rule; upstream lets the majority decide).
+    - With ``fill_below`` everything under a solid cell is occupied: of a wall such a camera
+      sees the top.
     - Below ``ground_height_m`` there is no obstacle; what is asked there gets the answer of
       the lowest layer, so that the ground blocks no landing but a dog does.
     - Outside of the grid, to the sides and above, everything is occupied.
@@ -65,7 +67,12 @@ class OccupancyGrid:
         around[tuple(slice(b, -b) for b in self._border)] = 0
         self.occupancy = around.reshape(-1)
         """How many solid cells reach each cell; flat, with ``strides``."""
-        steps = np.meshgrid(*(np.arange(-g, g + 1) for g in self._growth), indexing="ij")
+        # Highest solid cell of each column, counted from the array's lower end; for fill_below.
+        self._tops = np.full(int(x * y), -1, np.intp)
+        grown = [np.arange(-g, g + 1) for g in self._growth]
+        if p.fill_below:
+            grown[2] = np.zeros(1, int)
+        steps = np.meshgrid(*grown, indexing="ij")
         self._stamp = sum(
             step.ravel() * stride for step, stride in zip(steps, self.strides, strict=True)
         )
@@ -104,7 +111,7 @@ class OccupancyGrid:
         return np.asarray(self.occupancy[self.index(points_m)] > 0)
 
     def index(self, points_m: Points) -> Cells:
-        """Return flat indices into ``occupancy`` of points (n, 3); what is outside is the border."""
+        """Return flat indices into ``occupancy`` of points (n, 3); outside is the border."""
         border = self._border
         cells = (points_m - self.origin_m) * (1 / self._p.resolution_m) + border
         lowest = border - (1, 1, 0)
@@ -153,16 +160,37 @@ class OccupancyGrid:
         """Bring what is solid and inflated in line with the log-odds."""
         raised = self._raised
         odds = self._odds[raised]
-        solid = odds >= np.float32(self._threshold)
+        solid = odds >= self._threshold
         differs = solid != self._solid[raised]
         changed, state = raised[differs], solid[differs]
         self._solid[changed] = state
         self._solid_since[changed[state]] = time_s
-        reached = changed[:, None] + self._stamp
-        # Cells reach one another several times over, so that plain addition would not do.
-        np.add.at(self.occupancy, reached[state], np.int16(1))
-        np.add.at(self.occupancy, reached[~state], np.int16(-1))
-        self._raised = raised[odds > np.float32(self._floor)]
+        self._raised = raised[odds > self._floor]
+        if self._p.fill_below:
+            self._settle_columns(np.unique(changed // self.strides[1]))
+        else:
+            self._reach(changed[state], 1)
+            self._reach(changed[~state], -1)
+
+    def _settle_columns(self, columns: Cells) -> None:
+        """Renew the tops of columns, below which all is occupied."""
+        height = int(self.strides[1])
+        solid = self._solid.reshape(-1, height)[columns]
+        tops = np.where(solid.any(axis=1), height - 1 - solid[:, ::-1].argmax(axis=1), -1)
+        before = self._tops[columns]
+        self._tops[columns] = tops
+        grow = self._growth[2]
+        levels = np.arange(height)
+        was = (before[:, None] >= 0) & (levels <= before[:, None] + grow)
+        now = (tops[:, None] >= 0) & (levels <= tops[:, None] + grow)
+        cells = columns[:, None] * height + levels
+        self._reach(cells[now & ~was], 1)
+        self._reach(cells[was & ~now], -1)
+
+    def _reach(self, cells: Cells, change: int) -> None:
+        """Let cells reach all those that they inflate to, or no longer."""
+        # Cells are reached several times over, so that plain addition would not do.
+        np.add.at(self.occupancy, cells[:, None] + self._stamp, np.int16(change))
 
 
 def _log_odds(probability: float) -> float:

@@ -19,8 +19,11 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Pairs:
-    """Pairs {p, v}: control point ``index`` (m,) shall lie beyond ``base`` (m, 3) along
-    the unit vector ``direction`` (m, 3)."""
+    """Pairs {p, v}, each of a place on an obstacle and the way out of it.
+
+    Control point ``index`` (m,) shall lie beyond ``base`` (m, 3) along the unit vector
+    ``direction`` (m, 3).
+    """
 
     index: NDArray[np.intp]
     base: Array

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from landing_systems.modules.planning_ego import costs
-from landing_systems.modules.planning_ego.bspline import FIXED, UniformSpline, fit
+from landing_systems.modules.planning_ego.bspline import FIXED, UniformSpline, fit, sampling_matrix
 from landing_systems.modules.planning_ego.guides import CollisionSearch, Pairs
 from landing_systems.modules.planning_ego.lbfgs import minimise
 from landing_systems.modules.planning_ego.parameters import EgoParameters
@@ -87,8 +87,7 @@ def _reallocate_time(
         if ratio <= 1 + p.feasibility_tolerance:
             return spline
         span = spline.span_s * min(ratio, p.time_ratio_limit)
-        knots = np.arange(len(spline.points) - 2) * spline.span_s
-        reference = spline.evaluate(knots)
+        reference = sampling_matrix(len(spline.points), 1) @ spline.points
         slower = fit(reference, task.start, task.end, span)
         objective = _Objective(p, span, reference=reference, fitness_weight=weight)
         points = solver.minimise(objective, slower.points)

@@ -70,6 +70,8 @@ class EgoParameters:
     """Obstacles grow by this, rounded up to cells, as a cube. [L] grid_map/obstacles_inflation."""
     vertical_inflation_m: float | None = None
     """Growth in z; ``None`` is ``inflation_m``. [O]"""
+    fill_below: bool = False
+    """What is below something solid is occupied as well, for a camera that sees only tops. [O]"""
     p_hit: float = 0.65
     p_miss: float = 0.35
     p_min: float = 0.12
@@ -222,6 +224,9 @@ LANDING = EgoParameters(
     # The UAV's radius of 0.5 m and 0.1 m for position and tracking, rounded up to 0.75 m.
     inflation_m=0.6,
     vertical_inflation_m=0.5,
+    # From above, a wall is its top, and nothing tells that one cannot fly into it from the side.
+    # It costs the way under trees, where a UAV 1 m wide has no business.
+    fill_below=True,
     # At 10 Hz a dog at 5 m/s stays in a cell for a frame or two: one hit occupies, and one or
     # two misses clear.  Upstream's six hits would take 0.6 s, and see no moving thing at all.
     p_hit=0.97,

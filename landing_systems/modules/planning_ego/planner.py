@@ -114,7 +114,7 @@ class EgoPlanner:
         if self._state == "INIT":
             self._state = "WAIT_TARGET"
         if self._state == "WAIT_TARGET" and self._goal is not None and not self._reached:
-            self._state = "GEN_NEW_TRAJ"
+            self._state, self._hold = "GEN_NEW_TRAJ", position
         if (
             self._state == "EMERGENCY_STOP"
             and np.linalg.norm(velocity) < self._p.emergency_exit_speed_mps
@@ -140,10 +140,10 @@ class EgoPlanner:
             self._hold, self._flown = here, None
             self._reached = flown.at_goal and self._state == "EXEC_TRAJ"
             self._state = "WAIT_TARGET" if self._reached else "GEN_NEW_TRAJ"
-        elif self._state == "EXEC_TRAJ":
+        elif self._state == "EXEC_TRAJ" and self._goal is not None:
             start = flown.spline.evaluate(0.0)
             near = np.linalg.norm(self._goal - position) < p.no_replan_distance_m
-            if not near and np.linalg.norm(here - start) >= p.replan_distance_m:
+            if not (near and flown.at_goal) and np.linalg.norm(here - start) >= p.replan_distance_m:
                 self._state = "REPLAN_TRAJ"
 
     def _try(self, time_s: float, position: Array, start: Array) -> bool:
