@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
@@ -24,19 +25,41 @@ def depth_image(
 ) -> NDArray[np.float32]:
     """Return the planar depth (H, W) of boxes on the ground z = 0; 100 where there is nothing."""
     eye = np.array(eye_m, float)
-    (cx, cy), f = camera.centre_px, camera.focal_px
-    u, v = np.meshgrid(np.arange(camera.width_px), np.arange(camera.height_px))
-    body = np.stack([(cy - v) / f, (cx - u) / f, np.full(u.shape, -1.0)], axis=-1)
-    rays = body @ Rotation.from_quat(attitude).as_matrix().T
+    rotation = Rotation.from_quat(attitude).as_matrix()
+    rays = _rays(camera) @ rotation.T.astype(np.float32)
     with np.errstate(divide="ignore", invalid="ignore"):
-        depth = np.where(rays[..., 2] < 0, -eye[2] / rays[..., 2], 100.0)
+        depth = np.where(rays[..., 2] < 0, np.float32(-eye[2]) / rays[..., 2], np.float32(100))
         for low, high in boxes:
-            to_low, to_high = (np.array(low) - eye) / rays, (np.array(high) - eye) / rays
+            part = _part_of_image(camera, (np.array([low, high]) - eye) @ rotation)
+            to_low = (np.array(low) - eye).astype(np.float32) / rays[part]
+            to_high = (np.array(high) - eye).astype(np.float32) / rays[part]
             enters = np.minimum(to_low, to_high).max(axis=-1)
             leaves = np.maximum(to_low, to_high).min(axis=-1)
-            seen = (enters > 0) & (enters <= leaves) & (enters < depth)
-            depth = np.where(seen, enters, depth)
-    return np.minimum(depth, 100.0).astype(np.float32)
+            seen = (enters > 0) & (enters <= leaves) & (enters < depth[part])
+            depth[part] = np.where(seen, enters, depth[part])
+    return np.minimum(depth, np.float32(100))
+
+
+def _rays(camera: Camera) -> NDArray[np.float32]:
+    (cx, cy), f = camera.centre_px, camera.focal_px
+    u, v = np.meshgrid(np.arange(camera.width_px), np.arange(camera.height_px))
+    rays = np.stack([(cy - v) / f, (cx - u) / f, np.full(u.shape, -1.0)], axis=-1)
+    return rays.astype(np.float32)
+
+
+def _part_of_image(camera: Camera, ends: Array) -> tuple[slice, slice]:
+    """Return rows and columns that surely hold a level camera's box; all if it is tilted.
+
+    ``ends`` (2, 3) are the lowest and highest corner in the body frame.
+    """
+    whole = slice(0, camera.height_px), slice(0, camera.width_px)
+    if (ends[0] > ends[1]).any() or -ends[1, 2] < 0.1:
+        return whole
+    (cx, cy), f = camera.centre_px, camera.focal_px
+    corners = np.array(list(itertools.product(*ends.T)))
+    u, v = cx + f * corners[:, 1] / corners[:, 2], cy + f * corners[:, 0] / corners[:, 2]
+    rows = slice(max(0, int(v.min()) - 1), max(0, int(v.max()) + 2))
+    return rows, slice(max(0, int(u.min()) - 1), max(0, int(u.max()) + 2))
 
 
 def observe(
@@ -63,15 +86,8 @@ def observe(
 
 def distance_to(boxes: Sequence[Box], points: Array) -> Array:
     """Distance (n,) of points (n, 3) from the nearest box."""
-    return np.min(
-        [
-            np.linalg.norm(
-                np.maximum(np.maximum(np.array(low) - points, points - np.array(high)), 0), axis=1
-            )
-            for low, high in boxes
-        ],
-        axis=0,
-    )
+    outside = [np.maximum(np.maximum(low - points, points - high), 0) for low, high in boxes]
+    return np.asarray(np.linalg.norm(outside, axis=2).min(axis=0))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

@@ -106,6 +106,15 @@ class OccupancyGrid:
             self._odds[known[unseen & (stood_s < p.static_after_s)]] = self._floor
         self._settle(time_s)
 
+    def add_solid(self, time_s: float, points_m: Points) -> None:
+        """Enter points (n, 3) that are known to be solid, as from a map; misses clear them."""
+        cells = np.unique(self._inside(points_m))
+        fresh = cells[self._odds[cells] <= self._floor]
+        self._odds[cells] = self._top
+        self._hit_at[cells] = time_s
+        self._raised = np.concatenate([self._raised, fresh])
+        self._settle(time_s)
+
     def occupied(self, points_m: Points) -> NDArray[np.bool_]:
         """Whether points (n, 3) lie within the inflated obstacles, or outside of the grid."""
         return np.asarray(self.occupancy[self.index(points_m)] > 0)
