@@ -71,9 +71,7 @@ def test_a_guide_leads_around_and_ends_where_asked() -> None:
     grid = known(POST)
     start, goal = np.array([-5.0, 0.0, 3.0]), np.array([2.5, 0.0, 3.0])
     for step in (1, 2):
-        guide = find_guide(
-            grid, start, goal, lowest_m=1.0, step=step, weight=1.2, max_nodes=50_000
-        )
+        guide = find_guide(grid, start, goal, lowest_m=1.0, step=step, weight=1.2, max_nodes=50_000)
         assert guide is not None
         assert not grid.occupied(guide).any()
         assert np.abs(guide[[0, -1]] - [start, goal]).max() <= 0.125 + 1e-9
@@ -96,9 +94,7 @@ def test_there_is_no_guide_into_an_obstacle_or_after_too_many_nodes() -> None:
     inside = np.array([-1.5, 0.0, 3.0])
 
     def search(goal: np.ndarray, max_nodes: int) -> np.ndarray | None:
-        return find_guide(
-            grid, start, goal, lowest_m=1.0, step=1, weight=1.2, max_nodes=max_nodes
-        )
+        return find_guide(grid, start, goal, lowest_m=1.0, step=1, weight=1.2, max_nodes=max_nodes)
 
     assert search(inside, 10_000) is None
     assert search(beyond, 10) is None

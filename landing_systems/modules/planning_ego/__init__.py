@@ -27,9 +27,13 @@ forgetting what has moved on, leaving an obstacle's inflation, replanning when f
 trajectory.
 
 Not reproduced: the ROS nodes, the server that turns trajectories into attitude commands, the
-yaw (the caller's), the topological search of its successor, and swarms.  It cannot see beside
-or above itself with a camera that looks down; what was never seen counts as free, as upstream.
-Obstacles do not move in its plans: they are where the latest frames have shown them.
+yaw (the caller's), the topological search of its successor, and swarms.
+
+Limits.  A camera that looks down does not see what is beside or above the UAV, and what was
+never seen counts as free, as upstream: flown low through country it has not looked at from above,
+the planner meets a wall that is higher than the UAV when it is too late.  Cross at a height above
+everything, and descend into what has been seen.  Obstacles do not move in its plans: they are
+where the latest frames have shown them.
 """
 
 from landing_systems.modules.planning_ego.errors import (

@@ -47,6 +47,16 @@ class Pairs:
         return np.asarray(np.einsum("ij,ij->i", points[self.index] - self.base, self.direction))
 
 
+def samples_per_span(parameters: EgoParameters) -> int:
+    """Return at how many places of a knot span a curve is checked: two to a cell's side."""
+    return max(2, math.ceil(2 * parameters.control_point_distance_m / parameters.resolution_m))
+
+
+def checked_samples(count: int, per_span: int, share: float) -> int:
+    """Return how many samples of a curve of ``count`` control points must be free."""
+    return max(1, math.ceil(share * ((count - 3) * per_span + 1)))
+
+
 class CollisionSearch:
     """Finds where splines with ``count`` control points collide, and the ways out.
 
@@ -69,13 +79,10 @@ class CollisionSearch:
         self._p = parameters
         self._lowest_m = lowest_m
         self._escape_m = escape_m
-        # Two samples to a cell's side.
-        self._per_span = max(
-            2, math.ceil(2 * parameters.control_point_distance_m / parameters.resolution_m)
-        )
-        self._matrix = sampling_matrix(count, self._per_span)
-        self._checked = max(1, math.ceil(checked_share * len(self._matrix)))
-        knots = np.arange(len(self._matrix)) / self._per_span
+        per_span = samples_per_span(parameters)
+        self._matrix = sampling_matrix(count, per_span)
+        self._checked = checked_samples(count, per_span, checked_share)
+        knots = np.arange(len(self._matrix)) / per_span
         # Near the knot k the curve is drawn most by the control point k + 1.
         self._owner = np.floor(knots + 1.5).astype(np.intp)
         self._movable = FIXED, count - FIXED - 1
@@ -116,8 +123,8 @@ class CollisionSearch:
                 owners = np.intersect1d(owners, among)
                 if not len(owners):
                     continue
-            guide = self._guide(curve[before], curve[after])
-            if guide is None or not len(owners):
+            guide = self._guide(curve[before], curve[after]) if len(owners) else None
+            if guide is None:
                 return None
             result = result.and_also(self._push(points, owners, guide))
         return result

@@ -199,6 +199,8 @@ class _Solver:
         )
         self.iterations_left -= found.iterations
         whole[FIXED:-FIXED] = found.x
+        # The curve is in the hull of its control points: it goes no lower than they do.
+        np.maximum(whole[:, 2], self._lowest_m, out=whole[:, 2])
         return whole
 
 

@@ -207,8 +207,7 @@ LANDING = EgoParameters(
     goal_change_m=0.1,
     max_deviation_m=1.0,
     lookahead_s=0.1,
-    # Two cells are the UAV's radius; four times upstream's area of flight at a sixth of
-    # the cells per cubic metre.
+    # Two cells are the UAV's radius, and ten times upstream's volume takes fewer cells.
     resolution_m=0.25,
     map_size_m=(60.0, 60.0, 14.0),
     # The corner of the view from 10 m is 16 m away; with less, the ground's objects would

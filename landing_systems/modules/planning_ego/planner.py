@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import Literal
 
@@ -11,6 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from landing_systems.modules.planning_ego.bspline import UniformSpline
 from landing_systems.modules.planning_ego.errors import NoTrajectoryError, PlannerError
 from landing_systems.modules.planning_ego.grid import OccupancyGrid
+from landing_systems.modules.planning_ego.guides import checked_samples, samples_per_span
 from landing_systems.modules.planning_ego.initial import local_target
 from landing_systems.modules.planning_ego.parameters import EgoParameters
 from landing_systems.modules.planning_ego.trajectory import escape_distance, plan_trajectory
@@ -195,24 +197,26 @@ class EgoPlanner:
 
     def _collision_in(self, flown: _Flown, time_s: float) -> float | None:
         """Return the time in which the checked part of a trajectory collides, or None."""
-        p = self._p
-        elapsed, duration = time_s - flown.began_s, flown.spline.duration_s
-        if not flown.at_goal and elapsed < p.checked_share * duration:
-            duration *= p.checked_share
-        # Two samples to a cell's side at full speed.
-        step = p.resolution_m / (2 * p.max_vel_mps)
-        moments = np.arange(min(elapsed, duration), duration, step)
-        points = flown.spline.evaluate(np.append(moments, duration))
+        p, spline = self._p, flown.spline
+        elapsed = time_s - flown.began_s
+        # The places that the optimisation has checked, so that both agree.
+        count, per_span = len(spline.points), samples_per_span(p)
+        step = spline.span_s / per_span
+        whole = flown.at_goal or elapsed >= p.checked_share * spline.duration_s
+        last = checked_samples(count, per_span, 1.0 if whole else p.checked_share)
+        moments = np.arange(math.ceil(elapsed / step), last) * step
+        points = spline.evaluate(moments)
         hits = self.grid.occupied(points)
         if not hits.any():
             return None
-        lowest = min(p.min_height_m, float(points[0, 2]))
+        here = spline.evaluate(elapsed)
         try:
-            escape_m, _ = escape_distance(self.grid, points[0], lowest, p)
+            lowest = min(p.min_height_m, float(here[2]))
+            escape_m, _ = escape_distance(self.grid, here, lowest, p)
         except NoTrajectoryError:
             return 0.0
-        hits &= np.linalg.norm(points - points[0], axis=1) > escape_m
-        return float(hits.argmax()) * step if hits.any() else None
+        hits &= np.linalg.norm(points - here, axis=1) > escape_m
+        return float(moments[hits.argmax()] - elapsed) if hits.any() else None
 
     def _setpoint(self, time_s: float) -> Setpoint:
         rest = np.zeros((3, 3))
