@@ -82,8 +82,8 @@ def fitness(points: Array, reference: Array, parameters: EgoParameters) -> Term:
     return float(np.vdot(offsets, pull)), matrix.T @ (2 * pull)
 
 
-def overrun(points: Array, span_s: float, parameters: EgoParameters) -> float:
-    """By which factor the motion should take longer to keep its limits; 1 or less if it does.
+def usage(points: Array, span_s: float, parameters: EgoParameters) -> tuple[float, float]:
+    """Return the largest speed and acceleration as shares of their limits.
 
     What the start's state alone determines is left out: no timing changes it.
     """
@@ -91,7 +91,7 @@ def overrun(points: Array, span_s: float, parameters: EgoParameters) -> float:
     first = np.diff(points, axis=0)
     speed = np.linalg.norm(first[2:] / span_s * speed_scale(p), axis=1).max()
     bend = np.linalg.norm(np.diff(first, axis=0)[1:] / span_s**2, axis=1).max()
-    return float(max(speed / p.max_vel_mps, np.sqrt(bend / p.max_acc_mps2)))
+    return float(speed / p.max_vel_mps), float(bend / p.max_acc_mps2)
 
 
 def speed_scale(parameters: EgoParameters) -> Array:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import lru_cache
@@ -71,22 +72,21 @@ def _push_out(task: Task, parameters: EgoParameters) -> UniformSpline | None:
     return None
 
 
-def _reallocate_time(
-    spline: UniformSpline, task: Task, parameters: EgoParameters
-) -> UniformSpline | None:
+def _reallocate_time(spline: UniformSpline, task: Task, parameters: EgoParameters) -> UniformSpline:
     """Slow down until the limits are kept, staying on the curve by the fitness term.
 
-    Returns None if the slower curve collides whatever its fitness weighs.  What is still
-    too fast in the end, for it starts too fast, is flown all the same, as upstream.
+    What is too fast in the end, for it starts too fast or the slower curve would collide
+    whatever its fitness weighs, is flown all the same, as upstream.
     """
     p = parameters
     weight = p.weight_fitness
     solver = _Solver(task, p)
     for _ in range(p.max_reallocations):
-        ratio = costs.overrun(spline.points, spline.span_s, p)
-        if ratio <= 1 + p.feasibility_tolerance:
+        speed, acceleration = costs.usage(spline.points, spline.span_s, p)
+        if max(speed, acceleration) <= 1 + p.feasibility_tolerance:
             return spline
-        span = spline.span_s * min(ratio, p.time_ratio_limit)
+        # Speeds fall with the time, accelerations with its square.
+        span = spline.span_s * min(max(speed, math.sqrt(acceleration)), p.time_ratio_limit)
         reference = sampling_matrix(len(spline.points), 1) @ spline.points
         slower = fit(reference, task.start, task.end, span)
         objective = _Objective(p, span, reference=reference, fitness_weight=weight)
