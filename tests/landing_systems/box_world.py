@@ -44,7 +44,7 @@ def _rays(camera: Camera) -> NDArray[np.float32]:
     (cx, cy), f = camera.centre_px, camera.focal_px
     u, v = np.meshgrid(np.arange(camera.width_px), np.arange(camera.height_px))
     rays = np.stack([(cy - v) / f, (cx - u) / f, np.full(u.shape, -1.0)], axis=-1)
-    return rays.astype(np.float32)
+    return np.asarray(rays, np.float32)
 
 
 def _part_of_image(camera: Camera, ends: Array) -> tuple[slice, slice]:
@@ -108,7 +108,7 @@ def fly(
     boxes: Callable[[float], Sequence[Box]],
     *,
     seconds: float = 30.0,
-    set_goal: Callable[[EgoPlanner, tuple[float, float, float]], None] = EgoPlanner.set_goal,
+    from_s: float = 0.0,
 ) -> Run:
     """Fly a UAV that is at each setpoint one frame later, until the goal is reached.
 
@@ -118,10 +118,10 @@ def fly(
     position, velocity = np.array(start_m, float), np.zeros(3)
     times, places, said = [], [], []
     for frame in range(round(seconds * camera.rate_hz)):
-        time_s = frame / camera.rate_hz
+        time_s = from_s + frame / camera.rate_hz
         seen = observe(camera, time_s, position, boxes(time_s), offset_m=parameters.camera_offset_m)
         planner.observe(seen)
-        set_goal(planner, goal_m)
+        planner.set_goal(goal_m)
         setpoint = planner.plan(time_s, position, velocity)
         times.append(time_s)
         places.append(position)

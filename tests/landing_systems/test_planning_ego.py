@@ -171,20 +171,22 @@ def test_it_flies_to_the_goal_and_waits_for_the_next() -> None:
     assert middle.error is None
 
 
-def test_what_it_sees_below_it_flies_around_when_it_descends() -> None:
-    boxes: list[Box] = [((1.5, -1.0, 0.0), (3.0, 1.0, 4.0))]
-    found = run((6.0, 0.0, 2.0), boxes)
-    assert found.setpoints[-1].reached
-    assert distance_to(boxes, found.position_m).min() > UAV_RADIUS_M
+def test_it_descends_beside_what_it_has_seen_from_above() -> None:
+    boxes: list[Box] = [((-1.0, -1.0, 0.0), (0.5, 1.0, 4.0))]
+    planner = EgoPlanner(PARAMETERS, CAMERA)
+    above, low = (3.0, 0.0, 7.0), (-3.5, 0.0, 2.0)
+    fly(planner, PARAMETERS, CAMERA, (-5.0, 0.0, 7.0), above, lambda _: boxes)
+    down = fly(planner, PARAMETERS, CAMERA, above, low, lambda _: boxes, from_s=20.0)
+    assert down.setpoints[-1].reached
+    assert distance_to(boxes, down.position_m).min() > UAV_RADIUS_M
 
 
 def test_a_goal_in_an_obstacle_is_told_and_not_flown_into() -> None:
     boxes: list[Box] = [((5.0, -1.0, 0.0), (7.0, 1.0, 3.0))]
-    parameters = PARAMETERS
-    planner = EgoPlanner(parameters, CAMERA)
-    found = fly(
-        planner, parameters, CAMERA, (-2.0, 0.0, 7.0), (6.0, 0.0, 2.0), lambda _: boxes, seconds=10
-    )
+    planner = EgoPlanner(PARAMETERS, CAMERA)
+    above, within = (6.0, 0.0, 7.0), (6.0, 0.0, 2.0)
+    fly(planner, PARAMETERS, CAMERA, (3.0, 0.0, 7.0), above, lambda _: boxes)
+    found = fly(planner, PARAMETERS, CAMERA, above, within, lambda _: boxes, seconds=4, from_s=20.0)
     assert not found.setpoints[-1].reached
     assert isinstance(found.setpoints[-1].error, GoalInObstacleError)
     assert distance_to(boxes, found.position_m).min() > UAV_RADIUS_M
