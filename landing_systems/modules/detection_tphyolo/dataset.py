@@ -14,8 +14,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from landing_systems.modules.detection_tphyolo.decoding import CLASS_IDS, NETWORK_SIZE
-from landing_systems.modules.detection_tphyolo.detector import PADDING, fitted, shrink
+from landing_systems.modules.detection_tphyolo.detector import fitted, shrink
 from landing_systems.modules.detection_tphyolo.grounds import HIGHEST_ID, invented_map
+from landing_systems.modules.detection_tphyolo.patches import PADDING
 from landing_systems.modules.detection_tphyolo.scenes import Picture, Weather, pictures
 
 CROP_PX = 144
@@ -24,6 +25,8 @@ MAX_MARKERS = 5
 LABEL = 8
 """Centre x and y, width, height (pixel edges), id, hidden share, contrast, side in pixels;
 rows without a marker have a width of 0."""
+VERSION = 1
+"""To be raised when the same plan gives other pictures."""
 _RESIZE_JITTER = (0.75, 1.3)
 Array = NDArray[np.float32]
 
@@ -48,7 +51,7 @@ class DataPlan:
     @property
     def key(self) -> str:
         """Name of the folder that holds exactly this plan's pictures."""
-        text = json.dumps({**asdict(self), "shards": 0}, sort_keys=True)
+        text = json.dumps({**asdict(self), "shards": 0, "version": VERSION}, sort_keys=True)
         return hashlib.sha256(text.encode()).hexdigest()[:12]
 
 
@@ -116,9 +119,7 @@ def shard(plan: DataPlan, index: int) -> tuple[Samples, Samples]:
         map = invented_map(rng, index * plan.places + place, court=plan.court)
         for number in range(plan.scenarios // plan.places):
             weather: Weather = "full" if number % 2 else "confined"
-            shots = pictures(
-                rng, map, weather, plan.frames_per_scenario, marker_id=_marker_id(rng)
-            )
+            shots = pictures(rng, map, weather, plan.frames_per_scenario, marker_id=_marker_id(rng))
             for count, picture in enumerate(shots):
                 if count < plan.whole_frames:
                     frames.append(whole(picture))

@@ -13,8 +13,8 @@ CLASS_IDS = (0, 1, 2, 3)
 """The ids that are told apart, as in the paper's published detector (marker0 to marker3); a
 marker of another id belongs to no class and is not reported."""
 STRIDES = (4, 8, 16, 32)
-CHANNELS = 5 + len(CLASS_IDS)
-"""Centre x and y, logarithms of width and height, objectness, one logit per class."""
+CHANNELS = 5
+"""Centre x and y, logarithms of width and height, objectness."""
 BASE_CELLS = 4.0
 """A box of four cells has the logarithm 0."""
 NETWORK_SIZE = (320, 240)
@@ -30,13 +30,12 @@ class Boxes:
     """Boxes found in an image, the most confident first.
 
     ``centres_px`` and ``sizes_px`` are (n, 2) in pixel edges: the left edge of the image is 0,
-    the right edge its width.  ``logits`` are (n,), of the class in ``classes`` (n,).
+    the right edge its width.  ``logits`` are (n,), of being a marker.
     """
 
     centres_px: Array
     sizes_px: Array
     logits: Array
-    classes: NDArray[np.intp]
 
 
 @functools.lru_cache(maxsize=8)
@@ -54,40 +53,32 @@ def cells_of(width: int, height: int) -> Array:
 
 
 def decode(raw: Array, width: int, height: int, min_logit: float) -> Boxes:
-    """Return the boxes in the network's answer (5 + ids, cells), without duplicates.
-
-    The logit of a box is that of objectness times class: both are sigmoids, and the product's
-    logit is what calibration takes.
-    """
-    objects, ids = raw[4], raw[5:]
-    # A product of two probabilities is below either, so this cannot lose a candidate.
-    candidates = np.flatnonzero(objects > min_logit)
-    if len(candidates) > _MAX_CANDIDATES:
-        best = np.argsort(-objects[candidates], kind="stable")[:_MAX_CANDIDATES]
-        candidates = candidates[best]
-    classes = ids[:, candidates].argmax(axis=0)
-    logits = joint_logit(objects[candidates], ids[classes, candidates])
-    keep = np.flatnonzero(logits > min_logit)
-    order = keep[np.argsort(-logits[keep], kind="stable")]
+    """Return the boxes in the network's answer (5, cells), without duplicates."""
+    candidates = np.flatnonzero(raw[4] > min_logit)
+    order = np.argsort(-raw[4, candidates], kind="stable")[:_MAX_CANDIDATES]
     chosen = candidates[order]
     x, y, stride = cells_of(width, height)[:, chosen]
     shift = raw[:4, chosen]
     centres = np.stack([x + shift[0] * stride, y + shift[1] * stride], 1)
     sizes = BASE_CELLS * stride[:, None] * np.exp(np.clip(shift[2:], -_LARGEST_LOG, _LARGEST_LOG).T)
     first = suppress(centres, sizes)
-    return Boxes(
-        centres_px=centres[first],
-        sizes_px=sizes[first],
-        logits=logits[order][first],
-        classes=classes[order][first],
-    )
+    return Boxes(centres_px=centres[first], sizes_px=sizes[first], logits=raw[4, chosen][first])
 
 
-def joint_logit(a: Array, b: Array) -> Array:
+def joint_logit(a: float, b: float) -> float:
     """Return the logit of the product of two probabilities given as logits."""
-    # p/(1-p) of the product is 1 / (e^-a + e^-b + e^-(a+b)).
-    result: Array = -np.logaddexp(np.logaddexp(-a, -b), -(a + b))
-    return result
+    # p / (1 - p) of the product is 1 / (e^-a + e^-b + e^-(a + b)).
+    return float(-np.logaddexp(np.logaddexp(-a, -b), -(a + b)))
+
+
+def class_logit(answer: Array) -> tuple[int, float]:
+    """Return the likeliest class of the second network's answer (ids + 1,) and its logit.
+
+    The last number is that of "another id, or no marker", which is never returned.
+    """
+    best = int(answer[:-1].argmax())
+    others = np.delete(answer.astype(np.float64), best)
+    return best, float(answer[best] - np.logaddexp.reduce(others))
 
 
 def suppress(centres: Array, sizes: Array, limit: float = NMS_IOU) -> list[int]:

@@ -13,14 +13,14 @@ from landing_systems.modules.detection_opencv import CAMERA_FROM_BODY, rotation_
 from landing_systems.modules.detection_tphyolo.decoding import (
     CLASS_IDS,
     NETWORK_SIZE,
-    Boxes,
+    class_logit,
     decode,
+    joint_logit,
 )
+from landing_systems.modules.detection_tphyolo.patches import PADDING, normalised, patch
 from landing_systems.modules.detection_tphyolo.weights import SHIPPED, read_weights
 from pytest_garl import Camera, Detection, Mission, Observation
 
-PADDING = 114
-"""The grey about a frame that is smaller than what the network takes, as in YOLOv5."""
 LARGEST_SIDE_PX = 64.0
 """A marker that is larger according to the altimeter is shrunk to this: the network has been
 trained for sizes up to it."""
@@ -30,6 +30,8 @@ SIZE_TOLERANCE = 1.6
 """A box is a marker's only if its size is that of a marker on the ground below, within this
 factor: the outline of a turned marker is up to 1.41 times as wide as the marker."""
 MIN_HEIGHT_M = 0.3
+MAX_MARKERS = 6
+"""At most so many are read, so that a strange frame takes no longer than others."""
 
 
 class TphYoloDetector:
@@ -38,77 +40,94 @@ class TphYoloDetector:
     Raises WeightsError for weights that are missing, damaged or not what their manifest says.
     """
 
-    def __init__(self, mission: Mission, weights: Path = SHIPPED) -> None:
-        content, manifest = read_weights(weights)
-        self._net = cv2.dnn.readNetFromONNX(
-            # OpenCV 5.0's own engine refuses the network (an assertion about shapes).
-            np.frombuffer(content, np.uint8),
-            engine=cv2.dnn.ENGINE_CLASSIC,
-        )
-        self._slope, self._offset = manifest.calibration
+    def __init__(
+        self, mission: Mission, weights: Path = SHIPPED, *, min_confidence: float = MIN_CONFIDENCE
+    ) -> None:
+        files = read_weights(weights)
+        # The engine that OpenCV 5.0 prefers refuses the network (an assertion about shapes),
+        # and it ignores which one is asked for where it reads from memory.
+        self._boxes = cv2.dnn.readNetFromONNX(str(files.boxes), engine=cv2.dnn.ENGINE_CLASSIC)
+        self._ids = cv2.dnn.readNetFromONNX(str(files.ids), engine=cv2.dnn.ENGINE_CLASSIC)
+        self._slope, self._offset = files.calibration
         self._camera: Camera = mission.camera
         self._side_m = mission.marker_side_m
-        self._min_logit = self._logit_of(MIN_CONFIDENCE)
+        self._min_confidence = min_confidence
+        self._min_logit = (_logit(min_confidence) - self._offset) / self._slope
 
     def detect(self, observation: Observation) -> tuple[Detection, ...]:
         """Return all markers in the frame whose size fits the height, the surest first."""
         height = max(MIN_HEIGHT_M, float(observation.position_m[2]))
         side_px = self._camera.focal_px * self._side_m / height
-        boxes, scale, shift = self.boxes(observation.image, side_px)
+        picture, scale, shift = fitted(observation.image, side_px)
+        self._boxes.setInput(cv2.dnn.blobFromImage(picture, 1 / 255))
+        raw = np.asarray(self._boxes.forward(), np.float32)[0]
+        # A product of two probabilities is below either: what is left out here is lost anyway.
+        boxes = decode(raw, *NETWORK_SIZE, self._min_logit)
         found = []
-        for index in range(len(boxes.logits)):
-            centre = (boxes.centres_px[index] - shift) / scale
-            size = boxes.sizes_px[index] / scale
-            detection = self._placed(centre, size, side_px, boxes, index, observation)
-            if detection is not None:
-                found.append(detection)
-        return tuple(found)
-
-    def boxes(
-        self, image: NDArray[np.uint8], side_px: float
-    ) -> tuple[Boxes, float, tuple[float, float]]:
-        """Return boxes in the network's picture, and the frame's scale and shift in it.
-
-        ``side_px`` is how wide a marker should be in the frame.
-        """
-        picture, scale, shift = fitted(image, side_px)
-        self._net.setInput(cv2.dnn.blobFromImage(picture, 1 / 255))
-        raw = np.asarray(self._net.forward(), np.float32)
-        return decode(raw[0], *NETWORK_SIZE, self._min_logit), scale, shift
+        for centre, size, logit in zip(boxes.centres_px, boxes.sizes_px, boxes.logits, strict=True):
+            middle = (centre - shift) / scale
+            place = self._place(middle, size / scale, side_px, observation)
+            if place is None:
+                continue
+            (x, y), expected_px = place
+            number, answer = self._identify(picture, centre, expected_px * scale)
+            confidence = self.confidence(joint_logit(float(logit), answer))
+            if confidence >= self._min_confidence:
+                found.append(
+                    Detection(
+                        marker_id=CLASS_IDS[number],
+                        confidence=confidence,
+                        position_m=(x, y, 0.0),
+                        corners_px=_corners(middle, size / scale),
+                    )
+                )
+            if len(found) == MAX_MARKERS:
+                break
+        return tuple(sorted(found, key=lambda each: -each.confidence))
 
     def confidence(self, logit: float) -> float:
         """Return the calibrated probability that a box is a marker of its class."""
-        return 1 / (1 + math.exp(-(self._slope * logit + self._offset)))
+        return float(1 / (1 + np.exp(-(self._slope * logit + self._offset))))
 
-    def _logit_of(self, confidence: float) -> float:
-        return (math.log(confidence / (1 - confidence)) - self._offset) / self._slope
+    def _identify(
+        self, picture: NDArray[np.uint8], centre: NDArray[np.float32], side_px: float
+    ) -> tuple[int, float]:
+        """Return the likeliest class of what a box holds, and its logit."""
+        cut = patch(picture, (float(centre[0]), float(centre[1])), side_px)
+        self._ids.setInput(normalised(cut[None]))
+        return class_logit(np.asarray(self._ids.forward(), np.float32)[0])
 
-    def _placed(
+    def _place(
         self,
         centre: NDArray[np.float32],
         size: NDArray[np.float32],
         side_px: float,
-        boxes: Boxes,
-        index: int,
         observation: Observation,
-    ) -> Detection | None:
-        place = ground_place(centre, self._camera, observation)
-        if place is None:
+    ) -> tuple[tuple[float, float], float] | None:
+        """Return where a box of the frame lies on the ground, and its marker's side in pixels.
+
+        None where it does not look like a marker on the ground.
+        """
+        found = ground_place(centre, self._camera, observation)
+        if found is None:
             return None
-        (x, y), stretch = place
-        expected = side_px * stretch
-        if not expected / SIZE_TOLERANCE < math.sqrt(float(size.prod())) < (
-            math.sqrt(2) * expected * SIZE_TOLERANCE
-        ):
-            return None
-        (left, top), (right, bottom) = centre - size / 2 - 0.5, centre + size / 2 - 0.5
-        corners = ((left, top), (right, top), (right, bottom), (left, bottom))
-        return Detection(
-            marker_id=CLASS_IDS[int(boxes.classes[index])],
-            confidence=self.confidence(float(boxes.logits[index])),
-            position_m=(x, y, 0.0),
-            corners_px=tuple((float(u), float(v)) for u, v in corners),
-        )
+        place, nearer = found
+        expected, width = side_px * nearer, math.sqrt(float(size.prod()))
+        least, most = expected / SIZE_TOLERANCE, math.sqrt(2) * expected * SIZE_TOLERANCE
+        return (place, expected) if least < width < most else None
+
+
+def _logit(chance: float) -> float:
+    return math.log(chance / (1 - chance))
+
+
+def _corners(
+    centre: NDArray[np.float32], size: NDArray[np.float32]
+) -> tuple[tuple[float, float], ...]:
+    """Return a box's corners in pixels, whose centres are at whole numbers."""
+    (left, top), (right, bottom) = centre - size / 2 - 0.5, centre + size / 2 - 0.5
+    corners = ((left, top), (right, top), (right, bottom), (left, bottom))
+    return tuple((float(u), float(v)) for u, v in corners)
 
 
 def ground_place(

@@ -47,7 +47,7 @@ def invented_map(rng: np.random.Generator, index: int, *, court: bool) -> Map:
         uav_start_m=(0.0, -HALF_M, 0.0),
         ground=Ground(
             texture=texture,
-            texture_seed=FIRST_TEXTURE_SEED + index,
+            texture_seed=int(rng.integers(FIRST_TEXTURE_SEED, 2**31)),
             colour=_near(rng, _COLOURS[texture], 28),
             layers=tuple(layers),
         ),

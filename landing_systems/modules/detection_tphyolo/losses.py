@@ -1,4 +1,4 @@
-"""What training minimises: which cells answer for which marker, and three losses."""
+"""What the first network minimises: which cells answer for which marker, and two losses."""
 
 from __future__ import annotations
 
@@ -13,7 +13,6 @@ from torch.nn.functional import binary_cross_entropy_with_logits
 
 from landing_systems.modules.detection_tphyolo.decoding import (
     BASE_CELLS,
-    CLASS_IDS,
     STRIDES,
     cells_of,
 )
@@ -39,7 +38,6 @@ class LossWeights:
 
     box: float = 1.5
     objectness: float = 1.0
-    classes: float = 1.5
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -47,13 +45,11 @@ class Targets:
     """What the cells of a batch shall say.
 
     ``cells`` (k, 2) are (picture, cell) that answer for a marker, ``boxes`` (k, 4) its centre
-    and size, ``classes`` (k, ids) its class, all 0 for an id of no class.  ``ignored`` (n,
-    cells) need not say anything about objectness.
+    and size.  ``ignored`` (n, cells) need not say anything about objectness.
     """
 
     cells: NDArray[np.int64]
     boxes: Array
-    classes: Array
     ignored: NDArray[np.bool_]
 
 
@@ -63,11 +59,10 @@ def targets_of(labels: Array, regions: Array, width: int, height: int) -> Target
     ignored = np.zeros((len(labels), grid.shape[1]), np.bool_)
     chosen: list[tuple[int, int]] = []
     boxes: list[Array] = []
-    classes: list[Array] = []
     taken: dict[tuple[int, int], float] = {}
     for picture, (rows, region) in enumerate(zip(labels, regions, strict=True)):
         for row in rows[rows[:, 2] > 0]:
-            inner = _inside(row, region, width, height)
+            inner = seen_part(row, region, width, height)
             if inner is None:
                 continue
             middle, share = inner
@@ -83,22 +78,21 @@ def targets_of(labels: Array, regions: Array, width: int, height: int) -> Target
                 taken[key] = distance
                 chosen.append(key)
                 boxes.append(row[:4])
-                classes.append((np.array(CLASS_IDS) == int(row[4])).astype(np.float32))
     return Targets(
         cells=np.array(chosen, np.int64).reshape(-1, 2),
         boxes=np.array(boxes, np.float32).reshape(-1, 4),
-        classes=np.array(classes, np.float32).reshape(-1, len(CLASS_IDS)),
         ignored=ignored,
     )
 
 
-def _inside(row: Array, region: Array, width: int, height: int) -> tuple[Array, float] | None:
+def seen_part(row: Array, region: Array, width: int, height: int) -> tuple[Array, float] | None:
     """Return the middle of a box's part in the picture, and that part's share of the box."""
     low = np.maximum(row[:2] - row[2:4] / 2, np.maximum(region[:2], 0))
     high = np.minimum(row[:2] + row[2:4] / 2, np.minimum(region[2:], (width, height)))
     if (high <= low).any():
         return None
-    return (low + high) / 2, float(np.prod((high - low) / row[2:4]))
+    middle: Array = ((low + high) / 2).astype(np.float32)
+    return middle, float(np.prod((high - low) / row[2:4]))
 
 
 def _answering(grid: Array, row: Array, middle: Array) -> NDArray[np.intp]:
@@ -142,7 +136,7 @@ def complete_iou(a: Tensor, b: Tensor) -> Tensor:
 
 
 def loss_of(raw: Tensor, targets: Targets, grid: Tensor, weights: LossWeights) -> Tensor:
-    """Return the loss of a batch's answers (n, 5 + ids, cells)."""
+    """Return the loss of a batch's answers (n, 5, cells)."""
     wanted = torch.zeros_like(raw[:, 4])
     picture, cell = torch.from_numpy(targets.cells).T
     wanted[picture, cell] = 1.0
@@ -151,11 +145,7 @@ def loss_of(raw: Tensor, targets: Targets, grid: Tensor, weights: LossWeights) -
     count = max(1, len(targets.cells))
     total = weights.objectness * losses[heard].sum() / count
     if len(targets.cells):
-        answers = raw[picture, :, cell]
-        found = boxes_of(answers[:, :4], grid[:, cell])
+        found = boxes_of(raw[picture, :4, cell], grid[:, cell])
         boxes = 1 - complete_iou(found, torch.from_numpy(targets.boxes))
-        classes = binary_cross_entropy_with_logits(
-            answers[:, 5:], torch.from_numpy(targets.classes), reduction="none"
-        )
-        total = total + weights.box * boxes.mean() + weights.classes * classes.sum(1).mean()
+        total = total + weights.box * boxes.mean()
     return total

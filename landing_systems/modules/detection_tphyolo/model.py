@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import torch
 from torch import Tensor, nn
 
-from landing_systems.modules.detection_tphyolo.decoding import CHANNELS, CLASS_IDS, STRIDES
+from landing_systems.modules.detection_tphyolo.decoding import CHANNELS
 
 _PRIOR = -4.6
 """Initial logit of objectness: one cell in a hundred, so that training does not begin with a
@@ -59,7 +59,8 @@ class Bottleneck(nn.Module):
 
     def forward(self, x: Tensor) -> Tensor:
         """Map (N, width, H, W) to the same shape."""
-        return x + self.expand(self.squeeze(x))
+        result: Tensor = x + self.expand(self.squeeze(x))
+        return result
 
 
 class TransformerBlock(nn.Module):
@@ -89,7 +90,8 @@ class TransformerBlock(nn.Module):
         weights = ((query @ key) * (width // self.heads) ** -0.5).softmax(3)
         seen = (weights @ value).transpose(2, 3).reshape(count, width, rows, columns)
         x = x + self.out(seen)
-        return x + self.feed(x)
+        result: Tensor = x + self.feed(x)
+        return result
 
 
 class Cbam(nn.Module):
@@ -115,7 +117,7 @@ class Cbam(nn.Module):
 class TphYolo(nn.Module):
     """Backbone, neck and four heads; see the package's docstring for what is reproduced.
 
-    Takes RGB in [0, 1], (N, 3, H, W) with H and W multiples of 8; gives (N, 5 + ids, cells):
+    Takes RGB in [0, 1], (N, 3, H, W) with H and W multiples of 8; gives (N, 5, cells):
     all cells of stride 4 row by row, then of 8, 16 and 32; see ``decoding.decode`` for what
     the numbers mean.
     """
@@ -145,13 +147,14 @@ class TphYolo(nn.Module):
         )
         self.heads = nn.ModuleList(nn.Conv2d(width, CHANNELS, 1) for width in w.neck)
         for head in self.heads:
-            assert isinstance(head, nn.Conv2d) and head.bias is not None
+            assert isinstance(head, nn.Conv2d)
+            assert head.bias is not None
             nn.init.normal_(head.weight, std=0.01)
             nn.init.zeros_(head.bias)
             nn.init.constant_(head.bias[4], _PRIOR)
 
     def forward(self, x: Tensor) -> Tensor:
-        """Map (N, 3, H, W) to (N, 5 + ids, cells)."""
+        """Map (N, 3, H, W) to (N, 5, cells)."""
         s2 = self.stage2(self.stem(x))
         s3 = self.stage3(s2)
         s4 = self.stage4(s3)
@@ -184,10 +187,8 @@ def fused(model: nn.Module) -> nn.Module:
     for module in result.modules():
         if isinstance(module, (Convolution, Projection)):
             convolution, norm = module[0], module[1]
-            assert isinstance(convolution, nn.Conv2d) and isinstance(norm, nn.BatchNorm2d)
+            assert isinstance(convolution, nn.Conv2d)
+            assert isinstance(norm, nn.BatchNorm2d)
             module[0] = torch.nn.utils.fuse_conv_bn_eval(convolution, norm)
             module[1] = nn.Identity()
     return result
-
-
-assert len(STRIDES) == 4 and CHANNELS == 5 + len(CLASS_IDS)

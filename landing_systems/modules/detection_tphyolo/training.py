@@ -13,10 +13,10 @@ from typing import Any
 import numpy as np
 import torch
 from numpy.typing import NDArray
-from torch import Tensor, nn
+from torch import nn
 
 from landing_systems.modules.detection_tphyolo.dataset import CROP_PX, Samples, load_shard
-from landing_systems.modules.detection_tphyolo.decoding import NETWORK_SIZE, cells_of
+from landing_systems.modules.detection_tphyolo.decoding import cells_of
 from landing_systems.modules.detection_tphyolo.losses import LossWeights, loss_of, targets_of
 from landing_systems.modules.detection_tphyolo.model import TphYolo
 
@@ -55,8 +55,10 @@ class Trainer:
         torch.manual_seed(plan.seed)
         self.plan, self.step = plan, 0
         self._crops, self._frames = _Pool(crops), _Pool(frames)
-        self.model = TphYolo().to(memory_format=torch.channels_last).train()
-        self.averaged = copy.deepcopy(self.model).eval().requires_grad_(False)
+        self.model = TphYolo().train()
+        self.model.to(memory_format=torch.channels_last)  # type: ignore[call-overload]
+        self.averaged = copy.deepcopy(self.model)
+        self.averaged.eval().requires_grad_(False)
         matrices = [each for each in self.model.parameters() if each.ndim > 1]
         vectors = [each for each in self.model.parameters() if each.ndim <= 1]
         self._optimiser = torch.optim.AdamW(
@@ -135,9 +137,7 @@ class Trainer:
                     kept.copy_(states[1][name])
 
 
-def train(
-    plan: TrainPlan, data: Path, shards: int, told: Callable[[int, float], None]
-) -> TphYolo:
+def train(plan: TrainPlan, data: Path, shards: int, told: Callable[[int, float], None]) -> TphYolo:
     """Train on the shards in ``data`` and return the averaged network.
 
     ``told`` hears each step's number and loss.  A checkpoint in ``data`` is continued.
@@ -229,12 +229,3 @@ def varied(rng: np.random.Generator, images: NDArray[np.uint8]) -> Array:
 
 def _cosine(share: float) -> float:
     return 0.5 * (1 + math.cos(math.pi * min(1.0, share)))
-
-
-def answers(model: nn.Module, images: NDArray[np.uint8]) -> Array:
-    """Return a network's answers (n, 5 + ids, cells) to pictures (n, H, W, 3)."""
-    if images.shape[1:3] != NETWORK_SIZE[::-1]:
-        raise ValueError(f"found pictures of {images.shape[1:3]}, expected {NETWORK_SIZE[::-1]}")
-    batch: Tensor = torch.from_numpy(images.astype(np.float32) / 255).permute(0, 3, 1, 2)
-    with torch.inference_mode():
-        return np.asarray(model(batch).numpy(), np.float32)

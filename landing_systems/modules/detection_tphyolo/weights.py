@@ -1,4 +1,4 @@
-"""Weights on disk: an ONNX file and its manifest, checked before anything is loaded."""
+"""Weights on disk: two ONNX files and their manifest, checked before anything is loaded."""
 
 from __future__ import annotations
 
@@ -11,9 +11,11 @@ from pathlib import Path
 from typing import Any
 
 from landing_systems.modules.detection_tphyolo.decoding import CLASS_IDS, NETWORK_SIZE
+from landing_systems.modules.detection_tphyolo.patches import PATCH_PX
 
-SHIPPED = Path(__file__).with_name("weights") / "tphyolo.onnx"
+SHIPPED = Path(__file__).with_name("weights") / "tphyolo.json"
 FORMAT = 1
+NETWORKS = ("boxes", "ids")
 
 
 class WeightsError(Exception):
@@ -21,46 +23,63 @@ class WeightsError(Exception):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Manifest:
-    """What a manifest says that flying needs: the confidence's slope and offset on logits."""
+class Weights:
+    """Checked files of both networks, and the confidence's slope and offset on logits."""
 
+    boxes: Path
+    ids: Path
     calibration: tuple[float, float]
 
 
 def write_weights(
-    path: Path, content: bytes, calibration: tuple[float, float], about: Mapping[str, Any]
+    manifest: Path,
+    networks: Mapping[str, bytes],
+    calibration: tuple[float, float],
+    about: Mapping[str, Any],
 ) -> None:
-    """Write weights (.onnx) and their manifest (.json) beside them."""
-    path.parent.mkdir(parents=True, exist_ok=True)
-    path.write_bytes(content)
-    manifest = {
+    """Write the manifest (.json) and beside it the networks (-boxes.onnx, -ids.onnx)."""
+    manifest.parent.mkdir(parents=True, exist_ok=True)
+    for name in NETWORKS:
+        network_file(manifest, name).write_bytes(networks[name])
+    content = {
         "format": FORMAT,
-        "sha256": hashlib.sha256(content).hexdigest(),
+        "sha256": {name: hashlib.sha256(networks[name]).hexdigest() for name in NETWORKS},
         "classes": list(CLASS_IDS),
         "network_size": list(NETWORK_SIZE),
+        "patch_size": PATCH_PX,
         "calibration": {"slope": calibration[0], "offset": calibration[1]},
         **about,
     }
-    text = json.dumps(manifest, indent=2) + "\n"
-    path.with_suffix(".json").write_text(text, encoding="utf-8")
+    manifest.write_text(json.dumps(content, indent=2) + "\n", encoding="utf-8")
 
 
-def read_weights(path: Path) -> tuple[bytes, Manifest]:
-    """Return the weights' bytes and their manifest; raise WeightsError where they disagree."""
-    file = path.with_suffix(".json")
+def network_file(manifest: Path, name: str) -> Path:
+    """Return where a network of a manifest lies."""
+    return manifest.with_name(f"{manifest.stem}-{name}.onnx")
+
+
+def read_weights(file: Path) -> Weights:
+    """Return what the manifest tells; raise WeightsError where it or a network is damaged."""
     try:
-        content = path.read_bytes()
         manifest = json.loads(file.read_text(encoding="utf-8"))
+        contents = {name: network_file(file, name).read_bytes() for name in NETWORKS}
     except (OSError, ValueError) as error:
-        raise _wrong(path, f"cannot be read with its manifest {file.name} ({error})") from error
+        raise _wrong(file, f"cannot be read with its networks ({error})") from error
     if not isinstance(manifest, dict) or manifest.get("format") != FORMAT:
         raise _wrong(file, f"is not a manifest of format {FORMAT}")
-    found, told = hashlib.sha256(content).hexdigest(), str(manifest.get("sha256"))
-    if found != told:
-        raise _wrong(path, f"has the hash {found[:16]}…, its manifest says {told[:16]}…")
-    expected = (list(CLASS_IDS), list(NETWORK_SIZE))
-    if (manifest.get("classes"), manifest.get("network_size")) != expected:
-        raise _wrong(file, f"is for other classes or sizes; expected {expected}")
+    told = manifest.get("sha256")
+    for name, content in contents.items():
+        found = hashlib.sha256(content).hexdigest()
+        expected = str(told.get(name)) if isinstance(told, dict) else "nothing"
+        if found != expected:
+            raise _wrong(
+                network_file(file, name),
+                f"has the hash {found[:16]}…, its manifest says {expected[:16]}…",
+            )
+    sizes = {"classes": list(CLASS_IDS), "network_size": list(NETWORK_SIZE), "patch_size": PATCH_PX}
+    for key, value in sizes.items():
+        if manifest.get(key) != value:
+            raise _wrong(file, f"has {key} = {manifest.get(key)}; expected {value}")
     try:
         numbers = manifest["calibration"]
         slope, offset = float(numbers["slope"]), float(numbers["offset"])
@@ -68,11 +87,15 @@ def read_weights(path: Path) -> tuple[bytes, Manifest]:
         raise _wrong(file, f"has no calibration with slope and offset ({error})") from error
     if not (math.isfinite(slope) and math.isfinite(offset) and slope > 0):
         raise _wrong(file, f"has the slope {slope} and offset {offset}; expected finite, rising")
-    return content, Manifest(calibration=(slope, offset))
+    return Weights(
+        boxes=network_file(file, "boxes"),
+        ids=network_file(file, "ids"),
+        calibration=(slope, offset),
+    )
 
 
 def _wrong(path: Path, problem: str) -> WeightsError:
     return WeightsError(
-        f"marker detector: {path} {problem}; restore the file, or train it again with "
+        f"marker detector: {path} {problem}; restore the files, or train it again with "
         "`python -m landing_systems.modules.detection_tphyolo.train`"
     )
