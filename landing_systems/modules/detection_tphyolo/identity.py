@@ -1,11 +1,12 @@
 """The second network, which reads the id: TPH-YOLOv5's classifier of cut-outs, much smaller.
 
-A single cell of the first network, told only which of four ids is right, does not learn within
-the hour to read codes that may be turned by any angle; a classifier of cut-outs does in minutes.
+A cell of the first network, told only which of four ids is right, was still at chance after 1,750
+steps: the codes may be turned by any angle.  A classifier of cut-outs learns it in some hundred.
 """
 
 from __future__ import annotations
 
+import copy
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
@@ -22,7 +23,7 @@ from landing_systems.modules.detection_tphyolo.losses import (
     MIN_SIDE_PX,
     seen_part,
 )
-from landing_systems.modules.detection_tphyolo.model import Convolution
+from landing_systems.modules.detection_tphyolo.model import Convolution, follow
 from landing_systems.modules.detection_tphyolo.patches import PATCH_PX, normalised, patch
 
 OTHER = len(CLASS_IDS)
@@ -34,7 +35,7 @@ _CELLS = PATCH_PX // 8
 class IdentityPlan:
     """How to learn to read ids."""
 
-    steps: int = 4000
+    steps: int = 6000
     seed: int = 0
     patches: int = 64
     nothing: float = 0.15
@@ -95,7 +96,8 @@ class Cuttings:
             kind = self._by_class[number]
             shard, picture, row = kind[rng.integers(len(kind))]
             x, y, _, _, _, _, _, side = self._shards[shard].labels[picture, row]
-            middle = np.array([x, y]) + rng.normal(0, plan.shift * side, 2)
+            across, down = rng.normal(0, plan.shift * side, 2)
+            middle = (float(x + across), float(y + down))
             size = float(side) * float(np.exp(rng.normal(0, plan.resize)))
             turn = float(rng.uniform(0, 2 * np.pi))
             patches.append(patch(self._shards[shard].images[picture], middle, size, turn))
@@ -105,7 +107,7 @@ class Cuttings:
     def _nothing(self, rng: np.random.Generator) -> NDArray[np.uint8]:
         """Cut beside the markers: a patch that holds one's middle would not be nothing."""
         while True:
-            shard = self._shards[rng.integers(len(self._shards))]
+            shard = self._shards[int(rng.integers(len(self._shards)))]
             picture = int(rng.integers(len(shard.images)))
             left, top, right, bottom = shard.regions[picture]
             middle = rng.uniform((left, top), (right, bottom))
@@ -114,7 +116,7 @@ class Cuttings:
             away = np.abs(rows[:, :2] - middle).max(axis=1)
             if not ((rows[:, 2] > 0) & (away < 0.6 * rows[:, 7])).any():
                 turn = float(rng.uniform(0, 2 * np.pi))
-                return patch(shard.images[picture], middle, side, turn)
+                return patch(shard.images[picture], middle.tolist(), side, turn)
 
 
 def _legible(row: NDArray[np.float32], region: NDArray[np.float32], size: int) -> bool:
@@ -134,11 +136,7 @@ def train_identity(
     torch.manual_seed(plan.seed)
     cuttings = Cuttings(shards, plan)
     model = IdentityNet().train()
-    averaged = torch.optim.swa_utils.AveragedModel(
-        model,
-        multi_avg_fn=torch.optim.swa_utils.get_ema_multi_avg_fn(plan.average),
-        use_buffers=True,
-    )
+    averaged = copy.deepcopy(model).eval().requires_grad_(False)
     optimiser = torch.optim.AdamW(
         model.parameters(), lr=plan.learning_rate, weight_decay=plan.weight_decay
     )
@@ -154,8 +152,6 @@ def train_identity(
         loss.backward()  # type: ignore[no-untyped-call]
         optimiser.step()
         schedule.step()
-        averaged.update_parameters(model)
+        follow(averaged, model, step, plan.average)
         told(step + 1, float(loss.detach()))
-    result = averaged.module.eval()
-    assert isinstance(result, IdentityNet)
-    return result
+    return averaged

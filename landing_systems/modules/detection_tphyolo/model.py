@@ -192,3 +192,15 @@ def fused(model: nn.Module) -> nn.Module:
             module[0] = torch.nn.utils.fuse_conv_bn_eval(convolution, norm)
             module[1] = nn.Identity()
     return result
+
+
+def follow(averaged: nn.Module, model: nn.Module, step: int, decay: float) -> None:
+    """Move ``averaged`` towards ``model``, in the first steps faster than ``decay`` says."""
+    decay = min(decay, (1 + step) / (10 + step))
+    states = averaged.state_dict(), model.state_dict()
+    with torch.no_grad():
+        for name, kept in states[0].items():
+            if kept.dtype.is_floating_point:
+                kept.lerp_(states[1][name], 1 - decay)
+            else:
+                kept.copy_(states[1][name])

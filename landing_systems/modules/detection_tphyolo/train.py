@@ -2,7 +2,7 @@
 
 Renders pictures of invented places (once; they are kept under ``.garl/``), learns from them,
 calibrates the confidence on other invented places, and writes two ONNX files and a manifest.
-Rendering takes some 5 minutes and learning some 45 on two cores; what was interrupted goes on.
+Rendering takes some 5 minutes and learning some 50 on two cores; interrupted, it goes on.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ import time
 from collections.abc import Callable
 from dataclasses import asdict, replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 import cv2
@@ -31,6 +31,9 @@ from landing_systems.modules.detection_tphyolo.weights import SHIPPED, write_wei
 from pytest_garl import Mission
 from pytest_garl.scenarios.placement import MARKER_DICTIONARY, MARKER_SIDE_M
 
+if TYPE_CHECKING:
+    from landing_systems.modules.detection_tphyolo.identity import IdentityNet, IdentityPlan
+
 CALIBRATION_SEED = 1_000_000
 """Added to the training's seed: places in which the network has not learned."""
 CALIBRATION_SCENARIOS = 120
@@ -41,7 +44,7 @@ _TOLD_STEPS = 50
 
 @click.command(help=__doc__)
 @click.option(
-    "--steps", type=click.IntRange(20), default=9000, show_default=True, help="Steps of learning."
+    "--steps", type=click.IntRange(20), default=15000, show_default=True, help="Steps of learning."
 )
 @click.option(
     "--minutes",
@@ -51,7 +54,7 @@ _TOLD_STEPS = 50
 @click.option(
     "--reading-steps",
     type=click.IntRange(20),
-    default=4000,
+    default=6000,
     show_default=True,
     help="Steps of the second network, which reads ids.",
 )
@@ -96,7 +99,7 @@ def main(
     import torch
 
     from landing_systems.modules.detection_tphyolo.export import onnx_bytes
-    from landing_systems.modules.detection_tphyolo.identity import IdentityPlan, train_identity
+    from landing_systems.modules.detection_tphyolo.identity import IdentityPlan
     from landing_systems.modules.detection_tphyolo.model import parameter_count
     from landing_systems.modules.detection_tphyolo.training import (
         TrainPlan,
@@ -113,8 +116,7 @@ def main(
     if minutes is not None:
         plan = replace(plan, steps=max(20, round(60 * minutes / seconds_per_step(plan, place))))
     reading = IdentityPlan(steps=reading_steps, seed=seed)
-    crops = [load_shard(place, index, "crops") for index in range(shards)]
-    reader = train_identity(reading, crops, _teller("reading ids", reading.steps))
+    reader = _reader(reading, place, shards)
     finder = train(plan, place, shards, _teller("finding markers", plan.steps))
     width, height = NETWORK_SIZE
     networks = {
@@ -144,6 +146,23 @@ def main(
     write_weights(out, networks, (round(slope, 6), round(offset, 6)), about)
     size = sum(len(content) for content in networks.values()) / 1e6
     click.echo(f"{out}: {size:.2f} MB of weights, calibrated on {len(right)} detections")
+
+
+def _reader(plan: IdentityPlan, place: Path, shards: int) -> IdentityNet:
+    """Train the network that reads ids, or load it where this plan has trained it before."""
+    import torch
+
+    from landing_systems.modules.detection_tphyolo.identity import IdentityNet, train_identity
+
+    file = place / f"reader-{plan.seed}-{plan.steps}-{shards}.pt"
+    if file.exists():
+        model = IdentityNet().eval()
+        model.load_state_dict(torch.load(file, weights_only=True))
+        return model
+    crops = [load_shard(place, index, "crops") for index in range(shards)]
+    model = train_identity(plan, crops, _teller("reading ids", plan.steps))
+    torch.save(model.state_dict(), file)
+    return model
 
 
 def calibration_set(weights: Path, seed: int, *, court: bool) -> tuple[list[float], list[bool]]:

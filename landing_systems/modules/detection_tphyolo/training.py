@@ -18,7 +18,7 @@ from torch import nn
 from landing_systems.modules.detection_tphyolo.dataset import CROP_PX, Samples, load_shard
 from landing_systems.modules.detection_tphyolo.decoding import cells_of
 from landing_systems.modules.detection_tphyolo.losses import LossWeights, loss_of, targets_of
-from landing_systems.modules.detection_tphyolo.model import TphYolo
+from landing_systems.modules.detection_tphyolo.model import TphYolo, follow
 
 Array = NDArray[np.float32]
 
@@ -32,7 +32,7 @@ class TrainPlan:
     steps: a crop is a tenth of the work of a frame.
     """
 
-    steps: int = 9000
+    steps: int = 15000
     seed: int = 0
     crops: int = 32
     crop_px: int = 128
@@ -91,7 +91,7 @@ class Trainer:
         loss.backward()  # type: ignore[no-untyped-call]
         nn.utils.clip_grad_norm_(self.model.parameters(), plan.clip)
         self._optimiser.step()
-        self._average()
+        follow(self.averaged, self.model, self.step, plan.average)
         self.step += 1
         return float(loss.detach())
 
@@ -126,16 +126,6 @@ class Trainer:
         warm = min(1.0, (self.step + 1) / plan.warm_up)
         return plan.learning_rate * warm * (0.01 + 0.99 * _cosine(self.step / plan.steps))
 
-    def _average(self) -> None:
-        decay = min(self.plan.average, (1 + self.step) / (10 + self.step))
-        with torch.no_grad():
-            states = self.averaged.state_dict(), self.model.state_dict()
-            for name, kept in states[0].items():
-                if kept.dtype.is_floating_point:
-                    kept.lerp_(states[1][name], 1 - decay)
-                else:
-                    kept.copy_(states[1][name])
-
 
 def train(plan: TrainPlan, data: Path, shards: int, told: Callable[[int, float], None]) -> TphYolo:
     """Train on the shards in ``data`` and return the averaged network.
@@ -145,7 +135,7 @@ def train(plan: TrainPlan, data: Path, shards: int, told: Callable[[int, float],
     crops = [load_shard(data, index, "crops") for index in range(shards)]
     frames = [load_shard(data, index, "frames") for index in range(shards)]
     trainer = Trainer(plan, crops, frames)
-    file = data / f"checkpoint-{plan.seed}.pt"
+    file = data / f"finder-{plan.seed}-{plan.steps}-{shards}.pt"
     trainer.load(file)
     while trainer.step < plan.steps:
         told(trainer.step + 1, trainer.advance())

@@ -4,6 +4,8 @@ import dataclasses
 import math
 import subprocess
 import sys
+from collections.abc import Mapping
+from types import MappingProxyType
 
 import numpy as np
 import pytest
@@ -30,10 +32,11 @@ from pytest_garl.scenarios.maps import load_map
 from pytest_garl.simulation.camera import Renderer
 from pytest_garl.simulation.view import View
 
+NONE: Mapping[str, float] = MappingProxyType({})
 LEVEL = (0.0, 0.0, 0.0, 1.0)
 
 
-def renderer(number: int = 0, **genes: float) -> Renderer:
+def renderer(number: int = 0, genes: Mapping[str, float] = NONE) -> Renderer:
     map = dataclasses.replace(load_map("lawn"), objects=(("person", 1),))
     genome = genome_for(map, weather="full")
     scenario = decode(genome.nominal, genome, map="lawn", seed=1)
@@ -117,7 +120,7 @@ def test_the_truth_of_a_clear_marker() -> None:
 def test_people_leaves_and_snow_hide_a_marker(
     genes: dict[str, float], person: bool, low: float, high: float
 ) -> None:
-    made = renderer(**genes)
+    made = renderer(genes=genes)
     x, y = made.marker_m
     position = (x, y, 6.0)
     at = (x, y, 0.0) if person else (50.0, 50.0, 0.0)
@@ -128,7 +131,7 @@ def test_people_leaves_and_snow_hide_a_marker(
 
 
 def test_fog_takes_the_contrast() -> None:
-    made = renderer(fog=1.0)
+    made = renderer(genes={"fog": 1.0})
     x, y = made.marker_m
     frame = made.render((x, y, 12.0), LEVEL, 0.0, [((50.0, 50.0, 0.0), 0.0)])
     marker = truth(Print(marker_id=0, place_m=(x, y)), made, frame, (x, y, 12.0), LEVEL)

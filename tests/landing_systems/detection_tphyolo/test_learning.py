@@ -113,9 +113,10 @@ def test_a_marker_cut_by_the_frame_is_answered_for_where_it_is_seen() -> None:
     assert (cells_of(128, 128)[0, targets.cells[:, 1]] > 0).all()
 
 
-@pytest.mark.parametrize("doubt", [{"hidden": 0.7}, {"contrast": 3.0}])
-def test_what_cannot_be_read_is_neither_marker_nor_ground(doubt: dict[str, float]) -> None:
-    targets = targets_of(label(62, 66, 16, **doubt), WHOLE, 128, 128)
+@pytest.mark.parametrize(("hidden", "contrast"), [(0.7, 90.0), (0.0, 3.0)])
+def test_what_cannot_be_read_is_neither_marker_nor_ground(hidden: float, contrast: float) -> None:
+    doubtful = label(62, 66, 16, hidden=hidden, contrast=contrast)
+    targets = targets_of(doubtful, WHOLE, 128, 128)
     assert len(targets.cells) == 0
     raw = torch.zeros(1, CHANNELS, targets.ignored.shape[1])
     grid = torch.from_numpy(cells_of(128, 128).copy())
