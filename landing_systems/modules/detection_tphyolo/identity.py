@@ -141,7 +141,7 @@ def train_identity(
         model.parameters(), lr=plan.learning_rate, weight_decay=plan.weight_decay
     )
     schedule = torch.optim.lr_scheduler.OneCycleLR(
-        optimiser, plan.learning_rate, total_steps=plan.steps, pct_start=0.05
+        optimiser, plan.learning_rate, total_steps=plan.steps, pct_start=0.1
     )
     for step in range(plan.steps):
         rng = np.random.default_rng(np.random.SeedSequence(plan.seed, spawn_key=(1, step)))

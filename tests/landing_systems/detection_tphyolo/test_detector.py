@@ -9,6 +9,7 @@ from types import MappingProxyType
 
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 
 from benchmarks.detection import mission
 from landing_systems.modules.detection_tphyolo.detector import (
@@ -26,6 +27,7 @@ from landing_systems.modules.detection_tphyolo.scenes import (
     truth,
 )
 from landing_systems.modules.detection_tphyolo.scoring import observation_of, score
+from pytest_garl import Observation
 from pytest_garl.scenarios.chromosome import decode
 from pytest_garl.scenarios.genes import genome_for
 from pytest_garl.scenarios.maps import load_map
@@ -34,6 +36,7 @@ from pytest_garl.simulation.view import View
 
 NONE: Mapping[str, float] = MappingProxyType({})
 LEVEL = (0.0, 0.0, 0.0, 1.0)
+BLACK = np.zeros((240, 320, 3), np.uint8)
 
 
 def renderer(number: int = 0, genes: Mapping[str, float] = NONE) -> Renderer:
@@ -44,26 +47,36 @@ def renderer(number: int = 0, genes: Mapping[str, float] = NONE) -> Renderer:
     return Renderer(scenario, map, CAMERA, np.random.default_rng(0), marker_id=number)
 
 
+def observed(
+    position: tuple[float, float, float],
+    attitude: tuple[float, float, float, float] = LEVEL,
+    image: NDArray[np.uint8] = BLACK,
+) -> Observation:
+    return Observation(
+        time_s=0.0,
+        position_m=np.array(position),
+        velocity_mps=np.zeros(3),
+        attitude=np.array(attitude),
+        image=image,
+        depth_m=np.zeros(image.shape[:2], np.float32),
+    )
+
+
 def test_a_box_is_placed_where_its_ray_meets_the_ground() -> None:
     rng = np.random.default_rng(3)
-    shown = next(pictures(rng, load_map("lawn"), "confined", 1))
     for _ in range(20):
         position, attitude = random_pose(rng, (2.0, -1.0))
         view = View.of(CAMERA, position, attitude)
         seen = (np.array([[2.0, -1.0, 0.0]]) - view.eye) @ view.axes.T
         centre = view.pixels(seen)[0] + 0.5
-        observation = dataclasses.replace(
-            observation_of(shown), position_m=np.array(position), attitude=np.array(attitude)
-        )
-        found = ground_place(centre, CAMERA, observation)
+        found = ground_place(centre, CAMERA, observed(position, attitude))
         assert found is not None
         assert found[0] == pytest.approx((2.0, -1.0), abs=1e-3)
         assert found[1] == pytest.approx(position[2] / seen[0, 2], rel=1e-3)
 
 
 def test_a_ray_to_the_sky_has_no_place_on_the_ground() -> None:
-    shown = next(pictures(np.random.default_rng(0), load_map("lawn"), "confined", 1))
-    on_its_back = dataclasses.replace(observation_of(shown), attitude=np.array([1.0, 0, 0, 0]))
+    on_its_back = observed((0.0, 0.0, 5.0), (1.0, 0.0, 0.0, 0.0))
     assert ground_place(np.array([160, 120], np.float32), CAMERA, on_its_back) is None
 
 
@@ -147,11 +160,7 @@ def test_the_shipped_weights_find_the_marker_and_tell_it_from_another() -> None:
         for height in (2.5, 5.0, 9.0):
             position = (x + 0.3, y - 0.4, height)
             frame = made.render(position, LEVEL, 0.0, [((50.0, 50.0, 0.0), 0.0)])
-            shown = next(pictures(np.random.default_rng(0), load_map("lawn"), "confined", 1))
-            picture = dataclasses.replace(
-                shown, frame=frame, position_m=position, attitude=LEVEL, markers=()
-            )
-            found = detector.detect(observation_of(picture))
+            found = detector.detect(observed(position, image=frame.image))
             sure = [item for item in found if item.confidence >= 0.8]
             assert [item.marker_id for item in sure] == expected
             for item in sure:

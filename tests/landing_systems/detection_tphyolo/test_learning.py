@@ -169,12 +169,12 @@ def test_shifting_keeps_labels_on_their_markers() -> None:
 def test_a_few_steps_of_training_lower_the_loss_and_go_on_where_they_stopped(
     tmp_path: Path,
 ) -> None:
-    crops, frames = painted(24, (CROP_PX, CROP_PX), 0), painted(4, (320, 240), 1)
-    plan = TrainPlan(steps=20, warm_up=5, crops=8, frames=1, frame_share=0.1)
+    crops, frames = painted(12, (CROP_PX, CROP_PX), 0), painted(2, (320, 240), 1)
+    plan = TrainPlan(steps=20, warm_up=5, crops=4, frames=1, frame_share=0.1)
     torch.set_num_threads(1)
     trainer = Trainer(plan, [crops], [frames])
     losses = [trainer.advance() for _ in range(16)]
-    assert np.mean(losses[-4:]) < 0.8 * np.mean(losses[:4])
+    assert np.mean(losses[-4:]) < 0.85 * np.mean(losses[:4])
     trainer.save(tmp_path / "half.pt")
     rest = [trainer.advance() for _ in range(4)]
     again = Trainer(plan, [crops], [frames])
