@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 Array = NDArray[np.float64]
 FIXED = 3
@@ -29,7 +29,7 @@ class UniformSpline:
         """Time from the curve's start to its end."""
         return (len(self.points) - 3) * self.span_s
 
-    def evaluate(self, time_s: Array | float, derivative: int = 0) -> Array:
+    def evaluate(self, time_s: ArrayLike, derivative: int = 0) -> Array:
         """Return the position, velocity (1) or acceleration (2) at times from the start.
 
         Times (m,) give (m, 3), one time gives (3,); times outside are moved to the ends.
