@@ -328,8 +328,8 @@ off by {error} on average here (expected calibration error over ten bins).
 ## Time
 
 A frame of 320x240 takes {least} ms of CPU time at best and {usual} ms in the median, all included
-(one thread; OpenCV's DNN, classic engine). For the first network alone PyTorch's eager mode needed 1.7 times
-the CPU time (10.3 ms against 6.5 ms, measured on a loaded machine).
+(one thread; OpenCV's DNN, classic engine). For the first network alone PyTorch's eager mode
+needed 1.6 times the CPU time (10.3 ms against 6.5 ms, measured on a loaded machine).
 
 ## By weather, hidden share and size
 
