@@ -36,7 +36,6 @@ if TYPE_CHECKING:
 
 CALIBRATION_SEED = 1_000_000
 """Added to the training's seed: places in which the network has not learned."""
-CALIBRATION_SCENARIOS = 120
 CALIBRATION_FRAMES = 12
 PACKAGES = ("pytest-garl", "numpy", "opencv-python-headless", "torch", "onnx")
 _TOLD_STEPS = 50
@@ -66,6 +65,13 @@ _TOLD_STEPS = 50
 )
 @click.option("--shards", type=click.IntRange(1), default=40, show_default=True)
 @click.option(
+    "--calibration-scenarios",
+    type=click.IntRange(1),
+    default=120,
+    show_default=True,
+    help="Scenarios whose pictures calibrate the confidence.",
+)
+@click.option(
     "--workers",
     type=click.IntRange(1),
     default=min(16, os.cpu_count() or 1),
@@ -91,6 +97,7 @@ def main(
     seed: int,
     without_court: bool,
     shards: int,
+    calibration_scenarios: int,
     workers: int,
     folder: Path,
     out: Path,
@@ -132,9 +139,14 @@ def main(
         "reading": asdict(reading),
         "versions": {name: importlib.metadata.version(name) for name in PACKAGES},
     }
-    write_weights(out, networks, (1.0, 0.0), about)
-    logits, right = calibration_set(out, seed, court=not without_court)
-    slope, offset = calibration.fit(logits, right)
+    # What is shipped is replaced only by what has been calibrated.
+    draft = place / "draft.json"
+    write_weights(draft, networks, (1.0, 0.0), about)
+    logits, right = calibration_set(draft, seed, calibration_scenarios, court=not without_court)
+    try:
+        slope, offset = calibration.fit(logits, right)
+    except ValueError as error:
+        raise click.ClickException(str(error)) from error
     confidences = 1 / (1 + np.exp(-(slope * np.array(logits) + offset)))
     bins = calibration.reliability(confidences.tolist(), right)
     about["calibrated_on"] = {
@@ -165,7 +177,9 @@ def _reader(plan: IdentityPlan, place: Path, shards: int) -> IdentityNet:
     return model
 
 
-def calibration_set(weights: Path, seed: int, *, court: bool) -> tuple[list[float], list[bool]]:
+def calibration_set(
+    weights: Path, seed: int, scenarios: int, *, court: bool
+) -> tuple[list[float], list[bool]]:
     """Return logits of detections in places of their own, and whether each is right.
 
     The weights' manifest must have the calibration (1, 0): confidences are then plain.
@@ -183,7 +197,7 @@ def calibration_set(weights: Path, seed: int, *, court: bool) -> tuple[list[floa
     cv2.setNumThreads(1)
     detector = TphYoloDetector(mission, weights, min_confidence=0.02)
     logits, right = [], []
-    for index in range(CALIBRATION_SCENARIOS):
+    for index in range(scenarios):
         for picture in _calibration_pictures(seed, index, court):
             for each in score(picture, detector.detect(observation_of(picture))):
                 # What rounds to 1 has a logit all the same.
