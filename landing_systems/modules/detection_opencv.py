@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from pytest_garl import Camera, Detection, Mission, Observation
 
-_CAMERA_FROM_BODY = np.array([[0.0, -1.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 0.0, -1.0]])
+CAMERA_FROM_BODY = np.array([[0.0, -1.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 0.0, -1.0]])
 """Image right is the body's -y, image down its -x, the optical axis its -z."""
 CELLS = 7
 LOOKS: tuple[tuple[float, float, float], ...] = (
@@ -118,7 +118,7 @@ class OpenCvDetector:
         back, _ = cv2.projectPoints(self._corners, turn, shift, self._camera.matrix, None)
         if np.abs(back.reshape(4, 2) - quad).max() > MAX_REPROJECTION_PX:
             return None
-        in_body = _CAMERA_FROM_BODY.T @ shift.ravel()
+        in_body = CAMERA_FROM_BODY.T @ shift.ravel()
         offset = rotation_matrix(observation.attitude) @ in_body
         height = float(observation.position_m[2])
         if abs(-offset[2] - height) > HEIGHT_TOLERANCE * height + 0.3:

@@ -13,9 +13,9 @@ from numpy.typing import NDArray
 from pytest_garl.errors import GarlError
 from pytest_garl.landing_system import Camera
 from pytest_garl.scenarios.maps import Map
-from pytest_garl.scenarios.placement import MARKER_SIDE_M, marker_position_m
+from pytest_garl.scenarios.placement import MARKER_SIDE_M, TARGET_MARKER_ID, marker_position_m
 from pytest_garl.scenarios.scenario import Scenario
-from pytest_garl.simulation.ground import Raster, paint_ground
+from pytest_garl.simulation.ground import Ground, Raster, covered, paint_ground
 from pytest_garl.simulation.particles import Particles
 from pytest_garl.simulation.sensor import Sensor
 from pytest_garl.simulation.solids import Place, Solids
@@ -50,6 +50,8 @@ class Renderer:
 
     ``segment_ids`` numbers ground (0), marker (1), static bodies and dynamic objects.
     With ``colour=False`` nothing is painted: such a renderer gives frames without colour.
+    Flights have the marker that missions look for; another ``marker_id`` is for training
+    detectors.
     """
 
     def __init__(
@@ -60,6 +62,7 @@ class Renderer:
         rng: np.random.Generator,
         *,
         colour: bool = True,
+        marker_id: int = TARGET_MARKER_ID,
     ) -> None:
         self.camera = camera
         self.conditions = conditions_of(scenario)
@@ -67,7 +70,9 @@ class Renderer:
         names = ["ground", "marker", *(body.name for body in map.bodies)]
         names += [name for name, _ in map.object_names]
         self.segment_ids: Mapping[str, int] = {name: index for index, name in enumerate(names)}
-        self._ground = paint_ground(scenario, map, self.conditions, rng) if colour else None
+        self._ground = (
+            paint_ground(scenario, map, self.conditions, rng, marker_id) if colour else None
+        )
         self._solids = Solids(map, self.conditions, self.segment_ids)
         self._sensor = Sensor(camera, self.conditions, rng)
         self._particles = Particles(camera, self.conditions, rng)
@@ -129,6 +134,10 @@ class Renderer:
         self._marker_segment(segmentation, View.of(self.camera, position_m, attitude))
         return int(np.count_nonzero(segmentation))
 
+    def covered(self, places_m: NDArray[np.float64]) -> NDArray[np.bool_]:
+        """Whether places (n, 2) on the ground lie under leaves or snow, shape (n,)."""
+        return covered(places_m, self._painted().cover_shift_m, self.conditions)
+
     def marker_area_px(self, position_m: Vector, attitude: Quaternion) -> float:
         """Projected area of the marker, clipped to the frame, with nothing in front."""
         polygon = self._marker_polygon(View.of(self.camera, position_m, attitude))
@@ -164,18 +173,22 @@ class Renderer:
         footprint = float(depth[height // 2, width // 2]) / self.camera.focal_px
         # Four channels: warpPerspective is 2.5 times as fast as with three.
         image = np.empty((height, width, 4), np.uint8)
-        if self._ground is None:
-            raise GarlError("this renderer was made with colour=False; it has no ground to show")
-        inset = self._ground.inset
+        ground = self._painted()
+        inset = ground.inset
         rows, columns = slice(0, height), slice(0, width)
         if horizon or not inset.holds(world @ self._corners):
-            _warp(self._ground.wide, image, world, footprint, cv2.BORDER_REFLECT_101)
+            _warp(ground.wide, image, world, footprint, cv2.BORDER_REFLECT_101)
             rows, columns = view.box(view.ground_polygon(inset.outline))
         part = image[rows, columns]
         if part.size:
             shift = np.array([[1.0, 0.0, columns.start], [0.0, 1.0, rows.start], [0.0, 0.0, 1.0]])
             _warp(inset, part, world @ shift, footprint, cv2.BORDER_TRANSPARENT)
         return np.asarray(cv2.cvtColor(image, cv2.COLOR_RGBA2RGB), dtype=np.uint8)
+
+    def _painted(self) -> Ground:
+        if self._ground is None:
+            raise GarlError("this renderer was made with colour=False; it has no ground to show")
+        return self._ground
 
     def _marker_polygon(self, view: View) -> Array:
         half = MARKER_SIDE_M / 2

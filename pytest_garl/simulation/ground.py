@@ -73,14 +73,22 @@ class Raster:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Ground:
-    """The whole ground coarsely, and a piece about the marker finely."""
+    """The whole ground coarsely, and a piece about the marker finely.
+
+    ``cover_shift_m`` (2,) says where the pattern of fallen leaves and snow begins.
+    """
 
     wide: Raster
     inset: Raster
+    cover_shift_m: NDArray[np.float64]
 
 
 def paint_ground(
-    scenario: Scenario, map: Map, conditions: Conditions, rng: np.random.Generator
+    scenario: Scenario,
+    map: Map,
+    conditions: Conditions,
+    rng: np.random.Generator,
+    marker_id: int = TARGET_MARKER_ID,
 ) -> Ground:
     """Paint the ground of one flight in full light; exposure comes later."""
     marker = marker_position_m(scenario, map)
@@ -97,12 +105,12 @@ def paint_ground(
         else:
             image = _detail(painted, wide_box, box, resolution, map)
         canvas = _Canvas(image, box, resolution)
-        canvas.marker(marker, MARKER_SIDE_M, 0.0, TARGET_MARKER_ID)
+        canvas.marker(marker, MARKER_SIDE_M, 0.0, marker_id)
         _wet(image, conditions.wetness)
         _cover(image, box, resolution, shift, conditions)
         _light(image, canvas, map, conditions)
         rasters.append(_raster(image, box, resolution))
-    return Ground(wide=rasters[0], inset=rasters[1])
+    return Ground(wide=rasters[0], inset=rasters[1], cover_shift_m=shift)
 
 
 def _raster(image: Image, box: tuple[float, float, float, float], resolution: float) -> Raster:
@@ -382,6 +390,22 @@ def _cover(
         image[here] = colours[grid][here]
     if conditions.snow_cover > 0:
         image[snow[grid] <= conditions.snow_cover] = (236, 240, 246)
+
+
+def covered(
+    places_m: NDArray[np.float64], shift_m: NDArray[np.float64], conditions: Conditions
+) -> NDArray[np.bool_]:
+    """Whether places (n, 2) lie under leaves or snow; ``shift_m`` is the ground's, shape (n,)."""
+    leaves, _, snow = _cover_tiles()
+    size = leaves.shape[0]
+    column = ((places_m[:, 0] - shift_m[0]) / _INSET_M).astype(int) % size
+    row = ((shift_m[1] - places_m[:, 1]) / _INSET_M).astype(int) % size
+    under = np.zeros(len(places_m), np.bool_)
+    if conditions.leaf_cover > 0:
+        under |= leaves[row, column] <= conditions.leaf_cover
+    if conditions.snow_cover > 0:
+        under |= snow[row, column] <= conditions.snow_cover
+    return under
 
 
 def _light(image: Image, canvas: _Canvas, map: Map, conditions: Conditions) -> None:

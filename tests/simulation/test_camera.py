@@ -225,3 +225,31 @@ def test_marker_position_is_where_the_genes_say() -> None:
     genome = genome_for(map, weather="full")
     scenario = repair(decode(genome.nominal, genome, map="court", seed=0), map)
     assert made.marker_m == marker_position_m(scenario, map)
+
+
+def test_places_under_leaves_are_those_that_are_painted_so() -> None:
+    made, _ = renderer(genes={"road_leaf": 0.4})
+    bare, _ = renderer()
+    x, y = made.marker_m
+    far_away = [((50.0, 50.0, 0.0), 0.0)] * 3
+    frames = [each.render((x, y, 2.0), LEVEL, 0.0, far_away).image for each in (made, bare)]
+    changed = np.abs(frames[0].astype(int) - frames[1].astype(int)).max(axis=2) > 30
+    rows, columns = np.mgrid[20:220:3, 20:300:3].reshape(2, -1)
+    # At zero yaw up is east and right is south; 2 m up a pixel is 2 m / 160.
+    places = np.column_stack([x + (119.5 - rows) / 80, y - (columns - 159.5) / 80])
+    agreed = made.covered(places) == changed[rows, columns]
+    assert agreed.mean() > 0.9  # but for the leaves' edges
+    assert 0.3 < made.covered(places).mean() < 0.5
+    assert not bare.covered(places).any()
+
+
+def test_another_marker_is_drawn_where_asked() -> None:
+    _, map = renderer()
+    genome = genome_for(map, weather="full")
+    scenario = repair(decode(genome.nominal, genome, map="lawn", seed=0), map)
+    other = Renderer(scenario, map, CAMERA, np.random.default_rng(0), marker_id=7)
+    x, y = other.marker_m
+    image = other.render((x, y, 3.0), LEVEL, 0.0, [((50.0, 50.0, 0.0), 0.0)] * 3).image
+    detector = cv2.aruco.ArucoDetector(cv2.aruco.getPredefinedDictionary(cv2.aruco.DICT_5X5_50))
+    _, ids, _ = detector.detectMarkers(cv2.cvtColor(image, cv2.COLOR_RGB2GRAY))
+    assert np.ravel(ids).tolist() == [7]

@@ -1,0 +1,163 @@
+"""MM-MLS: the learned detector, Ego-Planner, ArduPilot-style control with precision landing."""
+
+from __future__ import annotations
+
+import dataclasses
+import functools
+import math
+from collections import deque
+from collections.abc import Callable
+
+import numpy as np
+
+from landing_systems.modules.control_ardupilot import ArduPilotControl, tuned, vehicle_of
+from landing_systems.modules.decision import Decision, DecisionModule, DecisionParameters
+from landing_systems.modules.detection_tphyolo.detector import TphYoloDetector
+from landing_systems.modules.planning_ego import LANDING, EgoPlanner, Setpoint
+from pytest_garl import (
+    Abort,
+    Airframe,
+    Command,
+    Detection,
+    Diagnostics,
+    Land,
+    Mission,
+    MotorThrusts,
+    Observation,
+    PositionSetpoint,
+    VehicleState,
+)
+
+AIRFRAME = Airframe(control_rate_hz=240)
+PARAMETERS = dataclasses.replace(tuned(vehicle_of(AIRFRAME).hover_throttle), plnd_enabled=True)
+DECISION = DecisionParameters()
+CLEAR_S = 1.0
+"""The column below must have been free for so long before a descent goes on."""
+GIVE_WAY_M = 3.0
+"""How far to climb out of the way of what comes in below: more than a person is high."""
+COLUMN_STEP_M = 0.25
+FEET_M = 0.45
+"""The column begins below the feet by as much as the planner's obstacles grow."""
+
+Place = tuple[float, float, float]
+
+
+class MultiModuleLandingSystem:
+    """The third row of the paper's table of landing systems.
+
+    The decision module says where to go, the planner how to get there, the flight control
+    flies it.  The last two metres are ArduPilot's precision landing, fed by the detector.
+    A descent gives way, upwards, while something is in the column below.
+    """
+
+    airframe = AIRFRAME
+
+    def reset(self, mission: Mission) -> None:
+        """Prepare for one flight."""
+        self._mission = mission
+        self._detector = TphYoloDetector(mission)
+        self._decision = DecisionModule(mission, DECISION)
+        self._planner = EgoPlanner(LANDING, mission.camera, mission.gps_position_m)
+        self._control = ArduPilotControl(self.airframe, PARAMETERS)
+        self._orders: deque[tuple[float, Callable[[], None]]] = deque()
+        self._blocked_s = -math.inf
+        self._refuge_m: float | None = None
+
+    def step(self, observation: Observation) -> Command:
+        """See, decide, plan, order."""
+        now = observation.time_s
+        x, y, z = (float(value) for value in observation.position_m)
+        seen = self._detector.detect(observation)
+        self._planner.observe(observation)
+        decision = self._decision.decide(now, (x, y, z), seen)
+        self._tell_target(now, decision, seen)
+        if decision.phase == "abort":
+            return Abort(diagnostics=_diagnostics(decision, seen))
+        if decision.phase == "take-off":
+            self._later(now, lambda: self._control.take_off(self._mission.search_altitude_m))
+            return PositionSetpoint(
+                position_m=decision.goal_m, diagnostics=_diagnostics(decision, seen)
+            )
+        goal = self._refuge(now, decision, (x, y, z))
+        if goal is None and decision.phase == "commit":
+            self._later(now, self._control.land)
+            note = f"precision landing: {self._control.precision.status}"
+            return Land(diagnostics=_diagnostics(decision, seen, note=note))
+        if goal is not None:
+            self._decision.interrupt()
+        self._planner.set_goal(goal or decision.goal_m)
+        plan = self._planner.plan(now, observation.position_m, observation.velocity_mps)
+        self._later(now, lambda: self._follow(plan))
+        note = "something is in the column below" if goal else str(plan.error or decision.note)
+        return PositionSetpoint(
+            position_m=plan.position_m,
+            diagnostics=_diagnostics(decision, seen, path=plan.path_m, note=note),
+        )
+
+    def control(self, state: VehicleState) -> MotorThrusts:
+        """Fly the motors; orders take effect ``latency_s`` after the image they came from."""
+        while self._orders and self._orders[0][0] <= state.time_s:
+            self._orders.popleft()[1]()
+        return self._control.control(state)
+
+    def _later(self, now: float, order: Callable[[], None]) -> None:
+        self._orders.append((now + self.airframe.latency_s, order))
+
+    def _follow(self, plan: Setpoint) -> None:
+        self._control.guide(
+            position=plan.position_m,
+            velocity=plan.velocity_mps,
+            acceleration=plan.acceleration_mps2,
+            yaw=0.0,
+        )
+
+    def _tell_target(self, now: float, decision: Decision, seen: tuple[Detection, ...]) -> None:
+        """Tell precision landing where the target is seen, once there is one."""
+        target = decision.target_m
+        if target is None:
+            return
+        for item in seen:
+            near = math.dist(item.position_m[:2], target) <= DECISION.retarget_m
+            sure = item.confidence >= DECISION.min_confidence
+            if item.marker_id == self._mission.marker_id and near and sure:
+                tell = self._control.landing_target
+                self._later(now, functools.partial(tell, item.position_m, now))
+                return
+
+    def _refuge(self, now: float, decision: Decision, at: Place) -> Place | None:
+        """Return where to wait while the column below a descent is not free, or None."""
+        if decision.phase not in ("descend", "commit"):
+            return None
+        target = decision.target_m or at[:2]
+        if self._column_taken(target, at[2]):
+            self._blocked_s = now
+            if self._refuge_m is None:
+                self._refuge_m = min(self._mission.search_altitude_m, at[2] + GIVE_WAY_M)
+        if now - self._blocked_s < CLEAR_S and self._refuge_m is not None:
+            return (*target, self._refuge_m)
+        self._refuge_m = None
+        return None
+
+    def _column_taken(self, target: tuple[float, float], height_m: float) -> bool:
+        heights = np.arange(0.0, height_m - FEET_M, COLUMN_STEP_M)
+        if not len(heights):
+            return False
+        points = np.column_stack([np.tile(np.array(target), (len(heights), 1)), heights])
+        return bool(self._planner.grid.occupied(points).any())
+
+
+def _diagnostics(
+    decision: Decision,
+    seen: tuple[Detection, ...],
+    *,
+    path: tuple[Place, ...] = (),
+    note: str = "",
+) -> Diagnostics:
+    target = decision.target_m
+    return Diagnostics(
+        phase=decision.phase,
+        detections=seen,
+        target_m=(*target, 0.0) if target else None,
+        planned_path_m=path,
+        note=note or decision.note,
+    )

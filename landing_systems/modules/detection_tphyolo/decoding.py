@@ -1,0 +1,99 @@
+"""From the network's numbers to boxes: cells, sizes, confidence, non-maximum suppression."""
+
+from __future__ import annotations
+
+import functools
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float32]
+CLASS_IDS = (0, 1, 2, 3)
+"""The ids that are told apart, as in the paper's published detector (marker0 to marker3); a
+marker of another id belongs to no class and is not reported."""
+STRIDES = (4, 8, 16, 32)
+CHANNELS = 5
+"""Centre x and y, logarithms of width and height, objectness."""
+BASE_CELLS = 4.0
+"""A box of four cells has the logarithm 0."""
+NETWORK_SIZE = (320, 240)
+"""Width and height in pixels of what the network takes."""
+NMS_IOU = 0.45
+"""TPH-YOLOv5's default."""
+_LARGEST_LOG = 4.0
+_MAX_CANDIDATES = 64
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Boxes:
+    """Boxes found in an image, the most confident first.
+
+    ``centres_px`` and ``sizes_px`` are (n, 2) in pixel edges: the left edge of the image is 0,
+    the right edge its width.  ``logits`` are (n,), of being a marker.
+    """
+
+    centres_px: Array
+    sizes_px: Array
+    logits: Array
+
+
+@functools.lru_cache(maxsize=8)
+def cells_of(width: int, height: int) -> Array:
+    """Return centre x, centre y and stride of all cells, shape (3, cells), in pixel edges."""
+    columns, rows = -(-width // 4), -(-height // 4)
+    parts = []
+    for stride in STRIDES:
+        x, y = np.meshgrid(np.arange(columns) + 0.5, np.arange(rows) + 0.5)
+        parts.append(np.stack([x * stride, y * stride, np.full_like(x, stride)]).reshape(3, -1))
+        columns, rows = -(-columns // 2), -(-rows // 2)
+    cells = np.concatenate(parts, 1).astype(np.float32)
+    cells.flags.writeable = False
+    return cells
+
+
+def decode(raw: Array, width: int, height: int, min_logit: float) -> Boxes:
+    """Return the boxes in the network's answer (5, cells), without duplicates."""
+    candidates = np.flatnonzero(raw[4] > min_logit)
+    order = np.argsort(-raw[4, candidates], kind="stable")[:_MAX_CANDIDATES]
+    chosen = candidates[order]
+    x, y, stride = cells_of(width, height)[:, chosen]
+    shift = raw[:4, chosen]
+    centres = np.stack([x + shift[0] * stride, y + shift[1] * stride], 1)
+    sizes = BASE_CELLS * stride[:, None] * np.exp(np.clip(shift[2:], -_LARGEST_LOG, _LARGEST_LOG).T)
+    first = suppress(centres, sizes)
+    return Boxes(centres_px=centres[first], sizes_px=sizes[first], logits=raw[4, chosen][first])
+
+
+def joint_logit(a: float, b: float) -> float:
+    """Return the logit of the product of two probabilities given as logits."""
+    # p / (1 - p) of the product is 1 / (e^-a + e^-b + e^-(a + b)).
+    return float(-np.logaddexp(np.logaddexp(-a, -b), -(a + b)))
+
+
+def class_logit(answer: Array) -> tuple[int, float]:
+    """Return the likeliest class of the second network's answer (ids + 1,) and its logit.
+
+    The last number is that of "another id, or no marker", which is never returned.
+    """
+    best = int(answer[:-1].argmax())
+    others = np.delete(answer.astype(np.float64), best)
+    return best, float(answer[best] - np.logaddexp.reduce(others))
+
+
+def suppress(centres: Array, sizes: Array, limit: float = NMS_IOU) -> list[int]:
+    """Return the indices of boxes (n, 2), best first, that overlap no better box too much."""
+    kept: list[int] = []
+    for index in range(len(centres)):
+        if all(iou(centres, sizes, index, other) <= limit for other in kept):
+            kept.append(index)
+    return kept
+
+
+def iou(centres: Array, sizes: Array, a: int, b: int) -> float:
+    """Intersection of two of the boxes over their union."""
+    low = np.maximum(centres[a] - sizes[a] / 2, centres[b] - sizes[b] / 2)
+    high = np.minimum(centres[a] + sizes[a] / 2, centres[b] + sizes[b] / 2)
+    common = float(np.prod(np.maximum(high - low, 0.0)))
+    union = float(sizes[a].prod() + sizes[b].prod()) - common
+    return common / union if union > 0 else 0.0
