@@ -8,11 +8,10 @@ import math
 from collections import deque
 from collections.abc import Callable
 
-import numpy as np
-
 from landing_systems.modules.control_ardupilot import ArduPilotControl, tuned, vehicle_of
 from landing_systems.modules.decision import Decision, DecisionModule, DecisionParameters
 from landing_systems.modules.detection_tphyolo.detector import TphYoloDetector
+from landing_systems.modules.movement_watch import MovementWatch
 from landing_systems.modules.planning_ego import LANDING, EgoPlanner, Setpoint
 from pytest_garl import (
     Abort,
@@ -29,15 +28,17 @@ from pytest_garl import (
 )
 
 AIRFRAME = Airframe(control_rate_hz=240)
-PARAMETERS = dataclasses.replace(tuned(vehicle_of(AIRFRAME).hover_throttle), plnd_enabled=True)
+PARAMETERS = dataclasses.replace(
+    tuned(vehicle_of(AIRFRAME).hover_throttle),
+    plnd_enabled=True,
+    # ArduPilot's 1 m/s² takes more than a second for the first metre; who runs in does not.
+    wpnav_accel_z=2.5,
+)
 DECISION = DecisionParameters()
 CLEAR_S = 1.0
-"""The column below must have been free for so long before a descent goes on."""
-GIVE_WAY_M = 3.0
-"""How far to climb out of the way of what comes in below: more than a person is high."""
-COLUMN_STEP_M = 0.25
-FEET_M = 0.45
-"""The column begins below the feet by as much as the planner's obstacles grow."""
+"""Nothing must have been in the way below for so long before a descent goes on."""
+REFUGE_M = 4.5
+"""How high to wait while something is: above people, and above birds that fly at 3 m."""
 
 Place = tuple[float, float, float]
 
@@ -47,7 +48,7 @@ class MultiModuleLandingSystem:
 
     The decision module says where to go, the planner how to get there, the flight control
     flies it.  The last two metres are ArduPilot's precision landing, fed by the detector.
-    A descent gives way, upwards, while something is in the column below.
+    A descent gives way, straight up, to what stands or moves below.
     """
 
     airframe = AIRFRAME
@@ -60,8 +61,8 @@ class MultiModuleLandingSystem:
         self._planner = EgoPlanner(LANDING, mission.camera, mission.gps_position_m)
         self._control = ArduPilotControl(self.airframe, PARAMETERS)
         self._orders: deque[tuple[float, Callable[[], None]]] = deque()
+        self._watch = MovementWatch(mission)
         self._blocked_s = -math.inf
-        self._refuge_m: float | None = None
 
     def step(self, observation: Observation) -> Command:
         """See, decide, plan, order."""
@@ -78,17 +79,18 @@ class MultiModuleLandingSystem:
             return PositionSetpoint(
                 position_m=decision.goal_m, diagnostics=_diagnostics(decision, seen)
             )
-        goal = self._refuge(now, decision, (x, y, z))
-        if goal is None and decision.phase == "commit":
+        if self._watch.in_the_way(observation):
+            self._blocked_s = now
+        if now - self._blocked_s < CLEAR_S and decision.phase in ("descend", "commit"):
+            return self._give_way(now, decision, seen, (x, y, z))
+        if decision.phase == "commit":
             self._later(now, self._control.land)
             note = f"precision landing: {self._control.precision.status}"
             return Land(diagnostics=_diagnostics(decision, seen, note=note))
-        if goal is not None:
-            self._decision.interrupt()
-        self._planner.set_goal(goal or decision.goal_m)
+        self._planner.set_goal(decision.goal_m)
         plan = self._planner.plan(now, observation.position_m, observation.velocity_mps)
         self._later(now, lambda: self._follow(plan))
-        note = "something is in the column below" if goal else str(plan.error or decision.note)
+        note = str(plan.error or decision.note)
         return PositionSetpoint(
             position_m=plan.position_m,
             diagnostics=_diagnostics(decision, seen, path=plan.path_m, note=note),
@@ -124,26 +126,17 @@ class MultiModuleLandingSystem:
                 self._later(now, functools.partial(tell, item.position_m, now))
                 return
 
-    def _refuge(self, now: float, decision: Decision, at: Place) -> Place | None:
-        """Return where to wait while the column below a descent is not free, or None."""
-        if decision.phase not in ("descend", "commit"):
-            return None
-        target = decision.target_m or at[:2]
-        if self._column_taken(target, at[2]):
-            self._blocked_s = now
-            if self._refuge_m is None:
-                self._refuge_m = min(self._mission.search_altitude_m, at[2] + GIVE_WAY_M)
-        if now - self._blocked_s < CLEAR_S and self._refuge_m is not None:
-            return (*target, self._refuge_m)
-        self._refuge_m = None
-        return None
-
-    def _column_taken(self, target: tuple[float, float], height_m: float) -> bool:
-        heights = np.arange(0.0, height_m - FEET_M, COLUMN_STEP_M)
-        if not len(heights):
-            return False
-        points = np.column_stack([np.tile(np.array(target), (len(heights), 1)), heights])
-        return bool(self._planner.grid.occupied(points).any())
+    def _give_way(
+        self, now: float, decision: Decision, seen: tuple[Detection, ...], at: Place
+    ) -> Command:
+        """Climb straight up, where the UAV came from, without asking the planner."""
+        self._decision.interrupt()
+        refuge = (at[0], at[1], max(at[2], min(REFUGE_M, self._mission.search_altitude_m)))
+        self._later(now, functools.partial(self._control.guide, position=refuge, yaw=0.0))
+        note = "something is in the way below"
+        return PositionSetpoint(
+            position_m=refuge, diagnostics=_diagnostics(decision, seen, note=note)
+        )
 
 
 def _diagnostics(
