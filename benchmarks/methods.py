@@ -102,8 +102,10 @@ def report(rows: list[dict[str, str]]) -> str:
         "| map | method | seeds | violations | aborted | Top-10 | signatures | distance |",
         "| --- | --- | --- | --- | --- | --- | --- | --- |",
     ]
+    # Rows of an earlier form of a method are kept as method@commit.
+    methods = dict.fromkeys((*METHODS, *(row["method"] for row in rows)))
     for map in ("court", "lawn"):
-        for method in METHODS:
+        for method in methods:
             own = [row for row in rows if (row["map"], row["method"]) == (map, method)]
             if not own:
                 continue

@@ -23,6 +23,7 @@ from pytest_garl.search.method import Flown, Plan
 from pytest_garl.search.objectives import threat
 from pytest_garl.search.operators import (
     CROSSOVER_PROBABILITY,
+    LARGEST_STEP,
     Matrix,
     local_steps,
     nuclear_gene_crossover,
@@ -37,6 +38,8 @@ WEATHERS = 0.5
 """Share of these that also meet in another weather, that of a flight that was not aborted."""
 PROGRESS = 0.01
 """A child that raises its cell's threat by so much has succeeded."""
+NEAREST = 0.1
+"""The largest step shrinks with the distance to a violation, down to this share of it."""
 MEMORY = 0.9
 """What a trial still counts for after one more of its cell: cells change as they are searched."""
 
@@ -136,17 +139,21 @@ class Garl:
         rng, genome = self._rng, self._plan.genome
         first = self._elite(name)
         row, seed = encode(first.scenario, genome), first.scenario.seed
+        # What nearly fails needs a small change, and so does what shall fail again.
+        largest = LARGEST_STEP * max(NEAREST, 1 - threat(first.result))
         body = f"{first.result['closest_body']}."
         aim = np.array([key.startswith(body) for key in genome.keys])
         if aim.any() and rng.random() < self._aims:
-            moved = local_steps(row[None], genome.lower, genome.upper, rng, probability=1.0)[0]
+            moved = local_steps(
+                row[None], genome.lower, genome.upper, rng, probability=1.0, largest=largest
+            )[0]
             if rng.random() < self._weathers:
                 row = np.where(self._weather, encode(self._in_other_weather(), genome), row)
             return self._scenario(np.where(aim, moved, row), seed)
         second = self._elite(str(rng.choice(sorted(self._cells)))).scenario
         pair = np.array([[*row, seed], [*encode(second, genome), second.seed]])
         crossed = nuclear_gene_crossover(pair, genome.borders, rng, self._crossover)[:1]
-        moved = local_steps(crossed[:, :-1], genome.lower, genome.upper, rng)[0]
+        moved = local_steps(crossed[:, :-1], genome.lower, genome.upper, rng, largest=largest)[0]
         return self._scenario(moved, int(crossed[0, -1]))
 
     def _in_other_weather(self) -> Scenario:

@@ -74,8 +74,8 @@ def property_mutation(
     return mutated
 
 
-LOCAL_STEPS = (0.003, 0.3)
-"""Least and largest standard deviation of a local step, as shares of the property's range."""
+LEAST_STEP, LARGEST_STEP = 0.003, 0.3
+"""Standard deviations of a local step, as shares of the property's range."""
 
 
 def local_steps(
@@ -85,14 +85,15 @@ def local_steps(
     rng: np.random.Generator,
     *,
     probability: float = MUTATION_PROBABILITY,
+    largest: float = LARGEST_STEP,
 ) -> Matrix:
     """Return a copy in which each property moves a little with ``probability``, at least one.
 
-    How far is drawn for each chromosome, log-uniformly: a collision may hang on centimetres.
+    How far is drawn for each chromosome, log-uniformly up to ``largest``: a collision may hang
+    on centimetres.
     """
     rows, columns = offspring.shape
-    low, high = np.log(LOCAL_STEPS)
-    scale = np.exp(rng.uniform(low, high, (rows, 1)))
+    scale = np.exp(rng.uniform(np.log(LEAST_STEP), np.log(largest), (rows, 1)))
     moves = rng.random(offspring.shape) < probability
     moves[np.arange(rows), rng.integers(columns, size=rows)] = True
     steps = rng.normal(0.0, 1.0, offspring.shape) * scale * (upper - lower)
