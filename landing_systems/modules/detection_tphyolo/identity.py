@@ -130,12 +130,18 @@ def _legible(row: NDArray[np.float32], region: NDArray[np.float32], size: int) -
 
 
 def train_identity(
-    plan: IdentityPlan, shards: Sequence[Samples], told: Callable[[int, float], None]
+    plan: IdentityPlan,
+    shards: Sequence[Samples],
+    told: Callable[[int, float], None],
+    device: str = "cpu",
 ) -> IdentityNet:
-    """Train on crops and return the averaged network; ``told`` hears each step and loss."""
+    """Train on crops and return the averaged network, on the CPU.
+
+    ``told`` hears each step and loss.
+    """
     torch.manual_seed(plan.seed)
     cuttings = Cuttings(shards, plan)
-    model = IdentityNet().train()
+    model = IdentityNet().train().to(device)
     averaged = copy.deepcopy(model).eval().requires_grad_(False)
     optimiser = torch.optim.AdamW(
         model.parameters(), lr=plan.learning_rate, weight_decay=plan.weight_decay
@@ -146,12 +152,12 @@ def train_identity(
     for step in range(plan.steps):
         rng = np.random.default_rng(np.random.SeedSequence(plan.seed, spawn_key=(1, step)))
         patches, classes = cuttings.draw(rng)
-        answer: Tensor = model(torch.from_numpy(normalised(patches)))
-        loss = nn.functional.cross_entropy(answer, torch.from_numpy(classes))
+        answer: Tensor = model(torch.from_numpy(normalised(patches)).to(device))
+        loss = nn.functional.cross_entropy(answer, torch.from_numpy(classes).to(device))
         optimiser.zero_grad()
         loss.backward()  # type: ignore[no-untyped-call]
         optimiser.step()
         schedule.step()
         follow(averaged, model, step, plan.average)
         told(step + 1, float(loss.detach()))
-    return averaged
+    return averaged.cpu()

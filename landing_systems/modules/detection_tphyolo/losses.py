@@ -138,14 +138,14 @@ def complete_iou(a: Tensor, b: Tensor) -> Tensor:
 def loss_of(raw: Tensor, targets: Targets, grid: Tensor, weights: LossWeights) -> Tensor:
     """Return the loss of a batch's answers (n, 5, cells)."""
     wanted = torch.zeros_like(raw[:, 4])
-    picture, cell = torch.from_numpy(targets.cells).T
+    picture, cell = torch.from_numpy(targets.cells).to(raw.device).T
     wanted[picture, cell] = 1.0
-    heard = ~torch.from_numpy(targets.ignored) | (wanted > 0)
+    heard = ~torch.from_numpy(targets.ignored).to(raw.device) | (wanted > 0)
     losses = binary_cross_entropy_with_logits(raw[:, 4], wanted, reduction="none")
     count = max(1, len(targets.cells))
     total = weights.objectness * losses[heard].sum() / count
     if len(targets.cells):
         found = boxes_of(raw[picture, :4, cell], grid[:, cell])
-        boxes = 1 - complete_iou(found, torch.from_numpy(targets.boxes))
+        boxes = 1 - complete_iou(found, torch.from_numpy(targets.boxes).to(raw.device))
         total = total + weights.box * boxes.mean()
     return total

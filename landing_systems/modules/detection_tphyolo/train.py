@@ -78,6 +78,9 @@ _TOLD_STEPS = 50
     help="Processes that render and threads that learn (default: one per core).",
 )
 @click.option(
+    "--device", help="Where to learn, as PyTorch names it (default: cuda where there is one)."
+)
+@click.option(
     "--folder",
     type=click.Path(path_type=Path, file_okay=False),
     default=Path(".garl/tphyolo"),
@@ -99,6 +102,7 @@ def main(
     shards: int,
     calibration_scenarios: int,
     workers: int,
+    device: str | None,
     folder: Path,
     out: Path,
 ) -> None:
@@ -115,16 +119,18 @@ def main(
     )
 
     began = time.perf_counter()
+    device = device or ("cuda" if torch.cuda.is_available() else "cpu")
     data = DataPlan(seed=seed, court=not without_court, shards=shards)
     place = folder / data.key
     render_all(data, place, workers, lambda done: click.echo(f"rendered {done} of {shards} shards"))
     torch.set_num_threads(workers)
     plan = TrainPlan(steps=steps, seed=seed)
     if minutes is not None:
-        plan = replace(plan, steps=max(20, round(60 * minutes / seconds_per_step(plan, place))))
+        pace = seconds_per_step(plan, place, device)
+        plan = replace(plan, steps=max(20, round(60 * minutes / pace)))
     reading = IdentityPlan(steps=reading_steps, seed=seed)
-    reader = _reader(reading, place, shards)
-    finder = train(plan, place, shards, _teller("finding markers", plan.steps))
+    reader = _reader(reading, place, shards, device)
+    finder = train(plan, place, shards, _teller("finding markers", plan.steps), device)
     width, height = NETWORK_SIZE
     networks = {
         "boxes": onnx_bytes(finder, (1, 3, height, width)),
@@ -137,6 +143,7 @@ def main(
         "data": asdict(data),
         "training": asdict(plan),
         "reading": asdict(reading),
+        "device": device,
         "versions": {name: importlib.metadata.version(name) for name in PACKAGES},
     }
     # What is shipped is replaced only by what has been calibrated.
@@ -160,7 +167,7 @@ def main(
     click.echo(f"{out}: {size:.2f} MB of weights, calibrated on {len(right)} detections")
 
 
-def _reader(plan: IdentityPlan, place: Path, shards: int) -> IdentityNet:
+def _reader(plan: IdentityPlan, place: Path, shards: int, device: str) -> IdentityNet:
     """Train the network that reads ids, or load it where this plan has trained it before."""
     import torch
 
@@ -172,7 +179,7 @@ def _reader(plan: IdentityPlan, place: Path, shards: int) -> IdentityNet:
         model.load_state_dict(torch.load(file, weights_only=True))
         return model
     crops = [load_shard(place, index, "crops") for index in range(shards)]
-    model = train_identity(plan, crops, _teller("reading ids", plan.steps))
+    model = train_identity(plan, crops, _teller("reading ids", plan.steps), device)
     torch.save(model.state_dict(), file)
     return model
 

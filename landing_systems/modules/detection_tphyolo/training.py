@@ -51,12 +51,18 @@ class TrainPlan:
 class Trainer:
     """The state of a training: it can be stopped after any step and continued."""
 
-    def __init__(self, plan: TrainPlan, crops: Sequence[Samples], frames: Sequence[Samples]):
+    def __init__(
+        self,
+        plan: TrainPlan,
+        crops: Sequence[Samples],
+        frames: Sequence[Samples],
+        device: str = "cpu",
+    ) -> None:
         torch.manual_seed(plan.seed)
-        self.plan, self.step = plan, 0
+        self.plan, self.step, self._device = plan, 0, torch.device(device)
         self._crops, self._frames = _Pool(crops), _Pool(frames)
         self.model = TphYolo().train()
-        self.model.to(memory_format=torch.channels_last)  # type: ignore[call-overload]
+        self.model.to(self._device, memory_format=torch.channels_last)  # type: ignore[call-overload]
         self.averaged = copy.deepcopy(self.model)
         self.averaged.eval().requires_grad_(False)
         matrices = [each for each in self.model.parameters() if each.ndim > 1]
@@ -80,11 +86,11 @@ class Trainer:
         else:
             images, labels, regions = self._frames.draw(rng, plan.frames)
         height, width = images.shape[1:3]
-        batch = torch.from_numpy(varied(rng, images)).permute(0, 3, 1, 2)
+        batch = torch.from_numpy(varied(rng, images)).to(self._device).permute(0, 3, 1, 2)
         for group in self._optimiser.param_groups:
             group["lr"] = self._rate()
         self._optimiser.zero_grad()
-        grid = torch.from_numpy(cells_of(width, height).copy())
+        grid = torch.from_numpy(cells_of(width, height).copy()).to(self._device)
         loss = loss_of(
             self.model(batch), targets_of(labels, regions, width, height), grid, plan.losses
         )
@@ -112,7 +118,7 @@ class Trainer:
         """Continue from a checkpoint of the same plan; return whether there was one."""
         if not file.exists():
             return False
-        state = torch.load(file, weights_only=True)
+        state = torch.load(file, map_location=self._device, weights_only=True)
         if state["plan"] != asdict(self.plan):
             return False
         self.step = int(state["step"])
@@ -127,27 +133,33 @@ class Trainer:
         return plan.learning_rate * warm * (0.01 + 0.99 * _cosine(self.step / plan.steps))
 
 
-def train(plan: TrainPlan, data: Path, shards: int, told: Callable[[int, float], None]) -> TphYolo:
-    """Train on the shards in ``data`` and return the averaged network.
+def train(
+    plan: TrainPlan,
+    data: Path,
+    shards: int,
+    told: Callable[[int, float], None],
+    device: str = "cpu",
+) -> TphYolo:
+    """Train on the shards in ``data`` and return the averaged network, on the CPU.
 
     ``told`` hears each step's number and loss.  A checkpoint in ``data`` is continued.
     """
     crops = [load_shard(data, index, "crops") for index in range(shards)]
     frames = [load_shard(data, index, "frames") for index in range(shards)]
-    trainer = Trainer(plan, crops, frames)
+    trainer = Trainer(plan, crops, frames, device)
     file = data / f"finder-{plan.seed}-{plan.steps}-{shards}.pt"
     trainer.load(file)
     while trainer.step < plan.steps:
         told(trainer.step + 1, trainer.advance())
         if trainer.step % plan.checkpoint_steps == 0 or trainer.step == plan.steps:
             trainer.save(file)
-    return trainer.averaged
+    return trainer.averaged.cpu()
 
 
-def seconds_per_step(plan: TrainPlan, data: Path) -> float:
+def seconds_per_step(plan: TrainPlan, data: Path, device: str = "cpu") -> float:
     """Measure steps on crops, about what a step of the whole training takes."""
     samples = [load_shard(data, 0, kind) for kind in ("crops", "frames")]
-    trainer = Trainer(plan, samples[:1], samples[1:])
+    trainer = Trainer(plan, samples[:1], samples[1:], device)
     trainer.advance()
     began = time.perf_counter()
     for _ in range(_TIMED_STEPS):
