@@ -1,6 +1,6 @@
 # Two commands for a fresh machine with Python 3.11 and make: `make search`, `make test`.
 PYTHON ?= python3.11
-BUDGET ?= 40
+BUDGET ?= 20
 VENV := .venv
 BIN := $(VENV)/bin
 READY := $(VENV)/.installed
@@ -11,7 +11,7 @@ READY := $(VENV)/.installed
 help:  ## show the commands
 	@grep -hE '^[a-z]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/'
 
-search: $(READY)  ## fly BUDGET scenarios (default 40) per landing system and map
+search: $(READY)  ## fly BUDGET scenarios (default 20) per landing system and map
 	$(BIN)/pytest --garl-budget=$(BUDGET) landing_systems/
 
 test: lint types layers tests  ## lint, types, layers and all tests
