@@ -9,7 +9,6 @@ table.
 from __future__ import annotations
 
 import argparse
-import csv
 import functools
 import os
 from collections.abc import Callable, Sequence
@@ -20,6 +19,7 @@ from typing import Any
 import numpy as np
 from scipy.stats import t
 
+from benchmarks.rows import append, read
 from pytest_garl.adversary.pilots import StraightPilot
 from pytest_garl.adversary.policies import policy_spec
 from pytest_garl.scenarios.genes import genome_for
@@ -139,7 +139,7 @@ def main() -> None:
     parser.add_argument("--seeds", type=int, nargs="+", default=[100, 101, 102])
     parser.add_argument("--variants", nargs="+", default=list(VARIANTS))
     arguments = parser.parse_args()
-    known = list(csv.DictReader(FILE.open())) if FILE.exists() else []
+    known = read(FILE)
     if arguments.report:
         print(report(known))
         return
@@ -150,17 +150,7 @@ def main() -> None:
             for map in MAPS:
                 for name in arguments.variants:
                     if (name, seed, map) not in done:
-                        _append(search(name, seed, map, pool))
-
-
-def _append(row: dict[str, Any]) -> None:
-    new = not FILE.exists()
-    with FILE.open("a", newline="") as file:
-        writer = csv.DictWriter(file, FIELDS)
-        if new:
-            writer.writeheader()
-        writer.writerow(row)
-    print(", ".join(f"{name} {value}" for name, value in row.items()), flush=True)
+                        append(FILE, FIELDS, [search(name, seed, map, pool)])
 
 
 if __name__ == "__main__":

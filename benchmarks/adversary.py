@@ -9,7 +9,6 @@ the same for every mover.
 from __future__ import annotations
 
 import argparse
-import csv
 import os
 from collections import Counter
 from concurrent.futures import ProcessPoolExecutor
@@ -17,6 +16,7 @@ from pathlib import Path
 from typing import Any
 
 from benchmarks.oracle import oracle_spec
+from benchmarks.rows import append, read, share
 from pytest_garl.adversary.policies import policy_spec
 from pytest_garl.scenarios.genes import WEATHER, genome_for
 from pytest_garl.scenarios.maps import load_map
@@ -24,7 +24,6 @@ from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.search.child import THREADS
 from pytest_garl.search.random_search import propose
 from pytest_garl.simulation.policy import PolicySpec
-from pytest_garl.verdicts.metrics import share_interval
 
 FILE = Path("docs/adversary.csv")
 SEED = 4242
@@ -131,7 +130,7 @@ def report(rows: list[dict[str, str]]) -> str:
                     continue
                 total = {name: sum(int(row[name]) for row in own) for name in FIELDS[5:]}
                 cells = [
-                    _share(total[name], total["flights"])
+                    share(total[name], total["flights"])
                     for name in ("collided", "blocked", "violations")
                 ]
                 kinds = " / ".join(str(total[kind]) for kind in KINDS)
@@ -140,11 +139,6 @@ def report(rows: list[dict[str, str]]) -> str:
                     f"| {cells[1]} | {cells[2]} |"
                 )
     return "\n".join(lines)
-
-
-def _share(count: int, total: int) -> str:
-    low, high = share_interval(count, total)
-    return f"{100 * count / total:.1f} % [{100 * low:.1f}, {100 * high:.1f}]"
 
 
 def main() -> None:
@@ -156,7 +150,7 @@ def main() -> None:
     parser.add_argument("--systems", nargs="+", default=list(SYSTEMS))
     parser.add_argument("--workers", type=int, default=os.cpu_count() or 1)
     arguments = parser.parse_args()
-    known = list(csv.DictReader(FILE.open())) if FILE.exists() else []
+    known = read(FILE)
     if arguments.report:
         print(report(known))
         return
@@ -169,17 +163,7 @@ def main() -> None:
                     for mover in arguments.movers:
                         key = (mover, sha256_of(mover), system, map, str(chunk))
                         if key not in done:
-                            _append(row_of(mover, system, map, chunk, pool))
-
-
-def _append(row: dict[str, Any]) -> None:
-    new = not FILE.exists()
-    with FILE.open("a", newline="") as file:
-        writer = csv.DictWriter(file, FIELDS)
-        if new:
-            writer.writeheader()
-        writer.writerow(row)
-    print(", ".join(f"{name} {value}" for name, value in row.items()), flush=True)
+                            append(FILE, FIELDS, [row_of(mover, system, map, chunk, pool)])
 
 
 if __name__ == "__main__":

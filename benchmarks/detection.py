@@ -27,17 +27,20 @@ from landing_systems.modules.detection_tphyolo.calibration import (
 from landing_systems.modules.detection_tphyolo.decoding import CLASS_IDS
 from landing_systems.modules.detection_tphyolo.detector import TphYoloDetector
 from landing_systems.modules.detection_tphyolo.scenes import (
-    CAMERA,
     Marker,
     Picture,
     Weather,
     pictures,
 )
-from landing_systems.modules.detection_tphyolo.scoring import Scored, observation_of, score
+from landing_systems.modules.detection_tphyolo.scoring import (
+    Scored,
+    mission,
+    observation_of,
+    score,
+)
 from landing_systems.modules.detection_tphyolo.weights import SHIPPED
-from pytest_garl import Detection, Mission, Observation
+from pytest_garl import Detection, Observation
 from pytest_garl.scenarios.maps import load_map
-from pytest_garl.scenarios.placement import MARKER_DICTIONARY, MARKER_SIDE_M
 
 CONFIRM = 0.8
 """The decision's threshold."""
@@ -70,20 +73,6 @@ class Results:
     sightings: list[Sighting]
     scored: dict[str, list[tuple[str, Weather, Scored]]]
     errors_m: dict[str, list[float]]
-
-
-def mission() -> Mission:
-    """Return the mission of the paper with the default camera."""
-    return Mission(
-        gps_position_m=(0.0, 0.0),
-        home_m=(0.0, 0.0, 0.0),
-        search_altitude_m=10.0,
-        marker_id=0,
-        marker_side_m=MARKER_SIDE_M,
-        marker_dictionary=MARKER_DICTIONARY,
-        camera=CAMERA,
-        time_limit_s=120.0,
-    )
 
 
 def aruco_once(observation: Observation) -> Sequence[Detection]:

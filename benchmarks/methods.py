@@ -7,7 +7,6 @@ any time; ``--report`` prints the table of what is there.
 from __future__ import annotations
 
 import argparse
-import csv
 import subprocess
 import sys
 from collections.abc import Sequence
@@ -16,13 +15,14 @@ from typing import Any
 
 import numpy as np
 
+from benchmarks.rows import append, read, share
 from pytest_garl.scenarios.chromosome import encode
 from pytest_garl.scenarios.genes import genome_for
 from pytest_garl.scenarios.maps import load_map
 from pytest_garl.search.job import load_scenario
 from pytest_garl.search.ledger import Ledger
 from pytest_garl.search.objectives import diversity
-from pytest_garl.verdicts.metrics import share_interval, top_k
+from pytest_garl.verdicts.metrics import top_k
 from pytest_garl.verdicts.serialise import from_dict
 
 FILE = Path("docs/methods.csv")
@@ -111,14 +111,13 @@ def report(rows: list[dict[str, str]]) -> str:
                 continue
             count = sum(int(row["violations"]) for row in own)
             total = sum(int(row["budget"]) for row in own)
-            low, high = share_interval(count, total)
             aborted = sum(int(row["aborted"]) for row in own)
             tops = [row["top10"] or "–" for row in own]
             kinds = [row["signatures"] for row in own]
             spread = [float(row["parameter_distance"]) for row in own if row["parameter_distance"]]
             lines.append(
-                f"| {map} | {method} | {len(own)} | {100 * count / total:.1f} % "
-                f"[{100 * low:.1f}, {100 * high:.1f}] | {100 * aborted / total:.0f} % "
+                f"| {map} | {method} | {len(own)} | {share(count, total)} "
+                f"| {100 * aborted / total:.0f} % "
                 f"| {', '.join(tops)} | {', '.join(kinds)} | {np.mean(spread):.2f} |"
             )
     return "\n".join(lines)
@@ -132,7 +131,7 @@ def main() -> None:
     parser.add_argument("--seeds", type=int, nargs="+", default=[0, 1, 2])
     parser.add_argument("--methods", nargs="+", default=list(METHODS))
     arguments = parser.parse_args()
-    known = list(csv.DictReader(FILE.open())) if FILE.exists() else []
+    known = read(FILE)
     if arguments.report:
         print(report(known))
         return
@@ -141,12 +140,7 @@ def main() -> None:
         for method in arguments.methods:
             if (method, seed, arguments.budget) not in done:
                 ledger = search(method, seed, arguments.budget)
-                new = not FILE.exists()
-                with FILE.open("a", newline="") as file:
-                    writer = csv.DictWriter(file, FIELDS)
-                    if new:
-                        writer.writeheader()
-                    writer.writerows(rows_of(ledger, method, seed, arguments.budget))
+                append(FILE, FIELDS, rows_of(ledger, method, seed, arguments.budget))
 
 
 if __name__ == "__main__":

@@ -8,14 +8,14 @@ maps with the paper's method and policy, and can be stopped and started again at
 from __future__ import annotations
 
 import argparse
-import csv
 from collections import Counter
 from pathlib import Path
 from typing import Any
 
 from benchmarks.methods import run
+from benchmarks.rows import append, read, share
 from pytest_garl.search.ledger import Ledger
-from pytest_garl.verdicts.metrics import share_interval, top_k
+from pytest_garl.verdicts.metrics import top_k
 from pytest_garl.verdicts.serialise import from_dict
 
 FILE = Path("docs/rq1.csv")
@@ -80,12 +80,10 @@ def report(rows: list[dict[str, str]]) -> str:
             if not own:
                 continue
             sums = {name: sum(int(row[name]) for row in own) for name in COUNTS}
-            low, high = share_interval(sums["violations"], sums["flights"])
             rate, kinds = PAPERS[system, map]
             lines.append(
                 f"| {map} | {system} | {sums['flights']} "
-                f"| {100 * sums['violations'] / sums['flights']:.1f} % "
-                f"[{100 * low:.1f}, {100 * high:.1f}] | {rate} % "
+                f"| {share(sums['violations'], sums['flights'])} | {rate} % "
                 f"| {' / '.join(str(sums[kind]) for kind in TYPES)} "
                 f"| {' / '.join(str(kind) for kind in kinds)} "
                 f"| {sums['late']}, {sums['off']}, {sums['hard']} "
@@ -104,7 +102,7 @@ def main() -> None:
     parser.add_argument("--seeds", type=int, nargs="+", default=[0])
     parser.add_argument("--systems", nargs="+", choices=list(TESTS), default=list(TESTS))
     arguments = parser.parse_args()
-    known = list(csv.DictReader(FILE.open())) if FILE.exists() else []
+    known = read(FILE)
     if arguments.report:
         print(report([row for row in known if row["method"] == arguments.method]))
         return
@@ -116,16 +114,8 @@ def main() -> None:
                 continue
             folder = Path(f".garl/rq1/{system}-{method}-{seed}-{budget}")
             options = [f"--garl-budget={budget}", f"--garl-method={method}", f"--garl-seed={seed}"]
-            _append(rows_of(run(folder, TESTS[system], options), system, method, seed))
-
-
-def _append(rows: list[dict[str, Any]]) -> None:
-    new = not FILE.exists()
-    with FILE.open("a", newline="") as file:
-        writer = csv.DictWriter(file, FIELDS)
-        if new:
-            writer.writeheader()
-        writer.writerows(rows)
+            ledger = run(folder, TESTS[system], options)
+            append(FILE, FIELDS, rows_of(ledger, system, method, seed))
 
 
 if __name__ == "__main__":

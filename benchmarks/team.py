@@ -9,7 +9,6 @@ fifty full flights per cell and call, appended to ``docs/team.csv``; ``--report`
 from __future__ import annotations
 
 import argparse
-import csv
 import dataclasses
 import functools
 import os
@@ -22,6 +21,7 @@ import torch
 from rich.progress import Progress
 
 from benchmarks.adversary import CHUNK, MAPS, SYSTEMS
+from benchmarks.rows import append, read, share
 from pytest_garl.adversary import rewards
 from pytest_garl.adversary.dqn import Experience, Learner, Training
 from pytest_garl.adversary.episode import Episode, draw_episode
@@ -34,7 +34,6 @@ from pytest_garl.scenarios.maps import Map, load_map
 from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.search.child import THREADS
 from pytest_garl.search.random_search import propose
-from pytest_garl.verdicts.metrics import share_interval
 
 FILE = Path("docs/team.csv")
 TOGETHER = Path(".garl/team/together.npz")
@@ -157,12 +156,10 @@ def report(rows: list[dict[str, str]]) -> str:
                 if not own:
                     continue
                 flights = sum(int(row["flights"]) for row in own)
-                cells = []
-                for name in ("collided", "blocked"):
-                    number = sum(int(row[name]) for row in own)
-                    low, high = share_interval(number, flights)
-                    share = 100 * number / flights
-                    cells.append(f"{share:.1f} % [{100 * low:.1f}, {100 * high:.1f}]")
+                cells = [
+                    share(sum(int(row[name]) for row in own), flights)
+                    for name in ("collided", "blocked")
+                ]
                 lines.append(f"| {system} | {count} | {mover} | {flights} | {' | '.join(cells)} |")
     return "\n".join(lines)
 
@@ -175,7 +172,7 @@ def main() -> None:
     parser.add_argument("--episodes", type=int, default=800)
     parser.add_argument("--flights", type=int, default=300, help="per cell, both maps together")
     arguments = parser.parse_args()
-    known = list(csv.DictReader(FILE.open())) if FILE.exists() else []
+    known = read(FILE)
     if arguments.report:
         print(report(known))
         return
@@ -193,21 +190,15 @@ def main() -> None:
                         for mover in ("copies", "together"):
                             key = (mover, str(count), system, map, str(chunk))
                             if key not in done:
-                                _append(key, pool)
+                                append(FILE, FIELDS, [_row(key, pool)])
 
 
-def _append(key: tuple[str, str, str, str, str], pool: ProcessPoolExecutor) -> None:
+def _row(key: tuple[str, str, str, str, str], pool: ProcessPoolExecutor) -> dict[str, Any]:
     mover, count, system, map, chunk = key
     jobs = [(each, at, mover, system) for each, at in scenarios(map, int(count), int(chunk))]
     ends = list(pool.map(fly_one, jobs))
     figures = (len(ends), sum(hit for hit, _ in ends), sum(blocked for _, blocked in ends))
-    new = not FILE.exists()
-    with FILE.open("a", newline="") as file:
-        writer = csv.writer(file)
-        if new:
-            writer.writerow(FIELDS)
-        writer.writerow((*key, *figures))
-    print(*key, *figures, flush=True)
+    return dict(zip(FIELDS, (*key, *figures), strict=True))
 
 
 if __name__ == "__main__":

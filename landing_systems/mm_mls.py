@@ -18,7 +18,6 @@ from pytest_garl import (
     Airframe,
     Command,
     Detection,
-    Diagnostics,
     Land,
     Mission,
     MotorThrusts,
@@ -73,11 +72,11 @@ class MultiModuleLandingSystem:
         decision = self._decision.decide(now, (x, y, z), seen)
         self._tell_target(now, decision, seen)
         if decision.phase == "abort":
-            return Abort(diagnostics=_diagnostics(decision, seen))
+            return Abort(diagnostics=decision.diagnostics(seen))
         if decision.phase == "take-off":
             self._later(now, lambda: self._control.take_off(self._mission.search_altitude_m))
             return PositionSetpoint(
-                position_m=decision.goal_m, diagnostics=_diagnostics(decision, seen)
+                position_m=decision.goal_m, diagnostics=decision.diagnostics(seen)
             )
         if self._watch.in_the_way(observation):
             self._blocked_s = now
@@ -86,14 +85,14 @@ class MultiModuleLandingSystem:
         if decision.phase == "commit":
             self._later(now, self._control.land)
             note = f"precision landing: {self._control.precision.status}"
-            return Land(diagnostics=_diagnostics(decision, seen, note=note))
+            return Land(diagnostics=decision.diagnostics(seen, note=note))
         self._planner.set_goal(decision.goal_m)
         plan = self._planner.plan(now, observation.position_m, observation.velocity_mps)
         self._later(now, lambda: self._follow(plan))
         note = str(plan.error or decision.note)
         return PositionSetpoint(
             position_m=plan.position_m,
-            diagnostics=_diagnostics(decision, seen, path=plan.path_m, note=note),
+            diagnostics=decision.diagnostics(seen, path=plan.path_m, note=note),
         )
 
     def control(self, state: VehicleState) -> MotorThrusts:
@@ -135,22 +134,5 @@ class MultiModuleLandingSystem:
         self._later(now, functools.partial(self._control.guide, position=refuge, yaw=0.0))
         note = "something is in the way below"
         return PositionSetpoint(
-            position_m=refuge, diagnostics=_diagnostics(decision, seen, note=note)
+            position_m=refuge, diagnostics=decision.diagnostics(seen, note=note)
         )
-
-
-def _diagnostics(
-    decision: Decision,
-    seen: tuple[Detection, ...],
-    *,
-    path: tuple[Place, ...] = (),
-    note: str = "",
-) -> Diagnostics:
-    target = decision.target_m
-    return Diagnostics(
-        phase=decision.phase,
-        detections=seen,
-        target_m=(*target, 0.0) if target else None,
-        planned_path_m=path,
-        note=note or decision.note,
-    )

@@ -2,33 +2,14 @@
 
 from __future__ import annotations
 
-from landing_systems.modules.control_simple import SimpleControl
-from landing_systems.modules.decision import DecisionModule
 from landing_systems.modules.detection_opencv import OpenCvDetector
-from pytest_garl import Airframe, Command, Diagnostics, Mission, Observation
+from landing_systems.modules.plain_landing import PlainLandingSystem
+from pytest_garl import Mission
 
 
-class OpenCvLandingSystem:
+class OpenCvLandingSystem(PlainLandingSystem):
     """The first row of the paper's table of landing systems."""
 
-    airframe = Airframe()
-
-    def reset(self, mission: Mission) -> None:
-        """Prepare for one flight."""
-        self._detector = OpenCvDetector(mission)
-        self._decision = DecisionModule(mission)
-        self._control = SimpleControl()
-
-    def step(self, observation: Observation) -> Command:
-        """See, decide, command."""
-        seen = self._detector.detect(observation)
-        x, y, z = (float(value) for value in observation.position_m)
-        decision = self._decision.decide(observation.time_s, (x, y, z), seen)
-        target = decision.target_m
-        diagnostics = Diagnostics(
-            phase=decision.phase,
-            detections=seen,
-            target_m=(*target, 0.0) if target else None,
-            note=decision.note,
-        )
-        return self._control.command(decision, (x, y, z), diagnostics)
+    def detector(self, mission: Mission) -> OpenCvDetector:
+        """Return the detector for one flight."""
+        return OpenCvDetector(mission)

@@ -8,7 +8,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Literal
 
-from pytest_garl import Detection, Mission
+from pytest_garl import Detection, Diagnostics, Mission
 
 Phase = Literal[
     "take-off", "transit", "search", "confirm", "approach", "descend", "commit", "regain", "abort"
@@ -66,6 +66,22 @@ class Decision:
     goal_m: tuple[float, float, float]
     target_m: Place | None
     note: str = ""
+
+    def diagnostics(
+        self,
+        seen: tuple[Detection, ...],
+        *,
+        path: tuple[tuple[float, float, float], ...] = (),
+        note: str = "",
+    ) -> Diagnostics:
+        """Return the decision for the flight's record, with what it was made from."""
+        return Diagnostics(
+            phase=self.phase,
+            detections=seen,
+            target_m=(*self.target_m, 0.0) if self.target_m else None,
+            planned_path_m=path,
+            note=note or self.note,
+        )
 
 
 class DecisionModule:

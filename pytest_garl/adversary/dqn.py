@@ -116,7 +116,7 @@ class Learner:
         values = self.network(states).gather(1, actions[:, None]).squeeze(1)
         loss = torch.nn.functional.smooth_l1_loss(values, wanted)
         self.optimiser.zero_grad()
-        loss.backward()  # type: ignore[no-untyped-call]
+        torch.autograd.backward(loss)
         self.optimiser.step()
         self.updates += 1
         if self.updates % training.target_every == 0:

@@ -57,10 +57,6 @@ def invented_map(rng: np.random.Generator, index: int, *, court: bool) -> Map:
     )
 
 
-def _layer(kind: LayerKind, *points: tuple[float, float], **rest: object) -> Layer:
-    return Layer(kind=kind, points_m=points, **rest)  # type: ignore[arg-type]
-
-
 def _court_lines(rng: np.random.Generator) -> list[Layer]:
     """Lines, circles and areas of some sport, nowhere as on the court that is flown."""
     layers = []
@@ -68,7 +64,9 @@ def _court_lines(rng: np.random.Generator) -> list[Layer]:
         x, y = _place(rng)
         width, depth = (float(value) for value in rng.uniform(1.5, 7.0, 2))
         colour = _near(rng, _AREAS[rng.integers(len(_AREAS))], 20)
-        layers.append(_layer("rectangle", (x, y), (x + width, y + depth), colour=colour))
+        layers.append(
+            Layer(kind="rectangle", points_m=((x, y), (x + width, y + depth)), colour=colour)
+        )
     paint = _near(rng, _PAINTS[rng.integers(len(_PAINTS))], 14)
     stroke = float(rng.uniform(0.04, 0.12))
     for _ in range(rng.integers(2, 7)):
@@ -76,13 +74,18 @@ def _court_lines(rng: np.random.Generator) -> list[Layer]:
         (x, y), half = _place(rng), float(rng.uniform(2, 12))
         dx, dy = half * math.cos(angle), half * math.sin(angle)
         ends = (x - dx, y - dy), (x + dx, y + dy)
-        layers.append(_layer("line", *ends, size_m=stroke, colour=paint))
+        layers.append(Layer(kind="line", points_m=ends, size_m=stroke, colour=paint))
     for _ in range(rng.integers(0, 4)):
         start, radius = float(rng.uniform(0, 6)), float(rng.uniform(0.6, 7))
         angles = (start, start + float(rng.uniform(1.5, 6.3)))
         layers.append(
-            _layer(
-                "arc", _place(rng), size_m=radius, width_m=stroke, angles_rad=angles, colour=paint
+            Layer(
+                kind="arc",
+                points_m=(_place(rng),),
+                size_m=radius,
+                width_m=stroke,
+                angles_rad=angles,
+                colour=paint,
             )
         )
     return layers
@@ -98,7 +101,7 @@ def _wear(rng: np.random.Generator) -> list[Layer]:
         kind: LayerKind = "patches" if rng.random() < 0.7 else "roots"
         colour = _near(rng, (112, 108, 90), 40)
         spread = float(rng.uniform(2, 7))
-        layers.append(_layer(kind, _place(rng), size_m=spread, colour=colour))
+        layers.append(Layer(kind=kind, points_m=(_place(rng),), size_m=spread, colour=colour))
     return layers
 
 
@@ -109,7 +112,9 @@ def _fakes(rng: np.random.Generator) -> list[Layer]:
         x, y = _place(rng)
         side = float(rng.uniform(0.6, 2.2))
         white, black = _near(rng, (236, 236, 236), 12), _near(rng, (26, 26, 26), 14)
-        layers.append(_layer("rectangle", (x, y), (x + side, y + side), colour=white))
+        layers.append(
+            Layer(kind="rectangle", points_m=((x, y), (x + side, y + side)), colour=white)
+        )
         cells, margin = int(rng.integers(1, 9)), 0.12 * side
         cell = (side - 2 * margin) / cells
         style = rng.integers(4)
@@ -124,7 +129,7 @@ def _fakes(rng: np.random.Generator) -> list[Layer]:
                 if dark:
                     low = (x + margin + column * cell, y + margin + row * cell)
                     high = (low[0] + cell, low[1] + cell)
-                    layers.append(_layer("rectangle", low, high, colour=black))
+                    layers.append(Layer(kind="rectangle", points_m=(low, high), colour=black))
     return layers
 
 
@@ -138,7 +143,11 @@ def _decoys(rng: np.random.Generator, count: int) -> list[Layer]:
         known = rng.random() < 0.65
         number = int(rng.integers(1, 4)) if known else int(rng.integers(4, HIGHEST_ID + 1))
         yaw = float(rng.uniform(0, 2 * math.pi))
-        layers.append(_layer("marker", at, size_m=MARKER_SIDE_M, yaw_rad=yaw, marker_id=number))
+        layers.append(
+            Layer(
+                kind="marker", points_m=(at,), size_m=MARKER_SIDE_M, yaw_rad=yaw, marker_id=number
+            )
+        )
     return layers
 
 

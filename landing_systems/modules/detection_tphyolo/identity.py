@@ -155,7 +155,7 @@ def train_identity(
         answer: Tensor = model(torch.from_numpy(normalised(patches)).to(device))
         loss = nn.functional.cross_entropy(answer, torch.from_numpy(classes).to(device))
         optimiser.zero_grad()
-        loss.backward()  # type: ignore[no-untyped-call]
+        torch.autograd.backward(loss)
         optimiser.step()
         schedule.step()
         follow(averaged, model, step, plan.average)

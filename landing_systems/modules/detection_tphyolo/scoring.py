@@ -9,8 +9,9 @@ from typing import Literal
 
 import numpy as np
 
-from landing_systems.modules.detection_tphyolo.scenes import Marker, Picture
-from pytest_garl import Detection, Observation
+from landing_systems.modules.detection_tphyolo.scenes import CAMERA, Marker, Picture
+from pytest_garl import Detection, Mission, Observation
+from pytest_garl.scenarios.placement import MARKER_DICTIONARY, MARKER_SIDE_M
 
 Kind = Literal["right", "wrong-id", "nothing-there"]
 
@@ -46,6 +47,20 @@ def _scored(picture: Picture, detection: Detection) -> Scored:
         return Scored(detection=detection, kind="nothing-there", marker=None)
     kind: Kind = "right" if best.marker_id == detection.marker_id else "wrong-id"
     return Scored(detection=detection, kind=kind, marker=best)
+
+
+def mission() -> Mission:
+    """Return the paper's mission with the camera of the pictures."""
+    return Mission(
+        gps_position_m=(0.0, 0.0),
+        home_m=(0.0, 0.0, 0.0),
+        search_altitude_m=10.0,
+        marker_id=0,
+        marker_side_m=MARKER_SIDE_M,
+        marker_dictionary=MARKER_DICTIONARY,
+        camera=CAMERA,
+        time_limit_s=120.0,
+    )
 
 
 def observation_of(picture: Picture) -> Observation:

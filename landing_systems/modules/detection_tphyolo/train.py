@@ -25,11 +25,9 @@ from landing_systems.modules.detection_tphyolo.decoding import NETWORK_SIZE
 from landing_systems.modules.detection_tphyolo.detector import TphYoloDetector
 from landing_systems.modules.detection_tphyolo.grounds import invented_map
 from landing_systems.modules.detection_tphyolo.patches import PATCH_PX
-from landing_systems.modules.detection_tphyolo.scenes import CAMERA, Picture, Weather, pictures
-from landing_systems.modules.detection_tphyolo.scoring import observation_of, score
+from landing_systems.modules.detection_tphyolo.scenes import Picture, Weather, pictures
+from landing_systems.modules.detection_tphyolo.scoring import mission, observation_of, score
 from landing_systems.modules.detection_tphyolo.weights import SHIPPED, write_weights
-from pytest_garl import Mission
-from pytest_garl.scenarios.placement import MARKER_DICTIONARY, MARKER_SIDE_M
 
 if TYPE_CHECKING:
     from landing_systems.modules.detection_tphyolo.identity import IdentityNet, IdentityPlan
@@ -191,18 +189,8 @@ def calibration_set(
 
     The weights' manifest must have the calibration (1, 0): confidences are then plain.
     """
-    mission = Mission(
-        gps_position_m=(0.0, 0.0),
-        home_m=(0.0, 0.0, 0.0),
-        search_altitude_m=10.0,
-        marker_id=0,
-        marker_side_m=MARKER_SIDE_M,
-        marker_dictionary=MARKER_DICTIONARY,
-        camera=CAMERA,
-        time_limit_s=120.0,
-    )
     cv2.setNumThreads(1)
-    detector = TphYoloDetector(mission, weights, min_confidence=0.02)
+    detector = TphYoloDetector(mission(), weights, min_confidence=0.02)
     logits, right = [], []
     for index in range(scenarios):
         for picture in _calibration_pictures(seed, index, court):

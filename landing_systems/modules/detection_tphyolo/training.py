@@ -61,8 +61,8 @@ class Trainer:
         torch.manual_seed(plan.seed)
         self.plan, self.step, self._device = plan, 0, torch.device(device)
         self._crops, self._frames = _Pool(crops), _Pool(frames)
-        self.model = TphYolo().train()
-        self.model.to(self._device, memory_format=torch.channels_last)  # type: ignore[call-overload]
+        self.model = TphYolo().train().to(self._device)
+        nn.utils.convert_conv2d_weight_memory_format(self.model, torch.channels_last)
         self.averaged = copy.deepcopy(self.model)
         self.averaged.eval().requires_grad_(False)
         matrices = [each for each in self.model.parameters() if each.ndim > 1]
@@ -94,7 +94,7 @@ class Trainer:
         loss = loss_of(
             self.model(batch), targets_of(labels, regions, width, height), grid, plan.losses
         )
-        loss.backward()  # type: ignore[no-untyped-call]
+        torch.autograd.backward(loss)
         nn.utils.clip_grad_norm_(self.model.parameters(), plan.clip)
         self._optimiser.step()
         follow(self.averaged, self.model, self.step, plan.average)

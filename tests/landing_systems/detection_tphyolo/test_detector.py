@@ -11,7 +11,6 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from benchmarks.detection import mission
 from landing_systems.modules.detection_tphyolo.detector import (
     LARGEST_SIDE_PX,
     TphYoloDetector,
@@ -26,7 +25,7 @@ from landing_systems.modules.detection_tphyolo.scenes import (
     random_pose,
     truth,
 )
-from landing_systems.modules.detection_tphyolo.scoring import observation_of, score
+from landing_systems.modules.detection_tphyolo.scoring import mission, observation_of, score
 from pytest_garl import Observation
 from pytest_garl.scenarios.chromosome import decode
 from pytest_garl.scenarios.genes import genome_for
