@@ -6,35 +6,36 @@ import cv2
 import numpy as np
 import pytest
 
-torch = pytest.importorskip("torch")
+pytest.importorskip("torch")
+import torch
 
-from landing_systems.modules.detection_tphyolo.dataset import (  # noqa: E402
+from landing_systems.modules.detection_tphyolo.dataset import (
     CROP_PX,
     LABEL,
     MAX_MARKERS,
     Samples,
 )
-from landing_systems.modules.detection_tphyolo.decoding import CHANNELS, cells_of  # noqa: E402
-from landing_systems.modules.detection_tphyolo.identity import (  # noqa: E402
+from landing_systems.modules.detection_tphyolo.decoding import CHANNELS, cells_of
+from landing_systems.modules.detection_tphyolo.identity import (
     OTHER,
     Cuttings,
     IdentityNet,
     IdentityPlan,
     train_identity,
 )
-from landing_systems.modules.detection_tphyolo.losses import (  # noqa: E402
+from landing_systems.modules.detection_tphyolo.losses import (
     LossWeights,
     complete_iou,
     loss_of,
     targets_of,
 )
-from landing_systems.modules.detection_tphyolo.model import (  # noqa: E402
+from landing_systems.modules.detection_tphyolo.model import (
     TphYolo,
     fused,
     parameter_count,
 )
-from landing_systems.modules.detection_tphyolo.patches import PATCH_PX, REACH  # noqa: E402
-from landing_systems.modules.detection_tphyolo.training import (  # noqa: E402
+from landing_systems.modules.detection_tphyolo.patches import PATCH_PX, REACH
+from landing_systems.modules.detection_tphyolo.training import (
     Trainer,
     TrainPlan,
     shifted,

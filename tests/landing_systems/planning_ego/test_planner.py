@@ -2,6 +2,7 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 import pytest
@@ -147,8 +148,8 @@ def test_no_way_is_an_error_of_its_own() -> None:
         plan(known(closed))
 
 
-def run(goal: tuple[float, float, float], boxes: Sequence[Box] = (), **settings: float) -> Run:
-    parameters = dataclasses.replace(PARAMETERS, **settings)  # type: ignore[arg-type]
+def run(goal: tuple[float, float, float], boxes: Sequence[Box] = (), **settings: Any) -> Run:
+    parameters = dataclasses.replace(PARAMETERS, **settings)
     planner = EgoPlanner(parameters, CAMERA)
     return fly(planner, parameters, CAMERA, (-10.0, 0.0, 7.0), goal, lambda _: boxes)
 

@@ -1,5 +1,7 @@
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 import pytest
 from scipy.interpolate import BSpline
@@ -79,13 +81,15 @@ def test_an_initial_spline_keeps_the_speed_limit_on_a_straight_way() -> None:
     assert 1.5 < speeds.max() < 2.1
 
 
-def gradient_error(term: costs.Term, cost: object, points: np.ndarray) -> float:
+def gradient_error(
+    term: costs.Term, cost: Callable[[np.ndarray], costs.Term], points: np.ndarray
+) -> float:
     """Largest difference of a gradient from central differences, relative to its largest."""
     numeric = np.zeros_like(points)
     for index in np.ndindex(points.shape):
         step = np.zeros_like(points)
         step[index] = 1e-5
-        numeric[index] = (cost(points + step)[0] - cost(points - step)[0]) / 2e-5  # type: ignore[operator]
+        numeric[index] = (cost(points + step)[0] - cost(points - step)[0]) / 2e-5
     return float(np.abs(term[1] - numeric).max() / np.abs(numeric).max())
 
 
