@@ -44,10 +44,7 @@ class TphYoloDetector:
         self, mission: Mission, weights: Path = SHIPPED, *, min_confidence: float = MIN_CONFIDENCE
     ) -> None:
         files = read_weights(weights)
-        # The engine that OpenCV 5.0 prefers refuses the network (an assertion about shapes),
-        # and it ignores which one is asked for where it reads from memory.
-        self._boxes = cv2.dnn.readNetFromONNX(str(files.boxes), engine=cv2.dnn.ENGINE_CLASSIC)
-        self._ids = cv2.dnn.readNetFromONNX(str(files.ids), engine=cv2.dnn.ENGINE_CLASSIC)
+        self._boxes, self._ids = load_network(files.boxes), load_network(files.ids)
         self._slope, self._offset = files.calibration
         self._camera: Camera = mission.camera
         self._side_m = mission.marker_side_m
@@ -115,6 +112,13 @@ class TphYoloDetector:
         expected, width = side_px * nearer, math.sqrt(float(size.prod()))
         least, most = expected / SIZE_TOLERANCE, math.sqrt(2) * expected * SIZE_TOLERANCE
         return (place, expected) if least < width < most else None
+
+
+def load_network(file: Path) -> cv2.dnn.Net:
+    """Return a network from its ONNX file."""
+    # The engine that OpenCV 5.0 prefers refuses the network (an assertion about shapes),
+    # and it ignores which one is asked for where it reads from memory.
+    return cv2.dnn.readNetFromONNX(str(file), engine=cv2.dnn.ENGINE_CLASSIC)
 
 
 def _logit(chance: float) -> float:
