@@ -238,7 +238,8 @@ def engines_ms(weights: Path, runs: int) -> tuple[float, float]:
     from landing_systems.modules.detection_tphyolo.model import TphYolo, fused
 
     torch.set_num_threads(1)
-    eager = fused(TphYolo()).to(memory_format=torch.channels_last)
+    eager = fused(TphYolo())
+    torch.nn.utils.convert_conv2d_weight_memory_format(eager, torch.channels_last)
     network = load_network(read_weights(weights).boxes)
     width, height = NETWORK_SIZE
     image = np.random.default_rng(0).random((1, 3, height, width), dtype=np.float32)
@@ -328,7 +329,8 @@ _REPORT = """# The learned marker detector beside ArUco
 
 Written by `python -m benchmarks.detection`: {frames} frames of {scenarios} random scenarios on the
 maps that are flown, from seeds and with ground textures that training never saw.
-{weights}. Heights 0.5 to 15 m, tilts up to 20°, all headings, people, dogs and birds on and about the marker; half of the
+{weights}. Heights 0.5 to
+15 m, tilts up to 20°, all headings, people, dogs and birds on and about the marker; half of the
 scenarios in the confined weather of searches, half with each weather gene drawn from its full range
 with a probability of a quarter. A marker counts as found when a detection with its id and a
 confidence of at least 0.8 lies on it. Its hidden share is what objects, leaves and snow on it
