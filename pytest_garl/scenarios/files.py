@@ -22,6 +22,9 @@ def dumps(scenario: Scenario) -> str:
         f'map = "{scenario.map}"',
         f"seed = {scenario.seed}",
     ]
+    if scenario.absent:
+        names = ", ".join(f'"{name}"' for name in scenario.absent)
+        lines.append(f"absent = [{names}]")
     section = ""
     for key, value in scenario.genes:
         head, _, name = key.partition(".")
@@ -38,11 +41,16 @@ def loads(text: str, map: Map, *, source: str = "scenario") -> Scenario:
     Weather may use the full range.  Raises ScenarioError that names source and key.
     """
     top = Table(parse(text, source), source)
-    top.only({"schema", "map", "seed", "genes"})
+    top.only({"schema", "map", "seed", "absent", "genes"})
     if top.integer("schema") != SCHEMA:
         raise top.error("schema", f"found {top.get('schema')}, expected {SCHEMA}")
     if top.text("map") != map.name:
         raise top.error("map", f"found {top.text('map')!r}, expected {map.name!r}")
+    absent = top.texts("absent")
+    try:
+        map = map.without(absent)
+    except ScenarioError as error:
+        raise top.error("absent", str(error)) from error
     sections = top.table("genes")
     extras = tuple(gene for name, gene in EXTRAS.items() if name in sections.values)
     genome = genome_for(map, weather="full", extras=extras)
@@ -55,7 +63,8 @@ def loads(text: str, map: Map, *, source: str = "scenario") -> Scenario:
     for item in genome.properties:
         head, _, name = item.key.partition(".")
         genes.append((item.key, tables[head].number(name, low=item.low, high=item.high)))
-    return Scenario(map=map.name, seed=top.integer("seed"), genes=tuple(genes))
+    seed = top.integer("seed")
+    return Scenario(map=map.name, seed=seed, genes=tuple(genes), absent=map.absent)
 
 
 def map_name_in(text: str, *, source: str = "scenario") -> str:

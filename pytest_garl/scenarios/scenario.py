@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Mapping
 from dataclasses import dataclass
 
@@ -17,11 +18,14 @@ class Scenario:
     ``("person-1.velocity", 0.8)``.  What a value means in metres or lux is said by the
     genome's properties and the simulator.  ``seed`` feeds the sensor noise, the falling
     particles and the undirected object moves; it does not depend on the scenario's slot.
+    ``absent`` names those of the map's objects that stay at home and have no genes; searches
+    fly with all of them, shrinking sends home whom a violation does not need.
     """
 
     map: str
     seed: int
     genes: tuple[tuple[str, float], ...]
+    absent: tuple[str, ...] = ()
 
     def __getitem__(self, key: str) -> float:
         """Return the value of a property; raise ScenarioError for one that is not there."""
@@ -42,4 +46,11 @@ class Scenario:
         for key in values:
             self[key]
         genes = tuple((name, float(values.get(name, value))) for name, value in self.genes)
-        return Scenario(map=self.map, seed=self.seed, genes=genes)
+        return dataclasses.replace(self, genes=genes)
+
+    def without(self, *names: str) -> Scenario:
+        """Return a copy in which these objects stay at home."""
+        for name in names:
+            self[f"{name}.velocity"]
+        genes = tuple(pair for pair in self.genes if pair[0].partition(".")[0] not in names)
+        return dataclasses.replace(self, genes=genes, absent=tuple(sorted({*self.absent, *names})))

@@ -56,6 +56,13 @@ class Table:
             raise self.error(key, f"found {value!r}, expected one of {', '.join(sorted(among))}")
         return value
 
+    def texts(self, key: str) -> tuple[str, ...]:
+        """Return a list of strings, empty if absent."""
+        value = self.values.get(key, [])
+        if not isinstance(value, list) or not all(isinstance(item, str) for item in value):
+            raise self.error(key, f"found {value!r}, expected a list of strings")
+        return tuple(value)
+
     def integer(self, key: str, default: int | None = None, low: int = 0) -> int:
         """Return a whole number of at least ``low``."""
         value = self.get(key, default)

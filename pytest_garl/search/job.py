@@ -64,14 +64,16 @@ def loads(text: str) -> Job:
 
 def dump_scenario(scenario: Scenario) -> str:
     """Return a scenario as one line of JSON."""
-    return json.dumps({"map": scenario.map, "seed": scenario.seed, "genes": scenario.genes})
+    values = {"map": scenario.map, "seed": scenario.seed, "genes": scenario.genes}
+    return json.dumps(values | ({"absent": scenario.absent} if scenario.absent else {}))
 
 
 def load_scenario(text: str) -> Scenario:
     """Return the scenario in a line of JSON."""
     values = json.loads(text)
     genes = tuple((key, float(value)) for key, value in values["genes"])
-    return Scenario(map=values["map"], seed=values["seed"], genes=genes)
+    absent = tuple(values.get("absent", ()))
+    return Scenario(map=values["map"], seed=values["seed"], genes=genes, absent=absent)
 
 
 def fly_job(

@@ -34,7 +34,7 @@ def fly(
     exception; KeyboardInterrupt and SystemExit pass through.
     """
     began = time.perf_counter()
-    place = map or load_map(scenario.map)
+    place = (map or load_map(scenario.map)).without(scenario.absent)
     flight = Loop(scenario, system, npcs.make, place, time_limit_s, guard).run()
     flight = dataclasses.replace(
         flight,

@@ -124,8 +124,10 @@ class Loop:
 
     def begin(self) -> None:
         """Reset policies and landing system."""
-        for index, item in enumerate(self.objects):
-            rng = generator(self.scenario.seed, "objects", index)
+        # By its place among all: who stays at home changes nothing for the others.
+        numbers = {name: index for index, (name, _) in enumerate(self.map.residents)}
+        for item in self.objects:
+            rng = generator(self.scenario.seed, "objects", numbers[item.name])
             item.policy.reset(self.situation(item), rng)
         self._start_system()
 

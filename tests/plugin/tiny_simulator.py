@@ -32,7 +32,7 @@ def fly(
     off = 3.0 if scenario["environment.fog"] > 0.1 else 0.1
     contacts: tuple[Contact, ...] = ()
     crash = None
-    if scenario["dog-1.velocity"] > 0.7:
+    if scenario.get("dog-1.velocity", 0.0) > 0.7:
         outcome = "collision"
         contacts = (
             Contact(

@@ -158,3 +158,22 @@ def test_a_chromosome_out_of_range_names_the_gene() -> None:
 def test_asking_for_a_gene_that_is_not_there_names_it() -> None:
     with pytest.raises(ScenarioError, match="no gene 'fog'"):
         Scenario(map="court", seed=0, genes=())["fog"]
+
+
+def test_absent_objects_survive_the_file_and_have_no_genes() -> None:
+    genome = genome_for(COURT)
+    whole = repair(decode(genome.nominal, genome, map="court", seed=4), COURT)
+    name = COURT.object_names[0][0]
+    fewer = whole.without(name)
+    assert not any(key.startswith(f"{name}.") for key, _ in fewer.genes)
+    assert loads(dumps(fewer), COURT) == fewer
+    assert problems(fewer, COURT) == ()
+    assert repair(fewer, COURT) == fewer
+
+
+def test_an_absent_object_must_be_one_of_the_map() -> None:
+    genome = genome_for(COURT)
+    text = dumps(repair(decode(genome.nominal, genome, map="court", seed=4), COURT))
+    text = text.replace("seed = 4", 'seed = 4\nabsent = ["cat-1"]')
+    with pytest.raises(ScenarioError, match=r"'absent': map 'court' has no object cat-1"):
+        loads(text, COURT)

@@ -173,6 +173,18 @@ def test_the_same_scenario_flies_the_same_bytes() -> None:
     assert (first.uav.position_m == again.uav.position_m).all()
 
 
+def test_who_stays_at_home_changes_nothing_for_the_others() -> None:
+    scenario = propose(LAWN, genome_for(LAWN), 3, 0, 1)[0]
+    names = [name for name, _ in LAWN.object_names]
+    alone = scenario.without(*names[:-1])
+    first, second = (
+        fly(each, ReferencePilot, policy_spec("waypoint"), time_limit_s=3.0)
+        for each in (scenario, alone)
+    )
+    assert [item.name for item in second.objects] == names[-1:]
+    assert np.array_equal(first.objects[-1].track.position_m, second.objects[-1].track.position_m)
+
+
 def test_another_process_flies_the_same_bytes() -> None:
     code = (
         "from tests.simulation.test_flight import *\n"

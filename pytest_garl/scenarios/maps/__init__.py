@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import dataclasses
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
@@ -52,7 +53,8 @@ class Map:
     """One place: ground, static bodies, the objects that live there, bounds and mission.
 
     ``bounds_m`` is (x_min, x_max, y_min, y_max); ``objects`` are (type, count) pairs;
-    ``sha256`` is that of the file, part of a run's identity.
+    ``sha256`` is that of the file, part of a run's identity.  ``absent`` are objects that stay
+    at home in one scenario; the file knows none.
     """
 
     name: str
@@ -64,15 +66,32 @@ class Map:
     bodies: tuple[Body, ...]
     objects: tuple[tuple[str, int], ...]
     sha256: str
+    absent: tuple[str, ...] = ()
 
     @property
-    def object_names(self) -> tuple[tuple[str, str], ...]:
-        """(name, type) of each dynamic object: ``("person-1", "person")``, in order."""
+    def residents(self) -> tuple[tuple[str, str], ...]:
+        """(name, type) of each dynamic object, absent or not, in order."""
         return tuple(
             (f"{kind}-{index}", kind)
             for kind, count in self.objects
             for index in range(1, count + 1)
         )
+
+    @property
+    def object_names(self) -> tuple[tuple[str, str], ...]:
+        """(name, type) of each dynamic object there is: ``("person-1", "person")``, in order."""
+        return tuple(pair for pair in self.residents if pair[0] not in self.absent)
+
+    def without(self, absent: Iterable[str]) -> Map:
+        """Return the map with these objects at home; raise ScenarioError for unknown ones."""
+        names = tuple(sorted(absent))
+        known = [name for name, _ in self.residents]
+        unknown = [name for name in names if name not in known]
+        if unknown:
+            raise ScenarioError(
+                f"map {self.name!r} has no object {', '.join(unknown)}; it has {', '.join(known)}"
+            )
+        return dataclasses.replace(self, absent=names)
 
     @property
     def diagonal_m(self) -> float:
