@@ -72,10 +72,12 @@ class Landing:
     @functools.cached_property
     def flight(self) -> Flight:
         """The flight's whole record, loaded from its file."""
+        from pytest_garl.search.slots import flight_name
         from pytest_garl.simulation.record import load
 
-        name = f"{self._target.search[:8]}-{self._target.slot.id(self._target.map)}.npz"
-        return load(self._run.options.folder / "flights" / name)
+        target, slot = self._target, self._target.slot
+        name = flight_name(target.search, slot.generation, slot.index, target.map)
+        return load(self._run.options.folder / "flights" / f"{name}.npz")
 
     def _undecided(self) -> None:
         pytest.skip(f"not decided: {self.result['undecided']}")

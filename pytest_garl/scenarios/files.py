@@ -25,14 +25,19 @@ def dumps(scenario: Scenario) -> str:
     if scenario.absent:
         names = ", ".join(f'"{name}"' for name in scenario.absent)
         lines.append(f"absent = [{names}]")
-    section = ""
+    return "\n".join([*lines, *gene_lines(scenario)]) + "\n"
+
+
+def gene_lines(scenario: Scenario) -> list[str]:
+    """Return the lines of a file that hold the genes, one table per subject."""
+    lines, section = [], ""
     for key, value in scenario.genes:
         head, _, name = key.partition(".")
         if head != section:
             lines += ["", f"[genes.{head}]"]
             section = head
         lines.append(f"{name} = {value!r}")
-    return "\n".join(lines) + "\n"
+    return lines
 
 
 def loads(text: str, map: Map, *, source: str = "scenario") -> Scenario:
@@ -46,6 +51,11 @@ def loads(text: str, map: Map, *, source: str = "scenario") -> Scenario:
         raise top.error("schema", f"found {top.get('schema')}, expected {SCHEMA}")
     if top.text("map") != map.name:
         raise top.error("map", f"found {top.text('map')!r}, expected {map.name!r}")
+    return read_genes(top, map)
+
+
+def read_genes(top: Table, map: Map) -> Scenario:
+    """Return the scenario in a document's ``seed``, ``absent`` and ``genes``."""
     absent = top.texts("absent")
     try:
         map = map.without(absent)

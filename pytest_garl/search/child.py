@@ -14,7 +14,7 @@ from typing import TextIO
 
 from pytest_garl.errors import LedgerError, PolicyError
 from pytest_garl.search.ledger import Ledger
-from pytest_garl.search.slots import Slot
+from pytest_garl.search.slots import flight_name
 
 THREADS = dict.fromkeys(
     ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "OPENCV_FOR_THREADS_NUM"), "1"
@@ -84,8 +84,7 @@ def main(path: str) -> None:
             ledger.count("idle_s", time.monotonic() - idle_since)
             job = loads(claim.job)
             watchdog.limit_s = job.timeout_s * (ALONE_FACTOR if claim.after else 1.0)
-            name = Slot(generation=claim.generation, index=claim.slot).id(job.map)
-            slot_id = f"{claim.search[:8]}-{name}"
+            slot_id = flight_name(claim.search, claim.generation, claim.slot, job.map)
             try:
                 result, sha256, wall_s = fly_job(
                     job, load_scenario(claim.scenario), slot_id, watchdog

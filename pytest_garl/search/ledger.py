@@ -13,17 +13,17 @@ from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 from pytest_garl.errors import LedgerError
 
-VERSION = 2
+VERSION = 3
 """Of the tables below; a ledger of another version is not continued."""
 SCHEMA = """
 CREATE TABLE run (key TEXT PRIMARY KEY, value TEXT NOT NULL);
 CREATE TABLE search (
     id TEXT PRIMARY KEY, system TEXT NOT NULL, map TEXT NOT NULL, wanted INTEGER NOT NULL,
-    job TEXT NOT NULL
+    job TEXT NOT NULL, kind TEXT NOT NULL DEFAULT 'search'
 );
 CREATE TABLE slot (
     search TEXT NOT NULL, generation INTEGER NOT NULL, slot INTEGER NOT NULL,
@@ -35,6 +35,9 @@ CREATE INDEX slot_state ON slot (state, generation, slot);
 CREATE TABLE seat (pid INTEGER PRIMARY KEY, owner INTEGER NOT NULL);
 CREATE TABLE meter (name TEXT PRIMARY KEY, value REAL NOT NULL);
 """
+Kind = Literal["search", "case", "errand"]
+"""What flights are for: a search's budget, saved cases, or something beside them, such as flying a
+violation once more.  Figures and the result hash are those of the searches."""
 _ADDRESS = re.compile(r"0x[0-9a-f]+")
 LEASE_S = 30.0
 """A claim that is not renewed for so long is free again: its process hangs or its id was given
@@ -66,6 +69,23 @@ class Progress:
     flown: int
     all: int
     generation: int
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Violating:
+    """A flown slot whose flight violated a property."""
+
+    search: str
+    generation: int
+    slot: int
+    scenario: str
+    result: dict[str, Any]
+    sha256: str
+
+    @property
+    def signature(self) -> str:
+        """The violation's signature."""
+        return str(self.result["verdict"]["signature"])
 
 
 _REMEDY = (
@@ -190,11 +210,13 @@ class Ledger:
         row = self._db.execute("SELECT value FROM run WHERE key = ?", (key,)).fetchone()
         return None if row is None else json.loads(row[0])
 
-    def add_search(self, search: str, system: str, map: str, wanted: int, job: str) -> None:
+    def add_search(
+        self, search: str, system: str, map: str, wanted: int, job: str, kind: Kind = "search"
+    ) -> None:
         """Register a search that will fly ``wanted`` slots; once is enough."""
         self._db.execute(
-            "INSERT OR IGNORE INTO search VALUES (?, ?, ?, ?, ?)",
-            (search, system, map, wanted, job),
+            "INSERT OR IGNORE INTO search VALUES (?, ?, ?, ?, ?, ?)",
+            (search, system, map, wanted, job, kind),
         )
 
     def job(self, search: str) -> str | None:
@@ -354,12 +376,21 @@ class Ledger:
         result: dict[str, Any] = json.loads(row[0])
         return result
 
-    def results(self) -> list[tuple[str, str, int, int, dict[str, Any]]]:
+    def sha256(self, search: str, generation: int, slot: int) -> str:
+        """Return the trajectory's hash of a flown slot; empty where its process did not live."""
+        row = self._db.execute(
+            "SELECT sha256 FROM slot WHERE search = ? AND generation = ? AND slot = ?",
+            (search, generation, slot),
+        ).fetchone()
+        return str(row[0] or "") if row else ""
+
+    def results(self, kind: Kind = "search") -> list[tuple[str, str, int, int, dict[str, Any]]]:
         """Return (system, map, generation, slot, result) of all flown slots in slot order."""
         rows = self._db.execute(
             "SELECT system, map, generation, slot, result FROM slot "
-            "JOIN search ON search.id = slot.search WHERE state = 'flown' "
-            "ORDER BY system, map, generation, slot"
+            "JOIN search ON search.id = slot.search WHERE state = 'flown' AND kind = ? "
+            "ORDER BY system, map, generation, slot",
+            (kind,),
         )
         return [(*row[:4], json.loads(row[4])) for row in rows]
 
@@ -368,11 +399,32 @@ class Ledger:
         rows = self._db.execute(
             "SELECT system, map, coalesce(sum(state = 'flown'), 0), wanted, "
             "coalesce(max(generation), 0) FROM search "
-            "LEFT JOIN slot ON search.id = slot.search GROUP BY search.id ORDER BY system, map"
+            "LEFT JOIN slot ON search.id = slot.search WHERE kind = 'search' "
+            "GROUP BY search.id ORDER BY system, map"
         )
         return [
             Progress(system=system, map=map, flown=flown, all=wanted, generation=generation)
             for system, map, flown, wanted, generation in rows
+        ]
+
+    def violating(self) -> list[Violating]:
+        """Return the searches' violations in slot order."""
+        rows = self._db.execute(
+            "SELECT search, generation, slot, scenario, result, sha256 FROM slot "
+            "JOIN search ON search.id = slot.search WHERE kind = 'search' AND state = 'flown' "
+            "AND json_extract(result, '$.verdict.primary') IS NOT NULL "
+            "ORDER BY system, map, generation, slot"
+        )
+        return [
+            Violating(
+                search=row[0],
+                generation=row[1],
+                slot=row[2],
+                scenario=row[3],
+                result=json.loads(row[4]),
+                sha256=row[5] or "",
+            )
+            for row in rows
         ]
 
     def nearest(self) -> dict[str, tuple[float, str]]:
@@ -380,8 +432,10 @@ class Ledger:
         rows = self._db.execute(
             "SELECT json_extract(m.value, '$.property') AS name, "
             "min(json_extract(m.value, '$.value')), json_extract(m.value, '$.unit') "
-            "FROM slot, json_each(slot.result, '$.verdict.margins') AS m "
-            "WHERE state = 'flown' AND json_extract(m.value, '$.decided') GROUP BY name"
+            "FROM slot JOIN search ON search.id = slot.search, "
+            "json_each(slot.result, '$.verdict.margins') AS m "
+            "WHERE kind = 'search' AND state = 'flown' AND json_extract(m.value, '$.decided') "
+            "GROUP BY name"
         )
         return {name: (value, unit) for name, value, unit in rows}
 
@@ -389,7 +443,8 @@ class Ledger:
         """Return how often each type of violation was found."""
         rows = self._db.execute(
             "SELECT json_extract(result, '$.verdict.violation_type') AS type, count(*) FROM slot "
-            "WHERE state = 'flown' AND type IS NOT NULL GROUP BY type ORDER BY type"
+            "JOIN search ON search.id = slot.search WHERE kind = 'search' "
+            "AND state = 'flown' AND type IS NOT NULL GROUP BY type ORDER BY type"
         )
         return dict(rows.fetchall())
 
@@ -397,7 +452,7 @@ class Ledger:
         """Return the scenario of a slot for each system that has one."""
         rows = self._db.execute(
             "SELECT system, scenario FROM slot JOIN search ON search.id = slot.search "
-            "WHERE map = ? AND generation = ? AND slot = ?",
+            "WHERE kind = 'search' AND map = ? AND generation = ? AND slot = ?",
             (map, generation, slot),
         )
         return dict(rows.fetchall())
@@ -407,7 +462,8 @@ class Ledger:
         digest = hashlib.sha256()
         rows = self._db.execute(
             "SELECT system, map, generation, slot, scenario, result, objectives, sha256 FROM slot "
-            "JOIN search ON search.id = slot.search ORDER BY system, map, generation, slot"
+            "JOIN search ON search.id = slot.search WHERE kind = 'search' "
+            "ORDER BY system, map, generation, slot"
         )
         for row in rows:
             # Addresses in a traceback differ from run to run and mean nothing.

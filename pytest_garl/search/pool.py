@@ -16,7 +16,7 @@ from pytest_garl.scenarios.maps import load_map
 from pytest_garl.search.child import CANNOT_GO_ON, THREADS, dump_file
 from pytest_garl.search.job import broken_result, fly_job, load_scenario, loads
 from pytest_garl.search.ledger import Ledger
-from pytest_garl.search.slots import Slot
+from pytest_garl.search.slots import Slot, flight_name
 
 POLL_S = 0.02
 MOST_LOSSES = 3
@@ -35,13 +35,17 @@ class Pool:
         """Return a slot's result when it is flown; ``tick`` is called before and while waiting."""
         tick()
         while (result := self._ledger.result(search, slot.generation, slot.index)) is None:
-            if self._workers == 0:
-                self._fly_here()
-            else:
-                self._look_after()
-                time.sleep(POLL_S)
+            self.turn()
             tick()
         return result
+
+    def turn(self) -> None:
+        """Let the flying go on for a moment: look after the children, or fly one slot here."""
+        if self._workers == 0:
+            self._fly_here()
+        else:
+            self._look_after()
+            time.sleep(POLL_S)
 
     def close(self) -> None:
         """End this process's children and give back what they had in flight."""
@@ -62,8 +66,7 @@ class Pool:
             time.sleep(POLL_S)
             return
         job = loads(claim.job)
-        name = Slot(generation=claim.generation, index=claim.slot).id(job.map)
-        slot_id = f"{claim.search[:8]}-{name}"
+        slot_id = flight_name(claim.search, claim.generation, claim.slot, job.map)
         result, sha256, wall_s = fly_job(job, load_scenario(claim.scenario), slot_id, None)
         self._ledger.record(claim, result, sha256, wall_s)
 

@@ -5,8 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal
 
-PropertyName = Literal["distance", "time", "collision", "crash", "abort"]
-ViolationType = Literal["I", "II", "III", "IV", "V", "late", "off", "hard", "abort"]
+PropertyName = Literal["distance", "time", "collision", "crash", "abort", "own"]
+ViolationType = Literal["I", "II", "III", "IV", "V", "late", "off", "hard", "abort", "own"]
+"""The paper's five types and ours; "own" is what a test asserts beyond them."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -1,0 +1,80 @@
+"""A saved case: one way to fail, with everything that it takes to fly it again and believe it."""
+
+from __future__ import annotations
+
+import hashlib
+import re
+from dataclasses import dataclass
+from typing import Literal
+
+from pytest_garl.scenarios.scenario import Scenario
+from pytest_garl.verdicts.verdict import PropertyName, ViolationType
+
+Status = Literal["open", "fixed", "unavoidable"]
+"""Open: known, expected to fail.  Fixed: must pass.  Unavoidable: not even a pilot that knows where
+everything is lands; gates nothing."""
+MoveList = tuple[tuple[float, float], ...]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Violation:
+    """What failed: the property, its measured margin (negative or 0 when violated), the story."""
+
+    signature: str
+    type: ViolationType
+    property: PropertyName
+    margin: float
+    unit: str
+    story: str
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Evidence:
+    """Why a case may be believed.
+
+    ``neighbours_failed`` of ``neighbours`` slightly different scenarios failed with the same
+    signature; ``trajectory_sha256`` is that of the flight, on CPUs of the class ``cpu``;
+    ``removed`` says what shrinking took away.
+    """
+
+    trajectory_sha256: str
+    cpu: str
+    map_sha256: str
+    neighbours: int
+    neighbours_failed: int
+    removed: str
+    versions: tuple[tuple[str, str], ...]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Case:
+    """One saved case.
+
+    ``system`` is "module:class"; ``moves`` are what each object did, so that no policy is
+    needed to fly it again; ``policy`` and ``policy_sha256`` name who moved them when it was
+    found.  ``test`` and ``assertion`` are set where a test's own assertion failed and the
+    built-in verdict is content: the test's name and the hash of the assertion's source.
+    """
+
+    system: str
+    status: Status
+    scenario: Scenario
+    violation: Violation
+    policy: str
+    policy_sha256: str
+    moves: tuple[tuple[str, MoveList], ...]
+    evidence: Evidence
+    test: str = ""
+    assertion: str = ""
+
+    @property
+    def id(self) -> str:
+        """A name such as ``court-IV-dog-3f9a12``, the same for the same scenario."""
+        facts = (self.system, self.scenario, self.violation.signature, self.moves, self.test)
+        digest = hashlib.sha256(repr(facts).encode()).hexdigest()
+        words = self.violation.signature.split(":")[:2] or [self.violation.type]
+        subject = "-".join(_SAFE.sub("_", word.partition("@")[0]) for word in words)
+        return f"{self.scenario.map}-{subject}-{digest[:6]}"
+
+
+_SAFE = re.compile(r"[^A-Za-z0-9]+")

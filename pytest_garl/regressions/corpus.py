@@ -1,0 +1,170 @@
+"""The corpus: the folder of saved cases, one subfolder for each landing system."""
+
+from __future__ import annotations
+
+import contextlib
+import difflib
+import fcntl
+import functools
+import os
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+from pytest_garl.errors import GarlError, ScenarioError
+from pytest_garl.regressions.case import Case
+from pytest_garl.regressions.files import dumps, load
+
+
+class CorpusError(GarlError):
+    """A folder of cases that cannot be read or written."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Entry:
+    """One file of the corpus: its case, or what is wrong with it."""
+
+    path: Path
+    case: Case | None
+    problem: str = ""
+
+    @property
+    def name(self) -> str:
+        """Name in item ids: that of the file."""
+        return self.path.stem
+
+
+def folder_of(cases: Path, system: str) -> Path:
+    """Return where the cases of a system ("module:class") lie: under its module's own name."""
+    return cases / system.partition(":")[0].rpartition(".")[2]
+
+
+def entries(cases: Path, system: str, map_folders: tuple[Path, ...]) -> tuple[Entry, ...]:
+    """Return the files of a system in the order of their names, broken ones among them."""
+    return tuple(
+        _of_system(entry, system) for entry in _in_folder(folder_of(cases, system), map_folders)
+    )
+
+
+def every_entry(cases: Path, map_folders: tuple[Path, ...]) -> tuple[Entry, ...]:
+    """Return all files of the corpus, system by system."""
+    folders = sorted(each for each in cases.iterdir() if each.is_dir()) if cases.is_dir() else ()
+    return tuple(entry for folder in folders for entry in _in_folder(folder, map_folders))
+
+
+def _in_folder(folder: Path, map_folders: tuple[Path, ...]) -> Iterator[Entry]:
+    for path in sorted(folder.glob("*.toml")):
+        try:
+            changed = path.stat().st_mtime_ns
+        except OSError:
+            # Gone since it was listed: somebody is cleaning up.
+            continue
+        yield _read(path, changed, map_folders)
+
+
+@functools.lru_cache(maxsize=10_000)
+def _read(path: Path, changed: int, map_folders: tuple[Path, ...]) -> Entry:
+    """Read a file once, however many tests fly it."""
+    del changed
+    try:
+        return Entry(path=path, case=load(path, map_folders))
+    except ScenarioError as error:
+        return Entry(path=path, case=None, problem=str(error))
+
+
+def _of_system(entry: Entry, system: str) -> Entry:
+    if entry.case is None or entry.case.system == system:
+        return entry
+    return Entry(
+        path=entry.path,
+        case=None,
+        problem=f"{entry.path}: key 'system': found {entry.case.system!r}, expected {system!r}, "
+        "the only system with tests whose cases lie in this folder",
+    )
+
+
+@contextlib.contextmanager
+def _alone(folder: Path) -> Iterator[None]:
+    """Let one process at a time add to a folder."""
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        # The folder itself is locked: a file for the purpose would have to be ignored by git.
+        handle = os.open(folder, os.O_RDONLY)
+    except OSError as error:
+        raise CorpusError(f"{folder}: cases cannot be saved here ({error})") from error
+    try:
+        fcntl.flock(handle, fcntl.LOCK_EX)
+        yield
+    finally:
+        os.close(handle)
+
+
+def known(cases: Path, case: Case, map_folders: tuple[Path, ...]) -> Path | None:
+    """Return the file that holds the same failure already: system, map, signature and test."""
+    for entry in entries(cases, case.system, map_folders):
+        if entry.case is not None and same_failure(entry.case, case):
+            return entry.path
+    return None
+
+
+def same_failure(one: Case, other: Case) -> bool:
+    """Whether two cases are one way to fail in one place."""
+    return _key(one) == _key(other)
+
+
+def _key(case: Case) -> tuple[str, ...]:
+    return (
+        case.system,
+        case.scenario.map,
+        case.violation.signature,
+        case.test,
+        case.assertion,
+    )
+
+
+def save(cases: Path, case: Case, map_folders: tuple[Path, ...] = ()) -> Path | None:
+    """Write a new case; return its file, or None where the same failure is known already."""
+    folder = folder_of(cases, case.system)
+    with _alone(folder):
+        if known(cases, case, map_folders) is not None:
+            return None
+        return _write(folder / f"{case.id}.toml", dumps(case))
+
+
+def replace(path: Path, case: Case) -> Path:
+    """Write a case in place of the one in ``path``, under the name that it should have."""
+    with _alone(path.parent):
+        written = _write(path.with_name(f"{case.id}.toml"), dumps(case))
+        if written != path:
+            path.unlink(missing_ok=True)
+        return written
+
+
+def _write(path: Path, text: str) -> Path:
+    scratch = path.with_name(f".{path.name}.{os.getpid()}")
+    try:
+        scratch.write_text(text, encoding="utf-8")
+        scratch.replace(path)
+    except OSError as error:
+        raise CorpusError(f"{path}: the case cannot be saved ({error})") from error
+    return path
+
+
+def patch_of(path: Path, root: Path, text: str) -> str:
+    """Return what ``git apply`` needs to make a new file of the project."""
+    name = path.relative_to(root).as_posix()
+    lines = text.splitlines(keepends=True)
+    body = difflib.unified_diff([], lines, "/dev/null", f"b/{name}")
+    return f"diff --git a/{name} b/{name}\nnew file mode 100644\n{''.join(body)}"
+
+
+def save_patch(folder: Path, cases: Path, root: Path, case: Case) -> Path:
+    """Write a patch that adds the case; the tree itself is left alone."""
+    path = folder_of(cases, case.system) / f"{case.id}.toml"
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        return _write(folder / f"{case.id}.patch", patch_of(path, root, dumps(case)))
+    except ValueError as error:
+        raise CorpusError(f"{cases}: lies outside of the project at {root}: no patch") from error
+    except OSError as error:
+        raise CorpusError(f"{folder}: the patch cannot be saved ({error})") from error

@@ -1,0 +1,207 @@
+"""Cases as small, sorted, commented TOML files: a person reads them, and no code is in them."""
+
+from __future__ import annotations
+
+import itertools
+import textwrap
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import cast
+
+from pytest_garl.errors import ScenarioError
+from pytest_garl.regressions.case import Case, Evidence, MoveList, Status, Violation
+from pytest_garl.scenarios.files import gene_lines, read_genes
+from pytest_garl.scenarios.maps import Map
+from pytest_garl.scenarios.toml_reader import Table, parse
+from pytest_garl.verdicts.verdict import PropertyName, ViolationType
+
+SCHEMA = 1
+_TYPES = ("I", "II", "III", "IV", "V", "late", "off", "hard", "abort", "own")
+_PROPERTIES = ("distance", "time", "collision", "crash", "abort", "own")
+_WIDTH = 98
+
+
+def dumps(case: Case) -> str:
+    """Return the case as TOML: the same bytes for equal cases."""
+    violation, evidence, scenario = case.violation, case.evidence, case.scenario
+    lines = [f"# {line}" for line in textwrap.wrap(violation.story, _WIDTH)]
+    lines += [
+        f"schema = {SCHEMA}",
+        f'system = "{case.system}"',
+        f'status = "{case.status}"',
+        f'map = "{scenario.map}"',
+        f"seed = {scenario.seed}",
+    ]
+    if scenario.absent:
+        lines.append(f"absent = [{', '.join(_text(name) for name in scenario.absent)}]")
+    lines += [
+        "",
+        "[violation]",
+        f"signature = {_text(violation.signature)}",
+        f'type = "{violation.type}"',
+        f'property = "{violation.property}"',
+        f"margin = {violation.margin!r}  # {violation.unit}; what is not above 0 is violated",
+        f"unit = {_text(violation.unit)}",
+        f"story = {_text(violation.story)}",
+    ]
+    if case.test:
+        lines += [f"test = {_text(case.test)}", f"assertion = {_text(case.assertion)}"]
+    lines += [
+        "",
+        "# Weather from 0 to 1, places from -1 to 1, velocity as a share of the top speed.",
+    ]
+    lines += gene_lines(scenario)[1:]
+    lines += [
+        "",
+        "# Who moved the objects when this was found.",
+        "[policy]",
+        f"name = {_text(case.policy)}",
+        f"sha256 = {_text(case.policy_sha256)}",
+        "",
+        "# What they did: [times, x, y], each for half a second; x east and y north as shares of",
+        "# the object's speed. After the last they stand still.",
+        "[moves]",
+    ]
+    lines += [f"{name} = {_moves(moves)}" for name, moves in case.moves]
+    lines += [
+        "",
+        "[evidence]",
+        f'trajectory_sha256 = "{evidence.trajectory_sha256}"',
+        f"cpu = {_text(evidence.cpu)}  # class of CPUs on which the hash holds",
+        f'map_sha256 = "{evidence.map_sha256}"',
+        f"neighbours = {evidence.neighbours}  # slightly different scenarios flown",
+        f"neighbours_failed = {evidence.neighbours_failed}",
+        f"removed = {_text(evidence.removed)}",
+        "",
+        "[evidence.versions]",
+        *(f"{_text(name)} = {_text(version)}" for name, version in evidence.versions),
+    ]
+    return "\n".join(lines) + "\n"
+
+
+def loads(text: str, load_map: Callable[[str], Map], *, source: str = "case") -> Case:
+    """Return the case in ``text``; raise ScenarioError that names source and key."""
+    top = Table(parse(text, source), source)
+    top.only(
+        {
+            "schema",
+            "system",
+            "status",
+            "map",
+            "seed",
+            "absent",
+            "violation",
+            "genes",
+            "policy",
+            "moves",
+            "evidence",
+        }
+    )
+    if top.integer("schema") != SCHEMA:
+        raise top.error("schema", f"found {top.get('schema')}, expected {SCHEMA}")
+    system = top.text("system")
+    if not all(system.partition(":")):
+        raise top.error("system", f"found {system!r}, expected 'module:class'")
+    try:
+        map = load_map(top.text("map"))
+    except ScenarioError as error:
+        raise top.error("map", str(error)) from error
+    scenario = read_genes(top, map)
+    violation = top.table("violation")
+    violation.only(
+        {"signature", "type", "property", "margin", "unit", "story", "test", "assertion"}
+    )
+    policy = top.table("policy")
+    policy.only({"name", "sha256"})
+    return Case(
+        system=system,
+        status=cast(Status, top.text("status", among=("open", "fixed", "unavoidable"))),
+        scenario=scenario,
+        violation=Violation(
+            signature=violation.text("signature"),
+            type=cast(ViolationType, violation.text("type", among=_TYPES)),
+            property=cast(PropertyName, violation.text("property", among=_PROPERTIES)),
+            margin=violation.number("margin"),
+            unit=violation.text("unit"),
+            story=violation.text("story"),
+        ),
+        policy=policy.text("name"),
+        policy_sha256=policy.text("sha256"),
+        moves=_read_moves(top.table("moves"), map, scenario.absent),
+        evidence=_read_evidence(top.table("evidence")),
+        test=violation.text("test", ""),
+        assertion=violation.text("assertion", ""),
+    )
+
+
+def load(path: Path, search_path: tuple[Path, ...] = ()) -> Case:
+    """Return the case in a file."""
+    from pytest_garl.scenarios.maps import load_map
+
+    try:
+        text = path.read_text(encoding="utf-8")
+    except (OSError, UnicodeDecodeError) as error:
+        raise ScenarioError(f"{path}: cannot be read: {error}") from error
+    return loads(text, lambda name: load_map(name, search_path), source=str(path))
+
+
+def _read_moves(table: Table, map: Map, absent: Sequence[str]) -> tuple[tuple[str, MoveList], ...]:
+    names = [name for name, _ in map.residents if name not in absent]
+    table.only(names)
+    return tuple((name, _read_runs(table, name)) for name in names)
+
+
+def _read_runs(table: Table, name: str) -> MoveList:
+    runs = table.get(name)
+    expected = "expected a list of [times, x, y] with times of at least 1 and x² + y² of at most 1"
+    if not isinstance(runs, list):
+        raise table.error(name, f"found {runs!r}, {expected}")
+    moves: list[tuple[float, float]] = []
+    for run in runs:
+        numbers = isinstance(run, list) and all(
+            isinstance(item, int | float) and not isinstance(item, bool) for item in run
+        )
+        if not numbers or len(run) != 3 or not isinstance(run[0], int) or not 1 <= run[0] <= 10_000:
+            raise table.error(name, f"found {run!r}, {expected}")
+        if not run[1] ** 2 + run[2] ** 2 <= 1 + 1e-9:
+            raise table.error(name, f"found {run!r}, {expected}")
+        moves += [(float(run[1]), float(run[2]))] * run[0]
+    return tuple(moves)
+
+
+def _read_evidence(table: Table) -> Evidence:
+    table.only(
+        {
+            "trajectory_sha256",
+            "cpu",
+            "map_sha256",
+            "neighbours",
+            "neighbours_failed",
+            "removed",
+            "versions",
+        }
+    )
+    versions = table.table("versions")
+    return Evidence(
+        trajectory_sha256=table.text("trajectory_sha256"),
+        cpu=table.text("cpu"),
+        map_sha256=table.text("map_sha256"),
+        neighbours=table.integer("neighbours"),
+        neighbours_failed=table.integer("neighbours_failed"),
+        removed=table.text("removed"),
+        versions=tuple((name, versions.text(name)) for name in versions.values),
+    )
+
+
+def _moves(moves: MoveList) -> str:
+    runs = [(len(list(run)), x, y) for (x, y), run in itertools.groupby(moves)]
+    return f"[{', '.join(f'[{count}, {x!r}, {y!r}]' for count, x, y in runs)}]"
+
+
+def _text(value: str) -> str:
+    """Return a TOML basic string."""
+    escaped = value.replace("\\", "\\\\").replace('"', '\\"')
+    plain = "".join(
+        char if char >= " " and char != "\x7f" else f"\\u{ord(char):04x}" for char in escaped
+    )
+    return f'"{plain}"'

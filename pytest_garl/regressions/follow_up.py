@@ -1,0 +1,122 @@
+"""After a search: pursue each new signature, and save what was found."""
+
+from __future__ import annotations
+
+import functools
+from collections import defaultdict
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+from pytest_garl.regressions.case import Case
+from pytest_garl.regressions.corpus import entries, save, save_patch
+from pytest_garl.regressions.pursuit import LEAST, Finding, Inquiry, Pursuit
+from pytest_garl.scenarios.maps import load_map
+from pytest_garl.search.errands import Done, Errands, Fly
+from pytest_garl.search.job import load_scenario, loads
+from pytest_garl.search.ledger import Ledger, Violating
+from pytest_garl.search.pool import Pool
+from pytest_garl.search.slots import flight_name
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Place:
+    """Where cases go: the corpus in the project, or patches where the tree must not change."""
+
+    root: Path
+    cases: Path
+    patches: Path | None
+    map_folders: tuple[Path, ...]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Pursued:
+    """What became of one new signature: its case and the file, or the reason for none."""
+
+    system: str
+    map: str
+    finding: Finding
+    file: Path | None
+
+
+def inquiries(ledger: Ledger, place: Place, budget: int) -> tuple[Inquiry, ...]:
+    """Return what is to be found out about signatures that no saved case has.
+
+    ``budget`` is for all signatures of one search together.  Where it does not reach for all, the
+    most frequent come first, and the others are left for `garl cases shrink`.
+    """
+    found = []
+    for search, rows in _by_search(ledger).items():
+        text = ledger.job(search)
+        assert text is not None
+        job = loads(text)
+        system = f"{job.system.module}:{job.system.qualname}"
+        known = {
+            entry.case.violation.signature
+            for entry in entries(place.cases, system, place.map_folders)
+            if entry.case is not None and entry.case.scenario.map == job.map and not entry.case.test
+        }
+        new = {signature: those for signature, those in rows.items() if signature not in known}
+        order = sorted(new, key=lambda signature: (-len(new[signature]), signature))
+        order = order[: budget // LEAST]
+        map = load_map(job.map, place.map_folders)
+        for signature in order:
+            violations = tuple(
+                (load_scenario(row.scenario), _done(row, job.flights, job.map))
+                for row in new[signature]
+            )
+            found.append(
+                Inquiry(
+                    name=f"{search} {signature}",
+                    signature=signature,
+                    violations=violations,
+                    job=job,
+                    map=map,
+                    budget=budget // len(order),
+                )
+            )
+    return tuple(found)
+
+
+def _by_search(ledger: Ledger) -> dict[str, dict[str, list[Violating]]]:
+    found: dict[str, dict[str, list[Violating]]] = {}
+    for row in ledger.violating():
+        found.setdefault(row.search, defaultdict(list))[row.signature].append(row)
+    return found
+
+
+def _done(row: Violating, flights: str, map: str) -> Done:
+    name = flight_name(row.search, row.generation, row.slot, map)
+    return Done(result=row.result, sha256=row.sha256, record=Path(flights) / f"{name}.npz")
+
+
+def follow_up(
+    ledger: Ledger, pool: Pool, place: Place, budget: int, tick: Callable[[], None]
+) -> tuple[Pursued, ...]:
+    """Pursue all new signatures at once and save their cases; the order is always the same."""
+    wanted = inquiries(ledger, place, budget)
+    functions: dict[str, Callable[[Fly], Finding]] = {
+        each.name: functools.partial(_pursue, each) for each in wanted
+    }
+    findings = Errands(ledger, pool, tick).run(functions)
+    return tuple(_saved(each, findings[each.name], place) for each in wanted)
+
+
+def _pursue(inquiry: Inquiry, fly: Fly) -> Finding:
+    return Pursuit(inquiry, fly).run()
+
+
+def _saved(inquiry: Inquiry, finding: Finding, place: Place) -> Pursued:
+    job = inquiry.job
+    return Pursued(
+        system=f"{job.system.module}:{job.system.qualname}",
+        map=job.map,
+        finding=finding,
+        file=_file(finding.case, place) if finding.case else None,
+    )
+
+
+def _file(case: Case, place: Place) -> Path | None:
+    if place.patches is not None:
+        return save_patch(place.patches, place.cases, place.root, case)
+    return save(place.cases, case, place.map_folders)

@@ -1,0 +1,233 @@
+"""From a violation to a case: confirm it, ask whether it can be avoided, shrink it, record it."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from pytest_garl.adversary.recorded import recorded_spec
+from pytest_garl.regressions.case import Case, Evidence, MoveList, Violation
+from pytest_garl.regressions.neighbours import COUNT, neighbours
+from pytest_garl.regressions.shrink import complexity, genome_of, shrink
+from pytest_garl.regressions.story import tell
+from pytest_garl.regressions.waiting import postponed
+from pytest_garl.scenarios.maps import Map
+from pytest_garl.scenarios.scenario import Scenario
+from pytest_garl.search.errands import Done, Fly
+from pytest_garl.search.job import Job
+from pytest_garl.search.reference import reference_to
+from pytest_garl.simulation.record import load
+from pytest_garl.simulation.reference_pilot import ReferencePilot
+from pytest_garl.verdicts.serialise import from_dict
+
+LEAST = 2 + COUNT
+"""Flights without which nothing can be said: once more, three neighbours, the reference pilot."""
+CANDIDATES = 3
+"""So many violations of a signature are tried for one whose neighbours fail as well."""
+Moves = tuple[tuple[str, MoveList], ...]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Inquiry:
+    """What is to be found out about one signature of one search.
+
+    ``violations`` are scenarios with the flights that violated.  ``budget`` bounds the flights.
+    """
+
+    name: str
+    signature: str
+    violations: tuple[tuple[Scenario, Done], ...]
+    job: Job
+    map: Map
+    budget: int
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Finding:
+    """What came of it: a case, or the reason why there is none."""
+
+    signature: str
+    case: Case | None
+    flights: int
+    reason: str = ""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Failure:
+    """A scenario that fails, what its objects did, its flight, how many neighbours fail too."""
+
+    scenario: Scenario
+    moves: Moves
+    done: Done
+    robust: int
+
+
+class Pursuit:
+    """The train of thought about one signature; every flight goes through ``fly``."""
+
+    def __init__(self, inquiry: Inquiry, fly: Fly) -> None:
+        self._inquiry, self._fly, self._flights = inquiry, fly, 0
+        self._flown: dict[Scenario, Done] = dict(inquiry.violations)
+
+    def run(self) -> Finding:
+        """Return what was found out."""
+        inquiry = self._inquiry
+        map = inquiry.map
+        simple = sorted(
+            (scenario for scenario, _ in inquiry.violations),
+            key=lambda each: complexity(each, genome_of(each, map)),
+        )
+        best = self._most_robust(simple[:CANDIDATES])
+        if best is None:
+            reason = "its flights with the recorded moves do not fail in the same way"
+            return self._finding(None, reason)
+        avoidable = self._avoidable(best.scenario)
+        shrunk = self._shrunk(best)
+        return self._finding(self._case(best.scenario, shrunk, avoidable))
+
+    @property
+    def _left(self) -> int:
+        return self._inquiry.budget - self._flights
+
+    def _finding(self, case: Case | None, reason: str = "") -> Finding:
+        return Finding(
+            signature=self._inquiry.signature, case=case, flights=self._flights, reason=reason
+        )
+
+    def _go(self, job: Job, scenario: Scenario) -> Done:
+        self._flights += 1
+        return self._fly(job, scenario)
+
+    def _again(self, scenario: Scenario, moves: Moves) -> Done:
+        """Fly with recorded moves."""
+        spec = recorded_spec(dict(moves))
+        return self._go(dataclasses.replace(self._inquiry.job, npcs=spec), scenario)
+
+    def _most_robust(self, scenarios: Sequence[Scenario]) -> _Failure | None:
+        """Return the first violation all of whose neighbours fail, or the best of those tried."""
+        best: _Failure | None = None
+        for scenario in scenarios:
+            if best is not None and self._left < 1 + COUNT + LEAST:
+                break
+            moves = moves_of(self._flown[scenario], scenario, self._inquiry.map)
+            done = self._again(scenario, moves)
+            if done.signature != self._inquiry.signature:
+                continue
+            robust = self._robust(scenario, moves)
+            if best is None or robust > best.robust:
+                best = _Failure(scenario=scenario, moves=moves, done=done, robust=robust)
+            if robust == COUNT:
+                break
+        return best
+
+    def _robust(self, scenario: Scenario, moves: Moves) -> int:
+        return sum(
+            self._again(each, moves).signature == self._inquiry.signature
+            for each in neighbours(scenario, self._inquiry.map)
+        )
+
+    def _avoidable(self, scenario: Scenario) -> bool:
+        """Whether a pilot that knows where everything is lands among the same objects."""
+        pilot = dataclasses.replace(self._inquiry.job, system=reference_to(ReferencePilot))
+        return not self._go(pilot, scenario).signature
+
+    def _shrunk(self, best: _Failure) -> _Failure:
+        """Return the simplest failure whose neighbours fail as well."""
+        inquiry = self._inquiry
+
+        def fails(scenario: Scenario) -> bool:
+            done = self._flown[scenario] = self._go(inquiry.job, scenario)
+            return done.signature == inquiry.signature
+
+        budget = self._left - COUNT
+        if budget <= 0:
+            return best
+        found = shrink(best.scenario, fails, inquiry.map, budget, culprit=culprit_of(best.done))
+        # From the simplest back towards the first, until it does not sit on an edge.
+        for scenario in reversed(found.history[1:]):
+            if self._left < COUNT:
+                break
+            done = self._flown[scenario]
+            moves = moves_of(done, scenario, inquiry.map)
+            robust = self._robust(scenario, moves)
+            if robust >= best.robust:
+                failure = _Failure(scenario=scenario, moves=moves, done=done, robust=robust)
+                return self._waiting(failure)
+        return best
+
+    def _waiting(self, failure: _Failure) -> _Failure:
+        """Let the culprit wait where it strikes from, as long as the failure survives it."""
+        culprit = culprit_of(failure.done)
+        if not culprit or not failure.done.record.exists():
+            return failure
+        flight = load(failure.done.record)
+        candidates = postponed(failure.scenario, failure.moves, flight, culprit, self._inquiry.map)
+        for scenario, moves in candidates:
+            if self._left < 1 + COUNT:
+                break
+            done = self._again(scenario, moves)
+            if done.signature != self._inquiry.signature:
+                continue
+            robust = self._robust(scenario, moves)
+            if robust >= failure.robust:
+                return _Failure(scenario=scenario, moves=moves, done=done, robust=robust)
+        return failure
+
+    def _case(self, first: Scenario, failure: _Failure, avoidable: bool) -> Case:
+        inquiry, done, job = self._inquiry, failure.done, self._inquiry.job
+        verdict = from_dict(done.result["verdict"])
+        assert verdict.primary is not None
+        assert verdict.violation_type is not None
+        margin = next((each for each in verdict.margins if each.property == verdict.primary), None)
+        flight = load(done.record) if done.record.exists() else None
+        return Case(
+            system=f"{job.system.module}:{job.system.qualname}",
+            status="open" if avoidable else "unavoidable",
+            scenario=failure.scenario,
+            violation=Violation(
+                signature=inquiry.signature,
+                type=verdict.violation_type,
+                property=verdict.primary,
+                margin=margin.value if margin else 0.0,
+                unit=margin.unit if margin else "1",
+                story=tell(flight, verdict) if flight else verdict.story,
+            ),
+            policy=job.npcs.name,
+            policy_sha256=str(dict(job.npcs.arguments).get("sha256", "")),
+            moves=failure.moves,
+            evidence=Evidence(
+                trajectory_sha256=done.sha256,
+                cpu=flight.cpu if flight else "",
+                map_sha256=job.map_sha256,
+                neighbours=COUNT,
+                neighbours_failed=failure.robust,
+                removed=removed(first, failure.scenario, inquiry.map),
+                versions=flight.versions if flight else (),
+            ),
+        )
+
+
+def moves_of(done: Done, scenario: Scenario, map: Map) -> Moves:
+    """Return what each object did in a flight; nothing where its process did not live."""
+    names = [name for name, _ in map.without(scenario.absent).object_names]
+    if not done.record.exists():
+        return tuple((name, ()) for name in names)
+    made = {item.name: item.moves for item in load(done.record).objects}
+    return tuple((name, tuple((float(x), float(y)) for x, y in made[name])) for name in names)
+
+
+def culprit_of(done: Done) -> str:
+    """Return the moving object that the UAV hit, if it did."""
+    hit = done.result["collisions"]
+    kind = done.result["verdict"]["violation_type"]
+    return str(hit[-1]) if hit and kind == "IV" else ""
+
+
+def removed(first: Scenario, last: Scenario, map: Map) -> str:
+    """Say what shrinking took away."""
+    before, after = (complexity(each, genome_of(first, map)) for each in (first, last))
+    if before == after:
+        return "nothing"
+    objects, genes = before[0] - after[0], before[1] - after[1]
+    return f"{objects} of {before[0]} objects, {genes} of {before[1]} genes off nominal"

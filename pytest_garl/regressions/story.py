@@ -1,0 +1,66 @@
+"""One sentence about a violation, for somebody who has seen no flight."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from pytest_garl.simulation.flight import Contact, Flight, ObjectRecord
+from pytest_garl.simulation.vehicle import BODY_ABOVE_FEET_M
+from pytest_garl.verdicts.verdict import Verdict
+
+NEAR_M = 3.0
+"""Horizontal distance at which an object enters the scene: two of the UAV's lengths and its
+own stride."""
+_COMPASS = (
+    "east",
+    "north-east",
+    "north",
+    "north-west",
+    "west",
+    "south-west",
+    "south",
+    "south-east",
+)
+
+
+def tell(flight: Flight, verdict: Verdict) -> str:
+    """Return the story: for a moving object how it came, then what happened where."""
+    contact = flight.contacts[-1] if flight.contacts else None
+    if verdict.violation_type != "IV" or contact is None:
+        return verdict.story
+    culprit = next((item for item in flight.objects if item.name == contact.body), None)
+    return f"{_entrance(flight, culprit, contact)} {verdict.story}" if culprit else verdict.story
+
+
+def _entrance(flight: Flight, culprit: ObjectRecord, contact: Contact) -> str:
+    """Return how the object came near: ``A dog at 2.1 m/s enters from the south-east ...``."""
+    there, own = flight.uav.position_m, culprit.track.position_m
+    away = np.hypot(own[:, 0] - there[:, 0], own[:, 1] - there[:, 1])
+    outside = np.flatnonzero(away > NEAR_M)
+    entered = int(outside[-1]) + 1 if len(outside) else 0
+    entered = min(entered, len(away) - 1)
+    up = max(0.0, float(there[entered, 2]) - BODY_ABOVE_FEET_M)
+    speeds = np.hypot(culprit.track.velocity_mps[:, 0], culprit.track.velocity_mps[:, 1])
+    speed = float(speeds[entered:].max())
+    kind = f"{_article(culprit.type)} {culprit.type}"
+    place = _over(flight, there[entered])
+    if speed < 0.1:
+        return f"{kind} stands still in the UAV's way, {up:.1f} m below it."
+    side = own[entered] - there[entered]
+    point = _COMPASS[round(math.atan2(side[1], side[0]) / (math.pi / 4)) % 8]
+    return (
+        f"{kind} at {speed:.1f} m/s enters from the {point} while the UAV is {up:.1f} m above "
+        f"{place}."
+    )
+
+
+def _over(flight: Flight, position: np.ndarray) -> str:
+    mx, my = flight.marker_position_m
+    distance = math.hypot(float(position[0]) - mx, float(position[1]) - my)
+    return "the marker" if distance < 1.0 else f"the ground, {distance:.1f} m from the marker"
+
+
+def _article(word: str) -> str:
+    return "An" if word[0] in "aeiou" else "A"

@@ -1,0 +1,41 @@
+"""Shorter records of moves: an object waits where it strikes from, instead of coming from afar."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from pytest_garl.regressions.case import MoveList
+from pytest_garl.scenarios.maps import Map
+from pytest_garl.scenarios.placement import start_genes
+from pytest_garl.scenarios.scenario import Scenario
+from pytest_garl.scenarios.validity import problems
+from pytest_garl.simulation.flight import Flight
+from pytest_garl.simulation.policy import DECISION_STEP_S
+
+LEADS_S = (2.0, 4.0, 8.0)
+"""How long before the end an object may still move, tried from short to long."""
+Moves = tuple[tuple[str, MoveList], ...]
+
+
+def postponed(
+    scenario: Scenario, moves: Moves, flight: Flight, name: str, map: Map
+) -> Iterator[tuple[Scenario, Moves]]:
+    """Yield scenarios in which an object stands until shortly before the end of the flight.
+
+    It stands where it was at that time; what makes no sense, such as standing on the marker, is
+    left out.
+    """
+    track = next(item.track for item in flight.objects if item.name == name)
+    own = dict(moves)[name]
+    for lead in LEADS_S:
+        wait = len(own) - round(lead / DECISION_STEP_S)
+        # The first moves of one that stands already need no replacing.
+        if wait <= 0 or all(move == (0.0, 0.0) for move in own[:wait]):
+            continue
+        index = min(len(track.time_s) - 1, int(track.time_s.searchsorted(wait * DECISION_STEP_S)))
+        x, y = (float(value) for value in track.position_m[index, :2])
+        there = scenario.replace(start_genes(name, (x, y), map))
+        if problems(there, map):
+            continue
+        still: MoveList = ((0.0, 0.0),) * wait + own[wait:]
+        yield there, tuple((each, still if each == name else its) for each, its in moves)

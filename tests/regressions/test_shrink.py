@@ -1,0 +1,111 @@
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+
+from pytest_garl.regressions.shrink import (
+    Trials,
+    by_hypothesis,
+    complexity,
+    genome_of,
+    reset_and_bisect,
+    shrink,
+)
+from pytest_garl.scenarios.chromosome import decode
+from pytest_garl.scenarios.genes import genome_for
+from pytest_garl.scenarios.maps import load_map
+from pytest_garl.scenarios.scenario import Scenario
+from pytest_garl.scenarios.validity import problems, repair
+
+LAWN = load_map("lawn")
+NAMES = [name for name, _ in LAWN.object_names]
+CULPRIT = NAMES[0]
+
+
+def violation(seed: int = 7) -> Scenario:
+    genome = genome_for(LAWN)
+    row = genome.random(np.random.default_rng(seed))
+    return repair(decode(row, genome, map="lawn", seed=1), LAWN)
+
+
+def fast(scenario: Scenario) -> bool:
+    return scenario.get(f"{CULPRIT}.velocity", 0.0) >= 0.3
+
+
+def in_fog(scenario: Scenario) -> bool:
+    return scenario["environment.fog"] >= 0.02 and fast(scenario)
+
+
+def two_of_them(scenario: Scenario) -> bool:
+    return fast(scenario) and NAMES[-1] not in scenario.absent
+
+
+FIRST = violation().replace({f"{CULPRIT}.velocity": 0.9, "environment.fog": 0.12})
+
+
+def test_all_that_a_failure_does_not_need_is_gone_after_few_flights() -> None:
+    found = shrink(FIRST, fast, LAWN, 100, culprit=CULPRIT, passes=(reset_and_bisect,))
+    assert set(found.simplest.absent) == {*NAMES} - {CULPRIT}
+    assert complexity(found.simplest, genome_of(FIRST, LAWN))[1] == 1
+    assert 0.3 <= found.simplest[f"{CULPRIT}.velocity"] <= 0.3 + 0.9 / 8
+    assert found.flights <= 6
+
+
+@pytest.mark.parametrize("fails", [in_fog, two_of_them])
+def test_what_a_failure_needs_stays(fails: Callable[[Scenario], bool]) -> None:
+    found = shrink(FIRST, fails, LAWN, 100, culprit=CULPRIT)
+    assert fails(found.simplest)
+    assert problems(found.simplest, LAWN) == ()
+    assert complexity(found.simplest, genome_of(FIRST, LAWN))[1] == (2 if fails is in_fog else 1)
+
+
+def test_hypothesis_finds_what_only_goes_together() -> None:
+    def unequal(scenario: Scenario) -> bool:
+        fog, dust = scenario["environment.fog"], scenario["environment.dust"]
+        return fast(scenario) and abs(fog - dust) < 0.01
+
+    first = FIRST.replace({"environment.dust": 0.12})
+    plain = shrink(first, unequal, LAWN, 300, culprit=CULPRIT, passes=(by_hypothesis,))
+    assert plain.simplest["environment.fog"] == plain.simplest["environment.dust"] == 0
+
+
+def test_the_budget_is_kept_and_nothing_is_flown_twice() -> None:
+    seen: list[Scenario] = []
+
+    def fails(scenario: Scenario) -> bool:
+        assert scenario not in seen
+        seen.append(scenario)
+        return in_fog(scenario)
+
+    for budget in (0, 1, 5, 40):
+        seen.clear()
+        found = shrink(FIRST, fails, LAWN, budget, culprit=CULPRIT)
+        assert found.flights == len(seen) <= budget
+
+
+def test_shrinking_is_deterministic() -> None:
+    one, other = (shrink(FIRST, in_fog, LAWN, 60, culprit=CULPRIT) for _ in range(2))
+    assert one == other
+
+
+def test_every_scenario_on_the_way_failed_and_is_simpler_than_the_last() -> None:
+    history = shrink(FIRST, in_fog, LAWN, 60, culprit=CULPRIT).history
+    genome = genome_of(FIRST, LAWN)
+    assert all(in_fog(each) for each in history)
+    sizes = [complexity(each, genome) for each in history]
+    assert sizes == sorted(sizes, reverse=True)
+    assert len(history) > 2
+
+
+def test_a_trial_is_of_a_scenario_that_makes_sense() -> None:
+    flown: list[Scenario] = []
+
+    def fails(scenario: Scenario) -> bool:
+        flown.append(scenario)
+        return False
+
+    trials = Trials(FIRST, fails, LAWN, 10)
+    trials(FIRST.replace({f"{CULPRIT}.start_x": FIRST[f"{NAMES[1]}.start_x"]}))
+    assert problems(flown[0], LAWN) == ()
