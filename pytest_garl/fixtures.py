@@ -12,10 +12,11 @@ from pytest_garl.errors import GarlError
 from pytest_garl.switches import FATAL, RUN
 
 if TYPE_CHECKING:
-    from pytest_garl.run import Run, Target
+    from pytest_garl.run import Run
     from pytest_garl.scenarios.scenario import Scenario
     from pytest_garl.simulation.flight import Flight
     from pytest_garl.simulation.policy import PolicySpec
+    from pytest_garl.targets import Target
     from pytest_garl.verdicts.verdict import Limits, Verdict
 
 
@@ -89,6 +90,8 @@ def garl_slot(request: pytest.FixtureRequest) -> Target:
     target: Target | str = request.param
     if isinstance(target, str):
         pytest.skip(target)
+    if target.broken:
+        pytest.fail(target.broken, pytrace=False)
     return target
 
 
@@ -143,5 +146,5 @@ def scenario(request: pytest.FixtureRequest, garl_slot: Target) -> Scenario:
 
     run = request.config.stash[RUN]
     request.getfixturevalue("landing")
-    texts = run.ledger.scenarios(garl_slot.slot.generation, garl_slot.slot.index, garl_slot.map)
-    return load_scenario(texts[f"{garl_slot.system.__module__}:{garl_slot.system.__qualname__}"])
+    slot = garl_slot.slot
+    return load_scenario(run.ledger.scenario(garl_slot.search, slot.generation, slot.index))

@@ -35,12 +35,16 @@ class Options:
     repeat: str
     duplicates: Literal["xfail", "fail"]
     npcs: str
+    shrink: int
+    xfail_strict: bool
+    cases: Path
     folder: Path
     root: Path
+    controller: str
 
     @property
-    def active(self) -> bool:
-        """Whether anything will be flown."""
+    def searches(self) -> bool:
+        """Whether more than saved cases is flown."""
         return self.budget > 0 or bool(self.repeat)
 
     @property
@@ -50,7 +54,12 @@ class Options:
 
     @property
     def ledger(self) -> Path:
-        """The ledger of this run; repeating writes one of its own and keeps the search's."""
+        """The ledger of this run; repeating writes one of its own and keeps the search's.
+
+        Runs of saved cases alone may be several at a time; each has one until it ends.
+        """
+        if not self.searches:
+            return self.folder / f"cases-{self.controller}.sqlite"
         return self.folder / ("repeat.sqlite" if self.repeat else "ledger.sqlite")
 
 
@@ -74,9 +83,19 @@ def read_options(config: pytest.Config) -> Options:
             Literal["xfail", "fail"], _among("duplicates", text["duplicates"], ("xfail", "fail"))
         ),
         npcs=_npcs(text["npcs"], text["method"]),
+        shrink=_integer("shrink", text["shrink"], 0) if text["shrink"] else budget // 4,
+        xfail_strict=bool(config.getini("garl_xfail_strict")),
+        cases=config.rootpath / str(config.getini("garl_cases")),
         folder=config.rootpath / str(config.getini("garl_dir")),
         root=config.rootpath,
+        controller=controller_of(config),
     )
+
+
+def controller_of(config: pytest.Config) -> str:
+    """Return the process whose run this is: xdist's controller, or this one."""
+    given: dict[str, Any] = getattr(config, "workerinput", {})
+    return str(given.get("garl_controller", os.getpid()))
 
 
 def _value(config: pytest.Config, option: Option) -> str:

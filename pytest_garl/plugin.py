@@ -32,20 +32,24 @@ def pytest_configure(config: pytest.Config) -> None:
     """Register the marker, and join or begin a run if anything is to be flown."""
     config.addinivalue_line(
         "markers",
-        "garl(system, maps, limits): search for violations of a landing system on maps",
+        "garl(system, maps, limits, deterministic): search for violations of a landing system",
     )
     if not asked(config):
         return
     from pytest_garl.options import read_options
 
-    options = read_options(config)
-    if options.active and not config.option.collectonly:
-        from pytest_garl.reports.session import begin_run
+    if read_options(config).searches and not config.option.collectonly:
+        _begin(config)
 
-        try:
-            config.stash[RUN] = begin_run(config, options)
-        except GarlError as error:
-            raise pytest.UsageError(str(error)) from error
+
+def _begin(config: pytest.Config) -> None:
+    from pytest_garl.options import read_options
+    from pytest_garl.reports.session import begin_run
+
+    try:
+        config.stash[RUN] = begin_run(config, read_options(config))
+    except GarlError as error:
+        raise pytest.UsageError(str(error)) from error
 
 
 def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
@@ -59,11 +63,11 @@ def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
             "@pytest.mark.garl(system=..., maps=[...])"
         )
     from pytest_garl.options import read_options
-    from pytest_garl.run import targets_for
+    from pytest_garl.targets import targets_for
 
     options = read_options(metafunc.config)
     try:
-        targets: list[Any] = list(targets_for(marker, options))
+        targets: list[Any] = list(targets_for(marker, options, metafunc.definition.originalname))
     except GarlError as error:
         raise pytest.Collector.CollectError(f"{metafunc.definition.nodeid}: {error}") from error
     ids = [target.name for target in targets]
@@ -75,8 +79,13 @@ def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
 
 
 def pytest_collection_finish(session: pytest.Session) -> None:
-    """Tell the run which slots are wanted."""
-    run = session.config.stash.get(RUN, None)
+    """Tell the run which slots are wanted; where there is none yet, saved cases begin one."""
+    config = session.config
+    if config.option.collectonly:
+        return
+    if RUN not in config.stash and any(target_of(item) for item in session.items):
+        _begin(config)
+    run = config.stash.get(RUN, None)
     if run is not None:
         run.select(session.items)
         if run.options.resume:
@@ -115,11 +124,11 @@ def pytest_pyfunc_call(pyfuncitem: pytest.Function) -> Generator[None, Any, Any]
 def pytest_runtest_makereport(
     item: pytest.Item, call: pytest.CallInfo[None]
 ) -> Generator[None, pytest.TestReport, pytest.TestReport]:
-    """Explain a violation, and report a known one as xfailed."""
+    """Explain a violation, report a known one as xfailed, and judge saved cases."""
     report = yield
     target = target_of(item)
     run = item.config.stash.get(RUN, None)
-    if target is not None and run is not None and report.when == "call" and report.failed:
+    if target is not None and run is not None and report.when == "call":
         from pytest_garl.reports.explain import explain
 
         explain(report, item, run, target)
@@ -145,6 +154,11 @@ def pytest_report_header(config: pytest.Config) -> str | None:
 
 def pytest_terminal_summary(terminalreporter: Any, config: pytest.Config) -> None:
     """Show what was found, per system and map."""
+    if RUN not in config.stash and config.pluginmanager.hasplugin("dsession"):
+        # xdist's controller collects nothing: its workers' cases show by their ledger.
+        folder = config.rootpath / str(config.getini("garl_dir"))
+        if (folder / f"cases-{os.getpid()}.sqlite").is_file():
+            _begin(config)
     run = config.stash.get(RUN, None)
     if run is not None:
         from pytest_garl.reports.terminal import summary
@@ -153,9 +167,18 @@ def pytest_terminal_summary(terminalreporter: Any, config: pytest.Config) -> Non
 
 
 def pytest_sessionfinish(session: pytest.Session) -> None:
-    """End the flying children."""
+    """Pursue and save what a search found, then end the flying children."""
     run = session.config.stash.get(RUN, None)
-    if run is not None:
+    if run is None:
+        return
+    try:
+        if run.searched(session):
+            from pytest_garl.reports.aftermath import pursue
+
+            pursue(run, session.config)
+            if run.troubled:
+                session.exitstatus = pytest.ExitCode.INTERNAL_ERROR
+    finally:
         run.pool.close()
 
 
@@ -168,8 +191,8 @@ def pytest_unconfigure(config: pytest.Config) -> None:
 
 @pytest.hookimpl(optionalhook=True)
 def pytest_configure_node(node: Any) -> None:
-    """Give an xdist worker the run's seed, so that a random one is drawn once."""
+    """Give an xdist worker the run's name, and its seed, so that a random one is drawn once."""
+    node.workerinput["garl_controller"] = str(os.getpid())
     run = node.config.stash.get(RUN, None)
     if run is not None:
         node.workerinput["garl_seed"] = str(run.options.seed)
-        node.workerinput["garl_controller"] = str(os.getpid())

@@ -2,61 +2,35 @@
 
 from __future__ import annotations
 
-import dataclasses
-import functools
 import hashlib
-import json
+import os
 import sys
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from pathlib import Path
 from typing import TYPE_CHECKING, Any, TextIO
 
 import pytest
 
-from pytest_garl.errors import GarlError, LedgerError
-from pytest_garl.options import SLOT_ID, Options
-from pytest_garl.search.ledger import Ledger
+from pytest_garl.errors import LedgerError
+from pytest_garl.options import Options
+from pytest_garl.search.ledger import Kind, Ledger
 from pytest_garl.search.pool import Pool
-from pytest_garl.search.reference import Reference, check_system, reference_to, sources_sha256
-from pytest_garl.search.slots import Slot, slots
-from pytest_garl.switches import target_of
+from pytest_garl.search.reference import Reference, reference_to, sources_sha256
+from pytest_garl.search.slots import Slot
+from pytest_garl.switches import POLICIES, target_of
+from pytest_garl.targets import FIRST, Target, name_of, repeated
 
 if TYPE_CHECKING:
+    from pytest_garl.regressions.follow_up import Pursued
     from pytest_garl.scenarios.scenario import Scenario
     from pytest_garl.search.breeder import Breeder
     from pytest_garl.search.job import Job
     from pytest_garl.search.method import Flown, Method
     from pytest_garl.simulation.policy import PolicySpec
-    from pytest_garl.verdicts.verdict import Limits
 
 FLIGHT_S = 2.2
 """Wall time of one flight on one core where no earlier run tells: OpenCV-MLS, measured by
 ``python -m benchmarks``."""
-
-
-@dataclass(frozen=True, kw_only=True)
-class Target:
-    """What an item tests: which system on which map, and what it flies."""
-
-    system: type
-    map: str
-    limits: Limits
-    slot: Slot
-    file: str = ""
-    """A scenario file to repeat; empty for a slot of a search."""
-
-    @property
-    def name(self) -> str:
-        """The slot's id in the item's name."""
-        return f"file-{Path(self.file).stem}" if self.file else self.slot.id(self.map)
-
-    @functools.cached_property
-    def search(self) -> str:
-        """Key of the search that the slot belongs to."""
-        reference = reference_to(self.system)
-        facts = [reference.module, reference.qualname, self.map, dataclasses.asdict(self.limits)]
-        return hashlib.sha256(json.dumps(facts).encode()).hexdigest()[:16]
 
 
 @dataclass(kw_only=True)
@@ -76,13 +50,17 @@ class Run:
     targets: dict[str, dict[Slot, Target]] = field(default_factory=dict)
     breeders: dict[str, Breeder] = field(default_factory=dict)
     results: dict[tuple[str, Slot], dict[str, Any]] = field(default_factory=dict)
+    pursued: tuple[Pursued, ...] = ()
+    """What became of new signatures after the search."""
+    troubled: bool = False
+    """Whether that could not be finished."""
     lock: TextIO | None = None
 
     def select(self, items: list[pytest.Item]) -> None:
         """Remember which slots the selected items want."""
         for item in items:
             target = target_of(item)
-            if target is not None:
+            if target is not None and not target.broken:
                 wanted = self.items.setdefault(target.search, {})
                 wanted.setdefault(target.slot, []).append(item.nodeid)
                 self.targets.setdefault(target.search, {})[target.slot] = target
@@ -110,6 +88,8 @@ class Run:
         self.ledger.close()
         if self.lock is not None:
             self.lock.close()
+        if not self.options.searches and self.options.controller == str(os.getpid()):
+            self.ledger.remove()
 
     def first_item(self, target: Target) -> str:
         """Return the node id of the first selected item of a slot."""
@@ -126,6 +106,25 @@ class Run:
         finally:
             self.waited()
 
+    def known(self, target: Target) -> dict[str, str]:
+        """Return the signatures that saved cases expect of a system on a map, with their files."""
+        from pytest_garl.regressions.corpus import entries
+        from pytest_garl.regressions.follow_up import is_known
+
+        options = self.options
+        return {
+            entry.case.violation.signature: entry.path.name
+            for entry in entries(options.cases, name_of(target.system), options.map_folders)
+            if entry.case is not None and is_known(entry.case, target.map)
+        }
+
+    def searched(self, session: pytest.Session) -> bool:
+        """Whether this process has seen a search to its end and may save what it found."""
+        options, worker = self.options, hasattr(session.config, "workerinput")
+        ended = session.exitstatus in (pytest.ExitCode.OK, pytest.ExitCode.TESTS_FAILED)
+        stopped = bool(session.shouldfail or session.shouldstop)
+        return ended and not (stopped or worker or options.repeat) and options.shrink > 0
+
     def twin(self, target: Target, signature: str) -> str:
         """Return the lowest selected slot below with the same signature, or nothing."""
         search = target.search
@@ -133,6 +132,22 @@ class Run:
             if self._wait(search, slot)["verdict"]["signature"] == signature:
                 return slot.id(target.map)
         return ""
+
+    def again(self, target: Target, count: int) -> tuple[list[dict[str, Any]], list[str]]:
+        """Fly a flown slot ``count`` times more; return results and trajectories' hashes."""
+        job = self.ledger.job(target.search)
+        assert job is not None
+        name = name_of(target.system)
+        text = self.ledger.scenario(target.search, target.slot.generation, target.slot.index)
+        assert text is not None
+        results, hashes = [], []
+        for index in range(count):
+            errand = again_key(target, index)
+            self.ledger.add_search(errand, name, target.map, 1, job, "errand")
+            self.ledger.add_slots(errand, 0, {0: text})
+            results.append(self._wait(errand, FIRST))
+            hashes.append(self.ledger.sha256(errand, 0, 0))
+        return results, hashes
 
     def _lower(self, search: str, below: Slot) -> list[Slot]:
         return [slot for slot in sorted(self.items[search]) if slot < below]
@@ -164,9 +179,12 @@ class Run:
         from pytest_garl.search.job import loads
 
         target = next(iter(wanted.values()))
+        npcs = _steered(target, npcs)
         job = self._job(target, npcs)
-        check_policy(npcs, load_map(job.map, self.options.map_folders))
-        name = f"{job.system.module}:{job.system.qualname}"
+        case = target.entry.case if target.entry else None
+        absent = case.scenario.absent if case else ()
+        check_policy(npcs, load_map(job.map, self.options.map_folders).without(absent))
+        name = name_of(target.system)
         slots: dict[int, list[int]] = {}
         for slot in sorted(wanted):
             slots.setdefault(slot.generation, []).append(slot.index)
@@ -174,7 +192,8 @@ class Run:
         flights = len(wanted)
         if method.learns:
             flights = max(slots) * self.options.population + len(slots[max(slots)])
-        self.ledger.add_search(search, name, target.map, flights, job.dumps())
+        kind: Kind = "case" if case else "search"
+        self.ledger.add_search(search, name, target.map, flights, job.dumps(), kind)
         nodes = [node for each in self.items[search].values() for node in each]
         files = sorted({node.partition("::")[0] for node in nodes})
         # For the summary, which xdist's controller writes without having had the items.
@@ -212,7 +231,7 @@ class Run:
         from pytest_garl.search.method import Plan
         from pytest_garl.search.methods import make_method
 
-        if self.options.repeat:
+        if any(each.entry for each in wanted.values()) or self.options.repeat:
             return _Repeat({slot: repeated(self.options, each) for slot, each in wanted.items()})
         map = load_map(next(iter(wanted.values())).map, self.options.map_folders)
         plan = Plan(
@@ -224,8 +243,27 @@ class Run:
         return make_method(self.options.method, plan)
 
 
+def again_key(target: Target, index: int) -> str:
+    """Return the ledger's key of a slot's flight once more."""
+    text = f"again {target.search} {target.slot.id(target.map)} {index}"
+    return hashlib.sha256(text.encode()).hexdigest()[:16]
+
+
+def _steered(target: Target, npcs: PolicySpec) -> PolicySpec:
+    """Return who moves the objects: a case's are those of its record, or of its policy."""
+    from pytest_garl.adversary.policies import policy_spec
+    from pytest_garl.adversary.recorded import recorded_spec
+
+    case = target.entry.case if target.entry else None
+    if case is None:
+        return npcs
+    if not target.live:
+        return recorded_spec(dict(case.moves))
+    return policy_spec(case.policy) if case.policy in POLICIES else npcs
+
+
 class _Repeat:
-    """Proposes the one scenario that is repeated, in whatever slot it has."""
+    """Proposes the one scenario that is repeated, or that a case holds, in its slot."""
 
     learns = False
 
@@ -241,96 +279,6 @@ class _Repeat:
 
     def tell(self, flown: Sequence[Flown]) -> Sequence[tuple[float, ...]]:
         return ()
-
-
-def targets_for(marker: pytest.Mark, options: Options) -> list[Target]:
-    """Return the slots of a marked test; raise GarlError for a marker that makes no sense."""
-    system, maps, limits = _read_marker(marker, options)
-    found = []
-    for map in maps:
-        if options.repeat:
-            found += _repeated_targets(system, map, limits, options)
-        else:
-            found += [
-                Target(system=system, map=map, limits=limits, slot=slot)
-                for slot in slots(options.budget, options.population)
-            ]
-    return found
-
-
-def repeated(options: Options, target: Target) -> Scenario:
-    """Return the scenario that ``--garl-repeat`` names for a system and map."""
-    from pytest_garl.scenarios.files import load
-    from pytest_garl.search.job import load_scenario
-
-    if target.file:
-        return load(Path(target.file), options.map_folders)
-    return load_scenario(_recorded(options, target)[_name(target.system)])
-
-
-def _repeated_targets(system: type, map: str, limits: Limits, options: Options) -> list[Target]:
-    if Path(options.repeat).is_file():
-        from pytest_garl.scenarios.files import map_name_in
-
-        text = Path(options.repeat).read_text(encoding="utf-8")
-        if map_name_in(text, source=options.repeat) != map:
-            return []
-        slot = Slot(generation=0, index=0)
-        return [Target(system=system, map=map, limits=limits, slot=slot, file=options.repeat)]
-    match = SLOT_ID.fullmatch(options.repeat)
-    if match is None or match["map"] != map:
-        return []
-    slot = Slot(generation=int(match["generation"]), index=int(match["slot"]))
-    target = Target(system=system, map=map, limits=limits, slot=slot)
-    return [target] if _name(system) in _recorded(options, target) else []
-
-
-def _recorded(options: Options, target: Target) -> dict[str, str]:
-    path = options.folder / "ledger.sqlite"
-    if not path.is_file():
-        raise GarlError(
-            f"--garl-repeat={options.repeat}: there is no ledger at {path}; run a search first, "
-            "or give a scenario file"
-        )
-    ledger = Ledger(path)
-    try:
-        return ledger.scenarios(target.slot.generation, target.slot.index, target.map)
-    finally:
-        ledger.close()
-
-
-def _name(system: type) -> str:
-    return f"{system.__module__}:{system.__qualname__}"
-
-
-def _read_marker(marker: pytest.Mark, options: Options) -> tuple[type, tuple[str, ...], Limits]:
-    from pytest_garl.scenarios.maps import load_map
-    from pytest_garl.verdicts.verdict import Limits
-
-    known = {"system", "maps", "limits"}
-    unknown = sorted(set(marker.kwargs) - known)
-    if unknown or marker.args:
-        raise GarlError(
-            f"mark.garl: found {', '.join(unknown) or 'positional arguments'}, expected keywords "
-            "system=, maps= and limits="
-        )
-    if "system" not in marker.kwargs:
-        raise GarlError("mark.garl: system= is missing; give the landing system's class")
-    system = marker.kwargs["system"]
-    check_system(system)
-    maps = marker.kwargs.get("maps", ("court", "lawn"))
-    maps = (maps,) if isinstance(maps, str) else tuple(maps)
-    for map in maps:
-        load_map(map, options.map_folders)
-    limits = marker.kwargs.get("limits", Limits())
-    if isinstance(limits, dict):
-        try:
-            limits = Limits(**limits)
-        except TypeError as error:
-            raise GarlError(f"mark.garl: limits={limits!r}: {error}") from error
-    if not isinstance(limits, Limits):
-        raise GarlError(f"mark.garl: limits={limits!r}: expected pytest_garl.limits(...)")
-    return system, tuple(m for m in maps if not options.maps or m in options.maps), limits
 
 
 def _path() -> list[str]:

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import pytest
 
 if TYPE_CHECKING:
-    from pytest_garl.run import Target
+    from pytest_garl.targets import Target
 
 RUN = pytest.StashKey[Any]()
 """Where a session keeps its run; none if nothing is to be flown."""
@@ -89,6 +89,12 @@ OPTIONS = (
         "'xfail' or as 'fail' (default: xfail).",
     ),
     Option(
+        name="shrink",
+        metavar="N",
+        help="Flights per landing system and map for confirming and shrinking what a search found, "
+        "before it is saved; 0 saves nothing (default: a quarter of the budget).",
+    ),
+    Option(
         name="npcs",
         metavar="POLICY",
         help=f"Who moves people, dogs and birds: {', '.join(POLICIES)}, or weights (.npz) that "
@@ -116,6 +122,13 @@ def add_options(parser: pytest.Parser) -> None:
         help="Continue the interrupted run in the ledger; everything else must be as it was.",
     )
     parser.addini("garl_dir", help="Folder of the ledger and the flights.", default=".garl")
+    parser.addini("garl_cases", help="Folder of the saved cases.", default="scenarios/regressions")
+    parser.addini(
+        "garl_xfail_strict",
+        help="Whether an open case that passes fails the run.",
+        type="bool",
+        default=False,
+    )
 
 
 def asked(config: pytest.Config) -> bool:

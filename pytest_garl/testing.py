@@ -5,8 +5,6 @@ from __future__ import annotations
 import inspect
 from typing import Any
 
-import numpy as np
-
 from pytest_garl.adversary.policies import policy_spec
 from pytest_garl.errors import LandingSystemError
 from pytest_garl.landing_system import Airframe, Mission, Observation, airframe_of
@@ -16,6 +14,7 @@ from pytest_garl.scenarios.maps import load_map
 from pytest_garl.scenarios.validity import repair
 from pytest_garl.search.reference import check_system
 from pytest_garl.simulation.fly import fly
+from pytest_garl.simulation.record import parted_s
 
 
 def check_landing_system(system: type, *, seconds: float = 5.0, map: str = "lawn") -> None:
@@ -83,12 +82,7 @@ def _fly(system: Any, seconds: float, name: str) -> Any:
 def _compare(system: type, first: Any, again: Any, problem: str) -> None:
     if first.sha256 == again.sha256:
         return
-    steps = zip(first.steps, again.steps, strict=False)
-    parted = next((a.time_s for a, b in steps if a != b), None)
-    if parted is None:
-        length = min(len(first.uav.time_s), len(again.uav.time_s))
-        differ = (first.uav.position_m[:length] != again.uav.position_m[:length]).any(axis=1)
-        parted = float(first.uav.time_s[int(np.argmax(differ))])
+    parted = parted_s(first, again)
     raise LandingSystemError(f"{system.__name__}: {problem}, first at {parted:.2f} s")
 
 

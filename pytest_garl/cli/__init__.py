@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import click
 
+from pytest_garl.cli.cases import cases
 from pytest_garl.cli.train import train
 from pytest_garl.errors import GarlError
 
@@ -24,8 +25,10 @@ def main() -> None:
     """Tools beside pytest --garl-budget=N.
 
     The search itself is pytest: run `pytest --garl-budget=40` where your landing tests are.
-    This command prepares what a search uses. `garl COMMAND --help` explains a command.
+    This command prepares what a search uses, and looks after what it found.
+    `garl COMMAND --help` explains a command.
     """
 
 
+main.add_command(cases)
 main.add_command(train)

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 from pytest_garl.scenarios.scenario import Scenario
-from pytest_garl.verdicts.verdict import PropertyName, ViolationType
+from pytest_garl.verdicts.verdict import Limits, PropertyName, ViolationType
 
 Status = Literal["open", "fixed", "unavoidable"]
 """Open: known, expected to fail.  Fixed: must pass.  Unavoidable: not even a pilot that knows where
@@ -54,6 +54,7 @@ class Case:
     needed to fly it again; ``policy`` and ``policy_sha256`` name who moved them when it was
     found.  ``test`` and ``assertion`` are set where a test's own assertion failed and the
     built-in verdict is content: the test's name and the hash of the assertion's source.
+    ``limits`` are those of the tests when it was found; pytest flies it with those of today.
     """
 
     system: str
@@ -64,6 +65,7 @@ class Case:
     policy_sha256: str
     moves: tuple[tuple[str, MoveList], ...]
     evidence: Evidence
+    limits: Limits
     test: str = ""
     assertion: str = ""
 
@@ -73,7 +75,7 @@ class Case:
         facts = (self.system, self.scenario, self.violation.signature, self.moves, self.test)
         digest = hashlib.sha256(repr(facts).encode()).hexdigest()
         words = self.violation.signature.split(":")[:2] or [self.violation.type]
-        subject = "-".join(_SAFE.sub("_", word.partition("@")[0]) for word in words)
+        subject = "-".join(_SAFE.sub("_", word.partition("@")[0]).strip("_") for word in words)
         return f"{self.scenario.map}-{subject}-{digest[:6]}"
 
 

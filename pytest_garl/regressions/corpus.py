@@ -100,15 +100,14 @@ def _alone(folder: Path) -> Iterator[None]:
 
 
 def known(cases: Path, case: Case, map_folders: tuple[Path, ...]) -> Path | None:
-    """Return the file that holds the same failure already: system, map, signature and test."""
+    """Return the file that expects the same failure: system, map, signature and test."""
     for entry in entries(cases, case.system, map_folders):
-        if entry.case is not None and same_failure(entry.case, case):
+        if entry.case is not None and entry.case.status != "fixed" and _same(entry.case, case):
             return entry.path
     return None
 
 
-def same_failure(one: Case, other: Case) -> bool:
-    """Whether two cases are one way to fail in one place."""
+def _same(one: Case, other: Case) -> bool:
     return _key(one) == _key(other)
 
 

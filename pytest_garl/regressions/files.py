@@ -6,14 +6,14 @@ import itertools
 import textwrap
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import cast
+from typing import Literal, cast
 
 from pytest_garl.errors import ScenarioError
 from pytest_garl.regressions.case import Case, Evidence, MoveList, Status, Violation
 from pytest_garl.scenarios.files import gene_lines, read_genes
 from pytest_garl.scenarios.maps import Map
 from pytest_garl.scenarios.toml_reader import Table, parse
-from pytest_garl.verdicts.verdict import PropertyName, ViolationType
+from pytest_garl.verdicts.verdict import Limits, PropertyName, ViolationType
 
 SCHEMA = 1
 _TYPES = ("I", "II", "III", "IV", "V", "late", "off", "hard", "abort", "own")
@@ -24,7 +24,8 @@ _WIDTH = 98
 def dumps(case: Case) -> str:
     """Return the case as TOML: the same bytes for equal cases."""
     violation, evidence, scenario = case.violation, case.evidence, case.scenario
-    lines = [f"# {line}" for line in textwrap.wrap(violation.story, _WIDTH)]
+    story = "".join(char if char.isprintable() else " " for char in violation.story)
+    lines = [f"# {line}" for line in textwrap.wrap(story, _WIDTH)]
     lines += [
         f"schema = {SCHEMA}",
         f'system = "{case.system}"',
@@ -47,6 +48,11 @@ def dumps(case: Case) -> str:
     if case.test:
         lines += [f"test = {_text(case.test)}", f"assertion = {_text(case.assertion)}"]
     lines += [
+        "",
+        "[limits]",
+        f"distance_m = {case.limits.distance_m!r}",
+        f"time_s = {case.limits.time_s!r}",
+        f'abort = "{case.limits.abort}"',
         "",
         "# Weather from 0 to 1, places from -1 to 1, velocity as a share of the top speed.",
     ]
@@ -91,6 +97,7 @@ def loads(text: str, load_map: Callable[[str], Map], *, source: str = "case") ->
             "seed",
             "absent",
             "violation",
+            "limits",
             "genes",
             "policy",
             "moves",
@@ -129,6 +136,7 @@ def loads(text: str, load_map: Callable[[str], Map], *, source: str = "case") ->
         policy_sha256=policy.text("sha256"),
         moves=_read_moves(top.table("moves"), map, scenario.absent),
         evidence=_read_evidence(top.table("evidence")),
+        limits=_read_limits(top.table("limits")),
         test=violation.text("test", ""),
         assertion=violation.text("assertion", ""),
     )
@@ -143,6 +151,16 @@ def load(path: Path, search_path: tuple[Path, ...] = ()) -> Case:
     except (OSError, UnicodeDecodeError) as error:
         raise ScenarioError(f"{path}: cannot be read: {error}") from error
     return loads(text, lambda name: load_map(name, search_path), source=str(path))
+
+
+def _read_limits(table: Table) -> Limits:
+    table.only({"distance_m", "time_s", "abort"})
+    abort = table.text("abort", among=("ok", "violation"))
+    return Limits(
+        distance_m=table.number("distance_m", low=0.0),
+        time_s=table.number("time_s", low=0.0),
+        abort=cast(Literal["ok", "violation"], abort),
+    )
 
 
 def _read_moves(table: Table, map: Map, absent: Sequence[str]) -> tuple[tuple[str, MoveList], ...]:

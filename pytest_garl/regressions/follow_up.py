@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import functools
 from collections import defaultdict
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -54,7 +54,7 @@ def inquiries(ledger: Ledger, place: Place, budget: int) -> tuple[Inquiry, ...]:
         known = {
             entry.case.violation.signature
             for entry in entries(place.cases, system, place.map_folders)
-            if entry.case is not None and entry.case.scenario.map == job.map and not entry.case.test
+            if entry.case is not None and is_known(entry.case, job.map)
         }
         new = {signature: those for signature, those in rows.items() if signature not in known}
         order = sorted(new, key=lambda signature: (-len(new[signature]), signature))
@@ -78,6 +78,11 @@ def inquiries(ledger: Ledger, place: Place, budget: int) -> tuple[Inquiry, ...]:
     return tuple(found)
 
 
+def is_known(case: Case, map: str) -> bool:
+    """Whether a case says that violations with its signature are expected on a map."""
+    return case.scenario.map == map and case.status != "fixed" and not case.test
+
+
 def _by_search(ledger: Ledger) -> dict[str, dict[str, list[Violating]]]:
     found: dict[str, dict[str, list[Violating]]] = {}
     for row in ledger.violating():
@@ -91,10 +96,13 @@ def _done(row: Violating, flights: str, map: str) -> Done:
 
 
 def follow_up(
-    ledger: Ledger, pool: Pool, place: Place, budget: int, tick: Callable[[], None]
+    ledger: Ledger,
+    pool: Pool,
+    place: Place,
+    wanted: Sequence[Inquiry],
+    tick: Callable[[], None],
 ) -> tuple[Pursued, ...]:
-    """Pursue all new signatures at once and save their cases; the order is always the same."""
-    wanted = inquiries(ledger, place, budget)
+    """Pursue all signatures at once and save their cases; the order is always the same."""
     functions: dict[str, Callable[[Fly], Finding]] = {
         each.name: functools.partial(_pursue, each) for each in wanted
     }

@@ -205,6 +205,7 @@ class Pursuit:
                 removed=removed(first, failure.scenario, inquiry.map),
                 versions=flight.versions if flight else (),
             ),
+            limits=job.limits,
         )
 
 
@@ -214,7 +215,9 @@ def moves_of(done: Done, scenario: Scenario, map: Map) -> Moves:
     if not done.record.exists():
         return tuple((name, ()) for name in names)
     made = {item.name: item.moves for item in load(done.record).objects}
-    return tuple((name, tuple((float(x), float(y)) for x, y in made[name])) for name in names)
+    return tuple(
+        (name, tuple((float(x), float(y)) for x, y in made.get(name, ()))) for name in names
+    )
 
 
 def culprit_of(done: Done) -> str:

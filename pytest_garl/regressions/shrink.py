@@ -3,7 +3,8 @@
 Two passes.  The first is cheap: send everybody home whom the failure does not need, reset genes to
 nominal, halving the set where all together is too much, then move what is left nearer to nominal by
 bisection.  The second is Hypothesis's shrinker on whole steps from nominal, which finds what only
-goes together.  Simpler means: fewer objects, fewer genes off nominal, nearer to nominal.
+goes together.  Simpler means: fewer objects, fewer genes off nominal, nearer to nominal, and
+numbers with fewer digits.
 """
 
 from __future__ import annotations
@@ -93,7 +94,7 @@ def shrink(
     """
     trials = Trials(first, fails, map, budget)
     try:
-        for each in (reset_and_bisect, by_hypothesis) if passes is None else passes:
+        for each in (reset_and_bisect, by_hypothesis, tidy) if passes is None else passes:
             each(trials, culprit)
     except SpentError:
         pass
@@ -107,8 +108,8 @@ def genome_of(scenario: Scenario, map: Map) -> Genome:
     return genome_for(map, weather="full", extras=extras)
 
 
-def complexity(scenario: Scenario, genome: Genome) -> tuple[int, int, float]:
-    """Return objects present, genes off nominal, and their distance: what shrinking lowers."""
+def complexity(scenario: Scenario, genome: Genome) -> tuple[int, int, float, int]:
+    """Return objects present, genes off nominal, their distance, digits: what shrinking lowers."""
     present = dict(scenario.genes)
     off, distance = 0, 0.0
     for gene in genome.genes:
@@ -118,10 +119,10 @@ def complexity(scenario: Scenario, genome: Genome) -> tuple[int, int, float]:
             if item.key in present and not item.key.endswith(("start_x", "start_y"))
         ]
         off += any(share > 0 for share in shares)
-        # Whole thousandths, so that repairs and rounding are no progress.
-        distance += sum(round(share, 3) for share in shares)
+        distance += sum(shares)
     objects = sum(key.endswith(".velocity") for key in present)
-    return objects, off, round(distance, 3)
+    digits = sum(len(repr(value)) for value in present.values())
+    return objects, off, round(distance, 2), digits
 
 
 def reset_and_bisect(trials: Trials, culprit: str) -> None:
@@ -202,6 +203,14 @@ def _bisect(trials: Trials) -> None:
                 most = share
             else:
                 least = share
+
+
+def tidy(trials: Trials, culprit: str) -> None:
+    """Write values with as few digits as the failure survives."""
+    for digits in (2, 3, 4):
+        rounded = {key: round(value, digits) for key, value in trials.best.genes}
+        if trials(trials.best.replace(rounded)):
+            return
 
 
 def by_hypothesis(trials: Trials, culprit: str) -> None:

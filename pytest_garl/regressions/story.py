@@ -3,9 +3,18 @@
 from __future__ import annotations
 
 import math
+from pathlib import Path
 
 import numpy as np
 
+from pytest_garl.regressions.shrink import genome_of
+from pytest_garl.scenarios.maps import load_map
+from pytest_garl.scenarios.placement import (
+    marker_position_m,
+    object_speed_mps,
+    object_start_m,
+)
+from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.simulation.flight import Contact, Flight, ObjectRecord
 from pytest_garl.simulation.vehicle import BODY_ABOVE_FEET_M
 from pytest_garl.verdicts.verdict import Verdict
@@ -64,3 +73,20 @@ def _over(flight: Flight, position: np.ndarray) -> str:
 
 def _article(word: str) -> str:
     return "An" if word[0] in "aeiou" else "A"
+
+
+def meanings(scenario: Scenario, map_folders: tuple[Path, ...]) -> list[tuple[str, str, str]]:
+    """Return what is off nominal as (gene, value, meaning in physical units)."""
+    map = load_map(scenario.map, map_folders)
+    rows = [
+        (item.key, f"{scenario[item.key]:.3g}", item.meaning)
+        for item in genome_of(scenario, map).properties
+        if item.key.startswith("environment.") and scenario[item.key] != item.nominal
+    ]
+    x, y = marker_position_m(scenario, map)
+    rows.append(("marker", "", f"at ({x:.1f}, {y:.1f}) m, east and north"))
+    for name, kind in map.without(scenario.absent).object_names:
+        x, y = object_start_m(scenario, map, name)
+        speed = object_speed_mps(scenario, map, name)
+        rows.append((name, "", f"a {kind} of up to {speed:.2f} m/s, from ({x:.1f}, {y:.1f}) m"))
+    return rows

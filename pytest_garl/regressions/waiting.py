@@ -25,8 +25,11 @@ def postponed(
     It stands where it was at that time; what makes no sense, such as standing on the marker, is
     left out.
     """
-    track = next(item.track for item in flight.objects if item.name == name)
-    own = dict(moves)[name]
+    # A team's own simulator may not record what its objects do.
+    track = next((item.track for item in flight.objects if item.name == name), None)
+    own = dict(moves).get(name, ())
+    if track is None:
+        return
     for lead in LEADS_S:
         wait = len(own) - round(lead / DECISION_STEP_S)
         # The first moves of one that stands already need no replacing.

@@ -3,12 +3,21 @@
 from __future__ import annotations
 
 import textwrap
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import pytest
 
 from pytest_garl.fixtures import Landing
-from pytest_garl.run import Run, Target
+from pytest_garl.run import Run, again_key
+from pytest_garl.targets import FIRST, Target
+
+if TYPE_CHECKING:
+    from pytest_garl.regressions.case import Case
+
+AGAIN = 4
+"""How often a violation of a system that need not be deterministic is flown once more."""
+MAYBE_FIXED = "garl.maybe_fixed"
+"""The user property that names the file of an open case that passes."""
 
 
 def crash_text(landing: Landing) -> str:
@@ -21,18 +30,126 @@ def crash_text(landing: Landing) -> str:
 def explain(report: pytest.TestReport, item: pytest.Item, run: Run, target: Target) -> None:
     """Add the story to a failing report; turn a known violation into an xfail."""
     result = run.ledger.result(target.search, target.slot.generation, target.slot.index)
-    if result is None or result["verdict"]["primary"] is None:
+    if result is None:
         return
-    verdict = result["verdict"]
-    twin = run.twin(target, verdict["signature"])
+    if target.entry is not None and target.entry.case is not None:
+        _explain_case(report, item, run, target, target.entry.case, result)
+    elif report.failed and result["verdict"]["primary"] is not None:
+        _explain_violation(report, item, run, target, result)
+
+
+def _explain_violation(
+    report: pytest.TestReport, item: pytest.Item, run: Run, target: Target, result: dict[str, Any]
+) -> None:
+    signature = result["verdict"]["signature"]
+    known = run.known(target).get(signature)
+    if known is not None:
+        return _expected(report, f"known: {signature} ({known})")
+    twin = run.twin(target, signature)
     if twin and run.options.duplicates == "xfail":
-        report.outcome = "skipped"
-        report.wasxfail = f"same violation as {twin} ({verdict['signature']})"
-        return
-    told = [verdict["story"], *_unusual(run, target)]
-    wrapped = [textwrap.fill(text, 98, subsequent_indent="  ") for text in told]
-    lines = [verdict["signature"], *wrapped, repeat_line(item, run, target)]
+        return _expected(report, f"same violation as {twin} ({signature})")
+    doubt = "" if twin or run.options.repeat else _doubt(run, target, result)
+    if doubt.startswith(FLAKY):
+        return _expected(report, doubt)
+    told = [result["verdict"]["story"], *_unusual(run, target), *filter(None, [doubt])]
+    return _tell(report, [signature, *_wrapped(told), repeat_line(item, run, target)])
+
+
+def _explain_case(
+    report: pytest.TestReport,
+    item: pytest.Item,
+    run: Run,
+    target: Target,
+    case: Case,
+    result: dict[str, Any],
+) -> None:
+    """Judge a case: an open one fails as it did before, a fixed one must not fail."""
+    assert target.entry is not None
+    verdict, file = result["verdict"], _relative(target.entry.path, run)
+    same = verdict["signature"] == case.violation.signature
+    if report.failed:
+        if case.status == "unavoidable":
+            return _expected(report, f"unavoidable: {case.violation.signature} ({file})")
+        if case.status == "open" and (same or case.test):
+            return _expected(report, f"known: {case.violation.signature} ({file})")
+        state = "was fixed and fails again" if case.status == "fixed" else "fails in another way"
+        told = [
+            f"The case {file} {state}.",
+            f"Saved: {case.violation.signature}. {case.violation.story}",
+            f"Flown: {verdict['signature'] or 'no violation of its own'}. {verdict['story']}",
+        ]
+        return _tell(report, [*_wrapped(told), f"See it: garl cases replay {file}"])
+    first = run.first_item(target) == item.nodeid
+    if report.passed and case.status == "open" and verdict["primary"] is None and first:
+        report.user_properties.append((MAYBE_FIXED, file))
+        if run.options.xfail_strict:
+            report.outcome = "failed"
+            report.longrepr = (
+                f"{file} is open but passes (garl_xfail_strict): maybe fixed; "
+                f"if so: garl cases promote {file}"
+            )
+    return None
+
+
+FLAKY = "FLAKY"
+
+
+def _doubt(run: Run, target: Target, result: dict[str, Any]) -> str:
+    """Fly a new violation again; return what is doubtful about it, or nothing."""
+    if target.deterministic:
+        _, hashes = run.again(target, 1)
+        slot = target.slot
+        if hashes[0] == run.ledger.sha256(target.search, slot.generation, slot.index):
+            return ""
+        return (
+            "Nondeterministic landing system: the same flight again came to other trajectories"
+            f"{_parting(run, target)}. Seed its generators in reset(mission) and read no clock, or "
+            "mark it deterministic=False; what is found cannot be gated otherwise."
+        )
+    from pytest_garl.verdicts.metrics import share_interval
+
+    results, _ = run.again(target, AGAIN)
+    failed = 1 + sum(each["verdict"]["primary"] is not None for each in results)
+    low, high = share_interval(failed, 1 + AGAIN)
+    share = f"{failed} of {1 + AGAIN} flights fail [{100 * low:.0f}, {100 * high:.0f}] %"
+    if failed == 1 + AGAIN:
+        return f"Fails each time: {share}."
+    return f"{FLAKY}: {share} ({result['verdict']['signature']})"
+
+
+def _parting(run: Run, target: Target) -> str:
+    """Say when two flights of a slot part, where both were recorded."""
+    from pytest_garl.search.slots import flight_name
+    from pytest_garl.simulation.record import load, parted_s
+
+    slot = target.slot
+    names = (
+        flight_name(target.search, slot.generation, slot.index, target.map),
+        flight_name(again_key(target, 0), FIRST.generation, FIRST.index, target.map),
+    )
+    files = [run.options.folder / "flights" / f"{name}.npz" for name in names]
+    if not all(file.exists() for file in files):
+        return ""
+    first, second = (load(file) for file in files)
+    return f", from {parted_s(first, second):.2f} s on"
+
+
+def _expected(report: pytest.TestReport, reason: str) -> None:
+    report.outcome = "skipped"
+    report.wasxfail = reason
+
+
+def _tell(report: pytest.TestReport, lines: list[str]) -> None:
     report.sections.append(("garl: what happened", "\n".join(lines)))
+
+
+def _wrapped(told: list[str]) -> list[str]:
+    return [textwrap.fill(text, 98, subsequent_indent="  ") for text in told]
+
+
+def _relative(path: Any, run: Run) -> str:
+    root = run.options.root
+    return str(path.relative_to(root)) if path.is_relative_to(root) else str(path)
 
 
 def repeat_line(item: pytest.Item, run: Run, target: Target) -> str:
@@ -45,8 +162,8 @@ def _unusual(run: Run, target: Target) -> list[str]:
     from pytest_garl.scenarios.maps import load_map
     from pytest_garl.search.job import load_scenario
 
-    texts = run.ledger.scenarios(target.slot.generation, target.slot.index, target.map)
-    text = texts.get(f"{target.system.__module__}:{target.system.__qualname__}")
+    slot = target.slot
+    text = run.ledger.scenario(target.search, slot.generation, slot.index)
     if text is None:
         return []
     scenario = load_scenario(text)

@@ -17,9 +17,7 @@ from pytest_garl.options import Options
 from pytest_garl.run import Run
 from pytest_garl.search.ledger import Ledger
 from pytest_garl.search.pool import Pool
-from pytest_garl.search.reference import Reference, reference_to
-
-BUILT_IN = Reference(module="pytest_garl.simulation.fly", file="", qualname="fly")
+from pytest_garl.search.reference import BUILT_IN, reference_to
 
 
 def begin_run(config: pytest.Config, options: Options) -> Run:
@@ -27,7 +25,9 @@ def begin_run(config: pytest.Config, options: Options) -> Run:
     # Weights that cannot be trusted end the session before there is a ledger.
     policy_spec(options.npcs)
     lock = None
-    if hasattr(config, "workerinput"):
+    if not options.searches:
+        ledger = _shared(options)
+    elif hasattr(config, "workerinput"):
         ledger = Ledger(options.ledger)
     else:
         lock = _lock(options.ledger)
@@ -59,6 +59,22 @@ def begin_run(config: pytest.Config, options: Options) -> Run:
     )
     run.flight_s = _or_default(ledger)
     return run
+
+
+def _shared(options: Options) -> Ledger:
+    """Return the ledger of a run of saved cases, made by whoever of its processes comes first."""
+    path = options.ledger
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        with path.with_suffix(".lock").open("a") as file:
+            fcntl.flock(file, fcntl.LOCK_EX)
+            if path.is_file():
+                return Ledger(path)
+            return Ledger.create(path, {"version": version("pytest-garl")})
+    except OSError as error:
+        raise LedgerError(
+            f"{path}: cannot be written ({error}); choose another folder with the ini key garl_dir"
+        ) from error
 
 
 def _lock(ledger: Path) -> TextIO:

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from typing import Any
 
+from pytest_garl.reports.aftermath import told
+from pytest_garl.reports.explain import MAYBE_FIXED
 from pytest_garl.run import Run
 from pytest_garl.search.slots import Slot
 from pytest_garl.verdicts.metrics import share_interval, top_k
@@ -27,7 +29,25 @@ def header(run: Run) -> str:
 
 
 def summary(reporter: Any, run: Run) -> None:
-    """Write a table per system and map, then what was found."""
+    """Write a table per system and map, then what was saved, and which cases may be fixed."""
+    _searches(reporter, run)
+    lines = [*told(run.pursued, run.options.root), *_maybe_fixed(reporter)]
+    if lines:
+        reporter.section("garl: cases", sep="=")
+    for line in lines:
+        reporter.write_line(line)
+
+
+def _maybe_fixed(reporter: Any) -> list[str]:
+    """Return a line for each open case that passed."""
+    properties = [
+        each for report in reporter.getreports("passed") for each in report.user_properties
+    ]
+    files = sorted({str(value) for key, value in properties if key == MAYBE_FIXED})
+    return [f"maybe fixed: {file} passes; if so: garl cases promote {file}" for file in files]
+
+
+def _searches(reporter: Any, run: Run) -> None:
     groups: dict[tuple[str, str], list[tuple[Slot, dict[str, Any]]]] = {}
     for system, map, generation, index, result in run.ledger.results():
         slot = Slot(generation=generation, index=index)

@@ -189,6 +189,12 @@ class Ledger:
         """Close the file."""
         self._db.close()
 
+    def remove(self) -> None:
+        """Remove the closed file and those beside it: nobody will ask for it again."""
+        for suffix in ("", "-wal", "-shm"):
+            self.path.with_name(self.path.name + suffix).unlink(missing_ok=True)
+        self.path.with_suffix(".lock").unlink(missing_ok=True)
+
     @contextmanager
     def transaction(self) -> Iterator[None]:
         """Hold the write lock over several statements."""
@@ -375,6 +381,14 @@ class Ledger:
             return None
         result: dict[str, Any] = json.loads(row[0])
         return result
+
+    def scenario(self, search: str, generation: int, slot: int) -> str | None:
+        """Return a slot's scenario, or None where it has not been bred."""
+        row = self._db.execute(
+            "SELECT scenario FROM slot WHERE search = ? AND generation = ? AND slot = ?",
+            (search, generation, slot),
+        ).fetchone()
+        return None if row is None else str(row[0])
 
     def sha256(self, search: str, generation: int, slot: int) -> str:
         """Return the trajectory's hash of a flown slot; empty where its process did not live."""

@@ -41,6 +41,10 @@ class Reference:
         return found
 
 
+BUILT_IN = Reference(module="pytest_garl.simulation.fly", file="", qualname="fly")
+"""The project's own simulator."""
+
+
 def reference_to(thing: Any) -> Reference:
     """Return where ``thing`` is defined; raise LandingSystemError if no child can find it."""
     qualname = getattr(thing, "__qualname__", "")

@@ -60,6 +60,17 @@ def hash_of(flight: Flight) -> str:
     return digest.hexdigest()
 
 
+def parted_s(first: Flight, second: Flight) -> float:
+    """Return when two flights of the same scenario part: in a step, or else in the track."""
+    steps = zip(first.steps, second.steps, strict=False)
+    parted = next((a.time_s for a, b in steps if a != b), None)
+    if parted is not None:
+        return parted
+    length = min(len(first.uav.time_s), len(second.uav.time_s))
+    differ = (first.uav.position_m[:length] != second.uav.position_m[:length]).any(axis=1)
+    return float(first.uav.time_s[int(np.argmax(differ)) if differ.any() else length - 1])
+
+
 def save(flight: Flight, path: Path) -> None:
     """Write the flight atomically as one .npz that holds arrays and a JSON header."""
     arrays: dict[str, np.ndarray[Any, Any]] = {}

@@ -51,16 +51,20 @@ def test_collisions(landing):
 """
 
 
+def write_project(folder: Path, system: str = "Good", maps: str = "['lawn']") -> None:
+    shutil.copy(Path(__file__).with_name("tiny_simulator.py"), folder)
+    (folder / "systems.py").write_text(SYSTEMS)
+    (folder / "test_it.py").write_text(TESTS.format(system=system, maps=maps))
+    (folder / "conftest.py").write_text(CONFTEST)
+
+
 def project(pytester: pytest.Pytester, system: str = "Good", maps: str = "['lawn']") -> None:
-    tiny = Path(__file__).with_name("tiny_simulator.py")
-    shutil.copy(tiny, pytester.path / "tiny_simulator.py")
-    pytester.makepyfile(systems=SYSTEMS)
-    pytester.makepyfile(test_it=TESTS.format(system=system, maps=maps))
-    pytester.makeconftest(CONFTEST)
+    write_project(pytester.path, system, maps)
 
 
 def run(pytester: pytest.Pytester, *args: str) -> pytest.RunResult:
-    return pytester.runpytest_subprocess("-p", "no:cacheprovider", *args)
+    """Run pytest; what a search finds is saved only where a test asks for it."""
+    return pytester.runpytest_subprocess("-p", "no:cacheprovider", "--garl-shrink=0", *args)
 
 
 def result_hash(pytester: pytest.Pytester) -> str:

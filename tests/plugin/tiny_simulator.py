@@ -29,10 +29,12 @@ def fly(
     del npcs, time_limit_s
     marker = marker_position_m(scenario, map)
     outcome: Any = "landed"
-    off = 3.0 if scenario["environment.fog"] > 0.1 else 0.1
+    # Who is told the truth neither loses its way nor is hit.
+    knows = getattr(system, "needs_camera", True) is False
+    off = 3.0 if scenario["environment.fog"] > 0.1 and not knows else 0.1
     contacts: tuple[Contact, ...] = ()
     crash = None
-    if scenario.get("dog-1.velocity", 0.0) > 0.7:
+    if scenario.get("dog-1.velocity", 0.0) > 0.7 and not knows:
         outcome = "collision"
         contacts = (
             Contact(

@@ -1,0 +1,233 @@
+"""``garl cases``: look at saved cases, fly them again, keep them tidy."""
+
+from __future__ import annotations
+
+import dataclasses
+from pathlib import Path
+
+import click
+from rich.console import Console
+from rich.table import Table
+
+from pytest_garl.errors import GarlError
+from pytest_garl.regressions import corpus
+from pytest_garl.regressions.case import Case
+from pytest_garl.regressions.files import load
+from pytest_garl.regressions.replay import Replay, replay, system_of
+from pytest_garl.regressions.story import meanings
+
+DEFAULT = Path("scenarios/regressions")
+STALE = 3
+"""Exit status of a replay that proves nothing; 1 says that the case fails."""
+
+
+@dataclasses.dataclass(frozen=True, slots=True, kw_only=True)
+class _Folders:
+    cases: Path
+    root: Path
+
+    @property
+    def maps(self) -> tuple[Path, ...]:
+        return (self.root / "scenarios" / "maps",)
+
+    def case(self, file: Path) -> Case:
+        return load(file, self.maps)
+
+
+@click.group()
+@click.option(
+    "--folder",
+    type=click.Path(path_type=Path, file_okay=False),
+    default=DEFAULT,
+    show_default=True,
+    help="Where the cases are (the ini key garl_cases).",
+)
+@click.pass_context
+def cases(context: click.Context, folder: Path) -> None:
+    """Look after saved violations: list, show, replay, promote, shrink, prune, check.
+
+    A case is a file under scenarios/regressions/<system>/. Run these commands where you run pytest.
+    """
+    context.obj = _Folders(cases=folder, root=Path.cwd())
+
+
+FILE = click.argument("file", type=click.Path(path_type=Path, exists=True, dir_okay=False))
+
+
+@cases.command("list")
+@click.pass_obj
+def list_(folders: _Folders) -> None:
+    """List all cases with what they say."""
+    found = corpus.every_entry(folders.cases, folders.maps)
+    if not found:
+        click.echo(f"no cases in {folders.cases}; a search saves what it finds")
+        return
+    table = Table(box=None, header_style="bold")
+    for name in ("case", "status", "signature", "margin", "neighbours", "objects", "removed"):
+        table.add_column(name, overflow="fold")
+    for entry in found:
+        case = entry.case
+        if case is None:
+            table.add_row(entry.name, "[red]broken[/red]", entry.problem)
+            continue
+        evidence = case.evidence
+        table.add_row(
+            f"{entry.path.parent.name}/{entry.name}",
+            _coloured(case.status),
+            case.violation.signature,
+            f"{case.violation.margin:.2f} {case.violation.unit}",
+            f"{evidence.neighbours_failed}/{evidence.neighbours}",
+            " ".join(name for name, _ in case.moves) or "none",
+            evidence.removed,
+        )
+    Console().print(table)
+
+
+def _coloured(status: str) -> str:
+    colour = {"open": "yellow", "fixed": "green"}.get(status, "dim")
+    return f"[{colour}]{status}[/{colour}]"
+
+
+@cases.command()
+@FILE
+@click.pass_obj
+def show(folders: _Folders, file: Path) -> None:
+    """Tell what happens in a case, in words and physical units."""
+    case = folders.case(file)
+    evidence = case.evidence
+    click.echo(f"{case.id}  {case.status}  {case.system}")
+    click.echo(f"{case.violation.signature}: {case.violation.story}\n")
+    table = Table(box=None, header_style="bold")
+    for name in ("what", "value", "meaning"):
+        table.add_column(name)
+    for row in meanings(case.scenario, folders.maps):
+        table.add_row(*row)
+    Console().print(table)
+    click.echo(
+        f"\n{evidence.neighbours_failed} of {evidence.neighbours} neighbours fail too; shrinking "
+        f"removed {evidence.removed}; objects were moved by {case.policy}"
+    )
+    click.echo(f"Fly it: garl cases replay {file}")
+
+
+@cases.command("replay")
+@FILE
+@click.option("--live", is_flag=True, help="Let the policy steer instead of the recorded moves.")
+@click.option(
+    "--video",
+    type=click.Path(path_type=Path, dir_okay=False),
+    help="Draw the flight into this .mp4: the camera's view beside a plan (extra: video).",
+)
+@click.pass_context
+def replay_(context: click.Context, file: Path, live: bool, video: Path | None) -> None:
+    """Fly a case again and answer FIXED, FAILED or STALE (exit status 0, 1, 3)."""
+    folders: _Folders = context.obj
+    case = folders.case(file)
+    result = replay(case, folders.root, folders.maps, live=live)
+    _answer(result)
+    if video is not None:
+        from pytest_garl.landing_system import airframe_of
+        from pytest_garl.reports.video import save_video
+
+        camera = airframe_of(system_of(case, folders.root)).camera
+        save_video(
+            video, result.flight, case.scenario, result.map, camera, result.verdict.signature
+        )
+        click.echo(f"drawn: {video}")
+    context.exit({"FIXED": 0, "FAILED": 1, "STALE": STALE}[result.answer])
+
+
+def _answer(result: Replay) -> None:
+    click.secho(result.answer, bold=True, fg="green" if result.answer == "FIXED" else "red")
+    click.echo(f"{result.verdict.signature or 'no violation'}: {result.verdict.story}")
+    if result.changed:
+        click.echo(f"changed since it was saved: {'; '.join(result.changed)}")
+    if result.same is not None:
+        click.echo("the same flight to the byte" if result.same else "another flight than recorded")
+
+
+@cases.command()
+@FILE
+@click.pass_obj
+def promote(folders: _Folders, file: Path) -> None:
+    """Say that a case is fixed: from now on it must pass.
+
+    It is flown first, with its recorded moves and with a live policy; if it fails, it stays open.
+    """
+    case = folders.case(file)
+    for live in (False, True):
+        result = replay(case, folders.root, folders.maps, live=live)
+        if result.answer == "FAILED":
+            how = "a live policy" if live else "its recorded moves"
+            raise GarlError(
+                f"{file}: still fails with {how} ({result.verdict.signature}); it stays "
+                f"{case.status}"
+            )
+    corpus.replace(file, dataclasses.replace(case, status="fixed"))
+    click.echo(f"{file}: fixed; from now on it must pass")
+
+
+@cases.command()
+@FILE
+@click.option("--flights", default=40, show_default=True, help="Flights to spend at most.")
+@click.option("--workers", default=2, show_default=True, help="Flying child processes.")
+@click.pass_obj
+def shrink(folders: _Folders, file: Path, flights: int, workers: int) -> None:
+    """Go on shrinking a case."""
+    from pytest_garl.regressions.resumed import shrink_case
+
+    case = folders.case(file)
+    finding = shrink_case(case, folders.root, folders.maps, flights, workers)
+    if finding.case is None:
+        raise GarlError(f"{file}: {finding.reason}; `garl cases replay {file}` tells more")
+    path = corpus.replace(file, dataclasses.replace(finding.case, status=case.status))
+    click.echo(f"{path}: removed {finding.case.evidence.removed} ({finding.flights} flights)")
+
+
+@cases.command()
+@click.option("--yes", is_flag=True, help="Delete without asking.")
+@click.pass_obj
+def prune(folders: _Folders, yes: bool) -> None:
+    """Fly all cases that are not fixed and delete those that say nothing any more.
+
+    That is: they pass, but the map or pytest-garl is not what it was, so nobody knows why.
+    """
+    kept = 0
+    for entry in corpus.every_entry(folders.cases, folders.maps):
+        if entry.case is None or entry.case.status == "fixed":
+            continue
+        result = replay(entry.case, folders.root, folders.maps)
+        if result.answer != "STALE":
+            kept += 1
+            continue
+        click.echo(f"{entry.path}: passes, but {'; '.join(result.changed)}")
+        if yes or click.confirm("delete it?"):
+            entry.path.unlink()
+    click.echo(f"{kept} cases still say something")
+
+
+@cases.command()
+@click.pass_obj
+def check(folders: _Folders) -> None:
+    """Check all files without flying: readable, named after what they hold, system importable."""
+    problems = []
+    found = corpus.every_entry(folders.cases, folders.maps)
+    for entry in found:
+        case = entry.case
+        if case is None:
+            problems.append(entry.problem)
+            continue
+        if entry.name != case.id:
+            problems.append(
+                f"{entry.path}: its content has the name {case.id}; it was changed by hand, or "
+                "renamed"
+            )
+        try:
+            system_of(case, folders.root)
+        except GarlError as error:
+            problems.append(f"{entry.path}: {error}")
+    for problem in problems:
+        click.echo(problem, err=True)
+    click.echo(f"{len(found)} cases, {len(problems)} problems")
+    if problems:
+        raise SystemExit(1)

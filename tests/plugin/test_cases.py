@@ -1,0 +1,205 @@
+from __future__ import annotations
+
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from pytest_garl.regressions.files import dumps, load
+from tests.plugin.test_plugin import project, result_hash, write_project
+
+SEARCH = ("--garl-budget=24", "--garl-workers=0", "--garl-shrink=60")
+CASES = ("--garl-workers=0",)
+
+
+def run(pytester: pytest.Pytester, *args: str) -> pytest.RunResult:
+    return pytester.runpytest_subprocess("-p", "no:cacheprovider", *(args or CASES))
+
+
+def cases(pytester: pytest.Pytester) -> list[Path]:
+    return sorted((pytester.path / "scenarios" / "regressions" / "systems").glob("*.toml"))
+
+
+def saved(pytester: pytest.Pytester) -> dict[str, str]:
+    return {path.name: path.read_text() for path in cases(pytester)}
+
+
+@pytest.fixture(scope="module")
+def template(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Return a project whose search has saved two cases: a dog, and fog that misleads."""
+    folder = tmp_path_factory.mktemp("searched")
+    write_project(folder)
+    command = [sys.executable, "-m", "pytest", "-p", "no:cacheprovider", *SEARCH]
+    done = subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False)
+    assert done.returncode == pytest.ExitCode.TESTS_FAILED, done.stdout
+    assert "confirming and shrinking 2 new kinds of violation" in done.stdout
+    assert "saved scenarios/regressions/systems/lawn-IV-dog-" in done.stdout
+    return folder
+
+
+@pytest.fixture
+def searched(pytester: pytest.Pytester, template: Path) -> pytest.Pytester:
+    """Return a copy of that project."""
+    shutil.copytree(template, pytester.path, dirs_exist_ok=True)
+    return pytester
+
+
+def change(path: Path, old: str, new: str) -> None:
+    text = path.read_text()
+    assert old in text
+    path.write_text(text.replace(old, new))
+
+
+def test_what_a_search_finds_is_saved_small_and_then_expected(searched: pytest.Pytester) -> None:
+    fog, dog = cases(searched)
+    assert (fog.name[:14], dog.name[:11]) == ("lawn-I-unknown", "lawn-IV-dog")
+    found = load(dog)
+    assert set(found.scenario.absent) == {"bird-1", "person-1", "person-2"}
+    assert found.scenario["environment.fog"] == 0.0
+    assert 0.7 < found.scenario["dog-1.velocity"] < 0.8
+    assert load(fog).scenario["environment.fog"] < 0.12
+    result = run(searched, *CASES, "-rx")
+    result.assert_outcomes(passed=2, skipped=2, xfailed=2)
+    result.stdout.fnmatch_lines(["*case-lawn-I*known: I?:unknown (scenarios/regressions/*"])
+    assert result.ret == 0
+    assert not list((searched.path / ".garl").glob("cases-*"))
+
+
+def test_a_search_expects_what_is_known_and_saves_nothing_twice(searched: pytest.Pytester) -> None:
+    before = saved(searched)
+    result = run(searched, *SEARCH)
+    assert result.ret == 0
+    assert "failed" not in result.parseoutcomes()
+    assert saved(searched) == before
+
+
+@pytest.mark.parametrize("how", [("--garl-workers=1",), ("--garl-workers=2", "-n2")])
+def test_the_same_search_saves_the_same_bytes(
+    searched: pytest.Pytester, how: tuple[str, ...]
+) -> None:
+    before, known = saved(searched), result_hash(searched)
+    shutil.rmtree(searched.path / "scenarios")
+    run(searched, *SEARCH, *how)
+    assert saved(searched) == before
+    assert result_hash(searched) == known
+
+
+def test_cases_fly_under_xdist(searched: pytest.Pytester) -> None:
+    run(searched, "-n2", "--garl-workers=1").assert_outcomes(passed=2, skipped=2, xfailed=2)
+    assert not list((searched.path / ".garl").glob("cases-*"))
+
+
+def test_shrinking_can_be_switched_off(pytester: pytest.Pytester) -> None:
+    project(pytester)
+    run(pytester, *SEARCH, "--garl-shrink=0")
+    assert not cases(pytester)
+
+
+def test_an_open_case_that_passes_may_be_fixed(searched: pytest.Pytester) -> None:
+    change(searched.path / "tiny_simulator.py", "> 0.7 and", "> 7 and")
+    result = run(searched)
+    result.assert_outcomes(passed=4, skipped=1, xfailed=1)
+    result.stdout.fnmatch_lines(["maybe fixed: scenarios/*IV-dog*.toml passes; if so: garl cases*"])
+    assert result.ret == 0
+    strict = run(searched, *CASES, "-o", "garl_xfail_strict=true")
+    assert strict.ret == pytest.ExitCode.TESTS_FAILED
+    strict.stdout.fnmatch_lines(["*is open but passes (garl_xfail_strict)*"])
+
+
+def test_an_open_case_that_fails_in_another_way_fails(searched: pytest.Pytester) -> None:
+    change(searched.path / "tiny_simulator.py", 'body="dog-1"', 'body="tree-1"')
+    change(searched.path / "tiny_simulator.py", 'kind="dog"', 'kind="tree"')
+    change(searched.path / "tiny_simulator.py", '"dynamic"', '"static"')
+    result = run(searched)
+    result.stdout.fnmatch_lines(
+        ["*IV-dog*fails in another way.", "Saved: IV:dog:*", "Flown: III:tree:*", "See it: garl*"]
+    )
+    assert result.ret == pytest.ExitCode.TESTS_FAILED
+
+
+def test_a_fixed_case_must_pass_with_its_moves_and_with_a_live_policy(
+    searched: pytest.Pytester,
+) -> None:
+    change(cases(searched)[1], 'status = "open"', 'status = "fixed"')
+    broken = run(searched)
+    broken.assert_outcomes(passed=2, skipped=3, xfailed=1, failed=2)
+    broken.stdout.fnmatch_lines(["*case-lawn-IV-dog-*-live*", "*was fixed and fails again.*"])
+    change(searched.path / "tiny_simulator.py", "> 0.7 and", "> 7 and")
+    run(searched).assert_outcomes(passed=7, skipped=1, xfailed=1)
+
+
+def test_what_cannot_be_avoided_gates_nothing(pytester: pytest.Pytester) -> None:
+    project(pytester)
+    change(pytester.path / "tiny_simulator.py", "is False", "is None")
+    result = run(pytester, *SEARCH)
+    result.stdout.fnmatch_lines(["*UNAVOIDABLE, gates nothing*"])
+    assert {load(path).status for path in cases(pytester)} == {"unavoidable"}
+    assert run(pytester).ret == 0
+
+
+def test_with_ci_set_the_tree_is_left_alone_and_a_patch_brings_the_case(
+    pytester: pytest.Pytester, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("CI", "true")
+    project(pytester)
+    result = run(pytester, *SEARCH)
+    assert not cases(pytester)
+    result.stdout.fnmatch_lines(["patch .garl/patches/*.patch", "*git apply .garl/patches/*.patch"])
+    patches = sorted((pytester.path / ".garl" / "patches").glob("*.patch"))
+    assert len(patches) == 2
+    subprocess.run(["git", "init", "-q"], check=True, cwd=pytester.path)
+    subprocess.run(["git", "apply", *map(str, patches)], check=True, cwd=pytester.path)
+    for path in cases(pytester):
+        assert dumps(load(path)) == path.read_text()
+    assert run(pytester).ret == 0
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "words"),
+    [
+        ('status = "open"', "status = open", "not valid TOML"),
+        ("schema = 1", "schema = 9", "key 'schema': found 9, expected 1"),
+        ("fog = 0.0", "fog = 1.5", "'genes.environment.fog': found 1.5"),
+        ('map = "lawn"', 'map = "moon"', "key 'map': unknown map 'moon'"),
+        ('"systems:Good"', '"systems:Other"', "key 'system': found 'systems:Other', expected"),
+        ("dog-1 = []", "dog-1 = [[1, 2.0, 0.0]]", "'moves.dog-1': found [[]1, 2.0, 0.0]"),
+        ("dog-1 = []", "cat-1 = []", "'moves.cat-1': unknown key"),
+    ],
+)
+def test_a_broken_case_errs_alone_and_names_file_and_key(
+    searched: pytest.Pytester, old: str, new: str, words: str
+) -> None:
+    path = cases(searched)[1]
+    change(path, old, new)
+    result = run(searched)
+    result.assert_outcomes(passed=1, skipped=1, xfailed=1, errors=3)
+    result.stdout.fnmatch_lines([f"*{path.name}*{words}*"])
+
+
+def test_a_system_that_is_not_deterministic_is_told_so(pytester: pytest.Pytester) -> None:
+    project(pytester)
+    simulator = pytester.path / "tiny_simulator.py"
+    change(simulator, "else 0.1", "else 0.1\n    off += 1e-6 * __import__('random').random()")
+    result = run(pytester, *SEARCH, "--garl-shrink=0")
+    result.stdout.fnmatch_lines(["Nondeterministic landing system: *from * s on*"])
+    assert result.ret == pytest.ExitCode.TESTS_FAILED
+
+
+def test_flaky_is_not_failed(pytester: pytest.Pytester) -> None:
+    project(pytester)
+    change(pytester.path / "test_it.py", "maps=", "deterministic=False, maps=")
+    simulator = pytester.path / "tiny_simulator.py"
+    # Hit every second time that a process flies the same scenario.
+    change(
+        simulator,
+        "and not knows:\n        outcome",
+        "and not knows and SEEN.count(scenario.seed) % 2 == 0:\n        outcome",
+    )
+    change(simulator, "    contacts: tuple", "    SEEN.append(scenario.seed)\n    contacts: tuple")
+    change(simulator, "\n\ndef fly(", "\n\nSEEN = ['']\n\n\ndef fly(")
+    result = run(pytester, "--garl-budget=24", "--garl-workers=0", "--garl-shrink=0", "-rx")
+    outcomes = result.parseoutcomes()
+    assert outcomes["xfailed"] >= 1
+    result.stdout.fnmatch_lines(["*FLAKY: * of 5 flights fail [[]*, *[]] % (IV:dog*"])
