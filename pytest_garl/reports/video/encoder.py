@@ -39,9 +39,7 @@ def write(frames: Iterable[Image], path: Path, rate_hz: float) -> None:
     path.parent.mkdir(parents=True, exist_ok=True)
     scratch = path.with_name(f".{path.name}.{os.getpid()}")
     try:
-        _encode(
-            _command(program, width, height, rate_hz, scratch), chain([first], pictures), path
-        )
+        _encode(_command(program, width, height, rate_hz, scratch), chain([first], pictures), path)
         scratch.replace(path)
     finally:
         scratch.unlink(missing_ok=True)

@@ -16,8 +16,10 @@ Colour = tuple[int, int, int]
 Point = tuple[float, float]
 
 PAPER, INK, FAINT, RULE = (250, 250, 248), (28, 30, 34), (112, 116, 122), (206, 208, 212)
-UAV, MARKER, SYSTEM, HIT = (24, 84, 222), (214, 0, 150), (240, 120, 0), (206, 22, 22)
-"""The UAV, the true marker, what the landing system believes, and contacts."""
+UAV, VIEW, MARKER = (24, 84, 222), (96, 150, 246), (214, 0, 150)
+"""The UAV and its path, the ground in view, the true marker."""
+SYSTEM, HIT = (240, 120, 0), (206, 22, 22)
+"""What the landing system believes; what the UAV touched."""
 OBJECTS: Mapping[str, Colour] = MappingProxyType(
     {"person": (158, 26, 44), "dog": (112, 66, 18), "bird": (0, 112, 122)}
 )

@@ -11,13 +11,14 @@ from numpy.typing import NDArray
 
 from pytest_garl.landing_system import Camera
 from pytest_garl.reports.video import ink
+from pytest_garl.reports.video.labels import Labels
 from pytest_garl.reports.video.moment import Moment, path_until
 from pytest_garl.scenarios.bodies import rotate
 from pytest_garl.scenarios.maps import Map
 from pytest_garl.scenarios.object_types import OBJECT_TYPES
 from pytest_garl.scenarios.placement import MARKER_SIDE_M
 from pytest_garl.scenarios.scenario import Scenario
-from pytest_garl.simulation.flight import Flight, Step
+from pytest_garl.simulation.flight import Flight, ObjectRecord, Step
 from pytest_garl.simulation.ground import paint_ground
 from pytest_garl.simulation.meshes import mesh_of, placed_hulls
 from pytest_garl.simulation.randomness import generator
@@ -28,7 +29,7 @@ WIDTH, HEIGHT = 384, 656
 BEYOND_M = 2.0
 """How much is shown beyond the map's bounds."""
 _UAV_RADIUS_M = 0.5
-_WASH = 0.55
+_WASH = 0.62
 """Share of white in the painted ground, so that paths stand out from it."""
 
 
@@ -62,15 +63,12 @@ class MapPane:
         self._draw_footprint(pane, moment)
         for item in self._flight.objects:
             path = self.pixels(path_until(item.track, moment.time_s))
-            ink.line(pane, path, ink.OBJECTS.get(item.type, ink.INK), 1)
+            ink.line(pane, path, _colour(item), 1)
         ink.line(pane, self.pixels(path_until(self._flight.uav, moment.time_s)), ink.UAV, 2)
         self._draw_thoughts(pane, step)
+        self._write_names(pane, moment)
         for item, (place, yaw) in zip(self._flight.objects, moment.objects, strict=True):
-            colour = ink.OBJECTS.get(item.type, ink.INK)
-            radius = OBJECT_TYPES[item.type].radius_m
-            self._draw_mover(pane, place, yaw, radius, colour)
-            x, y = self._pixel(place)
-            ink.label(pane, item.name, (x + radius * self._scale + 6, y + 5), colour)
+            self._draw_mover(pane, place, yaw, _radius_m(item), _colour(item))
         nose = rotate(moment.attitude, (1.0, 0.0, 0.0))
         yaw = math.atan2(nose[1], nose[0])
         self._draw_mover(pane, moment.position_m, yaw, _UAV_RADIUS_M, ink.UAV)
@@ -121,9 +119,6 @@ class MapPane:
                 r, g, b = ((2 * value + 255) // 3 for value in part.colour)
                 ink.area(image, outline, (r, g, b))
                 ink.line(image, outline, part.colour, 1, closed=True)
-        for name, x, y in self._flight.decoys:
-            left, low = self._pixel((x, y))
-            ink.label(image, name, (left - 30, low + self._scale * MARKER_SIDE_M + 6), ink.INK, 12)
         x, y = self._flight.marker_position_m
         half = MARKER_SIDE_M / 2
         square = np.array([[x - half, y - half], [x + half, y - half], [x + half, y + half]])
@@ -141,13 +136,15 @@ class MapPane:
         ink.line(self._still, arrow, ink.INK, 2)
 
     def _draw_footprint(self, pane: ink.Image, moment: Moment) -> None:
-        """Outline the ground that the camera sees, unless it sees the horizon."""
+        """Outline the ground in view, its upper edge thick, unless the horizon is in view."""
         view = View.of(self._camera, moment.eye_m, moment.attitude)
         right, low = self._camera.width_px - 0.5, self._camera.height_px - 0.5
         corners = np.array([[-0.5, -0.5, 1], [right, -0.5, 1], [right, low, 1], [-0.5, low, 1]])
         ground = view.ground_of_pixel @ corners.T
         if (ground[2] < 0).all():
-            ink.line(pane, self.pixels((ground[:2] / ground[2]).T), ink.UAV, 1, closed=True)
+            outline = self.pixels((ground[:2] / ground[2]).T)
+            ink.line(pane, outline, ink.VIEW, 1, closed=True)
+            ink.line(pane, outline[:2], ink.VIEW, 4)
 
     def _draw_thoughts(self, pane: ink.Image, step: Step | None) -> None:
         thoughts = step.diagnostics if step else None
@@ -156,7 +153,20 @@ class MapPane:
         if thoughts.planned_path_m:
             ink.line(pane, self.pixels(np.array(thoughts.planned_path_m)), ink.SYSTEM, 3)
         if thoughts.target_m is not None:
-            ink.cross(pane, self._pixel(thoughts.target_m), 7, ink.SYSTEM)
+            ink.cross(pane, self._pixel(thoughts.target_m), 10, ink.SYSTEM)
+
+    def _write_names(self, pane: ink.Image, moment: Moment) -> None:
+        labels = Labels(pane)
+        half = MARKER_SIDE_M / 2
+        labels.keep_clear(self._pixel(self._flight.marker_position_m), half * self._scale)
+        labels.keep_clear(self._pixel(moment.position_m), _UAV_RADIUS_M * self._scale)
+        names = [(name, (x, y), half, ink.INK) for name, x, y in self._flight.decoys]
+        for item, ((x, y, _), _) in zip(self._flight.objects, moment.objects, strict=True):
+            names.append((item.name, (x, y), _radius_m(item), _colour(item)))
+        for _, place, radius, _ in names:
+            labels.keep_clear(self._pixel(place), radius * self._scale)
+        for name, place, radius, colour in names:
+            labels.write(name, self._pixel(place), radius * self._scale, colour)
 
     def _draw_mover(
         self,
@@ -172,3 +182,11 @@ class MapPane:
         ink.disc(pane, at, radius, colour)
         nose = (at[0] + radius * math.cos(yaw_rad), at[1] - radius * math.sin(yaw_rad))
         ink.line(pane, np.array([at, nose]), ink.PAPER, 2)
+
+
+def _colour(item: ObjectRecord) -> ink.Colour:
+    return ink.OBJECTS.get(item.type, ink.INK)
+
+
+def _radius_m(item: ObjectRecord) -> float:
+    return OBJECT_TYPES[item.type].radius_m

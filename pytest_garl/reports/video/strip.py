@@ -15,9 +15,9 @@ WIDTH, HEIGHT = 640, 176
 _LEFT, _RIGHT, _TOP, _BOTTOM = 44, WIDTH - 14, 62, 134
 _STEPS = (0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0, 200.0, 500.0)
 _LEGEND = (
-    (ink.UAV, "UAV, its path, the ground in view"),
+    (ink.UAV, "UAV, its path, view (thick edge: top)"),
     (ink.MARKER, "marker"),
-    (ink.SYSTEM, "the system's detection, target, plan"),
+    (ink.SYSTEM, "system's detection, target, plan"),
 )
 
 
