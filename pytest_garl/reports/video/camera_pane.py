@@ -41,7 +41,7 @@ class CameraPane:
             self._detection(view, detection)
         outline = self._marker(moment)
         if len(outline) >= 3:
-            ink.line(view, outline, ink.MARKER, 1, closed=True)
+            ink.line(view, outline, ink.MARKER, 2, closed=True)
         pane = np.zeros((HEIGHT, WIDTH, 3), np.uint8)
         pane[self._top : self._top + self._size[1], self._left : self._left + self._size[0]] = view
         return pane
@@ -58,7 +58,7 @@ class CameraPane:
         if not detection.corners_px:
             return
         corners = self._pixels(np.array(detection.corners_px))
-        ink.line(view, corners, ink.SYSTEM, 4, closed=True)
+        ink.line(view, corners, ink.SYSTEM, 5, closed=True)
         low = corners[np.argmax(corners[:, 1])]
         ink.label(view, words, (float(low[0]), float(low[1]) + 18), ink.SYSTEM)
 

@@ -78,7 +78,7 @@ def _encode(command: Sequence[str], pictures: Iterable[Image], path: Path) -> No
 
 def _command(program: str, width: int, height: int, rate_hz: float, path: Path) -> list[str]:
     source = f"-f rawvideo -pix_fmt rgb24 -s {width}x{height} -r {rate_hz:g} -i -"
-    coding = f"-c:v libx264 -preset medium -crf {_QUALITY} -pix_fmt yuv420p"
+    coding = f"-c:v libx264 -preset veryfast -crf {_QUALITY} -pix_fmt yuv420p"
     bound = f"-maxrate {_TOP_KBPS}k -bufsize {_BUFFER_KBIT}k"
     # Untagged, players guess the colours' matrix from the picture's size.
     colours = "-vf scale=out_color_matrix=bt709 -colorspace bt709"
