@@ -81,8 +81,8 @@ def _command(program: str, width: int, height: int, rate_hz: float, path: Path) 
     coding = f"-c:v libx264 -preset veryfast -crf {_QUALITY} -pix_fmt yuv420p"
     bound = f"-maxrate {_TOP_KBPS}k -bufsize {_BUFFER_KBIT}k"
     # Untagged, players guess the colours' matrix from the picture's size.
-    colours = "-vf scale=out_color_matrix=bt709 -colorspace bt709"
-    colours += " -color_primaries bt709 -color_trc bt709"
+    colours = "-vf scale=out_color_matrix=bt709,"
+    colours += "setparams=color_primaries=bt709:color_trc=bt709:colorspace=bt709"
     words = f"-nostdin -y -v error {source} -an {coding} {bound} {colours} -movflags +faststart"
     return [program, *words.split(), "-f", "mp4", str(path)]
 

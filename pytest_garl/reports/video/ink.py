@@ -114,7 +114,7 @@ def _cut(words: str, size: int, bold: bool, most_px: float) -> str:
 
 
 def _fixed(points: NDArray[Any]) -> NDArray[np.int32]:
-    return np.round(np.asarray(points, np.float64) * 2**_SHIFT).astype(np.int32)
+    return np.asarray(np.round(np.asarray(points) * 2.0**_SHIFT), np.int32)
 
 
 def _weight(bold: bool) -> int:
