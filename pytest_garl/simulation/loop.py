@@ -35,6 +35,7 @@ from pytest_garl.simulation.randomness import generator
 from pytest_garl.simulation.recorder import Recorder
 from pytest_garl.simulation.truth import Truth, TruthObject
 from pytest_garl.simulation.vehicle import Thrusts, Vector, drag, lag, vehicle_model, wrench
+from pytest_garl.simulation.view import eye_under
 from pytest_garl.simulation.world import PHYSICS_RATE_HZ, Quaternion, World
 
 TRACK_EVERY = 10
@@ -47,7 +48,6 @@ HARD_TOUCHDOWN_MPS = 2.0
 """Contact speed of a drop from 0.2 m: the least drop height of EASA CS 27.725."""
 ABORT_CLEAR_M = 2.0
 ABORT_HEIGHT_M = 5.0
-CAMERA_BELOW_M = 0.05
 POSITION_NOISE_M = 0.02
 VELOCITY_NOISE_MPS = 0.05
 """Engineering estimate: RTK gives centimetres; 0.05 m/s is u-blox's stated accuracy (M8)."""
@@ -284,7 +284,7 @@ class Loop:
     def eye(self) -> tuple[Vector, Quaternion]:
         """Return the camera's place and the UAV's attitude."""
         position, attitude, _, _ = self.world.uav()
-        return _below(position, attitude), attitude
+        return eye_under(position, attitude), attitude
 
     def _see(self, tick: int, position: Vector, attitude: Quaternion, velocity: Vector) -> None:
         now = tick / PHYSICS_RATE_HZ
@@ -305,7 +305,7 @@ class Loop:
             self._ask("observe_truth", lambda: self.system.observe_truth(truth))
         camera = self.airframe.camera
         if self.renderer:
-            eye = _below(position, attitude)
+            eye = eye_under(position, attitude)
             frame = self.renderer.render(eye, attitude, now, poses)
             visible = self.recorder.sight(frame, self.renderer, eye, attitude)
         else:
@@ -383,12 +383,6 @@ def crash_of(error: Exception, method: str) -> Crash:
         where=where,
         traceback=text,
     )
-
-
-def _below(position: Vector, attitude: Quaternion) -> Vector:
-    """Return the camera's place under a UAV."""
-    dx, dy, dz = rotate(attitude, (0.0, 0.0, -CAMERA_BELOW_M))
-    return position[0] + dx, position[1] + dy, position[2] + dz
 
 
 def _frozen(array: Array) -> Array:

@@ -12,14 +12,23 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pytest_garl.landing_system import Camera
+from pytest_garl.scenarios.bodies import rotate
 from pytest_garl.simulation.meshes import clip_polygon, rotation_matrix
 
 Array = NDArray[np.float32]
+Vector = tuple[float, float, float]
 Quaternion = tuple[float, float, float, float]
+CAMERA_BELOW_M = 0.05
 NEAR_M = 0.05
 FAR_M = 100.0
 _FARTHEST_PX = np.float32(2e4)
 """Pixel coordinates are bounded so that fixed-point drawing does not overflow."""
+
+
+def eye_under(position_m: Vector, attitude: Quaternion) -> Vector:
+    """Return the camera's place under a UAV at ``position_m``."""
+    dx, dy, dz = rotate(attitude, (0.0, 0.0, -CAMERA_BELOW_M))
+    return position_m[0] + dx, position_m[1] + dy, position_m[2] + dz
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -31,7 +40,7 @@ class View:
     axes: NDArray[np.float64]
 
     @classmethod
-    def of(cls, camera: Camera, position_m: tuple[float, float, float], q: Quaternion) -> View:
+    def of(cls, camera: Camera, position_m: Vector, q: Quaternion) -> View:
         """Return the view of a camera under a UAV with attitude ``q``."""
         body = rotation_matrix(q)
         axes = np.stack([-body[:, 1], -body[:, 0], -body[:, 2]])
