@@ -53,7 +53,14 @@ def run(folder: Path, tests: str, options: Sequence[str]) -> Path:
     """Run a search with its files in ``folder``, or go on with it; return the ledger."""
     ledger = folder / "ledger.sqlite"
     command = [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", "--tb=no", "-r", ""]
-    command += [*options, "-o", f"garl_dir={folder}", tests, *["--garl-resume"] * ledger.exists()]
+    command += [
+        *options,
+        "--garl-shrink=0",
+        "-o",
+        f"garl_dir={folder}",
+        tests,
+        *["--garl-resume"] * ledger.exists(),
+    ]
     done = subprocess.run(command, check=False)
     if done.returncode not in (0, 1):
         raise SystemExit(done.returncode)

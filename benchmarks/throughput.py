@@ -15,6 +15,7 @@ def search_s(workers: int, budget: int, map: str) -> float:
         command = [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider"]
         command += [
             f"--garl-budget={budget}",
+            "--garl-shrink=0",
             f"--garl-workers={workers}",
             f"--garl-map={map}",
             "--garl-method=random",

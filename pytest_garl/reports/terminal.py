@@ -100,6 +100,8 @@ def _spent(meters: dict[str, float]) -> str:
     """Return what the run cost beside the budget."""
     flying, idle = meters.get("flying_s", 0.0), meters.get("idle_s", 0.0)
     words = f"flights: {meters.get('flights', 0):.0f}, flown again {meters.get('retried', 0):.0f}"
+    if "errands" in meters:
+        words += f", to confirm and shrink {meters['errands']:.0f}"
     if flying + idle > 0:
         words += f", workers idle {100 * idle / (flying + idle):.0f} %"
     return words

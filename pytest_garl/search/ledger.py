@@ -38,6 +38,7 @@ CREATE TABLE meter (name TEXT PRIMARY KEY, value REAL NOT NULL);
 Kind = Literal["search", "case", "errand"]
 """What flights are for: a search's budget, saved cases, or something beside them, such as flying a
 violation once more.  Figures and the result hash are those of the searches."""
+_METERS = {"search": "flights", "case": "cases", "errand": "errands"}
 _ADDRESS = re.compile(r"0x[0-9a-f]+")
 LEASE_S = 30.0
 """A claim that is not renewed for so long is free again: its process hangs or its id was given
@@ -340,7 +341,10 @@ class Ledger:
                 (text, sha256, wall_s, claim.search, claim.generation, claim.slot),
             )
             if done.rowcount:
-                self.count("flights")
+                kind = self._db.execute(
+                    "SELECT kind FROM search WHERE id = ?", (claim.search,)
+                ).fetchone()[0]
+                self.count(_METERS[kind])
                 self.count("flying_s", wall_s)
 
     def claim_of(self, pid: int) -> tuple[Claim, int] | None:

@@ -23,7 +23,13 @@ class Slow:
     def reset(self, mission): time.sleep(0.03)
     def step(self, observation): return Land()
 """
-BUDGET = ("--garl-budget=30", "--garl-population=6", "--garl-workers=2", "--garl-map=lawn")
+BUDGET = (
+    "--garl-budget=30",
+    "--garl-shrink=0",
+    "--garl-population=6",
+    "--garl-workers=2",
+    "--garl-map=lawn",
+)
 
 
 def slow_project(pytester: pytest.Pytester) -> None:

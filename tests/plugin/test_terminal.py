@@ -96,7 +96,9 @@ def slow_project(pytester: pytest.Pytester) -> None:
 @pytest.mark.parametrize("args", [("-q",), ("-v",), ("-q", "-n2"), ("-v", "-n2")])
 def test_the_progress_line_comes_and_goes(pytester: pytest.Pytester, args: tuple[str, ...]) -> None:
     slow_project(pytester)
-    written = on_a_terminal(pytester, "--garl-budget=5", "--garl-workers=1", "--no-summary", *args)
+    written = on_a_terminal(
+        pytester, "--garl-budget=5", "--garl-shrink=0", "--garl-workers=1", "--no-summary", *args
+    )
     during = screen(written[: [match.end() for match in LINE.finditer(written)][-1]])
     assert LINE.match(during[-1]), "the line is the last on the screen"
     drawn = re.findall(r"\r\n(garl: [^\x1b\r\n]*)\x1b", written)
@@ -117,7 +119,7 @@ def test_no_line_where_it_would_disturb(
     pytester: pytest.Pytester, args: tuple[str, ...], term: str
 ) -> None:
     slow_project(pytester)
-    written = on_a_terminal(pytester, "--garl-budget=2", "-q", *args, term=term)
+    written = on_a_terminal(pytester, "--garl-budget=2", "--garl-shrink=0", "-q", *args, term=term)
     assert "garl: violations" in written
     assert not re.search(r"\d flown  ", written)
     assert "\x1b7" not in written
@@ -131,7 +133,9 @@ def test_a_dead_worker_leaves_no_litter(pytester: pytest.Pytester) -> None:
         "def pytest_runtest_teardown(item): 's02' in item.name and os._exit(4)\n"
     )
     only = ("-k", "test_time", "--max-worker-restart=1")
-    written = on_a_terminal(pytester, "--garl-budget=5", "--garl-workers=1", "-n2", *only)
+    written = on_a_terminal(
+        pytester, "--garl-budget=5", "--garl-shrink=0", "--garl-workers=1", "-n2", *only
+    )
     assert LINE.search(written)
     rows = [row.rstrip() for row in screen(written)]
     assert any(re.fullmatch(r"replacing crashed worker gw\d", row) for row in rows)
@@ -157,7 +161,7 @@ def test_lf_flies_exactly_the_failing_slots_again(
     pytester: pytest.Pytester, parallel: tuple[str, ...]
 ) -> None:
     project(pytester)
-    args = ("--garl-budget=24", "--garl-workers=1", "-rf", *parallel)
+    args = ("--garl-budget=24", "--garl-shrink=0", "--garl-workers=1", "-rf", *parallel)
 
     def failed(result: pytest.RunResult) -> set[str]:
         return {line.split(" - ")[0] for line in result.outlines if line.startswith("FAILED")}
