@@ -1,0 +1,167 @@
+from __future__ import annotations
+
+import sys
+from collections.abc import Iterator
+from importlib.metadata import version
+from pathlib import Path
+
+import pytest
+from click.testing import CliRunner, Result
+
+from pytest_garl.cli import main
+from pytest_garl.regressions.case import Case, Evidence, Violation
+from pytest_garl.regressions.corpus import save
+from pytest_garl.regressions.files import load
+from pytest_garl.scenarios.chromosome import decode
+from pytest_garl.scenarios.genes import genome_for
+from pytest_garl.scenarios.maps import load_map
+from pytest_garl.scenarios.validity import repair
+from pytest_garl.verdicts.verdict import Limits
+
+SYSTEM = """
+from pathlib import Path
+from pytest_garl import Abort, PositionSetpoint
+
+class Lander:
+    def reset(self, mission):
+        self.home = mission.home_m
+
+    def step(self, observation):
+        if Path("broken").exists():
+            raise ZeroDivisionError("no plan")
+        x, y, _ = self.home
+        return Abort()
+"""
+LAWN = load_map("lawn")
+
+
+def broken_lander() -> Case:
+    """Return a case in which the lander raises at once, in fog that has nothing to do with it."""
+    genome = genome_for(LAWN)
+    scenario = repair(decode(genome.nominal, genome, map="lawn", seed=3), LAWN)
+    names = [name for name, _ in LAWN.object_names]
+    return Case(
+        system="stack_of_test:Lander",
+        status="open",
+        scenario=scenario.replace({"environment.fog": 0.1}).without(*names[1:]),
+        violation=Violation(
+            signature="V:ZeroDivisionError@stack_of_test.step",
+            type="V",
+            property="crash",
+            margin=0.0,
+            unit="1",
+            story="The landing system raised: ZeroDivisionError: no plan.",
+        ),
+        policy="stationary",
+        policy_sha256="",
+        moves=((names[0], ()),),
+        evidence=Evidence(
+            trajectory_sha256="",
+            cpu="",
+            map_sha256=LAWN.sha256,
+            neighbours=3,
+            neighbours_failed=3,
+            removed="nothing",
+            versions=(("pytest-garl", version("pytest-garl")),),
+        ),
+        limits=Limits(),
+    )
+
+
+@pytest.fixture
+def file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
+    """Return the file of a case in a project whose lander is broken."""
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(sys, "path", [*sys.path])
+    (tmp_path / "stack_of_test.py").write_text(SYSTEM)
+    (tmp_path / "broken").touch()
+    path = save(tmp_path / "scenarios" / "regressions", broken_lander())
+    assert path is not None
+    yield path.relative_to(tmp_path)
+    sys.modules.pop("stack_of_test", None)
+
+
+def garl(*args: str | Path) -> Result:
+    return CliRunner().invoke(main, ["cases", *map(str, args)], env={"COLUMNS": "200"})
+
+
+def repaired() -> None:
+    Path("broken").unlink()
+
+
+def test_list_and_show_tell_what_it_is(file: Path) -> None:
+    listed = garl("list")
+    assert "stack_of_test/lawn-V-ZeroDivisionError-" in listed.output
+    assert "open" in listed.output
+    shown = garl("show", file).output
+    assert "raised: ZeroDivisionError: no plan." in shown
+    assert "fog (1: visibility 10 m)" in shown
+    assert "a person of up to 0.00 m/s" in shown
+
+
+def test_replay_answers_failed_then_fixed_and_promote_believes_only_the_latter(file: Path) -> None:
+    failed = garl("replay", file)
+    assert failed.output.startswith("FAILED\nV:ZeroDivisionError@stack_of_test.step")
+    assert failed.exit_code == 1
+    refused = garl("promote", file)
+    assert "still fails with its recorded moves" in refused.output
+    assert load(file).status == "open"
+    repaired()
+    fixed = garl("replay", file)
+    assert fixed.output.startswith("FIXED\nno violation")
+    assert fixed.exit_code == 0
+    assert garl("promote", file).exit_code == 0
+    assert load(file).status == "fixed"
+
+
+def test_what_passes_in_another_world_is_stale_and_can_be_pruned(file: Path) -> None:
+    file.write_text(file.read_text().replace(LAWN.sha256, "0" * 64))
+    assert garl("replay", file).exit_code == 1
+    assert "1 cases still say something" in garl("prune", "--yes").output
+    repaired()
+    stale = garl("replay", file)
+    assert stale.output.startswith("STALE")
+    assert "changed since it was saved: the map 'lawn' has changed" in stale.output
+    assert stale.exit_code == 3
+    assert "passes, but the map 'lawn' has changed" in garl("prune", "--yes").output
+    assert not file.exists()
+
+
+def test_shrinking_goes_on(file: Path) -> None:
+    result = garl("shrink", file, "--flights=20", "--workers=0")
+    assert result.exit_code == 0, result.output
+    (path,) = Path("scenarios/regressions/stack_of_test").glob("*.toml")
+    case = load(path)
+    assert case.scenario["environment.fog"] == 0.0
+    assert len(case.scenario.absent) == len(LAWN.residents)
+    assert case.status == "open"
+
+
+def test_what_does_not_fail_any_more_is_not_shrunk(file: Path) -> None:
+    before = file.read_text()
+    repaired()
+    assert "do not fail in the same way" in garl("shrink", file, "--workers=0").output
+    assert file.read_text() == before
+
+
+def test_check_names_every_problem(file: Path) -> None:
+    assert garl("check").output == "1 cases, 0 problems\n"
+    file.write_text(file.read_text().replace("seed = 3", "seed = 4"))
+    file.with_name("other.toml").write_text("schema = ")
+    checked = garl("check")
+    assert "it was changed by hand" in checked.output
+    assert "not valid TOML" in checked.output
+    assert checked.exit_code == 1
+
+
+def test_a_missing_system_is_one_clear_error(file: Path) -> None:
+    file.write_text(file.read_text().replace("stack_of_test:Lander", "stack_of_test:Landr"))
+    result = garl("replay", file)
+    assert "system 'stack_of_test:Landr': cannot be imported from" in result.output
+    assert result.exit_code == 1
+
+
+def test_a_replay_draws_a_film(file: Path) -> None:
+    pytest.importorskip("imageio_ffmpeg")
+    assert "drawn: it.mp4" in garl("replay", file, "--video=it.mp4").output
+    assert Path("it.mp4").read_bytes()[4:8] == b"ftyp"
