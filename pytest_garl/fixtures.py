@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import functools
 import math
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, NoReturn
 
 import pytest
@@ -12,7 +13,6 @@ from pytest_garl.errors import GarlError
 from pytest_garl.switches import FATAL, RUN
 
 if TYPE_CHECKING:
-    from pytest_garl.run import Run
     from pytest_garl.scenarios.scenario import Scenario
     from pytest_garl.simulation.flight import Flight
     from pytest_garl.simulation.policy import PolicySpec
@@ -27,8 +27,8 @@ class Landing:
     ``final_distance_m`` and ``elapsed_s`` can always be read.
     """
 
-    def __init__(self, target: Target, result: dict[str, Any], run: Run) -> None:
-        self._target, self.result, self._run = target, result, run
+    def __init__(self, target: Target, result: dict[str, Any], record: Path) -> None:
+        self._target, self.result, self._record = target, result, record
         self.slot: str = target.name
         self.outcome: str = result["outcome"]
         self.final_distance_m: float = result["final_distance_m"]
@@ -73,12 +73,9 @@ class Landing:
     @functools.cached_property
     def flight(self) -> Flight:
         """The flight's whole record, loaded from its file."""
-        from pytest_garl.search.slots import flight_name
         from pytest_garl.simulation.record import load
 
-        target, slot = self._target, self._target.slot
-        name = flight_name(target.search, slot.generation, slot.index, target.map)
-        return load(self._run.options.folder / "flights" / f"{name}.npz")
+        return load(self._record)
 
     def _undecided(self) -> None:
         pytest.skip(f"not decided: {self.result['undecided']}")
@@ -120,7 +117,7 @@ def landing(request: pytest.FixtureRequest, garl_slot: Target, npcs: PolicySpec)
         result = run.fly(garl_slot, npcs)
     except GarlError as error:
         _stop(request, error)
-    landing = Landing(garl_slot, result, run)
+    landing = Landing(garl_slot, result, run.record(garl_slot))
     verdict = result["verdict"]
     request.node.user_properties += [
         ("garl.slot", garl_slot.name),
@@ -142,9 +139,7 @@ def landing(request: pytest.FixtureRequest, garl_slot: Target, npcs: PolicySpec)
 @pytest.fixture
 def scenario(request: pytest.FixtureRequest, garl_slot: Target) -> Scenario:
     """Return the scenario that the slot holds."""
-    from pytest_garl.search.job import load_scenario
-
     run = request.config.stash[RUN]
     request.getfixturevalue("landing")
-    slot = garl_slot.slot
-    return load_scenario(run.ledger.scenario(garl_slot.search, slot.generation, slot.index))
+    scenario: Scenario = run.scenario(garl_slot)
+    return scenario

@@ -131,7 +131,7 @@ def pytest_runtest_makereport(
     if target is not None and run is not None and report.when == "call":
         from pytest_garl.reports.explain import explain
 
-        explain(report, item, run, target)
+        explain(report, item, run, target, call.excinfo.value if call.excinfo else None)
     return report
 
 

@@ -7,6 +7,7 @@ import os
 import sys
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, TextIO
 
 import pytest
@@ -16,11 +17,12 @@ from pytest_garl.options import Options
 from pytest_garl.search.ledger import Kind, Ledger
 from pytest_garl.search.pool import Pool
 from pytest_garl.search.reference import Reference, reference_to, sources_sha256
-from pytest_garl.search.slots import Slot
+from pytest_garl.search.slots import Slot, flight_name
 from pytest_garl.switches import POLICIES, target_of
 from pytest_garl.targets import FIRST, Target, name_of, repeated
 
 if TYPE_CHECKING:
+    from pytest_garl.own import Asks
     from pytest_garl.regressions.follow_up import Pursued
     from pytest_garl.scenarios.scenario import Scenario
     from pytest_garl.search.breeder import Breeder
@@ -54,6 +56,9 @@ class Run:
     """What became of new signatures after the search."""
     troubled: bool = False
     """Whether that could not be finished."""
+    own: dict[tuple[str, str], Asks] = field(default_factory=dict)
+    """Assertions of tests that failed where the built-in verdict is content, by search and
+    signature."""
     lock: TextIO | None = None
 
     def select(self, items: list[pytest.Item]) -> None:
@@ -106,6 +111,21 @@ class Run:
         finally:
             self.waited()
 
+    def record(self, target: Target) -> Path:
+        """Return where the record of a slot's flight lies."""
+        slot = target.slot
+        name = flight_name(target.search, slot.generation, slot.index, target.map)
+        return self.options.folder / "flights" / f"{name}.npz"
+
+    def scenario(self, target: Target) -> Scenario:
+        """Return what a slot flies."""
+        from pytest_garl.search.job import load_scenario
+
+        slot = target.slot
+        text = self.ledger.scenario(target.search, slot.generation, slot.index)
+        assert text is not None
+        return load_scenario(text)
+
     def known(self, target: Target) -> dict[str, str]:
         """Return the signatures that saved cases expect of a system on a map, with their files."""
         from pytest_garl.regressions.corpus import entries
@@ -125,11 +145,11 @@ class Run:
         stopped = bool(session.shouldfail or session.shouldstop)
         return ended and not (stopped or worker or options.repeat) and options.shrink > 0
 
-    def twin(self, target: Target, signature: str) -> str:
-        """Return the lowest selected slot below with the same signature, or nothing."""
+    def twin(self, target: Target, alike: Callable[[Target, dict[str, Any]], bool]) -> str:
+        """Return the lowest selected slot below whose result is alike, or nothing."""
         search = target.search
         for slot in self._lower(search, target.slot):
-            if self._wait(search, slot)["verdict"]["signature"] == signature:
+            if alike(self.targets[search][slot], self._wait(search, slot)):
                 return slot.id(target.map)
         return ""
 

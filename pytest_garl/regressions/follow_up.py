@@ -4,17 +4,18 @@ from __future__ import annotations
 
 import functools
 from collections import defaultdict
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 from pytest_garl.regressions.case import Case
 from pytest_garl.regressions.corpus import entries, save, save_patch
-from pytest_garl.regressions.pursuit import LEAST, Finding, Inquiry, Pursuit
+from pytest_garl.regressions.pursuit import LEAST, Asks, Finding, Inquiry, Pursuit
 from pytest_garl.scenarios.maps import load_map
+from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.search.errands import Done, Errands, Fly
-from pytest_garl.search.job import load_scenario, loads
-from pytest_garl.search.ledger import Ledger, Violating
+from pytest_garl.search.job import Job, load_scenario, loads
+from pytest_garl.search.ledger import Ledger, Row
 from pytest_garl.search.pool import Pool
 from pytest_garl.search.slots import flight_name
 
@@ -39,14 +40,21 @@ class Pursued:
     file: Path | None
 
 
-def inquiries(ledger: Ledger, place: Place, budget: int) -> tuple[Inquiry, ...]:
+def inquiries(
+    ledger: Ledger, place: Place, budget: int, own: Mapping[tuple[str, str], Asks] | None = None
+) -> tuple[Inquiry, ...]:
     """Return what is to be found out about signatures that no saved case has.
 
     ``budget`` is for all signatures of one search together.  Where it does not reach for all, the
-    most frequent come first, and the others are left for `garl cases shrink`.
+    most frequent come first.  ``own`` are assertions of tests that failed where the verdict is
+    content, by search and signature.
     """
     found = []
-    for search, rows in _by_search(ledger).items():
+    asks = own or {}
+    groups = _by_search(ledger)
+    for search, signature in asks:
+        groups.setdefault(search, {})[signature] = []
+    for search, rows in groups.items():
         text = ledger.job(search)
         assert text is not None
         job = loads(text)
@@ -56,23 +64,24 @@ def inquiries(ledger: Ledger, place: Place, budget: int) -> tuple[Inquiry, ...]:
             for entry in entries(place.cases, system, place.map_folders)
             if entry.case is not None and is_known(entry.case, job.map)
         }
-        new = {signature: those for signature, those in rows.items() if signature not in known}
+        new = {
+            signature: _failures(ledger, search, those, asks.get((search, signature)), job)
+            for signature, those in rows.items()
+            if signature not in known
+        }
         order = sorted(new, key=lambda signature: (-len(new[signature]), signature))
         order = order[: budget // LEAST]
         map = load_map(job.map, place.map_folders)
         for signature in order:
-            violations = tuple(
-                (load_scenario(row.scenario), _done(row, job.flights, job.map))
-                for row in new[signature]
-            )
             found.append(
                 Inquiry(
                     name=f"{search} {signature}",
                     signature=signature,
-                    violations=violations,
+                    violations=new[signature],
                     job=job,
                     map=map,
                     budget=budget // len(order),
+                    asks=asks.get((search, signature)),
                 )
             )
     return tuple(found)
@@ -80,19 +89,32 @@ def inquiries(ledger: Ledger, place: Place, budget: int) -> tuple[Inquiry, ...]:
 
 def is_known(case: Case, map: str) -> bool:
     """Whether a case says that violations with its signature are expected on a map."""
-    return case.scenario.map == map and case.status != "fixed" and not case.test
+    return case.scenario.map == map and case.status != "fixed"
 
 
-def _by_search(ledger: Ledger) -> dict[str, dict[str, list[Violating]]]:
-    found: dict[str, dict[str, list[Violating]]] = {}
+def _by_search(ledger: Ledger) -> dict[str, dict[str, list[Row]]]:
+    found: dict[str, dict[str, list[Row]]] = {}
     for row in ledger.violating():
         found.setdefault(row.search, defaultdict(list))[row.signature].append(row)
     return found
 
 
-def _done(row: Violating, flights: str, map: str) -> Done:
-    name = flight_name(row.search, row.generation, row.slot, map)
-    return Done(result=row.result, sha256=row.sha256, record=Path(flights) / f"{name}.npz")
+def _failures(
+    ledger: Ledger, search: str, violating: Sequence[Row], asks: Asks | None, job: Job
+) -> tuple[tuple[Scenario, Done], ...]:
+    """Return scenarios with their flights: those that violated, or those that a test refuses."""
+    rows = ledger.flown(search) if asks else violating
+    flights = [(load_scenario(row.scenario), _done(row, job)) for row in rows]
+    if asks is None:
+        return tuple(flights)
+    return tuple(
+        (scenario, done) for scenario, done in flights if asks(done.result, done.record, scenario)
+    )
+
+
+def _done(row: Row, job: Job) -> Done:
+    name = flight_name(row.search, row.generation, row.slot, job.map)
+    return Done(result=row.result, sha256=row.sha256, record=Path(job.flights) / f"{name}.npz")
 
 
 def follow_up(

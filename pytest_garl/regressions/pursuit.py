@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
 
 from pytest_garl.adversary.recorded import recorded_spec
 from pytest_garl.regressions.case import Case, Evidence, MoveList, Violation
@@ -17,9 +19,11 @@ from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.search.errands import Done, Fly
 from pytest_garl.search.job import Job
 from pytest_garl.search.reference import reference_to
+from pytest_garl.simulation.flight import Flight
 from pytest_garl.simulation.record import load
 from pytest_garl.simulation.reference_pilot import ReferencePilot
 from pytest_garl.verdicts.serialise import from_dict
+from pytest_garl.verdicts.verdict import Verdict
 
 LEAST = 2 + COUNT
 """Flights without which nothing can be said: once more, three neighbours, the reference pilot."""
@@ -29,10 +33,25 @@ Moves = tuple[tuple[str, MoveList], ...]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class OwnFailure:
+    """How a test's own assertion failed on a flight."""
+
+    test: str
+    assertion: str
+    signature: str
+    message: str
+
+
+Asks = Callable[[dict[str, Any], Path, Scenario], OwnFailure | None]
+"""A test's own assertion, asked of a flight: result, record, scenario."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Inquiry:
     """What is to be found out about one signature of one search.
 
     ``violations`` are scenarios with the flights that violated.  ``budget`` bounds the flights.
+    ``asks`` is the test's own assertion that failed, None for the built-in verdict.
     """
 
     name: str
@@ -41,6 +60,14 @@ class Inquiry:
     job: Job
     map: Map
     budget: int
+    asks: Asks | None = None
+
+    def failed(self, scenario: Scenario, done: Done) -> bool:
+        """Whether a flight failed in the way that is asked about."""
+        if self.asks is None:
+            return done.signature == self.signature
+        own = self.asks(done.result, done.record, scenario)
+        return own is not None and own.signature == self.signature
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -112,7 +139,7 @@ class Pursuit:
                 break
             moves = moves_of(self._flown[scenario], scenario, self._inquiry.map)
             done = self._again(scenario, moves)
-            if done.signature != self._inquiry.signature:
+            if not self._inquiry.failed(scenario, done):
                 continue
             robust = self._robust(scenario, moves)
             if best is None or robust > best.robust:
@@ -123,14 +150,15 @@ class Pursuit:
 
     def _robust(self, scenario: Scenario, moves: Moves) -> int:
         return sum(
-            self._again(each, moves).signature == self._inquiry.signature
+            self._inquiry.failed(each, self._again(each, moves))
             for each in neighbours(scenario, self._inquiry.map)
         )
 
     def _avoidable(self, scenario: Scenario) -> bool:
         """Whether a pilot that knows where everything is lands among the same objects."""
         pilot = dataclasses.replace(self._inquiry.job, system=reference_to(ReferencePilot))
-        return not self._go(pilot, scenario).signature
+        done = self._go(pilot, scenario)
+        return not done.signature and not self._inquiry.failed(scenario, done)
 
     def _shrunk(self, best: _Failure) -> _Failure:
         """Return the simplest failure whose neighbours fail as well."""
@@ -138,7 +166,7 @@ class Pursuit:
 
         def fails(scenario: Scenario) -> bool:
             done = self._flown[scenario] = self._go(inquiry.job, scenario)
-            return done.signature == inquiry.signature
+            return inquiry.failed(scenario, done)
 
         budget = self._left - COUNT
         if budget <= 0:
@@ -167,7 +195,7 @@ class Pursuit:
             if self._left < 1 + COUNT:
                 break
             done = self._again(scenario, moves)
-            if done.signature != self._inquiry.signature:
+            if not self._inquiry.failed(scenario, done):
                 continue
             robust = self._robust(scenario, moves)
             if robust >= failure.robust:
@@ -176,23 +204,13 @@ class Pursuit:
 
     def _case(self, first: Scenario, failure: _Failure, avoidable: bool) -> Case:
         inquiry, done, job = self._inquiry, failure.done, self._inquiry.job
-        verdict = from_dict(done.result["verdict"])
-        assert verdict.primary is not None
-        assert verdict.violation_type is not None
-        margin = next((each for each in verdict.margins if each.property == verdict.primary), None)
         flight = load(done.record) if done.record.exists() else None
+        own = inquiry.asks(done.result, done.record, failure.scenario) if inquiry.asks else None
         return Case(
             system=f"{job.system.module}:{job.system.qualname}",
             status="open" if avoidable else "unavoidable",
             scenario=failure.scenario,
-            violation=Violation(
-                signature=inquiry.signature,
-                type=verdict.violation_type,
-                property=verdict.primary,
-                margin=margin.value if margin else 0.0,
-                unit=margin.unit if margin else "1",
-                story=tell(flight, verdict) if flight else verdict.story,
-            ),
+            violation=_violation(from_dict(done.result["verdict"]), flight, own),
             policy=job.npcs.name,
             policy_sha256=str(dict(job.npcs.arguments).get("sha256", "")),
             moves=failure.moves,
@@ -206,7 +224,33 @@ class Pursuit:
                 versions=flight.versions if flight else (),
             ),
             limits=job.limits,
+            test=own.test if own else "",
+            assertion=own.assertion if own else "",
         )
+
+
+def _violation(verdict: Verdict, flight: Flight | None, own: OwnFailure | None) -> Violation:
+    """Return what failed, from the verdict or from the test's own assertion."""
+    if own is not None:
+        return Violation(
+            signature=own.signature,
+            type="own",
+            property="own",
+            margin=0.0,
+            unit="1",
+            story=f"{own.test}: {own.message}. {verdict.story}",
+        )
+    assert verdict.primary is not None
+    assert verdict.violation_type is not None
+    margin = next((each for each in verdict.margins if each.property == verdict.primary), None)
+    return Violation(
+        signature=verdict.signature,
+        type=verdict.violation_type,
+        property=verdict.primary,
+        margin=margin.value if margin else 0.0,
+        unit=margin.unit if margin else "1",
+        story=tell(flight, verdict) if flight else verdict.story,
+    )
 
 
 def moves_of(done: Done, scenario: Scenario, map: Map) -> Moves:

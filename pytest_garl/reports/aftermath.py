@@ -26,7 +26,7 @@ def pursue(run: Run, config: pytest.Config) -> None:
     )
     reporter: Any = config.pluginmanager.get_plugin("terminalreporter")
     try:
-        wanted = inquiries(run.ledger, place, options.shrink)
+        wanted = inquiries(run.ledger, place, options.shrink, run.own)
         if wanted:
             reporter.ensure_newline()
             reporter.write_line(

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import pytest
 
 from pytest_garl.fixtures import Landing
+from pytest_garl.own import Asks, failure_of
 from pytest_garl.run import Run, again_key
 from pytest_garl.targets import FIRST, Target
 
@@ -27,15 +28,23 @@ def crash_text(landing: Landing) -> str:
     return f"{story}\n\n{crash['traceback']}" if crash and crash["traceback"] else story
 
 
-def explain(report: pytest.TestReport, item: pytest.Item, run: Run, target: Target) -> None:
+def explain(
+    report: pytest.TestReport,
+    item: pytest.Item,
+    run: Run,
+    target: Target,
+    error: BaseException | None,
+) -> None:
     """Add the story to a failing report; turn a known violation into an xfail."""
     result = run.ledger.result(target.search, target.slot.generation, target.slot.index)
     if result is None:
         return
     if target.entry is not None and target.entry.case is not None:
-        _explain_case(report, item, run, target, target.entry.case, result)
+        _explain_case(report, item, run, target, target.entry.case, result, error)
     elif report.failed and result["verdict"]["primary"] is not None:
         _explain_violation(report, item, run, target, result)
+    elif report.failed and isinstance(item, pytest.Function) and error is not None:
+        _explain_own(report, item, run, target, error)
 
 
 def _explain_violation(
@@ -45,7 +54,7 @@ def _explain_violation(
     known = run.known(target).get(signature)
     if known is not None:
         return _expected(report, f"known: {signature} ({known})")
-    twin = run.twin(target, signature)
+    twin = run.twin(target, lambda _, other: other["verdict"]["signature"] == signature)
     if twin and run.options.duplicates == "xfail":
         return _expected(report, f"same violation as {twin} ({signature})")
     doubt = "" if twin or run.options.repeat else _doubt(run, target, result)
@@ -55,6 +64,35 @@ def _explain_violation(
     return _tell(report, [signature, *_wrapped(told), repeat_line(item, run, target)])
 
 
+def _explain_own(
+    report: pytest.TestReport, item: pytest.Function, run: Run, target: Target, error: BaseException
+) -> None:
+    """Treat a test's own assertion, where the built-in verdict is content, as another violation."""
+    failure = failure_of(item.originalname, error)
+    if failure is None:
+        return None
+    known = run.known(target).get(failure.signature)
+    if known is not None:
+        return _expected(report, f"known: {failure.signature} ({known})")
+    asks = Asks(item, target)
+    lines = [f"{failure.signature}: a property of your own", repeat_line(item, run, target)]
+    if not asks.possible:
+        lines.insert(1, "It is not saved: its test takes more than landing and scenario.")
+        return _tell(report, lines)
+    if hasattr(item.config, "workerinput"):
+        lines.insert(1, "It is not saved from a worker of xdist: run without -n.")
+
+    def alike(other: Target, result: dict[str, Any]) -> bool:
+        found = asks(result, run.record(other), run.scenario(other))
+        return found is not None and found.signature == failure.signature
+
+    twin = run.twin(target, alike)
+    if twin and run.options.duplicates == "xfail":
+        return _expected(report, f"same violation as {twin} ({failure.signature})")
+    run.own[target.search, failure.signature] = asks
+    return _tell(report, lines)
+
+
 def _explain_case(
     report: pytest.TestReport,
     item: pytest.Item,
@@ -62,6 +100,7 @@ def _explain_case(
     target: Target,
     case: Case,
     result: dict[str, Any],
+    error: BaseException | None,
 ) -> None:
     """Judge a case: an open one fails as it did before, a fixed one must not fail."""
     assert target.entry is not None
@@ -70,7 +109,7 @@ def _explain_case(
     if report.failed:
         if case.status == "unavoidable":
             return _expected(report, f"unavoidable: {case.violation.signature} ({file})")
-        if case.status == "open" and (same or case.test):
+        if case.status == "open" and (same or _same_assertion(case, item, error)):
             return _expected(report, f"known: {case.violation.signature} ({file})")
         state = "was fixed and fails again" if case.status == "fixed" else "fails in another way"
         told = [
@@ -89,6 +128,14 @@ def _explain_case(
                 f"if so: garl cases promote {file}"
             )
     return None
+
+
+def _same_assertion(case: Case, item: pytest.Item, error: BaseException | None) -> bool:
+    """Whether a case's own test fails in the assertion that it was saved for."""
+    if not case.test or error is None or not isinstance(item, pytest.Function):
+        return False
+    failure = failure_of(item.originalname, error)
+    return failure is not None and failure.signature == case.violation.signature
 
 
 FLAKY = "FLAKY"
@@ -160,13 +207,8 @@ def repeat_line(item: pytest.Item, run: Run, target: Target) -> str:
 def _unusual(run: Run, target: Target) -> list[str]:
     from pytest_garl.scenarios.genes import EXTRAS, genome_for
     from pytest_garl.scenarios.maps import load_map
-    from pytest_garl.search.job import load_scenario
 
-    slot = target.slot
-    text = run.ledger.scenario(target.search, slot.generation, slot.index)
-    if text is None:
-        return []
-    scenario = load_scenario(text)
+    scenario = run.scenario(target)
     map = load_map(target.map, run.options.map_folders)
     nominal = {
         item.key: item.nominal

@@ -73,8 +73,8 @@ class Progress:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Violating:
-    """A flown slot whose flight violated a property."""
+class Row:
+    """A flown slot."""
 
     search: str
     generation: int
@@ -425,16 +425,23 @@ class Ledger:
             for system, map, flown, wanted, generation in rows
         ]
 
-    def violating(self) -> list[Violating]:
+    def violating(self) -> list[Row]:
         """Return the searches' violations in slot order."""
+        return self._rows("json_extract(result, '$.verdict.primary') IS NOT NULL")
+
+    def flown(self, search: str) -> list[Row]:
+        """Return all flights of a search in slot order."""
+        return self._rows("search.id = ?", search)
+
+    def _rows(self, condition: str, *values: str) -> list[Row]:
         rows = self._db.execute(
             "SELECT search, generation, slot, scenario, result, sha256 FROM slot "
             "JOIN search ON search.id = slot.search WHERE kind = 'search' AND state = 'flown' "
-            "AND json_extract(result, '$.verdict.primary') IS NOT NULL "
-            "ORDER BY system, map, generation, slot"
+            f"AND {condition} ORDER BY system, map, generation, slot",
+            values,
         )
         return [
-            Violating(
+            Row(
                 search=row[0],
                 generation=row[1],
                 slot=row[2],

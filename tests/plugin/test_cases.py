@@ -181,7 +181,7 @@ def test_a_broken_case_errs_alone_and_names_file_and_key(
 def test_a_system_that_is_not_deterministic_is_told_so(pytester: pytest.Pytester) -> None:
     project(pytester)
     simulator = pytester.path / "tiny_simulator.py"
-    change(simulator, "else 0.1", "else 0.1\n    off += 1e-6 * __import__('random').random()")
+    change(simulator, "else off", "else off\n    off += 1e-6 * __import__('random').random()")
     result = run(pytester, *SEARCH, "--garl-shrink=0")
     result.stdout.fnmatch_lines(["Nondeterministic landing system: *from * s on*"])
     assert result.ret == pytest.ExitCode.TESTS_FAILED
@@ -203,3 +203,32 @@ def test_flaky_is_not_failed(pytester: pytest.Pytester) -> None:
     outcomes = result.parseoutcomes()
     assert outcomes["xfailed"] >= 1
     result.stdout.fnmatch_lines(["*FLAKY: * of 5 flights fail [[]*, *[]] % (IV:dog*"])
+
+
+OWN = """
+def test_own(landing, scenario):
+    exact = landing.final_distance_m < 0.05
+    assert exact or scenario["environment.snow"] < 0.1, "too much snow"
+"""
+
+
+def test_a_property_of_ones_own_is_shrunk_and_saved_for_its_test(
+    pytester: pytest.Pytester,
+) -> None:
+    project(pytester)
+    tests = pytester.path / "test_it.py"
+    tests.write_text(tests.read_text() + OWN)
+    result = run(pytester, *SEARCH)
+    result.stdout.fnmatch_lines(["own:test_own:*: a property of your own"])
+    (own,) = [path for path in cases(pytester) if "own" in path.name]
+    case = load(own)
+    assert (case.test, case.violation.type) == ("test_own", "own")
+    assert case.violation.story.startswith("test_own: too much snow")
+    assert len(case.scenario.absent) == 4
+    assert 0.1 <= case.scenario["environment.snow"] < 0.11
+    known = run(pytester)
+    # Four tests fly each of the two built-in cases, one flies its own.
+    assert sum(known.parseoutcomes().values()) == 4 * 2 + 1
+    assert known.ret == 0
+    change(tests, "< 0.1,", "< 0.09,")
+    assert run(pytester).ret == pytest.ExitCode.TESTS_FAILED

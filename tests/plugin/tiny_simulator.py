@@ -32,6 +32,7 @@ def fly(
     # Who is told the truth neither loses its way nor is hit.
     knows = getattr(system, "needs_camera", True) is False
     off = 3.0 if scenario["environment.fog"] > 0.1 and not knows else 0.1
+    off = 0.0 if knows else off
     contacts: tuple[Contact, ...] = ()
     crash = None
     if scenario.get("dog-1.velocity", 0.0) > 0.7 and not knows:

@@ -1,0 +1,61 @@
+"""A test's own assertion, asked of any flight: what a user demands beyond the built-in verdict."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from pytest_garl.fixtures import Landing
+from pytest_garl.regressions.pursuit import OwnFailure
+from pytest_garl.scenarios.scenario import Scenario
+from pytest_garl.targets import Target
+
+_GIVEN = {"landing", "scenario"}
+
+
+def failure_of(test: str, error: BaseException) -> OwnFailure | None:
+    """Return what an assertion said, or None for any other exception."""
+    if not isinstance(error, AssertionError):
+        return None
+    caught = pytest.ExceptionInfo.from_exception(error)
+    source = str(caught.traceback[-1].statement)
+    message = str(error).partition("\n")[0] or source.strip()
+    digest = hashlib.sha256(source.encode()).hexdigest()[:8]
+    return OwnFailure(
+        test=test, assertion=digest, signature=f"own:{test}:{digest}", message=message
+    )
+
+
+class Asks:
+    """Runs an item's test on other flights; only for tests that take nothing but a flight."""
+
+    def __init__(self, item: pytest.Function, target: Target) -> None:
+        self._function: Callable[..., Any] = item.obj
+        self._wanted = set(item._fixtureinfo.argnames)
+        self._target = target
+        self.test = item.originalname
+
+    @property
+    def possible(self) -> bool:
+        """Whether the test takes nothing that this module cannot give."""
+        return self._wanted <= _GIVEN
+
+    def __call__(
+        self, result: dict[str, Any], record: Path, scenario: Scenario
+    ) -> OwnFailure | None:
+        """Return how the test fails on a flight, or None."""
+        landing = Landing(self._target, result, record)
+        if landing.verdict.violation:
+            return None
+        given = {"landing": landing, "scenario": scenario}
+        try:
+            self._function(**{name: given[name] for name in self._wanted})
+        except pytest.skip.Exception:
+            return None
+        except Exception as error:  # noqa: BLE001 (a user's test may raise what it likes)
+            return failure_of(self.test, error)
+        return None
