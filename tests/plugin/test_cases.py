@@ -220,7 +220,7 @@ def test_a_property_of_ones_own_is_shrunk_and_saved_for_its_test(
     tests.write_text(tests.read_text() + OWN)
     result = run(pytester, *SEARCH)
     result.stdout.fnmatch_lines(["own:test_own:*: a property of your own"])
-    (own,) = [path for path in cases(pytester) if "own" in path.name]
+    (own,) = [path for path in cases(pytester) if "-own-" in path.name]
     case = load(own)
     assert (case.test, case.violation.type) == ("test_own", "own")
     assert case.violation.story.startswith("test_own: too much snow")
