@@ -1,0 +1,192 @@
+"""What the shrinker's passes are worth, on violations of OpenCV-MLS that a search found.
+
+``python -m benchmarks.shrinking`` takes twenty violations, kind after kind, from ``garl``, seed 0,
+of ``benchmarks.methods`` (flown first where it is missing), shrinks each by both passes and
+by each alone, and appends to ``docs/shrinking.csv`` what that lacks; ``--report`` prints the table.
+"""
+
+from __future__ import annotations
+
+import argparse
+import functools
+import itertools
+import os
+from collections import defaultdict
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from benchmarks.methods import search
+from benchmarks.rows import append, read
+from pytest_garl.regressions.pursuit import culprit_of
+from pytest_garl.regressions.shrink import (
+    by_hypothesis,
+    complexity,
+    genome_of,
+    reset_and_bisect,
+    shrink,
+    tidy,
+)
+from pytest_garl.scenarios.maps import load_map
+from pytest_garl.scenarios.scenario import Scenario
+from pytest_garl.search.errands import Done, Errands, Fly
+from pytest_garl.search.job import Job, load_scenario, loads
+from pytest_garl.search.ledger import Ledger, Row
+from pytest_garl.search.pool import Pool
+
+FILE = Path("docs/shrinking.csv")
+COUNT = 20
+BUDGET = 60
+PASSES: dict[str, tuple[Callable[..., None], ...]] = {
+    "both": (reset_and_bisect, by_hypothesis, tidy),
+    "reset and bisect": (reset_and_bisect,),
+    "Hypothesis": (by_hypothesis,),
+}
+FIELDS = (
+    "passes",
+    "map",
+    "slot",
+    "signature",
+    "flights",
+    "objects_before",
+    "objects",
+    "genes_before",
+    "genes",
+    "distance_before",
+    "distance",
+)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Violation:
+    """One violation to shrink."""
+
+    job: Job
+    slot: str
+    signature: str
+    scenario: Scenario
+    culprit: str
+
+
+def violations(ledger: Ledger, count: int) -> list[Violation]:
+    """Return violations, one of each kind, then a second of each, until there are enough."""
+    kinds: defaultdict[tuple[str, str], list[Row]] = defaultdict(list)
+    for row in ledger.violating():
+        kinds[row.search, row.signature].append(row)
+    turns = itertools.zip_longest(*kinds.values())
+    rows = [row for turn in turns for row in turn if row is not None]
+    return [_violation(ledger, row) for row in rows[:count]]
+
+
+def _violation(ledger: Ledger, row: Row) -> Violation:
+    text = ledger.job(row.search)
+    assert text is not None
+    done = Done(result=row.result, sha256=row.sha256, record=Path())
+    return Violation(
+        job=loads(text),
+        slot=f"g{row.generation:02d}-s{row.slot:02d}",
+        signature=row.signature,
+        scenario=load_scenario(row.scenario),
+        culprit=culprit_of(done),
+    )
+
+
+def shrink_one(violation: Violation, passes: str, fly: Fly) -> dict[str, Any]:
+    """Shrink a violation by some passes; return a row."""
+    map = load_map(violation.job.map)
+
+    def fails(scenario: Scenario) -> bool:
+        return fly(violation.job, scenario).signature == violation.signature
+
+    found = shrink(
+        violation.scenario,
+        fails,
+        map,
+        BUDGET,
+        culprit=violation.culprit,
+        passes=PASSES[passes],
+    )
+    genome = genome_of(violation.scenario, map)
+    before, after = (complexity(each, genome) for each in (violation.scenario, found.simplest))
+    return {
+        "passes": passes,
+        "map": map.name,
+        "slot": violation.slot,
+        "signature": violation.signature,
+        "flights": found.flights,
+        "objects_before": before[0],
+        "objects": after[0],
+        "genes_before": before[1],
+        "genes": after[1],
+        "distance_before": before[2],
+        "distance": after[2],
+    }
+
+
+def report(rows: list[dict[str, str]]) -> str:
+    """Return a Markdown table of medians."""
+    lines = [
+        "| passes | violations | flights | most | objects left | genes left | distance left |",
+        "| --- | --- | --- | --- | --- | --- | --- |",
+    ]
+    if rows:
+        first = [row for row in rows if row["passes"] == rows[0]["passes"]]
+        lines.append(
+            f"| (as found) | {len(first)} | 0 | 0 | {' | '.join(_medians(first, '_before'))} |"
+        )
+    for passes in PASSES:
+        own = [row for row in rows if row["passes"] == passes]
+        if own:
+            flights = [int(row["flights"]) for row in own]
+            lines.append(
+                f"| {passes} | {len(own)} | {np.median(flights):.0f} | {max(flights)} "
+                f"| {' | '.join(_medians(own, ''))} |"
+            )
+    return "\n".join(lines)
+
+
+def _medians(rows: list[dict[str, str]], suffix: str) -> Iterator[str]:
+    for name in ("objects", "genes", "distance"):
+        yield f"{np.median([float(row[name + suffix]) for row in rows]):.3g}"
+
+
+def main() -> None:
+    """Shrink what is missing, or print the table."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--report", action="store_true")
+    parser.add_argument("--count", type=int, default=COUNT)
+    parser.add_argument("--workers", type=int, default=os.cpu_count() or 1)
+    parser.add_argument("--ledger", type=Path, help="of a finished search, instead of flying one")
+    arguments = parser.parse_args()
+    known = read(FILE)
+    if arguments.report:
+        print(report(known))
+        return
+    done = {(row["passes"], row["map"], row["slot"]) for row in known}
+    source = Ledger(arguments.ledger or search("garl", 0, 400))
+    wanted = [
+        (each, passes)
+        for each in violations(source, arguments.count)
+        for passes in PASSES
+        if (passes, each.job.map, each.slot) not in done
+    ]
+    path = Path(".garl/shrinking/ledger.sqlite")
+    ledger = Ledger(path) if path.is_file() else Ledger.create(path, {})
+    pool = Pool(ledger, arguments.workers)
+    try:
+        # As many at a time as keep the workers busy; what is done is written down.
+        for start in range(0, len(wanted), 6):
+            functions = {
+                f"{each.job.map} {each.slot} {passes}": functools.partial(shrink_one, each, passes)
+                for each, passes in wanted[start : start + 6]
+            }
+            append(FILE, FIELDS, Errands(ledger, pool, lambda: None).run(functions).values())
+    finally:
+        pool.close()
+
+
+if __name__ == "__main__":
+    main()
