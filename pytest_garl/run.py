@@ -65,7 +65,7 @@ class Run:
         """Remember which slots the selected items want."""
         for item in items:
             target = target_of(item)
-            if target is not None and not target.broken:
+            if target is not None:
                 wanted = self.items.setdefault(target.search, {})
                 wanted.setdefault(target.slot, []).append(item.nodeid)
                 self.targets.setdefault(target.search, {})[target.slot] = target
@@ -189,7 +189,9 @@ class Run:
         """Put this search, and the others of the same system, into the ledger."""
         for search, wanted in self.targets.items():
             sample = next(iter(wanted.values()))
-            if search not in self.breeders and sample.system is target.system:
+            if search in self.breeders or sample.system is not target.system:
+                continue
+            if not sample.broken:
                 self._add(search, wanted, npcs)
 
     def _add(self, search: str, wanted: Mapping[Slot, Target], npcs: PolicySpec) -> None:

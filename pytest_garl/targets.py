@@ -114,15 +114,15 @@ def _saved_targets(subject: _Subject, options: Options, test: str) -> Iterator[T
     from pytest_garl.regressions.corpus import entries
 
     for entry in entries(options.cases, name_of(subject.system), options.map_folders):
-        case = entry.case
-        if case is None:
+        head = entry.head
+        if head is None:
             yield dataclasses.replace(subject.target("", FIRST), entry=entry)
             continue
-        if case.scenario.map not in subject.maps or case.test not in ("", test):
+        if head.map not in subject.maps or head.test not in ("", test):
             continue
-        target = dataclasses.replace(subject.target(case.scenario.map, FIRST), entry=entry)
+        target = dataclasses.replace(subject.target(head.map, FIRST), entry=entry)
         yield target
-        if case.status == "fixed":
+        if head.status == "fixed":
             yield dataclasses.replace(target, live=True)
 
 

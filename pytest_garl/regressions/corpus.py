@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import dataclasses
 import difflib
 import fcntl
 import functools
@@ -13,7 +14,7 @@ from pathlib import Path
 
 from pytest_garl.errors import GarlError, ScenarioError
 from pytest_garl.regressions.case import Case
-from pytest_garl.regressions.files import dumps, load
+from pytest_garl.regressions.files import Head, dumps, load, load_head
 
 
 class CorpusError(GarlError):
@@ -22,16 +23,31 @@ class CorpusError(GarlError):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Entry:
-    """One file of the corpus: its case, or what is wrong with it."""
+    """One file of the corpus.
+
+    ``head`` is what collecting needs; the rest of the file is read when somebody asks for it.
+    """
 
     path: Path
-    case: Case | None
-    problem: str = ""
+    changed: int
+    map_folders: tuple[Path, ...]
+    head: Head | None
+    fault: str = ""
 
     @property
     def name(self) -> str:
         """Name in item ids: that of the file."""
         return self.path.stem
+
+    @property
+    def case(self) -> Case | None:
+        """The case, or None where something is wrong with the file."""
+        return None if self.fault else _load(self.path, self.changed, self.map_folders)[0]
+
+    @property
+    def problem(self) -> str:
+        """What is wrong with the file: source, key, what was expected; nothing for a good one."""
+        return self.fault or _load(self.path, self.changed, self.map_folders)[1]
 
 
 def folder_of(cases: Path, system: str) -> Path:
@@ -64,23 +80,31 @@ def _in_folder(folder: Path, map_folders: tuple[Path, ...]) -> Iterator[Entry]:
 
 @functools.lru_cache(maxsize=10_000)
 def _read(path: Path, changed: int, map_folders: tuple[Path, ...]) -> Entry:
-    """Read a file once, however many tests fly it."""
+    """Read a file's head once, however many tests fly it."""
+    try:
+        head, fault = load_head(path), ""
+    except ScenarioError as error:
+        head, fault = None, str(error)
+    return Entry(path=path, changed=changed, map_folders=map_folders, head=head, fault=fault)
+
+
+@functools.lru_cache(maxsize=10_000)
+def _load(path: Path, changed: int, map_folders: tuple[Path, ...]) -> tuple[Case | None, str]:
     del changed
     try:
-        return Entry(path=path, case=load(path, map_folders))
+        return load(path, map_folders), ""
     except ScenarioError as error:
-        return Entry(path=path, case=None, problem=str(error))
+        return None, str(error)
 
 
 def _of_system(entry: Entry, system: str) -> Entry:
-    if entry.case is None or entry.case.system == system:
+    if entry.head is None or entry.head.system == system:
         return entry
-    return Entry(
-        path=entry.path,
-        case=None,
-        problem=f"{entry.path}: key 'system': found {entry.case.system!r}, expected {system!r}, "
-        "the only system with tests whose cases lie in this folder",
+    fault = (
+        f"{entry.path}: key 'system': found {entry.head.system!r}, expected {system!r}, the only "
+        "system with tests whose cases lie in this folder"
     )
+    return dataclasses.replace(entry, head=None, fault=fault)
 
 
 @contextlib.contextmanager

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import functools
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -113,16 +114,23 @@ def load_map(name: str, search_path: Sequence[Path] = ()) -> Map:
     Raises ScenarioError for an unknown name or a broken file; the message names file and
     key.
     """
-    from pytest_garl.scenarios.maps.reader import read_map
-
     for folder in _folders(search_path):
         file = folder / f"{name}.toml"
         if file in _maps_in(folder):
-            return read_map(file)
+            return _read(file, file.stat().st_mtime_ns)
     raise ScenarioError(
         f"unknown map {name!r}; expected one of {', '.join(map_names(search_path))}. "
         "A map of your own is a file scenarios/maps/<name>.toml"
     )
+
+
+@functools.lru_cache(maxsize=64)
+def _read(file: Path, changed: int) -> Map:
+    """Read a file once, until it changes."""
+    from pytest_garl.scenarios.maps.reader import read_map
+
+    del changed
+    return read_map(file)
 
 
 def _folders(search_path: Sequence[Path]) -> tuple[Path, ...]:
