@@ -56,6 +56,7 @@ VARIANTS: dict[str, Callable[[Plan], Method]] = {
     "one cell": functools.partial(Garl, cell=one),
     "cells of violations only": functools.partial(Garl, cell=found),
     "without exploring": functools.partial(Garl, explores=0.0),
+    "half of it exploring": functools.partial(Garl, explores=0.5),
     "cells in turn": functools.partial(Garl, learns_cells=False),
     "without aimed steps": functools.partial(Garl, aims=0.0),
     "without other weather": functools.partial(Garl, weathers=0.0),
