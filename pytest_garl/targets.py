@@ -112,10 +112,12 @@ def _saved_targets(subject: _Subject, options: Options, test: str) -> Iterator[T
     if not options.cases.is_dir():
         return
     from pytest_garl.regressions.corpus import entries
+    from pytest_garl.scenarios.maps import map_names
 
+    there = map_names(options.map_folders)
     for entry in entries(options.cases, name_of(subject.system), options.map_folders):
         head = entry.head
-        if head is None:
+        if head is None or head.map not in there:
             yield dataclasses.replace(subject.target("", FIRST), entry=entry)
             continue
         if head.map not in subject.maps or head.test not in ("", test):

@@ -10,10 +10,10 @@ from typing import Any
 
 from pytest_garl.adversary.recorded import recorded_spec
 from pytest_garl.regressions.case import Case, Evidence, MoveList, Violation
+from pytest_garl.regressions.moves import simpler
 from pytest_garl.regressions.neighbours import COUNT, neighbours
 from pytest_garl.regressions.shrink import complexity, genome_of, shrink
 from pytest_garl.regressions.story import tell
-from pytest_garl.regressions.waiting import postponed
 from pytest_garl.scenarios.maps import Map
 from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.search.errands import Done, Fly
@@ -171,6 +171,9 @@ class Pursuit:
         budget = self._left - COUNT
         if budget <= 0:
             return best
+        if budget > 4 * (1 + COUNT):
+            # A shorter record of moves wants a share as well.
+            budget -= 1 + COUNT
         found = shrink(best.scenario, fails, inquiry.map, budget, culprit=culprit_of(best.done))
         # From the simplest back towards the first, until it does not sit on an edge.
         for scenario in reversed(found.history[1:]):
@@ -181,16 +184,16 @@ class Pursuit:
             robust = self._robust(scenario, moves)
             if robust >= best.robust:
                 failure = _Failure(scenario=scenario, moves=moves, done=done, robust=robust)
-                return self._waiting(failure)
+                return self._recorded(failure)
         return best
 
-    def _waiting(self, failure: _Failure) -> _Failure:
-        """Let the culprit wait where it strikes from, as long as the failure survives it."""
+    def _recorded(self, failure: _Failure) -> _Failure:
+        """Return the failure with the shortest record of moves that it survives."""
         culprit = culprit_of(failure.done)
-        if not culprit or not failure.done.record.exists():
+        if not any(own for _, own in failure.moves) or not failure.done.record.exists():
             return failure
         flight = load(failure.done.record)
-        candidates = postponed(failure.scenario, failure.moves, flight, culprit, self._inquiry.map)
+        candidates = simpler(failure.scenario, failure.moves, flight, culprit, self._inquiry.map)
         for scenario, moves in candidates:
             if self._left < 1 + COUNT:
                 break

@@ -233,7 +233,9 @@ def _where(flight: Flight) -> str:
     place = f"{distance:.1f} m {point} of the marker" if distance > 0.3 else "over the marker"
     recent = [s for s in flight.steps if s.time_s > flight.elapsed_s - 2.0]
     hidden = ""
-    if recent and min(s.marker_visible for s in recent) < 0.99 and flight.outcome != "landed":
-        share = 100 * (1 - sum(s.marker_visible for s in recent) / len(recent))
-        hidden = f" In the last 2 s {share:.0f} % of the marker was hidden or out of the frame."
+    share = 1 - sum(s.marker_visible for s in recent) / len(recent) if recent else 0.0
+    if share >= 0.01 and flight.outcome != "landed":
+        hidden = (
+            f" In the last 2 s {100 * share:.0f} % of the marker was hidden or out of the frame."
+        )
     return f"At {flight.elapsed_s:.1f} s the UAV was {max(0.0, z - 0.2):.1f} m up, {place}.{hidden}"

@@ -1,7 +1,8 @@
-"""Shorter records of moves: an object waits where it strikes from, instead of coming from afar."""
+"""Shorter records of moves: whole hundredths, and an object that waits where it strikes from."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 
 from pytest_garl.regressions.case import MoveList
@@ -17,14 +18,34 @@ LEADS_S = (2.0, 4.0, 8.0)
 Moves = tuple[tuple[str, MoveList], ...]
 
 
-def postponed(
+def simpler(
     scenario: Scenario, moves: Moves, flight: Flight, name: str, map: Map
 ) -> Iterator[tuple[Scenario, Moves]]:
-    """Yield scenarios in which an object stands until shortly before the end of the flight.
+    """Yield scenarios with shorter records, the shortest first.
 
-    It stands where it was at that time; what makes no sense, such as standing on the marker, is
-    left out.
+    In the first ones the object ``name`` stands until shortly before the end of the flight,
+    where it was at that time; what makes no sense, such as standing on the marker, is left out.
+    In all of them moves are whole hundredths, so that equal ones are one run.
     """
+    yield from _postponed(scenario, moves, flight, name, map)
+    yield scenario, tuple((each, _rounded(own)) for each, own in moves)
+
+
+def _rounded(moves: MoveList) -> MoveList:
+    return tuple(_round(x, y) for x, y in moves)
+
+
+def _round(x: float, y: float) -> tuple[float, float]:
+    """Return a move in whole hundredths that is no longer than 1, without negative zeros."""
+    x, y = round(x, 2) + 0.0, round(y, 2) + 0.0
+    while math.hypot(x, y) > 1:
+        x, y = (round(v - math.copysign(0.01, v), 2) + 0.0 if v else v for v in (x, y))
+    return x, y
+
+
+def _postponed(
+    scenario: Scenario, moves: Moves, flight: Flight, name: str, map: Map
+) -> Iterator[tuple[Scenario, Moves]]:
     # A team's own simulator may not record what its objects do.
     track = next((item.track for item in flight.objects if item.name == name), None)
     own = dict(moves).get(name, ())
@@ -41,4 +62,9 @@ def postponed(
         if problems(there, map):
             continue
         still: MoveList = ((0.0, 0.0),) * wait + own[wait:]
-        yield there, tuple((each, still if each == name else its) for each, its in moves)
+        rounded = {key: round(value, 3) for key, value in start_genes(name, (x, y), map).items()}
+        there = there.replace(rounded)
+        yield (
+            there,
+            tuple((each, _rounded(still if each == name else its)) for each, its in moves),
+        )
