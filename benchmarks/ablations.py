@@ -51,12 +51,17 @@ def one(result: dict[str, Any]) -> str:
     return ""
 
 
+def half_exploring(plan: Plan) -> Method:
+    """Return ``garl`` with half of its scenarios without parents."""
+    return Garl(plan, explores=0.5)
+
+
 VARIANTS: dict[str, Callable[[Plan], Method]] = {
     "garl": find_method("garl"),
     "one cell": functools.partial(Garl, cell=one),
     "cells of violations only": functools.partial(Garl, cell=found),
     "without exploring": functools.partial(Garl, explores=0.0),
-    "half of it exploring": functools.partial(Garl, explores=0.5),
+    "half of it exploring": half_exploring,
     "cells in turn": functools.partial(Garl, learns_cells=False),
     "without aimed steps": functools.partial(Garl, aims=0.0),
     "without other weather": functools.partial(Garl, weathers=0.0),

@@ -11,6 +11,7 @@ import pytest
 
 from pytest_garl.errors import GarlError
 from pytest_garl.regressions.follow_up import Place, Pursued, follow_up, inquiries
+from pytest_garl.reports.progress import live
 from pytest_garl.run import Run
 
 
@@ -33,7 +34,8 @@ def pursue(run: Run, config: pytest.Config) -> None:
                 f"garl: confirming and shrinking {len(wanted)} new kinds of violation, at most "
                 f"{sum(each.budget for each in wanted)} flights"
             )
-            run.pursued = follow_up(run.ledger, run.pool, place, wanted, run.tick)
+            with live(run, config):
+                run.pursued = follow_up(run.ledger, run.pool, place, wanted, run.tick)
     except KeyboardInterrupt:
         reporter.ensure_newline()
         reporter.write_line(
@@ -44,8 +46,6 @@ def pursue(run: Run, config: pytest.Config) -> None:
         reporter.ensure_newline()
         reporter.write_line(f"garl: {error}", red=True)
         run.troubled = True
-    finally:
-        run.waited()
 
 
 def told(pursued: tuple[Pursued, ...], root: Path) -> list[str]:

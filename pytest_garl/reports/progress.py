@@ -16,7 +16,6 @@ from typing import Any
 import pytest
 
 from pytest_garl.errors import LedgerError
-from pytest_garl.reports.terminal import duration
 from pytest_garl.run import Run
 from pytest_garl.search.ledger import Ledger, Progress
 
@@ -40,8 +39,12 @@ def live(run: Run, config: pytest.Config) -> Iterator[None]:
         yield
     else:
         with closing(Line()) as line:
+            before = run.tick, run.waited
             run.tick, run.waited = partial(line.refresh, run.ledger), line.clear
-            yield
+            try:
+                yield
+            finally:
+                run.tick, run.waited = before
 
 
 def text(
@@ -67,6 +70,11 @@ def text(
     if margins:
         words.append("nearest " + ", ".join(sorted(margins)))
     return "  ".join(words)
+
+
+def duration(seconds: float) -> str:
+    """Return a duration in words."""
+    return f"{seconds:.0f} s" if seconds < 90 else f"{seconds / 60:.0f} min"
 
 
 _SHOWN = {"distance", "time", "collision"}
@@ -99,8 +107,13 @@ class Line:
             return False
         self._read = now
         searches = ledger.progress()
-        if searches:
-            self._began = self._began or now
+        if not searches:
+            return True
+        self._began = self._began or now
+        if all(each.flown == each.all for each in searches):
+            errands = ledger.meters().get("errands", 0)
+            self._text = f"garl: {errands:.0f} flights to confirm and shrink what was found"
+        else:
             self._text = text(searches, ledger.violations(), ledger.nearest(), now - self._began)
         return True
 

@@ -6,6 +6,7 @@ from typing import Any
 
 from pytest_garl.reports.aftermath import told
 from pytest_garl.reports.explain import MAYBE_FIXED
+from pytest_garl.reports.progress import duration
 from pytest_garl.run import Run
 from pytest_garl.search.slots import Slot
 from pytest_garl.verdicts.metrics import share_interval, top_k
@@ -109,8 +110,3 @@ def _spent(meters: dict[str, float]) -> str:
 
 def _percent(count: int, total: int) -> str:
     return f"{100 * count / total:.1f} %"
-
-
-def duration(seconds: float) -> str:
-    """Return a duration in words."""
-    return f"{seconds:.0f} s" if seconds < 90 else f"{seconds / 60:.0f} min"

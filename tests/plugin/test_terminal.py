@@ -194,3 +194,15 @@ def test_junit_carries_what_was_found(pytester: pytest.Pytester, parallel: tuple
         }
         assert f"[{found['garl.slot']}]" in str(case.get("name"))
         assert float(found["garl.elapsed_s"]) == 14.2
+
+
+def test_the_line_tells_of_shrinking_and_goes(pytester: pytest.Pytester) -> None:
+    slow_project(pytester)
+    written = on_a_terminal(
+        pytester, "--garl-budget=8", "--garl-shrink=12", "--garl-workers=1", "-q"
+    )
+    assert "garl: confirming and shrinking" in written
+    assert re.search(r"garl: \d+ flights to confirm and shrink", written)
+    after = "\n".join(screen(written))
+    assert "saved scenarios/regressions/slow/lawn-" in after.replace("\n", "")
+    assert "flights to confirm and shrink" not in after
