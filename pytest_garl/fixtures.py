@@ -101,11 +101,11 @@ def npcs(request: pytest.FixtureRequest) -> PolicySpec:
     return policy_spec(run.options.npcs if run else "dqn")
 
 
-def _stop(request: pytest.FixtureRequest, error: GarlError) -> NoReturn:
+def stop(item: pytest.Item, error: GarlError) -> NoReturn:
     """End the session: without ledger or policy no other item would fare better."""
-    if not hasattr(request.config, "workerinput"):
+    if not hasattr(item.config, "workerinput"):
         pytest.exit(f"garl: {error}", returncode=pytest.ExitCode.INTERNAL_ERROR)
-    request.node.user_properties.append((FATAL, str(error)))
+    item.user_properties.append((FATAL, str(error)))
     pytest.fail(f"garl: {error}", pytrace=False)
 
 
@@ -116,7 +116,7 @@ def landing(request: pytest.FixtureRequest, garl_slot: Target, npcs: PolicySpec)
     try:
         result = run.fly(garl_slot, npcs)
     except GarlError as error:
-        _stop(request, error)
+        stop(request.node, error)
     landing = Landing(garl_slot, result, run.record(garl_slot))
     verdict = result["verdict"]
     request.node.user_properties += [

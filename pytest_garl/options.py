@@ -35,6 +35,8 @@ class Options:
     repeat: str
     duplicates: Literal["xfail", "fail"]
     npcs: str
+    baseline: Path | None
+    level: float
     shrink: int
     xfail_strict: bool
     cases: Path
@@ -83,6 +85,8 @@ def read_options(config: pytest.Config) -> Options:
             Literal["xfail", "fail"], _among("duplicates", text["duplicates"], ("xfail", "fail"))
         ),
         npcs=_npcs(text["npcs"], text["method"]),
+        baseline=_baseline(config),
+        level=_level(text["level"]),
         shrink=_integer("shrink", text["shrink"], 0) if text["shrink"] else budget // 4,
         xfail_strict=bool(config.getini("garl_xfail_strict")),
         cases=config.rootpath / str(config.getini("garl_cases")),
@@ -129,6 +133,25 @@ def _seconds(text: str) -> float:
     if not 0 < value < 1e6:
         raise _wrong("timeout", text, "a positive number of seconds")
     return value
+
+
+def _level(text: str) -> float:
+    try:
+        value = float(text)
+    except ValueError:
+        value = -1.0
+    if not 0 < value < 1:
+        raise _wrong("level", text, "a number between 0 and 1")
+    return value
+
+
+def _baseline(config: pytest.Config) -> Path | None:
+    """Return the file: the command line's as seen from here, the ini key's from the root."""
+    given = config.getoption("--garl-baseline")
+    text, folder = (given, Path()) if given else (config.getini("garl_baseline"), config.rootpath)
+    if text and not (folder / text).is_file():
+        raise _wrong("baseline", text, "a file that `garl baseline save` wrote")
+    return folder / text if text else None
 
 
 def _among(name: str, text: str, known: tuple[str, ...]) -> str:

@@ -11,7 +11,7 @@ import pytest
 from pytest_garl import hookspecs
 from pytest_garl.errors import GarlError
 from pytest_garl.fixtures import garl_slot, landing, npcs, scenario
-from pytest_garl.switches import FATAL, RUN, add_options, asked, target_of
+from pytest_garl.switches import FATAL, RUN, add_options, asked, flies, target_of
 
 __all__ = ["garl_slot", "landing", "npcs", "scenario"]
 
@@ -38,7 +38,12 @@ def pytest_configure(config: pytest.Config) -> None:
         return
     from pytest_garl.options import read_options
 
-    if read_options(config).searches and not config.option.collectonly:
+    options = read_options(config)
+    if options.baseline is not None:
+        from pytest_garl.gating import register
+
+        register(config, options)
+    if options.searches and not config.option.collectonly:
         _begin(config)
 
 
@@ -83,7 +88,7 @@ def pytest_collection_finish(session: pytest.Session) -> None:
     config = session.config
     if config.option.collectonly:
         return
-    if RUN not in config.stash and any(target_of(item) for item in session.items):
+    if RUN not in config.stash and any(flies(item) for item in session.items):
         _begin(config)
     run = config.stash.get(RUN, None)
     if run is not None:

@@ -26,6 +26,7 @@ if TYPE_CHECKING:
     from pytest_garl.regressions.follow_up import Pursued
     from pytest_garl.scenarios.scenario import Scenario
     from pytest_garl.search.breeder import Breeder
+    from pytest_garl.search.errands import Done
     from pytest_garl.search.job import Job
     from pytest_garl.search.method import Flown, Method
     from pytest_garl.simulation.policy import PolicySpec
@@ -79,7 +80,7 @@ class Run:
             text = self.ledger.job(search)
             if text is not None:
                 then = loads(text)
-                differing = self._job(target, then.npcs).differences(then)
+                differing = self.job(target, then.npcs).differences(then)
                 if differing:
                     raise LedgerError(
                         f"--garl-resume: {target.system.__qualname__} on {target.map} is not what "
@@ -169,6 +170,18 @@ class Run:
             hashes.append(self.ledger.sha256(errand, 0, 0))
         return results, hashes
 
+    def fly_all(
+        self, target: Target, npcs: PolicySpec, scenarios: Sequence[Scenario]
+    ) -> Sequence[Done]:
+        """Return what scenarios come to that are flown beside the searches."""
+        from pytest_garl.search.batch import fly_all
+
+        try:
+            job = self.job(target, npcs)
+            return list(fly_all(self.ledger, self.pool, job, scenarios, self._advance))
+        finally:
+            self.waited()
+
     def _lower(self, search: str, below: Slot) -> list[Slot]:
         return [slot for slot in sorted(self.items[search]) if slot < below]
 
@@ -202,7 +215,7 @@ class Run:
 
         target = next(iter(wanted.values()))
         npcs = _steered(target, npcs)
-        job = self._job(target, npcs)
+        job = self.job(target, npcs)
         case = target.entry.case if target.entry else None
         absent = case.scenario.absent if case else ()
         check_policy(npcs, load_map(job.map, self.options.map_folders).without(absent))
@@ -228,7 +241,8 @@ class Run:
             )
         self.breeders[search] = Breeder(self.ledger, search, method, slots)
 
-    def _job(self, target: Target, npcs: PolicySpec) -> Job:
+    def job(self, target: Target, npcs: PolicySpec) -> Job:
+        """Return what a child must know to fly a target."""
         from pytest_garl.scenarios.maps import load_map
         from pytest_garl.search.job import Job
 

@@ -95,6 +95,19 @@ OPTIONS = (
         "before it is saved; 0 saves nothing (default: a quarter of the budget).",
     ),
     Option(
+        name="baseline",
+        metavar="FILE",
+        help="Gate: fly the scenarios of a file that `garl baseline save` wrote, and fail on a "
+        "violation of a new kind and on a significantly worse rate.",
+    ),
+    Option(
+        name="level",
+        metavar="P",
+        default="0.05",
+        help="How often the gate may fail a stack that is no worse than the baseline, per landing "
+        "system and map (default: 0.05).",
+    ),
+    Option(
         name="npcs",
         metavar="POLICY",
         help=f"Who moves people, dogs and birds: {', '.join(POLICIES)}, or weights (.npz) that "
@@ -134,9 +147,14 @@ def add_options(parser: pytest.Parser) -> None:
 def asked(config: pytest.Config) -> bool:
     """Whether the command line or the configuration says anything about flying."""
     names = [option.name for option in OPTIONS]
-    return any(config.getoption(f"--garl-{name}") is not None for name in names) or bool(
-        config.getini("garl_budget") or config.getini("garl_repeat")
+    return any(config.getoption(f"--garl-{name}") is not None for name in names) or any(
+        config.getini(f"garl_{name}") for name in ("budget", "repeat", "baseline")
     )
+
+
+def flies(item: pytest.Item) -> bool:
+    """Whether an item needs a run: a landing test, or a gate against a baseline."""
+    return target_of(item) is not None or hasattr(item, "garl_gate")
 
 
 def target_of(item: pytest.Item) -> Target | None:

@@ -74,7 +74,7 @@ class Target:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class _Subject:
+class Subject:
     """What a marker says."""
 
     system: type
@@ -83,6 +83,7 @@ class _Subject:
     deterministic: bool
 
     def target(self, map: str, slot: Slot) -> Target:
+        """Return what an item tests that flies a slot on a map."""
         return Target(
             system=self.system,
             map=map,
@@ -97,7 +98,7 @@ def targets_for(marker: pytest.Mark, options: Options, test: str) -> list[Target
 
     Raises GarlError for a marker that makes no sense.
     """
-    subject = _read_marker(marker, options)
+    subject = read_marker(marker, options)
     if options.repeat:
         return [each for map in subject.maps for each in _repeated_targets(subject, map, options)]
     searched = [
@@ -108,7 +109,7 @@ def targets_for(marker: pytest.Mark, options: Options, test: str) -> list[Target
     return [*_saved_targets(subject, options, test), *searched]
 
 
-def _saved_targets(subject: _Subject, options: Options, test: str) -> Iterator[Target]:
+def _saved_targets(subject: Subject, options: Options, test: str) -> Iterator[Target]:
     if not options.cases.is_dir():
         return
     from pytest_garl.regressions.corpus import entries
@@ -140,7 +141,7 @@ def repeated(options: Options, target: Target) -> Scenario:
     return load_scenario(_recorded(options, target)[name_of(target.system)])
 
 
-def _repeated_targets(subject: _Subject, map: str, options: Options) -> list[Target]:
+def _repeated_targets(subject: Subject, map: str, options: Options) -> list[Target]:
     if Path(options.repeat).is_file():
         from pytest_garl.scenarios.files import map_name_in
 
@@ -175,7 +176,8 @@ def name_of(system: type) -> str:
     return f"{system.__module__}:{system.__qualname__}"
 
 
-def _read_marker(marker: pytest.Mark, options: Options) -> _Subject:
+def read_marker(marker: pytest.Mark, options: Options) -> Subject:
+    """Return what a marker says; raise GarlError for one that makes no sense."""
     from pytest_garl.scenarios.maps import load_map
     from pytest_garl.verdicts.verdict import Limits
 
@@ -205,7 +207,7 @@ def _read_marker(marker: pytest.Mark, options: Options) -> _Subject:
     deterministic = marker.kwargs.get("deterministic", True)
     if not isinstance(deterministic, bool):
         raise GarlError(f"mark.garl: deterministic={deterministic!r}: expected True or False")
-    return _Subject(
+    return Subject(
         system=system,
         maps=tuple(m for m in maps if not options.maps or m in options.maps),
         limits=limits,

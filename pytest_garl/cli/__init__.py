@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import click
 
+from pytest_garl.cli.baseline import baseline, diff
 from pytest_garl.cli.cases import cases
 from pytest_garl.cli.train import train
 from pytest_garl.errors import GarlError
@@ -30,5 +31,7 @@ def main() -> None:
     """
 
 
+main.add_command(baseline)
 main.add_command(cases)
+main.add_command(diff)
 main.add_command(train)

@@ -14,6 +14,7 @@ from pytest_garl.regressions.case import Case, Evidence, MoveList, Status, Viola
 from pytest_garl.scenarios.files import gene_lines, read_genes
 from pytest_garl.scenarios.maps import Map
 from pytest_garl.scenarios.toml_reader import Table, parse
+from pytest_garl.scenarios.toml_writer import quoted as _text
 from pytest_garl.verdicts.verdict import Limits, PropertyName, ViolationType
 
 SCHEMA = 1
@@ -143,7 +144,7 @@ def loads(text: str, load_map: Callable[[str], Map], *, source: str = "case") ->
         policy_sha256=policy.text("sha256"),
         moves=_read_moves(top.table("moves"), map, scenario.absent),
         evidence=_read_evidence(top.table("evidence")),
-        limits=_read_limits(top.table("limits")),
+        limits=read_limits(top.table("limits")),
         test=head.test,
         assertion=top.text("assertion", ""),
     )
@@ -183,7 +184,8 @@ def _text_of(path: Path) -> str:
         raise ScenarioError(f"{path}: cannot be read: {error}") from error
 
 
-def _read_limits(table: Table) -> Limits:
+def read_limits(table: Table) -> Limits:
+    """Return the limits in a table of their own."""
     table.only({"distance_m", "time_s", "abort"})
     abort = table.text("abort", among=("ok", "violation"))
     return Limits(
@@ -244,12 +246,3 @@ def _read_evidence(table: Table) -> Evidence:
 def _moves(moves: MoveList) -> str:
     runs = [(len(list(run)), x, y) for (x, y), run in itertools.groupby(moves)]
     return f"[{', '.join(f'[{count}, {x!r}, {y!r}]' for count, x, y in runs)}]"
-
-
-def _text(value: str) -> str:
-    """Return a TOML basic string."""
-    escaped = value.replace("\\", "\\\\").replace('"', '\\"')
-    plain = "".join(
-        char if char >= " " and char != "\x7f" else f"\\u{ord(char):04x}" for char in escaped
-    )
-    return f'"{plain}"'

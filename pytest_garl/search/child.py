@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import TextIO
 
 from pytest_garl.errors import LedgerError, PolicyError
+from pytest_garl.search.checkout import see_only
 from pytest_garl.search.ledger import Ledger
 from pytest_garl.search.slots import flight_name
 
@@ -60,9 +61,11 @@ def _beat(path: Path) -> None:
         ledger.renew()
 
 
-def main(path: str) -> None:
-    """Fly until the parent process is gone."""
+def main(path: str, *checkouts: str) -> None:
+    """Fly until the parent process is gone; with checkouts, see only the first of them."""
     parent = os.getppid()
+    if checkouts:
+        see_only(checkouts)
     ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGTERM)
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     import cv2
@@ -103,6 +106,6 @@ def main(path: str) -> None:
 
 if __name__ == "__main__":
     try:
-        main(sys.argv[1])
+        main(*sys.argv[1:])
     except (LedgerError, PolicyError) as error:
         sys.exit(f"{CANNOT_GO_ON}{error}")

@@ -13,6 +13,7 @@ from typing import Any
 
 from pytest_garl.errors import LedgerError
 from pytest_garl.scenarios.maps import load_map
+from pytest_garl.search.checkout import Checkout
 from pytest_garl.search.child import CANNOT_GO_ON, THREADS, dump_file
 from pytest_garl.search.job import broken_result, fly_job, load_scenario, loads
 from pytest_garl.search.ledger import Ledger
@@ -24,10 +25,14 @@ MOST_LOSSES = 3
 
 
 class Pool:
-    """The children of this process; several pools share a ledger and its seats."""
+    """The children of this process; several pools share a ledger and its seats.
 
-    def __init__(self, ledger: Ledger, workers: int) -> None:
+    With a ``checkout`` they see the modules of that landing stack and of no other.
+    """
+
+    def __init__(self, ledger: Ledger, workers: int, checkout: Checkout | None = None) -> None:
         self._ledger, self._workers = ledger, workers
+        self._folders = checkout.arguments if checkout else ()
         self._children: dict[int, subprocess.Popen[str]] = {}
         self._losses = 0
 
@@ -84,7 +89,13 @@ class Pool:
     def _spawn(self) -> int:
         environment = {**os.environ, **THREADS}
         child = subprocess.Popen(
-            [sys.executable, "-m", "pytest_garl.search.child", str(self._ledger.path)],
+            [
+                sys.executable,
+                "-m",
+                "pytest_garl.search.child",
+                str(self._ledger.path),
+                *self._folders,
+            ],
             env=environment,
             stdin=subprocess.DEVNULL,
             stdout=subprocess.DEVNULL,

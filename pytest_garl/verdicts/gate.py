@@ -142,8 +142,9 @@ class Comparison:
         found += [f"new signature: {each}" for each in self.new_signatures]
         return tuple(found) if self.pairs else ("no pair could be compared",)
 
-    def figures(self) -> Iterator[str]:
-        """Yield lines about both rates."""
+    def summary(self) -> Iterator[str]:
+        """Yield the answer, and lines about both rates."""
+        yield "gate passed" if self.passed else f"gate FAILED: {'; '.join(self.reasons)}"
         alike = sum(bool(p.base.sha256) and p.base.sha256 == p.head.sha256 for p in self.pairs)
         yield (
             f"{len(self.pairs)} pairs flown, {alike} of them the same flight to the byte, "
@@ -158,8 +159,7 @@ class Comparison:
 
     def sentences(self) -> Iterator[str]:
         """Yield all that there is to tell, line by line: the answer, figures, pairs."""
-        yield "gate passed" if self.passed else f"gate FAILED: {'; '.join(self.reasons)}"
-        yield from self.figures()
+        yield from self.summary()
         for fate in DIFFERENT:
             pairs = self.of(fate)
             for pair in pairs[:SHOWN]:
@@ -211,7 +211,8 @@ def worse(broke: int, mended: int) -> float:
     got worse: one that got better must never fail it.  Without discordant pairs it is 1.
     """
     n = broke + mended
-    return sum(math.comb(n, k) for k in range(broke, n + 1)) / 2**n
+    ways: int = 2**n
+    return sum(math.comb(n, k) for k in range(broke, n + 1)) / ways
 
 
 def holm(values: Sequence[float]) -> tuple[float, ...]:

@@ -1,0 +1,247 @@
+"""``garl baseline`` and ``garl diff``: what a stack does today, and what a change does to it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+from rich.console import Console
+from rich.progress import track
+from rich.table import Table
+
+from pytest_garl.errors import OptionError
+
+if TYPE_CHECKING:
+    from pytest_garl.regressions.survey import Survey
+    from pytest_garl.search.errands import Done
+    from pytest_garl.search.reference import Reference
+    from pytest_garl.verdicts.gate import Comparison, Fate
+
+FAILED = 1
+"""Exit status of a comparison that fails; a usage error is 2."""
+COLOURS = {"broke": "red", "mended": "green", "changed": "yellow"}
+_FOLDER = click.Path(path_type=Path, file_okay=False, exists=True)
+_FILE = click.Path(path_type=Path, dir_okay=False)
+
+_SURVEY = (
+    click.option("--system", metavar="MODULE:CLASS", help="The landing system."),
+    click.option("--maps", default="court,lawn", show_default=True, help="Separated by commas."),
+    click.option(
+        "--count",
+        type=click.IntRange(min=1),
+        default=100,
+        show_default=True,
+        help="Scenarios per map. To fail a worse rate takes six that broke at the least.",
+    ),
+    click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True),
+    click.option(
+        "--weather",
+        type=click.Choice(["confined", "full"]),
+        default="confined",
+        show_default=True,
+        help="How bad the weather may get, as for --garl-weather.",
+    ),
+    click.option(
+        "--npcs",
+        default="waypoint",
+        show_default=True,
+        help="Who moves people, dogs and birds, as for --garl-npcs.",
+    ),
+    click.option("--distance-m", type=float, default=1.5, show_default=True, help="Limit."),
+    click.option("--time-s", type=float, default=120.0, show_default=True, help="Limit."),
+    click.option(
+        "--abort",
+        type=click.Choice(["ok", "violation"]),
+        default="ok",
+        show_default=True,
+        help="Whether an aborted landing is a violation.",
+    ),
+    click.option(
+        "--simulator",
+        metavar="MODULE:FUNCTION",
+        default="",
+        help="What your hook pytest_garl_fly returns (default: the built-in simulator).",
+    ),
+    click.option(
+        "--workers",
+        type=click.IntRange(min=1),
+        default=2,
+        show_default=True,
+        help="Flying child processes.",
+    ),
+)
+
+
+def _survey_options(command: Callable[..., Any]) -> Callable[..., Any]:
+    for option in reversed(_SURVEY):
+        command = option(command)
+    return command
+
+
+@click.group()
+def baseline() -> None:
+    """Keep what a landing system does today, for pytest --garl-baseline=FILE to compare with."""
+
+
+@baseline.command()
+@_survey_options
+@click.option(
+    "--from-ledger",
+    "ledger",
+    type=_FILE,
+    help="Keep what a finished search flew (.garl/ledger.sqlite) instead of flying.",
+)
+@click.option("--out", type=_FILE, required=True, help="The file to write, to be committed.")
+def save(ledger: Path | None, out: Path, workers: int, system: str | None, **chosen: Any) -> None:
+    """Fly random scenarios with the landing system of this folder, and keep them.
+
+    Run it where you run pytest. The same options choose the same scenarios, whatever the system.
+    """
+    from pytest_garl.regressions import baseline as files
+    from pytest_garl.regressions.survey import from_ledger, survey_checkout
+    from pytest_garl.search.checkout import Checkout
+
+    if ledger is not None:
+        made = from_ledger(ledger)
+    elif system is None:
+        raise OptionError(
+            "garl baseline save: found neither --system nor --from-ledger, expected one of them, "
+            "such as --system landing_systems.mm_mls:MultiModuleLandingSystem"
+        )
+    else:
+        checkout = Checkout(folder=Path.cwd())
+        made = survey_checkout(_survey(**chosen), checkout, system, workers, _progress)
+    files.save(out, made)
+    for each in made.sets:
+        bad = sum(sample.answer.violated for sample in each.samples)
+        given_up = sum(sample.answer.aborted for sample in each.samples)
+        click.echo(f"{each.title}: {len(each.samples)} flown, {bad} violations, {given_up} aborts")
+    click.echo(f"saved {out}; the gate: pytest --garl-baseline={out}")
+
+
+@baseline.command()
+@click.argument("file", type=click.Path(path_type=Path, exists=True, dir_okay=False))
+@click.argument("name")
+def scenario(file: Path, name: str) -> None:
+    """Print one scenario of a baseline, such as court-17, as a file for pytest --garl-repeat."""
+    from pytest_garl.regressions import baseline as files
+    from pytest_garl.scenarios.files import dumps
+
+    for each in files.load(file, (_maps_folder(),)).sets:
+        for index, sample in enumerate(each.samples):
+            if each.name(index) == name:
+                click.echo(f"# {name} of {file}; objects were moved by {each.npcs}")
+                click.echo(dumps(sample.scenario), nl=False)
+                return
+    raise OptionError(f"{file}: holds no scenario {name!r}; expected one such as court-0")
+
+
+@click.command()
+@click.argument("base", type=_FOLDER)
+@click.argument("head", type=_FOLDER)
+@_survey_options
+@click.option(
+    "--level",
+    type=click.FloatRange(min=0, max=1, min_open=True, max_open=True),
+    default=0.05,
+    show_default=True,
+    help="How often a stack that is no worse may fail, per map.",
+)
+def diff(
+    base: Path,
+    head: Path,
+    level: float,
+    workers: int,
+    system: str | None,
+    **chosen: Any,
+) -> None:
+    """Fly the same scenarios with two checkouts of a landing stack and compare pair by pair.
+
+    BASE and HEAD are folders, such as two git worktrees. The exit status is 1 if HEAD is worse: a
+    violation of a new kind, or significantly more violations or aborts. Simulator, maps and
+    policies are those of this installation and folder for both.
+    """
+    from pytest_garl.regressions.survey import compare_sets, survey_checkout
+    from pytest_garl.search.checkout import Checkout
+
+    if system is None:
+        raise OptionError("garl diff: --system is missing; give MODULE:CLASS of the landing system")
+    survey = _survey(**chosen)
+    before, after = (
+        survey_checkout(survey, Checkout(folder=one, others=(other,)), system, workers, _progress)
+        for one, other in ((base, head), (head, base))
+    )
+    passed = True
+    for old, new in zip(before.sets, after.sets, strict=True):
+        found = compare_sets(old, new, level=level)
+        passed = passed and found.passed
+        _show(old.title, found)
+    if not passed:
+        raise SystemExit(FAILED)
+
+
+def _survey(
+    *,
+    maps: str,
+    distance_m: float,
+    time_s: float,
+    abort: Any,
+    simulator: str,
+    **rest: Any,
+) -> Survey:
+    from pytest_garl.regressions.survey import Survey
+    from pytest_garl.verdicts.verdict import Limits
+
+    return Survey(
+        maps=tuple(dict.fromkeys(part.strip() for part in maps.split(",") if part.strip())),
+        limits=Limits(distance_m=distance_m, time_s=time_s, abort=abort),
+        simulator=_simulator(simulator),
+        map_folders=(_maps_folder(),),
+        **rest,
+    )
+
+
+def _simulator(text: str) -> Reference:
+    from pytest_garl.search.reference import BUILT_IN, Reference
+
+    if not text:
+        return BUILT_IN
+    module, _, name = text.partition(":")
+    if not module or not name:
+        raise OptionError(f"--simulator: found {text!r}, expected MODULE:FUNCTION")
+    return Reference(module=module, file="", qualname=name)
+
+
+def _maps_folder() -> Path:
+    return Path.cwd() / "scenarios" / "maps"
+
+
+def _progress(flights: Iterator[Done], title: str, total: int) -> Iterable[Done]:
+    """Show on a terminal how far flights are; on stderr, which is not what is asked for."""
+    console = Console(stderr=True)
+    hidden = not console.is_terminal
+    return track(flights, title, total, console=console, disable=hidden, transient=True)
+
+
+def _show(title: str, found: Comparison) -> None:
+    from pytest_garl.verdicts.gate import DIFFERENT
+
+    table = Table(title=title, title_justify="left", box=None, header_style="bold")
+    for name in ("scenario", "", "base", "head"):
+        table.add_column(name, overflow="fold")
+    for fate in DIFFERENT:
+        for pair in found.of(fate):
+            table.add_row(pair.name, _coloured(fate), pair.base.words, pair.head.words)
+    console = Console()
+    if table.row_count:
+        console.print(table)
+    answer, *figures = found.summary()
+    click.secho(f"{title}: {answer}", bold=True, fg="green" if found.passed else "red")
+    for line in figures:
+        click.echo(f"    {line}")
+
+
+def _coloured(fate: Fate) -> str:
+    return f"[{COLOURS[fate]}]{fate}[/]"

@@ -1,0 +1,146 @@
+"""The gate against a baseline: one item per landing system and map that flies all its scenarios."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Generator, Iterable, Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from pytest_garl.adversary.policies import policy_spec
+from pytest_garl.errors import GarlError
+from pytest_garl.fixtures import stop
+from pytest_garl.options import Options
+from pytest_garl.regressions.baseline import Baseline, SampleSet, load
+from pytest_garl.regressions.survey import compare_flights, moved_on, unlike
+from pytest_garl.run import Run
+from pytest_garl.switches import RUN
+from pytest_garl.targets import FIRST, Target, name_of, read_marker
+
+TOLD = "garl.gate"
+"""The user property under which a gate's sentences reach the summary, also from xdist's workers."""
+
+
+def register(config: pytest.Config, options: Options) -> None:
+    """Add the gate to a session; raise UsageError for a file that is no baseline."""
+    assert options.baseline is not None
+    try:
+        baseline = load(options.baseline, options.map_folders)
+    except GarlError as error:
+        raise pytest.UsageError(f"--garl-baseline: {error}") from error
+    config.pluginmanager.register(Gating(options, options.baseline, baseline), "garl_gating")
+
+
+class Gate(pytest.Item):
+    """Flies one set of the baseline and fails if the landing system is worse."""
+
+    def __init__(self, *, target: Target, base: SampleSet, **rest: Any) -> None:
+        super().__init__(**rest)
+        self.garl_gate = base
+        self._target = target
+
+    def runtest(self) -> None:
+        """Fly and compare."""
+        run: Run = self.config.stash[RUN]
+        base = self.garl_gate
+        try:
+            npcs = policy_spec(base.npcs)
+            differing = unlike(base, run.job(self._target, npcs))
+            if differing:
+                refused = f"gate FAILED: no fair comparison, {'; '.join(differing)}"
+                lines = [refused, "If that is wanted, save the baseline anew."]
+                self._tell(lines)
+                pytest.fail("\n".join(lines), pytrace=False)
+            flights = run.fly_all(self._target, npcs, [each.scenario for each in base.samples])
+            known = run.known(self._target)
+        except GarlError as error:
+            stop(self, error)
+        found = compare_flights(base, flights, level=run.options.level, known=known)
+        self._tell(found.sentences())
+        if not found.passed:
+            # The pairs are listed once, in the summary.
+            pytest.fail("\n".join(found.summary()), pytrace=False)
+
+    def _tell(self, lines: Iterable[str]) -> None:
+        """Leave lines for the summary."""
+        self.user_properties += [(TOLD, line) for line in (self.garl_gate.title, *lines)]
+
+    def reportinfo(self) -> tuple[os.PathLike[str] | str, int | None, str]:
+        """Return where the item comes from and what it is called."""
+        return self.path, None, self.name
+
+
+class Gating:
+    """The hooks of a session with a baseline."""
+
+    def __init__(self, options: Options, file: Path, baseline: Baseline) -> None:
+        self._options, self._file, self._baseline = options, file, baseline
+        self._placed: set[tuple[str, str, str]] = set()
+
+    @pytest.hookimpl(wrapper=True)
+    def pytest_pycollect_makeitem(
+        self, collector: pytest.Module | pytest.Class
+    ) -> Generator[None, Any, Any]:
+        """Put a gate before the first marked test of each module, for each of its maps."""
+        made = yield
+        if not isinstance(made, list):
+            return made
+        marker = next((mark for item in made if (mark := item.get_closest_marker("garl"))), None)
+        return made if marker is None else [*self._gates(collector, marker), *made]
+
+    def _gates(
+        self, collector: pytest.Module | pytest.Class, marker: pytest.Mark
+    ) -> Iterator[Gate]:
+        subject = read_marker(marker, self._options)
+        for map in subject.maps:
+            base = self._baseline.of(name_of(subject.system), map)
+            place = (str(collector.path), name_of(subject.system), map)
+            if base is not None and place not in self._placed:
+                self._placed.add(place)
+                yield Gate.from_parent(
+                    collector,
+                    name=f"baseline[{base.title}]",
+                    target=subject.target(map, FIRST),
+                    base=base,
+                )
+
+    def pytest_collection_finish(self, session: pytest.Session) -> None:
+        """Refuse to pass where the command line asks for a gate and no test calls for one."""
+        asked = session.config.getoption("--garl-baseline")
+        if asked and not any(isinstance(item, Gate) for item in session.items):
+            wanted = ", ".join(f"{each.system} on {each.map}" for each in self._baseline.sets)
+            raise pytest.UsageError(
+                f"--garl-baseline={asked}: nothing to compare: it holds {wanted}, and no selected "
+                "test is marked with one of these"
+            )
+
+    def pytest_report_header(self) -> str:
+        """Say what the gate will fly, at most."""
+        sets = ", ".join(f"{len(each.samples)} of {each.title}" for each in self._baseline.sets)
+        return f"garl: gate against {self._file}: {sets}, level {self._options.level:g}"
+
+    def pytest_terminal_summary(self, terminalreporter: Any) -> None:
+        """Show what each gate says."""
+        reports = [
+            report
+            for outcome in ("passed", "failed")
+            for report in terminalreporter.getreports(outcome)
+            if report.when == "call"
+        ]
+        told = {
+            report.nodeid: lines
+            for report in reports
+            if (lines := [str(text) for key, text in report.user_properties if key == TOLD])
+        }
+        if not told:
+            return
+        terminalreporter.section("garl: baseline", sep="=")
+        terminalreporter.write_line(f"{self._file}, flown again")
+        for note in moved_on(self._baseline):
+            terminalreporter.write_line(f"note: {note}; differences may be its doing")
+        for title, *lines in (told[node] for node in sorted(told)):
+            terminalreporter.write_line(f"{title}: {lines[0]}")
+            for line in lines[1:]:
+                terminalreporter.write_line(f"    {line}")

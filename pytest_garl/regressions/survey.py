@@ -1,0 +1,199 @@
+"""Make a baseline, by flying or from a finished search, and compare a stack with it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
+from dataclasses import dataclass, field
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+
+from pytest_garl.adversary.policies import check_policy, policy_spec
+from pytest_garl.errors import PolicyError
+from pytest_garl.regressions.baseline import Baseline, BaselineError, Sample, SampleSet
+from pytest_garl.scenarios.genes import WeatherRange, genome_for
+from pytest_garl.scenarios.maps import load_map
+from pytest_garl.scenarios.scenario import Scenario
+from pytest_garl.search.batch import fly_all, own_pool
+from pytest_garl.search.checkout import Checkout, describe
+from pytest_garl.search.errands import Done
+from pytest_garl.search.job import Job, load_scenario, loads
+from pytest_garl.search.ledger import VERSION, Ledger
+from pytest_garl.search.random_search import propose
+from pytest_garl.search.reference import BUILT_IN, Reference
+from pytest_garl.simulation.policy import PolicySpec
+from pytest_garl.verdicts.gate import LEVEL, Comparison, Pair, answer_of, compare
+from pytest_garl.verdicts.verdict import Limits
+
+TIMEOUT_S = 10.0
+Track = Callable[[Iterator[Done], str, int], Iterable[Done]]
+"""Shows how far flights are: (flights, title, how many) -> the same flights."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Survey:
+    """Which scenarios are flown, and with what; equal surveys fly equal scenarios."""
+
+    maps: tuple[str, ...] = ("court", "lawn")
+    count: int = 100
+    seed: int = 0
+    weather: WeatherRange = "confined"
+    npcs: str = "waypoint"
+    limits: Limits = field(default_factory=Limits)
+    simulator: Reference = BUILT_IN
+    map_folders: tuple[Path, ...] = ()
+
+    def scenarios(self, map: str) -> Sequence[Scenario]:
+        """Return the random scenarios on a map: the first generation of random search."""
+        place = load_map(map, self.map_folders)
+        genome = genome_for(place, weather=self.weather)
+        return propose(place, genome, self.seed, 0, self.count)
+
+
+def survey_checkout(
+    survey: Survey, checkout: Checkout, system: str, workers: int, track: Track
+) -> Baseline:
+    """Fly a survey with the landing system of one checkout."""
+    reference, sources = describe(checkout, system)
+    npcs = policy_spec(survey.npcs)
+    sets = []
+    with own_pool(workers, checkout) as (ledger, pool):
+        for name in survey.maps:
+            map = load_map(name, survey.map_folders)
+            check_policy(npcs, map)
+            job = Job(
+                system=reference,
+                system_sha256=sources,
+                simulator=survey.simulator,
+                map=map.name,
+                map_sha256=map.sha256,
+                map_folders=tuple(str(folder.resolve()) for folder in survey.map_folders),
+                npcs=npcs,
+                limits=survey.limits,
+                timeout_s=TIMEOUT_S,
+                path=(str(checkout.folder.resolve()),),
+                flights=str(ledger.path.parent / "flights"),
+            )
+            scenarios = survey.scenarios(name)
+            title = f"{checkout.folder}: {reference.qualname} on {name}"
+            flights = track(fly_all(ledger, pool, job, scenarios), title, len(scenarios))
+            sets.append(_set(job, zip(scenarios, flights, strict=True)))
+    return _baseline(sets)
+
+
+def from_ledger(path: Path) -> Baseline:
+    """Return what a search flew as a baseline; raise BaselineError for one that cannot be."""
+    if not path.is_file():
+        raise BaselineError(f"{path}: there is no ledger; run pytest --garl-budget=N first")
+    ledger = Ledger(path)
+    try:
+        found = ledger.fact("ledger")
+        if found != VERSION:
+            raise BaselineError(f"{path}: found a ledger of version {found}, expected {VERSION}")
+        searches: dict[str, list[tuple[Scenario, Done]]] = {}
+        for job_text, text, result, sha256 in ledger.flown():
+            done = Done(result=result, sha256=sha256, record=Path())
+            searches.setdefault(job_text, []).append((load_scenario(text), done))
+    finally:
+        ledger.close()
+    if not searches:
+        raise BaselineError(f"{path}: no search has flown anything yet")
+    sets = []
+    for job_text, flights in searches.items():
+        job = loads(job_text)
+        _check_npcs(path, job.npcs)
+        sets.append(_set(job, flights))
+    return _baseline(sets)
+
+
+def _check_npcs(path: Path, npcs: PolicySpec) -> None:
+    """Refuse a policy that the baseline's name for it does not bring back."""
+    try:
+        same = policy_spec(npcs.name) == npcs
+    except PolicyError:
+        same = False
+    if not same:
+        raise BaselineError(
+            f"{path}: objects were moved by {npcs.name!r} ({npcs.factory}), which is neither a "
+            "shipped policy nor weights as they are today; save a baseline of another search"
+        )
+
+
+def _set(job: Job, flights: Iterable[tuple[Scenario, Done]]) -> SampleSet:
+    return SampleSet(
+        system=_name(job.system),
+        map=job.map,
+        map_sha256=job.map_sha256,
+        simulator=_name(job.simulator),
+        npcs=job.npcs.name,
+        npcs_sha256=_npcs_sha256(job.npcs),
+        limits=job.limits,
+        samples=tuple(
+            Sample(scenario=scenario, answer=answer_of(done.result, done.sha256))
+            for scenario, done in flights
+        ),
+    )
+
+
+def _baseline(sets: Sequence[SampleSet]) -> Baseline:
+    from pytest_garl.simulation.fly import PACKAGES
+    from pytest_garl.simulation.record import cpu_class
+
+    return Baseline(
+        cpu=cpu_class(),
+        versions=tuple((name, version(name)) for name in PACKAGES),
+        sets=tuple(sets),
+    )
+
+
+def _name(reference: Reference) -> str:
+    return f"{reference.module}:{reference.qualname}"
+
+
+def _npcs_sha256(npcs: PolicySpec) -> str:
+    return str(dict(npcs.arguments).get("sha256", ""))
+
+
+def unlike(base: SampleSet, job: Job) -> tuple[str, ...]:
+    """Return what else than the landing system has changed: then no rates can be compared."""
+    pairs = (
+        ("limits", base.limits, job.limits),
+        (f"map {base.map}", base.map_sha256[:12], job.map_sha256[:12]),
+        ("simulator", base.simulator, _name(job.simulator)),
+        (f"weights of {base.npcs}", base.npcs_sha256[:12], _npcs_sha256(job.npcs)[:12]),
+    )
+    return tuple(f"{what} was {then}, is {today}" for what, then, today in pairs if then != today)
+
+
+def moved_on(base: Baseline) -> tuple[str, ...]:
+    """Return which packages that shape a flight have other versions than when it was saved."""
+    found = []
+    for name, then in base.versions:
+        try:
+            today = version(name)
+        except PackageNotFoundError:
+            today = "absent"
+        if then != today:
+            found.append(f"{name} was {then}, is {today}")
+    return tuple(found)
+
+
+def compare_flights(
+    base: SampleSet, flights: Iterable[Done], *, level: float = LEVEL, known: Collection[str] = ()
+) -> Comparison:
+    """Return how flights of the base's scenarios, in its order, compare with it."""
+    pairs = [
+        Pair(name=base.name(index), base=sample.answer, head=answer_of(done.result, done.sha256))
+        for index, (sample, done) in enumerate(zip(base.samples, flights, strict=True))
+    ]
+    return compare(pairs, level=level, known=known)
+
+
+def compare_sets(base: SampleSet, head: SampleSet, *, level: float = LEVEL) -> Comparison:
+    """Return how two sets of the same scenarios compare; raise BaselineError for others."""
+    if [each.scenario for each in base.samples] != [each.scenario for each in head.samples]:
+        raise BaselineError(f"{base.title}: the two stacks did not fly the same scenarios")
+    pairs = [
+        Pair(name=base.name(index), base=before.answer, head=after.answer)
+        for index, (before, after) in enumerate(zip(base.samples, head.samples, strict=True))
+    ]
+    return compare(pairs, level=level)

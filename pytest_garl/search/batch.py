@@ -1,0 +1,65 @@
+"""Many flights of given scenarios at once, beside any search."""
+
+from __future__ import annotations
+
+import dataclasses
+import hashlib
+import json
+import tempfile
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+
+from pytest_garl.errors import LedgerError
+from pytest_garl.scenarios.scenario import Scenario
+from pytest_garl.search.checkout import Checkout
+from pytest_garl.search.errands import Done
+from pytest_garl.search.job import Job, dump_scenario, loads
+from pytest_garl.search.ledger import Ledger
+from pytest_garl.search.pool import Pool
+from pytest_garl.search.slots import Slot, flight_name
+
+
+def fly_all(
+    ledger: Ledger,
+    pool: Pool,
+    job: Job,
+    scenarios: Sequence[Scenario],
+    tick: Callable[[], None] = lambda: None,
+) -> Iterator[Done]:
+    """Yield what each scenario came to, in order; all are handed out before the first is awaited.
+
+    Raises LedgerError if a resumed run flew them in another way.
+    """
+    system = f"{job.system.module}:{job.system.qualname}"
+    texts = {index: dump_scenario(scenario) for index, scenario in enumerate(scenarios)}
+    facts = [system, job.map, job.npcs.name, dataclasses.asdict(job.limits), *texts.values()]
+    search = hashlib.sha256(json.dumps(facts).encode()).hexdigest()[:16]
+    ledger.add_search(search, system, job.map, len(texts), job.dumps(), "case")
+    known = ledger.job(search)
+    differing = job.differences(loads(known)) if known else ()
+    if differing:
+        raise LedgerError(
+            f"{ledger.path}: {system} on {job.map} flew the same scenarios before, but "
+            f"{', '.join(differing)} changed; run without --garl-resume to begin anew"
+        )
+    ledger.add_slots(search, 0, texts)
+    for index in texts:
+        yield Done(
+            result=pool.wait(search, Slot(generation=0, index=index), tick),
+            sha256=ledger.sha256(search, 0, index),
+            record=Path(job.flights) / f"{flight_name(search, 0, index, job.map)}.npz",
+        )
+
+
+@contextmanager
+def own_pool(workers: int, checkout: Checkout) -> Iterator[tuple[Ledger, Pool]]:
+    """Give a ledger and children that see one checkout, for as long as the block lasts."""
+    with tempfile.TemporaryDirectory(prefix="garl-") as scratch:
+        ledger = Ledger.create(Path(scratch) / "ledger.sqlite", {})
+        pool = Pool(ledger, workers, checkout)
+        try:
+            yield ledger, pool
+        finally:
+            pool.close()
+            ledger.close()
