@@ -18,6 +18,7 @@ from pytest_garl.regressions.survey import compare_flights, moved_on, unlike
 from pytest_garl.run import Run
 from pytest_garl.switches import RUN
 from pytest_garl.targets import FIRST, Target, name_of, read_marker
+from pytest_garl.verdicts.gate import Comparison, Fate
 
 TOLD = "garl.gate"
 """The user property under which a gate's sentences reach the summary, also from xdist's workers."""
@@ -58,7 +59,7 @@ class Gate(pytest.Item):
         except GarlError as error:
             stop(self, error)
         found = compare_flights(base, flights, level=run.options.level, known=known)
-        self._tell(found.sentences())
+        self._tell([*found.sentences(), *self._hint(found, run.options.baseline)])
         if not found.passed:
             # The pairs are listed once, in the summary.
             pytest.fail("\n".join(found.summary()), pytrace=False)
@@ -66,6 +67,16 @@ class Gate(pytest.Item):
     def _tell(self, lines: Iterable[str]) -> None:
         """Leave lines for the summary."""
         self.user_properties += [(TOLD, line) for line in (self.garl_gate.title, *lines)]
+
+    def _hint(self, found: Comparison, file: Path | None) -> Iterator[str]:
+        """Say how to look at a pair that is worse."""
+        worse: tuple[Fate, ...] = ("broke", "changed")
+        first = next((pair for fate in worse for pair in found.of(fate)), None)
+        if first is not None:
+            yield (
+                f"fly it: garl baseline scenario {file} {first.name} > one.toml; "
+                f"pytest --garl-repeat=one.toml --garl-npcs={self.garl_gate.npcs}"
+            )
 
     def reportinfo(self) -> tuple[os.PathLike[str] | str, int | None, str]:
         """Return where the item comes from and what it is called."""
@@ -78,6 +89,8 @@ class Gating:
     def __init__(self, options: Options, file: Path, baseline: Baseline) -> None:
         self._options, self._file, self._baseline = options, file, baseline
         self._placed: set[tuple[str, str, str]] = set()
+        self._told: dict[str, list[str]] = {}
+        self._problem = ""
 
     @pytest.hookimpl(wrapper=True)
     def pytest_pycollect_makeitem(
@@ -107,14 +120,36 @@ class Gating:
                 )
 
     def pytest_collection_finish(self, session: pytest.Session) -> None:
-        """Refuse to pass where the command line asks for a gate and no test calls for one."""
-        asked = session.config.getoption("--garl-baseline")
-        if asked and not any(isinstance(item, Gate) for item in session.items):
-            wanted = ", ".join(f"{each.system} on {each.map}" for each in self._baseline.sets)
-            raise pytest.UsageError(
-                f"--garl-baseline={asked}: nothing to compare: it holds {wanted}, and no selected "
-                "test is marked with one of these"
-            )
+        """Refuse to begin where the command line asks for a gate and no selected test has one."""
+        worker = hasattr(session.config, "workerinput")
+        if not worker and not any(isinstance(item, Gate) for item in session.items):
+            problem = self._nothing(session.config)
+            if problem:
+                raise pytest.UsageError(problem)
+
+    def pytest_runtest_logreport(self, report: pytest.TestReport) -> None:
+        """Remember what a gate says."""
+        lines = [str(text) for key, text in report.user_properties if key == TOLD]
+        if lines and report.when == "call":
+            self._told[report.nodeid] = lines
+
+    def pytest_sessionfinish(self, session: pytest.Session) -> None:
+        """Refuse to pass without a gate under xdist, whose workers alone know the items."""
+        if not session.config.pluginmanager.hasplugin("dsession") or self._told:
+            return
+        if session.exitstatus in (pytest.ExitCode.OK, pytest.ExitCode.NO_TESTS_COLLECTED):
+            self._problem = self._nothing(session.config)
+            if self._problem:
+                session.exitstatus = pytest.ExitCode.USAGE_ERROR
+
+    def _nothing(self, config: pytest.Config) -> str:
+        """Return what is wrong with a session without gate; an ini key asks for none."""
+        asked = config.getoption("--garl-baseline")
+        wanted = ", ".join(f"{each.system} on {each.map}" for each in self._baseline.sets)
+        return asked and (
+            f"--garl-baseline={asked}: nothing to compare: it holds {wanted}, and no selected test "
+            "is marked with one of these"
+        )
 
     def pytest_report_header(self) -> str:
         """Say what the gate will fly, at most."""
@@ -123,24 +158,14 @@ class Gating:
 
     def pytest_terminal_summary(self, terminalreporter: Any) -> None:
         """Show what each gate says."""
-        reports = [
-            report
-            for outcome in ("passed", "failed")
-            for report in terminalreporter.getreports(outcome)
-            if report.when == "call"
-        ]
-        told = {
-            report.nodeid: lines
-            for report in reports
-            if (lines := [str(text) for key, text in report.user_properties if key == TOLD])
-        }
-        if not told:
+        if not self._told and not self._problem:
             return
         terminalreporter.section("garl: baseline", sep="=")
-        terminalreporter.write_line(f"{self._file}, flown again")
+        if self._problem:
+            terminalreporter.write_line(self._problem, red=True)
         for note in moved_on(self._baseline):
             terminalreporter.write_line(f"note: {note}; differences may be its doing")
-        for title, *lines in (told[node] for node in sorted(told)):
-            terminalreporter.write_line(f"{title}: {lines[0]}")
-            for line in lines[1:]:
+        for _, (title, answer, *lines) in sorted(self._told.items()):
+            terminalreporter.write_line(f"{title}: {answer}")
+            for line in lines:
                 terminalreporter.write_line(f"    {line}")

@@ -10,6 +10,7 @@ import click
 from rich.console import Console
 from rich.progress import track
 from rich.table import Table
+from rich.text import Text
 
 from pytest_garl.errors import OptionError
 
@@ -17,7 +18,7 @@ if TYPE_CHECKING:
     from pytest_garl.regressions.survey import Survey
     from pytest_garl.search.errands import Done
     from pytest_garl.search.reference import Reference
-    from pytest_garl.verdicts.gate import Comparison, Fate
+    from pytest_garl.verdicts.gate import Comparison
 
 FAILED = 1
 """Exit status of a comparison that fails; a usage error is 2."""
@@ -62,7 +63,7 @@ _SURVEY = (
         "--simulator",
         metavar="MODULE:FUNCTION",
         default="",
-        help="What your hook pytest_garl_fly returns (default: the built-in simulator).",
+        help="What the stack's hook pytest_garl_fly returns (default: the built-in simulator).",
     ),
     click.option(
         "--workers",
@@ -160,8 +161,8 @@ def diff(
     """Fly the same scenarios with two checkouts of a landing stack and compare pair by pair.
 
     BASE and HEAD are folders, such as two git worktrees. The exit status is 1 if HEAD is worse: a
-    violation of a new kind, or significantly more violations or aborts. Simulator, maps and
-    policies are those of this installation and folder for both.
+    violation of a new kind, or significantly more violations or aborts. The simulator and the
+    policies are this installation's for both, and a map of your own is this folder's.
     """
     from pytest_garl.regressions.survey import compare_sets, survey_checkout
     from pytest_garl.search.checkout import Checkout
@@ -228,12 +229,14 @@ def _progress(flights: Iterator[Done], title: str, total: int) -> Iterable[Done]
 def _show(title: str, found: Comparison) -> None:
     from pytest_garl.verdicts.gate import DIFFERENT
 
-    table = Table(title=title, title_justify="left", box=None, header_style="bold")
+    table = Table(box=None, header_style="bold")
     for name in ("scenario", "", "base", "head"):
         table.add_column(name, overflow="fold")
     for fate in DIFFERENT:
         for pair in found.of(fate):
-            table.add_row(pair.name, _coloured(fate), pair.base.words, pair.head.words)
+            # As texts: in a string rich would make an animal of ":dog:".
+            cells = (pair.name, fate, pair.base.words, pair.head.words)
+            table.add_row(*(Text(cell) for cell in cells), style=COLOURS[fate])
     console = Console()
     if table.row_count:
         console.print(table)
@@ -241,7 +244,3 @@ def _show(title: str, found: Comparison) -> None:
     click.secho(f"{title}: {answer}", bold=True, fg="green" if found.passed else "red")
     for line in figures:
         click.echo(f"    {line}")
-
-
-def _coloured(fate: Fate) -> str:
-    return f"[{COLOURS[fate]}]{fate}[/]"

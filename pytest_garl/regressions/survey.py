@@ -156,12 +156,18 @@ def _npcs_sha256(npcs: PolicySpec) -> str:
 def unlike(base: SampleSet, job: Job) -> tuple[str, ...]:
     """Return what else than the landing system has changed: then no rates can be compared."""
     pairs = (
-        ("limits", base.limits, job.limits),
+        ("limits", _words(base.limits), _words(job.limits)),
         (f"map {base.map}", base.map_sha256[:12], job.map_sha256[:12]),
         ("simulator", base.simulator, _name(job.simulator)),
         (f"weights of {base.npcs}", base.npcs_sha256[:12], _npcs_sha256(job.npcs)[:12]),
     )
-    return tuple(f"{what} was {then}, is {today}" for what, then, today in pairs if then != today)
+    return tuple(
+        f"{what}: saved with {then}, found {today}" for what, then, today in pairs if then != today
+    )
+
+
+def _words(limits: Limits) -> str:
+    return f"{limits.distance_m:g} m, {limits.time_s:g} s, abort {limits.abort}"
 
 
 def moved_on(base: Baseline) -> tuple[str, ...]:

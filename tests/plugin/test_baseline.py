@@ -77,6 +77,9 @@ def test_a_worse_stack_fails_and_its_broken_pairs_are_listed(
     result.assert_outcomes(failed=1, skipped=3)
     result.stdout.fnmatch_lines(["*Good-lawn: gate FAILED: significantly more violations: p *"])
     result.stdout.fnmatch_lines(["    broke    lawn-*: landed -> IV:dog:*"])
+    result.stdout.fnmatch_lines(
+        ["    fly it: garl baseline scenario *base.toml lawn-* > one.toml; pytest --garl-repeat=*"]
+    )
     result.stdout.fnmatch_lines(["FAILED test_it.py::baseline[[]Good-lawn[]]*"])
     assert result.ret == pytest.ExitCode.TESTS_FAILED
 
@@ -106,7 +109,7 @@ def test_another_world_is_no_fair_comparison(saved: pytest.Pytester) -> None:
     result = run(saved)
     result.assert_outcomes(failed=1, skipped=3)
     result.stdout.fnmatch_lines(
-        ["*gate FAILED: no fair comparison, limits was *time_s=60.0*, is *time_s=120.0*"]
+        ["*gate FAILED: no fair comparison, limits: saved with *, 60 s, *, found *, 120 s, *"]
     )
 
 
@@ -118,6 +121,9 @@ def test_a_gate_is_selected_like_any_test_and_one_without_subject_is_an_error(
     nothing = run(saved, *GATE, "-k", "test_time")
     assert nothing.ret == pytest.ExitCode.USAGE_ERROR
     nothing.stderr.fnmatch_lines(["*nothing to compare: it holds systems:Good on lawn, and no *"])
+    parallel = run(saved, *GATE, "-k", "test_time", "-n1")
+    assert parallel.ret == pytest.ExitCode.USAGE_ERROR
+    parallel.stdout.fnmatch_lines(["*nothing to compare: *"])
     by_ini = run(saved, "--garl-workers=0", "-o", "garl_baseline=base.toml", "-k", "test_time")
     assert by_ini.ret == pytest.ExitCode.OK
 

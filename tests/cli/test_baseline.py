@@ -1,0 +1,150 @@
+from __future__ import annotations
+
+import re
+import shutil
+from pathlib import Path
+
+import pytest
+from click.testing import CliRunner, Result
+
+from pytest_garl.cli import main
+from pytest_garl.regressions.baseline import load
+from pytest_garl.scenarios.files import load as load_scenario
+from tests.plugin import tiny_simulator
+
+SYSTEM = """
+try:
+    import only_in_head
+except ImportError:
+    only_in_head = None
+
+from pytest_garl import Abort, Land
+from stack.helper import decide
+
+
+class Lander:
+    def reset(self, mission):
+        assert only_in_head is None or __file__.find("head") > 0
+
+    def step(self, observation):
+        return decide(observation)
+
+
+class GivesUp(Lander):
+    def step(self, observation):
+        return Abort()
+"""
+FINE = "from pytest_garl import Land\ndef decide(observation):\n    return Land()\n"
+WRONG = "def decide(observation):\n    raise ValueError('no plan')\n"
+TINY = ("--maps=lawn", "--workers=1", "--simulator=tiny_simulator:fly")
+
+
+def write_checkout(folder: Path, helper: str) -> Path:
+    (folder / "stack").mkdir(parents=True)
+    (folder / "stack" / "__init__.py").touch()
+    (folder / "stack" / "system.py").write_text(SYSTEM)
+    (folder / "stack" / "helper.py").write_text(helper)
+    shutil.copy(tiny_simulator.__file__, folder / "tiny_simulator.py")
+    return folder
+
+
+@pytest.fixture
+def checkouts(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """Return a folder with a base and a head that are alike; the head is the working directory."""
+    write_checkout(tmp_path / "base", FINE)
+    (write_checkout(tmp_path / "head", FINE) / "only_in_head.py").touch()
+    monkeypatch.chdir(tmp_path / "head")
+    return tmp_path
+
+
+def garl(*words: str) -> Result:
+    return CliRunner().invoke(main, [*words], env={"COLUMNS": "120"})
+
+
+def diff(*options: str) -> Result:
+    return garl("diff", "../base", ".", "--system=stack.system:Lander", *TINY, *options)
+
+
+def test_two_alike_checkouts_pass(checkouts: Path) -> None:
+    result = diff("--count=12")
+    assert result.exit_code == 0, result.output
+    assert "Lander-lawn: gate passed" in result.output
+    assert "12 pairs flown, 12 of them the same flight to the byte" in result.output
+
+
+def test_each_checkout_flies_with_its_own_modules_and_what_broke_is_listed(
+    checkouts: Path,
+) -> None:
+    (checkouts / "head" / "stack" / "helper.py").write_text(WRONG)
+    result = diff("--count=12")
+    assert result.exit_code == 1, result.output
+    assert re.search(r"lawn-\d+ +broke +landed +V:ValueError@helper.decide", result.output)
+    assert re.search(r"lawn-\d+ +changed +IV:dog:last-metre:unseen +V:", result.output)
+    assert "gate FAILED: significantly more violations: p " in result.output
+    assert "; new signature: V:ValueError@" in result.output
+
+
+def test_a_system_that_one_checkout_lacks_is_a_clear_error(checkouts: Path) -> None:
+    shutil.rmtree(checkouts / "base" / "stack")
+    result = diff("--count=1")
+    assert result.exit_code == 1
+    assert "system 'stack.system:Lander' of ../base: ModuleNotFoundError" in result.output
+    assert "Expected MODULE:CLASS" in result.output
+
+
+@pytest.mark.parametrize(
+    ("words", "expected"),
+    [
+        (("--system=stack.system:Other",), "AttributeError: "),
+        (("--system=stack.helper:decide",), "expected a class, found function"),
+        (("--system=stack",), "found 'stack'"),
+        ((), "found neither --system nor --from-ledger"),
+        (("--system=stack.system:Lander", "--maps=moon"), "unknown map 'moon'"),
+        (("--system=stack.system:Lander", "--npcs=cats"), "unknown object policy 'cats'"),
+        (("--system=stack.system:Lander", "--simulator=mine"), "expected MODULE:FUNCTION"),
+        (("--from-ledger=.garl/ledger.sqlite",), "there is no ledger"),
+    ],
+)
+def test_what_cannot_be_saved_is_told(
+    checkouts: Path, words: tuple[str, ...], expected: str
+) -> None:
+    result = garl("baseline", "save", *words, "--out=base.toml")
+    assert result.exit_code == 1
+    assert expected in result.output
+    assert not Path("base.toml").exists()
+
+
+def test_the_same_options_save_the_same_bytes_and_a_scenario_can_be_taken_out(
+    checkouts: Path,
+) -> None:
+    save = ("baseline", "save", "--system=stack.system:Lander", *TINY, "--count=4")
+    first = garl(*save, "--out=one/base.toml")
+    assert first.exit_code == 0, first.output
+    assert "Lander-lawn: 4 flown, " in first.output
+    garl(*save, "--out=two.toml", "--workers=2")
+    assert Path("two.toml").read_bytes() == Path("one/base.toml").read_bytes()
+    (saved,) = load(Path("two.toml")).sets
+    printed = garl("baseline", "scenario", "two.toml", "lawn-3")
+    Path("three.toml").write_text(printed.output)
+    assert load_scenario(Path("three.toml")) == saved.samples[3].scenario
+    missing = garl("baseline", "scenario", "two.toml", "lawn-4")
+    assert "holds no scenario 'lawn-4'" in missing.output
+
+
+@pytest.mark.sim
+def test_real_flights_become_a_baseline(checkouts: Path) -> None:
+    save = (
+        "baseline",
+        "save",
+        "--system=stack.system:GivesUp",
+        "--maps=lawn",
+        "--count=1",
+        "--workers=1",
+    )
+    result = garl(*save, "--out=base.toml", "--npcs=dqn", "--abort=violation")
+    assert result.exit_code == 0, result.output
+    assert "GivesUp-lawn: 1 flown, 1 violations, 1 aborts" in result.output
+    (saved,) = load(Path("base.toml")).sets
+    assert saved.npcs_sha256
+    assert {sample.answer.signature.partition(":")[0] for sample in saved.samples} == {"abort"}
+    assert all(sample.answer.sha256 for sample in saved.samples)
