@@ -106,7 +106,10 @@ class Gating:
     def _gates(
         self, collector: pytest.Module | pytest.Class, marker: pytest.Mark
     ) -> Iterator[Gate]:
-        subject = read_marker(marker, self._options)
+        try:
+            subject = read_marker(marker, self._options)
+        except GarlError as error:
+            raise pytest.Collector.CollectError(f"{collector.nodeid}: {error}") from error
         for map in subject.maps:
             base = self._baseline.of(name_of(subject.system), map)
             place = (str(collector.path), name_of(subject.system), map)
@@ -165,6 +168,10 @@ class Gating:
             terminalreporter.write_line(self._problem, red=True)
         for note in moved_on(self._baseline):
             terminalreporter.write_line(f"note: {note}; differences may be its doing")
+        titles = {title for title, *_ in self._told.values()}
+        for each in self._baseline.sets:
+            if each.title not in titles:
+                terminalreporter.write_line(f"note: {each.title} was not flown")
         for _, (title, answer, *lines) in sorted(self._told.items()):
             terminalreporter.write_line(f"{title}: {answer}")
             for line in lines:

@@ -195,8 +195,11 @@ def _survey(
     from pytest_garl.regressions.survey import Survey
     from pytest_garl.verdicts.verdict import Limits
 
+    names = tuple(dict.fromkeys(part.strip() for part in maps.split(",") if part.strip()))
+    if not names:
+        raise OptionError(f"--maps: found {maps!r}, expected names such as court,lawn")
     return Survey(
-        maps=tuple(dict.fromkeys(part.strip() for part in maps.split(",") if part.strip())),
+        maps=names,
         limits=Limits(distance_m=distance_m, time_s=time_s, abort=abort),
         simulator=_simulator(simulator),
         map_folders=(_maps_folder(),),

@@ -171,8 +171,10 @@ def _words(limits: Limits) -> str:
 
 
 def moved_on(base: Baseline) -> tuple[str, ...]:
-    """Return which packages that shape a flight have other versions than when it was saved."""
-    found = []
+    """Return what shapes a flight beside the stack and is not as when the baseline was saved."""
+    from pytest_garl.simulation.record import cpu_class
+
+    found = [] if base.cpu == cpu_class() else [f"the CPU was {base.cpu}, is {cpu_class()}"]
     for name, then in base.versions:
         try:
             today = version(name)

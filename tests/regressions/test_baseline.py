@@ -32,6 +32,7 @@ from pytest_garl.search.job import Job, dump_scenario
 from pytest_garl.search.ledger import Ledger
 from pytest_garl.search.random_search import propose
 from pytest_garl.search.reference import BUILT_IN, Reference
+from pytest_garl.simulation.record import cpu_class
 from pytest_garl.verdicts.gate import Answer
 from pytest_garl.verdicts.verdict import Limits
 
@@ -187,8 +188,11 @@ def test_another_world_is_told_from_another_stack() -> None:
 
 def test_versions_that_moved_on_are_told() -> None:
     assert "numpy was 2.0.0, is " in " ".join(moved_on(baseline()))
-    gone = dataclasses.replace(baseline(), versions=(("no-such-package", "1"),))
-    assert moved_on(gone) == ("no-such-package was 1, is absent",)
+    gone = Baseline(cpu="z80", versions=(("no-such-package", "1"),), sets=())
+    assert moved_on(gone) == (
+        f"the CPU was z80, is {cpu_class()}",
+        "no-such-package was 1, is absent",
+    )
 
 
 def test_two_sets_are_compared_scenario_by_scenario_and_only_equal_ones() -> None:
