@@ -89,19 +89,23 @@ def from_ledger(path: Path) -> Baseline:
         found = ledger.fact("ledger")
         if found != VERSION:
             raise BaselineError(f"{path}: found a ledger of version {found}, expected {VERSION}")
-        searches: dict[str, list[tuple[Scenario, Done]]] = {}
-        for job_text, text, result, sha256 in ledger.flown():
-            done = Done(result=result, sha256=sha256, record=Path())
-            searches.setdefault(job_text, []).append((load_scenario(text), done))
+        searches = [(loads(job), ledger.flown(search)) for search, job in ledger.searches()]
     finally:
         ledger.close()
-    if not searches:
-        raise BaselineError(f"{path}: no search has flown anything yet")
     sets = []
-    for job_text, flights in searches.items():
-        job = loads(job_text)
+    for job, rows in searches:
         _check_npcs(path, job.npcs)
-        sets.append(_set(job, flights))
+        flights = [
+            (
+                load_scenario(row.scenario),
+                Done(result=row.result, sha256=row.sha256, record=Path()),
+            )
+            for row in rows
+        ]
+        if flights:
+            sets.append(_set(job, flights))
+    if not sets:
+        raise BaselineError(f"{path}: no search has flown anything yet")
     return _baseline(sets)
 
 

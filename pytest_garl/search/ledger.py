@@ -412,14 +412,12 @@ class Ledger:
         )
         return [(*row[:4], json.loads(row[4])) for row in rows]
 
-    def flown(self) -> list[tuple[str, str, dict[str, Any], str]]:
-        """Return (job, scenario, result, sha256) of the searches' flown slots in slot order."""
+    def searches(self) -> list[tuple[str, str]]:
+        """Return (id, job) of each search."""
         rows = self._db.execute(
-            "SELECT job, scenario, result, sha256 FROM slot "
-            "JOIN search ON search.id = slot.search WHERE state = 'flown' AND kind = 'search' "
-            "ORDER BY system, map, search, generation, slot"
+            "SELECT id, job FROM search WHERE kind = 'search' ORDER BY system, map, id"
         )
-        return [(job, text, json.loads(result), sha or "") for job, text, result, sha in rows]
+        return rows.fetchall()
 
     def progress(self) -> list[Progress]:
         """Return how far each search is."""
