@@ -1,0 +1,81 @@
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, cast
+
+import pytest
+
+from pytest_garl.adversary.policies import policy_spec
+from pytest_garl.errors import LedgerError
+from pytest_garl.regressions.survey import Survey
+from pytest_garl.search.batch import fly_all
+from pytest_garl.search.job import Job, dump_scenario
+from pytest_garl.search.ledger import Ledger
+from pytest_garl.search.pool import Pool
+from pytest_garl.search.reference import BUILT_IN, Reference
+from pytest_garl.search.slots import Slot
+from pytest_garl.verdicts.verdict import Limits
+
+JOB = Job(
+    system=Reference(module="stack", file="", qualname="Lander"),
+    system_sha256="one",
+    simulator=BUILT_IN,
+    map="lawn",
+    map_sha256="",
+    map_folders=(),
+    npcs=policy_spec("waypoint"),
+    limits=Limits(),
+    timeout_s=10.0,
+    path=(),
+    flights="flights",
+)
+SCENARIOS = Survey(count=3).scenarios("lawn")
+
+
+class Instant:
+    """Flies nothing; remembers what had been handed out when the first flight was awaited."""
+
+    def __init__(self, ledger: Ledger) -> None:
+        self._ledger = ledger
+        self.handed_out: list[str] = []
+
+    def wait(self, search: str, slot: Slot, tick: Callable[[], None]) -> dict[str, Any]:
+        tick()
+        if not self.handed_out:
+            self.handed_out = [text for text, _ in self._ledger.generation(search, 0)]
+        return {"index": slot.index}
+
+
+@pytest.fixture
+def pool(tmp_path: Path) -> Instant:
+    return Instant(Ledger.create(tmp_path / "ledger.sqlite", {}))
+
+
+def fly(pool: Instant, job: Job = JOB, count: int = 3) -> list[int]:
+    flights = fly_all(pool._ledger, cast(Pool, pool), job, SCENARIOS[:count])
+    return [done.result["index"] for done in flights]
+
+
+def test_all_flights_are_handed_out_before_the_first_is_awaited(pool: Instant) -> None:
+    assert fly(pool) == [0, 1, 2]
+    assert pool.handed_out == [dump_scenario(each) for each in SCENARIOS]
+
+
+def test_flights_beside_a_search_count_as_none(pool: Instant) -> None:
+    fly(pool)
+    assert pool._ledger.progress() == []
+    assert pool._ledger.searches() == []
+
+
+def test_a_resumed_batch_must_be_of_the_same_system_but_others_do_not_matter(
+    pool: Instant,
+) -> None:
+    fly(pool)
+    changed = dataclasses.replace(JOB, system_sha256="two")
+    with pytest.raises(
+        LedgerError, match=r"stack:Lander on lawn flew .* but system_sha256 changed"
+    ):
+        fly(pool, changed)
+    assert fly(pool, changed, count=2) == [0, 1]
