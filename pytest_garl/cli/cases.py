@@ -80,7 +80,8 @@ def list_(folders: _Folders) -> None:
             " ".join(name for name, _ in case.moves) or "none",
             evidence.removed,
         )
-    Console().print(table)
+    # Or else rich would make an animal of ":dog:".
+    Console(emoji=False).print(table)
 
 
 def _coloured(status: str) -> str:
@@ -102,7 +103,7 @@ def show(folders: _Folders, file: Path) -> None:
         table.add_column(name)
     for row in meanings(case.scenario, folders.maps):
         table.add_row(*row)
-    Console().print(table)
+    Console(emoji=False).print(table)
     click.echo(
         f"\n{evidence.neighbours_failed} of {evidence.neighbours} neighbours fail too; shrinking "
         f"removed {evidence.removed}; objects were moved by {case.policy}"

@@ -17,6 +17,7 @@ from pytest_garl.scenarios.genes import genome_for
 from pytest_garl.scenarios.maps import load_map
 from pytest_garl.scenarios.validity import repair
 from pytest_garl.verdicts.verdict import Limits
+from tests.regressions.test_files import case as dog_case
 
 SYSTEM = """
 from pathlib import Path
@@ -165,3 +166,11 @@ def test_a_replay_draws_a_film(file: Path) -> None:
     pytest.importorskip("imageio_ffmpeg")
     assert "drawn: it.mp4" in garl("replay", file, "--video=it.mp4").output
     assert Path("it.mp4").read_bytes()[4:8] == b"ftyp"
+
+
+def test_a_list_shows_signatures_as_they_are_and_no_animals(tmp_path: Path) -> None:
+    save(tmp_path, dog_case())
+    listed = CliRunner().invoke(
+        main, ["cases", "--folder", str(tmp_path), "list"], env={"COLUMNS": "200"}
+    )
+    assert "IV:dog:last-metre:unseen" in listed.output
