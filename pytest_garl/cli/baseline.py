@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -27,7 +28,13 @@ _FOLDER = click.Path(path_type=Path, file_okay=False, exists=True)
 _FILE = click.Path(path_type=Path, dir_okay=False)
 
 _SURVEY = (
-    click.option("--system", metavar="MODULE:CLASS", help="The landing system."),
+    click.option(
+        "--system",
+        "systems",
+        metavar="MODULE:CLASS",
+        multiple=True,
+        help="The landing system; may be given several times.",
+    ),
     click.option("--maps", default="court,lawn", show_default=True, help="Separated by commas."),
     click.option(
         "--count",
@@ -68,8 +75,8 @@ _SURVEY = (
     click.option(
         "--workers",
         type=click.IntRange(min=1),
-        default=2,
-        show_default=True,
+        default=lambda: os.cpu_count() or 1,
+        show_default="one per CPU core",
         help="Flying child processes.",
     ),
 )
@@ -95,7 +102,9 @@ def baseline() -> None:
     help="Keep what a finished search flew (.garl/ledger.sqlite) instead of flying.",
 )
 @click.option("--out", type=_FILE, required=True, help="The file to write, to be committed.")
-def save(ledger: Path | None, out: Path, workers: int, system: str | None, **chosen: Any) -> None:
+def save(
+    ledger: Path | None, out: Path, workers: int, systems: tuple[str, ...], **chosen: Any
+) -> None:
     """Fly random scenarios with the landing system of this folder, and keep them.
 
     Run it where you run pytest. The same options choose the same scenarios, whatever the system.
@@ -106,14 +115,14 @@ def save(ledger: Path | None, out: Path, workers: int, system: str | None, **cho
 
     if ledger is not None:
         made = from_ledger(ledger)
-    elif system is None:
+    elif not systems:
         raise OptionError(
             "garl baseline save: found neither --system nor --from-ledger, expected one of them, "
             "such as --system landing_systems.mm_mls:MultiModuleLandingSystem"
         )
     else:
         checkout = Checkout(folder=Path.cwd())
-        made = survey_checkout(_survey(**chosen), checkout, system, workers, _progress)
+        made = survey_checkout(_survey(**chosen), checkout, systems, workers, _progress)
     files.save(out, made)
     for each in made.sets:
         bad = sum(sample.answer.violated for sample in each.samples)
@@ -155,7 +164,7 @@ def diff(
     head: Path,
     level: float,
     workers: int,
-    system: str | None,
+    systems: tuple[str, ...],
     **chosen: Any,
 ) -> None:
     """Fly the same scenarios with two checkouts of a landing stack and compare pair by pair.
@@ -167,11 +176,11 @@ def diff(
     from pytest_garl.regressions.survey import compare_sets, survey_checkout
     from pytest_garl.search.checkout import Checkout
 
-    if system is None:
+    if not systems:
         raise OptionError("garl diff: --system is missing; give MODULE:CLASS of the landing system")
     survey = _survey(**chosen)
     before, after = (
-        survey_checkout(survey, Checkout(folder=one, others=(other,)), system, workers, _progress)
+        survey_checkout(survey, Checkout(folder=one, others=(other,)), systems, workers, _progress)
         for one, other in ((base, head), (head, base))
     )
     passed = True

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from importlib.metadata import PackageNotFoundError, version
@@ -11,7 +12,7 @@ from pytest_garl.adversary.policies import check_policy, policy_spec
 from pytest_garl.errors import PolicyError
 from pytest_garl.regressions.baseline import Baseline, BaselineError, Sample, SampleSet
 from pytest_garl.scenarios.genes import WeatherRange, genome_for
-from pytest_garl.scenarios.maps import load_map
+from pytest_garl.scenarios.maps import Map, load_map
 from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.search.batch import fly_all, own_pool
 from pytest_garl.search.checkout import Checkout, describe
@@ -42,24 +43,24 @@ class Survey:
     simulator: Reference = BUILT_IN
     map_folders: tuple[Path, ...] = ()
 
-    def scenarios(self, map: str) -> Sequence[Scenario]:
+    def scenarios(self, map: Map) -> Sequence[Scenario]:
         """Return the random scenarios on a map: the first generation of random search."""
-        place = load_map(map, self.map_folders)
-        genome = genome_for(place, weather=self.weather)
-        return propose(place, genome, self.seed, 0, self.count)
+        genome = genome_for(map, weather=self.weather)
+        return propose(map, genome, self.seed, 0, self.count)
 
 
 def survey_checkout(
-    survey: Survey, checkout: Checkout, system: str, workers: int, track: Track
+    survey: Survey, checkout: Checkout, systems: Sequence[str], workers: int, track: Track
 ) -> Baseline:
-    """Fly a survey with the landing system of one checkout."""
-    reference, sources = describe(checkout, system)
+    """Fly a survey with landing systems ("module:class") of one checkout."""
+    found = [describe(checkout, system) for system in systems]
     npcs = policy_spec(survey.npcs)
+    maps = [load_map(name, survey.map_folders) for name in survey.maps]
+    for map in maps:
+        check_policy(npcs, map)
     sets = []
     with own_pool(workers, checkout) as (ledger, pool):
-        for name in survey.maps:
-            map = load_map(name, survey.map_folders)
-            check_policy(npcs, map)
+        for (reference, sources), map in itertools.product(found, maps):
             job = Job(
                 system=reference,
                 system_sha256=sources,
@@ -73,8 +74,8 @@ def survey_checkout(
                 path=(str(checkout.folder.resolve()),),
                 flights=str(ledger.path.parent / "flights"),
             )
-            scenarios = survey.scenarios(name)
-            title = f"{checkout.folder}: {reference.qualname} on {name}"
+            scenarios = survey.scenarios(map)
+            title = f"{checkout.folder}: {reference.qualname} on {map.name}"
             flights = track(fly_all(ledger, pool, job, scenarios), title, len(scenarios))
             sets.append(_set(job, zip(scenarios, flights, strict=True)))
     return _baseline(sets)

@@ -126,8 +126,11 @@ def test_the_same_options_save_the_same_bytes_and_a_scenario_can_be_taken_out(
     assert Path("two.toml").read_bytes() == Path("one/base.toml").read_bytes()
     (saved,) = load(Path("two.toml")).sets
     printed = garl("baseline", "scenario", "two.toml", "lawn-3")
-    Path("three.toml").write_text(printed.output)
-    assert load_scenario(Path("three.toml")) == saved.samples[3].scenario
+    Path("one.toml").write_text(printed.output)
+    assert load_scenario(Path("one.toml")) == saved.samples[3].scenario
+    several = garl(*save, "--system=stack.system:GivesUp", "--out=three.toml")
+    assert "GivesUp-lawn: 4 flown, " in several.output
+    assert [each.title for each in load(Path("three.toml")).sets] == ["Lander-lawn", "GivesUp-lawn"]
     missing = garl("baseline", "scenario", "two.toml", "lawn-4")
     assert "holds no scenario 'lawn-4'" in missing.output
 

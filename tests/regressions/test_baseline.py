@@ -36,13 +36,13 @@ from pytest_garl.simulation.record import cpu_class
 from pytest_garl.verdicts.gate import Answer
 from pytest_garl.verdicts.verdict import Limits
 
-LAWN = load_map("lawn")
+LAWN, COURT = load_map("lawn"), load_map("court")
 LANDED = Answer(outcome="landed", signature="", sha256="ab" * 32)
 DOG = Answer(outcome="collision", signature="IV:dog:descent:seen", paper_violation=True)
 
 
 def sample_set(count: int = 3, answer: Answer = LANDED) -> SampleSet:
-    scenarios = Survey(count=count).scenarios("lawn")
+    scenarios = Survey(count=count).scenarios(LAWN)
     return SampleSet(
         system="stack.landing:Lander",
         map="lawn",
@@ -77,10 +77,8 @@ def job(simulator: Reference = BUILT_IN) -> Job:
 
 
 def test_a_baseline_survives_its_file_exactly_and_has_the_same_bytes_again(tmp_path: Path) -> None:
-    court = dataclasses.replace(
-        sample_set(), map="court", map_sha256=load_map("court").sha256, samples=()
-    )
-    scenarios = Survey(count=2, seed=5).scenarios("court")
+    court = dataclasses.replace(sample_set(), map="court", map_sha256=COURT.sha256, samples=())
+    scenarios = Survey(count=2, seed=5).scenarios(COURT)
     court = dataclasses.replace(
         court, samples=tuple(Sample(scenario=each, answer=DOG) for each in scenarios)
     )
@@ -156,15 +154,13 @@ def test_what_no_file_can_hold_is_not_saved(tmp_path: Path) -> None:
 
 
 def test_equal_surveys_draw_equal_scenarios_and_a_longer_one_begins_alike() -> None:
-    assert Survey(count=5).scenarios("lawn") == Survey(count=9).scenarios("lawn")[:5]
-    assert Survey(count=5).scenarios("lawn") != Survey(count=5, seed=1).scenarios("lawn")
-    worst = max(each["environment.fog"] for each in Survey(count=50).scenarios("lawn"))
+    assert Survey(count=5).scenarios(LAWN) == Survey(count=9).scenarios(LAWN)[:5]
+    assert Survey(count=5).scenarios(LAWN) != Survey(count=5, seed=1).scenarios(LAWN)
+    worst = max(each["environment.fog"] for each in Survey(count=50).scenarios(LAWN))
     assert (
         worst
         <= 0.15
-        < max(
-            each["environment.fog"] for each in Survey(count=50, weather="full").scenarios("lawn")
-        )
+        < max(each["environment.fog"] for each in Survey(count=50, weather="full").scenarios(LAWN))
     )
 
 
@@ -213,7 +209,7 @@ def result() -> dict[str, object]:
 def write_ledger(path: Path, of: Job) -> None:
     ledger = Ledger.create(path, {})
     ledger.add_search("a", "stack.landing:Lander", "lawn", 2, of.dumps())
-    texts = [dump_scenario(each) for each in Survey(count=2).scenarios("lawn")]
+    texts = [dump_scenario(each) for each in Survey(count=2).scenarios(LAWN)]
     ledger.add_slots("a", 0, dict(enumerate(texts)))
     claim = ledger.claim()
     assert claim is not None

@@ -10,6 +10,7 @@ import pytest
 from pytest_garl.adversary.policies import policy_spec
 from pytest_garl.errors import LedgerError
 from pytest_garl.regressions.survey import Survey
+from pytest_garl.scenarios.maps import load_map
 from pytest_garl.search.batch import fly_all
 from pytest_garl.search.job import Job, dump_scenario
 from pytest_garl.search.ledger import Ledger
@@ -31,7 +32,7 @@ JOB = Job(
     path=(),
     flights="flights",
 )
-SCENARIOS = Survey(count=3).scenarios("lawn")
+SCENARIOS = Survey(count=3).scenarios(load_map("lawn"))
 
 
 class Instant:
