@@ -63,19 +63,21 @@ def list_(folders: _Folders) -> None:
         click.echo(f"no cases in {folders.cases}; a search saves what it finds")
         return
     table = Table(box=None, header_style="bold")
-    for name in ("case", "status", "signature", "margin", "neighbours", "objects", "removed"):
+    for name in ("case", "status", "signature", "robust"):
+        table.add_column(name, no_wrap=True)
+    for name in ("objects", "shrinking removed"):
         table.add_column(name, overflow="fold")
     for entry in found:
         case = entry.case
         if case is None:
-            table.add_row(entry.name, "[red]broken[/red]", entry.problem)
+            name = f"{entry.path.parent.name}/{entry.name}"
+            table.add_row(name, "[red]broken[/red]", "", "", "", entry.problem)
             continue
         evidence = case.evidence
         table.add_row(
             f"{entry.path.parent.name}/{entry.name}",
             _coloured(case.status),
             case.violation.signature,
-            f"{case.violation.margin:.2f} {case.violation.unit}",
             f"{evidence.neighbours_failed}/{evidence.neighbours}",
             " ".join(name for name, _ in case.moves) or "none",
             evidence.removed,
