@@ -23,6 +23,8 @@ class Slow:
     def reset(self, mission): time.sleep(0.03)
     def step(self, observation): return Land()
 """
+FLOWN = "FROM slot JOIN search ON search.id = slot.search WHERE kind = 'search' AND state = 'flown'"
+"""Flights of the search; a violation that was flown once more is none of its budget."""
 BUDGET = (
     "--garl-budget=30",
     "--garl-shrink=0",
@@ -64,7 +66,7 @@ def query(path: Path, sql: str) -> list[tuple[int, ...]]:
 
 def wait_for(path: Path, flights: int, process: subprocess.Popen[str]) -> None:
     for _ in range(3000):
-        done = query(path, "SELECT count(*) FROM slot WHERE state = 'flown'")
+        done = query(path, f"SELECT count(*) {FLOWN}")
         if process.poll() is not None or (done and done[0][0] >= flights):
             return
         time.sleep(0.01)
@@ -106,7 +108,7 @@ def test_a_killed_run_resumes_as_if_nothing_had_happened(
     if not undisturbed:
         run(pytester, *BUDGET)
         undisturbed["hash"] = result_hash(pytester)
-        assert query(ledger, "SELECT count(*) FROM slot WHERE state = 'flown'") == [(30,)]
+        assert query(ledger, f"SELECT count(*) {FLOWN}") == [(30,)]
     victim = ("pytest", "child", "worker")[moment % 3]
     rng = random.Random(moment)
     process = start(pytester, *(["-n2"] if victim == "worker" else []))
@@ -127,10 +129,10 @@ def test_a_killed_run_resumes_as_if_nothing_had_happened(
             break
         time.sleep(0.05)
     assert not any(alive(pid) for pid in seats), "orphans"
-    before = query(ledger, "SELECT generation, slot, sha256 FROM slot WHERE state = 'flown'")
+    before = query(ledger, f"SELECT generation, slot, sha256 {FLOWN}")
     resumed = run(pytester, *BUDGET, "--garl-resume")
     assert resumed.ret in (0, 1)
-    after = query(ledger, "SELECT generation, slot, sha256 FROM slot WHERE state = 'flown'")
+    after = query(ledger, f"SELECT generation, slot, sha256 {FLOWN}")
     assert len(after) == 30
     assert set(before) <= set(after)
     assert query(ledger, "SELECT CAST(value AS INT) FROM meter WHERE name = 'flights'") == [(30,)]
@@ -152,7 +154,7 @@ def test_ctrl_c_leaves_no_orphan_and_a_ledger_that_resumes(pytester: pytest.Pyte
     resumed = run(pytester, *BUDGET, "--garl-resume")
     assert resumed.ret in (0, 1)
     resumed.stdout.fnmatch_lines(["garl: resuming after * flights; budget 30*"])
-    assert query(ledger, "SELECT count(*) FROM slot WHERE state = 'flown'") == [(30,)]
+    assert query(ledger, f"SELECT count(*) {FLOWN}") == [(30,)]
 
 
 def test_a_second_run_in_the_same_folder_is_refused(pytester: pytest.Pytester) -> None:
@@ -202,9 +204,8 @@ def test_the_budget_is_exact(pytester: pytest.Pytester, budget: int) -> None:
     project(pytester)
     run(pytester, f"--garl-budget={budget}", "--garl-workers=0")
     ledger = pytester.path / ".garl" / "ledger.sqlite"
-    assert query(ledger, "SELECT count(*), count(DISTINCT scenario) FROM slot") == [
-        (budget, budget)
-    ]
+    counted = query(ledger, f"SELECT count(*), count(DISTINCT scenario) {FLOWN}")
+    assert counted == [(budget, budget)]
 
 
 @pytest.mark.parametrize("parallel", [(), ("-n2",)])
@@ -228,7 +229,7 @@ def test_a_full_disk_ends_the_run_with_one_clear_error(
     assert "is there space" in done.stdout + done.stderr
     assert "Traceback" not in done.stdout
     ledger = pytester.path / ".garl" / "ledger.sqlite"
-    flown = query(ledger, "SELECT count(*) FROM slot WHERE state = 'flown'")[0][0]
+    flown = query(ledger, f"SELECT count(*) {FLOWN}")[0][0]
     assert 0 < flown < 30
     assert run(pytester, *BUDGET, "--garl-resume").ret in (0, 1)
-    assert query(ledger, "SELECT count(*) FROM slot WHERE state = 'flown'") == [(30,)]
+    assert query(ledger, f"SELECT count(*) {FLOWN}") == [(30,)]
