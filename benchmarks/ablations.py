@@ -129,9 +129,9 @@ def report(rows: list[dict[str, str]]) -> str:
 
 
 def _mean(values: Sequence[float]) -> str:
-    """Return the mean with its 95 % interval (Student's t)."""
+    """Return the mean with its 95 % interval (Student's t), which says something from three on."""
     mean = float(np.mean(values))
-    if len(values) < 2:
+    if len(values) < 3:
         return f"{mean:.1f}"
     error = float(np.std(values, ddof=1)) / len(values) ** 0.5
     half = float(t.ppf(0.975, len(values) - 1)) * error
