@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 
 from pytest_garl.errors import LedgerError
-from pytest_garl.search.ledger import Ledger
+from pytest_garl.search.ledger import VERSION, Ledger
 
 FACTS = {"seed": 3, "version": "1"}
 
@@ -94,7 +94,7 @@ def test_a_ledger_of_another_version_is_not_resumed(tmp_path: Path) -> None:
     database.execute("UPDATE run SET value = '1' WHERE key = 'ledger'")
     database.commit()
     database.close()
-    with pytest.raises(LedgerError, match="ledger was 1, is 2"):
+    with pytest.raises(LedgerError, match=f"ledger was 1, is {VERSION}"):
         Ledger.resume(tmp_path / "ledger.sqlite", FACTS)
 
 
