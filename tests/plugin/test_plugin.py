@@ -335,5 +335,5 @@ def test_a_run_without_landing_tests_imports_nothing_heavy(pytester: pytest.Pyte
 
 def test_the_plugin_can_be_left_out(pytester: pytest.Pytester) -> None:
     pytester.makepyfile(test_plain="def test_plain(): pass")
-    result = run(pytester, "-p", "no:garl")
+    result = pytester.runpytest_subprocess("-p", "no:garl")
     result.assert_outcomes(passed=1)
