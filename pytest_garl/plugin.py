@@ -136,12 +136,17 @@ def pytest_runtest_makereport(
     if target is not None and run is not None and report.when == "call":
         from pytest_garl.reports.explain import explain
 
-        explain(report, item, run, target, call.excinfo.value if call.excinfo else None)
+        try:
+            explain(report, item, run, target, call.excinfo.value if call.excinfo else None)
+        except GarlError as error:
+            # Without a ledger no other item would fare better.
+            report.outcome, report.longrepr = "failed", f"garl: {error}"
+            report.user_properties.append((FATAL, str(error)))
     return report
 
 
 def pytest_runtest_logreport(report: pytest.TestReport) -> None:
-    """End an xdist session whose workers have lost their ledger."""
+    """End a session that has lost its ledger, wherever that was noticed."""
     for key, value in report.user_properties:
         if key == FATAL:
             raise pytest.exit.Exception(f"garl: {value}", pytest.ExitCode.INTERNAL_ERROR)
