@@ -19,6 +19,8 @@ from pytest_garl.search.ledger import Ledger, Row
 from pytest_garl.search.pool import Pool
 from pytest_garl.search.slots import flight_name
 
+UNREACHED = "the budget of --garl-shrink did not reach it"
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Place:
@@ -46,8 +48,8 @@ def inquiries(
     """Return what is to be found out about signatures that no saved case has.
 
     ``budget`` is for all signatures of one search together.  Where it does not reach for all, the
-    most frequent come first.  ``own`` are assertions of tests that failed where the verdict is
-    content, by search and signature.
+    most frequent come first and the others have none.  ``own`` are assertions of tests that
+    failed where the verdict is content, by search and signature.
     """
     found = []
     asks = own or {}
@@ -70,9 +72,9 @@ def inquiries(
             if signature not in known
         }
         order = sorted(new, key=lambda signature: (-len(new[signature]), signature))
-        order = order[: budget // LEAST]
+        reached = min(len(order), budget // LEAST)
         map = load_map(job.map, place.map_folders)
-        for signature in order:
+        for number, signature in enumerate(order):
             found.append(
                 Inquiry(
                     name=f"{search} {signature}",
@@ -80,7 +82,7 @@ def inquiries(
                     violations=new[signature],
                     job=job,
                     map=map,
-                    budget=budget // len(order),
+                    budget=budget // reached if number < reached else 0,
                     asks=asks.get((search, signature)),
                 )
             )
@@ -133,6 +135,8 @@ def follow_up(
 
 
 def _pursue(inquiry: Inquiry, fly: Fly) -> Finding:
+    if inquiry.budget == 0:
+        return Finding(signature=inquiry.signature, case=None, flights=0, reason=UNREACHED)
     return Pursuit(inquiry, fly).run()
 
 

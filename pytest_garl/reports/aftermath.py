@@ -28,14 +28,15 @@ def pursue(run: Run, config: pytest.Config) -> None:
     reporter: Any = config.pluginmanager.get_plugin("terminalreporter")
     try:
         wanted = inquiries(run.ledger, place, options.shrink, run.own)
-        if wanted:
+        reached = [each for each in wanted if each.budget]
+        if reached:
             reporter.ensure_newline()
             reporter.write_line(
-                f"garl: confirming and shrinking {len(wanted)} new kinds of violation, at most "
-                f"{sum(each.budget for each in wanted)} flights"
+                f"garl: confirming and shrinking {len(reached)} new kinds of violation, at most "
+                f"{sum(each.budget for each in reached)} flights"
             )
-            with live(run, config):
-                run.pursued = follow_up(run.ledger, run.pool, place, wanted, run.tick)
+        with live(run, config):
+            run.pursued = follow_up(run.ledger, run.pool, place, wanted, run.tick)
     except KeyboardInterrupt:
         reporter.ensure_newline()
         reporter.write_line(

@@ -86,6 +86,14 @@ def test_the_same_search_saves_the_same_bytes(
     assert result_hash(searched) == known
 
 
+def test_what_the_budget_does_not_reach_is_told(pytester: pytest.Pytester) -> None:
+    project(pytester)
+    result = run(pytester, *SEARCH, "--garl-shrink=5")
+    assert len(cases(pytester)) == 1
+    told = "not saved: Good on lawn: IV:dog:*: the budget of --garl-shrink did not reach it"
+    result.stdout.fnmatch_lines(["*confirming and shrinking 1 new kinds*", told])
+
+
 def test_cases_fly_under_xdist(searched: pytest.Pytester) -> None:
     run(searched, "-n2", "--garl-workers=1").assert_outcomes(passed=2, skipped=2, xfailed=2)
     assert not list((searched.path / ".garl").glob("cases-*"))
