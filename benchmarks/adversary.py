@@ -64,7 +64,7 @@ def spec_of(mover: str) -> PolicySpec:
 
 def sha256_of(mover: str) -> str:
     """Return the start of the hash of a learned mover's weights; nothing for the others."""
-    return str(dict(spec_of(mover).arguments).get("sha256", ""))[:16]
+    return spec_of(mover).sha256[:16]
 
 
 def scenarios(map: str, chunk: int) -> list[Scenario]:

@@ -79,14 +79,14 @@ def read_options(config: pytest.Config) -> Options:
         maps=tuple(part.strip() for part in text["map"].split(",") if part.strip()),
         workers=_integer("workers", text["workers"], 0) if text["workers"] else os.cpu_count() or 1,
         weather=cast("WeatherRange", _among("weather", text["weather"], ("confined", "full"))),
-        timeout_s=_seconds(text["timeout"]),
+        timeout_s=_number("timeout", text["timeout"], 1e6, "a positive number of seconds"),
         repeat=_repeat(text["repeat"]),
         duplicates=cast(
             Literal["xfail", "fail"], _among("duplicates", text["duplicates"], ("xfail", "fail"))
         ),
         npcs=_npcs(text["npcs"], text["method"]),
         baseline=_baseline(config),
-        level=_level(text["level"]),
+        level=_number("level", text["level"], 1, "a number between 0 and 1"),
         shrink=_integer("shrink", text["shrink"], 0) if text["shrink"] else budget // 4,
         xfail_strict=bool(config.getini("garl_xfail_strict")),
         cases=config.rootpath / str(config.getini("garl_cases")),
@@ -125,23 +125,14 @@ def _population(budget: int) -> int:
     return population(budget)
 
 
-def _seconds(text: str) -> float:
+def _number(name: str, text: str, below: float, expected: str) -> float:
+    """Return a number between 0 and ``below``, both excluded."""
     try:
         value = float(text)
     except ValueError:
         value = -1.0
-    if not 0 < value < 1e6:
-        raise _wrong("timeout", text, "a positive number of seconds")
-    return value
-
-
-def _level(text: str) -> float:
-    try:
-        value = float(text)
-    except ValueError:
-        value = -1.0
-    if not 0 < value < 1:
-        raise _wrong("level", text, "a number between 0 and 1")
+    if not 0 < value < below:
+        raise _wrong(name, text, expected)
     return value
 
 

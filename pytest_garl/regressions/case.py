@@ -14,6 +14,7 @@ Status = Literal["open", "fixed", "unavoidable"]
 """Open: known, expected to fail.  Fixed: must pass.  Unavoidable: not even a pilot that knows where
 everything is lands; gates nothing."""
 MoveList = tuple[tuple[float, float], ...]
+Moves = tuple[tuple[str, MoveList], ...]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -63,7 +64,7 @@ class Case:
     violation: Violation
     policy: str
     policy_sha256: str
-    moves: tuple[tuple[str, MoveList], ...]
+    moves: Moves
     evidence: Evidence
     limits: Limits
     test: str = ""

@@ -60,7 +60,7 @@ def inquiries(
         text = ledger.job(search)
         assert text is not None
         job = loads(text)
-        system = f"{job.system.module}:{job.system.qualname}"
+        system = job.system.name
         known = {
             entry.case.violation.signature
             for entry in entries(place.cases, system, place.map_folders)
@@ -143,7 +143,7 @@ def _pursue(inquiry: Inquiry, fly: Fly) -> Finding:
 def _saved(inquiry: Inquiry, finding: Finding, place: Place) -> Pursued:
     job = inquiry.job
     return Pursued(
-        system=f"{job.system.module}:{job.system.qualname}",
+        system=job.system.name,
         map=job.map,
         finding=finding,
         file=_file(finding.case, place) if finding.case else None,

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 
-from pytest_garl.regressions.case import MoveList
+from pytest_garl.regressions.case import MoveList, Moves
 from pytest_garl.scenarios.maps import Map
 from pytest_garl.scenarios.placement import start_genes
 from pytest_garl.scenarios.scenario import Scenario
@@ -15,7 +15,6 @@ from pytest_garl.simulation.policy import DECISION_STEP_S
 
 LEADS_S = (2.0, 4.0, 8.0)
 """How long before the end an object may still move, tried from short to long."""
-Moves = tuple[tuple[str, MoveList], ...]
 
 
 def simpler(

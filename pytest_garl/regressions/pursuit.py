@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from pytest_garl.adversary.recorded import recorded_spec
-from pytest_garl.regressions.case import Case, Evidence, MoveList, Violation
+from pytest_garl.regressions.case import Case, Evidence, Moves, Violation
 from pytest_garl.regressions.moves import simpler
 from pytest_garl.regressions.neighbours import COUNT, neighbours
 from pytest_garl.regressions.shrink import complexity, genome_of, shrink
@@ -29,7 +29,6 @@ LEAST = 2 + COUNT
 """Flights without which nothing can be said: once more, three neighbours, the reference pilot."""
 CANDIDATES = 3
 """So many violations of a signature are tried for one whose neighbours fail as well."""
-Moves = tuple[tuple[str, MoveList], ...]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -210,12 +209,12 @@ class Pursuit:
         flight = load(done.record) if done.record.exists() else None
         own = inquiry.asks(done.result, done.record, failure.scenario) if inquiry.asks else None
         return Case(
-            system=f"{job.system.module}:{job.system.qualname}",
+            system=job.system.name,
             status="open" if avoidable else "unavoidable",
             scenario=failure.scenario,
             violation=_violation(from_dict(done.result["verdict"]), flight, own),
             policy=job.npcs.name,
-            policy_sha256=str(dict(job.npcs.arguments).get("sha256", "")),
+            policy_sha256=job.npcs.sha256,
             moves=failure.moves,
             evidence=Evidence(
                 trajectory_sha256=done.sha256,

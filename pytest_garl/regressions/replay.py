@@ -4,10 +4,9 @@ from __future__ import annotations
 
 import sys
 from dataclasses import dataclass
-from importlib import import_module
 from importlib.metadata import version
 from pathlib import Path
-from typing import Any, Literal
+from typing import Literal
 
 from pytest_garl.adversary.policies import policy_spec
 from pytest_garl.adversary.recorded import recorded_spec
@@ -15,7 +14,7 @@ from pytest_garl.errors import LandingSystemError
 from pytest_garl.regressions.case import Case
 from pytest_garl.scenarios.maps import Map, load_map
 from pytest_garl.search.job import PAPER_LIMIT_S
-from pytest_garl.search.reference import check_system
+from pytest_garl.search.reference import system_named
 from pytest_garl.simulation.flight import Flight
 from pytest_garl.simulation.fly import fly
 from pytest_garl.verdicts.judge import judge
@@ -42,20 +41,15 @@ class Replay:
 
 def system_of(case: Case, folder: Path) -> type:
     """Return the landing system's class, imported as from ``folder``."""
-    module, _, name = case.system.partition(":")
     if str(folder) not in sys.path:
         sys.path.insert(0, str(folder))
     try:
-        found: Any = import_module(module)
-        for part in name.split("."):
-            found = getattr(found, part)
-    except (ImportError, AttributeError) as error:
+        system: type = system_named(case.system)
+    except LandingSystemError as error:
         raise LandingSystemError(
             f"system {case.system!r}: cannot be imported from {folder} ({error}); run this where "
             "your landing tests are run, or mend the case's key 'system'"
         ) from error
-    check_system(found)
-    system: type = found
     return system
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import tempfile
 from pathlib import Path
 
 from pytest_garl.adversary.policies import policy_spec
@@ -10,10 +9,9 @@ from pytest_garl.regressions.case import Case
 from pytest_garl.regressions.pursuit import Finding, Inquiry, Pursuit
 from pytest_garl.regressions.replay import system_of
 from pytest_garl.scenarios.maps import load_map
+from pytest_garl.search.batch import own_pool
 from pytest_garl.search.errands import Done, Errands, Fly
 from pytest_garl.search.job import Job
-from pytest_garl.search.ledger import Ledger
-from pytest_garl.search.pool import Pool
 from pytest_garl.search.reference import BUILT_IN, reference_to, sources_sha256
 
 TIMEOUT_S = 10.0
@@ -25,7 +23,7 @@ def shrink_case(
     """Return a simpler case, or the reason why there is none."""
     map = load_map(case.scenario.map, map_folders)
     system = system_of(case, folder)
-    with tempfile.TemporaryDirectory() as scratch:
+    with own_pool(workers) as (ledger, pool):
         job = Job(
             system=reference_to(system),
             system_sha256=sources_sha256(system),
@@ -37,7 +35,7 @@ def shrink_case(
             limits=case.limits,
             timeout_s=TIMEOUT_S,
             path=(str(folder),),
-            flights=scratch,
+            flights=str(ledger.path.parent / "flights"),
         )
 
         def think(fly: Fly) -> Finding:
@@ -52,10 +50,4 @@ def shrink_case(
             )
             return Pursuit(inquiry, fly).run()
 
-        ledger = Ledger.create(Path(scratch) / "ledger.sqlite", {})
-        pool = Pool(ledger, workers)
-        try:
-            return Errands(ledger, pool, lambda: None).run({case.id: think})[case.id]
-        finally:
-            pool.close()
-            ledger.close()
+        return Errands(ledger, pool, lambda: None).run({case.id: think})[case.id]

@@ -10,12 +10,12 @@ numbers with fewer digits.
 from __future__ import annotations
 
 import contextlib
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 
 from hypothesis import HealthCheck, Phase, Verbosity, given, seed, settings
 from hypothesis import strategies as st
-from hypothesis.database import InMemoryExampleDatabase, choices_to_bytes
+from hypothesis.database import ExampleDatabase, choices_to_bytes
 
 from pytest_garl.scenarios.genes import EXTRAS, Genome, NuclearGene, Property, genome_for
 from pytest_garl.scenarios.maps import Map
@@ -26,7 +26,6 @@ STEPS = 20
 """Steps from nominal to the end of a gene's range: a twentieth is read and compared at a glance."""
 BISECTIONS = 3
 """Flights spent on how near to nominal one gene can go: to an eighth of its distance."""
-_KEY = b"garl"
 Change = Callable[[Scenario], Scenario]
 
 
@@ -213,11 +212,27 @@ def tidy(trials: Trials, culprit: str) -> None:
             return
 
 
+class _HandedOver(ExampleDatabase):
+    """Holds one failing input, in the secondary part: what is in the primary counts as shrunk."""
+
+    def __init__(self, choices: bytes) -> None:
+        super().__init__()
+        self._choices = choices
+
+    def fetch(self, key: bytes) -> Iterable[bytes]:
+        return [self._choices] if key.endswith(b".secondary") else []
+
+    def save(self, key: bytes, value: bytes) -> None:
+        """Keep nothing: the simplest is kept by the trials."""
+
+    def delete(self, key: bytes, value: bytes) -> None:
+        """Keep what was handed over."""
+
+
 def by_hypothesis(trials: Trials, culprit: str) -> None:
     """Let Hypothesis shrink the failing scenario as whole steps from nominal.
 
-    The failing input is handed over through the example database, in its secondary part: what
-    lies in the primary one counts as shrunk.
+    The failing input is handed over through the example database.
     """
     first = trials.best
     lines = list(_lines(trials, culprit))
@@ -229,10 +244,8 @@ def by_hypothesis(trials: Trials, culprit: str) -> None:
             scenario = change(scenario, value)
         return scenario
 
-    database = InMemoryExampleDatabase()
-
     @settings(
-        database=database,
+        database=_HandedOver(choices_to_bytes(start)),
         max_examples=100_000,
         phases=(Phase.reuse, Phase.shrink),
         deadline=None,
@@ -248,8 +261,6 @@ def by_hypothesis(trials: Trials, culprit: str) -> None:
             # Hypothesis ends of itself where nothing new fails.
             assert not trials(build(drawn))
 
-    test._hypothesis_internal_database_key = _KEY  # type: ignore[attr-defined]
-    database.save(_KEY + b".secondary", choices_to_bytes(start))
     with contextlib.suppress(AssertionError):
         # That it fails is known; the simplest is kept by the trials.
         test()

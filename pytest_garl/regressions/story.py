@@ -17,21 +17,12 @@ from pytest_garl.scenarios.placement import (
 from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.simulation.flight import Contact, Flight, ObjectRecord
 from pytest_garl.simulation.vehicle import BODY_ABOVE_FEET_M
+from pytest_garl.verdicts.compass import compass_point
 from pytest_garl.verdicts.verdict import Verdict
 
 NEAR_M = 3.0
 """Horizontal distance at which an object enters the scene: two of the UAV's lengths and its
 own stride."""
-_COMPASS = (
-    "east",
-    "north-east",
-    "north",
-    "north-west",
-    "west",
-    "south-west",
-    "south",
-    "south-east",
-)
 
 
 def tell(flight: Flight, verdict: Verdict) -> str:
@@ -58,7 +49,7 @@ def _entrance(flight: Flight, culprit: ObjectRecord, contact: Contact) -> str:
     if speed < 0.1:
         return f"{kind} stands still in the UAV's way, {up:.1f} m below it."
     side = own[entered] - there[entered]
-    point = _COMPASS[round(math.atan2(side[1], side[0]) / (math.pi / 4)) % 8]
+    point = compass_point(float(side[0]), float(side[1]))
     return (
         f"{kind} at {speed:.1f} m/s enters from the {point} while the UAV is {up:.1f} m above "
         f"{place}."

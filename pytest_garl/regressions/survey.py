@@ -125,12 +125,12 @@ def _check_npcs(path: Path, npcs: PolicySpec) -> None:
 
 def _set(job: Job, flights: Iterable[tuple[Scenario, Done]]) -> SampleSet:
     return SampleSet(
-        system=_name(job.system),
+        system=job.system.name,
         map=job.map,
         map_sha256=job.map_sha256,
-        simulator=_name(job.simulator),
+        simulator=job.simulator.name,
         npcs=job.npcs.name,
-        npcs_sha256=_npcs_sha256(job.npcs),
+        npcs_sha256=job.npcs.sha256,
         limits=job.limits,
         samples=tuple(
             Sample(scenario=scenario, answer=answer_of(done.result, done.sha256))
@@ -150,21 +150,13 @@ def _baseline(sets: Sequence[SampleSet]) -> Baseline:
     )
 
 
-def _name(reference: Reference) -> str:
-    return f"{reference.module}:{reference.qualname}"
-
-
-def _npcs_sha256(npcs: PolicySpec) -> str:
-    return str(dict(npcs.arguments).get("sha256", ""))
-
-
 def unlike(base: SampleSet, job: Job) -> tuple[str, ...]:
     """Return what else than the landing system has changed: then no rates can be compared."""
     pairs = (
         ("limits", _words(base.limits), _words(job.limits)),
         (f"map {base.map}", base.map_sha256[:12], job.map_sha256[:12]),
-        ("simulator", base.simulator, _name(job.simulator)),
-        (f"weights of {base.npcs}", base.npcs_sha256[:12], _npcs_sha256(job.npcs)[:12]),
+        ("simulator", base.simulator, job.simulator.name),
+        (f"weights of {base.npcs}", base.npcs_sha256[:12], job.npcs.sha256[:12]),
     )
     return tuple(
         f"{what}: saved with {then}, found {today}" for what, then, today in pairs if then != today

@@ -31,7 +31,7 @@ def fly_all(
 
     Raises LedgerError if a resumed run flew them in another way.
     """
-    system = f"{job.system.module}:{job.system.qualname}"
+    system = job.system.name
     texts = {index: dump_scenario(scenario) for index, scenario in enumerate(scenarios)}
     facts = [system, job.map, job.npcs.name, dataclasses.asdict(job.limits), *texts.values()]
     search = hashlib.sha256(json.dumps(facts).encode()).hexdigest()[:16]
@@ -53,8 +53,8 @@ def fly_all(
 
 
 @contextmanager
-def own_pool(workers: int, checkout: Checkout) -> Iterator[tuple[Ledger, Pool]]:
-    """Give a ledger and children that see one checkout, for as long as the block lasts."""
+def own_pool(workers: int, checkout: Checkout | None = None) -> Iterator[tuple[Ledger, Pool]]:
+    """Give a ledger and children for as long as the block lasts; they may see one checkout only."""
     with tempfile.TemporaryDirectory(prefix="garl-") as scratch:
         ledger = Ledger.create(Path(scratch) / "ledger.sqlite", {})
         pool = Pool(ledger, workers, checkout)

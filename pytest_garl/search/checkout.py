@@ -2,21 +2,19 @@
 
 from __future__ import annotations
 
-import importlib
 import json
 import subprocess
 import sys
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 from pytest_garl.errors import LandingSystemError
 from pytest_garl.search.reference import (
     Reference,
-    check_system,
     reference_to,
     sources_sha256,
+    system_named,
 )
 
 
@@ -77,16 +75,10 @@ def describe(checkout: Checkout, system: str) -> tuple[Reference, str]:
 def main(system: str, folders: Sequence[str]) -> None:
     """Import a system and write what :func:`describe` wants to know."""
     see_only(folders)
-    module, _, qualname = system.partition(":")
-    if not module or not qualname:
-        sys.exit(f"found {system!r}")
     try:
-        found: Any = importlib.import_module(module)
-        for name in qualname.split("."):
-            found = getattr(found, name)
-        check_system(found)
-    except Exception as error:  # noqa: BLE001 (whatever the module raises is why it fails)
-        sys.exit(f"{type(error).__name__}: {error}".replace("\n", " "))
+        found = system_named(system)
+    except LandingSystemError as error:
+        sys.exit(str(error).replace("\n", " "))
     reference = reference_to(found)
     facts = {name: getattr(reference, name) for name in ("module", "file", "qualname")}
     line = json.dumps({"reference": facts, "sha256": sources_sha256(found)})

@@ -12,11 +12,11 @@ from __future__ import annotations
 
 import hashlib
 import queue
-import threading
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Generic, Protocol, TypeVar
+from typing import Any, Protocol, TypeVar
 
 from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.search.job import Job, dump_scenario
@@ -53,8 +53,8 @@ class _StoppedError(BaseException):
 
 
 @dataclass(slots=True, kw_only=True)
-class _Thought(Generic[T]):
-    """One function under way."""
+class _Thought:
+    """One function under way; None ends its questions, or the wait for an answer."""
 
     name: str
     asked: queue.SimpleQueue[tuple[Job, Scenario] | None]
@@ -62,8 +62,16 @@ class _Thought(Generic[T]):
     job: Job | None = None
     search: str = ""
     flown: int = 0
-    result: T | None = None
-    error: BaseException | None = None
+
+    def fly(self, job: Job, scenario: Scenario) -> Done:
+        """Ask for a flight and wait for it: what the function is given."""
+        self.asked.put((job, scenario))
+        answer = self.answers.get()
+        if answer is None:
+            # Whoever asks on is to be ended again.
+            self.answers.put(None)
+            raise _StoppedError
+        return answer
 
 
 class Errands:
@@ -77,47 +85,32 @@ class Errands:
 
         The names tell flights of different functions apart and must be the same when resumed.
         """
-        thoughts = [self._begin(name, function) for name, function in functions.items()]
-        try:
-            waiting = list(thoughts)
-            while waiting:
-                waiting = [thought for thought in waiting if not self._advance(thought)]
-                if waiting:
-                    self._pool.turn()
-                self._tick()
-        finally:
-            for thought in thoughts:
-                thought.answers.put(None)
-        results = {}
-        for thought in thoughts:
-            if thought.error is not None:
-                raise thought.error
-            results[thought.name] = thought.result
-        return results  # type: ignore[return-value]  # none is missing where none failed
-
-    def _begin(self, name: str, function: Callable[[Fly], T]) -> _Thought[T]:
-        thought: _Thought[T] = _Thought(
-            name=name, asked=queue.SimpleQueue(), answers=queue.SimpleQueue()
-        )
-
-        def fly(job: Job, scenario: Scenario) -> Done:
-            thought.asked.put((job, scenario))
-            answer = thought.answers.get()
-            if answer is None:
-                raise _StoppedError
-            return answer
-
-        def think() -> None:
+        thoughts = [
+            _Thought(name=name, asked=queue.SimpleQueue(), answers=queue.SimpleQueue())
+            for name in functions
+        ]
+        with ThreadPoolExecutor(max(1, len(functions)), thread_name_prefix="garl") as threads:
             try:
-                thought.result = function(fly)
-            except BaseException as error:  # noqa: BLE001 (raised again in the main thread)
-                thought.error = error
-            thought.asked.put(None)
+                futures = {
+                    thought.name: _begin(threads, thought, functions[thought.name])
+                    for thought in thoughts
+                }
+                self._wait(thoughts)
+            finally:
+                for thought in thoughts:
+                    thought.answers.put(None)
+        return {name: future.result() for name, future in futures.items()}
 
-        threading.Thread(target=think, name=f"garl {name}", daemon=True).start()
-        return thought
+    def _wait(self, thoughts: Sequence[_Thought]) -> None:
+        """Let the pool fly what is asked for until nobody asks any more."""
+        waiting = list(thoughts)
+        while waiting:
+            waiting = [thought for thought in waiting if not self._advance(thought)]
+            if waiting:
+                self._pool.turn()
+            self._tick()
 
-    def _advance(self, thought: _Thought[T]) -> bool:
+    def _advance(self, thought: _Thought) -> bool:
         """Take a function as far as it goes without a flight; return whether it is done."""
         while True:
             if thought.job is not None:
@@ -131,11 +124,11 @@ class Errands:
                 return True
             self._ask(thought, *wanted)
 
-    def _ask(self, thought: _Thought[T], job: Job, scenario: Scenario) -> None:
+    def _ask(self, thought: _Thought, job: Job, scenario: Scenario) -> None:
         key = f"errand {thought.name} {thought.flown}"
         thought.job, thought.search = job, hashlib.sha256(key.encode()).hexdigest()[:16]
         thought.flown += 1
-        name = f"{job.system.module}:{job.system.qualname}"
+        name = job.system.name
         self._ledger.add_search(thought.search, name, job.map, 1, job.dumps(), "errand")
         self._ledger.add_slots(thought.search, 0, {0: dump_scenario(scenario)})
 
@@ -148,3 +141,11 @@ class Errands:
             sha256=self._ledger.sha256(search, 0, 0),
             record=Path(job.flights) / f"{flight_name(search, 0, 0, job.map)}.npz",
         )
+
+
+def _begin(
+    threads: ThreadPoolExecutor, thought: _Thought, function: Callable[[Fly], T]
+) -> Future[T]:
+    future = threads.submit(function, thought.fly)
+    future.add_done_callback(lambda _: thought.asked.put(None))
+    return future

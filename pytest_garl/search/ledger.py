@@ -16,6 +16,8 @@ from pathlib import Path
 from typing import Any, Literal
 
 from pytest_garl.errors import LedgerError
+from pytest_garl.search.database import REMEDY, Database
+from pytest_garl.search.processes import alive
 
 VERSION = 3
 """Of the tables below; a ledger of another version is not continued."""
@@ -89,49 +91,12 @@ class Row:
         return str(self.result["verdict"]["signature"])
 
 
-_REMEDY = (
-    "Is it a ledger, is there space, may it be written? Mend that and go on with --garl-resume, or "
-    "choose another folder with the ini key garl_dir"
-)
-
-
-class _Database:
-    """A connection whose errors are those of the ledger."""
-
-    def __init__(self, path: Path) -> None:
-        self._path = path
-        with self._explained():
-            self._connection = sqlite3.connect(path, timeout=30, isolation_level=None)
-
-    def execute(self, sql: str, values: Sequence[Any] = ()) -> sqlite3.Cursor:
-        with self._explained():
-            return self._connection.execute(sql, values)
-
-    def executemany(self, sql: str, rows: Sequence[Sequence[Any]]) -> None:
-        with self._explained():
-            self._connection.executemany(sql, rows)
-
-    def executescript(self, sql: str) -> None:
-        with self._explained():
-            self._connection.executescript(sql)
-
-    def close(self) -> None:
-        self._connection.close()
-
-    @contextmanager
-    def _explained(self) -> Iterator[None]:
-        try:
-            yield
-        except sqlite3.Error as error:
-            raise LedgerError(f"{self._path}: {error}. {_REMEDY}") from error
-
-
 class Ledger:
     """A run's searches, slots and results; safe for several processes."""
 
     def __init__(self, path: Path) -> None:
         self.path = path
-        self._db = _Database(path)
+        self._db = Database(path)
         self._db.execute("PRAGMA journal_mode=WAL")
         self._db.execute("PRAGMA synchronous=NORMAL")
 
@@ -143,7 +108,7 @@ class Ledger:
             if path.is_file():
                 _set_aside(path)
         except OSError as error:
-            raise LedgerError(f"{path}: {error.strerror}. {_REMEDY}") from error
+            raise LedgerError(f"{path}: {error.strerror}. {REMEDY}") from error
         ledger = cls(path)
         ledger._db.executescript(SCHEMA)
         facts = {**run, "ledger": VERSION}
@@ -511,7 +476,7 @@ class Ledger:
         """Start a child by ``spawn() -> pid`` unless ``limit`` of them live already."""
         with self.transaction():
             for pid, owner in self._db.execute("SELECT pid, owner FROM seat").fetchall():
-                if not _alive(pid) and not _alive(owner):
+                if not alive(pid) and not alive(owner):
                     self._db.execute("DELETE FROM seat WHERE pid = ?", (pid,))
             taken = self._db.execute("SELECT count(*) FROM seat").fetchone()[0]
             if taken >= limit:
@@ -534,8 +499,8 @@ class Ledger:
         ).fetchall()
         for pid, lease, owner in rows:
             silent = lease is not None and lease < time.time()
-            watched = owner is not None and _alive(owner)
-            if silent or not (_alive(pid) or watched):
+            watched = owner is not None and alive(owner)
+            if silent or not (alive(pid) or watched):
                 self.release(pid, "waiting")
 
 
@@ -546,18 +511,3 @@ def _set_aside(path: Path) -> None:
     for suffix in ("-wal", "-shm"):
         path.with_name(path.name + suffix).unlink(missing_ok=True)
     path.replace(path.with_name(f"{path.stem}-previous{path.suffix}"))
-
-
-def _alive(pid: int) -> bool:
-    try:
-        os.kill(pid, 0)
-    except ProcessLookupError:
-        return False
-    except PermissionError:
-        return True
-    try:
-        fields = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()
-    except OSError:
-        return True
-    # A dead process that nobody has asked about yet.
-    return fields[0] != "Z"

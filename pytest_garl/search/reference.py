@@ -22,6 +22,11 @@ class Reference:
     file: str
     qualname: str
 
+    @property
+    def name(self) -> str:
+        """The name in ledgers, cases and baselines: "module:qualname"."""
+        return f"{self.module}:{self.qualname}"
+
     def load(self) -> Any:
         """Return the object, imported by name, or from its file where the name fails."""
         try:
@@ -74,6 +79,21 @@ def sources_sha256(thing: Any) -> str:
     for file in sorted(files):
         digest.update(file.name.encode() + file.read_bytes())
     return digest.hexdigest()
+
+
+def system_named(name: str) -> Any:
+    """Import a landing system by "module:class"; raise LandingSystemError for what is none."""
+    module, _, qualname = name.partition(":")
+    if not module or not qualname:
+        raise LandingSystemError(f"found {name!r}")
+    try:
+        found: Any = importlib.import_module(module)
+        for part in qualname.split("."):
+            found = getattr(found, part)
+    except (ImportError, AttributeError) as error:
+        raise LandingSystemError(f"{type(error).__name__}: {error}") from error
+    check_system(found)
+    return found
 
 
 def check_system(system: Any) -> None:

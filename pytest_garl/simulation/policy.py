@@ -106,6 +106,11 @@ class PolicySpec:
     factory: str
     arguments: tuple[tuple[str, str | int | float], ...] = ()
 
+    @property
+    def sha256(self) -> str:
+        """The hash of a learned policy's weights; empty for the others."""
+        return str(dict(self.arguments).get("sha256", ""))
+
     def make(self) -> ObjectPolicy:
         """Return a fresh policy for one object; raise PolicyError where there is none."""
         module, _, attribute = self.factory.partition(":")

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 
 from pytest_garl.simulation.flight import Contact, Flight, Separation
+from pytest_garl.verdicts.compass import compass_point
 from pytest_garl.verdicts.moments import last_sighting_s, moment, speaks, was_in_view
 from pytest_garl.verdicts.verdict import (
     Limits,
@@ -213,23 +214,11 @@ def _abort_time(flight: Flight) -> float:
     return next((e.time_s for e in flight.events if e.name == "abort_command"), flight.elapsed_s)
 
 
-_COMPASS = (
-    "east",
-    "north-east",
-    "north",
-    "north-west",
-    "west",
-    "south-west",
-    "south",
-    "south-east",
-)
-
-
 def _where(flight: Flight) -> str:
     x, y, z = (float(value) for value in flight.uav.position_m[-1])
     mx, my = flight.marker_position_m
     distance = math.hypot(x - mx, y - my)
-    point = _COMPASS[round(math.atan2(y - my, x - mx) / (math.pi / 4)) % 8]
+    point = compass_point(x - mx, y - my)
     place = f"{distance:.1f} m {point} of the marker" if distance > 0.3 else "over the marker"
     recent = [s for s in flight.steps if s.time_s > flight.elapsed_s - 2.0]
     hidden = ""
