@@ -125,7 +125,7 @@ def _saved_targets(subject: Subject, options: Options, test: str) -> Iterator[Ta
             continue
         target = dataclasses.replace(subject.target(head.map, FIRST), entry=entry)
         yield target
-        if head.status == "fixed":
+        if head.status == "fixed" and head.avoidable == "live":
             yield dataclasses.replace(target, live=True)
 
 

@@ -155,10 +155,11 @@ def _answer(result: Replay) -> None:
 def promote(folders: _Folders, file: Path) -> None:
     """Say that a case is fixed: from now on it must pass.
 
-    It is flown first, with its recorded moves and with a live policy; if it fails, it stays open.
+    It is flown first, with its recorded moves and, where the reference pilot gets away from it,
+    with a live policy; if it fails, it stays open.
     """
     case = folders.case(file)
-    for live in (False, True):
+    for live in (False, True) if case.avoidable == "live" else (False,):
         result = replay(case, folders.root, folders.maps, live=live)
         if result.answer == "FAILED":
             how = "a live policy" if live else "its recorded moves"

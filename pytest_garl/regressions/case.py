@@ -13,6 +13,9 @@ from pytest_garl.verdicts.verdict import Limits, PropertyName, ViolationType
 Status = Literal["open", "fixed", "unavoidable"]
 """Open: known, expected to fail.  Fixed: must pass.  Unavoidable: not even a pilot that knows where
 everything is lands; gates nothing."""
+Avoidable = Literal["live", "recorded", "no"]
+"""Among which objects that pilot lands: those that a live policy steers after it, those that
+only repeat what they did, or neither."""
 MoveList = tuple[tuple[float, float], ...]
 Moves = tuple[tuple[str, MoveList], ...]
 
@@ -55,11 +58,13 @@ class Case:
     needed to fly it again; ``policy`` and ``policy_sha256`` name who moved them when it was
     found.  ``test`` and ``assertion`` are set where a test's own assertion failed and the
     built-in verdict is content: the test's name and the hash of the assertion's source.
+    ``avoidable`` says what may be asked of a repair: not to outrun a pursuer that nobody outruns.
     ``limits`` are those of the tests when it was found; pytest flies it with those of today.
     """
 
     system: str
     status: Status
+    avoidable: Avoidable
     scenario: Scenario
     violation: Violation
     policy: str

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Literal, cast
 
 from pytest_garl.errors import ScenarioError
-from pytest_garl.regressions.case import Case, Evidence, MoveList, Status, Violation
+from pytest_garl.regressions.case import Avoidable, Case, Evidence, MoveList, Status, Violation
 from pytest_garl.scenarios.files import gene_lines, read_genes
 from pytest_garl.scenarios.maps import Map
 from pytest_garl.scenarios.toml_reader import Table, parse
@@ -20,6 +20,8 @@ from pytest_garl.verdicts.verdict import Limits, PropertyName, ViolationType
 SCHEMA = 1
 _TYPES = ("I", "II", "III", "IV", "V", "late", "off", "hard", "abort", "own")
 _PROPERTIES = ("distance", "time", "collision", "crash", "abort", "own")
+_STATUSES = ("open", "fixed", "unavoidable")
+_AVOIDABLE = ("live", "recorded", "no")
 _WIDTH = 98
 
 
@@ -29,6 +31,7 @@ class Head:
 
     system: str
     status: Status
+    avoidable: Avoidable
     map: str
     test: str
 
@@ -42,6 +45,7 @@ def dumps(case: Case) -> str:
         f"schema = {SCHEMA}",
         f'system = "{case.system}"',
         f'status = "{case.status}"',
+        f'avoidable = "{case.avoidable}"  # among which objects the reference pilot lands',
         f'map = "{scenario.map}"',
         f"seed = {scenario.seed}",
     ]
@@ -105,6 +109,7 @@ def loads(text: str, load_map: Callable[[str], Map], *, source: str = "case") ->
             "schema",
             "system",
             "status",
+            "avoidable",
             "map",
             "seed",
             "test",
@@ -131,6 +136,7 @@ def loads(text: str, load_map: Callable[[str], Map], *, source: str = "case") ->
     return Case(
         system=head.system,
         status=head.status,
+        avoidable=head.avoidable,
         scenario=scenario,
         violation=Violation(
             signature=violation.text("signature"),
@@ -164,7 +170,8 @@ def _read_head(top: Table) -> Head:
         raise top.error("system", f"found {system!r}, expected 'module:class'")
     return Head(
         system=system,
-        status=cast(Status, top.text("status", among=("open", "fixed", "unavoidable"))),
+        status=cast(Status, top.text("status", among=_STATUSES)),
+        avoidable=cast(Avoidable, top.text("avoidable", among=_AVOIDABLE)),
         map=top.text("map"),
         test=top.text("test", ""),
     )

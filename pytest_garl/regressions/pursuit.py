@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from pytest_garl.adversary.recorded import recorded_spec
-from pytest_garl.regressions.case import Case, Evidence, Moves, Violation
+from pytest_garl.regressions.case import Avoidable, Case, Evidence, Moves, Violation
 from pytest_garl.regressions.moves import simpler
 from pytest_garl.regressions.neighbours import COUNT, neighbours
 from pytest_garl.regressions.shrink import complexity, genome_of, shrink
@@ -25,7 +25,9 @@ from pytest_garl.simulation.reference_pilot import ReferencePilot
 from pytest_garl.verdicts.serialise import from_dict
 from pytest_garl.verdicts.verdict import Verdict
 
-LEAST = 2 + COUNT
+PILOTS = 2
+"""Flights of the reference pilot: against the recorded moves, against the live policy."""
+LEAST = 1 + COUNT + PILOTS
 """Flights without which nothing can be said: once more, three neighbours, the reference pilot."""
 CANDIDATES = 3
 """So many violations of a signature are tried for one whose neighbours fail as well."""
@@ -108,13 +110,13 @@ class Pursuit:
         if best is None:
             reason = "its flights with the recorded moves do not fail in the same way"
             return self._finding(None, reason)
-        avoidable = self._avoidable(best.scenario)
         shrunk = self._shrunk(best)
-        return self._finding(self._case(best.scenario, shrunk, avoidable))
+        return self._finding(self._case(best.scenario, shrunk, self._avoidable(shrunk)))
 
     @property
     def _left(self) -> int:
-        return self._inquiry.budget - self._flights
+        """Flights that may be spent before the reference pilot's."""
+        return self._inquiry.budget - self._flights - PILOTS
 
     def _finding(self, case: Case | None, reason: str = "") -> Finding:
         return Finding(
@@ -153,9 +155,18 @@ class Pursuit:
             for each in neighbours(scenario, self._inquiry.map)
         )
 
-    def _avoidable(self, scenario: Scenario) -> bool:
+    def _avoidable(self, failure: _Failure) -> Avoidable:
         """Whether a pilot that knows where everything is lands among the same objects."""
-        pilot = dataclasses.replace(self._inquiry.job, system=reference_to(ReferencePilot))
+        scenario, job = failure.scenario, self._inquiry.job
+        pilot = dataclasses.replace(job, system=reference_to(ReferencePilot))
+        recorded = recorded_spec(dict(failure.moves))
+        if not self._lands(dataclasses.replace(pilot, npcs=recorded), scenario):
+            return "no"
+        # Where nothing moves, nothing pursues.
+        alone = not failure.moves
+        return "live" if alone or self._lands(pilot, scenario) else "recorded"
+
+    def _lands(self, pilot: Job, scenario: Scenario) -> bool:
         done = self._go(pilot, scenario)
         return not done.signature and not self._inquiry.failed(scenario, done)
 
@@ -204,13 +215,14 @@ class Pursuit:
                 return _Failure(scenario=scenario, moves=moves, done=done, robust=robust)
         return failure
 
-    def _case(self, first: Scenario, failure: _Failure, avoidable: bool) -> Case:
+    def _case(self, first: Scenario, failure: _Failure, avoidable: Avoidable) -> Case:
         inquiry, done, job = self._inquiry, failure.done, self._inquiry.job
         flight = load(done.record) if done.record.exists() else None
         own = inquiry.asks(done.result, done.record, failure.scenario) if inquiry.asks else None
         return Case(
             system=job.system.name,
-            status="open" if avoidable else "unavoidable",
+            status="unavoidable" if avoidable == "no" else "open",
+            avoidable=avoidable,
             scenario=failure.scenario,
             violation=_violation(from_dict(done.result["verdict"]), flight, own),
             policy=job.npcs.name,

@@ -14,6 +14,12 @@ from pytest_garl.regressions.follow_up import Place, Pursued, follow_up, inquiri
 from pytest_garl.reports.progress import live
 from pytest_garl.run import Run
 
+PILOT = {
+    "live": "the reference pilot lands",
+    "recorded": "the reference pilot lands unless it is pursued as well",
+    "no": "UNAVOIDABLE, gates nothing",
+}
+
 
 def pursue(run: Run, config: pytest.Config) -> None:
     """Pursue new signatures; what comes of it is told in the summary."""
@@ -68,7 +74,7 @@ def told(pursued: tuple[Pursued, ...], root: Path) -> list[str]:
         evidence = case.evidence
         facts = [
             f"{evidence.neighbours_failed} of {evidence.neighbours} neighbours fail too",
-            "the reference pilot lands" if case.status == "open" else "UNAVOIDABLE, gates nothing",
+            PILOT[case.avoidable],
             f"shrinking removed {evidence.removed}",
             f"{each.finding.flights} flights",
         ]

@@ -44,6 +44,7 @@ def broken_lander() -> Case:
     return Case(
         system="stack_of_test:Lander",
         status="open",
+        avoidable="live",
         scenario=scenario.replace({"environment.fog": 0.1}).without(*names[1:]),
         violation=Violation(
             signature="V:ZeroDivisionError@stack_of_test.step",

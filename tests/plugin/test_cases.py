@@ -88,7 +88,7 @@ def test_the_same_search_saves_the_same_bytes(
 
 def test_what_the_budget_does_not_reach_is_told(pytester: pytest.Pytester) -> None:
     project(pytester)
-    result = run(pytester, *SEARCH, "--garl-shrink=5")
+    result = run(pytester, *SEARCH, "--garl-shrink=6")
     assert len(cases(pytester)) == 1
     told = "not saved: Good on lawn: IV:dog:*: the budget of --garl-shrink did not reach it"
     result.stdout.fnmatch_lines(["*confirming and shrinking 1 new kinds*", told])
@@ -145,6 +145,24 @@ def test_what_cannot_be_avoided_gates_nothing(pytester: pytest.Pytester) -> None
     result.stdout.fnmatch_lines(["*UNAVOIDABLE, gates nothing*"])
     assert {load(path).status for path in cases(pytester)} == {"unavoidable"}
     assert run(pytester).ret == 0
+
+
+def test_who_repairs_need_not_outrun_what_the_reference_pilot_does_not(
+    pytester: pytest.Pytester,
+) -> None:
+    project(pytester)
+    simulator = pytester.path / "tiny_simulator.py"
+    change(simulator, "    del npcs, time_limit_s\n", "")
+    hit = "> 0.7 and (not knows or npcs.name != 'recorded')"
+    change(simulator, "> 0.7 and not knows", hit)
+    result = run(pytester, *SEARCH)
+    result.stdout.fnmatch_lines(["*(3 of 3 neighbours fail too; the reference pilot lands unless*"])
+    fog, dog = cases(pytester)
+    assert (load(fog).avoidable, load(dog).avoidable) == ("live", "recorded")
+    assert load(dog).status == "open"
+    change(dog, 'status = "open"', 'status = "fixed"')
+    change(simulator, hit, "> 7")
+    run(pytester).assert_outcomes(passed=5, xfailed=1)
 
 
 def test_with_ci_set_the_tree_is_left_alone_and_a_patch_brings_the_case(

@@ -30,6 +30,7 @@ def case(signature: str = "IV:dog:last-metre:unseen", story: str = "A dog. It bi
     return Case(
         system=SYSTEM,
         status="open",
+        avoidable="live",
         scenario=scenario,
         violation=Violation(
             signature=signature,
