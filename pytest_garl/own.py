@@ -11,9 +11,11 @@ from typing import Any
 
 import pytest
 
+from pytest_garl.errors import GarlError
 from pytest_garl.fixtures import Landing
 from pytest_garl.regressions.pursuit import OwnFailure
 from pytest_garl.scenarios.scenario import Scenario
+from pytest_garl.switches import target_of
 from pytest_garl.targets import Target
 
 _GIVEN = {"landing", "scenario"}
@@ -30,6 +32,20 @@ def failure_of(test: str, error: BaseException) -> OwnFailure | None:
     return OwnFailure(
         test=test, assertion=digest, signature=f"own:{test}:{digest}", message=message
     )
+
+
+def asks_of(session: pytest.Session, nodeid: str) -> tuple[Target, Asks]:
+    """Return what a test asks that another process has run; this one has collected nothing."""
+    path = session.config.rootpath / nodeid.partition("::")[0]
+    nodes: list[Any] = [pytest.Module.from_parent(session, path=path)]
+    for node in nodes:
+        if isinstance(node, pytest.Function) and node.nodeid == nodeid:
+            target = target_of(node)
+            assert target is not None
+            return target, Asks(node, target)
+        if isinstance(node, pytest.Collector) and nodeid.startswith(node.nodeid):
+            nodes.extend(node.collect())
+    raise GarlError(f"{nodeid}: a worker ran it, but it is not found in {path}")
 
 
 class Asks:

@@ -11,7 +11,7 @@ import pytest
 from pytest_garl import hookspecs
 from pytest_garl.errors import GarlError
 from pytest_garl.fixtures import garl_slot, landing, npcs, scenario
-from pytest_garl.switches import FATAL, RUN, add_options, asked, flies, target_of
+from pytest_garl.switches import FATAL, OWN, RUN, add_options, asked, flies, target_of
 
 __all__ = ["garl_slot", "landing", "npcs", "scenario"]
 
@@ -146,10 +146,13 @@ def pytest_runtest_makereport(
 
 
 def pytest_runtest_logreport(report: pytest.TestReport) -> None:
-    """End a session that has lost its ledger, wherever that was noticed."""
+    """End a session that has lost its ledger; remember what xdist's workers tell of assertions."""
     for key, value in report.user_properties:
         if key == FATAL:
             raise pytest.exit.Exception(f"garl: {value}", pytest.ExitCode.INTERNAL_ERROR)
+        worker = getattr(report, "node", None)
+        if key == OWN and worker is not None:
+            worker.config.stash[RUN].told[report.nodeid] = str(value)
 
 
 def pytest_report_header(config: pytest.Config) -> str | None:
@@ -185,7 +188,7 @@ def pytest_sessionfinish(session: pytest.Session) -> None:
         if run.searched(session):
             from pytest_garl.reports.aftermath import pursue
 
-            pursue(run, session.config)
+            pursue(run, session)
             if run.troubled:
                 session.exitstatus = pytest.ExitCode.INTERNAL_ERROR
     finally:

@@ -60,6 +60,8 @@ class Run:
     own: dict[tuple[str, str], Asks] = field(default_factory=dict)
     """Assertions of tests that failed where the built-in verdict is content, by search and
     signature."""
+    told: dict[str, str] = field(default_factory=dict)
+    """Tests of which xdist's workers say that they failed so, with the signature."""
     lock: TextIO | None = None
 
     def select(self, items: list[pytest.Item]) -> None:

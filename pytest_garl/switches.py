@@ -18,6 +18,8 @@ RUN = pytest.StashKey[Any]()
 """Where a session keeps its run; none if nothing is to be flown."""
 FATAL = "garl.fatal"
 """The user property by which an xdist worker tells the controller that the run cannot go on."""
+OWN = "garl.own"
+"""The user property by which it tells of a test that failed in an assertion of its own."""
 METHODS = ("garl", "garl-paper", "random")
 POLICIES = ("dqn", "dqn-paper", "greedy", "stand", "waypoint", "random_walk", "stationary")
 Option = namedtuple("Option", ["name", "metavar", "help", "default"], defaults=[""])

@@ -10,6 +10,7 @@ from typing import Any
 import pytest
 
 from pytest_garl.errors import GarlError
+from pytest_garl.own import asks_of
 from pytest_garl.regressions.follow_up import Place, Pursued, follow_up, inquiries
 from pytest_garl.reports.progress import live
 from pytest_garl.run import Run
@@ -21,9 +22,9 @@ PILOT = {
 }
 
 
-def pursue(run: Run, config: pytest.Config) -> None:
+def pursue(run: Run, session: pytest.Session) -> None:
     """Pursue new signatures; what comes of it is told in the summary."""
-    options = run.options
+    options, config = run.options, session.config
     place = Place(
         root=options.root,
         cases=options.cases,
@@ -33,6 +34,9 @@ def pursue(run: Run, config: pytest.Config) -> None:
     )
     reporter: Any = config.pluginmanager.get_plugin("terminalreporter")
     try:
+        for nodeid, signature in sorted(run.told.items()):
+            target, asks = asks_of(session, nodeid)
+            run.own[target.search, signature] = asks
         wanted = inquiries(run.ledger, place, options.shrink, run.own)
         reached = [each for each in wanted if each.budget]
         if reached:

@@ -10,6 +10,7 @@ import pytest
 from pytest_garl.fixtures import Landing
 from pytest_garl.own import Asks, failure_of
 from pytest_garl.run import Run, again_key
+from pytest_garl.switches import OWN
 from pytest_garl.targets import FIRST, Target
 
 if TYPE_CHECKING:
@@ -79,8 +80,6 @@ def _explain_own(
     if not asks.possible:
         lines.insert(1, "It is not saved: its test takes more than landing and scenario.")
         return _tell(report, lines)
-    if hasattr(item.config, "workerinput"):
-        lines.insert(1, "It is not saved from a worker of xdist: run without -n.")
 
     def alike(other: Target, result: dict[str, Any]) -> bool:
         found = asks(result, run.record(other), run.scenario(other))
@@ -90,6 +89,8 @@ def _explain_own(
     if twin and run.options.duplicates == "xfail":
         return _expected(report, f"same violation as {twin} ({failure.signature})")
     run.own[target.search, failure.signature] = asks
+    if hasattr(item.config, "workerinput"):
+        report.user_properties.append((OWN, failure.signature))
     return _tell(report, lines)
 
 

@@ -238,13 +238,14 @@ def test_own(landing, scenario):
 """
 
 
+@pytest.mark.parametrize("how", [("--garl-workers=0",), ("--garl-workers=1", "-n2")])
 def test_a_property_of_ones_own_is_shrunk_and_saved_for_its_test(
-    pytester: pytest.Pytester,
+    pytester: pytest.Pytester, how: tuple[str, ...]
 ) -> None:
     project(pytester)
     tests = pytester.path / "test_it.py"
     tests.write_text(tests.read_text() + OWN)
-    result = run(pytester, *SEARCH)
+    result = run(pytester, *SEARCH, *how)
     result.stdout.fnmatch_lines(["own:test_own:*: a property of your own"])
     (own,) = [path for path in cases(pytester) if "-own-" in path.name]
     case = load(own)
