@@ -4,12 +4,13 @@ BUDGET ?= 20
 VENV := .venv
 BIN := $(VENV)/bin
 READY := $(VENV)/.installed
+SMOKE := .garl/experiment-smoke
 
-.PHONY: search test lint types layers tests bench clean
+.PHONY: search test lint types layers tests bench experiment-smoke clean
 .DEFAULT_GOAL := help
 
 help:  ## show the commands
-	@grep -hE '^[a-z]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/'
+	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/'
 
 search: $(READY)  ## fly BUDGET scenarios (default 20) per landing system and map
 	$(BIN)/pytest --garl-budget=$(BUDGET) landing_systems/
@@ -31,6 +32,11 @@ tests: $(READY)
 
 bench: $(READY)  ## measure frames, flights and the plugin's overhead
 	$(BIN)/python -m benchmarks
+
+experiment-smoke: $(READY)  ## fly, measure and report an experiment at toy size
+	rm -rf $(SMOKE)
+	$(BIN)/garl experiment docs/experiments/smoke.toml --out=$(SMOKE) --folder=$(SMOKE)/runs
+	$(BIN)/garl experiment docs/experiments/smoke.toml --out=$(SMOKE) --report
 
 clean:  ## remove the virtual environment and the run folder
 	rm -rf $(VENV) .garl

@@ -1,5 +1,7 @@
 from __future__ import annotations
 
+import dataclasses
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -20,3 +22,15 @@ def test_every_command_of_the_cases_page_exists() -> None:
     lines = (DOCS / "cases.md").read_text().splitlines()
     named = {line.split()[2] for line in lines if line.startswith("    garl cases ")}
     assert named == set(cases.commands)
+
+
+def test_the_page_of_experiments_tells_every_column_and_every_key() -> None:
+    from pytest_garl.experiments.plan import TOP_KEYS
+    from pytest_garl.experiments.rows import Row
+
+    text = (DOCS / "experiments" / "README.md").read_text()
+    types = {f"type_{kind}" for kind in ("ii", "iii", "iv")}
+    columns = {field.name for field in dataclasses.fields(Row)} - types
+    assert [name for name in columns if f"`{name}`" not in text] == []
+    told = {name.strip("[]") for name in re.findall(r"`([a-z_\[\]]+)`", text)}
+    assert told >= TOP_KEYS

@@ -6,6 +6,7 @@ import click
 
 from pytest_garl.cli.baseline import baseline, diff
 from pytest_garl.cli.cases import cases
+from pytest_garl.cli.experiment import experiment
 from pytest_garl.cli.train import train
 from pytest_garl.errors import GarlError
 
@@ -34,4 +35,5 @@ def main() -> None:
 main.add_command(baseline)
 main.add_command(cases)
 main.add_command(diff)
+main.add_command(experiment)
 main.add_command(train)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import os
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -11,6 +10,7 @@ from typing import Any
 
 from pytest_garl.errors import GarlError, ScenarioError
 from pytest_garl.regressions.files import read_limits
+from pytest_garl.saving import save_text
 from pytest_garl.scenarios.genes import EXTRAS, Property, genome_for
 from pytest_garl.scenarios.maps import Map
 from pytest_garl.scenarios.scenario import Scenario
@@ -166,13 +166,7 @@ def load(path: Path, search_path: tuple[Path, ...] = ()) -> Baseline:
 def save(path: Path, baseline: Baseline) -> None:
     """Write the file; what stood there before is replaced as a whole."""
     _checked(baseline, lambda problem: BaselineError(f"{path}: {problem}"))
-    scratch = path.with_name(f".{path.name}.{os.getpid()}")
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        scratch.write_text(dumps(baseline), encoding="utf-8")
-        scratch.replace(path)
-    except OSError as error:
-        raise BaselineError(f"{path}: the baseline cannot be saved ({error})") from error
+    save_text(path, dumps(baseline))
 
 
 def _checked(baseline: Baseline, wrong: Callable[[str], GarlError]) -> None:

@@ -2,12 +2,9 @@
 
 from __future__ import annotations
 
-import contextlib
 import dataclasses
 import difflib
-import fcntl
 import functools
-import os
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -15,6 +12,7 @@ from pathlib import Path
 from pytest_garl.errors import GarlError, ScenarioError
 from pytest_garl.regressions.case import Case
 from pytest_garl.regressions.files import Head, dumps, load, load_head
+from pytest_garl.saving import alone, save_text
 
 
 class CorpusError(GarlError):
@@ -107,22 +105,6 @@ def _of_system(entry: Entry, system: str) -> Entry:
     return dataclasses.replace(entry, head=None, fault=fault)
 
 
-@contextlib.contextmanager
-def _alone(folder: Path) -> Iterator[None]:
-    """Let one process at a time add to a folder."""
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-        # The folder itself is locked: a file for the purpose would have to be ignored by git.
-        handle = os.open(folder, os.O_RDONLY)
-    except OSError as error:
-        raise CorpusError(f"{folder}: cases cannot be saved here ({error})") from error
-    try:
-        fcntl.flock(handle, fcntl.LOCK_EX)
-        yield
-    finally:
-        os.close(handle)
-
-
 def known(cases: Path, case: Case, map_folders: tuple[Path, ...]) -> Path | None:
     """Return the file that expects the same failure: system, map, signature and test."""
     for entry in entries(cases, case.system, map_folders):
@@ -148,29 +130,19 @@ def _key(case: Case) -> tuple[str, ...]:
 def save(cases: Path, case: Case, map_folders: tuple[Path, ...] = ()) -> Path | None:
     """Write a new case; return its file, or None where the same failure is known already."""
     folder = folder_of(cases, case.system)
-    with _alone(folder):
+    with alone(folder):
         if known(cases, case, map_folders) is not None:
             return None
-        return _write(folder / f"{case.id}.toml", dumps(case))
+        return save_text(folder / f"{case.id}.toml", dumps(case))
 
 
 def replace(path: Path, case: Case) -> Path:
     """Write a case in place of the one in ``path``, under the name that it should have."""
-    with _alone(path.parent):
-        written = _write(path.with_name(f"{case.id}.toml"), dumps(case))
+    with alone(path.parent):
+        written = save_text(path.with_name(f"{case.id}.toml"), dumps(case))
         if written != path:
             path.unlink(missing_ok=True)
         return written
-
-
-def _write(path: Path, text: str) -> Path:
-    scratch = path.with_name(f".{path.name}.{os.getpid()}")
-    try:
-        scratch.write_text(text, encoding="utf-8")
-        scratch.replace(path)
-    except OSError as error:
-        raise CorpusError(f"{path}: the case cannot be saved ({error})") from error
-    return path
 
 
 def patch_of(path: Path, root: Path, text: str) -> str:
@@ -185,9 +157,7 @@ def save_patch(folder: Path, cases: Path, root: Path, case: Case) -> Path:
     """Write a patch that adds the case; the tree itself is left alone."""
     path = folder_of(cases, case.system) / f"{case.id}.toml"
     try:
-        folder.mkdir(parents=True, exist_ok=True)
-        return _write(folder / f"{case.id}.patch", patch_of(path, root, dumps(case)))
+        text = patch_of(path, root, dumps(case))
     except ValueError as error:
         raise CorpusError(f"{cases}: lies outside of the project at {root}: no patch") from error
-    except OSError as error:
-        raise CorpusError(f"{folder}: the patch cannot be saved ({error})") from error
+    return save_text(folder / f"{case.id}.patch", text)

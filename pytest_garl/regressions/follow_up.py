@@ -106,7 +106,7 @@ def _failures(
 ) -> tuple[tuple[Scenario, Done], ...]:
     """Return scenarios with their flights: those that violated, or those that a test refuses."""
     rows = ledger.flown(search) if asks else violating
-    flights = [(load_scenario(row.scenario), _done(row, job)) for row in rows]
+    flights = [(load_scenario(row.scenario), done_of(row, job)) for row in rows]
     if asks is None:
         return tuple(flights)
     return tuple(
@@ -114,7 +114,8 @@ def _failures(
     )
 
 
-def _done(row: Row, job: Job) -> Done:
+def done_of(row: Row, job: Job) -> Done:
+    """Return a search's flight as what is flown beside it comes back."""
     name = flight_name(row.search, row.generation, row.slot, job.map)
     return Done(result=row.result, sha256=row.sha256, record=Path(job.flights) / f"{name}.npz")
 

@@ -17,7 +17,7 @@ from pytest_garl.options import Options
 from pytest_garl.run import Run
 from pytest_garl.search.ledger import Ledger
 from pytest_garl.search.pool import Pool
-from pytest_garl.search.reference import BUILT_IN, reference_to
+from pytest_garl.search.reference import BUILT_IN, package_sha256, reference_to
 
 
 def begin_run(config: pytest.Config, options: Options) -> Run:
@@ -33,6 +33,7 @@ def begin_run(config: pytest.Config, options: Options) -> Run:
         lock = _lock(options.ledger)
         facts: dict[str, Any] = {
             "version": version("pytest-garl"),
+            "sources of pytest-garl": package_sha256()[:12],
             "python": sys.version.split()[0],
             "seed": options.seed,
             "budget": options.budget,

@@ -454,13 +454,14 @@ class Ledger:
         )
         return dict(rows.fetchall())
 
-    def result_hash(self) -> str:
-        """Return a hash of all results that two equal runs share."""
+    def result_hash(self, search: str = "") -> str:
+        """Return a hash of all results that two equal runs share, or of one search's."""
         digest = hashlib.sha256()
         rows = self._db.execute(
             "SELECT system, map, generation, slot, scenario, result, objectives, sha256 FROM slot "
-            "JOIN search ON search.id = slot.search WHERE kind = 'search' "
-            "ORDER BY system, map, generation, slot"
+            "JOIN search ON search.id = slot.search WHERE kind = 'search' AND ? IN ('', search.id) "
+            "ORDER BY system, map, generation, slot",
+            (search,),
         )
         for row in rows:
             # Addresses in a traceback differ from run to run and mean nothing.
@@ -471,6 +472,13 @@ class Ledger:
         """Return the mean wall time of a flight on one process, if any was flown."""
         row = self._db.execute("SELECT avg(wall_s) FROM slot WHERE state = 'flown'").fetchone()
         return None if row[0] is None else float(row[0])
+
+    def flying_s(self, search: str) -> float:
+        """Return the wall time of all flights of a search, each on one process."""
+        row = self._db.execute(
+            "SELECT coalesce(sum(wall_s), 0) FROM slot WHERE search = ?", (search,)
+        ).fetchone()
+        return float(row[0])
 
     def take_seat(self, limit: int, spawn: Any) -> bool:
         """Start a child by ``spawn() -> pid`` unless ``limit`` of them live already."""

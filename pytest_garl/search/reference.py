@@ -81,6 +81,17 @@ def sources_sha256(thing: Any) -> str:
     return digest.hexdigest()
 
 
+def package_sha256() -> str:
+    """Hash what of this package shapes a search: its sources, maps and shipped weights."""
+    home = Path(__file__).parents[1]
+    rooms = ("scenarios", "simulation", "adversary", "search", "verdicts")
+    digest = hashlib.sha256((home / "landing_system.py").read_bytes())
+    for file in sorted(file for room in rooms for file in (home / room).rglob("*")):
+        if file.suffix in (".py", ".toml", ".npz"):
+            digest.update(file.relative_to(home).as_posix().encode() + file.read_bytes())
+    return digest.hexdigest()
+
+
 def system_named(name: str) -> Any:
     """Import a landing system by "module:class"; raise LandingSystemError for what is none."""
     module, _, qualname = name.partition(":")

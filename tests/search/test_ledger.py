@@ -129,3 +129,20 @@ def test_the_hash_covers_results_not_costs(tmp_path: Path) -> None:
         hashes.add(ledger.result_hash())
         ledger.close()
     assert len(hashes) == 1
+
+
+def test_a_search_has_a_hash_and_a_time_of_its_own(tmp_path: Path) -> None:
+    def flown(path: Path, value: int) -> Ledger:
+        ledger = made(path)
+        ledger.add_search("t", "systems:Good", "lawn", 1, "{}")
+        ledger.add_slots("t", 0, {0: "d"})
+        while claim := ledger.claim():
+            result = {"n": value if claim.search == "t" else 1}
+            ledger.record(claim, result, "hash", 0.5)
+        return ledger
+
+    one, other = flown(tmp_path / "one.sqlite", 1), flown(tmp_path / "other.sqlite", 2)
+    assert one.result_hash("s") == other.result_hash("s")
+    assert one.result_hash("t") != other.result_hash("t")
+    assert len({one.result_hash(), one.result_hash("s"), one.result_hash("t")}) == 3
+    assert (one.flying_s("s"), one.flying_s("t"), one.flying_s("u")) == (1.5, 0.5, 0.0)

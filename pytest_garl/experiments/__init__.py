@@ -1,0 +1,1 @@
+"""Experiments: systems × maps × methods × seeds, flown run by run, and their report."""

@@ -1,0 +1,145 @@
+"""The report of an experiment: one Markdown file, made from its TOML file and rows alone."""
+
+from __future__ import annotations
+
+import os
+import re
+from collections import Counter
+from collections.abc import Iterable, Iterator, Sequence
+from pathlib import Path
+
+from pytest_garl.experiments import goals, tables
+from pytest_garl.experiments.campaign import missing
+from pytest_garl.experiments.figures import samples
+from pytest_garl.experiments.plan import Experiment, Grid, Run
+from pytest_garl.experiments.plots import draw
+from pytest_garl.experiments.rows import Row
+from pytest_garl.saving import save_text
+from pytest_garl.verdicts.metrics import CELL_M, HEIGHT_M
+
+HOW_TO_READ = f"""\
+- A violation is the paper's: a collision, a landing more than 1.5 m off the marker, or none in
+  120 s. Landing late and giving up stand in columns of their own. In brackets the exact
+  (Clopper-Pearson) 95 % interval. The flights of a search that learns are no independent sample:
+  what seeds differ by tells more than an interval.
+- *Unavoidable*: of violations drawn at random, the share that a pilot which knows where everything
+  is does not avoid either, while the objects repeat what they did.
+- *Top-10*: flights until the tenth violation, one figure per seed; – where there were fewer than
+  ten. In comparisons and means such a search counts as the budget and one more.
+- *Hours*: of one search on its workers, idle ones included, and after "+" the training of the
+  policy, which is done once for all searches.
+- *Parameter distance*: the mean Euclidean distance between all scenarios of a search (the paper's
+  equation), every gene normalised to [0, 1]; the same of the violating ones alone; and that of the
+  eight weather genes as they are. The paper's code measured weather alone, without normalising
+  it, so its figures stand beside that.
+- *Coverage*: the share of cells of {CELL_M:g} m, up to {HEIGHT_M:g} m above the map, that
+  violating flights pass through.
+- *Signatures*: distinct mechanisms and moments of violations, such as
+  `IV:dog:last-metre:unseen`, one count per seed.
+- *Paper*: its figure for its method of this name; its simulator, maps and landing systems are
+  others.
+- *A12* (Vargha and Delaney): how often a search of the first method has the larger figure; 0.5 is
+  no difference. *p*: exact two-sided Mann-Whitney test over the seeds. Three seeds against three
+  cannot come below 0.10."""
+
+
+def write(experiment: Experiment, rows: Sequence[Row], source: str, path: Path) -> Path:
+    """Write the report to ``path``, and pictures beside it; ``source`` names the rows' file."""
+    sections = [
+        f"# {experiment.title}",
+        f"<!-- Written by `garl experiment {experiment.file.name} --report` from {source}: change "
+        "remarks in the TOML file, and write it again. -->",
+        experiment.text,
+        "## What was run",
+        *_flown(experiment, rows),
+    ]
+    for grid in experiment.grids:
+        sections += _grid(experiment, grid, rows, path)
+    if experiment.goals is not None:
+        found = goals.judged(experiment, experiment.goals, rows)
+        sections += [
+            f"## Goals of {experiment.goals.method} on {experiment.goals.system}",
+            "Means over seeds; two methods are compared on the seeds that both have flown.",
+            goals.table(found, experiment.goals.method),
+            experiment.goals.remarks,
+        ]
+    sections += ["## How to read the tables", HOW_TO_READ]
+    return save_text(path, "\n\n".join(part for part in sections if part) + "\n")
+
+
+def _flown(experiment: Experiment, rows: Sequence[Row]) -> Iterator[str]:
+    own = [
+        row
+        for grid in experiment.grids
+        for each in samples(experiment, grid, rows)
+        for row in each.rows
+    ]
+    lines = []
+    for grid in experiment.grids:
+        found = samples(experiment, grid, rows)
+        flown, wanted = sum(len(each.rows) for each in found), len(found) * len(grid.seeds)
+        seeds = ", ".join(str(seed) for seed in grid.seeds)
+        lines.append(
+            f"- {grid.name}: {flown} of {wanted} searches of {experiment.budget} flights: "
+            f"{', '.join(grid.systems)} on {', '.join(grid.maps)} by {', '.join(grid.methods)}; "
+            f"seeds {seeds}"
+        )
+    yield "\n".join(lines)
+    left = missing(experiment, rows)
+    if left:
+        yield "Not run:\n\n" + "\n".join(_left(left))
+    unique = {row.key: row for row in own}.values()
+    if unique:
+        yield "Flown with:\n\n" + "\n".join(_identity(unique))
+    if len({row.package_sha256 for row in unique}) > 1:
+        yield "**These searches are of more than one state of pytest-garl.**"
+
+
+def _left(runs: Iterable[Run]) -> Iterator[str]:
+    groups: dict[tuple[str, str, tuple[str, ...]], list[str]] = {}
+    for run in runs:
+        groups.setdefault((run.system, run.method, run.maps), []).append(str(run.seed))
+    for (system, method, maps), seeds in groups.items():
+        yield f"- {system}, {method}, on {' and '.join(maps)}: seed {', '.join(seeds)}"
+
+
+def _identity(rows: Iterable[Row]) -> Iterator[str]:
+    """Say which code and machines the rows are of, so that a mixture shows."""
+    facts = [
+        Counter(f"pytest-garl {row.version}, sources {row.package_sha256}" for row in rows),
+        Counter(f"{row.machine}, {row.workers} workers" for row in rows),
+        Counter(
+            f"{row.system}: `{row.landing_system}`, sources {row.landing_system_sha256}"
+            for row in rows
+        ),
+        Counter(f"map {row.map} {row.map_sha256}" for row in rows),
+        Counter(f"{row.method}: objects steered by {_policy(row)}" for row in rows),
+    ]
+    for fact in facts:
+        for text, count in sorted(fact.items()):
+            yield f"- {text} ({count} searches)"
+
+
+def _policy(row: Row) -> str:
+    return f"{row.policy} {row.policy_sha256}".strip()
+
+
+def _grid(experiment: Experiment, grid: Grid, rows: Sequence[Row], path: Path) -> list[str]:
+    slug = re.sub(r"[^a-z0-9]+", "-", f"{experiment.file.stem}-{grid.name}".lower())
+    picture = path.parent / "pictures" / f"{slug}.png"
+    drawn = draw(experiment, grid, rows, picture)
+    compared = tables.comparison(experiment, grid, rows)
+    return [
+        f"## {grid.title}",
+        grid.text,
+        tables.effect(experiment, grid, rows),
+        tables.spread(experiment, grid, rows),
+        "Types of violations, as shares of those of a type I to V:",
+        tables.kinds(experiment, grid, rows),
+        f"![{grid.title}]({os.path.relpath(picture, path.parent)})" if drawn else "",
+        "Points are searches, boxes reach over quartiles and whiskers over all; × is the paper's."
+        if drawn
+        else "",
+        compared,
+        grid.remarks,
+    ]

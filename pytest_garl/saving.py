@@ -1,0 +1,46 @@
+"""Text files that are whole or not there at all, whoever else writes beside."""
+
+from __future__ import annotations
+
+import contextlib
+import fcntl
+import os
+from collections.abc import Iterator
+from pathlib import Path
+
+from pytest_garl.errors import GarlError
+
+
+class SavingError(GarlError):
+    """A file that cannot be written, or a folder in which nothing can be."""
+
+
+def save_text(path: Path, text: str) -> Path:
+    """Write a file in one piece and return its path; its folder is made where it is missing."""
+    scratch = path.with_name(f".{path.name}.{os.getpid()}")
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        with scratch.open("w", encoding="utf-8", newline="") as file:
+            file.write(text)
+            file.flush()
+            os.fsync(file.fileno())
+        scratch.replace(path)
+    except OSError as error:
+        raise SavingError(f"{path}: cannot be saved ({error})") from error
+    return path
+
+
+@contextlib.contextmanager
+def alone(folder: Path) -> Iterator[None]:
+    """Let one process at a time change the files of a folder, from reading them to writing."""
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        # The folder itself is locked: a file for the purpose would have to be ignored by git.
+        handle = os.open(folder, os.O_RDONLY)
+    except OSError as error:
+        raise SavingError(f"{folder}: nothing can be saved here ({error})") from error
+    try:
+        fcntl.flock(handle, fcntl.LOCK_EX)
+        yield
+    finally:
+        os.close(handle)

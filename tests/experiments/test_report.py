@@ -1,0 +1,206 @@
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from pytest_garl.experiments import goals
+from pytest_garl.experiments.plan import Experiment, read
+from pytest_garl.experiments.report import write
+from pytest_garl.experiments.rows import Row
+from tests.experiments.samples import row
+
+TEXT = """
+title = "Mine"
+text = "What it is for."
+budget = 40
+maps = ["court"]
+seeds = [0, 1]
+[systems]
+Lander = "test_it.py"
+[[grids]]
+name = "RQ2"
+title = "Methods"
+text = "What is asked."
+remarks = "What came of it."
+methods = ["garl", "random", "ga"]
+[goals]
+grid = "RQ2"
+system = "Lander"
+method = "garl"
+random = "random"
+baselines = ["random", "ga"]
+remarks = "Why so."
+[training_hours]
+garl = 0.25
+[[published]]
+system = "Lander"
+map = "court"
+methods = ["garl"]
+violations = 20.6
+top10 = 42
+distance = 0.19
+coverage = 11.24
+hours = 12
+kinds = [12, 35, 2, 45, 6]
+[[published]]
+system = "Lander"
+map = "court"
+methods = ["random"]
+violations = 2.25
+top10 = 0
+"""
+GARL = (
+    row(),
+    row(
+        seed=1,
+        violations=14,
+        top10=20,
+        covered=90,
+        signatures=("I:decoy:transit", "II:lost:descent", "IV:bird:descent:seen"),
+    ),
+)
+RANDOM = (
+    row(
+        method="random",
+        violations=4,
+        top10=None,
+        covered=30,
+        signatures=("II:lost:descent",),
+        parameter_distance=1.2,
+        piloted=0,
+        unavoidable=0,
+        policy="waypoint",
+        policy_sha256="",
+    ),
+    row(method="random", seed=1, violations=6, top10=None, covered=60, parameter_distance=1.3),
+)
+
+
+@pytest.fixture
+def experiment(tmp_path: Path) -> Experiment:
+    (tmp_path / "mine.toml").write_text(TEXT)
+    return read(tmp_path / "mine.toml")
+
+
+def report(experiment: Experiment, rows: tuple[Row, ...]) -> str:
+    path = experiment.file.parent / "out" / "mine.md"
+    assert write(experiment, rows, "mine.csv", path) == path
+    return path.read_text()
+
+
+def test_ours_and_the_papers_stand_side_by_side(experiment: Experiment) -> None:
+    text = report(experiment, GARL + RANDOM)
+    # 24 of 80 violate; the pilot tried 8 and failed in 2; 7,200 s on two workers are an hour.
+    assert (
+        "| court | Lander | garl | 0, 1 | 30.0 [20.3, 41.3] | 20.60 | 7.5 | 10.0 "
+        "| 25.0 [3.2, 65.1] of 8 | 30, 20 | 42 | 1.00 + 0.25 | 12 |"
+    ) in text
+    assert (
+        "| court | Lander | garl | 1.50 | 1.25 | 0.125 | 0.19 | 4.00 | 11.24 | 2, 3 (4 in all) |"
+        in text
+    )
+    assert "| garl | 10 / 20 / 0 / 60 / 10 | 12 / 35 / 2 / 45 / 6 | 20 | 6 | 2 | 0 | 0 |" in text
+    assert "| –, – | cannot find | 1.00 | – |" in text
+    assert "| court | Lander | ga | not run | – | – |" in text
+
+
+def test_methods_are_compared_over_seeds(experiment: Experiment) -> None:
+    text = report(experiment, GARL + RANDOM)
+    # Two against two, all on one side: 2 of 6 deals are as extreme. 41 stands for no tenth.
+    assert (
+        "| court | Lander | random | 2, 2 | U 4, p 0.33, A12 1.00 | U 0, p 0.33, A12 0.00 "
+        "| U 4, p 0.33, A12 1.00 | U 4, p 0.33, A12 1.00 | U 3.5, p 0.67, A12 0.88 |"
+    ) in text
+    assert "garl against" not in report(experiment, GARL[:1] + RANDOM)
+
+
+def test_it_says_what_was_flown_and_what_was_not(experiment: Experiment) -> None:
+    text = report(experiment, GARL + RANDOM[:1] + (row(seed=7), row(budget=400)))
+    assert (
+        "- RQ2: 3 of 6 searches of 40 flights: Lander on court by garl, random, ga; seeds 0, 1"
+        in text
+    )
+    assert "- Lander, ga, on court: seed 0, 1\n- Lander, random, on court: seed 1" in text
+    assert "- pytest-garl 0.1.0, sources dddddddddddd (3 searches)" in text
+    assert "- Lander: `stack.lander:Lander`, sources aaaaaaaaaaaa (3 searches)" in text
+    assert "- random: objects steered by waypoint (1 searches)" in text
+    assert "more than one state" not in text
+    assert "**These searches are of more than one state of pytest-garl.**" in report(
+        experiment, (GARL[0], row(seed=1, package_sha256="0"))
+    )
+
+
+def test_remarks_outlive_a_new_report(experiment: Experiment) -> None:
+    for rows in (GARL, GARL + RANDOM):
+        text = report(experiment, rows)
+        places = [
+            text.index(words)
+            for words in ("What it is for.", "What is asked.", "What came of it.", "Why so.")
+        ]
+        assert places == sorted(places)
+
+
+def test_equal_rows_make_equal_bytes(experiment: Experiment) -> None:
+    first = report(experiment, GARL + RANDOM)
+    picture = experiment.file.parent / "out" / "pictures" / "mine-rq2.png"
+    before = picture.read_bytes()
+    picture.unlink()
+    assert report(experiment, tuple(reversed(GARL + RANDOM))) == first
+    assert picture.read_bytes() == before
+    assert before.startswith(b"\x89PNG")
+    assert len(before) < 60_000
+    assert "![Methods](pictures/mine-rq2.png)" in first
+
+
+def test_without_rows_all_is_not_run(experiment: Experiment) -> None:
+    text = report(experiment, ())
+    assert "RQ2: 0 of 6 searches" in text
+    assert text.count("**not run**") == len(goals.GOALS)
+    assert "Flown with" not in text
+    assert not (experiment.file.parent / "out" / "pictures").exists()
+
+
+def verdicts(experiment: Experiment, rows: tuple[Row, ...]) -> list[tuple[str, str]]:
+    assert experiment.goals is not None
+    return [
+        (f"{each.goal.figure.title} {each.goal.wish}", each.verdict)
+        for each in goals.judged(experiment, experiment.goals, rows)
+    ]
+
+
+def test_goals_are_met_missed_or_open(experiment: Experiment) -> None:
+    assert verdicts(experiment, GARL + RANDOM) == [
+        # 30 % against 12.5 %.
+        ("violations, % at least 2 × chance", "met"),
+        ("violations, % above every baseline", "not run"),
+        # 25 against more than 40: 41 / 2 is less.
+        ("Top-10, flights at most 0.5 × chance", "missed"),
+        ("Top-10, flights below every baseline", "not run"),
+        # 1.5 = 1.2 × 1.25.
+        ("parameter distance at least 1.2 × chance", "met"),
+        # 4 % against 1.5 %.
+        ("coverage, % at least 2 × chance", "met"),
+        ("signatures above every baseline", "not run"),
+    ]
+
+
+def test_a_rival_as_good_is_a_goal_missed(experiment: Experiment) -> None:
+    equal = tuple(row(method="ga", seed=each.seed, violations=12, top10=25) for each in GARL)
+    found = dict(verdicts(experiment, GARL + RANDOM + equal))
+    assert found["violations, % above every baseline"] == "missed"
+    assert found["Top-10, flights below every baseline"] == "missed"
+    # 2.5 against 2 and 1.5.
+    assert found["signatures above every baseline"] == "met"
+    text = report(experiment, GARL + RANDOM + equal)
+    assert (
+        "| court | Top-10, flights | below every baseline | **missed** | 25 | random ≥ 41, ga 25 |"
+    ) in text
+
+
+def test_methods_are_compared_on_the_seeds_that_both_have(experiment: Experiment) -> None:
+    # Alone with seed 1, chance has 15 %, garl 35 %; over all seeds garl has but 30 %.
+    found = dict(verdicts(experiment, (*GARL, row(method="random", seed=1, violations=7))))
+    assert found["violations, % at least 2 × chance"] == "met"
+    found = dict(verdicts(experiment, (*GARL, row(method="random", seed=1, violations=8))))
+    assert found["violations, % at least 2 × chance"] == "missed"

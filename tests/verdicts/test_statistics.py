@@ -1,0 +1,69 @@
+from __future__ import annotations
+
+import itertools
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.stats import mannwhitneyu
+
+from pytest_garl.verdicts.statistics import mann_whitney, vargha_delaney
+
+values = st.lists(st.integers(0, 6).map(float), min_size=2, max_size=5)
+
+
+@pytest.mark.parametrize(
+    ("first", "second", "a12"),
+    [
+        ([3.0, 4.0], [1.0, 2.0], 1.0),
+        ([1.0, 2.0], [3.0, 4.0], 0.0),
+        ([1.0, 2.0], [1.0, 2.0], 0.5),
+        # Of six pairs 5 beats three, 2 beats one and ties with one: (3 + 1 + 1/2) / 6.
+        ([5.0, 2.0], [1.0, 2.0, 4.0], 4.5 / 6),
+    ],
+)
+def test_a12_is_the_chance_to_be_larger(
+    first: list[float], second: list[float], a12: float
+) -> None:
+    assert vargha_delaney(first, second) == pytest.approx(a12)
+
+
+def test_three_against_three_cannot_be_surer_than_a_tenth() -> None:
+    # U = 9; of the 20 ways to deal six values out, this one and its mirror are as extreme.
+    u, p = mann_whitney([4.0, 5.0, 6.0], [1.0, 2.0, 3.0])
+    assert [u, p] == pytest.approx([9, 2 / 20])
+
+
+def test_equal_values_tell_nothing() -> None:
+    assert mann_whitney([2.0, 2.0], [2.0, 2.0, 2.0]) == (3.0, 1.0)
+
+
+def test_many_values_without_ties_agree_with_the_exact_distribution() -> None:
+    first, second = [float(n) for n in range(0, 16, 2)], [float(n) for n in range(5, 19, 2)]
+    u, p = mann_whitney(first, second)
+    expected = mannwhitneyu(first, second, alternative="two-sided", method="exact")
+    assert [u, p] == pytest.approx([expected.statistic, expected.pvalue])
+
+
+def test_more_values_than_can_be_dealt_out_are_approximated() -> None:
+    first, second = [float(n) for n in range(12)], [n + 0.5 for n in range(12)]
+    expected = mannwhitneyu(first, second, alternative="two-sided", method="asymptotic")
+    u, p = mann_whitney(first, second)
+    assert [u, p] == pytest.approx([expected.statistic, expected.pvalue])
+
+
+@settings(deadline=None, max_examples=40)
+@given(values, values)
+def test_p_is_the_share_of_deals_at_least_as_extreme(
+    first: list[float], second: list[float]
+) -> None:
+    u, p = mann_whitney(first, second)
+    assert u == pytest.approx(len(first) * len(second) * vargha_delaney(first, second))
+    pool = [*first, *second]
+    deals = []
+    for chosen in itertools.combinations(range(len(pool)), len(first)):
+        rest = [pool[n] for n in range(len(pool)) if n not in chosen]
+        deals.append(len(first) * len(second) * vargha_delaney([pool[n] for n in chosen], rest))
+    more = sum(deal >= u - 1e-9 for deal in deals) / len(deals)
+    less = sum(deal <= u + 1e-9 for deal in deals) / len(deals)
+    assert p == pytest.approx(min(1.0, 2 * min(more, less)))
