@@ -49,10 +49,10 @@ to another."""
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Claim:
-    """One slot that this process shall fly.
+    """One slot that a process shall fly, or see to it that it is flown.
 
     ``after`` is what its first flight did to its process, "hung" or "died"; then it is
-    flown once more, alone.
+    flown once more, alone.  ``attempt`` counts from 1.
     """
 
     search: str
@@ -61,6 +61,8 @@ class Claim:
     scenario: str
     job: str
     after: str
+    attempt: int
+    pid: int
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -196,13 +198,19 @@ class Ledger:
         row = self._db.execute("SELECT job FROM search WHERE id = ?", (search,)).fetchone()
         return None if row is None else str(row[0])
 
-    def add_slots(self, search: str, generation: int, scenarios: Mapping[int, str]) -> None:
-        """Hand out a generation's slots; once is enough, and twice must be the same."""
+    def add_slots(
+        self, search: str, generation: int, scenarios: Mapping[int, str], after: str = ""
+    ) -> None:
+        """Hand out a generation's slots; once is enough, and twice must be the same.
+
+        ``after`` is what an earlier flight of them did to its process, as in a Claim.
+        """
+        state = after or "waiting"
         with self.transaction():
             self._db.executemany(
-                "INSERT OR IGNORE INTO slot (search, generation, slot, scenario) "
-                "VALUES (?, ?, ?, ?)",
-                [(search, generation, slot, text) for slot, text in scenarios.items()],
+                "INSERT OR IGNORE INTO slot (search, generation, slot, scenario, state) "
+                "VALUES (?, ?, ?, ?, ?)",
+                [(search, generation, slot, text, state) for slot, text in scenarios.items()],
             )
             rows = self._db.execute(
                 "SELECT slot, scenario FROM slot WHERE search = ? AND generation = ?",
@@ -255,7 +263,7 @@ class Ledger:
             if alone:
                 return None
             row = self._db.execute(
-                "SELECT search, generation, slot, scenario, state FROM slot "
+                "SELECT search, generation, slot, scenario, state, attempts FROM slot "
                 "WHERE state IN ('died', 'hung', 'waiting') "
                 "ORDER BY state, generation, slot, search LIMIT 1"
             ).fetchone()
@@ -274,6 +282,8 @@ class Ledger:
             scenario=row[3],
             job=job,
             after="" if row[4] == "waiting" else row[4],
+            attempt=row[5] + 1,
+            pid=os.getpid(),
         )
 
     def renew(self) -> None:
@@ -312,8 +322,8 @@ class Ledger:
                 self.count(_METERS[kind])
                 self.count("flying_s", wall_s)
 
-    def claim_of(self, pid: int) -> tuple[Claim, int] | None:
-        """Return the slot that a process has in flight, and which attempt it is."""
+    def claim_of(self, pid: int) -> Claim | None:
+        """Return the slot that a process has in flight; it may be gone by then."""
         row = self._db.execute(
             "SELECT s.search, generation, slot, scenario, job, attempts FROM slot s "
             "JOIN search ON search.id = s.search WHERE pid = ? AND state = 'claimed'",
@@ -321,23 +331,38 @@ class Ledger:
         ).fetchone()
         if row is None:
             return None
-        claim = Claim(
+        return Claim(
             search=row[0],
             generation=row[1],
             slot=row[2],
             scenario=row[3],
             job=row[4],
             after="",
+            attempt=row[5],
+            pid=pid,
         )
-        return claim, row[5]
 
-    def release(self, pid: int, state: str) -> None:
-        """Give back what a process had in flight: 'waiting', or 'hung' or 'died' to fly alone."""
+    def release(self, pid: int) -> None:
+        """Give back all that a process has in flight, as if it had not been claimed."""
         self._db.execute(
-            "UPDATE slot SET state = ?, pid = NULL, lease = NULL, "
-            "attempts = attempts - (? = 'waiting') "
-            "WHERE pid = ? AND state = 'claimed'",
-            (state, state, pid),
+            "UPDATE slot SET state = 'waiting', pid = NULL, lease = NULL, "
+            "attempts = attempts - 1 WHERE pid = ? AND state = 'claimed'",
+            (pid,),
+        )
+
+    def give_back(self, claim: Claim) -> None:
+        """Give back one slot, as if it had not been claimed."""
+        self._set_state(claim, claim.after or "waiting", claim.attempt - 1)
+
+    def fly_alone(self, claim: Claim, after: Literal["hung", "died"]) -> None:
+        """Hand out a slot once more, when nobody else flies; say what its flight did."""
+        self._set_state(claim, after, claim.attempt)
+
+    def _set_state(self, claim: Claim, state: str, attempts: int) -> None:
+        self._db.execute(
+            "UPDATE slot SET state = ?, pid = NULL, lease = NULL, attempts = ? "
+            "WHERE search = ? AND generation = ? AND slot = ? AND state = 'claimed' AND pid = ?",
+            (state, attempts, claim.search, claim.generation, claim.slot, claim.pid),
         )
 
     def result(self, search: str, generation: int, slot: int) -> dict[str, Any] | None:
@@ -366,6 +391,21 @@ class Ledger:
             (search, generation, slot),
         ).fetchone()
         return str(row[0] or "") if row else ""
+
+    def wall_s(self, search: str, generation: int, slot: int) -> float:
+        """Return how long a flown slot took; 0 where its process did not live."""
+        row = self._db.execute(
+            "SELECT wall_s FROM slot WHERE search = ? AND generation = ? AND slot = ?",
+            (search, generation, slot),
+        ).fetchone()
+        return float(row[0] or 0.0) if row else 0.0
+
+    def waiting(self) -> int:
+        """Return how many slots could be handed out."""
+        row = self._db.execute(
+            "SELECT count(*) FROM slot WHERE state IN ('died', 'hung', 'waiting')"
+        ).fetchone()
+        return int(row[0])
 
     def results(self, kind: Kind = "search") -> list[tuple[str, str, int, int, dict[str, Any]]]:
         """Return (system, map, generation, slot, result) of all flown slots in slot order."""
@@ -509,7 +549,7 @@ class Ledger:
             silent = lease is not None and lease < time.time()
             watched = owner is not None and alive(owner)
             if silent or not (alive(pid) or watched):
-                self.release(pid, "waiting")
+                self.release(pid)
 
 
 def _set_aside(path: Path) -> None:

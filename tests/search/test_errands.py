@@ -14,7 +14,7 @@ from pytest_garl.scenarios.validity import repair
 from pytest_garl.search.errands import Done, Errands, Fly
 from pytest_garl.search.job import Job
 from pytest_garl.search.ledger import Ledger
-from pytest_garl.search.pool import Pool
+from pytest_garl.search.local_pool import local_pool
 from pytest_garl.search.reference import reference_to
 from pytest_garl.simulation.policy import PolicySpec
 from pytest_garl.simulation.reference_pilot import ReferencePilot
@@ -59,7 +59,7 @@ def ledger(tmp_path: Path) -> Ledger:
 
 
 def errands(ledger: Ledger, tick: Callable[[], None] = lambda: None) -> Errands:
-    return Errands(ledger, Pool(ledger, workers=0), tick)
+    return Errands(ledger, local_pool(ledger, workers=0), tick)
 
 
 def foggier(job: Job) -> Callable[[Fly], tuple[float, str]]:
