@@ -8,10 +8,12 @@ from __future__ import annotations
 import logging
 import os
 import secrets
+import shutil
 import signal
 import sys
 import tempfile
 import threading
+import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from importlib.metadata import version
@@ -60,12 +62,9 @@ def own(workers: int) -> Iterator[tuple[Any, Base, int]]:
     os.environ.setdefault("RAY_AUTH_TOKEN", secrets.token_hex(32))
     cpus = workers or os.cpu_count() or 1
     # Not in TMPDIR: a socket's path has 107 characters at most, and Ray's take 60.
-    place = os.environ.get("RAY_TMPDIR", "/tmp")
-    with (
-        tempfile.TemporaryDirectory(
-            prefix="garl-ray-", dir=place, ignore_cleanup_errors=True
-        ) as folder,
-        _connected(
+    folder = tempfile.mkdtemp(prefix="garl-ray-", dir=os.environ.get("RAY_TMPDIR", "/tmp"))
+    try:
+        with _connected(
             "local",
             num_cpus=cpus,
             include_dashboard=False,
@@ -73,9 +72,19 @@ def own(workers: int) -> Iterator[tuple[Any, Base, int]]:
             _temp_dir=folder,
             # Short of memory the kernel ends what needs most, the flight, as it does without Ray.
             _system_config={"memory_monitor_refresh_ms": 0},
-        ) as ray,
-    ):
-        yield ray, Base(scratch=folder), cpus
+        ) as ray:
+            yield ray, Base(scratch=folder), cpus
+    finally:
+        _remove(Path(folder))
+
+
+def _remove(folder: Path) -> None:
+    """Remove a cluster's folder, in which its last processes may write until they are gone."""
+    for _ in range(50):
+        shutil.rmtree(folder, ignore_errors=True)
+        if not folder.exists():
+            return
+        time.sleep(0.1)
 
 
 @contextmanager
