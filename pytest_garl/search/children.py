@@ -22,8 +22,9 @@ from pytest_garl.search.processes import CANNOT_GO_ON
 POLL_S = 0.02
 MOST_LOSSES = 3
 """Children that may die without a flight before the pool gives up."""
-PATIENCE_S = 15.0
-"""How long a child may take to end when it is asked to; Ray's cluster needs a second or two."""
+PATIENCE_S = 30.0
+"""How long a child may take to end when it is asked to; one that ends a Ray cluster needs a second
+or two, and more on a busy machine."""
 COMPLAINT_BYTES = 2**16
 """How much is read of what a child said on stderr: its end says why it died."""
 

@@ -38,13 +38,13 @@ class Landed:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Base:
-    """Where pilots work.
+    """Where pilots work, each in a folder of its own below ``scratch``.
 
-    ``scratch`` holds their ledgers and records; where ``home`` is set, the working directory is a
-    copy of that folder, and ``inside`` is the folder of it in which pytest runs.
+    Where ``home`` is set, Ray has put a copy of it into the working directory, in which pilots
+    leave nothing that Ray does not remove with it; ``inside`` is the folder in which pytest runs.
     """
 
-    scratch: str | None = None
+    scratch: str = "."
     home: str = ""
     inside: str = "."
 
@@ -60,8 +60,8 @@ class Pilot:
     def __init__(self, base: Base) -> None:
         here = Path.cwd()
         self._relocation = Relocation(home=base.home, here=str(here)) if base.home else None
+        self._folder = Path(tempfile.mkdtemp(prefix=".garl-pilot-", dir=here / base.scratch))
         os.chdir(here / base.inside)
-        self._folder = Path(tempfile.mkdtemp(prefix="garl-pilot-", dir=base.scratch))
         self._ledger = Ledger.create(self._folder / "ledger.sqlite", {})
         self._pool = ChildPool(self._ledger, Flyers(seats=1, settle=self._note))
         self._flown = 0

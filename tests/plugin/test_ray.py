@@ -61,40 +61,38 @@ def place() -> Iterator[Path]:
 
 
 @pytest.fixture(scope="module")
-def head() -> Iterator[dict[str, str]]:
-    """Start a cluster that is there before pytest; return the environment in which it is found."""
+def head() -> Iterator[tuple[int, dict[str, str]]]:
+    """Start a cluster that is there before pytest; return its process, and how to find it."""
     with socket.socket() as free:
         free.bind(("127.0.0.1", 0))
         port = free.getsockname()[1]
-    found = {"RAY_AUTH_MODE": "token", "RAY_AUTH_TOKEN": "0" * 64}
-    folder = tempfile.mkdtemp(prefix="ray-", dir="/tmp")
+    token = {"RAY_AUTH_MODE": "token", "RAY_AUTH_TOKEN": "0" * 64}
+    folder = Path(tempfile.mkdtemp(prefix="ray-", dir="/tmp"))
     command = [sys.executable, "-m", "ray.scripts.scripts", "start", "--head", "--block"]
     command += [f"--port={port}", "--num-cpus=2", f"--object-store-memory={2**27}"]
     command += ["--include-dashboard=false", "--disable-usage-stats", f"--temp-dir={folder}"]
-    process = subprocess.Popen(
-        command,
-        env={**os.environ, **found},
-        stdout=subprocess.DEVNULL,
-        stderr=subprocess.DEVNULL,
-    )
-    yield {**found, "RAY_ADDRESS": f"127.0.0.1:{port}", "HEAD": str(process.pid)}
-    process.terminate()
-    process.wait(60)
-    shutil.rmtree(folder, ignore_errors=True)
+    with (folder / "said").open("w") as said:
+        process = subprocess.Popen(
+            command, env={**os.environ, **token}, stdout=said, stderr=subprocess.STDOUT
+        )
+    try:
+        while "Ray runtime started" not in (folder / "said").read_text():
+            assert process.poll() is None, (folder / "said").read_text()
+            time.sleep(0.1)
+        yield process.pid, {**token, "RAY_ADDRESS": f"127.0.0.1:{port}"}
+    finally:
+        process.terminate()
+        process.wait(PATIENCE_S)
+        shutil.rmtree(folder, ignore_errors=True)
 
 
 @pytest.fixture
-def cluster(head: dict[str, str], monkeypatch: pytest.MonkeyPatch) -> int:
+def cluster(head: tuple[int, dict[str, str]], monkeypatch: pytest.MonkeyPatch) -> int:
     """Let sessions find the cluster; return its process."""
-    host, _, port = head["RAY_ADDRESS"].partition(":")
-    for name, value in head.items():
+    pid, environment = head
+    for name, value in environment.items():
         monkeypatch.setenv(name, value)
-    for _ in range(600):
-        with socket.socket() as attempt:
-            if attempt.connect_ex((host, int(port))) == 0:
-                return int(head["HEAD"])
-        time.sleep(0.1)
-    raise AssertionError("no cluster in 60 s")
+    return pid
 
 
 def below(pid: int) -> list[int]:

@@ -35,6 +35,14 @@ class Exits(Good):
         os._exit(3)
 
 
+class Reports(Good):
+    """Dies as a program does that tells of its error itself."""
+
+    def step(self, observation: Observation) -> Land:
+        sys.stderr.write("Traceback (most recent call last):\nMemoryError\n")
+        os._exit(1)
+
+
 class Sleeps(Good):
     def step(self, observation: Observation) -> Land:
         time.sleep(60)

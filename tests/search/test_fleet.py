@@ -46,7 +46,11 @@ class FakeRay:
         fly: Callable[[Claim], object] = lambda claim: LANDED,
         about: Callable[[], object] = lambda: ("node", versions()),
     ) -> None:
-        self._answers = {"fly": fly, "about": about, "close": lambda: None}
+        self._answers: dict[str, Callable[..., object]] = {
+            "fly": fly,
+            "about": about,
+            "close": lambda: None,
+        }
         self._refs: dict[int, object] = {}
         self.hired = self.closed = 0
         self.most = 0

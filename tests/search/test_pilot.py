@@ -9,14 +9,15 @@ from pathlib import Path
 
 import pytest
 
+from pytest_garl.errors import PoolError
 from pytest_garl.search.deaths import Death
-from pytest_garl.search.job import dump_scenario, fly_job
+from pytest_garl.search.job import dump_scenario, fly_job, loads
 from pytest_garl.search.ledger import Claim
 from pytest_garl.search.pilot import Base, Landed, Pilot
-from pytest_garl.search.reference import Reference
+from pytest_garl.search.reference import Reference, reference_to
 from pytest_garl.simulation.record import load
 from tests.plugin.test_plugin import write_project
-from tests.search.flying import Exits, Good, Loud, Sleeps, job_of, scenario
+from tests.search.flying import Exits, Good, Loud, Reports, Sleeps, job_of, scenario
 
 
 def claim(system: type, after: str = "", timeout_s: float = 10.0) -> Claim:
@@ -38,7 +39,7 @@ def pilot(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Pilot]:
     pilot = Pilot(Base(scratch=str(tmp_path)))
     yield pilot
     pilot.close()
-    assert not list(tmp_path.glob("garl-pilot-*"))
+    assert not list(tmp_path.glob(".garl-pilot-*"))
 
 
 def test_a_pilot_flies_what_a_child_of_the_local_pool_would(pilot: Pilot, tmp_path: Path) -> None:
@@ -55,6 +56,19 @@ def test_a_pilot_outlives_what_it_flies(pilot: Pilot) -> None:
     death = pilot.fly(claim(Exits))
     assert death == Death(status=3, words="", complaint="no fuel\n")
     assert isinstance(pilot.fly(claim(Good)), Landed)
+
+
+def test_a_traceback_on_stderr_is_the_landing_systems_own(pilot: Pilot) -> None:
+    death = pilot.fly(claim(Reports))
+    assert isinstance(death, Death)
+    assert (death.status, death.hung) == (1, False)
+
+
+def test_a_simulator_that_fails_is_no_death_of_the_landing_system(pilot: Pilot) -> None:
+    job = loads(claim(Good).job)
+    broken = dataclasses.replace(job, simulator=reference_to(scenario))
+    with pytest.raises(PoolError, match=r"^the simulator failed in a child process:\nTraceback"):
+        pilot.fly(dataclasses.replace(claim(Good), job=broken.dumps()))
 
 
 def test_a_call_that_hangs_is_told_from_a_death(pilot: Pilot) -> None:
@@ -90,7 +104,8 @@ def test_a_pilot_in_a_copy_of_the_project_tells_of_home(
         path=(str(home),),
     )
     monkeypatch.chdir(copy)
-    pilot = Pilot(Base(scratch=str(tmp_path), home=str(home), inside="inside"))
+    pilot = Pilot(Base(home=str(home), inside="inside"))
+    assert list(copy.glob(".garl-pilot-*"))
     try:
         found = pilot.fly(dataclasses.replace(claim(Good), job=job.dumps()))
     finally:
