@@ -19,7 +19,7 @@ from pytest_garl.errors import LedgerError
 from pytest_garl.search.database import REMEDY, Database
 from pytest_garl.search.processes import alive
 
-VERSION = 3
+VERSION = 4
 """Of the tables below; a ledger of another version is not continued."""
 SCHEMA = """
 CREATE TABLE run (key TEXT PRIMARY KEY, value TEXT NOT NULL);
@@ -30,10 +30,11 @@ CREATE TABLE search (
 CREATE TABLE slot (
     search TEXT NOT NULL, generation INTEGER NOT NULL, slot INTEGER NOT NULL,
     scenario TEXT NOT NULL, state TEXT NOT NULL DEFAULT 'waiting', pid INTEGER, lease REAL,
-    attempts INTEGER NOT NULL DEFAULT 0, result TEXT, objectives TEXT, sha256 TEXT, wall_s REAL,
+    attempts INTEGER NOT NULL DEFAULT 0, after TEXT NOT NULL DEFAULT '',
+    result TEXT, objectives TEXT, sha256 TEXT, wall_s REAL,
     PRIMARY KEY (search, generation, slot)
 );
-CREATE INDEX slot_state ON slot (state, generation, slot);
+CREATE INDEX slot_state ON slot (state, after DESC, generation, slot);
 CREATE TABLE seat (pid INTEGER PRIMARY KEY, owner INTEGER NOT NULL);
 CREATE TABLE meter (name TEXT PRIMARY KEY, value REAL NOT NULL);
 """
@@ -49,7 +50,7 @@ to another."""
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Claim:
-    """One slot that a process shall fly, or see to it that it is flown.
+    """One slot that the process ``pid`` shall fly, or see to it that it is flown.
 
     ``after`` is what its first flight did to its process, "hung" or "died"; then it is
     flown once more, alone.  ``attempt`` counts from 1.
@@ -205,12 +206,11 @@ class Ledger:
 
         ``after`` is what an earlier flight of them did to its process, as in a Claim.
         """
-        state = after or "waiting"
         with self.transaction():
             self._db.executemany(
-                "INSERT OR IGNORE INTO slot (search, generation, slot, scenario, state) "
+                "INSERT OR IGNORE INTO slot (search, generation, slot, scenario, after) "
                 "VALUES (?, ?, ?, ?, ?)",
-                [(search, generation, slot, text, state) for slot, text in scenarios.items()],
+                [(search, generation, slot, text, after) for slot, text in scenarios.items()],
             )
             rows = self._db.execute(
                 "SELECT slot, scenario FROM slot WHERE search = ? AND generation = ?",
@@ -263,11 +263,10 @@ class Ledger:
             if alone:
                 return None
             row = self._db.execute(
-                "SELECT search, generation, slot, scenario, state, attempts FROM slot "
-                "WHERE state IN ('died', 'hung', 'waiting') "
-                "ORDER BY state, generation, slot, search LIMIT 1"
+                "SELECT search, generation, slot, scenario, after, attempts FROM slot "
+                "WHERE state = 'waiting' ORDER BY after DESC, generation, slot, search LIMIT 1"
             ).fetchone()
-            if row is None or (row[4] != "waiting" and flying):
+            if row is None or (row[4] and flying):
                 return None
             self._db.execute(
                 "UPDATE slot SET state = 'claimed', pid = ?, lease = ?, attempts = attempts + 1 "
@@ -281,7 +280,7 @@ class Ledger:
             slot=row[2],
             scenario=row[3],
             job=job,
-            after="" if row[4] == "waiting" else row[4],
+            after=row[4],
             attempt=row[5] + 1,
             pid=os.getpid(),
         )
@@ -325,7 +324,7 @@ class Ledger:
     def claim_of(self, pid: int) -> Claim | None:
         """Return the slot that a process has in flight; it may be gone by then."""
         row = self._db.execute(
-            "SELECT s.search, generation, slot, scenario, job, attempts FROM slot s "
+            "SELECT s.search, generation, slot, scenario, job, after, attempts FROM slot s "
             "JOIN search ON search.id = s.search WHERE pid = ? AND state = 'claimed'",
             (pid,),
         ).fetchone()
@@ -337,8 +336,8 @@ class Ledger:
             slot=row[2],
             scenario=row[3],
             job=row[4],
-            after="",
-            attempt=row[5],
+            after=row[5],
+            attempt=row[6],
             pid=pid,
         )
 
@@ -352,17 +351,17 @@ class Ledger:
 
     def give_back(self, claim: Claim) -> None:
         """Give back one slot, as if it had not been claimed."""
-        self._set_state(claim, claim.after or "waiting", claim.attempt - 1)
+        self._hand_out(claim, claim.attempt - 1, claim.after)
 
     def fly_alone(self, claim: Claim, after: Literal["hung", "died"]) -> None:
         """Hand out a slot once more, when nobody else flies; say what its flight did."""
-        self._set_state(claim, after, claim.attempt)
+        self._hand_out(claim, claim.attempt, after)
 
-    def _set_state(self, claim: Claim, state: str, attempts: int) -> None:
+    def _hand_out(self, claim: Claim, attempts: int, after: str) -> None:
         self._db.execute(
-            "UPDATE slot SET state = ?, pid = NULL, lease = NULL, attempts = ? "
+            "UPDATE slot SET state = 'waiting', pid = NULL, lease = NULL, attempts = ?, after = ? "
             "WHERE search = ? AND generation = ? AND slot = ? AND state = 'claimed' AND pid = ?",
-            (state, attempts, claim.search, claim.generation, claim.slot, claim.pid),
+            (attempts, after, claim.search, claim.generation, claim.slot, claim.pid),
         )
 
     def result(self, search: str, generation: int, slot: int) -> dict[str, Any] | None:
@@ -402,9 +401,7 @@ class Ledger:
 
     def waiting(self) -> int:
         """Return how many slots could be handed out."""
-        row = self._db.execute(
-            "SELECT count(*) FROM slot WHERE state IN ('died', 'hung', 'waiting')"
-        ).fetchone()
+        row = self._db.execute("SELECT count(*) FROM slot WHERE state = 'waiting'").fetchone()
         return int(row[0])
 
     def results(self, kind: Kind = "search") -> list[tuple[str, str, int, int, dict[str, Any]]]:

@@ -77,5 +77,8 @@ def test_what_is_given_back_is_flown_as_if_it_had_not_been_claimed(ledger: Ledge
     ledger.record(claimed(ledger), {}, "", 0.0)
     settle(ledger, first, HUNG)
     alone = claimed(ledger)
+    assert (alone.after, alone.attempt) == ("hung", 2)
     ledger.give_back(alone)
+    assert claimed(ledger) == alone
+    ledger.release(alone.pid)
     assert claimed(ledger) == alone
