@@ -19,6 +19,7 @@ from pytest_garl.search.job import Job, loads
 from pytest_garl.search.ledger import Claim, Ledger
 from pytest_garl.search.local_pool import Flyers
 from pytest_garl.search.pool import wait_for
+from pytest_garl.search.reference import package_sha256
 from pytest_garl.search.relocation import Relocation
 from pytest_garl.search.slots import Slot, flight_name
 from pytest_garl.simulation.flight import PACKAGES
@@ -113,8 +114,8 @@ class Pilot:
 
 
 def versions() -> dict[str, str]:
-    """Return the installed versions of what decides on a flight's bytes."""
-    found = {}
+    """Return the installed versions of what decides on a flight's bytes, and our sources' hash."""
+    found = {"sources of pytest-garl": package_sha256()[:12]}
     for name in PACKAGES:
         try:
             found[name] = version(name)
