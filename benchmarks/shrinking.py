@@ -35,7 +35,7 @@ from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.search.errands import Done, Errands, Fly
 from pytest_garl.search.job import Job, load_scenario, loads
 from pytest_garl.search.ledger import Ledger, Row
-from pytest_garl.search.pool import Pool
+from pytest_garl.search.local_pool import local_pool
 
 FILE = Path("docs/shrinking.csv")
 COUNT = 20
@@ -175,7 +175,7 @@ def main() -> None:
     ]
     path = Path(".garl/shrinking/ledger.sqlite")
     ledger = Ledger(path) if path.is_file() else Ledger.create(path, {})
-    pool = Pool(ledger, arguments.workers)
+    pool = local_pool(ledger, arguments.workers)
     try:
         # As many at a time as keep the workers busy; what is done is written down.
         for start in range(0, len(wanted), 6):

@@ -29,3 +29,7 @@ class PolicyError(GarlError):
 
 class LedgerError(GarlError):
     """A ledger that cannot be opened, written or continued."""
+
+
+class PoolError(GarlError):
+    """Flying processes that cannot be started, or cannot go on."""

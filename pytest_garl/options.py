@@ -29,7 +29,11 @@ class Options:
     population: int
     resume: bool
     maps: tuple[str, ...]
-    workers: int
+    pool: Literal["local", "ray"]
+    workers: int | None
+    """None: as many as the Ray cluster has CPUs."""
+    ray_address: str
+    """Of a cluster that is there already, or empty: one on this machine."""
     weather: WeatherRange
     timeout_s: float
     repeat: str
@@ -69,6 +73,8 @@ def read_options(config: pytest.Config) -> Options:
     """Return the options; raise UsageError that says what was found and what is expected."""
     text = {option.name: _value(config, option) for option in OPTIONS}
     budget = _integer("budget", text["budget"], 1) if text["budget"] else 0
+    address = os.environ.get("RAY_ADDRESS", "")
+    address = "" if address == "local" else address
     size = _integer("population", text["population"], 1) if text["population"] else 0
     return Options(
         budget=budget,
@@ -77,7 +83,9 @@ def read_options(config: pytest.Config) -> Options:
         seed=_seed(config, text["seed"]),
         method=_method(text["method"]),
         maps=tuple(part.strip() for part in text["map"].split(",") if part.strip()),
-        workers=_integer("workers", text["workers"], 0) if text["workers"] else os.cpu_count() or 1,
+        pool=cast(Literal["local", "ray"], _among("pool", text["pool"], ("local", "ray"))),
+        workers=_workers(text["workers"], text["pool"], address),
+        ray_address=address,
         weather=cast("WeatherRange", _among("weather", text["weather"], ("confined", "full"))),
         timeout_s=_number("timeout", text["timeout"], 1e6, "a positive number of seconds"),
         repeat=_repeat(text["repeat"]),
@@ -115,6 +123,13 @@ def _integer(name: str, text: str, low: int) -> int:
     if not re.fullmatch(r"\d+", text) or int(text) < low:
         raise _wrong(name, text, f"a whole number of at least {low}")
     return int(text)
+
+
+def _workers(text: str, pool: str, ray_address: str) -> int | None:
+    if text:
+        # None of Ray's workers is the pytest process.
+        return _integer("workers", text, 1 if pool == "ray" else 0)
+    return None if pool == "ray" and ray_address else os.cpu_count() or 1
 
 
 def _population(budget: int) -> int:

@@ -15,7 +15,7 @@ import pytest
 from pytest_garl.errors import LedgerError
 from pytest_garl.options import Options
 from pytest_garl.search.ledger import Kind, Ledger
-from pytest_garl.search.pool import Pool
+from pytest_garl.search.pool import Pool, wait_for
 from pytest_garl.search.reference import Reference, reference_to, sources_sha256
 from pytest_garl.search.slots import Slot, flight_name
 from pytest_garl.switches import POLICIES, target_of
@@ -191,7 +191,8 @@ class Run:
         """Return a slot's result; what is flown never changes and is asked for once."""
         known = self.results.get((search, slot))
         if known is None:
-            known = self.results[search, slot] = self.pool.wait(search, slot, self._advance)
+            known = wait_for(self.ledger, self.pool, search, slot, self._advance)
+            self.results[search, slot] = known
         return known
 
     def _advance(self) -> None:

@@ -61,7 +61,15 @@ OPTIONS = (
         name="workers",
         metavar="N",
         help="Fly in N child processes, whatever the -n of pytest-xdist; 0 flies inside pytest, "
-        "for a debugger (default: one per CPU core).",
+        "for a debugger (default: one per CPU core, with a Ray cluster one per CPU of it).",
+    ),
+    Option(
+        name="pool",
+        metavar="WHERE",
+        default="local",
+        help="Where flights are flown: 'local' in child processes, 'ray' on the Ray cluster of "
+        "RAY_ADDRESS, or without it on one that is started here and ends with the run; that needs "
+        "pytest-garl[ray]. The results are the same (default: local).",
     ),
     Option(
         name="weather",

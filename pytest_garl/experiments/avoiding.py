@@ -19,7 +19,7 @@ from pytest_garl.regressions.pursuit import moves_of
 from pytest_garl.search.errands import Errands, Fly
 from pytest_garl.search.job import load_scenario
 from pytest_garl.search.ledger import Ledger, Row
-from pytest_garl.search.pool import Pool
+from pytest_garl.search.local_pool import local_pool
 from pytest_garl.search.reference import reference_to
 from pytest_garl.simulation.reference_pilot import ReferencePilot
 
@@ -47,7 +47,7 @@ def pilot(
         for search in searches
         for flight in drawn[search.key]
     }
-    with closing(_opened(path)) as ledger, closing(Pool(ledger, workers)) as pool:
+    with closing(_opened(path)) as ledger, closing(local_pool(ledger, workers)) as pool:
         avoided = Errands(ledger, pool, tick).run(flights)
     return tuple(
         Piloted(

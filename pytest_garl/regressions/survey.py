@@ -140,7 +140,7 @@ def _set(job: Job, flights: Iterable[tuple[Scenario, Done]]) -> SampleSet:
 
 
 def _baseline(sets: Sequence[SampleSet]) -> Baseline:
-    from pytest_garl.simulation.fly import PACKAGES
+    from pytest_garl.simulation.flight import PACKAGES
     from pytest_garl.simulation.record import cpu_class
 
     return Baseline(

@@ -16,14 +16,18 @@ from pytest_garl.errors import LedgerError
 from pytest_garl.options import Options
 from pytest_garl.run import Run
 from pytest_garl.search.ledger import Ledger
+from pytest_garl.search.local_pool import local_pool
 from pytest_garl.search.pool import Pool
+from pytest_garl.search.ray_pool import check_ray, ray_pool
 from pytest_garl.search.reference import BUILT_IN, package_sha256, reference_to
 
 
 def begin_run(config: pytest.Config, options: Options) -> Run:
     """Return this process's part of the run; the ledger is made by the first process alone."""
-    # Weights that cannot be trusted end the session before there is a ledger.
+    # Weights that cannot be trusted, or no Ray, end the session before there is a ledger.
     policy_spec(options.npcs)
+    if options.pool == "ray":
+        check_ray(options.ray_address)
     lock = None
     if not options.searches:
         ledger = _shared(options)
@@ -54,12 +58,19 @@ def begin_run(config: pytest.Config, options: Options) -> Run:
     run = Run(
         options=options,
         ledger=ledger,
-        pool=Pool(ledger, options.workers),
+        pool=_pool(ledger, options),
         simulator=reference_to(own) if own else BUILT_IN,
         lock=lock,
     )
     run.flight_s = _or_default(ledger)
     return run
+
+
+def _pool(ledger: Ledger, options: Options) -> Pool:
+    if options.pool == "ray":
+        return ray_pool(ledger, options.workers, options.root)
+    assert options.workers is not None
+    return local_pool(ledger, options.workers)
 
 
 def _shared(options: Options) -> Ledger:

@@ -19,14 +19,24 @@ def header(run: Run) -> str:
     options = run.options
     if options.repeat:
         return f"garl: repeating {options.repeat}"
-    each = options.budget * run.flight_s / max(1, options.workers)
     done = sum(search.flown for search in run.ledger.progress()) if options.resume else 0
     before = f"resuming after {done} flights; " if options.resume else ""
     return (
         f"garl: {before}budget {options.budget} per system and map, method {options.method}, "
         f"seed {options.seed}, objects {options.npcs}, weather {options.weather}, "
-        f"{options.workers} workers; about {duration(each)} per system and map"
+        f"{_workers(run)}"
     )
+
+
+def _workers(run: Run) -> str:
+    """Return how many fly and where, and how long it will take where that is known."""
+    options = run.options
+    ray = f" of Ray at {options.ray_address}" if options.ray_address else " of Ray, started here"
+    place = ray if options.pool == "ray" else ""
+    if options.workers is None:
+        return f"all workers{place}"
+    each = options.budget * run.flight_s / max(1, options.workers)
+    return f"{options.workers} workers{place}; about {duration(each)} per system and map"
 
 
 def summary(reporter: Any, run: Run) -> None:

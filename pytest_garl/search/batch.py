@@ -16,7 +16,8 @@ from pytest_garl.search.checkout import Checkout
 from pytest_garl.search.errands import Done
 from pytest_garl.search.job import Job, dump_scenario, loads
 from pytest_garl.search.ledger import Ledger
-from pytest_garl.search.pool import Pool
+from pytest_garl.search.local_pool import local_pool
+from pytest_garl.search.pool import Pool, wait_for
 from pytest_garl.search.slots import Slot, flight_name
 
 
@@ -46,7 +47,7 @@ def fly_all(
     ledger.add_slots(search, 0, texts)
     for index in texts:
         yield Done(
-            result=pool.wait(search, Slot(generation=0, index=index), tick),
+            result=wait_for(ledger, pool, search, Slot(generation=0, index=index), tick),
             sha256=ledger.sha256(search, 0, index),
             record=Path(job.flights) / f"{flight_name(search, 0, index, job.map)}.npz",
         )
@@ -57,7 +58,7 @@ def own_pool(workers: int, checkout: Checkout | None = None) -> Iterator[tuple[L
     """Give a ledger and children for as long as the block lasts; they may see one checkout only."""
     with tempfile.TemporaryDirectory(prefix="garl-") as scratch:
         ledger = Ledger.create(Path(scratch) / "ledger.sqlite", {})
-        pool = Pool(ledger, workers, checkout)
+        pool = local_pool(ledger, workers, checkout)
         try:
             yield ledger, pool
         finally:

@@ -2,31 +2,26 @@
 
 from __future__ import annotations
 
-import ctypes
 import faulthandler
 import os
-import signal
-import sys
 import threading
 import time
 from pathlib import Path
 from typing import TextIO
 
-from pytest_garl.errors import LedgerError, PolicyError
+from pytest_garl.errors import LedgerError
 from pytest_garl.search.checkout import see_only
 from pytest_garl.search.ledger import Ledger
+from pytest_garl.search.processes import end_with_parent, run_child
 from pytest_garl.search.slots import flight_name
 
 THREADS = dict.fromkeys(
     ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "OPENCV_FOR_THREADS_NUM"), "1"
 )
-CANNOT_GO_ON = "garl cannot go on: "
-"""With this a child says on stderr that neither it nor another can fly: no place to write, or
-a policy of objects that fails."""
 IDLE_S = 0.02
 BEAT_S = 5.0
 ALONE_FACTOR = 3.0
-_PR_SET_PDEATHSIG = 1
+_STDERR = 2
 
 
 class Watchdog:
@@ -53,21 +48,23 @@ def dump_file(folder: Path, pid: int) -> Path:
     return folder / f"child-{pid}.txt"
 
 
-def _beat(path: Path) -> None:
-    """Renew this process's claims for ever; the process's end ends it."""
-    ledger = Ledger(path)
-    while True:
-        time.sleep(BEAT_S)
-        ledger.renew()
+def keep_claims(path: Path) -> None:
+    """Renew this process's claims from a thread, until the process ends."""
+
+    def beat() -> None:
+        ledger = Ledger(path)
+        while True:
+            time.sleep(BEAT_S)
+            ledger.renew()
+
+    threading.Thread(target=beat, daemon=True).start()
 
 
 def main(path: str, *checkouts: str) -> None:
     """Fly until the parent process is gone; with checkouts, see only the first of them."""
-    parent = os.getppid()
+    parent_lives = end_with_parent()
     if checkouts:
         see_only(checkouts)
-    ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGTERM)
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
     import cv2
 
     from pytest_garl.search.job import broken_result, fly_job, load_scenario, loads
@@ -75,16 +72,18 @@ def main(path: str, *checkouts: str) -> None:
     cv2.setNumThreads(1)
     assert all(os.environ.get(name) == value for name, value in THREADS.items())
     ledger = Ledger(Path(path))
-    threading.Thread(target=_beat, args=(Path(path),), daemon=True).start()
+    keep_claims(Path(path))
     idle_since = time.monotonic()
     with dump_file(Path(path).parent, os.getpid()).open("w") as words:
         watchdog = Watchdog(words)
-        while os.getppid() == parent:
+        while parent_lives():
             claim = ledger.claim()
             if claim is None:
                 time.sleep(IDLE_S)
                 continue
             ledger.count("idle_s", time.monotonic() - idle_since)
+            # What was said in earlier flights explains nothing about this one's death.
+            os.ftruncate(_STDERR, 0)
             job = loads(claim.job)
             watchdog.limit_s = job.timeout_s * (ALONE_FACTOR if claim.after else 1.0)
             slot_id = flight_name(claim.search, claim.generation, claim.slot, job.map)
@@ -105,7 +104,4 @@ def main(path: str, *checkouts: str) -> None:
 
 
 if __name__ == "__main__":
-    try:
-        main(*sys.argv[1:])
-    except (LedgerError, PolicyError) as error:
-        sys.exit(f"{CANNOT_GO_ON}{error}")
+    run_child(main, "the simulator")

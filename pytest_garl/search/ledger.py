@@ -19,7 +19,7 @@ from pytest_garl.errors import LedgerError
 from pytest_garl.search.database import REMEDY, Database
 from pytest_garl.search.processes import alive
 
-VERSION = 3
+VERSION = 4
 """Of the tables below; a ledger of another version is not continued."""
 SCHEMA = """
 CREATE TABLE run (key TEXT PRIMARY KEY, value TEXT NOT NULL);
@@ -30,10 +30,11 @@ CREATE TABLE search (
 CREATE TABLE slot (
     search TEXT NOT NULL, generation INTEGER NOT NULL, slot INTEGER NOT NULL,
     scenario TEXT NOT NULL, state TEXT NOT NULL DEFAULT 'waiting', pid INTEGER, lease REAL,
-    attempts INTEGER NOT NULL DEFAULT 0, result TEXT, objectives TEXT, sha256 TEXT, wall_s REAL,
+    attempts INTEGER NOT NULL DEFAULT 0, after TEXT NOT NULL DEFAULT '',
+    result TEXT, objectives TEXT, sha256 TEXT, wall_s REAL,
     PRIMARY KEY (search, generation, slot)
 );
-CREATE INDEX slot_state ON slot (state, generation, slot);
+CREATE INDEX slot_state ON slot (state, after DESC, generation, slot);
 CREATE TABLE seat (pid INTEGER PRIMARY KEY, owner INTEGER NOT NULL);
 CREATE TABLE meter (name TEXT PRIMARY KEY, value REAL NOT NULL);
 """
@@ -49,10 +50,10 @@ to another."""
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Claim:
-    """One slot that this process shall fly.
+    """One slot that the process ``pid`` shall fly, or see to it that it is flown.
 
     ``after`` is what its first flight did to its process, "hung" or "died"; then it is
-    flown once more, alone.
+    flown once more, alone.  ``attempt`` counts from 1.
     """
 
     search: str
@@ -61,6 +62,8 @@ class Claim:
     scenario: str
     job: str
     after: str
+    attempt: int
+    pid: int
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -196,13 +199,18 @@ class Ledger:
         row = self._db.execute("SELECT job FROM search WHERE id = ?", (search,)).fetchone()
         return None if row is None else str(row[0])
 
-    def add_slots(self, search: str, generation: int, scenarios: Mapping[int, str]) -> None:
-        """Hand out a generation's slots; once is enough, and twice must be the same."""
+    def add_slots(
+        self, search: str, generation: int, scenarios: Mapping[int, str], after: str = ""
+    ) -> None:
+        """Hand out a generation's slots; once is enough, and twice must be the same.
+
+        ``after`` is what an earlier flight of them did to its process, as in a Claim.
+        """
         with self.transaction():
             self._db.executemany(
-                "INSERT OR IGNORE INTO slot (search, generation, slot, scenario) "
-                "VALUES (?, ?, ?, ?)",
-                [(search, generation, slot, text) for slot, text in scenarios.items()],
+                "INSERT OR IGNORE INTO slot (search, generation, slot, scenario, after) "
+                "VALUES (?, ?, ?, ?, ?)",
+                [(search, generation, slot, text, after) for slot, text in scenarios.items()],
             )
             rows = self._db.execute(
                 "SELECT slot, scenario FROM slot WHERE search = ? AND generation = ?",
@@ -255,11 +263,10 @@ class Ledger:
             if alone:
                 return None
             row = self._db.execute(
-                "SELECT search, generation, slot, scenario, state FROM slot "
-                "WHERE state IN ('died', 'hung', 'waiting') "
-                "ORDER BY state, generation, slot, search LIMIT 1"
+                "SELECT search, generation, slot, scenario, after, attempts FROM slot "
+                "WHERE state = 'waiting' ORDER BY after DESC, generation, slot, search LIMIT 1"
             ).fetchone()
-            if row is None or (row[4] != "waiting" and flying):
+            if row is None or (row[4] and flying):
                 return None
             self._db.execute(
                 "UPDATE slot SET state = 'claimed', pid = ?, lease = ?, attempts = attempts + 1 "
@@ -273,7 +280,9 @@ class Ledger:
             slot=row[2],
             scenario=row[3],
             job=job,
-            after="" if row[4] == "waiting" else row[4],
+            after=row[4],
+            attempt=row[5] + 1,
+            pid=os.getpid(),
         )
 
     def renew(self) -> None:
@@ -312,32 +321,47 @@ class Ledger:
                 self.count(_METERS[kind])
                 self.count("flying_s", wall_s)
 
-    def claim_of(self, pid: int) -> tuple[Claim, int] | None:
-        """Return the slot that a process has in flight, and which attempt it is."""
+    def claim_of(self, pid: int) -> Claim | None:
+        """Return the slot that a process has in flight; it may be gone by then."""
         row = self._db.execute(
-            "SELECT s.search, generation, slot, scenario, job, attempts FROM slot s "
+            "SELECT s.search, generation, slot, scenario, job, after, attempts FROM slot s "
             "JOIN search ON search.id = s.search WHERE pid = ? AND state = 'claimed'",
             (pid,),
         ).fetchone()
         if row is None:
             return None
-        claim = Claim(
+        return Claim(
             search=row[0],
             generation=row[1],
             slot=row[2],
             scenario=row[3],
             job=row[4],
-            after="",
+            after=row[5],
+            attempt=row[6],
+            pid=pid,
         )
-        return claim, row[5]
 
-    def release(self, pid: int, state: str) -> None:
-        """Give back what a process had in flight: 'waiting', or 'hung' or 'died' to fly alone."""
+    def release(self, pid: int) -> None:
+        """Give back all that a process has in flight, as if it had not been claimed."""
         self._db.execute(
-            "UPDATE slot SET state = ?, pid = NULL, lease = NULL, "
-            "attempts = attempts - (? = 'waiting') "
-            "WHERE pid = ? AND state = 'claimed'",
-            (state, state, pid),
+            "UPDATE slot SET state = 'waiting', pid = NULL, lease = NULL, "
+            "attempts = attempts - 1 WHERE pid = ? AND state = 'claimed'",
+            (pid,),
+        )
+
+    def give_back(self, claim: Claim) -> None:
+        """Give back one slot, as if it had not been claimed."""
+        self._hand_out(claim, claim.attempt - 1, claim.after)
+
+    def fly_alone(self, claim: Claim, after: Literal["hung", "died"]) -> None:
+        """Hand out a slot once more, when nobody else flies; say what its flight did."""
+        self._hand_out(claim, claim.attempt, after)
+
+    def _hand_out(self, claim: Claim, attempts: int, after: str) -> None:
+        self._db.execute(
+            "UPDATE slot SET state = 'waiting', pid = NULL, lease = NULL, attempts = ?, after = ? "
+            "WHERE search = ? AND generation = ? AND slot = ? AND state = 'claimed' AND pid = ?",
+            (attempts, after, claim.search, claim.generation, claim.slot, claim.pid),
         )
 
     def result(self, search: str, generation: int, slot: int) -> dict[str, Any] | None:
@@ -366,6 +390,19 @@ class Ledger:
             (search, generation, slot),
         ).fetchone()
         return str(row[0] or "") if row else ""
+
+    def wall_s(self, search: str, generation: int, slot: int) -> float:
+        """Return how long a flown slot took; 0 where its process did not live."""
+        row = self._db.execute(
+            "SELECT wall_s FROM slot WHERE search = ? AND generation = ? AND slot = ?",
+            (search, generation, slot),
+        ).fetchone()
+        return float(row[0] or 0.0) if row else 0.0
+
+    def waiting(self) -> int:
+        """Return how many slots could be handed out."""
+        row = self._db.execute("SELECT count(*) FROM slot WHERE state = 'waiting'").fetchone()
+        return int(row[0])
 
     def results(self, kind: Kind = "search") -> list[tuple[str, str, int, int, dict[str, Any]]]:
         """Return (system, map, generation, slot, result) of all flown slots in slot order."""
@@ -509,7 +546,7 @@ class Ledger:
             silent = lease is not None and lease < time.time()
             watched = owner is not None and alive(owner)
             if silent or not (alive(pid) or watched):
-                self.release(pid, "waiting")
+                self.release(pid)
 
 
 def _set_aside(path: Path) -> None:

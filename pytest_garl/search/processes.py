@@ -1,9 +1,21 @@
-"""Whether other processes live."""
+"""Processes: whether others live, and how a child says its last words and ends with its parent."""
 
 from __future__ import annotations
 
+import ctypes
 import os
+import signal
+import sys
+import traceback
+from collections.abc import Callable
 from pathlib import Path
+
+from pytest_garl.errors import GarlError
+
+CANNOT_GO_ON = "garl cannot go on: "
+"""With this a child says on stderr that neither it nor another can fly: no place to write, a
+policy of objects that fails, a simulator that does."""
+_PR_SET_PDEATHSIG = 1
 
 
 def alive(pid: int) -> bool:
@@ -20,3 +32,24 @@ def alive(pid: int) -> bool:
         return True
     # A dead process that nobody has asked about yet.
     return fields[0] != "Z"
+
+
+def end_with_parent() -> Callable[[], bool]:
+    """Tie this process to its parent's life, not to Ctrl-C; return whether the parent is there."""
+    parent = os.getppid()
+    ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGTERM)
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    return lambda: os.getppid() == parent
+
+
+def run_child(main: Callable[..., None], failing: str) -> None:
+    """Run what a child is for, with its arguments; tell the pool why it cannot go on.
+
+    ``failing`` says what it is that failed where an error was not raised on purpose.
+    """
+    try:
+        main(*sys.argv[1:])
+    except GarlError as error:
+        sys.exit(f"{CANNOT_GO_ON}{error}")
+    except Exception:  # noqa: BLE001 (told to the pool, which raises it)
+        sys.exit(f"{CANNOT_GO_ON}{failing} failed in a child process:\n{traceback.format_exc()}")

@@ -16,6 +16,8 @@ BodyClass = Literal["static", "dynamic", "ground"]
 
 TRACK_RATE_HZ = 24.0
 """Rate of the recorded tracks: every tenth physics step."""
+PACKAGES = ("pytest-garl", "numpy", "opencv-python-headless", "pybullet")
+"""Whose versions decide on a flight's bytes."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

@@ -64,13 +64,15 @@ def query(path: Path, sql: str) -> list[tuple[int, ...]]:
         database.close()
 
 
-def wait_for(path: Path, flights: int, process: subprocess.Popen[str]) -> None:
-    for _ in range(3000):
+def wait_for(
+    path: Path, flights: int, process: subprocess.Popen[str], patience_s: float = 30.0
+) -> None:
+    for _ in range(int(100 * patience_s)):
         done = query(path, f"SELECT count(*) {FLOWN}")
         if process.poll() is not None or (done and done[0][0] >= flights):
             return
         time.sleep(0.01)
-    raise AssertionError("nothing was flown in 30 s")
+    raise AssertionError(f"nothing was flown in {patience_s:g} s")
 
 
 def children_of(pid: int) -> list[int]:

@@ -1,9 +1,7 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable
 from pathlib import Path
-from typing import Any, cast
 
 import pytest
 
@@ -14,9 +12,7 @@ from pytest_garl.scenarios.maps import load_map
 from pytest_garl.search.batch import fly_all
 from pytest_garl.search.job import Job, dump_scenario
 from pytest_garl.search.ledger import Ledger
-from pytest_garl.search.pool import Pool
 from pytest_garl.search.reference import BUILT_IN, Reference
-from pytest_garl.search.slots import Slot
 from pytest_garl.verdicts.verdict import Limits
 
 JOB = Job(
@@ -39,14 +35,18 @@ class Instant:
     """Flies nothing; remembers what had been handed out when the first flight was awaited."""
 
     def __init__(self, ledger: Ledger) -> None:
-        self._ledger = ledger
+        self.ledger = ledger
         self.handed_out: list[str] = []
 
-    def wait(self, search: str, slot: Slot, tick: Callable[[], None]) -> dict[str, Any]:
-        tick()
+    def turn(self) -> None:
+        claim = self.ledger.claim()
+        assert claim is not None
         if not self.handed_out:
-            self.handed_out = [text for text, _ in self._ledger.generation(search, 0)]
-        return {"index": slot.index}
+            self.handed_out = [text for text, _ in self.ledger.generation(claim.search, 0)]
+        self.ledger.record(claim, {"index": claim.slot}, "", 0.0)
+
+    def close(self) -> None:
+        pass
 
 
 @pytest.fixture
@@ -55,7 +55,7 @@ def pool(tmp_path: Path) -> Instant:
 
 
 def fly(pool: Instant, job: Job = JOB, count: int = 3) -> list[int]:
-    flights = fly_all(pool._ledger, cast(Pool, pool), job, SCENARIOS[:count])
+    flights = fly_all(pool.ledger, pool, job, SCENARIOS[:count])
     return [done.result["index"] for done in flights]
 
 
@@ -66,8 +66,8 @@ def test_all_flights_are_handed_out_before_the_first_is_awaited(pool: Instant) -
 
 def test_flights_beside_a_search_count_as_none(pool: Instant) -> None:
     fly(pool)
-    assert pool._ledger.progress() == []
-    assert pool._ledger.searches() == []
+    assert pool.ledger.progress() == []
+    assert pool.ledger.searches() == []
 
 
 def test_a_resumed_batch_must_be_of_the_same_system_but_others_do_not_matter(

@@ -6,51 +6,18 @@ from pathlib import Path
 
 import pytest
 
-from pytest_garl.scenarios.chromosome import decode
-from pytest_garl.scenarios.genes import genome_for
-from pytest_garl.scenarios.maps import load_map
-from pytest_garl.scenarios.scenario import Scenario
-from pytest_garl.scenarios.validity import repair
 from pytest_garl.search.errands import Done, Errands, Fly
 from pytest_garl.search.job import Job
 from pytest_garl.search.ledger import Ledger
-from pytest_garl.search.pool import Pool
+from pytest_garl.search.local_pool import local_pool
 from pytest_garl.search.reference import reference_to
-from pytest_garl.simulation.policy import PolicySpec
 from pytest_garl.simulation.reference_pilot import ReferencePilot
-from pytest_garl.verdicts.verdict import Limits
-from tests.plugin import tiny_simulator
-
-LAWN = load_map("lawn")
-
-
-class Hit:
-    def reset(self, mission: object) -> None: ...
-
-    def step(self, observation: object) -> None: ...
-
-
-def scenario(fog: float) -> Scenario:
-    genome = genome_for(LAWN)
-    nominal = repair(decode(genome.nominal, genome, map="lawn", seed=1), LAWN)
-    return nominal.replace({"environment.fog": fog})
+from tests.search.flying import Good, job_of, scenario
 
 
 @pytest.fixture
 def job(tmp_path: Path) -> Job:
-    return Job(
-        system=reference_to(Hit),
-        system_sha256="",
-        simulator=reference_to(tiny_simulator.fly),
-        map="lawn",
-        map_sha256=LAWN.sha256,
-        map_folders=(),
-        npcs=PolicySpec(name="none", factory="nowhere:Nothing"),
-        limits=Limits(),
-        timeout_s=10.0,
-        path=(),
-        flights=str(tmp_path / "flights"),
-    )
+    return job_of(Good, tmp_path / "flights")
 
 
 @pytest.fixture
@@ -59,7 +26,7 @@ def ledger(tmp_path: Path) -> Ledger:
 
 
 def errands(ledger: Ledger, tick: Callable[[], None] = lambda: None) -> Errands:
-    return Errands(ledger, Pool(ledger, workers=0), tick)
+    return Errands(ledger, local_pool(ledger, workers=0), tick)
 
 
 def foggier(job: Job) -> Callable[[Fly], tuple[float, str]]:
