@@ -163,7 +163,12 @@ def _method(text: str) -> str:
     return text
 
 
-POLICY_OF = {"garl-paper": "dqn-paper", "random": "waypoint", "surrogate-random": "dqn-paper"}
+POLICY_OF = {
+    "garl-paper": "dqn-paper",
+    "ga": "destination",
+    "random": "waypoint",
+    "surrogate-random": "dqn-paper",
+}
 """Who moves objects where nobody says: what is part of each of the paper's methods."""
 
 

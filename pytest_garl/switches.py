@@ -20,8 +20,17 @@ FATAL = "garl.fatal"
 """The user property by which an xdist worker tells the controller that the run cannot go on."""
 OWN = "garl.own"
 """The user property by which it tells of a test that failed in an assertion of its own."""
-METHODS = ("garl", "garl-paper", "random", "surrogate-random")
-POLICIES = ("dqn", "dqn-paper", "greedy", "stand", "waypoint", "random_walk", "stationary")
+METHODS = ("garl", "garl-paper", "ga", "random", "surrogate-random")
+POLICIES = (
+    "dqn",
+    "dqn-paper",
+    "greedy",
+    "stand",
+    "destination",
+    "waypoint",
+    "random_walk",
+    "stationary",
+)
 Option = namedtuple("Option", ["name", "metavar", "help", "default"], defaults=[""])
 """One option: its name without ``garl-``, default, and what ``--help`` says."""
 
@@ -114,7 +123,8 @@ OPTIONS = (
         metavar="POLICY",
         help=f"Who moves people, dogs and birds: {', '.join(POLICIES)}, or weights (.npz) that "
         "`garl train` wrote (default: dqn; dqn-paper for the methods garl-paper and "
-        "surrogate-random, waypoint for random; for --garl-repeat those of the search).",
+        "surrogate-random, waypoint for random, destination for ga; for --garl-repeat those of the "
+        "search).",
     ),
 )
 

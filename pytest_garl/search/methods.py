@@ -13,6 +13,7 @@ METHODS: Mapping[str, str] = MappingProxyType(
     {
         "garl": "pytest_garl.search.garl:Garl",
         "garl-paper": "pytest_garl.search.garl_paper:method",
+        "ga": "pytest_garl.search.ga:method",
         "random": "pytest_garl.search.random_search:RandomSearch",
         "surrogate-random": "pytest_garl.search.surrogate_random:method",
     }

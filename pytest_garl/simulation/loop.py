@@ -279,6 +279,7 @@ class Loop:
             uav_velocity_mps=velocity,
             marker_position_m=self.marker,
             map=self.map,
+            scenario=self.scenario,
         )
 
     def eye(self) -> tuple[Vector, Quaternion]:

@@ -14,6 +14,7 @@ if TYPE_CHECKING:
 
     from pytest_garl.scenarios.maps import Map
     from pytest_garl.scenarios.object_types import ObjectType
+    from pytest_garl.scenarios.scenario import Scenario
 
 DECISION_STEP_S = 0.5
 """Time between two decisions of a policy (paper, section 3.4: "0.5 seconds")."""
@@ -36,7 +37,10 @@ class ObjectState:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Situation:
-    """What a policy may see when it decides for one object: everything, exactly."""
+    """What a policy may see when it decides for one object: everything, exactly.
+
+    ``scenario`` is what is flown, with all its genes.
+    """
 
     time_s: float
     self: ObjectState
@@ -45,6 +49,7 @@ class Situation:
     uav_velocity_mps: tuple[float, float, float]
     marker_position_m: tuple[float, float]
     map: Map
+    scenario: Scenario
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -282,6 +282,7 @@ def test_nonsense_on_the_command_line_is_one_clear_error(
         (("--garl-method=garl-paper",), "*objects dqn-paper,*"),
         (("--garl-method=random",), "*objects waypoint,*"),
         (("--garl-method=surrogate-random",), "*objects dqn-paper,*"),
+        (("--garl-method=ga",), "*objects destination,*"),
         (("--garl-method=random", "--garl-npcs=stand"), "*objects stand,*"),
     ],
 )

@@ -13,7 +13,7 @@ from pytest_garl.regressions.case import Case, Evidence, Violation
 from pytest_garl.regressions.corpus import entries, every_entry, patch_of, replace, save
 from pytest_garl.regressions.files import dumps, loads
 from pytest_garl.scenarios.chromosome import decode
-from pytest_garl.scenarios.genes import genome_for
+from pytest_garl.scenarios.genes import genome_for, with_destinations
 from pytest_garl.scenarios.maps import load_map
 from pytest_garl.scenarios.validity import repair
 from pytest_garl.verdicts.verdict import Limits
@@ -67,6 +67,14 @@ def test_a_case_survives_its_file_and_has_the_same_bytes_again() -> None:
 def test_no_story_breaks_the_file(story: str) -> None:
     strange = case(story=story)
     assert loads(dumps(strange), load_map) == strange
+
+
+def test_a_case_with_destinations_survives_its_file() -> None:
+    genome = with_destinations(genome_for(LAWN))
+    row = genome.random(np.random.default_rng(1))
+    scenario = repair(decode(row, genome, map="lawn", seed=9), LAWN).without(*NAMES[:-1])
+    bound = dataclasses.replace(case(), scenario=scenario, policy="destination")
+    assert loads(dumps(bound), load_map) == bound
 
 
 def test_moves_are_written_as_runs() -> None:
