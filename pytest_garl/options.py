@@ -166,6 +166,7 @@ def _method(text: str) -> str:
 POLICY_OF = {
     "garl-paper": "dqn-paper",
     "ga": "destination",
+    "offline-rl": "destination",
     "random": "waypoint",
     "surrogate-random": "dqn-paper",
 }

@@ -14,6 +14,7 @@ METHODS: Mapping[str, str] = MappingProxyType(
         "garl": "pytest_garl.search.garl:Garl",
         "garl-paper": "pytest_garl.search.garl_paper:method",
         "ga": "pytest_garl.search.ga:method",
+        "offline-rl": "pytest_garl.search.offline_rl:method",
         "random": "pytest_garl.search.random_search:RandomSearch",
         "surrogate-random": "pytest_garl.search.surrogate_random:method",
     }

@@ -118,6 +118,17 @@ def test_the_same_seed_gives_the_same_results_for_any_workers(pytester: pytest.P
     assert result_hash(pytester) not in hashes
 
 
+def test_a_network_that_learns_in_pytest_finds_the_same_for_any_workers(
+    pytester: pytest.Pytester,
+) -> None:
+    project(pytester)
+    hashes = set()
+    for args in (("--garl-workers=0",), ("--garl-workers=2", "-n2")):
+        run(pytester, "--garl-budget=80", "--garl-method=offline-rl", "-k", "test_time", *args)
+        hashes.add(result_hash(pytester))
+    assert len(hashes) == 1
+
+
 def test_duplicates_can_be_shown_as_failures(pytester: pytest.Pytester) -> None:
     project(pytester)
     result = run(pytester, "--garl-budget=24", "--garl-workers=0", "--garl-duplicates=fail")
@@ -283,6 +294,7 @@ def test_nonsense_on_the_command_line_is_one_clear_error(
         (("--garl-method=random",), "*objects waypoint,*"),
         (("--garl-method=surrogate-random",), "*objects dqn-paper,*"),
         (("--garl-method=ga",), "*objects destination,*"),
+        (("--garl-method=offline-rl",), "*objects destination,*"),
         (("--garl-method=random", "--garl-npcs=stand"), "*objects stand,*"),
     ],
 )
