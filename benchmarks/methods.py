@@ -26,7 +26,7 @@ from pytest_garl.verdicts.serialise import from_dict
 
 FILE = Path("docs/methods.csv")
 METHODS = ("random", "garl-paper", "garl")
-MOVERS = ("ga", "offline-rl", "surrogate-random")
+MOVERS = ("ga", "offline-rl", "online-rl", "surrogate-random")
 """Methods that are what they are by who moves the objects; with the others they walk at random."""
 FIELDS = (
     "method",

@@ -167,6 +167,7 @@ POLICY_OF = {
     "garl-paper": "dqn-paper",
     "ga": "destination",
     "offline-rl": "destination",
+    "online-rl": "online-rl",
     "random": "waypoint",
     "surrogate-random": "dqn-paper",
 }

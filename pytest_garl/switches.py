@@ -20,10 +20,11 @@ FATAL = "garl.fatal"
 """The user property by which an xdist worker tells the controller that the run cannot go on."""
 OWN = "garl.own"
 """The user property by which it tells of a test that failed in an assertion of its own."""
-METHODS = ("garl", "garl-paper", "ga", "offline-rl", "random", "surrogate-random")
+METHODS = ("garl", "garl-paper", "ga", "offline-rl", "online-rl", "random", "surrogate-random")
 POLICIES = (
     "dqn",
     "dqn-paper",
+    "online-rl",
     "greedy",
     "stand",
     "destination",
@@ -123,8 +124,8 @@ OPTIONS = (
         metavar="POLICY",
         help=f"Who moves people, dogs and birds: {', '.join(POLICIES)}, or weights (.npz) that "
         "`garl train` wrote (default: dqn; dqn-paper for the methods garl-paper and "
-        "surrogate-random, waypoint for random, destination for ga and offline-rl; for "
-        "--garl-repeat those of the search).",
+        "surrogate-random, online-rl for online-rl, waypoint for random, destination for ga and "
+        "offline-rl; for --garl-repeat those of the search).",
     ),
 )
 

@@ -172,7 +172,6 @@ def train(
     checkpoint: Path | None = None,
     report: Callable[[EpisodeRecord], None] = lambda record: None,
     every: int = 50,
-    env: Callable[[Surrogate], SurrogateEnv] = SurrogateEnv,
 ) -> Learner:
     """Train, telling ``report`` of each episode; return the learner.
 
@@ -181,7 +180,7 @@ def train(
     ends with the same weights as one that was never interrupted.
     """
     envs: Any = gymnasium.vector.AsyncVectorEnv(
-        [functools.partial(env, surrogate)] * training.environments,
+        [functools.partial(SurrogateEnv, surrogate)] * training.environments,
         context="spawn",
         autoreset_mode=gymnasium.vector.AutoresetMode.DISABLED,
     )
@@ -189,7 +188,7 @@ def train(
         size, actions = envs.single_observation_space.shape[0], envs.single_action_space.n
         learner = Learner(size, int(actions), training)
         if checkpoint and checkpoint.exists():
-            _restore(learner, checkpoint, identity(surrogate, training, env))
+            _restore(learner, checkpoint, identity(surrogate, training))
         kept = len(learner.history)
         while len(learner.history) < training.episodes:
             for record in _round(envs, learner, len(learner.history)):
@@ -199,7 +198,7 @@ def train(
                     learner.history.append(record)
             done = len(learner.history)
             if checkpoint and (done - kept >= every or done >= training.episodes):
-                _keep(learner, checkpoint, identity(surrogate, training, env))
+                _keep(learner, checkpoint, identity(surrogate, training))
                 kept = done
     return learner
 
@@ -281,15 +280,10 @@ def sources_sha256() -> str:
     return digest.hexdigest()
 
 
-def identity(
-    surrogate: Surrogate,
-    training: Training,
-    env: Callable[[Surrogate], SurrogateEnv] = SurrogateEnv,
-) -> str:
+def identity(surrogate: Surrogate, training: Training) -> str:
     """Return a hash of what is trained and how; another training has another."""
     maps = [map.sha256 for map in surrogate.maps]
-    place = f"{env.__module__}.{getattr(env, '__qualname__', env)}"
-    what = (sources_sha256(), place, dataclasses.replace(surrogate, maps=()), maps, training)
+    what = (sources_sha256(), dataclasses.replace(surrogate, maps=()), maps, training)
     return hashlib.sha256(repr(what).encode()).hexdigest()
 
 

@@ -164,7 +164,7 @@ POLICIES: Mapping[str, PolicySpec] = MappingProxyType(
 )
 
 
-LEARNED = ("dqn", "dqn-paper")
+LEARNED = ("dqn", "dqn-paper", "online-rl")
 
 
 def policy_spec(name: str) -> PolicySpec:

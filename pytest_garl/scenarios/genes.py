@@ -154,6 +154,10 @@ WEATHER = (
 )
 """The paper's eight weather genes; ``simulation/weather.py`` gives them their meaning."""
 
+SUN = "environment.sun_position"
+ENVIRONMENT = (*(f"environment.{name}" for name, _ in WEATHER), SUN)
+"""Keys of the environment's properties; none is below 0 or above 1."""
+
 WIND = CompositeGene(
     name="wind", genes=(_place("wind", "wind", "wind as a share of 10 m/s, towards"),)
 )

@@ -295,6 +295,7 @@ def test_nonsense_on_the_command_line_is_one_clear_error(
         (("--garl-method=surrogate-random",), "*objects dqn-paper,*"),
         (("--garl-method=ga",), "*objects destination,*"),
         (("--garl-method=offline-rl",), "*objects destination,*"),
+        (("--garl-method=online-rl",), "*objects online-rl,*"),
         (("--garl-method=random", "--garl-npcs=stand"), "*objects stand,*"),
     ],
 )
