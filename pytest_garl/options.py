@@ -92,7 +92,7 @@ def read_options(config: pytest.Config) -> Options:
         duplicates=cast(
             Literal["xfail", "fail"], _among("duplicates", text["duplicates"], ("xfail", "fail"))
         ),
-        npcs=_npcs(text["npcs"], text["method"]),
+        npcs=_npcs(text["npcs"] or _npcs_then(config, text["repeat"]), text["method"]),
         baseline=_baseline(config),
         level=_number("level", text["level"], 1, "a number between 0 and 1"),
         shrink=_integer("shrink", text["shrink"], 0) if text["shrink"] else budget // 4,
@@ -178,8 +178,15 @@ def _method(text: str) -> str:
     return text
 
 
-POLICY_OF = {"garl-paper": "dqn-paper", "random": "waypoint"}
-"""Who moves objects where nobody says: the paper's policy for its method, none for chance."""
+POLICY_OF = {
+    "garl-paper": "dqn-paper",
+    "ga": "destination",
+    "offline-rl": "destination",
+    "online-rl": "online-rl",
+    "random": "waypoint",
+    "surrogate-random": "dqn-paper",
+}
+"""Who moves objects where nobody says: what is part of each of the paper's methods."""
 
 
 def _npcs(text: str, method: str) -> str:
@@ -191,6 +198,23 @@ def _npcs(text: str, method: str) -> str:
         expected = f"one of {', '.join(POLICIES)}, or weights (.npz) that `garl train` wrote"
         raise _wrong("npcs", text, expected)
     return text
+
+
+def _npcs_then(config: pytest.Config, repeat: str) -> str:
+    """Return who moved objects in the search whose slot is repeated, or nothing."""
+    path = config.rootpath / str(config.getini("garl_dir")) / "ledger.sqlite"
+    if not SLOT_ID.fullmatch(repeat) or not path.is_file():
+        return ""
+    from pytest_garl.search.ledger import Ledger
+
+    try:
+        ledger = Ledger(path)
+        try:
+            return str(ledger.fact("npcs") or "")
+        finally:
+            ledger.close()
+    except GarlError as error:
+        raise pytest.UsageError(f"--garl-repeat={repeat}: {error}") from error
 
 
 def _seed(config: pytest.Config, text: str) -> int:

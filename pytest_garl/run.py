@@ -297,7 +297,7 @@ def _steered(target: Target, npcs: PolicySpec) -> PolicySpec:
     if case is None:
         return npcs
     if not target.live:
-        return recorded_spec(dict(case.moves))
+        return recorded_spec(dict(case.moves), dict(case.changes))
     return policy_spec(case.policy) if case.policy in POLICIES else npcs
 
 

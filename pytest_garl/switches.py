@@ -20,8 +20,18 @@ FATAL = "garl.fatal"
 """The user property by which an xdist worker tells the controller that the run cannot go on."""
 OWN = "garl.own"
 """The user property by which it tells of a test that failed in an assertion of its own."""
-METHODS = ("garl", "garl-paper", "random")
-POLICIES = ("dqn", "dqn-paper", "greedy", "stand", "waypoint", "random_walk", "stationary")
+METHODS = ("garl", "garl-paper", "ga", "offline-rl", "online-rl", "random", "surrogate-random")
+POLICIES = (
+    "dqn",
+    "dqn-paper",
+    "online-rl",
+    "greedy",
+    "stand",
+    "destination",
+    "waypoint",
+    "random_walk",
+    "stationary",
+)
 Option = namedtuple("Option", ["name", "metavar", "help", "default"], defaults=[""])
 """One option: its name without ``garl-``, default, and what ``--help`` says."""
 
@@ -121,8 +131,9 @@ OPTIONS = (
         name="npcs",
         metavar="POLICY",
         help=f"Who moves people, dogs and birds: {', '.join(POLICIES)}, or weights (.npz) that "
-        "`garl train` wrote (default: dqn; dqn-paper for the method garl-paper, waypoint for "
-        "random).",
+        "`garl train` wrote (default: dqn; dqn-paper for the methods garl-paper and "
+        "surrogate-random, online-rl for online-rl, waypoint for random, destination for ga and "
+        "offline-rl; for --garl-repeat those of the search).",
     ),
 )
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import dataclasses
 import functools
 import hashlib
@@ -69,9 +70,11 @@ class Learner:
     def __init__(self, size: int, actions: int, training: Training) -> None:
         self.choices, self.training = actions, training
         self.history: list[EpisodeRecord] = []
-        torch.manual_seed(training.seed)
         self.rng = np.random.default_rng(training.seed)
-        self.network, self.target = (_mlp(size, training.hidden, actions) for _ in range(2))
+        # Who else draws from torch's own generator in this process shall not notice.
+        with torch.random.fork_rng(devices=[]):
+            torch.manual_seed(training.seed)
+            self.network, self.target = (_mlp(size, training.hidden, actions) for _ in range(2))
         self.target.load_state_dict(self.network.state_dict())
         self.optimiser = torch.optim.Adam(self.network.parameters(), lr=training.learning_rate)
         self.updates = 0
@@ -169,7 +172,6 @@ def train(
     checkpoint: Path | None = None,
     report: Callable[[EpisodeRecord], None] = lambda record: None,
     every: int = 50,
-    env: Callable[[Surrogate], SurrogateEnv] = SurrogateEnv,
 ) -> Learner:
     """Train, telling ``report`` of each episode; return the learner.
 
@@ -177,18 +179,16 @@ def train(
     training that goes on from its ``checkpoint``, written about ``every`` so many episodes,
     ends with the same weights as one that was never interrupted.
     """
-    threads = torch.get_num_threads()
-    torch.set_num_threads(1)
     envs: Any = gymnasium.vector.AsyncVectorEnv(
-        [functools.partial(env, surrogate)] * training.environments,
+        [functools.partial(SurrogateEnv, surrogate)] * training.environments,
         context="spawn",
         autoreset_mode=gymnasium.vector.AutoresetMode.DISABLED,
     )
-    try:
+    with contextlib.closing(envs), one_thread():
         size, actions = envs.single_observation_space.shape[0], envs.single_action_space.n
         learner = Learner(size, int(actions), training)
         if checkpoint and checkpoint.exists():
-            _restore(learner, checkpoint, identity(surrogate, training, env))
+            _restore(learner, checkpoint, identity(surrogate, training))
         kept = len(learner.history)
         while len(learner.history) < training.episodes:
             for record in _round(envs, learner, len(learner.history)):
@@ -198,12 +198,20 @@ def train(
                     learner.history.append(record)
             done = len(learner.history)
             if checkpoint and (done - kept >= every or done >= training.episodes):
-                _keep(learner, checkpoint, identity(surrogate, training, env))
+                _keep(learner, checkpoint, identity(surrogate, training))
                 kept = done
-    finally:
-        envs.close()
-        torch.set_num_threads(threads)
     return learner
+
+
+@contextlib.contextmanager
+def one_thread() -> Iterator[None]:
+    """Let torch compute on one thread: the cores are for flying, and sums are the same anywhere."""
+    threads = torch.get_num_threads()
+    torch.set_num_threads(1)
+    try:
+        yield
+    finally:
+        torch.set_num_threads(threads)
 
 
 def _round(envs: Any, learner: Learner, first: int) -> Iterator[EpisodeRecord]:
@@ -272,15 +280,10 @@ def sources_sha256() -> str:
     return digest.hexdigest()
 
 
-def identity(
-    surrogate: Surrogate,
-    training: Training,
-    env: Callable[[Surrogate], SurrogateEnv] = SurrogateEnv,
-) -> str:
+def identity(surrogate: Surrogate, training: Training) -> str:
     """Return a hash of what is trained and how; another training has another."""
     maps = [map.sha256 for map in surrogate.maps]
-    place = f"{env.__module__}.{getattr(env, '__qualname__', env)}"
-    what = (sources_sha256(), place, dataclasses.replace(surrogate, maps=()), maps, training)
+    what = (sources_sha256(), dataclasses.replace(surrogate, maps=()), maps, training)
     return hashlib.sha256(repr(what).encode()).hexdigest()
 
 

@@ -126,6 +126,16 @@ def draw_episode(map: Map, kinds: Sequence[str], rng: np.random.Generator) -> tu
     return repair(scenario, place), place
 
 
+def in_any_environment(scenario: Scenario, map: Map, rng: np.random.Generator) -> Scenario:
+    """Return the scenario in weather and light, and with a marker, as a search draws them."""
+    drawn = {
+        item.key: float(rng.uniform(item.low, item.high))
+        for item in genome_for(map).properties
+        if item.key.startswith(("environment.", "marker."))
+    }
+    return repair(scenario.replace(drawn), map)
+
+
 def _uav_start(map: Map, rng: np.random.Generator) -> tuple[float, float, float]:
     """Draw a start with nothing above it, around the marker."""
     discs = [disc for body in map.bodies for disc in discs_of(body)]

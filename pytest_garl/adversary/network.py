@@ -15,9 +15,9 @@ from zipfile import BadZipFile
 import numpy as np
 from numpy.typing import NDArray
 
-from pytest_garl.adversary.states import ACTIONS, VIEWS
+from pytest_garl.adversary.states import VIEWS, on_turn
 from pytest_garl.errors import PolicyError
-from pytest_garl.simulation.policy import Move, PolicySpec, Situation
+from pytest_garl.simulation.policy import STAY, Move, PolicySpec, Situation
 
 Array = NDArray[np.float64]
 WEIGHTS = Path(__file__).with_name("weights")
@@ -35,7 +35,7 @@ class Network:
     layers: tuple[tuple[Array, Array], ...]
 
     def values(self, state: NDArray[Any]) -> Array:
-        """Return the value of each action, shape (5,)."""
+        """Return the value of each action, shape (actions,)."""
         signal: Array = state.astype(np.float64)
         for weight, bias in self.layers[:-1]:
             signal = np.maximum(weight @ signal + bias, 0.0)
@@ -54,7 +54,9 @@ class LearnedPolicy:
         """Nothing to prepare: the state says everything."""
 
     def decide(self, situation: Situation) -> Move:
-        """Return the best action."""
+        """Return the best action, or stay where it is another's turn."""
+        if self._view.in_turn and not on_turn(situation):
+            return STAY
         values = self._network.values(self._view.state(situation))
         return self._view.moves(situation)[int(np.argmax(values))]
 
@@ -62,9 +64,9 @@ class LearnedPolicy:
 def learned_spec(name: str) -> PolicySpec:
     """Return the specification of a shipped policy, or of one in a file.
 
-    ``name`` is "dqn", "dqn-paper", or the path of weights (``.npz``) that ``garl train``
-    wrote, with their manifest (``.json``) beside them.  Raises PolicyError for a file that is
-    missing, damaged, or not what its manifest says.
+    ``name`` is "dqn", "dqn-paper", "online-rl", or the path of weights (``.npz``) that
+    ``garl train`` wrote, with their manifest (``.json``) beside them.  Raises PolicyError for a
+    file that is missing, damaged, or not what its manifest says.
     """
     path = _path(name)
     sha256 = str(read_manifest(path)["sha256"])
@@ -135,19 +137,20 @@ def _load(weights: str, sha256: str) -> Network:
             ]
     except (ValueError, KeyError, TypeError, BadZipFile, EOFError) as error:
         raise _wrong(path, f"is no file of weights ({error})") from error
-    _check(path, layers, VIEWS[manifest["state"]].size)
+    _check(path, layers, manifest["state"])
     return Network(state=manifest["state"], layers=tuple(layers))
 
 
-def _check(path: Path, layers: Sequence[tuple[Array, Array]], size: int) -> None:
+def _check(path: Path, layers: Sequence[tuple[Array, Array]], state: str) -> None:
+    size, actions = VIEWS[state].size, VIEWS[state].actions
     for weight, bias in layers:
         if weight.ndim != 2 or bias.shape != weight.shape[:1] or weight.shape[1] != size:
             raise _wrong(path, f"has a layer of shape {weight.shape} where {size} numbers go in")
         if not (np.isfinite(weight).all() and np.isfinite(bias).all()):
             raise _wrong(path, "has weights that are not finite")
         size = weight.shape[0]
-    if size != len(ACTIONS):
-        raise _wrong(path, f"knows {size} actions; expected the {len(ACTIONS)} of the paper")
+    if size != actions:
+        raise _wrong(path, f"knows {size} actions; expected {actions} with the state {state!r}")
 
 
 def _path(name: str) -> Path:

@@ -9,8 +9,11 @@ from types import MappingProxyType
 import numpy as np
 
 from pytest_garl.errors import PolicyError
+from pytest_garl.scenarios.chromosome import decode
+from pytest_garl.scenarios.genes import genome_for, with_destinations
 from pytest_garl.scenarios.maps import Map
 from pytest_garl.scenarios.object_types import OBJECT_TYPES
+from pytest_garl.scenarios.placement import object_destination_m
 from pytest_garl.simulation.policy import (
     DECISION_STEP_S,
     STAY,
@@ -87,13 +90,13 @@ class Greedy:
 
     def reset(self, situation: Situation, rng: np.random.Generator) -> None:
         """Start towards the marker."""
-        self._move = _towards_marker(situation)
+        self._move = _towards(situation.marker_position_m, situation)
 
     def decide(self, situation: Situation) -> Move:
         """Go straight to the marker, and on beyond it by one decision."""
         stride = situation.self.speed_mps * DECISION_STEP_S
         if math.dist(situation.self.position_m[:2], situation.marker_position_m) > stride:
-            self._move = _towards_marker(situation)
+            self._move = _towards(situation.marker_position_m, situation)
         return self._move
 
 
@@ -104,18 +107,46 @@ class Stand:
         """Nothing to prepare."""
 
     def decide(self, situation: Situation) -> Move:
-        """Go to the marker, slower over the last step, and stay."""
-        stride = situation.self.speed_mps * DECISION_STEP_S
-        distance = math.dist(situation.self.position_m[:2], situation.marker_position_m)
-        move = _towards_marker(situation)
-        share = min(1.0, distance / stride) if stride > 0 else 0.0
-        return Move(x=share * move.x, y=share * move.y)
+        """Go to the marker and stay."""
+        return _walk_to(situation.marker_position_m, situation)
 
 
-def _towards_marker(situation: Situation) -> Move:
-    (x, y, _), (mx, my) = situation.self.position_m, situation.marker_position_m
-    length = math.dist((x, y), (mx, my))
-    return Move(x=(mx - x) / length, y=(my - y) / length) if length > 0 else STAY
+class Destination:
+    """Walks to the place that its genes say and stays there, as near as bodies let it.
+
+    The paper's baselines whose objects have a start and an end: ``ga`` and ``offline-rl``.
+    """
+
+    def reset(self, situation: Situation, rng: np.random.Generator) -> None:
+        """Look the destination up; raise PolicyError for a scenario without one."""
+        name = situation.self.name
+        goal = object_destination_m(situation.scenario, situation.map, name)
+        if goal is None:
+            raise PolicyError(
+                f"object policy 'destination': the scenario has no gene '{name}.destination_x'; "
+                "only the search methods ga and offline-rl give objects a destination. Choose one "
+                "of these (--garl-method), or another policy (--garl-npcs)"
+            )
+        self._goal = goal
+
+    def decide(self, situation: Situation) -> Move:
+        """Go there and stay."""
+        return _walk_to(self._goal, situation)
+
+
+def _walk_to(goal: tuple[float, float], situation: Situation) -> Move:
+    """Return the move to a place, slower over the last step."""
+    stride = situation.self.speed_mps * DECISION_STEP_S
+    distance = math.dist(situation.self.position_m[:2], goal)
+    move = _towards(goal, situation)
+    share = min(1.0, distance / stride) if stride > 0 else 0.0
+    return Move(x=share * move.x, y=share * move.y)
+
+
+def _towards(goal: tuple[float, float], situation: Situation) -> Move:
+    x, y, _ = situation.self.position_m
+    length = math.dist((x, y), goal)
+    return Move(x=(goal[0] - x) / length, y=(goal[1] - y) / length) if length > 0 else STAY
 
 
 POLICIES: Mapping[str, PolicySpec] = MappingProxyType(
@@ -127,12 +158,13 @@ POLICIES: Mapping[str, PolicySpec] = MappingProxyType(
             ("random_walk", RandomWalk),
             ("greedy", Greedy),
             ("stand", Stand),
+            ("destination", Destination),
         )
     }
 )
 
 
-LEARNED = ("dqn", "dqn-paper")
+LEARNED = ("dqn", "dqn-paper", "online-rl")
 
 
 def policy_spec(name: str) -> PolicySpec:
@@ -158,6 +190,7 @@ def check_policy(spec: PolicySpec, map: Map) -> None:
     Raises PolicyError if it cannot be made, raises, or answers what is no move.
     """
     x_min, x_max, y_min, y_max = map.bounds_m
+    genome = with_destinations(genome_for(map))
     states = [
         ObjectState(
             name=name,
@@ -177,10 +210,13 @@ def check_policy(spec: PolicySpec, map: Map) -> None:
             uav_velocity_mps=(0.0, 0.0, 0.0),
             marker_position_m=((x_min + x_max) / 2, (y_min + y_max) / 2),
             map=map,
+            scenario=decode(genome.nominal, genome, map=map.name, seed=0),
         )
         policy = spec.make()
         try:
             policy.reset(situation, np.random.default_rng(0))
+        except PolicyError:
+            raise
         except Exception as error:
             raise PolicyError(
                 f"object policy {spec.name!r}: reset raised {type(error).__name__}: {error}"

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import hashlib
 import math
+import struct
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from types import MappingProxyType
@@ -10,7 +12,8 @@ from types import MappingProxyType
 import numpy as np
 from numpy.typing import NDArray
 
-from pytest_garl.simulation.policy import DECISION_STEP_S, Move, Situation
+from pytest_garl.scenarios.genes import CONFINED_WEATHER, ENVIRONMENT, SUN
+from pytest_garl.simulation.policy import DECISION_STEP_S, STAY, Move, Situation
 
 State = NDArray[np.float32]
 
@@ -30,6 +33,8 @@ BODY_SCALE_M = 3.0
 """What each kind of number is divided by, so that all are of the order of one."""
 LIMIT = 10.0
 """No number is beyond this, however large the map."""
+CONDITION_STEP = 0.01
+"""What the paper's online rival alters a condition by at a time."""
 
 
 def paper(situation: Situation) -> State:
@@ -98,6 +103,45 @@ def fellow(situation: Situation) -> State:
     return np.concatenate([relative(situation), offset])
 
 
+def online(situation: Situation) -> State:
+    """Return the paper's four, the environment's nine properties and the marker's genes, (15,).
+
+    The state of the paper's Online RL "encodes the environment, marker position, and dynamic
+    objects' start points".  As in its code the places are those of the moment, the object's and
+    the UAV's; unlike there they are relative to the marker in flight as they were in training.
+    Weather is a share of the confined range, which the policy never leaves.
+    """
+    scenario = situation.scenario
+    conditions = [scenario[key] / _range(key) for key in ENVIRONMENT]
+    return _vector((*_places(situation), *conditions, scenario["marker.x"], scenario["marker.y"]))
+
+
+def online_moves(situation: Situation) -> tuple[Move, ...]:
+    """Return the paper's five moves, then each of nine conditions up and down, (23,).
+
+    As many as in the paper's code: eight weathers by ±0.01, and time of day.  No weather is
+    raised beyond the confined range: the policy knows no other.
+    """
+    changes = []
+    for key in ENVIRONMENT:
+        value = situation.scenario[key]
+        up = max(0.0, min(CONDITION_STEP, _range(key) - value))
+        changes += [(key, up), (key, -min(CONDITION_STEP, value))]
+    return *ACTIONS, *(Move(x=0.0, y=0.0, changes=(each,)) if each[1] else STAY for each in changes)
+
+
+def on_turn(situation: Situation) -> bool:
+    """Whether a decision is this object's, where one of all is drawn for each.
+
+    Objects have a generator each and none in common; what they draw together comes from what
+    all of them see.
+    """
+    names = sorted(each.name for each in (situation.self, *situation.others))
+    seen = struct.pack("<3d", situation.time_s, *situation.marker_position_m)
+    draw = int.from_bytes(hashlib.blake2b(seen, digest_size=8).digest(), "little")
+    return names[draw % len(names)] == situation.self.name
+
+
 def compass_moves(situation: Situation) -> tuple[Move, ...]:
     """Return what the paper's actions mean: north, south, west, east, stay."""
     return ACTIONS
@@ -111,11 +155,16 @@ def relative_moves(situation: Situation) -> tuple[Move, ...]:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class View:
-    """How a policy sees: the state's size, the state, and what the five actions mean."""
+    """How a policy sees: the state's size, the state, what the actions mean and how many there are.
+
+    ``in_turn`` is whether at each decision one object acts, drawn at random, and all others stay.
+    """
 
     size: int
     state: Callable[[Situation], State]
     moves: Callable[[Situation], tuple[Move, ...]]
+    actions: int = len(ACTIONS)
+    in_turn: bool = False
 
 
 VIEWS: Mapping[str, View] = MappingProxyType(
@@ -124,6 +173,13 @@ VIEWS: Mapping[str, View] = MappingProxyType(
         "extended": View(size=9, state=extended, moves=compass_moves),
         "relative": View(size=10, state=relative, moves=relative_moves),
         "fellow": View(size=12, state=fellow, moves=relative_moves),
+        "online": View(
+            size=4 + len(ENVIRONMENT) + 2,
+            state=online,
+            moves=online_moves,
+            actions=len(ACTIONS) + 2 * len(ENVIRONMENT),
+            in_turn=True,
+        ),
     }
 )
 """Each view by the name that a policy's manifest gives."""
@@ -150,6 +206,10 @@ def _being(situation: Situation) -> tuple[float, float, float]:
         kind.top_m / BODY_SCALE_M,
         kind.bottom_m / BODY_SCALE_M,
     )
+
+
+def _range(key: str) -> float:
+    return 1.0 if key == SUN else CONFINED_WEATHER
 
 
 def _vector(numbers: Sequence[float]) -> State:

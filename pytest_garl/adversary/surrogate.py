@@ -11,12 +11,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pytest_garl.adversary import rewards
-from pytest_garl.adversary.episode import Episode, draw_episode
+from pytest_garl.adversary.episode import Episode, draw_episode, in_any_environment
 from pytest_garl.adversary.pilots import AvoidingPilot, Caution, Habits, StraightPilot
-from pytest_garl.adversary.states import ACTIONS, LIMIT, VIEWS
+from pytest_garl.adversary.states import LIMIT, VIEWS
 from pytest_garl.landing_system import Airframe
 from pytest_garl.scenarios.maps import Map
-from pytest_garl.scenarios.scenario import Scenario
 
 Observation = NDArray[np.float32]
 
@@ -26,7 +25,9 @@ class Surrogate:
     """What is trained against: maps, types, UAV, state, reward.
 
     ``uav`` is "straight", the paper's, "avoiding", or "both", half of the episodes each.
-    ``discount`` is part of the potential-based reward.
+    ``discount`` is part of the potential-based reward.  With ``environment`` "drawn" an episode
+    begins in any weather and light of a search, with the marker anywhere, instead of clear
+    weather and a marker at a fixed place.
     """
 
     maps: tuple[Map, ...]
@@ -35,13 +36,14 @@ class Surrogate:
     state: str = "relative"
     reward: Literal["collision-first", "paper"] = "collision-first"
     discount: float = 0.99
+    environment: Literal["clear", "drawn"] = "clear"
     airframe: Airframe = field(default_factory=Airframe)
 
 
 class SurrogateEnv(gymnasium.Env[Observation, np.int64]):
     """One object, a marker at a fixed place, a UAV from take-off to landing or collision.
 
-    Actions are the paper's five, one every 0.5 s; the observation is the state's vector.
+    Actions are those of the state's view, one every 0.5 s; the observation is its vector.
     ``info`` tells ``collided``, ``outcome`` and, with the paper's reward, ``hidden``, the
     share of the marker in the frame that is covered.  A step after the end changes nothing.
     """
@@ -52,7 +54,7 @@ class SurrogateEnv(gymnasium.Env[Observation, np.int64]):
         self.surrogate = surrogate
         self._view = VIEWS[surrogate.state]
         self.observation_space = gymnasium.spaces.Box(-LIMIT, LIMIT, (self._view.size,), np.float32)
-        self.action_space = gymnasium.spaces.Discrete(len(ACTIONS))
+        self.action_space = gymnasium.spaces.Discrete(self._view.actions)
         self._episode: Episode | None = None
 
     def reset(
@@ -64,7 +66,9 @@ class SurrogateEnv(gymnasium.Env[Observation, np.int64]):
         rng, surrogate = self.np_random, self.surrogate
         map = surrogate.maps[int(rng.integers(len(surrogate.maps)))]
         kind = surrogate.kinds[int(rng.integers(len(surrogate.kinds)))]
-        scenario, place = self._draw(map, kind)
+        scenario, place = draw_episode(map, [kind], rng)
+        if surrogate.environment == "drawn":
+            scenario = in_any_environment(scenario, place, rng)
         avoiding = rng.random() < {"straight": 0.0, "both": 0.5, "avoiding": 1.0}[surrogate.uav]
         # The paper's UAV always flies alike; ours as differently as landing systems do.
         habits = Habits() if surrogate.uav == "straight" else Habits.drawn(rng)
@@ -108,10 +112,6 @@ class SurrogateEnv(gymnasium.Env[Observation, np.int64]):
         if self._episode is not None:
             self._episode.close()
             self._episode = None
-
-    def _draw(self, map: Map, kind: str) -> tuple[Scenario, Map]:
-        """Return where an episode begins."""
-        return draw_episode(map, [kind], self.np_random)
 
     def _current(self) -> Episode:
         if self._episode is None:

@@ -35,6 +35,10 @@ PRESETS: Mapping[str, tuple[Surrogate, Training]] = MappingProxyType(
             Surrogate(maps=(), uav="straight", state="paper", reward="paper"),
             Training(double=False, steps=1),
         ),
+        "online-rl": (
+            Surrogate(maps=(), uav="straight", state="online", reward="paper", environment="drawn"),
+            Training(double=False, steps=1),
+        ),
     }
 )
 """What each shipped policy was trained on, and how; the maps are filled in."""
@@ -109,6 +113,7 @@ def _about(
             "types": list(surrogate.kinds),
             "uav": surrogate.uav,
             "reward": surrogate.reward,
+            "environment": surrogate.environment,
             "airframe": dataclasses.asdict(surrogate.airframe),
         },
         "last_100_episodes": {

@@ -106,11 +106,22 @@ def show(folders: _Folders, file: Path) -> None:
     for row in meanings(case.scenario, folders.maps):
         table.add_row(*row)
     Console(emoji=False).print(table)
+    for key, by in _totals(case):
+        click.echo(f"while it is flown {key} changes by {by:+.2f}")
     click.echo(
         f"\n{evidence.neighbours_failed} of {evidence.neighbours} neighbours fail too; shrinking "
         f"removed {evidence.removed}; objects were moved by {case.policy}"
     )
     click.echo(f"Fly it: garl cases replay {file}")
+
+
+def _totals(case: Case) -> list[tuple[str, float]]:
+    """Return what policies changed of the environment, all of a gene's changes together."""
+    totals: dict[str, float] = {}
+    for _, own in case.changes:
+        for _, key, by in own:
+            totals[key] = totals.get(key, 0.0) + by
+    return sorted(totals.items())
 
 
 @cases.command("replay")

@@ -25,11 +25,12 @@ RECENT = 50
 @click.command(epilog="Example: garl train --map=court --type=dog --out=scenarios/dogs.npz")
 @click.option(
     "--policy",
-    type=click.Choice(["dqn", "dqn-paper"]),
+    type=click.Choice(["dqn", "dqn-paper", "online-rl"]),
     default="dqn",
     show_default=True,
     help="What is learned: to collide with a UAV that avoids what it sees (dqn), or the paper's "
-    "state and reward against a UAV that flies straight down (dqn-paper).",
+    "state and reward against a UAV that flies straight down (dqn-paper), or to change weather and "
+    "light as well, as the paper's online rival does (online-rl).",
 )
 @click.option(
     "--map",

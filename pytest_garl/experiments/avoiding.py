@@ -15,7 +15,7 @@ from pytest_garl.adversary.recorded import recorded_spec
 from pytest_garl.errors import LedgerError
 from pytest_garl.experiments.measure import Piloted, Search
 from pytest_garl.regressions.follow_up import done_of
-from pytest_garl.regressions.pursuit import moves_of
+from pytest_garl.regressions.pursuit import deeds_of
 from pytest_garl.search.errands import Errands, Fly
 from pytest_garl.search.job import load_scenario
 from pytest_garl.search.ledger import Ledger, Row
@@ -35,9 +35,10 @@ def pilot(
 ) -> tuple[Piloted, ...]:
     """Let the reference pilot fly at most ``limit`` violating scenarios of each search.
 
-    It knows where everything is, and the objects repeat what they did.  What it flies is drawn by
-    ``seed``, so that its share stands for all violations.  The flights stand in a ledger of their
-    own at ``path``, so that they count nowhere else; interrupted, it goes on from there.
+    It knows where everything is, and the objects repeat what they did, to the environment as
+    well.  What it flies is drawn by ``seed``, so that its share stands for all violations.  The
+    flights stand in a ledger of their own at ``path``, so that they count nowhere else;
+    interrupted, it goes on from there.
     """
     drawn = {search.key: _drawn(search.violating, limit, seed) for search in searches}
     flights = {
@@ -75,8 +76,7 @@ def _opened(path: Path) -> Ledger:
 def _avoided(search: Search, flight: Row, fly: Fly) -> bool:
     """Whether the reference pilot lands without a violation."""
     scenario, done = load_scenario(flight.scenario), done_of(flight, search.job)
-    moves = moves_of(done, scenario, search.map)
-    job = dataclasses.replace(
-        search.job, system=reference_to(ReferencePilot), npcs=recorded_spec(dict(moves))
-    )
+    deeds = deeds_of(done, scenario, search.map)
+    npcs = recorded_spec(dict(deeds.moves), dict(deeds.changes))
+    job = dataclasses.replace(search.job, system=reference_to(ReferencePilot), npcs=npcs)
     return not fly(job, scenario).signature

@@ -11,7 +11,7 @@ from typing import Any
 from pytest_garl.errors import GarlError, ScenarioError
 from pytest_garl.regressions.files import read_limits
 from pytest_garl.saving import save_text
-from pytest_garl.scenarios.genes import EXTRAS, Property, genome_for
+from pytest_garl.scenarios.genes import Property, genome_like
 from pytest_garl.scenarios.maps import Map
 from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.scenarios.toml_reader import Table, parse
@@ -221,9 +221,7 @@ def _read_set(table: Table, load_map: Callable[[str], Map]) -> SampleSet:
 def _read_genes(table: Table, map: Map) -> tuple[Property, ...]:
     """Return the properties that the columns of values stand for."""
     keys = table.texts("genes")
-    heads = {key.partition(".")[0] for key in keys}
-    extras = tuple(gene for name, gene in EXTRAS.items() if name in heads)
-    genome = genome_for(map, weather="full", extras=extras)
+    genome = genome_like(keys, map)
     if keys != genome.keys:
         wrong = sorted({*keys} ^ {*genome.keys})
         raise table.error(

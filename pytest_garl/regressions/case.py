@@ -18,6 +18,8 @@ Avoidable = Literal["live", "recorded", "no"]
 only repeat what they did, or neither."""
 MoveList = tuple[tuple[float, float], ...]
 Moves = tuple[tuple[str, MoveList], ...]
+ChangeList = tuple[tuple[int, str, float], ...]
+Changes = tuple[tuple[str, ChangeList], ...]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -51,13 +53,26 @@ class Evidence:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class Deeds:
+    """What objects did in a flight, and what their policies changed of the environment.
+
+    ``changes`` names the objects whose policy changed anything: the number of the decision,
+    the gene, what was added to it.
+    """
+
+    moves: Moves
+    changes: Changes = ()
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Case:
     """One saved case.
 
-    ``system`` is "module:class"; ``moves`` are what each object did, so that no policy is
-    needed to fly it again; ``policy`` and ``policy_sha256`` name who moved them when it was
-    found.  ``test`` and ``assertion`` are set where a test's own assertion failed and the
-    built-in verdict is content: the test's name and the hash of the assertion's source.
+    ``system`` is "module:class"; ``moves`` are what each object did, ``changes`` what of the
+    environment, so that no policy is needed to fly it again; ``policy`` and ``policy_sha256``
+    name who moved them when it was found.  ``test`` and ``assertion`` are set where a test's own
+    assertion failed and the built-in verdict is content: the test's name and the hash of the
+    assertion's source.
     ``avoidable`` says what may be asked of a repair: not to outrun a pursuer that nobody outruns.
     ``limits`` are those of the tests when it was found; pytest flies it with those of today.
     """
@@ -72,6 +87,7 @@ class Case:
     moves: Moves
     evidence: Evidence
     limits: Limits
+    changes: Changes = ()
     test: str = ""
     assertion: str = ""
 
@@ -79,7 +95,9 @@ class Case:
     def id(self) -> str:
         """A name such as ``court-IV-dog-3f9a12``, the same for the same scenario."""
         facts = (self.system, self.scenario, self.violation.signature, self.moves, self.test)
-        digest = hashlib.sha256(repr(facts).encode()).hexdigest()
+        # Nothing where nothing was changed, so that the names of other cases stay.
+        changes = repr(self.changes) if self.changes else ""
+        digest = hashlib.sha256(f"{facts!r}{changes}".encode()).hexdigest()
         words = self.violation.signature.split(":")[:2] or [self.violation.type]
         subject = "-".join(_SAFE.sub("_", word.partition("@")[0]).strip("_") for word in words)
         return f"{self.scenario.map}-{subject}-{digest[:6]}"

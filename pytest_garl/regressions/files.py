@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import math
 import textwrap
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -10,8 +11,18 @@ from pathlib import Path
 from typing import Literal, cast
 
 from pytest_garl.errors import ScenarioError
-from pytest_garl.regressions.case import Avoidable, Case, Evidence, MoveList, Status, Violation
+from pytest_garl.regressions.case import (
+    Avoidable,
+    Case,
+    ChangeList,
+    Changes,
+    Evidence,
+    MoveList,
+    Status,
+    Violation,
+)
 from pytest_garl.scenarios.files import gene_lines, read_genes
+from pytest_garl.scenarios.genes import ENVIRONMENT
 from pytest_garl.scenarios.maps import Map
 from pytest_garl.scenarios.toml_reader import Table, parse
 from pytest_garl.scenarios.toml_writer import quoted as _text
@@ -85,6 +96,14 @@ def dumps(case: Case) -> str:
         "[moves]",
     ]
     lines += [f"{name} = {_moves(moves)}" for name, moves in case.moves]
+    if case.changes:
+        lines += [
+            "",
+            "# What their policies changed of the environment: [decision, gene, added to it], the",
+            "# number of the decision from 0, two a second.",
+            "[changes]",
+            *(f"{name} = {_changes(own)}" for name, own in case.changes),
+        ]
     lines += [
         "",
         "[evidence]",
@@ -120,6 +139,7 @@ def loads(text: str, load_map: Callable[[str], Map], *, source: str = "case") ->
             "genes",
             "policy",
             "moves",
+            "changes",
             "evidence",
         }
     )
@@ -149,6 +169,9 @@ def loads(text: str, load_map: Callable[[str], Map], *, source: str = "case") ->
         policy=policy.text("name"),
         policy_sha256=policy.text("sha256"),
         moves=_read_moves(top.table("moves"), map, scenario.absent),
+        changes=_read_changes(top.table("changes"), map, scenario.absent)
+        if "changes" in top.values
+        else (),
         evidence=_read_evidence(top.table("evidence")),
         limits=read_limits(top.table("limits")),
         test=head.test,
@@ -226,6 +249,31 @@ def _read_runs(table: Table, name: str) -> MoveList:
     return tuple(moves)
 
 
+def _read_changes(table: Table, map: Map, absent: Sequence[str]) -> Changes:
+    names = [name for name, _ in map.residents if name not in absent]
+    table.only(names)
+    expected = f"expected a list of [decision, gene, number] with one of {', '.join(ENVIRONMENT)}"
+    found = []
+    for name in (each for each in names if each in table.values):
+        rows = table.get(name)
+        if not isinstance(rows, list) or not all(_is_change(row) for row in rows):
+            raise table.error(name, f"found {rows!r}, {expected}")
+        found.append((name, tuple((row[0], row[1], float(row[2])) for row in rows)))
+    return tuple(found)
+
+
+def _is_change(row: object) -> bool:
+    if not isinstance(row, list) or [type(item) for item in row[:2]] != [int, str]:
+        return False
+    return (
+        len(row) == 3
+        and 0 <= row[0] <= 10_000
+        and row[1] in ENVIRONMENT
+        and type(row[2]) in (int, float)
+        and math.isfinite(row[2])
+    )
+
+
 def _read_evidence(table: Table) -> Evidence:
     table.only(
         {
@@ -248,6 +296,11 @@ def _read_evidence(table: Table) -> Evidence:
         removed=table.text("removed"),
         versions=tuple((name, versions.text(name)) for name in versions.values),
     )
+
+
+def _changes(changes: ChangeList) -> str:
+    rows = (f"[{decision}, {_text(key)}, {by!r}]" for decision, key, by in changes)
+    return f"[{', '.join(rows)}]"
 
 
 def _moves(moves: MoveList) -> str:

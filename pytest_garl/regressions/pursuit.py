@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from pytest_garl.adversary.recorded import recorded_spec
-from pytest_garl.regressions.case import Avoidable, Case, Evidence, Moves, Violation
+from pytest_garl.regressions.case import Avoidable, Case, Deeds, Evidence, Violation
 from pytest_garl.regressions.moves import simpler
 from pytest_garl.regressions.neighbours import COUNT, neighbours
 from pytest_garl.regressions.shrink import complexity, genome_of, shrink
@@ -86,7 +86,7 @@ class _Failure:
     """A scenario that fails, what its objects did, its flight, how many neighbours fail too."""
 
     scenario: Scenario
-    moves: Moves
+    deeds: Deeds
     done: Done
     robust: int
 
@@ -127,9 +127,9 @@ class Pursuit:
         self._flights += 1
         return self._fly(job, scenario)
 
-    def _again(self, scenario: Scenario, moves: Moves) -> Done:
+    def _again(self, scenario: Scenario, deeds: Deeds) -> Done:
         """Fly with recorded moves."""
-        spec = recorded_spec(dict(moves))
+        spec = recorded_spec(dict(deeds.moves), dict(deeds.changes))
         return self._go(dataclasses.replace(self._inquiry.job, npcs=spec), scenario)
 
     def _most_robust(self, scenarios: Sequence[Scenario]) -> _Failure | None:
@@ -138,20 +138,20 @@ class Pursuit:
         for scenario in scenarios:
             if best is not None and self._left < 1 + COUNT + LEAST:
                 break
-            moves = moves_of(self._flown[scenario], scenario, self._inquiry.map)
-            done = self._again(scenario, moves)
+            deeds = deeds_of(self._flown[scenario], scenario, self._inquiry.map)
+            done = self._again(scenario, deeds)
             if not self._inquiry.failed(scenario, done):
                 continue
-            robust = self._robust(scenario, moves)
+            robust = self._robust(scenario, deeds)
             if best is None or robust > best.robust:
-                best = _Failure(scenario=scenario, moves=moves, done=done, robust=robust)
+                best = _Failure(scenario=scenario, deeds=deeds, done=done, robust=robust)
             if robust == COUNT:
                 break
         return best
 
-    def _robust(self, scenario: Scenario, moves: Moves) -> int:
+    def _robust(self, scenario: Scenario, deeds: Deeds) -> int:
         return sum(
-            self._inquiry.failed(each, self._again(each, moves))
+            self._inquiry.failed(each, self._again(each, deeds))
             for each in neighbours(scenario, self._inquiry.map)
         )
 
@@ -159,11 +159,11 @@ class Pursuit:
         """Whether a pilot that knows where everything is lands among the same objects."""
         scenario, job = failure.scenario, self._inquiry.job
         pilot = dataclasses.replace(job, system=reference_to(ReferencePilot))
-        recorded = recorded_spec(dict(failure.moves))
+        recorded = recorded_spec(dict(failure.deeds.moves), dict(failure.deeds.changes))
         if not self._lands(dataclasses.replace(pilot, npcs=recorded), scenario):
             return "no"
         # Where nothing moves, nothing pursues.
-        alone = not failure.moves
+        alone = not failure.deeds.moves
         return "live" if alone or self._lands(pilot, scenario) else "recorded"
 
     def _lands(self, pilot: Job, scenario: Scenario) -> bool:
@@ -190,29 +190,32 @@ class Pursuit:
             if self._left < COUNT:
                 break
             done = self._flown[scenario]
-            moves = moves_of(done, scenario, inquiry.map)
-            robust = self._robust(scenario, moves)
+            deeds = deeds_of(done, scenario, inquiry.map)
+            robust = self._robust(scenario, deeds)
             if robust >= best.robust:
-                failure = _Failure(scenario=scenario, moves=moves, done=done, robust=robust)
+                failure = _Failure(scenario=scenario, deeds=deeds, done=done, robust=robust)
                 return self._recorded(failure)
         return best
 
     def _recorded(self, failure: _Failure) -> _Failure:
         """Return the failure with the shortest record of moves that it survives."""
         culprit = culprit_of(failure.done)
-        if not any(own for _, own in failure.moves) or not failure.done.record.exists():
+        moves = failure.deeds.moves
+        if not any(own for _, own in moves) or not failure.done.record.exists():
             return failure
         flight = load(failure.done.record)
-        candidates = simpler(failure.scenario, failure.moves, flight, culprit, self._inquiry.map)
-        for scenario, moves in candidates:
+        for scenario, shorter in simpler(
+            failure.scenario, moves, flight, culprit, self._inquiry.map
+        ):
             if self._left < 1 + COUNT:
                 break
-            done = self._again(scenario, moves)
+            deeds = dataclasses.replace(failure.deeds, moves=shorter)
+            done = self._again(scenario, deeds)
             if not self._inquiry.failed(scenario, done):
                 continue
-            robust = self._robust(scenario, moves)
+            robust = self._robust(scenario, deeds)
             if robust >= failure.robust:
-                return _Failure(scenario=scenario, moves=moves, done=done, robust=robust)
+                return _Failure(scenario=scenario, deeds=deeds, done=done, robust=robust)
         return failure
 
     def _case(self, first: Scenario, failure: _Failure, avoidable: Avoidable) -> Case:
@@ -227,7 +230,8 @@ class Pursuit:
             violation=_violation(from_dict(done.result["verdict"]), flight, own),
             policy=job.npcs.name,
             policy_sha256=job.npcs.sha256,
-            moves=failure.moves,
+            moves=failure.deeds.moves,
+            changes=failure.deeds.changes,
             evidence=Evidence(
                 trajectory_sha256=done.sha256,
                 cpu=flight.cpu if flight else "",
@@ -267,14 +271,18 @@ def _violation(verdict: Verdict, flight: Flight | None, own: OwnFailure | None) 
     )
 
 
-def moves_of(done: Done, scenario: Scenario, map: Map) -> Moves:
+def deeds_of(done: Done, scenario: Scenario, map: Map) -> Deeds:
     """Return what each object did in a flight; nothing where its process did not live."""
     names = [name for name, _ in map.without(scenario.absent).object_names]
     if not done.record.exists():
-        return tuple((name, ()) for name in names)
-    made = {item.name: item.moves for item in load(done.record).objects}
-    return tuple(
-        (name, tuple((float(x), float(y)) for x, y in made.get(name, ()))) for name in names
+        return Deeds(moves=tuple((name, ()) for name in names))
+    objects = load(done.record).objects
+    made = {item.name: item.moves for item in objects}
+    return Deeds(
+        moves=tuple(
+            (name, tuple((float(x), float(y)) for x, y in made.get(name, ()))) for name in names
+        ),
+        changes=tuple((item.name, item.changes) for item in objects if item.changes),
     )
 
 

@@ -59,7 +59,7 @@ def replay(
     """Fly a case with its recorded moves, or with a ``live`` policy, and answer what it shows."""
     map = load_map(case.scenario.map, map_folders)
     system = system_of(case, folder)
-    npcs = policy_spec(case.policy) if live else recorded_spec(dict(case.moves))
+    npcs = policy_spec(case.policy) if live else recorded_spec(dict(case.moves), dict(case.changes))
     limit = max(PAPER_LIMIT_S, case.limits.time_s)
     flight = fly(case.scenario, system, npcs, map=map, time_limit_s=limit)
     verdict = judge(flight, case.limits)

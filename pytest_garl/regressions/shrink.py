@@ -17,7 +17,7 @@ from hypothesis import HealthCheck, Phase, Verbosity, given, seed, settings
 from hypothesis import strategies as st
 from hypothesis.database import ExampleDatabase, choices_to_bytes
 
-from pytest_garl.scenarios.genes import EXTRAS, Genome, NuclearGene, Property, genome_for
+from pytest_garl.scenarios.genes import Genome, NuclearGene, Property, genome_like
 from pytest_garl.scenarios.maps import Map
 from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.scenarios.validity import repair
@@ -26,6 +26,8 @@ STEPS = 20
 """Steps from nominal to the end of a gene's range: a twentieth is read and compared at a glance."""
 BISECTIONS = 3
 """Flights spent on how near to nominal one gene can go: to an eighth of its distance."""
+_PLACES = ("start_x", "start_y", "destination_x", "destination_y")
+"""No place of an object is simpler than another; only their digits count."""
 Change = Callable[[Scenario], Scenario]
 
 
@@ -102,9 +104,7 @@ def shrink(
 
 def genome_of(scenario: Scenario, map: Map) -> Genome:
     """Return the genome of a scenario's own genes, weather in its full range."""
-    sections = {key.partition(".")[0] for key, _ in scenario.genes}
-    extras = [gene for name, gene in EXTRAS.items() if name in sections]
-    return genome_for(map, weather="full", extras=extras)
+    return genome_like((key for key, _ in scenario.genes), map)
 
 
 def complexity(scenario: Scenario, genome: Genome) -> tuple[int, int, float, int]:
@@ -115,7 +115,7 @@ def complexity(scenario: Scenario, genome: Genome) -> tuple[int, int, float, int
         shares = [
             abs(present[item.key] - item.nominal) / (item.high - item.low)
             for item in gene.properties
-            if item.key in present and not item.key.endswith(("start_x", "start_y"))
+            if item.key in present and not item.key.endswith(_PLACES)
         ]
         off += any(share > 0 for share in shares)
         distance += sum(shares)
@@ -189,7 +189,7 @@ def _bisect(trials: Trials) -> None:
             item
             for item in gene.properties
             if item.key in present
-            and not item.key.endswith(("start_x", "start_y"))
+            and not item.key.endswith(_PLACES)
             and start[item.key] != item.nominal
         ]
         if not moved:
@@ -287,7 +287,7 @@ def _presence(name: str) -> Callable[[Scenario, int], Scenario]:
 
 def _steps(gene: NuclearGene, first: Scenario, present: set[str]) -> Iterator[_Line]:
     for item in gene.properties:
-        if item.key not in present or item.key.endswith(("start_x", "start_y")):
+        if item.key not in present or item.key.endswith(_PLACES):
             continue
         value = first[item.key]
         if value == item.nominal:

@@ -11,6 +11,7 @@ from pytest_garl.regressions.shrink import genome_of
 from pytest_garl.scenarios.maps import load_map
 from pytest_garl.scenarios.placement import (
     marker_position_m,
+    object_destination_m,
     object_speed_mps,
     object_start_m,
 )
@@ -79,5 +80,8 @@ def meanings(scenario: Scenario, map_folders: tuple[Path, ...]) -> list[tuple[st
     for name, kind in map.without(scenario.absent).object_names:
         x, y = object_start_m(scenario, map, name)
         speed = object_speed_mps(scenario, map, name)
-        rows.append((name, "", f"a {kind} of up to {speed:.2f} m/s, from ({x:.1f}, {y:.1f}) m"))
+        way = f"from ({x:.1f}, {y:.1f}) m"
+        goal = object_destination_m(scenario, map, name)
+        way += f" to ({goal[0]:.1f}, {goal[1]:.1f}) m" if goal else ""
+        rows.append((name, "", f"a {kind} of up to {speed:.2f} m/s, {way}"))
     return rows

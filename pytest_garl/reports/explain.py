@@ -206,14 +206,11 @@ def repeat_line(item: pytest.Item, run: Run, target: Target) -> str:
 
 
 def _unusual(run: Run, target: Target) -> list[str]:
-    from pytest_garl.scenarios.genes import EXTRAS, genome_for
+    from pytest_garl.regressions.shrink import genome_of
     from pytest_garl.scenarios.maps import load_map
 
     scenario = run.scenario(target)
     map = load_map(target.map, run.options.map_folders)
-    nominal = {
-        item.key: item.nominal
-        for item in genome_for(map, weather="full", extras=EXTRAS.values()).properties
-    }
+    nominal = {item.key: item.nominal for item in genome_of(scenario, map).properties}
     words = [f"{key}={value:.3g}" for key, value in scenario.genes if value != nominal.get(key)]
     return [f"Scenario (seed {scenario.seed}): {', '.join(words)}"]

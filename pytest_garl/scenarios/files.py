@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from pytest_garl.errors import ScenarioError
-from pytest_garl.scenarios.genes import EXTRAS, genome_for
+from pytest_garl.scenarios.genes import genome_like
 from pytest_garl.scenarios.maps import Map
 from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.scenarios.toml_reader import Table, parse
@@ -62,8 +62,12 @@ def read_genes(top: Table, map: Map) -> Scenario:
     except ScenarioError as error:
         raise top.error("absent", str(error)) from error
     sections = top.table("genes")
-    extras = tuple(gene for name, gene in EXTRAS.items() if name in sections.values)
-    genome = genome_for(map, weather="full", extras=extras)
+    named = (
+        f"{head}.{name}"
+        for head, section in sections.values.items()
+        for name in (section if isinstance(section, dict) else ())
+    )
+    genome = genome_like(named, map)
     heads = {key.partition(".")[0] for key in genome.keys}
     sections.only(heads)
     tables = {head: sections.table(head) for head in heads}

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Literal
@@ -153,6 +154,10 @@ WEATHER = (
 )
 """The paper's eight weather genes; ``simulation/weather.py`` gives them their meaning."""
 
+SUN = "environment.sun_position"
+ENVIRONMENT = (*(f"environment.{name}" for name, _ in WEATHER), SUN)
+"""Keys of the environment's properties; none is below 0 or above 1."""
+
 WIND = CompositeGene(
     name="wind", genes=(_place("wind", "wind", "wind as a share of 10 m/s, towards"),)
 )
@@ -161,7 +166,7 @@ GPS_ERROR = CompositeGene(
     genes=(_place("gps_error", "gps_error", "error of the told coordinate, share of 2.5 m"),),
 )
 EXTRAS = {"wind": WIND, "gps_error": GPS_ERROR}
-"""Genes that exist but are off by default."""
+"""Genes that exist but are off by default; so are destinations (``with_destinations``)."""
 
 
 def genome_for(
@@ -192,17 +197,55 @@ def genome_for(
     return Genome(composites=(environment, marker, objects, *extras))
 
 
-def _object_gene(name: str) -> NuclearGene:
-    start = tuple(
+def with_destinations(genome: Genome) -> Genome:
+    """Return the genome with a place (x, y) for each dynamic object where it is bound for.
+
+    The place belongs to the object's nuclear gene: where it starts and where it goes are
+    inherited together.
+    """
+    composites = (
+        dataclasses.replace(each, genes=tuple(_bound(gene) for gene in each.genes))
+        if each.name == "objects"
+        else each
+        for each in genome.composites
+    )
+    return Genome(composites=tuple(composites))
+
+
+def genome_like(keys: Iterable[str], map: Map) -> Genome:
+    """Return the genome, weather in its full range, of scenarios that have these genes.
+
+    Whatever is not there by default is part of it if one of the keys is.
+    """
+    keys = tuple(keys)
+    heads = {key.partition(".")[0] for key in keys}
+    extras = [gene for name, gene in EXTRAS.items() if name in heads]
+    genome = genome_for(map, weather="full", extras=extras)
+    bound = any(".destination_" in key for key in keys)
+    return with_destinations(genome) if bound else genome
+
+
+def _corner(name: str, end: str) -> tuple[Property, ...]:
+    """Return where an object starts or goes to; by default both is the same corner."""
+    return tuple(
         Property(
-            key=f"{name}.start_{axis}",
+            key=f"{name}.{end}_{axis}",
             low=-1.0,
             high=1.0,
-            nominal=nominal,
-            meaning=f"start over the map's bounds, {axis}",
+            nominal=0.9,
+            meaning=f"{end} over the map's bounds, {axis}",
         )
-        for axis, nominal in (("x", 0.9), ("y", 0.9))
+        for axis in ("x", "y")
     )
+
+
+def _bound(gene: NuclearGene) -> NuclearGene:
+    return dataclasses.replace(
+        gene, properties=(*gene.properties, *_corner(gene.name, "destination"))
+    )
+
+
+def _object_gene(name: str) -> NuclearGene:
     velocity = Property(
         key=f"{name}.velocity",
         low=0.0,
@@ -210,4 +253,4 @@ def _object_gene(name: str) -> NuclearGene:
         nominal=0.0,
         meaning="speed as a share of the type's top speed",
     )
-    return NuclearGene(name=name, properties=(*start, velocity))
+    return NuclearGene(name=name, properties=(*_corner(name, "start"), velocity))

@@ -67,10 +67,20 @@ def marker_genes(position_m: tuple[float, float], map: Map) -> dict[str, float]:
 
 def object_start_m(scenario: Scenario, map: Map, name: str) -> tuple[float, float]:
     """Where an object starts: its genes stretched over the map's bounds."""
+    return _over_bounds(scenario, map, f"{name}.start")
+
+
+def object_destination_m(scenario: Scenario, map: Map, name: str) -> tuple[float, float] | None:
+    """Where an object is bound for, or None where the genome has no destinations."""
+    bound = any(key == f"{name}.destination_x" for key, _ in scenario.genes)
+    return _over_bounds(scenario, map, f"{name}.destination") if bound else None
+
+
+def _over_bounds(scenario: Scenario, map: Map, place: str) -> tuple[float, float]:
     x_min, x_max, y_min, y_max = map.bounds_m
     return (
-        x_min + (scenario[f"{name}.start_x"] + 1) / 2 * (x_max - x_min),
-        y_min + (scenario[f"{name}.start_y"] + 1) / 2 * (y_max - y_min),
+        x_min + (scenario[f"{place}_x"] + 1) / 2 * (x_max - x_min),
+        y_min + (scenario[f"{place}_y"] + 1) / 2 * (y_max - y_min),
     )
 
 

@@ -13,7 +13,11 @@ METHODS: Mapping[str, str] = MappingProxyType(
     {
         "garl": "pytest_garl.search.garl:Garl",
         "garl-paper": "pytest_garl.search.garl_paper:method",
+        "ga": "pytest_garl.search.ga:method",
+        "offline-rl": "pytest_garl.search.offline_rl:method",
+        "online-rl": "pytest_garl.search.online_rl:method",
         "random": "pytest_garl.search.random_search:RandomSearch",
+        "surrogate-random": "pytest_garl.search.surrogate_random:method",
     }
 )
 """Where each method is made, so that only the one in use is imported."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -15,7 +16,7 @@ from pytest_garl.landing_system import Camera
 from pytest_garl.scenarios.maps import Map
 from pytest_garl.scenarios.placement import MARKER_SIDE_M, TARGET_MARKER_ID, marker_position_m
 from pytest_garl.scenarios.scenario import Scenario
-from pytest_garl.simulation.ground import Ground, Raster, covered, paint_ground
+from pytest_garl.simulation.ground import Ground, Raster, covered, paint_ground, repaint
 from pytest_garl.simulation.particles import Particles
 from pytest_garl.simulation.sensor import Sensor
 from pytest_garl.simulation.solids import Place, Solids
@@ -67,25 +68,45 @@ class Renderer:
         self.camera = camera
         self.conditions = conditions_of(scenario)
         self.marker_m = marker_position_m(scenario, map)
+        self._map, self._marker_id = map, marker_id
         names = ["ground", "marker", *(body.name for body in map.bodies)]
         names += [name for name, _ in map.object_names]
         self.segment_ids: Mapping[str, int] = {name: index for index, name in enumerate(names)}
         self._ground = (
             paint_ground(scenario, map, self.conditions, rng, marker_id) if colour else None
         )
-        self._solids = Solids(map, self.conditions, self.segment_ids)
-        self._sensor = Sensor(camera, self.conditions, rng)
-        self._particles = Particles(camera, self.conditions, rng)
         width, height = camera.width_px, camera.height_px
         (cx, cy), focal = camera.centre_px, camera.focal_px
         self._columns = np.arange(width, dtype=np.float32)
         self._rows = np.arange(height, dtype=np.float32)[:, None]
         across, down = (self._columns - cx) / focal, (self._rows - cy) / focal
-        stretch = np.sqrt(1 + across**2 + down**2)
-        self._decay = (-self.conditions.extinction_per_m * stretch).astype(np.float32)
+        self._stretch = np.sqrt(1 + across**2 + down**2)
         right, bottom = width - 1.0, height - 1.0
         self._corners = np.array([[0, 0, 1], [right, 0, 1], [right, bottom, 1], [0, bottom, 1]]).T
-        airlight = np.array(self.conditions.airlight)
+        self._before_draws = copy.deepcopy(rng)
+        self._prepare(rng)
+
+    def change(self, scenario: Scenario) -> None:
+        """Show the environment of ``scenario`` from the next frame on.
+
+        Its other genes must be those of the renderer's own; frames are then what they would be
+        had the renderer been made with it.
+        """
+        before, self.conditions = self.conditions, conditions_of(scenario)
+        if self._ground is not None:
+            self._ground = repaint(
+                self._ground, self.marker_m, self._map, before, self.conditions, self._marker_id
+            )
+        self._prepare(copy.deepcopy(self._before_draws))
+
+    def _prepare(self, rng: np.random.Generator) -> None:
+        """Make all that draws frames under the present conditions, but the ground."""
+        conditions = self.conditions
+        self._solids = Solids(self._map, conditions, self.segment_ids)
+        self._sensor = Sensor(self.camera, conditions, rng)
+        self._particles = Particles(self.camera, conditions, rng)
+        self._decay = (-conditions.extinction_per_m * self._stretch).astype(np.float32)
+        airlight = np.array(conditions.airlight)
         self._air = airlight.astype(np.uint8)
         veil = (1 - np.arange(256) / 255)[:, None] * airlight
         self._veil = np.round(veil).astype(np.uint8).reshape(1, 256, 3)

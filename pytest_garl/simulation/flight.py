@@ -35,12 +35,17 @@ class Track:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class ObjectRecord:
-    """What one dynamic object did: its track and its moves, one (x, y) per 0.5 s, (k, 2)."""
+    """What one dynamic object did: its track and its moves, one (x, y) per 0.5 s, (k, 2).
+
+    ``changes`` are those of the environment that its policy asked for: the number of the
+    decision, the gene, what was added to it.
+    """
 
     name: str
     type: str
     track: Track
     moves: NDArray[np.float64]
+    changes: tuple[tuple[int, str, float], ...] = ()
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

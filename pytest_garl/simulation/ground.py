@@ -75,12 +75,14 @@ class Raster:
 class Ground:
     """The whole ground coarsely, and a piece about the marker finely.
 
-    ``cover_shift_m`` (2,) says where the pattern of fallen leaves and snow begins.
+    ``cover_shift_m`` (2,) says where the pattern of fallen leaves and snow begins; ``unlit``
+    are both pieces without the shadows of static bodies.
     """
 
     wide: Raster
     inset: Raster
     cover_shift_m: NDArray[np.float64]
+    unlit: tuple[_Canvas, _Canvas]
 
 
 def paint_ground(
@@ -91,14 +93,54 @@ def paint_ground(
     marker_id: int = TARGET_MARKER_ID,
 ) -> Ground:
     """Paint the ground of one flight in full light; exposure comes later."""
-    marker = marker_position_m(scenario, map)
     shift = rng.uniform(0, _TILE_M, 2)
+    marker = marker_position_m(scenario, map)
+    return _lit(_painted(marker, map, conditions, shift, marker_id), map, conditions, shift)
+
+
+def repaint(
+    ground: Ground,
+    marker_m: tuple[float, float],
+    map: Map,
+    before: Conditions,
+    conditions: Conditions,
+    marker_id: int,
+) -> Ground:
+    """Return the ground under other conditions than ``before``, as if painted under them.
+
+    What lies on it costs five times as much as its shadows, so that it is painted anew only
+    where it has changed.
+    """
+    if _light_of(conditions) == _light_of(before) and _cover_of(conditions) == _cover_of(before):
+        return ground
+    unlit, shift = ground.unlit, ground.cover_shift_m
+    if _cover_of(conditions) != _cover_of(before):
+        unlit = _painted(marker_m, map, conditions, shift, marker_id)
+    return _lit(unlit, map, conditions, shift)
+
+
+def _cover_of(conditions: Conditions) -> tuple[float, ...]:
+    return conditions.wetness, conditions.leaf_cover, conditions.snow_cover
+
+
+def _light_of(conditions: Conditions) -> tuple[float, ...]:
+    return *conditions.sun, conditions.direct_share
+
+
+def _painted(
+    marker: tuple[float, float],
+    map: Map,
+    conditions: Conditions,
+    shift: NDArray[np.float64],
+    marker_id: int,
+) -> tuple[_Canvas, _Canvas]:
+    """Paint both pieces, with the marker and what lies about."""
     x_min, x_max, y_min, y_max = map.bounds_m
     wide_box = (x_min - _MARGIN_M, x_max + _MARGIN_M, y_min - _MARGIN_M, y_max + _MARGIN_M)
     half = _INSET_HALF_M
     inset_box = (marker[0] - half, marker[0] + half, marker[1] - half, marker[1] + half)
     painted = _base(map)
-    rasters = []
+    canvases = []
     for box, resolution in ((wide_box, _WIDE_M), (inset_box, _INSET_M)):
         if resolution == _WIDE_M:
             image = painted.copy()
@@ -108,9 +150,20 @@ def paint_ground(
         canvas.marker(marker, MARKER_SIDE_M, 0.0, marker_id)
         _wet(image, conditions.wetness)
         _cover(image, box, resolution, shift, conditions)
-        _light(image, canvas, map, conditions)
-        rasters.append(_raster(image, box, resolution))
-    return Ground(wide=rasters[0], inset=rasters[1], cover_shift_m=shift)
+        canvases.append(canvas)
+    return canvases[0], canvases[1]
+
+
+def _lit(
+    unlit: tuple[_Canvas, _Canvas],
+    map: Map,
+    conditions: Conditions,
+    shift: NDArray[np.float64],
+) -> Ground:
+    wide, inset = (
+        _raster(_light(canvas, map, conditions), canvas.box, canvas.resolution) for canvas in unlit
+    )
+    return Ground(wide=wide, inset=inset, cover_shift_m=shift, unlit=unlit)
 
 
 def _raster(image: Image, box: tuple[float, float, float, float], resolution: float) -> Raster:
@@ -408,10 +461,11 @@ def covered(
     return under
 
 
-def _light(image: Image, canvas: _Canvas, map: Map, conditions: Conditions) -> None:
-    """Darken what the static bodies keep the sun from."""
+def _light(canvas: _Canvas, map: Map, conditions: Conditions) -> Image:
+    """Return the piece, darker where the static bodies keep the sun from it."""
     if conditions.direct_share <= 0.01 or conditions.sun[2] <= 0.02:
-        return
+        return canvas.image
+    image = canvas.image.copy()
     mask = np.zeros(image.shape[:2], np.uint8)
     shade = _Canvas(mask, canvas.box, canvas.resolution)
     for body in map.bodies:
@@ -421,6 +475,7 @@ def _light(image: Image, canvas: _Canvas, map: Map, conditions: Conditions) -> N
     if mask.any():
         dark = cv2.convertScaleAbs(image, alpha=1 - conditions.direct_share)
         cv2.copyTo(dark, mask, image)
+    return image
 
 
 def shadow_of(points: NDArray[np.float32], sun: tuple[float, float, float]) -> NDArray[np.float32]:

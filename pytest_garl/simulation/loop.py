@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import traceback
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any, Protocol, TypeVar
 
@@ -26,11 +26,12 @@ from pytest_garl.scenarios.placement import marker_position_m, wind_mps
 from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.simulation.camera import Frame, Renderer
 from pytest_garl.simulation.commands import problem_with_command, problem_with_thrusts
+from pytest_garl.simulation.environment import changed
 from pytest_garl.simulation.flight import Crash, Flight, Outcome
 from pytest_garl.simulation.flight_control import FlightControl
 from pytest_garl.simulation.mission import mission_for
 from pytest_garl.simulation.objects import MovingObject
-from pytest_garl.simulation.policy import DECISION_STEP_S, ObjectPolicy, Situation
+from pytest_garl.simulation.policy import DECISION_STEP_S, Change, ObjectPolicy, Situation
 from pytest_garl.simulation.randomness import generator
 from pytest_garl.simulation.recorder import Recorder
 from pytest_garl.simulation.truth import Truth, TruthObject
@@ -260,13 +261,20 @@ class Loop:
 
     def _move_objects(self, tick: int) -> None:
         if tick % round(DECISION_STEP_S * PHYSICS_RATE_HZ) == 0:
-            for item in self.objects:
-                item.decide(self.situation(item))
+            moves = [item.decide(self.situation(item)) for item in self.objects]
+            self._change([change for move in moves for change in move.changes])
         for item in self.objects:
             item.advance(OBJECTS_EVERY / PHYSICS_RATE_HZ, self.objects)
             self.world.move(
                 item.name, item.position_m, item.yaw_rad, (item.vx_mps, item.vy_mps, 0.0)
             )
+
+    def _change(self, changes: Sequence[Change]) -> None:
+        scenario = changed(self.scenario, changes)
+        if scenario != self.scenario:
+            self.scenario = scenario
+            if self.renderer:
+                self.renderer.change(scenario)
 
     def situation(self, item: MovingObject) -> Situation:
         """Return what the policy of an object may see at this moment."""
@@ -279,6 +287,7 @@ class Loop:
             uav_velocity_mps=velocity,
             marker_position_m=self.marker,
             map=self.map,
+            scenario=self.scenario,
         )
 
     def eye(self) -> tuple[Vector, Quaternion]:

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+import functools
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -32,7 +32,8 @@ class Mesh:
     """Each part's vertices, for its shadow."""
 
 
-def mesh_of(parts: Sequence[Part], *, coarse_below_m: float = 0.0) -> Mesh:
+@functools.cache
+def mesh_of(parts: tuple[Part, ...], *, coarse_below_m: float = 0.0) -> Mesh:
     """Return the triangles of convex parts, wound outwards, in the body's frame.
 
     Round parts with a radius of at most ``coarse_below_m`` get fewer triangles.

@@ -40,6 +40,7 @@ class MovingObject:
         self.vx_mps = self.vy_mps = 0.0
         self.yaw_rad = 0.0
         self.moves: list[tuple[float, float]] = []
+        self.changes: list[tuple[int, str, float]] = []
         self._wanted = (0.0, 0.0)
         self._bounds = map.bounds_m
         self.low_m, self.high_m = self.type.bottom_m, self.type.top_m
@@ -73,12 +74,15 @@ class MovingObject:
             speed_mps=self.speed_mps,
         )
 
-    def decide(self, situation: Situation) -> None:
+    def decide(self, situation: Situation) -> Move:
         """Ask the policy where to go; raise PolicyError if it fails or answers nonsense."""
-        self.take(decision(self.policy, situation))
+        move = decision(self.policy, situation)
+        self.take(move)
+        return move
 
     def take(self, move: Move) -> None:
         """Go where ``move`` says until the next decision."""
+        self.changes += [(len(self.moves), key, float(by)) for key, by in move.changes]
         self.moves.append((move.x, move.y))
         self._wanted = (move.x * self.speed_mps, move.y * self.speed_mps)
         # What it can reach before the next decision; few, and mostly none.

@@ -8,12 +8,14 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Protocol
 
 from pytest_garl.errors import PolicyError
+from pytest_garl.scenarios.genes import ENVIRONMENT
 
 if TYPE_CHECKING:
     import numpy as np
 
     from pytest_garl.scenarios.maps import Map
     from pytest_garl.scenarios.object_types import ObjectType
+    from pytest_garl.scenarios.scenario import Scenario
 
 DECISION_STEP_S = 0.5
 """Time between two decisions of a policy (paper, section 3.4: "0.5 seconds")."""
@@ -36,7 +38,10 @@ class ObjectState:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Situation:
-    """What a policy may see when it decides for one object: everything, exactly."""
+    """What a policy may see when it decides for one object: everything, exactly.
+
+    ``scenario`` is what is flown, with all its genes, the environment as it is at the moment.
+    """
 
     time_s: float
     self: ObjectState
@@ -45,6 +50,11 @@ class Situation:
     uav_velocity_mps: tuple[float, float, float]
     marker_position_m: tuple[float, float]
     map: Map
+    scenario: Scenario
+
+
+Change = tuple[str, float]
+"""A gene of the environment, and what is added to it: ``("environment.fog", 0.01)``."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -52,11 +62,13 @@ class Move:
     """The wanted velocity until the next decision, as a share (x, y) of the object's speed.
 
     Its length is at most 1; the paper's five actions are (0, 1), (0, -1), (-1, 0), (1, 0)
-    and (0, 0).
+    and (0, 0).  A policy may change the environment as well: ``changes`` take effect at once,
+    each clipped to the gene's range, and are part of the flight's record.
     """
 
     x: float
     y: float
+    changes: tuple[Change, ...] = ()
 
 
 STAY = Move(x=0.0, y=0.0)
@@ -84,14 +96,25 @@ def decision(policy: ObjectPolicy, situation: Situation) -> Move:
         raise PolicyError(f"{name}: raised {type(error).__name__}: {error}") from error
     try:
         length = math.hypot(move.x, move.y)
+        wrong = [each for each in move.changes if not _is_change(each)]
     except (AttributeError, TypeError):
-        length = math.nan
+        length, wrong = math.nan, []
     if not length <= 1 + 1e-9:
         raise PolicyError(
             f"{name}: found {move!r}; expected Move(x=…, y=…), a share of the object's speed "
             "no longer than 1"
         )
+    if wrong:
+        raise PolicyError(
+            f"{name}: found the change {wrong[0]!r}; expected (gene, number) with one of "
+            f"{', '.join(ENVIRONMENT)}"
+        )
     return move
+
+
+def _is_change(each: object) -> bool:
+    pair = isinstance(each, tuple) and len(each) == 2 and each[0] in ENVIRONMENT
+    return pair and isinstance(each[1], int | float) and math.isfinite(each[1])  # type: ignore[index]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -46,7 +46,7 @@ def _instructions(features: str) -> str:
 
 
 def hash_of(flight: Flight) -> str:
-    """Return the SHA-256 of outcome, tracks, moves and contacts."""
+    """Return the SHA-256 of outcome, tracks, moves, changes of the environment and contacts."""
     digest = hashlib.sha256()
     head = (flight.outcome, flight.final_distance_m, flight.elapsed_s, flight.marker_position_m)
     digest.update(repr(head).encode())
@@ -55,6 +55,8 @@ def hash_of(flight: Flight) -> str:
             digest.update(np.ascontiguousarray(getattr(track, name)).tobytes())
     for item in flight.objects:
         digest.update(np.ascontiguousarray(item.moves).tobytes())
+        if item.changes:
+            digest.update(repr(item.changes).encode())
     for contact in flight.contacts:
         digest.update(repr(dataclasses.astuple(contact)).encode())
     return digest.hexdigest()
@@ -79,7 +81,7 @@ def save(flight: Flight, path: Path) -> None:
             arrays[f"{index}.{name}"] = getattr(track, name)
     for index, item in enumerate(flight.objects, start=1):
         arrays[f"{index}.moves"] = item.moves
-    header = {
+    header: dict[str, Any] = {
         "outcome": flight.outcome,
         "final_distance_m": flight.final_distance_m,
         "elapsed_s": flight.elapsed_s,
@@ -96,6 +98,8 @@ def save(flight: Flight, path: Path) -> None:
         "versions": flight.versions,
         "wall_s": flight.wall_s,
     }
+    if any(item.changes for item in flight.objects):
+        header["changes"] = [item.changes for item in flight.objects]
     text = json.dumps(header, allow_nan=False)
     arrays["header"] = np.frombuffer(text.encode(), dtype=np.uint8)
     buffer = io.BytesIO()
@@ -115,6 +119,8 @@ def load(path: Path) -> Flight:
     except (OSError, KeyError, ValueError, zipfile.BadZipFile) as error:
         raise GarlError(f"{path}: not a saved flight: {error}") from error
 
+    changes = header.get("changes") or [()] * len(header["objects"])
+
     def track(index: int) -> Track:
         return Track(**{name: arrays[f"{index}.{name}"] for name in _TRACK})
 
@@ -125,7 +131,13 @@ def load(path: Path) -> Flight:
         marker_position_m=_pair(header["marker_position_m"]),
         uav=track(0),
         objects=tuple(
-            ObjectRecord(name=name, type=kind, track=track(i), moves=arrays[f"{i}.moves"])
+            ObjectRecord(
+                name=name,
+                type=kind,
+                track=track(i),
+                moves=arrays[f"{i}.moves"],
+                changes=_tuple(changes[i - 1]),
+            )
             for i, (name, kind) in enumerate(header["objects"], start=1)
         ),
         contacts=tuple(Contact(**_tuples(item)) for item in header["contacts"]),

@@ -148,6 +148,7 @@ class Recorder:
                     type=item.type.name,
                     track=_track(times, samples),
                     moves=np.array(item.moves, dtype=np.float64).reshape(-1, 2),
+                    changes=tuple(item.changes),
                 )
                 for item, samples in zip(self._objects, self._tracks, strict=True)
             ),

@@ -216,7 +216,6 @@ def _sun_shines(conditions: Conditions) -> bool:
     return conditions.direct_share > 0.01 and conditions.sun[2] > 0.02
 
 
-@functools.cache
 def _levels(parts: tuple[Part, ...]) -> tuple[Mesh, ...]:
     return tuple(mesh_of(parts, coarse_below_m=radius) for radius in _COARSE_M)
 

@@ -1,10 +1,15 @@
 from __future__ import annotations
 
+from pytest_garl.scenarios.chromosome import decode
+from pytest_garl.scenarios.genes import genome_for
 from pytest_garl.scenarios.maps import load_map
 from pytest_garl.scenarios.object_types import OBJECT_TYPES
+from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.simulation.policy import ObjectState, Situation
 
 MAP = load_map("court")
+GENOME = genome_for(MAP)
+SCENARIO = decode(GENOME.nominal, GENOME, map="court", seed=0)
 
 
 def being(
@@ -25,6 +30,7 @@ def situation(
     uav: tuple[float, float, float] = (0.0, 0.0, 10.0),
     marker: tuple[float, float] = (0.0, 0.0),
     others: tuple[ObjectState, ...] = (),
+    scenario: Scenario = SCENARIO,
 ) -> Situation:
     return Situation(
         time_s=0.0,
@@ -34,4 +40,5 @@ def situation(
         uav_velocity_mps=(0.0, 0.0, -1.5),
         marker_position_m=marker,
         map=MAP,
+        scenario=scenario,
     )

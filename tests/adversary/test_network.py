@@ -114,7 +114,7 @@ def test_weights_that_cannot_be_trusted_are_refused(
 
 def test_a_network_with_other_actions_is_refused(tmp_path: Path) -> None:
     save(tmp_path / "w.npz", network(outputs=6), {})
-    with pytest.raises(PolicyError, match="knows 6 actions; expected the 5"):
+    with pytest.raises(PolicyError, match="knows 6 actions; expected 5 with the state 'paper'"):
         learned_spec(str(tmp_path / "w.npz"))
 
 
@@ -124,6 +124,13 @@ def test_weights_that_are_not_finite_are_refused(tmp_path: Path) -> None:
     save(tmp_path / "w.npz", net, {})
     with pytest.raises(PolicyError, match="not finite"):
         learned_spec(str(tmp_path / "w.npz"))
+
+
+def test_the_online_rivals_weights_say_that_they_control_the_environment() -> None:
+    manifest = read_manifest(WEIGHTS / "online-rl.npz")
+    assert (manifest["state"], manifest["surrogate"]["environment"]) == ("online", "drawn")
+    assert manifest["training"]["episodes"] == 800
+    assert manifest["surrogate"]["reward"] == "paper"
 
 
 @pytest.mark.parametrize("name", ["dqn", "dqn-paper"])

@@ -6,7 +6,7 @@ import math
 import numpy as np
 import pytest
 
-from pytest_garl.adversary.policies import POLICIES, check_policy, policy_spec
+from pytest_garl.adversary.policies import LEARNED, POLICIES, check_policy, policy_spec
 from pytest_garl.errors import PolicyError
 from pytest_garl.simulation.policy import DECISION_STEP_S, Move, PolicySpec, Situation
 from tests.adversary.situations import MAP, being, situation
@@ -39,7 +39,7 @@ def test_stand_walks_to_the_marker_and_stays() -> None:
     assert math.dist(path[-1], (3, 1)) < 1e-6
 
 
-@pytest.mark.parametrize("name", [*POLICIES, "dqn", "dqn-paper"])
+@pytest.mark.parametrize("name", [*POLICIES, *LEARNED])
 def test_every_shipped_policy_passes_the_check(name: str) -> None:
     check_policy(policy_spec(name), MAP)
 
@@ -61,6 +61,9 @@ class Wild:
             "nan": Move(x=math.nan, y=0.0),
             "words": Move(x="up", y=0.0),  # type: ignore[arg-type]
             "number": 7,
+            "wind": Move(x=0.0, y=0.0, changes=(("wind.x", 0.1),)),
+            "fog": Move(x=0.0, y=0.0, changes=(("environment.fog", math.nan),)),
+            "bare": Move(x=0.0, y=0.0, changes=("environment.fog", 0.1)),  # type: ignore[arg-type]
         }
         return answers[self._answer]  # type: ignore[return-value]
 
@@ -68,11 +71,14 @@ class Wild:
 @pytest.mark.parametrize(
     ("answer", "words"),
     [
-        ("far", r"deciding for person-1: found Move\(x=1.0, y=1.0\); expected"),
+        ("far", r"deciding for person-1: found Move\(x=1.0, y=1.0, changes=\(\)\); expected"),
         ("nan", "found Move"),
         ("number", "found 7; expected Move"),
         ("words", "found Move"),
         ("missing", "raised KeyError"),
+        ("wind", r"found the change \('wind.x', 0.1\); expected \(gene, number\) with one of env"),
+        ("fog", r"found the change \('environment.fog', nan\)"),
+        ("bare", "found the change 'environment.fog'"),
     ],
 )
 def test_a_policy_that_answers_nonsense_is_refused_before_any_flight(

@@ -24,6 +24,7 @@ from pytest_garl.adversary.episode import Episode, draw_episode
 from pytest_garl.adversary.network import learned_spec
 from pytest_garl.adversary.pilots import StraightPilot
 from pytest_garl.adversary.surrogate import Surrogate, SurrogateEnv
+from pytest_garl.adversary.training import PRESETS
 from pytest_garl.adversary.validation import validate
 from pytest_garl.cli import main
 from pytest_garl.errors import GarlError
@@ -33,6 +34,7 @@ from pytest_garl.simulation.policy import STAY
 COURT = (load_map("court"),)
 OURS = Surrogate(maps=COURT)
 PAPERS = Surrogate(maps=COURT, uav="straight", state="paper", reward="paper")
+ONLINE = dataclasses.replace(PRESETS["online-rl"][0], maps=COURT)
 
 
 def fly(env: SurrogateEnv, seed: int, action: int | None = None) -> list[Any]:
@@ -50,7 +52,7 @@ def fly(env: SurrogateEnv, seed: int, action: int | None = None) -> list[Any]:
 
 
 @pytest.mark.sim
-@pytest.mark.parametrize("surrogate", [OURS, PAPERS], ids=["ours", "paper"])
+@pytest.mark.parametrize("surrogate", [OURS, PAPERS, ONLINE], ids=["ours", "paper", "online"])
 def test_gymnasium_finds_nothing_wrong(surrogate: Surrogate) -> None:
     check_env(SurrogateEnv(surrogate), skip_render_check=True)
 
@@ -61,6 +63,22 @@ def test_a_seed_repeats_its_episode_and_others_differ() -> None:
     first, again, other = fly(env, 1), fly(env, 1), fly(env, 2)
     env.close()
     assert first == again != other
+
+
+@pytest.mark.sim
+def test_the_online_rival_changes_the_environment_that_it_sees() -> None:
+    env = SurrogateEnv(ONLINE)
+    starts = np.array([env.reset(seed=seed)[0] for seed in range(6)])
+    # Weather, light and the marker's place are drawn anew for each episode.
+    assert (starts[:, 4:].std(axis=0) > 0.05).all()
+    state, fog_up, east = starts[-1], np.int64(7), np.int64(3)
+    foggier = env.step(fog_up)[0]
+    assert foggier[5] == pytest.approx(min(1.0, state[5] + 0.01 / 0.15), abs=1e-6)
+    assert np.delete(foggier, [2, 3, 5]) == pytest.approx(np.delete(state, [2, 3, 5]), abs=1e-6)
+    moved = env.step(east)[0]
+    assert moved[4:] == pytest.approx(foggier[4:])
+    assert moved[0] > foggier[0]
+    env.close()
 
 
 @pytest.mark.sim
@@ -175,13 +193,10 @@ def test_validation_is_the_same_for_any_number_of_processes() -> None:
 
 
 def test_another_kind_of_episode_is_another_training() -> None:
-    class Other(SurrogateEnv):
-        pass
-
     first = identity(OURS, Training())
-    assert first == identity(OURS, Training(), SurrogateEnv)
+    assert first == identity(dataclasses.replace(OURS), Training())
     others = (
-        identity(OURS, Training(), Other),
+        identity(dataclasses.replace(OURS, environment="drawn"), Training()),
         identity(OURS, Training(seed=1)),
         identity(PAPERS, Training()),
     )

@@ -86,6 +86,19 @@ def test_the_same_search_saves_the_same_bytes(
     assert result_hash(searched) == known
 
 
+def test_cases_of_a_search_with_destinations_keep_them_and_are_flown(
+    pytester: pytest.Pytester,
+) -> None:
+    project(pytester)
+    run(pytester, *SEARCH, "--garl-method=ga")
+    found = [load(path) for path in cases(pytester)]
+    assert {case.policy for case in found} == {"destination"}
+    (dog,) = [case for case in found if case.violation.signature.startswith("IV:dog")]
+    assert -1 <= dog.scenario["dog-1.destination_x"] <= 1
+    assert not any(key.startswith("person-1") for key, _ in dog.scenario.genes)
+    run(pytester, *CASES).assert_outcomes(passed=2, skipped=2, xfailed=2)
+
+
 def test_what_the_budget_does_not_reach_is_told(pytester: pytest.Pytester) -> None:
     project(pytester)
     result = run(pytester, *SEARCH, "--garl-shrink=6")

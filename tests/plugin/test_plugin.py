@@ -7,8 +7,11 @@ from pathlib import Path
 
 import pytest
 
+from pytest_garl.search.job import loads
 from pytest_garl.search.ledger import Ledger
+from pytest_garl.search.methods import METHODS
 from pytest_garl.search.slots import population, slots
+from pytest_garl.switches import METHODS as OFFERED
 
 SYSTEMS = """
 import os, time, math
@@ -75,6 +78,10 @@ def result_hash(pytester: pytest.Pytester) -> str:
         ledger.close()
 
 
+def test_every_shipped_method_is_offered() -> None:
+    assert sorted(OFFERED) == sorted(METHODS)
+
+
 @pytest.mark.parametrize("budget", [1, 7, 8, 9, 40, 79, 80, 160, 200, 400, 401])
 def test_slots_are_exactly_the_budget(budget: int) -> None:
     names = slots(budget, population(budget))
@@ -109,6 +116,17 @@ def test_the_same_seed_gives_the_same_results_for_any_workers(pytester: pytest.P
     assert len(hashes) == 1
     run(pytester, "--garl-budget=16", "--garl-workers=0", "--garl-seed=1")
     assert result_hash(pytester) not in hashes
+
+
+def test_a_network_that_learns_in_pytest_finds_the_same_for_any_workers(
+    pytester: pytest.Pytester,
+) -> None:
+    project(pytester)
+    hashes = set()
+    for args in (("--garl-workers=0",), ("--garl-workers=2", "-n2")):
+        run(pytester, "--garl-budget=80", "--garl-method=offline-rl", "-k", "test_time", *args)
+        hashes.add(result_hash(pytester))
+    assert len(hashes) == 1
 
 
 def test_duplicates_can_be_shown_as_failures(pytester: pytest.Pytester) -> None:
@@ -185,6 +203,30 @@ def test_a_slot_is_repeated_from_the_ledger(pytester: pytest.Pytester) -> None:
     assert result_hash(pytester) == before
 
 
+@pytest.mark.parametrize(("args", "policy"), [((), "stand"), (("--garl-npcs=greedy",), "greedy")])
+def test_a_slot_is_repeated_with_the_objects_of_its_search_unless_one_says(
+    pytester: pytest.Pytester, args: tuple[str, ...], policy: str
+) -> None:
+    project(pytester)
+    run(pytester, "--garl-budget=1", "--garl-workers=0", "--garl-npcs=stand")
+    run(pytester, "--garl-workers=0", "--garl-repeat=lawn-g00-s00", *args)
+    ledger = Ledger(pytester.path / ".garl" / "repeat.sqlite")
+    [(_, job)] = ledger.searches()
+    ledger.close()
+    assert loads(job).npcs.name == policy
+
+
+def test_a_slot_of_a_ledger_that_cannot_be_read_is_one_clear_error(
+    pytester: pytest.Pytester,
+) -> None:
+    project(pytester)
+    (pytester.path / ".garl").mkdir()
+    (pytester.path / ".garl" / "ledger.sqlite").write_text("no ledger")
+    result = run(pytester, "--garl-repeat=lawn-g00-s00")
+    assert result.ret == pytest.ExitCode.USAGE_ERROR
+    result.stderr.fnmatch_lines(["*--garl-repeat=lawn-g00-s00: *ledger.sqlite*"])
+
+
 def test_stops_at_the_first_failure_with_x(pytester: pytest.Pytester) -> None:
     project(pytester)
     result = run(pytester, "--garl-budget=24", "--garl-workers=1", "-x")
@@ -250,6 +292,10 @@ def test_nonsense_on_the_command_line_is_one_clear_error(
         ((), "*method garl, seed 0, objects dqn,*"),
         (("--garl-method=garl-paper",), "*objects dqn-paper,*"),
         (("--garl-method=random",), "*objects waypoint,*"),
+        (("--garl-method=surrogate-random",), "*objects dqn-paper,*"),
+        (("--garl-method=ga",), "*objects destination,*"),
+        (("--garl-method=offline-rl",), "*objects destination,*"),
+        (("--garl-method=online-rl",), "*objects online-rl,*"),
         (("--garl-method=random", "--garl-npcs=stand"), "*objects stand,*"),
     ],
 )

@@ -26,7 +26,7 @@ from pytest_garl.regressions.survey import (
     moved_on,
     unlike,
 )
-from pytest_garl.scenarios.genes import WIND, genome_for
+from pytest_garl.scenarios.genes import WIND, genome_for, with_destinations
 from pytest_garl.scenarios.maps import load_map
 from pytest_garl.search.job import Job, dump_scenario
 from pytest_garl.search.ledger import Ledger
@@ -107,6 +107,13 @@ def test_extra_genes_are_kept() -> None:
     samples = tuple(Sample(scenario=each, answer=LANDED) for each in scenarios)
     windy = baseline(dataclasses.replace(sample_set(), samples=samples))
     assert loads(dumps(windy), load_map) == windy
+
+
+def test_destinations_are_kept() -> None:
+    scenarios = propose(LAWN, with_destinations(genome_for(LAWN)), 0, 0, 2)
+    samples = tuple(Sample(scenario=each, answer=LANDED) for each in scenarios)
+    bound = baseline(dataclasses.replace(sample_set(), samples=samples))
+    assert loads(dumps(bound), load_map) == bound
 
 
 @pytest.mark.parametrize(

@@ -13,7 +13,7 @@ from pytest_garl.regressions.case import Case, Evidence, Violation
 from pytest_garl.regressions.corpus import entries, every_entry, patch_of, replace, save
 from pytest_garl.regressions.files import dumps, loads
 from pytest_garl.scenarios.chromosome import decode
-from pytest_garl.scenarios.genes import genome_for
+from pytest_garl.scenarios.genes import genome_for, with_destinations
 from pytest_garl.scenarios.maps import load_map
 from pytest_garl.scenarios.validity import repair
 from pytest_garl.verdicts.verdict import Limits
@@ -67,6 +67,54 @@ def test_a_case_survives_its_file_and_has_the_same_bytes_again() -> None:
 def test_no_story_breaks_the_file(story: str) -> None:
     strange = case(story=story)
     assert loads(dumps(strange), load_map) == strange
+
+
+def test_a_case_with_destinations_survives_its_file() -> None:
+    genome = with_destinations(genome_for(LAWN))
+    row = genome.random(np.random.default_rng(1))
+    scenario = repair(decode(row, genome, map="lawn", seed=9), LAWN).without(*NAMES[:-1])
+    bound = dataclasses.replace(case(), scenario=scenario, policy="destination")
+    assert loads(dumps(bound), load_map) == bound
+
+
+def changing() -> Case:
+    changes = ((0, "environment.fog", 0.01), (2, "environment.sun_position", -0.01))
+    return dataclasses.replace(case(), policy="online-rl", changes=((NAMES[-1], changes),))
+
+
+def test_what_a_policy_changed_of_the_environment_survives_the_file() -> None:
+    text = dumps(changing())
+    assert f'{NAMES[-1]} = [[0, "environment.fog", 0.01], [2, "environment.sun_position"' in text
+    assert loads(text, load_map) == changing()
+    assert dumps(loads(text, load_map)) == text
+    assert changing().id != case().id
+    assert "[changes]" not in dumps(case())
+
+
+@pytest.mark.parametrize(
+    ("old", "new"),
+    [
+        ("[0, ", "[-1, "),
+        ("[0, ", "[0.5, "),
+        ('"environment.fog"', '"wind.x"'),
+        ("0.01]", "nan]"),
+        ("0.01]", '"a little"]'),
+        ("0.01]", "0.01, 3]"),
+    ],
+)
+def test_changes_that_make_no_sense_name_source_and_key(old: str, new: str) -> None:
+    text = dumps(changing())
+    start = text.index("[changes]")
+    broken = text[:start] + text[start:].replace(old, new, 1)
+    words = rf"lawn-x.toml: key 'changes.{NAMES[-1]}': found .* expected a list of \[decision, gene"
+    with pytest.raises(ScenarioError, match=words):
+        loads(broken, load_map, source="lawn-x.toml")
+
+
+def test_an_unknown_object_changes_nothing() -> None:
+    text = dumps(changing()).replace(f'{NAMES[-1]} = [[0, "env', 'cat-1 = [[0, "env')
+    with pytest.raises(ScenarioError, match=r"'changes.cat-1': unknown key"):
+        loads(text, load_map)
 
 
 def test_moves_are_written_as_runs() -> None:

@@ -14,7 +14,7 @@ from pytest_garl.regressions.shrink import (
     shrink,
 )
 from pytest_garl.scenarios.chromosome import decode
-from pytest_garl.scenarios.genes import genome_for
+from pytest_garl.scenarios.genes import genome_for, with_destinations
 from pytest_garl.scenarios.maps import load_map
 from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.scenarios.validity import problems, repair
@@ -97,6 +97,24 @@ def test_every_scenario_on_the_way_failed_and_is_simpler_than_the_last() -> None
     sizes = [complexity(each, genome) for each in history]
     assert sizes == sorted(sizes, reverse=True)
     assert len(history) > 2
+
+
+def test_destinations_survive_shrinking_with_fewer_digits() -> None:
+    genome = with_destinations(genome_for(LAWN))
+    row = genome.random(np.random.default_rng(4))
+    first = repair(decode(row, genome, map="lawn", seed=1), LAWN)
+    first = first.replace({f"{CULPRIT}.velocity": 0.9, f"{CULPRIT}.destination_x": 0.5123})
+
+    def fails(scenario: Scenario) -> bool:
+        return fast(scenario) and abs(scenario[f"{CULPRIT}.destination_x"] - 0.5123) < 0.1
+
+    found = shrink(first, fails, LAWN, 100, culprit=CULPRIT)
+    assert found.simplest[f"{CULPRIT}.destination_x"] == 0.51
+    assert found.simplest[f"{CULPRIT}.destination_y"] == pytest.approx(
+        first[f"{CULPRIT}.destination_y"], abs=0.005
+    )
+    assert set(found.simplest.absent) == {*NAMES} - {CULPRIT}
+    assert not any(key.startswith(NAMES[-1]) for key, _ in found.simplest.genes)
 
 
 def test_a_trial_is_of_a_scenario_that_makes_sense() -> None:

@@ -27,6 +27,7 @@ from pytest_garl.scenarios.placement import marker_genes
 from pytest_garl.search.random_search import propose
 from pytest_garl.simulation.flight import Contact, Flight, Track
 from pytest_garl.simulation.fly import fly
+from tests.simulation.test_environment import WEATHERMAKER
 
 LAWN = load_map("lawn")
 SCENARIO = propose(LAWN, genome_for(LAWN), 3, 0, 1)[0].without("bird-1")
@@ -102,6 +103,17 @@ def test_the_camera_part_is_what_the_system_saw(film: Film) -> None:
         shown = film.pictures[index][CAMERA_PART].astype(int)
         assert np.abs(shown - film.seen[index]).mean() <= most
     assert np.abs(film.seen[5].astype(int) - film.seen[10]).mean() > 3.0
+
+
+def test_the_camera_part_shows_the_environment_as_it_was_changed() -> None:
+    flight = fly(SCENARIO, Hovers, WEATHERMAKER, time_limit_s=FLOWN_S)
+    assert any(item.changes for item in flight.objects)
+    pictures = list(frames(flight, SCENARIO, LAWN, Hovers.airframe.camera))
+    # From 1.5 s on what it believes is drawn over what it sees.
+    for index, most in ((5, 0.01), (10, 0.01), (15, 2.0), (20, 2.0), (25, 2.0)):
+        shown = pictures[index][CAMERA_PART].astype(int)
+        assert np.abs(shown - Hovers.seen[index]).mean() <= most
+    assert np.abs(Hovers.seen[5].astype(int) - Hovers.seen[10]).mean() > 20.0
 
 
 def test_the_marker_is_drawn_at_its_place_on_the_map(film: Film) -> None:

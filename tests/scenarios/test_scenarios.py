@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from pytest_garl.errors import ScenarioError
 from pytest_garl.scenarios.chromosome import decode, encode
 from pytest_garl.scenarios.files import dumps, loads
-from pytest_garl.scenarios.genes import EXTRAS, genome_for
+from pytest_garl.scenarios.genes import EXTRAS, genome_for, genome_like, with_destinations
 from pytest_garl.scenarios.maps import load_map, map_names
 from pytest_garl.scenarios.placement import disc_to_square, square_to_disc
 from pytest_garl.scenarios.scenario import Scenario
@@ -85,6 +85,27 @@ def test_extra_genes_survive_the_file() -> None:
     genome = genome_for(COURT, extras=EXTRAS.values())
     scenario = decode(genome.nominal, genome, map="court", seed=3).replace({"wind.x": 0.5})
     assert loads(dumps(scenario), COURT) == scenario
+
+
+def test_destinations_survive_the_file_and_are_asked_of_every_object() -> None:
+    genome = with_destinations(genome_for(COURT))
+    row = genome.random(np.random.default_rng(3))
+    scenario = repair(decode(row, genome, map="court", seed=3), COURT)
+    text = dumps(scenario)
+    assert text.count("[genes.dog-1]") == 1
+    assert loads(text, COURT) == scenario
+    alone = scenario.without("dog-1", "bird-1")
+    assert loads(dumps(alone), COURT) == alone
+    x = scenario["dog-1.destination_x"]
+    with pytest.raises(ScenarioError, match=r"genes.dog-1.destination_x'?: missing"):
+        loads(text.replace(f"destination_x = {x!r}\n", ""), COURT)
+
+
+def test_the_genome_of_scenarios_is_known_by_their_keys() -> None:
+    plain = genome_for(COURT, weather="full")
+    assert genome_like(plain.keys, COURT) == plain
+    whole = with_destinations(genome_for(COURT, weather="full", extras=EXTRAS.values()))
+    assert genome_like(whole.keys, COURT) == whole
 
 
 GOOD = dumps(decode(genome_for(COURT).nominal, genome_for(COURT), map="court", seed=1))

@@ -67,7 +67,7 @@ def test_every_scenario_is_valid_and_new(name: str) -> None:
     assert len({each.genes for each in scenarios}) == len(scenarios) == 96
 
 
-@pytest.mark.parametrize("name", ["garl", "garl-paper"])
+@pytest.mark.parametrize("name", ["garl", "garl-paper", "ga"])
 @pytest.mark.parametrize("population", [1, 2, 3, 20])
 def test_any_population_breeds_its_like(name: str, population: int) -> None:
     made = bred(make_method(name, plan(population=population)), 4)

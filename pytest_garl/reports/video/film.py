@@ -20,6 +20,7 @@ from pytest_garl.scenarios.maps import Map
 from pytest_garl.scenarios.placement import marker_position_m
 from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.simulation.camera import Renderer
+from pytest_garl.simulation.environment import environment_at
 from pytest_garl.simulation.flight import Flight
 from pytest_garl.simulation.randomness import generator
 
@@ -52,13 +53,17 @@ def frames(
     renderer = Renderer(scenario, place, camera, generator(scenario.seed, "sensor"))
     left, right = CameraPane(renderer), MapPane(flight, scenario, place, camera)
     below = Strip(flight, signature)
+    shown = scenario
     for step in flight.steps:
+        if (now := environment_at(scenario, flight, step.time_s)) != shown:
+            renderer.change(now)
+            shown = now
         moment = moment_at(flight, step.time_s)
-        shown = np.vstack([left.draw(moment, step), below.draw(moment, step)])
-        yield np.hstack([shown, right.draw(moment, step)])
+        side = np.vstack([left.draw(moment, step), below.draw(moment, step)])
+        yield np.hstack([side, right.draw(moment, step)])
     last, moment = flight.steps[-1] if flight.steps else None, moment_at(flight, flight.elapsed_s)
-    shown = np.vstack([left.draw(moment, None), below.draw(moment, last, ended=True)])
-    picture = np.hstack([shown, right.draw(moment, last, ended=True)])
+    side = np.vstack([left.draw(moment, None), below.draw(moment, last, ended=True)])
+    picture = np.hstack([side, right.draw(moment, last, ended=True)])
     for _ in range(math.ceil(CLOSING_S * rate_hz(flight, camera))):
         yield picture
 
