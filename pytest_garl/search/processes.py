@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import ctypes
 import os
 import signal
@@ -32,6 +33,15 @@ def alive(pid: int) -> bool:
         return True
     # A dead process that nobody has asked about yet.
     return fields[0] != "Z"
+
+
+def named(text: str) -> bool:
+    """Return whether a process lives whose command line has this text in it."""
+    for file in Path("/proc").glob("[0-9]*/cmdline"):
+        with contextlib.suppress(OSError):
+            if os.fsencode(text) in file.read_bytes():
+                return True
+    return False
 
 
 def end_with_parent() -> Callable[[], bool]:

@@ -25,10 +25,12 @@ from pytest_garl.search.child import keep_claims
 from pytest_garl.search.fleet import Fleet
 from pytest_garl.search.ledger import Ledger
 from pytest_garl.search.pilot import Base
-from pytest_garl.search.processes import CANNOT_GO_ON, end_with_parent, run_child
+from pytest_garl.search.processes import CANNOT_GO_ON, end_with_parent, named, run_child
 
 PATIENCE_S = 180.0
 """How long Ray may take to connect, with the upload of the project; alone it goes on for ever."""
+PARTING_S = 10.0
+"""How long the processes of a cluster started here may take to end."""
 STORE_BYTES = 128 * 2**20
 """Object store of a cluster started here: records of flights, some 100 kB each, pass through it."""
 
@@ -75,16 +77,19 @@ def own(workers: int) -> Iterator[tuple[Any, Base, int]]:
         ) as ray:
             yield ray, Base(scratch=folder), cpus
     finally:
-        _remove(Path(folder))
+        _remove(folder)
 
 
-def _remove(folder: Path) -> None:
-    """Remove a cluster's folder, in which its last processes may write until they are gone."""
-    for _ in range(50):
-        shutil.rmtree(folder, ignore_errors=True)
-        if not folder.exists():
-            return
-        time.sleep(0.1)
+def _remove(folder: str) -> None:
+    """Remove a cluster's folder when nobody writes there any more.
+
+    Its processes have it in their command lines, as has a child that was flying: that one ends when
+    it notices that its pilot is gone, and would make the folder again to put its record there.
+    """
+    until = time.monotonic() + PARTING_S
+    while named(folder) and time.monotonic() < until:
+        time.sleep(0.05)
+    shutil.rmtree(folder, ignore_errors=True)
 
 
 @contextmanager

@@ -123,6 +123,16 @@ def test_a_cluster_that_cannot_be_started_here_is_one_clear_error_and_no_litter(
     assert not list(tmp_path.iterdir())
 
 
+def test_the_folder_goes_when_the_last_process_that_writes_there_is_gone(tmp_path: Path) -> None:
+    folder = tmp_path / "garl-ray-1"
+    folder.mkdir()
+    writes = "import pathlib, sys, time; time.sleep(0.5); pathlib.Path(sys.argv[1], 'a').touch()"
+    with subprocess.Popen([sys.executable, "-c", writes, str(folder)]) as process:
+        ray_driver._remove(str(folder))
+        assert process.wait(10) == 0
+    assert not folder.exists()
+
+
 def test_a_connection_that_never_comes_ends_the_driver() -> None:
     code = (
         "import sys, time, types\n"
