@@ -126,8 +126,15 @@ def test_a_cluster_that_cannot_be_started_here_is_one_clear_error_and_no_litter(
 def test_the_folder_goes_when_the_last_process_that_writes_there_is_gone(tmp_path: Path) -> None:
     folder = tmp_path / "garl-ray-1"
     folder.mkdir()
-    writes = "import pathlib, sys, time; time.sleep(0.5); pathlib.Path(sys.argv[1], 'a').touch()"
-    with subprocess.Popen([sys.executable, "-c", writes, str(folder)]) as process:
+    writes = (
+        "import pathlib, sys, time; print(flush=True); time.sleep(0.5); "
+        "pathlib.Path(sys.argv[1], 'a').touch()"
+    )
+    command = [sys.executable, "-c", writes, str(folder)]
+    with subprocess.Popen(command, stdout=subprocess.PIPE) as process:
+        # Right after its start a process has no command line for a moment.
+        assert process.stdout is not None
+        process.stdout.readline()
         ray_driver._remove(str(folder))
         assert process.wait(10) == 0
     assert not folder.exists()
