@@ -34,14 +34,14 @@ def test_a_toy_experiment_is_flown_measured_and_reported(tmp_path: Path) -> None
         ("random", 1),
     ]
     for row in rows:
-        assert row.budget == 6
+        assert row.budget == 3
         assert row.flying_s > 0
         assert row.weather_distance < row.parameter_distance
         # Whoever violates was somewhere.
         assert (row.covered > 0) == (row.violations > 0) == bool(row.signatures)
-        assert row.piloted == min(2, row.violations)
+        assert row.piloted == min(1, row.violations)
     garl("--report")
     text = (tmp_path / "smoke.md").read_text()
-    assert "Toy: 4 of 4 searches of 6 flights" in text
+    assert "Toy: 4 of 4 searches of 3 flights" in text
     assert "| 42.75 |" in text
     assert (tmp_path / "pictures" / "smoke-toy.png").is_file()
