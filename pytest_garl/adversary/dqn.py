@@ -76,7 +76,9 @@ class Learner:
             torch.manual_seed(training.seed)
             self.network, self.target = (_mlp(size, training.hidden, actions) for _ in range(2))
         self.target.load_state_dict(self.network.state_dict())
-        self.optimiser = torch.optim.Adam(self.network.parameters(), lr=training.learning_rate)
+        self.optimiser = torch.optim.Adam(
+            self.network.parameters(), lr=training.learning_rate, foreach=True
+        )
         self.updates = 0
         # Ring buffers: state, action, sum of rewards, the state after, its discount (0: ended).
         room = training.replay

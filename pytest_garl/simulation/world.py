@@ -118,8 +118,11 @@ class World:
 
     def touches(self) -> tuple[Touch, ...]:
         """Return the UAV's present contacts, one per body."""
+        contacts = self._p.getContactPoints(self._uav, **self._call)
+        if not contacts:
+            return ()
         found: dict[str, Touch] = {}
-        for contact in self._p.getContactPoints(bodyA=self._uav, **self._call):
+        for contact in contacts:
             # Bullet pushes bodies apart a step before they overlap: force without overlap is
             # a contact as well.
             if contact[8] <= 0 or contact[9] > 0:
