@@ -74,7 +74,7 @@ def _opened(path: Path) -> Ledger:
 
 
 def _avoided(search: Search, flight: Row, fly: Fly) -> bool:
-    """Whether the reference pilot lands without a violation."""
+    """Whether the reference pilot comes through without a violation."""
     scenario, done = load_scenario(flight.scenario), done_of(flight, search.job)
     deeds = deeds_of(done, scenario, search.map)
     npcs = recorded_spec(dict(deeds.moves), dict(deeds.changes))

@@ -12,10 +12,10 @@ from pytest_garl.verdicts.verdict import Limits, PropertyName, ViolationType
 
 Status = Literal["open", "fixed", "unavoidable"]
 """Open: known, expected to fail.  Fixed: must pass.  Unavoidable: not even a pilot that knows where
-everything is lands; gates nothing."""
+everything is, and may give up, comes through; gates nothing."""
 Avoidable = Literal["live", "recorded", "no"]
-"""Among which objects that pilot lands: those that a live policy steers after it, those that
-only repeat what they did, or neither."""
+"""Among which objects that pilot comes through without a violation: those that a live policy
+steers after it, those that only repeat what they did, or neither."""
 MoveList = tuple[tuple[float, float], ...]
 Moves = tuple[tuple[str, MoveList], ...]
 ChangeList = tuple[tuple[int, str, float], ...]

@@ -56,7 +56,7 @@ def dumps(case: Case) -> str:
         f"schema = {SCHEMA}",
         f'system = "{case.system}"',
         f'status = "{case.status}"',
-        f'avoidable = "{case.avoidable}"  # among which objects the reference pilot lands',
+        f'avoidable = "{case.avoidable}"  # among which objects the reference pilot comes through',
         f'map = "{scenario.map}"',
         f"seed = {scenario.seed}",
     ]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -149,24 +149,27 @@ class Pursuit:
                 break
         return best
 
-    def _robust(self, scenario: Scenario, deeds: Deeds) -> int:
-        return sum(
-            self._inquiry.failed(each, self._again(each, deeds))
-            for each in neighbours(scenario, self._inquiry.map)
-        )
+    def _robust(self, scenario: Scenario, deeds: Deeds, least: int = 0) -> int:
+        """Return how many neighbours fail too; fewer than ``least`` are not counted to the end."""
+        robust = COUNT
+        for each in neighbours(scenario, self._inquiry.map):
+            robust -= not self._inquiry.failed(each, self._again(each, deeds))
+            if robust < least:
+                break
+        return robust
 
     def _avoidable(self, failure: _Failure) -> Avoidable:
-        """Whether a pilot that knows where everything is lands among the same objects."""
+        """Whether a pilot that knows where everything is comes through, landed or aborted."""
         scenario, job = failure.scenario, self._inquiry.job
         pilot = dataclasses.replace(job, system=reference_to(ReferencePilot))
         recorded = recorded_spec(dict(failure.deeds.moves), dict(failure.deeds.changes))
-        if not self._lands(dataclasses.replace(pilot, npcs=recorded), scenario):
+        if not self._comes_through(dataclasses.replace(pilot, npcs=recorded), scenario):
             return "no"
         # Where nothing moves, nothing pursues.
         alone = not failure.deeds.moves
-        return "live" if alone or self._lands(pilot, scenario) else "recorded"
+        return "live" if alone or self._comes_through(pilot, scenario) else "recorded"
 
-    def _lands(self, pilot: Job, scenario: Scenario) -> bool:
+    def _comes_through(self, pilot: Job, scenario: Scenario) -> bool:
         done = self._go(pilot, scenario)
         return not done.signature and not self._inquiry.failed(scenario, done)
 
@@ -178,20 +181,17 @@ class Pursuit:
             done = self._flown[scenario] = self._go(inquiry.job, scenario)
             return inquiry.failed(scenario, done)
 
-        budget = self._left - COUNT
+        # Steps back from an edge want a share as well, and a shorter record of moves.
+        budget = self._left - COUNT - self._left // 3
         if budget <= 0:
             return best
-        if budget > 4 * (1 + COUNT):
-            # A shorter record of moves wants a share as well.
-            budget -= 1 + COUNT
         found = shrink(best.scenario, fails, inquiry.map, budget, culprit=culprit_of(best.done))
-        # From the simplest back towards the first, until it does not sit on an edge.
-        for scenario in reversed(found.history[1:]):
+        for scenario in _ever_further_back(found.history[1:]):
             if self._left < COUNT:
                 break
             done = self._flown[scenario]
             deeds = deeds_of(done, scenario, inquiry.map)
-            robust = self._robust(scenario, deeds)
+            robust = self._robust(scenario, deeds, best.robust)
             if robust >= best.robust:
                 failure = _Failure(scenario=scenario, deeds=deeds, done=done, robust=robust)
                 return self._recorded(failure)
@@ -213,7 +213,7 @@ class Pursuit:
             done = self._again(scenario, deeds)
             if not self._inquiry.failed(scenario, done):
                 continue
-            robust = self._robust(scenario, deeds)
+            robust = self._robust(scenario, deeds, failure.robust)
             if robust >= failure.robust:
                 return _Failure(scenario=scenario, deeds=deeds, done=done, robust=robust)
         return failure
@@ -245,6 +245,18 @@ class Pursuit:
             test=own.test if own else "",
             assertion=own.assertion if own else "",
         )
+
+
+def _ever_further_back(history: Sequence[Scenario]) -> Iterator[Scenario]:
+    """Yield the last, where the failure may sit on an edge, then some before it, lastly the first.
+
+    Steps double: three flights each decide whether one sits on an edge, and few are left.
+    """
+    index, step = len(history) - 1, 1
+    while index > 0:
+        yield history[index]
+        index, step = index - step, 2 * step
+    yield from history[:1]
 
 
 def _violation(verdict: Verdict, flight: Flight | None, own: OwnFailure | None) -> Violation:

@@ -16,8 +16,8 @@ from pytest_garl.reports.progress import live
 from pytest_garl.run import Run
 
 PILOT = {
-    "live": "the reference pilot lands",
-    "recorded": "the reference pilot lands unless it is pursued as well",
+    "live": "the reference pilot violates nothing",
+    "recorded": "the reference pilot violates nothing unless it is pursued as well",
     "no": "UNAVOIDABLE, gates nothing",
 }
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 
 from pytest_garl.landing_system import (
+    Abort,
     Airframe,
     Command,
     Land,
@@ -22,6 +23,10 @@ SLOW_BELOW_M = 1.5
 LOOK_AHEAD_S = 3.0
 CLEARANCE_M = 0.75
 """Half of the UAV and a quarter of a metre, beyond an object's own radius."""
+PATIENCE_S = 45.0
+"""So long, three times what coming down takes, it waits above a marker that is not free: who stands
+on it can keep anyone from landing, but makes nobody collide."""
+ABORT_TAKES_S = 10.0
 
 
 class ReferencePilot:
@@ -34,27 +39,31 @@ class ReferencePilot:
         """Remember the mission; the truth comes before each step."""
         self._mission = mission
         self._truth: Truth | None = None
-        self._arrived = False
+        self._arrived_s: float | None = None
 
     def observe_truth(self, truth: Truth) -> None:
         """Be told where everything is."""
         self._truth = truth
 
     def step(self, observation: Observation) -> Command:
-        """Climb, cross, wait for a clear column, descend."""
+        """Climb, cross, wait for a clear column, descend; or give up."""
         truth = self._truth
         x, y, z = (float(value) for value in observation.position_m)
         if truth is None:
             return PositionSetpoint(position_m=(x, y, CRUISE_M))
         goal = truth.marker_m
         offset = math.dist((x, y), goal)
-        if not self._arrived and z < CRUISE_M - 1.0:
-            home_x, home_y, _ = self._mission.home_m
-            return PositionSetpoint(position_m=(home_x, home_y, CRUISE_M))
-        if not self._arrived:
-            self._arrived = offset < CENTRED_M
+        if self._arrived_s is None:
+            if z < CRUISE_M - 1.0:
+                home_x, home_y, _ = self._mission.home_m
+                return PositionSetpoint(position_m=(home_x, home_y, CRUISE_M))
+            if offset < CENTRED_M:
+                self._arrived_s = observation.time_s
             return PositionSetpoint(position_m=(*goal, CRUISE_M), speed_mps=4.0)
         if self._blocked(truth, z):
+            last = self._mission.time_limit_s - ABORT_TAKES_S
+            if observation.time_s > min(self._arrived_s + PATIENCE_S, last):
+                return Abort()
             return VelocitySetpoint(velocity_mps=(*self._centring(goal, x, y), 1.0))
         if z < 0.35:
             return Land(speed_mps=0.4)
