@@ -25,9 +25,10 @@ from pytest_garl.simulation.reference_pilot import ReferencePilot
 from pytest_garl.verdicts.serialise import from_dict
 from pytest_garl.verdicts.verdict import Verdict
 
-PILOTS = 2
-"""Flights of the reference pilot: against the recorded moves, against the live policy."""
-LEAST = 1 + COUNT + PILOTS
+PILOTS = 3
+"""Flights of the reference pilot: against the recorded moves, against the live policy, and one more
+where the shortest record leaves nobody a way out."""
+LEAST = 1 + COUNT + 2
 """Flights without which nothing can be said: once more, three neighbours, the reference pilot."""
 CANDIDATES = 3
 """So many violations of a signature are tried for one whose neighbours fail as well."""
@@ -110,8 +111,13 @@ class Pursuit:
         if best is None:
             reason = "its flights with the recorded moves do not fail in the same way"
             return self._finding(None, reason)
-        shrunk = self._shrunk(best)
-        return self._finding(self._case(best.scenario, shrunk, self._avoidable(shrunk)))
+        # A case that nobody can avoid gates nothing: rather a longer record that leaves a way out.
+        *others, simplest = self._shrunk(best)
+        failure, avoidable = simplest, self._avoidable(simplest)
+        for longer in others:
+            if avoidable == "no" and (found := self._avoidable(longer)) != "no":
+                failure, avoidable = longer, found
+        return self._finding(self._case(best.scenario, failure, avoidable))
 
     @property
     def _left(self) -> int:
@@ -173,8 +179,8 @@ class Pursuit:
         done = self._go(pilot, scenario)
         return not done.signature and not self._inquiry.failed(scenario, done)
 
-    def _shrunk(self, best: _Failure) -> _Failure:
-        """Return the simplest failure whose neighbours fail as well."""
+    def _shrunk(self, best: _Failure) -> tuple[_Failure, ...]:
+        """Return the simplest failure whose neighbours fail as well: with all moves, with few."""
         inquiry = self._inquiry
 
         def fails(scenario: Scenario) -> bool:
@@ -184,7 +190,7 @@ class Pursuit:
         # Steps back from an edge want a share as well, and a shorter record of moves.
         budget = self._left - COUNT - self._left // 3
         if budget <= 0:
-            return best
+            return (best,)
         found = shrink(best.scenario, fails, inquiry.map, budget, culprit=culprit_of(best.done))
         for scenario in _ever_further_back(found.history[1:]):
             if self._left < COUNT:
@@ -194,8 +200,9 @@ class Pursuit:
             robust = self._robust(scenario, deeds, best.robust)
             if robust >= best.robust:
                 failure = _Failure(scenario=scenario, deeds=deeds, done=done, robust=robust)
-                return self._recorded(failure)
-        return best
+                shorter = self._recorded(failure)
+                return (failure,) if shorter is failure else (failure, shorter)
+        return (best,)
 
     def _recorded(self, failure: _Failure) -> _Failure:
         """Return the failure with the shortest record of moves that it survives."""
