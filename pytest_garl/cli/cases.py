@@ -63,27 +63,22 @@ def list_(folders: _Folders) -> None:
         click.echo(f"no cases in {folders.cases}; a search saves what it finds")
         return
     table = Table(box=None, header_style="bold")
-    for name in ("case", "status", "signature", "robust"):
+    for name in ("case", "status", "signature", "robust", "objects"):
         table.add_column(name, no_wrap=True)
-    for name in ("objects", "shrinking removed"):
-        table.add_column(name, overflow="fold")
     for entry in found:
-        case = entry.case
-        if case is None:
-            name = f"{entry.path.parent.name}/{entry.name}"
-            table.add_row(name, "[red]broken[/red]", "", "", "", entry.problem)
+        name = f"{entry.path.parent.name}/{entry.name}"
+        if entry.case is None:
+            table.add_row(name, "[red]broken[/red]")
             continue
-        evidence = case.evidence
-        table.add_row(
-            f"{entry.path.parent.name}/{entry.name}",
-            _coloured(case.status),
-            case.violation.signature,
-            f"{evidence.neighbours_failed}/{evidence.neighbours}",
-            " ".join(name for name, _ in case.moves) or "none",
-            evidence.removed,
-        )
+        case, evidence = entry.case, entry.case.evidence
+        robust = f"{evidence.neighbours_failed}/{evidence.neighbours}"
+        objects = str(len(case.moves))
+        table.add_row(name, _coloured(case.status), case.violation.signature, robust, objects)
     # Or else rich would make an animal of ":dog:".
     Console(emoji=False).print(table)
+    for entry in found:
+        if entry.case is None:
+            click.echo(entry.problem)
 
 
 def _coloured(status: str) -> str:
