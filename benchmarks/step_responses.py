@@ -118,7 +118,7 @@ def implied(pid: RatePid, angle_p: float, gain: float) -> tuple[float, float]:
 def attitude_table() -> list[str]:
     """Return the table of what the attitude gains imply."""
     model = vehicle_model(Airframe())
-    lever = model.arm_m / math.sqrt(2)
+    lever = model.lever_m
     # The mixer's 1 moves each of the four motors by half of its range.
     roll = 2 * model.max_thrust_n * lever / model.inertia[0]
     yaw = 2 * model.max_thrust_n * YAW_TORQUE_PER_THRUST_M / model.inertia[2]

@@ -14,10 +14,17 @@ from pytest_garl.landing_system import (
     Command,
     Land,
     PositionSetpoint,
-    VehicleState,
     VelocitySetpoint,
 )
-from pytest_garl.simulation.vehicle import GRAVITY_MPS2, Thrusts, Vector, VehicleModel, mix
+from pytest_garl.simulation.vehicle import (
+    GRAVITY_MPS2,
+    Motion,
+    Quaternion,
+    Thrusts,
+    Vector,
+    VehicleModel,
+    mix,
+)
 
 POSITION_P = 1.0
 VELOCITY_P = 2.2
@@ -48,29 +55,31 @@ class FlightControl:
         self._hold: Vector | None = None
         self._command: Command | None = None
 
-    def thrusts(self, state: VehicleState, command: Command | None, dt_s: float) -> Thrusts:
+    def thrusts(self, motion: Motion, command: Command | None, dt_s: float) -> Thrusts:
         """Return wanted motor thrusts (front left, front right, rear right, rear left)."""
         if command is None:
             return 0.0, 0.0, 0.0, 0.0
         if isinstance(command, AttitudeSetpoint):
             thrust = command.thrust * 4 * self._model.max_thrust_n
-            return self._attitude(state, _z_axis(command.attitude), _yaw(command.attitude), thrust)
+            return self._attitude(motion, _z_axis(command.attitude), _yaw(command.attitude), thrust)
         if type(command) is not type(self._command):
-            self._hold = state.position_m
+            self._hold = motion.position_m
         self._command = command
-        wanted, yaw = self._velocity(state, command)
-        acceleration = self._acceleration(state, wanted, dt_s)
-        force = (acceleration[0], acceleration[1], acceleration[2] + GRAVITY_MPS2)
-        vertical = max(2.0, force[2])
-        tilt = math.hypot(force[0], force[1]) / vertical
+        wanted, yaw = self._velocity(motion, command)
+        ax, ay, az = self._acceleration(motion, wanted, dt_s)
+        vertical = az + GRAVITY_MPS2
+        if vertical < 2.0:
+            vertical = 2.0
+        tilt = math.hypot(ax, ay) / vertical
         scale = _MAX_SLOPE / tilt if tilt > _MAX_SLOPE else 1.0
-        direction = _unit((force[0] * scale, force[1] * scale, vertical))
-        up = _z_axis(state.attitude)
-        thrust = self._model.mass_kg * vertical / max(0.5, up[2])
-        return self._attitude(state, direction, yaw, thrust)
+        direction = _unit((ax * scale, ay * scale, vertical))
+        x, y, _, _ = motion.attitude
+        upright = 1 - 2 * (x * x + y * y)
+        thrust = self._model.mass_kg * vertical / (0.5 if upright < 0.5 else upright)
+        return self._attitude(motion, direction, yaw, thrust)
 
-    def _velocity(self, state: VehicleState, command: Command) -> tuple[Vector, float]:
-        position = state.position_m
+    def _velocity(self, motion: Motion, command: Command) -> tuple[Vector, float]:
+        position = motion.position_m
         hold = self._hold or position
         if isinstance(command, VelocitySetpoint):
             return command.velocity_mps, command.yaw_rad
@@ -86,8 +95,8 @@ class FlightControl:
         vx, vy = POSITION_P * (hold[0] - position[0]), POSITION_P * (hold[1] - position[1])
         return (vx, vy, climb), 0.0
 
-    def _acceleration(self, state: VehicleState, wanted: Vector, dt_s: float) -> Vector:
-        (wx, wy, wz), (vx, vy, vz) = wanted, state.velocity_mps
+    def _acceleration(self, motion: Motion, wanted: Vector, dt_s: float) -> Vector:
+        (wx, wy, wz), (vx, vy, vz) = wanted, motion.velocity_mps
         climb = _bounded(wz, -MAX_DESCENT_MPS, MAX_CLIMB_MPS)
         return (
             self._axis(0, wx - vx, dt_s),
@@ -107,15 +116,15 @@ class FlightControl:
         return _bounded(proportional, -MAX_ACCELERATION_MPS2, MAX_ACCELERATION_MPS2) + integral
 
     def _attitude(
-        self, state: VehicleState, direction: Vector, yaw_rad: float, thrust_n: float
+        self, motion: Motion, direction: Vector, yaw_rad: float, thrust_n: float
     ) -> Thrusts:
         # The tilt error as a rotation vector in the body frame: z x wanted direction.
-        wx, wy, _ = _to_body(state.attitude, direction)
-        yaw_error = math.remainder(yaw_rad - _yaw(state.attitude), 2 * math.pi)
+        wx, wy, _ = _to_body(motion.attitude, direction)
+        yaw_error = math.remainder(yaw_rad - _yaw(motion.attitude), math.tau)
         roll = _bounded(-wy * ATTITUDE_P, -MAX_RATE_RADPS, MAX_RATE_RADPS)
         pitch = _bounded(wx * ATTITUDE_P, -MAX_RATE_RADPS, MAX_RATE_RADPS)
         yaw = _bounded(yaw_error * ATTITUDE_P / 4, -MAX_RATE_RADPS, MAX_RATE_RADPS)
-        (p, q, r), (ix, iy, iz) = state.angular_velocity_radps, self._model.inertia
+        (p, q, r), (ix, iy, iz) = motion.spin_radps, self._model.inertia
         torque = (
             ix * RATE_P * (roll - p),
             iy * RATE_P * (pitch - q),
@@ -129,12 +138,12 @@ def _bounded(value: float, low: float, high: float) -> float:
     return low if value < low else high if value > high else value
 
 
-def _z_axis(q: tuple[float, float, float, float]) -> Vector:
+def _z_axis(q: Quaternion) -> Vector:
     x, y, z, w = q
     return 2 * (x * z + w * y), 2 * (y * z - w * x), 1 - 2 * (x * x + y * y)
 
 
-def _yaw(q: tuple[float, float, float, float]) -> float:
+def _yaw(q: Quaternion) -> float:
     x, y, z, w = q
     return math.atan2(2 * (w * z + x * y), 1 - 2 * (y * y + z * z))
 
@@ -144,7 +153,7 @@ def _unit(v: Vector) -> Vector:
     return v[0] / length, v[1] / length, v[2] / length
 
 
-def _to_body(q: tuple[float, float, float, float], v: Vector) -> Vector:
+def _to_body(q: Quaternion, v: Vector) -> Vector:
     x, y, z, w = -q[0], -q[1], -q[2], q[3]
     tx, ty, tz = 2 * (y * v[2] - z * v[1]), 2 * (z * v[0] - x * v[2]), 2 * (x * v[1] - y * v[0])
     return (

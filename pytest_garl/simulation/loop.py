@@ -36,9 +36,18 @@ from pytest_garl.simulation.policy import DECISION_STEP_S, Change, ObjectPolicy,
 from pytest_garl.simulation.randomness import generator
 from pytest_garl.simulation.recorder import Recorder
 from pytest_garl.simulation.truth import Truth, TruthObject
-from pytest_garl.simulation.vehicle import Thrusts, Vector, drag, lag, vehicle_model, wrench
+from pytest_garl.simulation.vehicle import (
+    Motion,
+    Quaternion,
+    Thrusts,
+    Vector,
+    drag,
+    lag,
+    vehicle_model,
+    wrench,
+)
 from pytest_garl.simulation.view import eye_under
-from pytest_garl.simulation.world import PHYSICS_RATE_HZ, Quaternion, World
+from pytest_garl.simulation.world import PHYSICS_RATE_HZ, World
 
 TRACK_EVERY = 10
 OBJECTS_EVERY = 4
@@ -91,6 +100,7 @@ class Loop:
     ) -> None:
         self.scenario, self.map, self.guard = scenario, map, guard
         self.time_limit_s = time_limit_s
+        self.last_tick = round(time_limit_s * PHYSICS_RATE_HZ)
         self.make_system = system
         self.airframe: Airframe = airframe_of(system)
         self.marker = marker_position_m(scenario, map)
@@ -162,7 +172,7 @@ class Loop:
     @property
     def out_of_time(self) -> bool:
         """Whether the next ``tick`` is the one that says so."""
-        return self.ticks >= round(self.time_limit_s * PHYSICS_RATE_HZ)
+        return self.ticks >= self.last_tick
 
     def tick(self) -> Outcome | None:
         """Advance by 1/240 s; return the outcome once there is one."""
@@ -186,38 +196,41 @@ class Loop:
         while self.pending and self.pending[0][0] <= tick:
             self._take(self.pending.pop(0)[1])
         x, y, z, w = attitude
-        state = VehicleState(
-            time_s=now,
-            position_m=position,
-            velocity_mps=velocity,
-            attitude=attitude,
-            angular_velocity_radps=rotate((-x, -y, -z, w), spin),
-            thrusts_n=self.thrusts,
-        )
-        self._drive(tick, state)
+        self._drive(tick, Motion(position, velocity, attitude, rotate((-x, -y, -z, w), spin)))
         return self._contacts(now, position, attitude, velocity)
 
-    def _drive(self, tick: int, state: VehicleState) -> None:
+    def _drive(self, tick: int, motion: Motion) -> None:
         dt = 1 / PHYSICS_RATE_HZ
         resting = isinstance(self.command, Land) and self.landed_since is not None
         if resting:
             wanted: Thrusts = (0.0, 0.0, 0.0, 0.0)
         elif self.airframe.control_rate_hz and not isinstance(self.command, Abort):
             if tick % self.control_every == 0:
+                state = self._state(tick, motion)
                 answer: MotorThrusts = self._ask("control", lambda: self.system.control(state))
                 self._refuse(problem_with_thrusts(answer), "control")
                 a, b, c, d = (float(value) for value in answer.newtons)
                 self.motors = (a, b, c, d)
             wanted = self.motors
         else:
-            wanted = self.control.thrusts(state, self.command, dt)
-        self.thrusts = lag(self.thrusts, wanted, self.model, dt)
-        total, torque = wrench(self.thrusts, self.model)
-        fx, fy, fz = rotate(state.attitude, (0.0, 0.0, total))
-        vx, vy, vz = state.velocity_mps
-        dx, dy, dz = drag((vx - self.wind[0], vy - self.wind[1], vz), self.model)
-        force = (fx + dx, fy + dy, fz + dz)
-        self.world.step(state.position_m, force, rotate(state.attitude, torque))
+            wanted = self.control.thrusts(motion, self.command, dt)
+        model, attitude = self.model, motion.attitude
+        self.thrusts = lag(self.thrusts, wanted, model, dt)
+        total, torque = wrench(self.thrusts, model)
+        fx, fy, fz = rotate(attitude, (0.0, 0.0, total))
+        (vx, vy, vz), (wind_x, wind_y) = motion.velocity_mps, self.wind
+        dx, dy, dz = drag((vx - wind_x, vy - wind_y, vz), model)
+        self.world.step(motion.position_m, (fx + dx, fy + dy, fz + dz), rotate(attitude, torque))
+
+    def _state(self, tick: int, motion: Motion) -> VehicleState:
+        return VehicleState(
+            time_s=tick / PHYSICS_RATE_HZ,
+            position_m=motion.position_m,
+            velocity_mps=motion.velocity_mps,
+            attitude=motion.attitude,
+            angular_velocity_radps=motion.spin_radps,
+            thrusts_n=self.thrusts,
+        )
 
     def _contacts(
         self, now: float, position: Vector, attitude: Quaternion, velocity: Vector

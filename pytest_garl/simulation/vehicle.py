@@ -9,6 +9,7 @@ from __future__ import annotations
 import functools
 import math
 from dataclasses import dataclass
+from typing import NamedTuple
 
 from pytest_garl.landing_system import Airframe
 
@@ -37,9 +38,12 @@ class VehicleModel:
 
     mass_kg: float
     size_m: float
-    arm_m: float
+    lever_m: float
+    """How far a motor is from the roll axis, and from the pitch axis."""
     inertia: tuple[float, float, float]
     max_thrust_n: float
+    drag_n_per_mps: float
+    drag_n_per_mps2: float
 
 
 def vehicle_model(airframe: Airframe) -> VehicleModel:
@@ -57,14 +61,29 @@ def vehicle_model(airframe: Airframe) -> VehicleModel:
     return VehicleModel(
         mass_kg=mass,
         size_m=size,
-        arm_m=arm,
+        lever_m=arm / math.sqrt(2),
         inertia=(roll, roll, yaw),
         max_thrust_n=THRUST_PER_MOTOR_N * mass / REFERENCE_MASS_KG,
+        drag_n_per_mps=ROTOR_DRAG_PER_S * mass,
+        drag_n_per_mps2=0.5 * AIR_DENSITY_KGPM3 * (DRAG_AREA_M2 * size**2),
     )
 
 
 Thrusts = tuple[float, float, float, float]
 Vector = tuple[float, float, float]
+Quaternion = tuple[float, float, float, float]
+
+
+class Motion(NamedTuple):
+    """Where the vehicle is and how it moves: world frame, but the spin (rad/s) in the body's.
+
+    A named tuple, since one is made 240 times a second.
+    """
+
+    position_m: Vector
+    velocity_mps: Vector
+    attitude: Quaternion
+    spin_radps: Vector
 
 
 def lag(thrusts: Thrusts, wanted: Thrusts, model: VehicleModel, dt_s: float) -> Thrusts:
@@ -88,7 +107,7 @@ def _lag_share(dt_s: float) -> float:
 def wrench(thrusts: Thrusts, model: VehicleModel) -> tuple[float, Vector]:
     """Return the thrust along body z and the body torques of motors FL, FR, RR, RL."""
     fl, fr, rr, rl = thrusts
-    lever = model.arm_m / math.sqrt(2)
+    lever = model.lever_m
     roll = lever * (fl + rl - fr - rr)
     pitch = lever * (rr + rl - fl - fr)
     yaw = YAW_TORQUE_PER_THRUST_M * (fr + rl - fl - rr)
@@ -97,9 +116,8 @@ def wrench(thrusts: Thrusts, model: VehicleModel) -> tuple[float, Vector]:
 
 def mix(thrust_n: float, torque: Vector, model: VehicleModel) -> Thrusts:
     """Return the motor thrusts for a wanted collective thrust and body torque."""
-    lever = model.arm_m / math.sqrt(2)
-    base = thrust_n / 4
-    roll, pitch = torque[0] / (4 * lever), torque[1] / (4 * lever)
+    base, lever = thrust_n / 4, 4 * model.lever_m
+    roll, pitch = torque[0] / lever, torque[1] / lever
     yaw = torque[2] / (4 * YAW_TORQUE_PER_THRUST_M)
     return (
         base + roll - pitch - yaw,
@@ -113,6 +131,5 @@ def drag(air_velocity: Vector, model: VehicleModel) -> Vector:
     """Return the drag force for a velocity relative to the air: linear plus quadratic."""
     vx, vy, vz = air_velocity
     speed = math.sqrt(vx * vx + vy * vy + vz * vz)
-    area = DRAG_AREA_M2 * model.size_m**2
-    factor = -(ROTOR_DRAG_PER_S * model.mass_kg + 0.5 * AIR_DENSITY_KGPM3 * area * speed)
+    factor = -(model.drag_n_per_mps + model.drag_n_per_mps2 * speed)
     return factor * vx, factor * vy, factor * vz

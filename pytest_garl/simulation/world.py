@@ -13,6 +13,7 @@ from pytest_garl.scenarios.bodies import Body
 from pytest_garl.simulation.vehicle import (
     BODY_ABOVE_FEET_M,
     GRAVITY_MPS2,
+    Quaternion,
     Vector,
     VehicleModel,
 )
@@ -47,7 +48,6 @@ _BALL = str(Path(__file__).with_name("unit_ball.obj"))
 takes their convex hull."""
 _RANGE_M = 3.0
 """Distances beyond this are bounded by spheres instead of asked of the engine."""
-Quaternion = tuple[float, float, float, float]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
