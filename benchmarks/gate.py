@@ -1,0 +1,107 @@
+"""The gate of saved cases: how long it takes, and whether it ever says anything else.
+
+``python -m benchmarks.gate`` makes thirty cases of the committed ones and their neighbours, some of
+them called fixed, lets pytest fly them twenty times over and compares outcomes and trajectories;
+then it flies one case three hundred times and counts the hashes.
+"""
+
+from __future__ import annotations
+
+import argparse
+import dataclasses
+import itertools
+import os
+import sqlite3
+import statistics
+import subprocess
+import sys
+import tempfile
+import time
+from collections import Counter
+from collections.abc import Iterator
+from concurrent.futures import ProcessPoolExecutor
+from pathlib import Path
+
+from pytest_garl.regressions.case import Case
+from pytest_garl.regressions.files import dumps, load
+from pytest_garl.regressions.neighbours import neighbours
+from pytest_garl.regressions.replay import replay
+from pytest_garl.scenarios.maps import load_map
+from pytest_garl.search.child import THREADS
+
+CASES = Path("scenarios/regressions")
+COUNT = 30
+LINES = ("PASSED", "FAILED", "ERROR", "XFAIL", "XPASS")
+
+
+def mixed(found: list[Case]) -> Iterator[Case]:
+    """Yield the cases and their neighbours, some of these as if they had been mended.
+
+    What is called fixed here fails: the gate must be as steady about red as about green.
+    """
+    yield from found
+    for index in range(3):
+        for case in found:
+            beside = neighbours(case.scenario, load_map(case.scenario.map))[index]
+            status = "fixed" if index == 1 else case.status
+            yield dataclasses.replace(case, scenario=beside, status=status)
+
+
+def gate(cases: Path, folder: Path) -> tuple[float, str]:
+    """Fly all cases as pytest items; return the wall time, and outcomes and hashes as text."""
+    options = ("-q", "-rA", "-p", "no:cacheprovider", "--tb=no", "landing_systems")
+    ini = ("-o", f"garl_cases={cases}", "-o", f"garl_dir={folder}")
+    began = time.perf_counter()
+    done = subprocess.run(
+        [sys.executable, "-m", "pytest", *options, *ini],
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    took = time.perf_counter() - began
+    told = sorted(line for line in done.stdout.splitlines() if line.startswith(LINES))
+    with sqlite3.connect(folder / "ledger.sqlite") as ledger:
+        rows = ledger.execute(
+            "SELECT system, map, scenario, sha256 FROM slot JOIN search ON search.id = slot.search "
+            "ORDER BY system, map, scenario, sha256"
+        ).fetchall()
+    return took, "\n".join((*told, *map(repr, rows)))
+
+
+def hash_of_flight(path: Path) -> str:
+    """Fly a case once and return the trajectory's hash."""
+    import cv2
+
+    cv2.setNumThreads(1)
+    return replay(load(path), Path.cwd()).flight.sha256
+
+
+def main() -> None:
+    """Print times, how many different gates there were, and how many different flights."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--runs", type=int, default=20)
+    parser.add_argument("--replays", type=int, default=300)
+    arguments = parser.parse_args()
+    paths = sorted(CASES.rglob("*.toml"))
+    if not paths:
+        sys.exit(f"no cases in {CASES}; a search saves what it finds")
+    with tempfile.TemporaryDirectory() as name:
+        cases = Path(name, "cases")
+        for case in itertools.islice(mixed([load(path) for path in paths]), COUNT):
+            file = cases / case.system.partition(":")[0].rpartition(".")[2] / f"{case.id}.toml"
+            file.parent.mkdir(parents=True, exist_ok=True)
+            file.write_text(dumps(case))
+        count = sum(1 for _ in cases.rglob("*.toml"))
+        gates = [gate(cases, Path(name, f"run-{run}")) for run in range(arguments.runs)]
+    times = [took for took, _ in gates]
+    outcomes = Counter(line.split()[0] for line in gates[0][1].splitlines()[:-1] if line[0] != "(")
+    print(f"{count} cases, {arguments.runs} runs: {len({told for _, told in gates})} result(s)")
+    print(f"  {dict(outcomes)}; {statistics.median(times):.0f} s (most {max(times):.0f} s)")
+    os.environ.update(THREADS)
+    with ProcessPoolExecutor() as pool:
+        hashes = Counter(pool.map(hash_of_flight, [paths[0]] * arguments.replays))
+    print(f"{paths[0].name}: {arguments.replays} flights, {len(hashes)} hash(es)")
+
+
+if __name__ == "__main__":
+    main()
