@@ -76,9 +76,8 @@ class Learner:
             torch.manual_seed(training.seed)
             self.network, self.target = (_mlp(size, training.hidden, actions) for _ in range(2))
         self.target.load_state_dict(self.network.state_dict())
-        self.optimiser = torch.optim.Adam(
-            self.network.parameters(), lr=training.learning_rate, foreach=True
-        )
+        self.weights, self.gradient = _one_vector(self.network)
+        self.optimiser = torch.optim.Adam([self.weights], lr=training.learning_rate, foreach=False)
         self.updates = 0
         # Ring buffers: state, action, sum of rewards, the state after, its discount (0: ended).
         room = training.replay
@@ -120,7 +119,7 @@ class Learner:
             wanted = wanted + torch.from_numpy(self.discounts[chosen]) * rest
         values = self.network(states).gather(1, actions[:, None]).squeeze(1)
         loss = torch.nn.functional.smooth_l1_loss(values, wanted)
-        self.optimiser.zero_grad()
+        self.gradient.zero_()
         torch.autograd.backward(loss)
         self.optimiser.step()
         self.updates += 1
@@ -258,6 +257,22 @@ def _round(envs: Any, learner: Learner, first: int) -> Iterator[EpisodeRecord]:
             collided=bool(collided[index]),
             epsilon=epsilon,
         )
+
+
+def _one_vector(network: torch.nn.Module) -> tuple[torch.nn.Parameter, torch.Tensor]:
+    """Make a network's parameters pieces of one vector, and their gradients pieces of another.
+
+    The optimiser then steps once instead of for each of them, to the same bits: for a network as
+    small as this a third of an update's time.
+    """
+    parts = list(network.parameters())
+    weights = torch.nn.Parameter(torch.cat([part.detach().flatten() for part in parts]))
+    weights.grad = gradient = torch.zeros_like(weights)
+    sizes = [part.numel() for part in parts]
+    owns, slopes = torch.split(weights.detach(), sizes), torch.split(gradient, sizes)
+    for part, own, slope in zip(parts, owns, slopes, strict=True):
+        part.data, part.grad = own.view_as(part), slope.view_as(part)
+    return weights, gradient
 
 
 def _mlp(size: int, hidden: tuple[int, ...], actions: int) -> torch.nn.Sequential:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import math
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
@@ -41,6 +42,7 @@ class Disc:
     high_m: float
 
 
+@functools.lru_cache(maxsize=512)
 def discs_of(body: Body) -> tuple[Disc, ...]:
     """Return discs that cover the body's parts; long parts are cut into several."""
     return tuple(disc for part in body.parts for disc in _discs(body, part))
