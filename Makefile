@@ -6,7 +6,7 @@ BIN := $(VENV)/bin
 READY := $(VENV)/.installed
 SMOKE := .garl/experiment-smoke
 
-.PHONY: search test test-ray lint types layers tests bench experiment-smoke clean
+.PHONY: search test test-long test-ray lint types layers tests bench experiment-smoke clean
 .DEFAULT_GOAL := help
 
 help:  ## show the commands
@@ -28,7 +28,10 @@ layers: $(READY)
 	$(BIN)/lint-imports
 
 tests: $(READY)
-	$(BIN)/pytest -n 2 --dist=worksteal -m "not ray" --durations=15 tests landing_systems
+	$(BIN)/pytest -n 2 --dist=worksteal -m "not ray and not long" --durations=15 tests landing_systems
+
+test-long: $(READY)  ## the tutorial typed, and more moments to be killed in: minutes
+	$(BIN)/pytest -n 2 --dist=worksteal -m long tests
 
 test-ray: $(READY)  ## the tests that start Ray clusters: minutes, so not part of `test`
 	$(BIN)/pytest -m ray tests

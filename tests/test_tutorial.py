@@ -30,6 +30,7 @@ def flat(text: str) -> str:
 
 
 @pytest.mark.sim
+@pytest.mark.long
 def test_every_command_of_the_tutorial_prints_what_it_says(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

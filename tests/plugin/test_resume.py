@@ -101,7 +101,13 @@ def undisturbed() -> dict[str, str]:
     return {}
 
 
-@pytest.mark.parametrize("moment", range(20))
+MOMENTS = [
+    pytest.param(moment, marks=[] if moment % 4 == 0 else [pytest.mark.long])
+    for moment in range(20)
+]
+
+
+@pytest.mark.parametrize("moment", MOMENTS)
 def test_a_killed_run_resumes_as_if_nothing_had_happened(
     pytester: pytest.Pytester, undisturbed: dict[str, str], moment: int
 ) -> None:
