@@ -16,7 +16,8 @@ from pytest_garl.landing_system import Camera
 from pytest_garl.scenarios.maps import Map
 from pytest_garl.scenarios.placement import MARKER_SIDE_M, TARGET_MARKER_ID, marker_position_m
 from pytest_garl.scenarios.scenario import Scenario
-from pytest_garl.simulation.ground import Ground, Raster, covered, paint_ground, repaint
+from pytest_garl.simulation.ground import Ground, Raster, paint_ground, repaint
+from pytest_garl.simulation.ground_cover import covered
 from pytest_garl.simulation.particles import Particles
 from pytest_garl.simulation.sensor import Sensor
 from pytest_garl.simulation.solids import Place, Solids

@@ -113,8 +113,10 @@ def decision(policy: ObjectPolicy, situation: Situation) -> Move:
 
 
 def _is_change(each: object) -> bool:
-    pair = isinstance(each, tuple) and len(each) == 2 and each[0] in ENVIRONMENT
-    return pair and isinstance(each[1], int | float) and math.isfinite(each[1])  # type: ignore[index]
+    match each:
+        case (str(gene), int() | float() as amount) if isinstance(each, tuple):
+            return gene in ENVIRONMENT and math.isfinite(amount)
+    return False
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

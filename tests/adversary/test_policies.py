@@ -2,6 +2,7 @@ from __future__ import annotations
 
 import itertools
 import math
+from typing import Any
 
 import numpy as np
 import pytest
@@ -56,16 +57,19 @@ class Wild:
     def reset(self, situation: Situation, rng: np.random.Generator) -> None: ...
 
     def decide(self, situation: Situation) -> Move:
-        answers: dict[str, object] = {
+        words: Any = "up"
+        bare: Any = ("environment.fog", 0.1)
+        answers: dict[str, Any] = {
             "far": Move(x=1.0, y=1.0),
             "nan": Move(x=math.nan, y=0.0),
-            "words": Move(x="up", y=0.0),  # type: ignore[arg-type]
+            "words": Move(x=words, y=0.0),
             "number": 7,
             "wind": Move(x=0.0, y=0.0, changes=(("wind.x", 0.1),)),
             "fog": Move(x=0.0, y=0.0, changes=(("environment.fog", math.nan),)),
-            "bare": Move(x=0.0, y=0.0, changes=("environment.fog", 0.1)),  # type: ignore[arg-type]
+            "bare": Move(x=0.0, y=0.0, changes=bare),
         }
-        return answers[self._answer]  # type: ignore[return-value]
+        move: Move = answers[self._answer]
+        return move
 
 
 @pytest.mark.parametrize(

@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import ClassVar
 
 import numpy as np
 import pytest
@@ -34,7 +35,7 @@ class Hovers:
     """Climbs; keeps what it sees."""
 
     airframe = Airframe(latency_s=0.0, camera=SMALL)
-    seen: list[np.ndarray] = []  # noqa: RUF012
+    seen: ClassVar[list[np.ndarray]] = []
 
     def reset(self, mission: Mission) -> None:
         self.home = mission.home_m
@@ -48,7 +49,7 @@ class Hovers:
 class Weathermaker:
     """Lets it snow on the ground from the third decision on; only the dog's does."""
 
-    known: list[float] = []  # noqa: RUF012
+    known: ClassVar[list[float]] = []
 
     def reset(self, situation: Situation, rng: np.random.Generator) -> None:
         self.known.clear()

@@ -19,7 +19,7 @@ from pytest_garl.scenarios.placement import MARKER_SIDE_M, TARGET_MARKER_ID
 from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.scenarios.validity import repair
 from pytest_garl.simulation.camera import Frame, Renderer
-from pytest_garl.simulation.ground import marker_bits
+from pytest_garl.simulation.canvas import marker_bits
 from pytest_garl.simulation.view import View
 
 Weather = Literal["confined", "full"]
