@@ -83,17 +83,20 @@ def class_logit(answer: Array) -> tuple[int, float]:
 
 def suppress(centres: Array, sizes: Array, limit: float = NMS_IOU) -> list[int]:
     """Return the indices of boxes (n, 2), best first, that overlap no better box too much."""
+    doubles = iou(centres, sizes) > limit
     kept: list[int] = []
     for index in range(len(centres)):
-        if all(iou(centres, sizes, index, other) <= limit for other in kept):
+        if not doubles[index, kept].any():
             kept.append(index)
     return kept
 
 
-def iou(centres: Array, sizes: Array, a: int, b: int) -> float:
-    """Intersection of two of the boxes over their union."""
-    low = np.maximum(centres[a] - sizes[a] / 2, centres[b] - sizes[b] / 2)
-    high = np.minimum(centres[a] + sizes[a] / 2, centres[b] + sizes[b] / 2)
-    common = float(np.prod(np.maximum(high - low, 0.0)))
-    union = float(sizes[a].prod() + sizes[b].prod()) - common
-    return common / union if union > 0 else 0.0
+def iou(centres: Array, sizes: Array) -> Array:
+    """Return the intersection of any two boxes over their union, shape (n, n)."""
+    low, high = centres - sizes / 2, centres + sizes / 2
+    sides = np.minimum(high[:, None], high[None]) - np.maximum(low[:, None], low[None])
+    common = np.maximum(sides, 0.0).prod(axis=2)
+    areas = sizes.prod(axis=1)
+    union = areas[:, None] + areas[None] - common
+    result: Array = np.divide(common, union, out=np.zeros_like(common), where=union > 0)
+    return result

@@ -69,7 +69,7 @@ def test_an_id_of_no_class_is_never_returned() -> None:
 
 def test_overlap_is_intersection_over_union() -> None:
     centres, sizes = np.array([[1, 1], [2, 1]], np.float32), np.full((2, 2), 2, np.float32)
-    assert iou(centres, sizes, 0, 1) == pytest.approx(2 / 6)
+    assert iou(centres, sizes)[0, 1] == pytest.approx(2 / 6)
 
 
 def test_of_overlapping_boxes_the_first_is_kept_and_neighbours_stay() -> None:
