@@ -36,6 +36,9 @@ PARAMETERS = dataclasses.replace(
 DECISION = DecisionParameters()
 CLEAR_S = 1.0
 """Nothing must have been in the way below for so long before a descent goes on."""
+LOOK_EVERY = 2
+"""Frames per look of the detector, but for a free descent, in which it looks at each: its network
+takes two thirds of a step's time, and waiting or flying level five looks a second do."""
 REFUGE_M = 4.5
 """How high to wait while something is: above people, and above birds that fly at 3 m."""
 
@@ -62,15 +65,23 @@ class MultiModuleLandingSystem:
         self._orders: deque[tuple[float, Callable[[], None]]] = deque()
         self._watch = MovementWatch(mission)
         self._blocked_s = -math.inf
+        self._frame = 0
+        self._descends = False
+        self._seen: tuple[Detection, ...] = ()
 
     def step(self, observation: Observation) -> Command:
         """See, decide, plan, order."""
         now = observation.time_s
         x, y, z = (float(value) for value in observation.position_m)
-        seen = self._detector.detect(observation)
+        looks = self._descends or self._frame % LOOK_EVERY == 0
+        self._frame += 1
+        if looks:
+            self._seen = self._detector.detect(observation)
+        seen = self._seen
         self._planner.observe(observation)
-        decision = self._decision.decide(now, (x, y, z), seen)
-        self._tell_target(now, decision, seen)
+        decision = self._decision.decide(now, (x, y, z), seen if looks else None)
+        if looks:
+            self._tell_target(now, decision, seen)
         if decision.phase == "abort":
             return Abort(diagnostics=decision.diagnostics(seen))
         if decision.phase == "take-off":
@@ -80,7 +91,10 @@ class MultiModuleLandingSystem:
             )
         if self._watch.in_the_way(observation):
             self._blocked_s = now
-        if now - self._blocked_s < CLEAR_S and decision.phase in ("descend", "commit"):
+        below = decision.phase in ("descend", "commit")
+        waits = now - self._blocked_s < CLEAR_S
+        self._descends = below and not waits
+        if below and waits:
             return self._give_way(now, decision, seen, (x, y, z))
         if decision.phase == "commit":
             self._later(now, self._control.land)

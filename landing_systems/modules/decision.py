@@ -101,13 +101,19 @@ class DecisionModule:
         self._candidate_at = 0.0
 
     def decide(
-        self, time_s: float, position_m: tuple[float, float, float], seen: Iterable[Detection]
+        self,
+        time_s: float,
+        position_m: tuple[float, float, float],
+        seen: Iterable[Detection] | None,
     ) -> Decision:
-        """Return what to do after a frame seen at ``position_m``."""
+        """Return what to do after a frame seen at ``position_m``.
+
+        ``seen`` is None for a frame in which the detector has not looked.
+        """
         mission, p = self._mission, self._p
         x, y, z = position_m
-        spot = self._spot(seen)
-        self._note_sight(time_s, spot)
+        if seen is not None:
+            self._note_sight(time_s, self._spot(seen))
         if time_s > mission.time_limit_s - p.abort_reserve_s and self._phase != "commit":
             return self._go("abort", position_m, "no time is left for another try")
         if self._phase == "take-off":
