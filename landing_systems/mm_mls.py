@@ -30,8 +30,11 @@ AIRFRAME = Airframe(control_rate_hz=240)
 PARAMETERS = dataclasses.replace(
     tuned(vehicle_of(AIRFRAME).hover_throttle),
     plnd_enabled=True,
-    # ArduPilot's 1 m/s² takes more than a second for the first metre; who runs in does not.
-    wpnav_accel_z=2.5,
+    # With ArduPilot's 1 m/s² and 5 m/s³ a descent at 1.5 m/s is stopped after two seconds and
+    # one and a half metres; who runs in is there by then. Both are at most of the ranges that
+    # ArduPilot documents (0.5 to 5 m/s², 5 to 50 m/s³).
+    wpnav_accel_z=5.0,
+    psc_jerk_z=20.0,
 )
 DECISION = DecisionParameters()
 CLEAR_S = 1.0
