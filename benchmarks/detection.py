@@ -140,11 +140,25 @@ def recall(sightings: Iterable[Sighting], who: str) -> str:
     return f"{np.mean(hits):.3f}" if hits else "-"
 
 
-def rates(scored: Sequence[tuple[str, Weather, Scored]], frames: int) -> tuple[float, float]:
-    """Return wrong ids per confirmed detection, and false positives per frame."""
-    sure = [each for _, _, each in scored if each.detection.confidence >= CONFIRM]
+def clear(marker: Marker) -> bool:
+    """Whether a marker is wholly in the frame, large and legible, hidden or not."""
+    return marker.framed > 0.99 and marker.contrast >= LEGIBLE and marker.side_px >= 16
+
+
+def plain(marker: Marker) -> bool:
+    """Whether a marker is one of those for which the targets are set."""
+    return clear(marker) and marker.hidden <= 0.25
+
+
+def sure_ones(scored: Sequence[tuple[str, Weather, Scored]]) -> list[Scored]:
+    """Return the detections that the decision would confirm."""
+    return [each for _, _, each in scored if each.detection.confidence >= CONFIRM]
+
+
+def wrong_ids(sure: Sequence[Scored]) -> str:
+    """Return how many and which share of detections have another marker's id, as text."""
     wrong = sum(each.kind == "wrong-id" for each in sure)
-    return wrong / max(1, len(sure)), sum(each.kind == "nothing-there" for each in sure) / frames
+    return f"{wrong} of {len(sure)}: {100 * wrong / max(1, len(sure)):.2f} %"
 
 
 def table(results: Results, names: Sequence[str]) -> list[str]:
@@ -180,14 +194,11 @@ def summary(results: Results, names: Sequence[str]) -> list[str]:
     def chosen(test: Callable[[Marker], bool], map: str = "") -> list[Sighting]:
         return [each for each in results.sightings if test(each.marker) and map in ("", each.map)]
 
-    def clear(marker: Marker) -> bool:
-        return marker.framed > 0.99 and marker.contrast >= LEGIBLE and marker.side_px >= 16
-
     groups = {
-        "at least 16 px, at most 25 % hidden": chosen(lambda m: clear(m) and m.hidden <= 0.25),
-        "the same, court": chosen(lambda m: clear(m) and m.hidden <= 0.25, "court"),
-        "the same, lawn": chosen(lambda m: clear(m) and m.hidden <= 0.25, "lawn"),
-        "the same, only id 0": chosen(lambda m: clear(m) and m.hidden <= 0.25 and m.marker_id == 0),
+        "at least 16 px, at most 25 % hidden": chosen(plain),
+        "the same, court": chosen(plain, "court"),
+        "the same, lawn": chosen(plain, "lawn"),
+        "the same, only id 0": chosen(lambda m: plain(m) and m.marker_id == 0),
         "5 to 25 % hidden": chosen(lambda m: clear(m) and 0.05 < m.hidden <= 0.25),
         "25 to 50 % hidden": chosen(lambda m: clear(m) and 0.25 < m.hidden <= 0.5),
         "half to nearly all in the frame, at most 25 % hidden": chosen(
@@ -202,11 +213,16 @@ def summary(results: Results, names: Sequence[str]) -> list[str]:
     for title, group in groups.items():
         cells = " | ".join(recall(group, name) for name in names)
         lines.append(f"| {title} | {len(group)} | {cells} |")
-    both = {name: rates(results.scored[name], results.frames) for name in names}
+    sure = {name: sure_ones(results.scored[name]) for name in names}
+    ghosts = {name: sum(e.kind == "nothing-there" for e in sure[name]) for name in names}
     errors = {name: np.array(results.errors_m[name] or [np.nan]) for name in names}
     rows = {
-        "wrong ids among confirmed": [f"{100 * both[name][0]:.2f} %" for name in names],
-        "false positives per frame": [f"{both[name][1]:.4f}" for name in names],
+        "wrong ids among confirmed, at least 16 px, at most 25 % hidden": [
+            wrong_ids([e for e in sure[name] if e.marker is not None and plain(e.marker)])
+            for name in names
+        ],
+        "wrong ids among all confirmed": [wrong_ids(sure[name]) for name in names],
+        "false positives per frame": [f"{ghosts[name] / results.frames:.4f}" for name in names],
         "error in metres, median": [f"{np.median(errors[name]):.3f}" for name in names],
         "error in metres, 95 %": [f"{np.quantile(errors[name], 0.95):.3f}" for name in names],
     }

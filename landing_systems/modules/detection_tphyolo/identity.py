@@ -35,11 +35,16 @@ _CELLS = PATCH_PX // 8
 class IdentityPlan:
     """How to learn to read ids."""
 
-    steps: int = 6000
+    steps: int = 9000
     seed: int = 0
     patches: int = 64
     nothing: float = 0.15
     """Share of cut-outs from anywhere, mostly of no marker."""
+    mirrored: float = 0.1
+    """Share of mirror images of known markers, which look like them and are none."""
+    others: float = 0.3
+    """Share of markers with another id: there are 46 of them, and to be taken for the wanted
+    one is the worst that can happen."""
     shift: float = 0.06
     resize: float = 0.08
     """Spread of errors of the middle in sides, and of the size in its logarithm: the first
@@ -84,15 +89,18 @@ class Cuttings:
         self._by_class = [places[classes == each] for each in range(OTHER + 1)]
 
     def draw(self, rng: np.random.Generator) -> tuple[NDArray[np.uint8], NDArray[np.int64]]:
-        """Return patches (n, P, P, 3) and their classes, each class about equally often."""
+        """Return patches (n, P, P, 3) and their classes, the known ids about equally often."""
         plan = self._plan
         patches, classes = [], []
         for _ in range(plan.patches):
-            if rng.random() < plan.nothing:
+            chance = rng.random()
+            if chance < plan.nothing:
                 patches.append(self._nothing(rng))
                 classes.append(OTHER)
                 continue
-            number = int(rng.integers(OTHER + 1))
+            mirrored = chance < plan.nothing + plan.mirrored
+            other = not mirrored and chance < plan.nothing + plan.mirrored + plan.others
+            number = OTHER if other else int(rng.integers(OTHER))
             kind = self._by_class[number]
             shard, picture, row = kind[rng.integers(len(kind))]
             x, y, _, _, _, _, _, side = self._shards[shard].labels[picture, row]
@@ -100,8 +108,9 @@ class Cuttings:
             middle = (float(x + across), float(y + down))
             size = float(side) * float(np.exp(rng.normal(0, plan.resize)))
             turn = float(rng.uniform(0, 2 * np.pi))
-            patches.append(patch(self._shards[shard].images[picture], middle, size, turn))
-            classes.append(number)
+            cut = patch(self._shards[shard].images[picture], middle, size, turn)
+            patches.append(cut[:, ::-1] if mirrored else cut)
+            classes.append(OTHER if mirrored else number)
         return np.stack(patches), np.array(classes, np.int64)
 
     def _nothing(self, rng: np.random.Generator) -> NDArray[np.uint8]:
