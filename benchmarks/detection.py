@@ -44,7 +44,8 @@ from pytest_garl.scenarios.maps import load_map
 
 CONFIRM = 0.8
 """The decision's threshold."""
-SEED = 777_000
+SEED = 778_000
+"""The training was changed once after a look at errors in the pictures of seed 777,000."""
 FRAMES = 12
 IDS = (0, 0, 0, 1, 2, 3, 17)
 """Ids of the marker on the ground, in turn: the wanted one, the other classes, one of none."""
