@@ -30,8 +30,12 @@ SIZE_TOLERANCE = 1.6
 """A box is a marker's only if its size is that of a marker on the ground below, within this
 factor: the outline of a turned marker is up to 1.41 times as wide as the marker."""
 MIN_HEIGHT_M = 0.3
+WHOLE_BELOW_M = 2.0
+"""Lower than this, where it is landed on, a marker counts only if the frame does not cut it: the
+middle of one that is cut is a guess, off by up to 0.4 m.  From higher up it shows the way."""
 MAX_MARKERS = 6
 """At most so many are read, so that a strange frame takes no longer than others."""
+_EDGE_PX = 1.0
 
 
 class TphYoloDetector:
@@ -64,7 +68,7 @@ class TphYoloDetector:
         for centre, size, logit in zip(boxes.centres_px, boxes.sizes_px, boxes.logits, strict=True):
             middle = (centre - shift) / scale
             place = self._place(middle, size / scale, side_px, observation)
-            if place is None:
+            if place is None or (height < WHOLE_BELOW_M and self._cut(middle, size / scale)):
                 continue
             (x, y), expected_px = place
             number, answer = self._identify(picture, centre, expected_px * scale)
@@ -85,6 +89,12 @@ class TphYoloDetector:
     def confidence(self, logit: float) -> float:
         """Return the calibrated probability that a box is a marker of its class."""
         return float(1 / (1 + np.exp(-(self._slope * logit + self._offset))))
+
+    def _cut(self, centre: NDArray[np.float32], size: NDArray[np.float32]) -> bool:
+        """Whether a box (pixel edges of the frame) reaches the frame's edge."""
+        low, high = centre - size / 2, centre + size / 2
+        frame = (self._camera.width_px, self._camera.height_px)
+        return bool((low < _EDGE_PX).any() or (high > np.subtract(frame, _EDGE_PX)).any())
 
     def _identify(
         self, picture: NDArray[np.uint8], centre: NDArray[np.float32], side_px: float

@@ -166,6 +166,19 @@ def test_the_shipped_weights_find_the_marker_and_tell_it_from_another() -> None:
                 assert item.position_m[:2] == pytest.approx((x, y), abs=0.25)
 
 
+def test_a_marker_that_the_frame_cuts_is_nothing_to_land_on() -> None:
+    made = renderer()
+    detector = TphYoloDetector(mission())
+    x, y = made.marker_m
+    # At zero yaw the image's top is east: half a side out of the frame, then wholly inside.
+    for height in (3.0, 1.8):
+        for away, found in ((0.75 * height, height > 2.0), (0.0, True)):
+            position = (x - away, y, height)
+            frame = made.render(position, LEVEL, 0.0, [((50.0, 50.0, 0.0), 0.0)])
+            seen = detector.detect(observed(position, image=frame.image))
+            assert [each.marker_id for each in seen] == ([0] if found else []), (height, away)
+
+
 def test_detections_are_judged_by_the_marker_on_which_they_lie() -> None:
     rng = np.random.default_rng(8)
     picture = next(
