@@ -40,8 +40,11 @@ DECISION = DecisionParameters()
 CLEAR_S = 1.0
 """Nothing must have been in the way below for so long before a descent goes on."""
 LOOK_EVERY = 2
+LOOK_EVERY_WAITING = 5
 """Frames per look of the detector, but for a free descent, in which it looks at each: its network
-takes two thirds of a step's time, and waiting or flying level five looks a second do."""
+takes two thirds of a step's time, and flying level five looks a second do, waiting two."""
+PATIENCE_S = 45.0
+"""Waited so long in all, for a place that is not free, it goes home while there is battery."""
 REFUGE_M = 4.5
 """How high to wait while something is: above people, and above birds that fly at 3 m."""
 
@@ -68,25 +71,30 @@ class MultiModuleLandingSystem:
         self._orders: deque[tuple[float, Callable[[], None]]] = deque()
         self._watch = MovementWatch(mission)
         self._blocked_s = -math.inf
-        self._frame = 0
-        self._descends = False
+        self._waited_s, self._stepped_s = 0.0, 0.0
+        self._looked, self._look_every = 0, 1
         self._seen: tuple[Detection, ...] = ()
 
     def step(self, observation: Observation) -> Command:
         """See, decide, plan, order."""
         now = observation.time_s
         x, y, z = (float(value) for value in observation.position_m)
-        looks = self._descends or self._frame % LOOK_EVERY == 0
-        self._frame += 1
+        self._looked += 1
+        looks = self._looked >= self._look_every
         if looks:
+            self._looked = 0
             self._seen = self._detector.detect(observation)
         seen = self._seen
         self._planner.observe(observation)
         decision = self._decision.decide(now, (x, y, z), seen if looks else None)
         if looks:
             self._tell_target(now, decision, seen)
+        since, self._stepped_s = now - self._stepped_s, now
+        if self._waited_s > PATIENCE_S:
+            return Abort(diagnostics=decision.diagnostics(seen, note="the place was never free"))
         if decision.phase == "abort":
             return Abort(diagnostics=decision.diagnostics(seen))
+        self._look_every = LOOK_EVERY
         if decision.phase == "take-off":
             self._later(now, lambda: self._control.take_off(self._mission.search_altitude_m))
             return PositionSetpoint(
@@ -94,11 +102,13 @@ class MultiModuleLandingSystem:
             )
         if self._watch.in_the_way(observation):
             self._blocked_s = now
-        below = decision.phase in ("descend", "commit")
-        waits = now - self._blocked_s < CLEAR_S
-        self._descends = below and not waits
-        if below and waits:
+        descends = decision.phase in ("descend", "commit")
+        if now - self._blocked_s < CLEAR_S and (descends or z < REFUGE_M - 0.3):
+            self._look_every = LOOK_EVERY_WAITING
+            self._waited_s += since
             return self._give_way(now, decision, seen, (x, y, z))
+        if descends:
+            self._look_every = 1
         if decision.phase == "commit":
             self._later(now, self._control.land)
             note = f"precision landing: {self._control.precision.status}"
