@@ -352,8 +352,9 @@ scenarios in the confined weather of searches, half with each weather gene drawn
 with a probability of a quarter. A marker counts as found when a detection with its id and a
 confidence of at least 0.8 lies on it. Below 2 m the detector leaves out what touches the frame's
 edge (its middle is a guess), which costs recall here and nothing in flight: the UAV has come down
-over the marker. Its hidden share is what objects, leaves and snow on it cover; flakes and leaves in the air do not count, fog and darkness show in its contrast. "ArUco" is
-the detector of OpenCV-MLS on a single frame; "four looks" what it would find if the UAV hung still
+over the marker. Its hidden share is what objects, leaves and snow on it cover; flakes and leaves in
+the air do not count, fog and darkness show in its contrast. "ArUco" is the detector of OpenCV-MLS
+on a single frame; "four looks" what it would find if the UAV hung still
 and it tried all its ways to look.
 
 {summary}

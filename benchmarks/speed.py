@@ -1,13 +1,30 @@
-"""Milliseconds per frame, flights against real time, and where a flight's time goes."""
+"""Milliseconds per frame, flights against real time, and where the time of a flight goes.
+
+``python -m benchmarks.speed shares`` prints only the last: for each landing system, under the
+objects that the paper's search flies, the share of what it calls and of what the world does.
+"""
 
 from __future__ import annotations
 
+import functools
 import statistics
+import sys
 import time
+from collections import defaultdict
+from collections.abc import Callable
+from contextlib import ExitStack
+from typing import Any
+from unittest.mock import patch
 
 import cv2
 
+from landing_systems.mm_mls import MultiModuleLandingSystem
+from landing_systems.modules.detection_opencv import OpenCvDetector
+from landing_systems.modules.detection_tphyolo.detector import TphYoloDetector
+from landing_systems.modules.movement_watch import MovementWatch
+from landing_systems.modules.planning_ego import EgoPlanner
 from landing_systems.opencv_mls import OpenCvLandingSystem
+from landing_systems.tphyolo_mls import TphYoloLandingSystem
 from pytest_garl.adversary.policies import policy_spec
 from pytest_garl.landing_system import Camera
 from pytest_garl.scenarios.genes import genome_for
@@ -15,7 +32,21 @@ from pytest_garl.scenarios.maps import load_map
 from pytest_garl.search.random_search import propose
 from pytest_garl.simulation.camera import Renderer
 from pytest_garl.simulation.fly import fly
+from pytest_garl.simulation.objects import MovingObject
 from pytest_garl.simulation.randomness import generator
+from pytest_garl.simulation.world import World
+
+PARTS: tuple[tuple[str, Any, tuple[str, ...]], ...] = (
+    ("detection, OpenCV", OpenCvDetector, ("detect",)),
+    ("detection, TPH-YOLO", TphYoloDetector, ("detect",)),
+    ("planning: observe and replan", EgoPlanner, ("observe", "plan")),
+    ("watch for movements", MovementWatch, ("points_in_the_way",)),
+    ("flight control of MM-MLS", MultiModuleLandingSystem, ("control",)),
+    ("camera: frames and depth", Renderer, ("render",)),
+    ("physics and contacts", World, ("step", "touches", "separations", "uav", "move")),
+    ("objects and their policy", MovingObject, ("decide", "advance")),
+)
+REST = "rest of the flight"
 
 
 def frames() -> None:
@@ -55,11 +86,77 @@ def flights() -> None:
         )
 
 
+class Shares:
+    """CPU seconds by part; what one part calls of another counts for the other alone."""
+
+    def __init__(self) -> None:
+        self.seconds: dict[str, float] = defaultdict(float)
+        self._open: list[str] = [REST]
+        self._since = time.process_time()
+
+    def _switch(self) -> None:
+        now = time.process_time()
+        self.seconds[self._open[-1]] += now - self._since
+        self._since = now
+
+    def timed(self, part: str, call: Callable[..., Any]) -> Callable[..., Any]:
+        """Return ``call``, its time noted under ``part``."""
+
+        @functools.wraps(call)
+        def wrapped(*args: Any, **kwargs: Any) -> Any:
+            self._switch()
+            self._open.append(part)
+            try:
+                return call(*args, **kwargs)
+            finally:
+                self._switch()
+                self._open.pop()
+
+        return wrapped
+
+    def fly(self, flight: Callable[[], Any]) -> Any:
+        """Fly and note where the time goes; the clock itself takes about a twentieth."""
+        with ExitStack() as patched:
+            for part, owner, methods in PARTS:
+                for method in methods:
+                    call = self.timed(part, getattr(owner, method))
+                    patched.enter_context(patch.object(owner, method, call))
+            self._since = time.process_time()
+            answer = flight()
+            self._switch()
+        return answer
+
+
+def shares(count: int = 4) -> None:
+    """Print, for each landing system, where the time of flights on court and lawn goes."""
+    for system in (OpenCvLandingSystem, TphYoloLandingSystem, MultiModuleLandingSystem):
+        spent = Shares()
+        simulated = 0.0
+        for name in ("court", "lawn"):
+            map = load_map(name)
+            for scenario in propose(map, genome_for(map), 0, 0, count):
+                flown = spent.fly(
+                    functools.partial(fly, scenario, system, policy_spec("dqn-paper"), map=map)
+                )
+                simulated += flown.elapsed_s
+        total = sum(spent.seconds.values())
+        print(
+            f"{system.__name__}: {total / (2 * count):.1f} CPU seconds a flight of "
+            f"{simulated / (2 * count):.0f} s ({simulated / total:.1f} times real time)"
+        )
+        for part, seconds in sorted(spent.seconds.items(), key=lambda item: -item[1]):
+            print(f"  {100 * seconds / total:5.1f} %  {part}")
+
+
 def main() -> None:
     """Measure on one core."""
     cv2.setNumThreads(1)
+    if sys.argv[1:] == ["shares"]:
+        shares()
+        return
     frames()
     flights()
+    shares()
 
 
 if __name__ == "__main__":
