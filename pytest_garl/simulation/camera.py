@@ -218,10 +218,16 @@ class Renderer:
         up = float(view.eye[2])
         highest = float(max(slope[0, 0], slope[0, -1], slope[-1, 0], slope[-1, -1]))
         horizon = highest > -up / FAR_M
-        if horizon:
-            np.minimum(slope, np.float32(-up / FAR_M), out=slope)
+        if not horizon:
+            return np.divide(np.float32(-up), slope, out=slope), False
+        # Exactly the far plane: beyond it by a rounding the rasteriser writes no depth, and short
+        # of it the sky would be ground.
+        sky = slope >= np.float32(-up / FAR_M)
+        slope[sky] = -up / FAR_M
         depth: Array = np.divide(np.float32(-up), slope, out=slope)
-        return depth, horizon
+        np.minimum(depth, np.float32(FAR_M), out=depth)
+        depth[sky] = FAR_M
+        return depth, True
 
     def _ground_image(
         self, ground: Ground, view: View, footprint: float, sky: NDArray[np.bool_] | None

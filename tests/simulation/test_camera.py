@@ -236,6 +236,20 @@ def test_a_body_beside_the_camera_is_clipped_not_lost() -> None:
     assert np.isfinite(frame.depth_m).all()
 
 
+def test_what_stands_before_the_sky_has_its_own_depth_from_any_height() -> None:
+    made, map = renderer("lawn")
+    tree = map.bodies[0]
+    half = math.radians(75) / 2
+    level = (0.0, -math.sin(half), 0.0, math.cos(half))
+    for height in np.linspace(3.9, 4.2, 31):
+        eye = (tree.position_m[0] - 8.0, tree.position_m[1], float(height))
+        frame = made.render(eye, level, 0.0, poses(0, 0))
+        trunk = frame.segmentation == made.segment_ids[tree.name]
+        assert trunk.sum() > 200
+        assert frame.depth_m[trunk].max() < 15
+        assert frame.depth_m.max() == FAR_M
+
+
 def test_marker_position_is_where_the_genes_say() -> None:
     made, map = renderer("court")
     genome = genome_for(map, weather="full")
