@@ -96,7 +96,7 @@ class Episode:
             return 0, 0
         eye, attitude = self._loop.eye()
         poses = [(item.position_m, item.yaw_rad) for item in self._loop.objects]
-        frame = self._renderer.render(eye, attitude, 0.0, poses, colour=False)
+        frame = self._renderer.render(eye, attitude, 0.0, poses)
         marker = self._renderer.segment_ids["marker"]
         return self._renderer.marker_pixels(eye, attitude), int(frame.pixels[marker])
 

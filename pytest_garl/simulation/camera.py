@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import copy
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 import cv2
@@ -20,9 +20,9 @@ from pytest_garl.simulation.ground import Ground, Raster, paint_ground, repaint
 from pytest_garl.simulation.ground_cover import covered
 from pytest_garl.simulation.particles import Particles
 from pytest_garl.simulation.sensor import Sensor
-from pytest_garl.simulation.solids import Place, Solids
+from pytest_garl.simulation.solids import Place, Solids, draw_shadows
 from pytest_garl.simulation.view import FAR_M, View
-from pytest_garl.simulation.weather import conditions_of
+from pytest_garl.simulation.weather import Conditions, conditions_of
 
 Vector = tuple[float, float, float]
 Quaternion = tuple[float, float, float, float]
@@ -33,25 +33,55 @@ _SPECULAR_RADIUS = 0.10
 engineering estimate."""
 
 
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Frame:
     """One picture: RGB uint8 (H, W, 3), planar depth float32 (H, W), segmentation int32 (H, W).
 
     A ray that meets nothing has depth 100 and segment -1.  ``pixels`` counts those of each
-    segment from the marker's (1) on.
+    segment from the marker's (1) on.  ``image`` is painted when it is first asked for, and is
+    the same whenever that is.
     """
 
-    image: NDArray[np.uint8]
-    depth_m: NDArray[np.float32]
-    segmentation: NDArray[np.int32]
-    pixels: NDArray[np.intp]
+    __slots__ = ("_image", "_paint", "depth_m", "pixels", "segmentation")
+
+    def __init__(
+        self,
+        *,
+        paint: Callable[[], NDArray[np.uint8]],
+        depth_m: NDArray[np.float32],
+        segmentation: NDArray[np.int32],
+        pixels: NDArray[np.intp],
+    ) -> None:
+        self._paint = paint
+        self._image: NDArray[np.uint8] | None = None
+        self.depth_m = depth_m
+        self.segmentation = segmentation
+        self.pixels = pixels
+
+    @property
+    def image(self) -> NDArray[np.uint8]:
+        """What the camera's sensor delivers."""
+        if self._image is None:
+            self._image = self._paint()
+        return self._image
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class _Look:
+    """What the environment makes of a picture; another environment has another."""
+
+    conditions: Conditions
+    sensor: Sensor
+    particles: Particles
+    decay: Array
+    air: NDArray[np.uint8]
+    veil: NDArray[np.uint8]
 
 
 class Renderer:
     """Draws what the camera sees in one scenario; a frame is a pure function of its arguments.
 
     ``segment_ids`` numbers ground (0), marker (1), static bodies and dynamic objects.
-    With ``colour=False`` nothing is painted: such a renderer gives frames without colour.
+    With ``colour=False`` no ground is painted: such a renderer gives frames without images.
     Flights have the marker that missions look for; another ``marker_id`` is for training
     detectors.
     """
@@ -67,15 +97,13 @@ class Renderer:
         marker_id: int = TARGET_MARKER_ID,
     ) -> None:
         self.camera = camera
-        self.conditions = conditions_of(scenario)
+        conditions = conditions_of(scenario)
         self.marker_m = marker_position_m(scenario, map)
         self._map, self._marker_id = map, marker_id
         names = ["ground", "marker", *(body.name for body in map.bodies)]
         names += [name for name, _ in map.object_names]
         self.segment_ids: Mapping[str, int] = {name: index for index, name in enumerate(names)}
-        self._ground = (
-            paint_ground(scenario, map, self.conditions, rng, marker_id) if colour else None
-        )
+        self._ground = paint_ground(scenario, map, conditions, rng, marker_id) if colour else None
         width, height = camera.width_px, camera.height_px
         (cx, cy), focal = camera.centre_px, camera.focal_px
         self._columns = np.arange(width, dtype=np.float32)
@@ -85,7 +113,12 @@ class Renderer:
         right, bottom = width - 1.0, height - 1.0
         self._corners = np.array([[0, 0, 1], [right, 0, 1], [right, bottom, 1], [0, bottom, 1]]).T
         self._before_draws = copy.deepcopy(rng)
-        self._prepare(rng)
+        self._prepare(conditions, rng)
+
+    @property
+    def conditions(self) -> Conditions:
+        """The environment that frames show now."""
+        return self._look.conditions
 
     def change(self, scenario: Scenario) -> None:
         """Show the environment of ``scenario`` from the next frame on.
@@ -93,38 +126,33 @@ class Renderer:
         Its other genes must be those of the renderer's own; frames are then what they would be
         had the renderer been made with it.
         """
-        before, self.conditions = self.conditions, conditions_of(scenario)
+        before, conditions = self.conditions, conditions_of(scenario)
         if self._ground is not None:
             self._ground = repaint(
-                self._ground, self.marker_m, self._map, before, self.conditions, self._marker_id
+                self._ground, self.marker_m, self._map, before, conditions, self._marker_id
             )
-        self._prepare(copy.deepcopy(self._before_draws))
+        self._prepare(conditions, copy.deepcopy(self._before_draws))
 
-    def _prepare(self, rng: np.random.Generator) -> None:
-        """Make all that draws frames under the present conditions, but the ground."""
-        conditions = self.conditions
+    def _prepare(self, conditions: Conditions, rng: np.random.Generator) -> None:
+        """Make all that draws frames under these conditions, but the ground."""
         self._solids = Solids(self._map, conditions, self.segment_ids)
-        self._sensor = Sensor(self.camera, conditions, rng)
-        self._particles = Particles(self.camera, conditions, rng)
-        self._decay = (-conditions.extinction_per_m * self._stretch).astype(np.float32)
         airlight = np.array(conditions.airlight)
-        self._air = airlight.astype(np.uint8)
         veil = (1 - np.arange(256) / 255)[:, None] * airlight
-        self._veil = np.round(veil).astype(np.uint8).reshape(1, 256, 3)
+        self._look = _Look(
+            conditions=conditions,
+            sensor=Sensor(self.camera, conditions, rng),
+            particles=Particles(self.camera, conditions, rng),
+            decay=(-conditions.extinction_per_m * self._stretch).astype(np.float32),
+            air=airlight.astype(np.uint8),
+            veil=np.round(veil).astype(np.uint8).reshape(1, 256, 3),
+        )
 
     def render(
-        self,
-        position_m: Vector,
-        attitude: Quaternion,
-        time_s: float,
-        objects: Sequence[Place],
-        *,
-        colour: bool = True,
+        self, position_m: Vector, attitude: Quaternion, time_s: float, objects: Sequence[Place]
     ) -> Frame:
         """Return the frame from a camera at ``position_m`` with the UAV's ``attitude``.
 
-        ``objects`` are the (position, yaw) of the dynamic objects in the map's order;
-        ``colour=False`` leaves the image black and is faster.
+        ``objects`` are the (position, yaw) of the dynamic objects in the map's order.
         """
         view = View.of(self.camera, position_m, attitude)
         depth, horizon = self._ground_depth(view)
@@ -132,22 +160,28 @@ class Renderer:
         if horizon:
             segmentation[depth >= FAR_M] = -1
         marker = self._marker_segment(segmentation, view)
+        sky = segmentation < 0 if horizon else None
+        footprint = float(depth[depth.shape[0] // 2, depth.shape[1] // 2]) / self.camera.focal_px
         self._solids.place(objects)
-        if colour:
-            image = self._ground_image(view, depth, horizon)
-            self._solids.draw_shadows(image, view)
-            self._gloss(image, view)
-            if horizon:
-                image[segmentation < 0] = self._air
-        else:
-            image = np.zeros((*depth.shape, 3), np.uint8)
-        pixels = self._solids.draw(image, depth, segmentation, view)
+        shadows = self._solids.shadows()
+        pixels, layers = self._solids.draw(depth, segmentation, view)
         pixels[1] = np.count_nonzero(segmentation[marker] == 1)
-        if colour:
-            self._particles.draw(image, depth, view, time_s)
-            self._fog(image, depth)
-            image = self._sensor.expose(image, time_s)
-        return Frame(image=image, depth_m=depth, segmentation=segmentation, pixels=pixels)
+        look, ground = self._look, self._ground
+
+        def paint() -> NDArray[np.uint8]:
+            """Paint from the ground up, whatever the renderer draws by then."""
+            image = self._ground_image(_painted(ground), view, footprint, sky)
+            draw_shadows(image, view, shadows, look.conditions)
+            self._gloss(image, view, look.conditions)
+            if sky is not None:
+                image[sky] = look.air
+            for layer in layers:
+                layer.put_on(image)
+            look.particles.draw(image, depth, view, time_s)
+            _fog(image, depth, look)
+            return look.sensor.expose(image, time_s)
+
+        return Frame(paint=paint, depth_m=depth, segmentation=segmentation, pixels=pixels)
 
     def marker_pixels(self, position_m: Vector, attitude: Quaternion) -> int:
         """Count the marker's pixels in a frame with nothing in front of it."""
@@ -158,7 +192,7 @@ class Renderer:
 
     def covered(self, places_m: NDArray[np.float64]) -> NDArray[np.bool_]:
         """Whether places (n, 2) on the ground lie under leaves or snow, shape (n,)."""
-        return covered(places_m, self._painted().cover_shift_m, self.conditions)
+        return covered(places_m, _painted(self._ground).cover_shift_m, self.conditions)
 
     def marker_area_px(self, position_m: Vector, attitude: Quaternion) -> float:
         """Projected area of the marker, clipped to the frame, with nothing in front."""
@@ -184,21 +218,27 @@ class Renderer:
         up = float(view.eye[2])
         highest = float(max(slope[0, 0], slope[0, -1], slope[-1, 0], slope[-1, -1]))
         horizon = highest > -up / FAR_M
-        if horizon:
-            np.minimum(slope, np.float32(-up / FAR_M), out=slope)
+        if not horizon:
+            return np.divide(np.float32(-up), slope, out=slope), False
+        # Exactly the far plane: beyond it by a rounding the rasteriser writes no depth, and short
+        # of it the sky would be ground.
+        sky = slope >= np.float32(-up / FAR_M)
+        slope[sky] = -up / FAR_M
         depth: Array = np.divide(np.float32(-up), slope, out=slope)
-        return depth, horizon
+        np.minimum(depth, np.float32(FAR_M), out=depth)
+        depth[sky] = FAR_M
+        return depth, True
 
-    def _ground_image(self, view: View, depth: Array, horizon: bool) -> NDArray[np.uint8]:
+    def _ground_image(
+        self, ground: Ground, view: View, footprint: float, sky: NDArray[np.bool_] | None
+    ) -> NDArray[np.uint8]:
         world = view.ground_of_pixel
-        height, width = depth.shape
-        footprint = float(depth[height // 2, width // 2]) / self.camera.focal_px
+        height, width = self.camera.height_px, self.camera.width_px
         # Four channels: warpPerspective is 2.5 times as fast as with three.
         image = np.empty((height, width, 4), np.uint8)
-        ground = self._painted()
         inset = ground.inset
         rows, columns = slice(0, height), slice(0, width)
-        if horizon or not inset.holds(world @ self._corners):
+        if sky is not None or not inset.holds(world @ self._corners):
             _warp(ground.wide, image, world, footprint, cv2.BORDER_REFLECT_101)
             rows, columns = view.box(view.ground_polygon(inset.outline))
         part = image[rows, columns]
@@ -206,11 +246,6 @@ class Renderer:
             shift = np.array([[1.0, 0.0, columns.start], [0.0, 1.0, rows.start], [0.0, 0.0, 1.0]])
             _warp(inset, part, world @ shift, footprint, cv2.BORDER_TRANSPARENT)
         return np.asarray(cv2.cvtColor(image, cv2.COLOR_RGBA2RGB), dtype=np.uint8)
-
-    def _painted(self) -> Ground:
-        if self._ground is None:
-            raise GarlError("this renderer was made with colour=False; it has no ground to show")
-        return self._ground
 
     def _marker_polygon(self, view: View) -> Array:
         half = MARKER_SIDE_M / 2
@@ -227,10 +262,10 @@ class Renderer:
         cv2.fillConvexPoly(segmentation, points, (1.0,), cv2.LINE_8, _SHIFT)
         return view.box(polygon)
 
-    def _gloss(self, image: NDArray[np.uint8], view: View) -> None:
+    def _gloss(self, image: NDArray[np.uint8], view: View, conditions: Conditions) -> None:
         """Add the sun's reflection on wet ground, where the mirrored ray meets the sun."""
-        strength = 230.0 * self.conditions.wetness * self.conditions.direct_share
-        x, y, z = self.conditions.sun
+        strength = 230.0 * conditions.wetness * conditions.direct_share
+        x, y, z = conditions.sun
         mirrored = view.axes @ np.array([x, y, -z])
         if strength < 1 or mirrored[2] < 0.3:
             return
@@ -247,14 +282,21 @@ class Renderer:
         glow = (strength * np.outer(down, across)).astype(np.uint8)
         cv2.add(part, cv2.cvtColor(glow, cv2.COLOR_GRAY2RGB), part)
 
-    def _fog(self, image: NDArray[np.uint8], depth: Array) -> None:
-        """Let the air hide what is far: I = J t + A (1 - t) with t = exp(-extinction x path)."""
-        if self.conditions.extinction_per_m > 0:
-            # In bytes: a level of transmission is a level of grey at most.
-            through = cv2.convertScaleAbs(cv2.exp(cv2.multiply(depth, self._decay)), alpha=255)
-            through = cv2.cvtColor(through, cv2.COLOR_GRAY2RGB)
-            cv2.multiply(image, through, image, 1 / 255)
-            cv2.add(image, cv2.LUT(through, self._veil), image)
+
+def _painted(ground: Ground | None) -> Ground:
+    if ground is None:
+        raise GarlError("this renderer was made with colour=False; it has no ground to show")
+    return ground
+
+
+def _fog(image: NDArray[np.uint8], depth: Array, look: _Look) -> None:
+    """Let the air hide what is far: I = J t + A (1 - t) with t = exp(-extinction x path)."""
+    if look.conditions.extinction_per_m > 0:
+        # In bytes: a level of transmission is a level of grey at most.
+        through = cv2.convertScaleAbs(cv2.exp(cv2.multiply(depth, look.decay)), alpha=255)
+        through = cv2.cvtColor(through, cv2.COLOR_GRAY2RGB)
+        cv2.multiply(image, through, image, 1 / 255)
+        cv2.add(image, cv2.LUT(through, look.veil), image)
 
 
 def _warp(

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any, Protocol, TypeVar
 
 import numpy as np
+from numpy.typing import NDArray
 
 from pytest_garl.landing_system import (
     Abort,
@@ -67,6 +68,26 @@ VELOCITY_NOISE_MPS = 0.05
 """Engineering estimate: RTK gives centimetres; 0.05 m/s is u-blox's stated accuracy (M8)."""
 
 Array = TypeVar("Array", bound=np.ndarray[Any, Any])
+
+
+class Seen(Observation):
+    """An observation whose image is painted only for a system that looks at it.
+
+    To paint takes longer than all the rest of a frame, and not every system looks at each.
+    """
+
+    __slots__ = ("_frame",)
+    _frame: Frame | NDArray[np.uint8]
+
+    @property
+    def image(self) -> NDArray[np.uint8]:
+        """The RGB image, read-only."""
+        frame = self._frame
+        return _frozen(frame.image) if isinstance(frame, Frame) else frame
+
+    @image.setter
+    def image(self, frame: Frame | NDArray[np.uint8]) -> None:
+        object.__setattr__(self, "_frame", frame)
 
 
 class StepGuard(Protocol):
@@ -338,12 +359,12 @@ class Loop:
         else:
             frame, visible = _blank(camera.height_px, camera.width_px), (0.0, 0.0, ())
         noise = self.pose_rng.standard_normal(6)
-        observation = Observation(
+        observation = Seen(
             time_s=now,
             position_m=_frozen(np.array(position) + POSITION_NOISE_M * noise[:3]),
             velocity_mps=_frozen(np.array(velocity) + VELOCITY_NOISE_MPS * noise[3:]),
             attitude=_frozen(np.array(attitude)),
-            image=_frozen(frame.image),
+            image=frame,  # type: ignore[arg-type]
             depth_m=_frozen(frame.depth_m),
         )
         command: Command = self._ask("step", lambda: self.system.step(observation))
@@ -423,7 +444,7 @@ def _frozen(array: Array) -> Array:
 @functools.cache
 def _blank(height: int, width: int) -> Frame:
     return Frame(
-        image=np.zeros((height, width, 3), np.uint8),
+        paint=lambda: np.zeros((height, width, 3), np.uint8),
         depth_m=np.zeros((height, width), np.float32),
         segmentation=np.zeros((height, width), np.int32),
         pixels=np.zeros(2, np.intp),

@@ -67,6 +67,31 @@ class _Solid:
             self.lengths = [len(outline) for outline in outlines]
 
 
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Layer:
+    """The pixels of one solid, float32 (h, w, 3) in a window of the image, where ``covered``."""
+
+    rows: slice
+    columns: slice
+    covered: NDArray[np.bool_]
+    drawn: Array
+
+    def put_on(self, image: NDArray[np.uint8]) -> None:
+        """Put them over what the image shows."""
+        window = image[self.rows, self.columns]
+        cv2.copyTo(cv2.convertScaleAbs(self.drawn), self.covered.view(np.uint8), window)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Shadow:
+    """A dynamic object's shadow: outlines (n, 2) on the ground about ``at``, one after another."""
+
+    at: tuple[float, float, float]
+    outlines: NDArray[np.float64]
+    lengths: tuple[int, ...]
+    radius_m: float
+
+
 class Solids:
     """Draws static bodies and dynamic objects into frames."""
 
@@ -92,45 +117,28 @@ class Solids:
         for solid, place in zip(self._moving, objects, strict=True):
             solid.put(place, self._conditions)
 
-    def draw_shadows(self, image: NDArray[np.uint8], view: View) -> None:
-        """Darken the ground where the dynamic objects keep the sun from it."""
-        if not _sun_shines(self._conditions):
-            return
-        sun = self._conditions.sun
-        reach = 3 * max(2.0, float(view.eye[2]))
-        outlines, lengths = [], []
-        for solid in self._moving:
-            x = solid.at[0] - sun[0] / sun[2] * solid.at[2]
-            y = solid.at[1] - sun[1] / sun[2] * solid.at[2]
-            if math.hypot(x - view.eye[0], y - view.eye[1]) < reach + solid.meshes[0].radius_m:
-                outlines.append(solid.shadows + np.array([x, y]))
-                lengths += solid.lengths
-        if not outlines:
-            return
-        points, lengths = view.ground_polygons(np.concatenate(outlines), lengths)
-        rows, columns = view.box(points)
-        part = image[rows, columns]
-        if part.size == 0:
-            return
-        mask = np.zeros(part.shape[:2], np.uint8)
-        fixed = np.round((points - (columns.start, rows.start)) * 2**_SHIFT).astype(np.int32)
-        start = 0
-        for length in lengths:
-            cv2.fillConvexPoly(mask, fixed[start : start + length], (255.0,), cv2.LINE_8, _SHIFT)
-            start += length
-        share = self._conditions.direct_share
-        cv2.copyTo(cv2.convertScaleAbs(part, alpha=1 - share), mask, part)
+    def shadows(self) -> tuple[Shadow, ...]:
+        """Return the shadows of the dynamic objects as they stand."""
+        return tuple(
+            Shadow(
+                at=solid.at,
+                outlines=solid.shadows,
+                lengths=tuple(solid.lengths),
+                radius_m=solid.meshes[0].radius_m,
+            )
+            for solid in self._moving
+        )
 
     def draw(
-        self,
-        image: NDArray[np.uint8],
-        depth: Array,
-        segmentation: NDArray[np.int32],
-        view: View,
-    ) -> NDArray[np.intp]:
-        """Draw all solids over the ground; return how many pixels each segment got."""
+        self, depth: Array, segmentation: NDArray[np.int32], view: View
+    ) -> tuple[NDArray[np.intp], list[Layer]]:
+        """Draw all solids into depth and segmentation.
+
+        Returns how many pixels each segment got, and what to put on the image, in order.
+        """
         axes = view.axes.astype(np.float32)
         pixels = np.zeros(self._segments, np.intp)
+        layers = []
         for solid in (*self._static, *self._moving):
             at = np.array(solid.at)
             x, y, z = (float(value) for value in view.axes @ (at - view.eye))
@@ -149,29 +157,23 @@ class Solids:
                 seen, facing = triangles.reshape(-1, 3), facing[origin]
             if len(seen):
                 paint = self._shade(solid, level)[facing]
-                frame = (image, depth, segmentation)
-                pixels[solid.segment] = self._rasterise(seen, paint, solid.segment, frame, view)
-        return pixels
+                layer = self._rasterise(seen, paint, depth, view)
+                if layer is not None:
+                    segmentation[layer.rows, layer.columns][layer.covered] = solid.segment
+                    pixels[solid.segment] = np.count_nonzero(layer.covered)
+                    layers.append(layer)
+        return pixels, layers
 
-    def _rasterise(
-        self,
-        corners: Array,
-        paint: Array,
-        segment: int,
-        frame: tuple[NDArray[np.uint8], Array, NDArray[np.int32]],
-        view: View,
-    ) -> int:
+    def _rasterise(self, corners: Array, paint: Array, depth: Array, view: View) -> Layer | None:
         """Draw camera-frame triangles (corners (3 n, 3), paint (n, 3)) where they are nearest.
 
         OpenCV's rasteriser costs by the area of its target, so it gets only the window
         that holds the triangles; a shear along the depth moves the optical axis there.
-        Returns the number of pixels drawn.
         """
-        image, depth, segmentation = frame
         rows, columns = view.box(view.pixels(corners))
         height, width = rows.stop - rows.start, columns.stop - columns.start
         if height <= 0 or width <= 0:
-            return 0
+            return None
         (cx, cy), focal = view.camera.centre_px, view.camera.focal_px
         across = (columns.start + (width - 1) / 2 - cx) / focal
         down = (rows.start + (height - 1) / 2 - cy) / focal
@@ -190,9 +192,7 @@ class Solids:
             self._settings,
         )
         covered = cv2.extractChannel(drawn, 0) > 0
-        segmentation[rows, columns][covered] = segment
-        cv2.copyTo(cv2.convertScaleAbs(drawn), covered.view(np.uint8), image[rows, columns])
-        return int(np.count_nonzero(covered))
+        return Layer(rows=rows, columns=columns, covered=covered, drawn=drawn)
 
     def _shade(self, solid: _Solid, level: int) -> Array:
         """Return the mesh's colours in this light, kept until the solid turns.
@@ -210,6 +210,39 @@ class Solids:
             lit = mesh.colours * np.clip(light, 0, 1.15)[:, None]
             kept = solid.shades[level] = np.clip(np.round(lit), 1, 255).astype(np.float32)
         return kept
+
+
+def draw_shadows(
+    image: NDArray[np.uint8], view: View, shadows: Sequence[Shadow], conditions: Conditions
+) -> None:
+    """Darken the ground where dynamic objects keep the sun from it."""
+    if not _sun_shines(conditions):
+        return
+    sun = conditions.sun
+    reach = 3 * max(2.0, float(view.eye[2]))
+    outlines: list[NDArray[np.float64]] = []
+    lengths: list[int] = []
+    for shadow in shadows:
+        x = shadow.at[0] - sun[0] / sun[2] * shadow.at[2]
+        y = shadow.at[1] - sun[1] / sun[2] * shadow.at[2]
+        if math.hypot(x - view.eye[0], y - view.eye[1]) < reach + shadow.radius_m:
+            outlines.append(shadow.outlines + np.array([x, y]))
+            lengths += shadow.lengths
+    if not outlines:
+        return
+    points, lengths = view.ground_polygons(np.concatenate(outlines), lengths)
+    rows, columns = view.box(points)
+    part = image[rows, columns]
+    if part.size == 0:
+        return
+    mask = np.zeros(part.shape[:2], np.uint8)
+    fixed = np.round((points - (columns.start, rows.start)) * 2**_SHIFT).astype(np.int32)
+    start = 0
+    for length in lengths:
+        cv2.fillConvexPoly(mask, fixed[start : start + length], (255.0,), cv2.LINE_8, _SHIFT)
+        start += length
+    share = conditions.direct_share
+    cv2.copyTo(cv2.convertScaleAbs(part, alpha=1 - share), mask, part)
 
 
 def _sun_shines(conditions: Conditions) -> bool:

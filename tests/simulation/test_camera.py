@@ -93,12 +93,28 @@ def test_the_same_arguments_give_the_same_bytes() -> None:
     assert (first.image != picture(seed=5, **genes).image).any()
 
 
+def test_an_image_asked_for_late_shows_its_own_moment() -> None:
+    genes = {"rain": 0.3, "maple_leaf": 0.5, "road_leaf": 0.1, "fog": 0.05, "sun_position": 0.5}
+    made, map = renderer("lawn", seed=4, genes=genes)
+    x, y = made.marker_m
+    tilted = (0.5, 0.0, 0.0, 0.866)
+    late = made.render((x, y, 5.0), tilted, 1.0, poses(x, y))
+    made.render((x + 2, y, 8.0), LEVEL, 2.0, poses(x + 1, y - 1))
+    genome = genome_for(map, weather="full")
+    clear = repair(decode(genome.nominal, genome, map="lawn", seed=4), map)
+    made.change(clear.replace({"environment.road_snow": 0.9}))
+    made.render((x + 2, y, 8.0), LEVEL, 3.0, poses(x - 1, y - 1))
+    again, _ = renderer("lawn", seed=4, genes=genes)
+    assert (late.image == again.render((x, y, 5.0), tilted, 1.0, poses(x, y)).image).all()
+    assert (late.segmentation < 0).any(), "the horizon is part of this test"
+
+
 def test_the_markers_area_agrees_with_its_pixels() -> None:
     made, _ = renderer()
     x, y = made.marker_m
     for height in (2.0, 4.0, 8.0):
         eye = (x + 0.3, y - 0.2, height)
-        frame = made.render(eye, LEVEL, 0.0, poses(x + 6, y), colour=False)
+        frame = made.render(eye, LEVEL, 0.0, poses(x + 6, y))
         counted = (frame.segmentation == 1).sum()
         side = made.marker_area_px(eye, LEVEL) ** 0.5
         # fillConvexPoly draws the outline as well: half a pixel on each side.
@@ -192,7 +208,7 @@ def test_geometry_agrees_with_pybullets_renderer(name: str) -> None:
         if _inside(map, eye):
             continue
         objects = poses(eye[0], eye[1])
-        frame = made.render(eye, q, 0.0, objects, colour=False)
+        frame = made.render(eye, q, 0.0, objects)
         depth, masks = _bullet_frame(map, objects, eye, q)
         for body_name, mask in masks.items():
             ours = frame.segmentation == made.segment_ids[body_name]
@@ -215,9 +231,23 @@ def test_a_body_beside_the_camera_is_clipped_not_lost() -> None:
     made, map = renderer("lawn")
     tree = map.bodies[0]
     eye = (tree.position_m[0] + 0.4, tree.position_m[1], 2.0)
-    frame = made.render(eye, LEVEL, 0.0, poses(0, 0), colour=False)
+    frame = made.render(eye, LEVEL, 0.0, poses(0, 0))
     assert (frame.segmentation == made.segment_ids[tree.name]).sum() > 200
     assert np.isfinite(frame.depth_m).all()
+
+
+def test_what_stands_before_the_sky_has_its_own_depth_from_any_height() -> None:
+    made, map = renderer("lawn")
+    tree = map.bodies[0]
+    half = math.radians(75) / 2
+    level = (0.0, -math.sin(half), 0.0, math.cos(half))
+    for height in np.linspace(3.9, 4.2, 31):
+        eye = (tree.position_m[0] - 8.0, tree.position_m[1], float(height))
+        frame = made.render(eye, level, 0.0, poses(0, 0))
+        trunk = frame.segmentation == made.segment_ids[tree.name]
+        assert trunk.sum() > 200
+        assert frame.depth_m[trunk].max() < 15
+        assert frame.depth_m.max() == FAR_M
 
 
 def test_marker_position_is_where_the_genes_say() -> None:

@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import dataclasses
 from pathlib import Path
 from typing import ClassVar
 
@@ -46,6 +47,20 @@ class Hovers:
         return PositionSetpoint(position_m=(*self.home[:2], 3.0))
 
 
+class Procrastinates(Hovers):
+    """Keeps what it sees without looking at it."""
+
+    kept: ClassVar[list[Observation]] = []
+
+    def reset(self, mission: Mission) -> None:
+        self.home = mission.home_m
+        self.kept.clear()
+
+    def step(self, observation: Observation) -> Command:
+        self.kept.append(observation)
+        return PositionSetpoint(position_m=(*self.home[:2], 3.0))
+
+
 class Weathermaker:
     """Lets it snow on the ground from the third decision on; only the dog's does."""
 
@@ -70,6 +85,17 @@ WEATHERMAKER = PolicySpec(name="weathermaker", factory=f"{__name__}:Weathermaker
 def flown(policy: PolicySpec = WEATHERMAKER) -> tuple[Flight, list[np.ndarray]]:
     flight = fly(SCENARIO, Hovers, policy, time_limit_s=3.0)
     return flight, list(Hovers.seen)
+
+
+def test_an_image_looked_at_after_the_flight_shows_what_the_camera_saw_then() -> None:
+    looked_at, seen = flown()
+    procrastinated = fly(SCENARIO, Procrastinates, WEATHERMAKER, time_limit_s=3.0)
+    assert procrastinated.sha256 == looked_at.sha256
+    for observation, image in zip(Procrastinates.kept, seen, strict=True):
+        assert (observation.image == image).all()
+        assert not observation.image.flags.writeable
+    other = np.zeros_like(seen[0])
+    assert (dataclasses.replace(Procrastinates.kept[0], image=other).image == other).all()
 
 
 def test_changes_add_up_and_stay_in_the_genes_range() -> None:
