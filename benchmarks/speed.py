@@ -42,7 +42,8 @@ PARTS: tuple[tuple[str, Any, tuple[str, ...]], ...] = (
     ("planning: observe and replan", EgoPlanner, ("observe", "plan")),
     ("watch for movements", MovementWatch, ("points_in_the_way",)),
     ("flight control of MM-MLS", MultiModuleLandingSystem, ("control",)),
-    ("camera: frames and depth", Renderer, ("render",)),
+    ("camera: depth and segments", Renderer, ("render",)),
+    ("camera: images looked at", Renderer, ("_paint",)),
     ("physics and contacts", World, ("step", "touches", "separations", "uav", "move")),
     ("objects and their policy", MovingObject, ("decide", "advance")),
 )

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import copy
+import functools
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -20,7 +21,7 @@ from pytest_garl.simulation.ground import Ground, Raster, paint_ground, repaint
 from pytest_garl.simulation.ground_cover import covered
 from pytest_garl.simulation.particles import Particles
 from pytest_garl.simulation.sensor import Sensor
-from pytest_garl.simulation.solids import Place, Solids, draw_shadows
+from pytest_garl.simulation.solids import Layer, Place, Shadow, Solids, draw_shadows
 from pytest_garl.simulation.view import FAR_M, View
 from pytest_garl.simulation.weather import Conditions, conditions_of
 
@@ -75,6 +76,21 @@ class _Look:
     decay: Array
     air: NDArray[np.uint8]
     veil: NDArray[np.uint8]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class _Scene:
+    """What there is to paint in one frame."""
+
+    view: View
+    time_s: float
+    depth_m: Array
+    footprint_m: float
+    sky: NDArray[np.bool_] | None
+    shadows: Sequence[Shadow]
+    layers: Sequence[Layer]
+    ground: Ground | None
+    look: _Look
 
 
 class Renderer:
@@ -166,22 +182,33 @@ class Renderer:
         shadows = self._solids.shadows()
         pixels, layers = self._solids.draw(depth, segmentation, view)
         pixels[1] = np.count_nonzero(segmentation[marker] == 1)
-        look, ground = self._look, self._ground
-
-        def paint() -> NDArray[np.uint8]:
-            """Paint from the ground up, whatever the renderer draws by then."""
-            image = self._ground_image(_painted(ground), view, footprint, sky)
-            draw_shadows(image, view, shadows, look.conditions)
-            self._gloss(image, view, look.conditions)
-            if sky is not None:
-                image[sky] = look.air
-            for layer in layers:
-                layer.put_on(image)
-            look.particles.draw(image, depth, view, time_s)
-            _fog(image, depth, look)
-            return look.sensor.expose(image, time_s)
-
+        scene = _Scene(
+            view=view,
+            time_s=time_s,
+            depth_m=depth,
+            footprint_m=footprint,
+            sky=sky,
+            shadows=shadows,
+            layers=layers,
+            ground=self._ground,
+            look=self._look,
+        )
+        paint = functools.partial(self._paint, scene)
         return Frame(paint=paint, depth_m=depth, segmentation=segmentation, pixels=pixels)
+
+    def _paint(self, scene: _Scene) -> NDArray[np.uint8]:
+        """Paint from the ground up, whatever the renderer has drawn since."""
+        view, look = scene.view, scene.look
+        image = self._ground_image(scene)
+        draw_shadows(image, view, scene.shadows, look.conditions)
+        self._gloss(image, view, look.conditions)
+        if scene.sky is not None:
+            image[scene.sky] = look.air
+        for layer in scene.layers:
+            layer.put_on(image)
+        look.particles.draw(image, scene.depth_m, view, scene.time_s)
+        _fog(image, scene.depth_m, look)
+        return look.sensor.expose(image, scene.time_s)
 
     def marker_pixels(self, position_m: Vector, attitude: Quaternion) -> int:
         """Count the marker's pixels in a frame with nothing in front of it."""
@@ -229,16 +256,15 @@ class Renderer:
         depth[sky] = FAR_M
         return depth, True
 
-    def _ground_image(
-        self, ground: Ground, view: View, footprint: float, sky: NDArray[np.bool_] | None
-    ) -> NDArray[np.uint8]:
+    def _ground_image(self, scene: _Scene) -> NDArray[np.uint8]:
+        view, ground, footprint = scene.view, _painted(scene.ground), scene.footprint_m
         world = view.ground_of_pixel
         height, width = self.camera.height_px, self.camera.width_px
         # Four channels: warpPerspective is 2.5 times as fast as with three.
         image = np.empty((height, width, 4), np.uint8)
         inset = ground.inset
         rows, columns = slice(0, height), slice(0, width)
-        if sky is not None or not inset.holds(world @ self._corners):
+        if scene.sky is not None or not inset.holds(world @ self._corners):
             _warp(ground.wide, image, world, footprint, cv2.BORDER_REFLECT_101)
             rows, columns = view.box(view.ground_polygon(inset.outline))
         part = image[rows, columns]
