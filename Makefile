@@ -12,8 +12,8 @@ SMOKE := .garl/experiment-smoke
 help:  ## show the commands
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/'
 
-search: $(READY)  ## fly BUDGET scenarios (default 20) per landing system and map
-	$(BIN)/pytest --garl-budget=$(BUDGET) landing_systems/
+search: $(READY)  ## fly BUDGET scenarios (default 20) per landing system and map, as if nothing were known
+	$(BIN)/pytest --garl-budget=$(BUDGET) -o garl_cases=.garl/cases landing_systems/
 
 test: lint types layers tests  ## lint, types, layers and all tests
 
