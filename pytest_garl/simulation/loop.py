@@ -7,10 +7,9 @@ import math
 import traceback
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import Any, Protocol, TypeVar
+from typing import Any, Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
 from pytest_garl.landing_system import (
     Abort,
@@ -18,7 +17,6 @@ from pytest_garl.landing_system import (
     Command,
     Land,
     MotorThrusts,
-    Observation,
     VehicleState,
     airframe_of,
 )
@@ -33,6 +31,7 @@ from pytest_garl.simulation.flight import Crash, Flight, Outcome
 from pytest_garl.simulation.flight_control import FlightControl
 from pytest_garl.simulation.mission import mission_for
 from pytest_garl.simulation.objects import MovingObject
+from pytest_garl.simulation.observing import observe
 from pytest_garl.simulation.policy import DECISION_STEP_S, Change, ObjectPolicy, Situation
 from pytest_garl.simulation.randomness import generator
 from pytest_garl.simulation.recorder import Recorder
@@ -66,28 +65,6 @@ asked.  To meet within 10 steps the two would have to close at 48 m/s."""
 POSITION_NOISE_M = 0.02
 VELOCITY_NOISE_MPS = 0.05
 """Engineering estimate: RTK gives centimetres; 0.05 m/s is u-blox's stated accuracy (M8)."""
-
-Array = TypeVar("Array", bound=np.ndarray[Any, Any])
-
-
-class Seen(Observation):
-    """An observation whose image is painted only for a system that looks at it.
-
-    To paint takes longer than all the rest of a frame, and not every system looks at each.
-    """
-
-    __slots__ = ("_frame",)
-    _frame: Frame | NDArray[np.uint8]
-
-    @property
-    def image(self) -> NDArray[np.uint8]:
-        """The RGB image, read-only."""
-        frame = self._frame
-        return _frozen(frame.image) if isinstance(frame, Frame) else frame
-
-    @image.setter
-    def image(self, frame: Frame | NDArray[np.uint8]) -> None:
-        object.__setattr__(self, "_frame", frame)
 
 
 class StepGuard(Protocol):
@@ -359,13 +336,12 @@ class Loop:
         else:
             frame, visible = _blank(camera.height_px, camera.width_px), (0.0, 0.0, ())
         noise = self.pose_rng.standard_normal(6)
-        observation = Seen(
+        observation = observe(
+            frame,
             time_s=now,
-            position_m=_frozen(np.array(position) + POSITION_NOISE_M * noise[:3]),
-            velocity_mps=_frozen(np.array(velocity) + VELOCITY_NOISE_MPS * noise[3:]),
-            attitude=_frozen(np.array(attitude)),
-            image=frame,  # type: ignore[arg-type]
-            depth_m=_frozen(frame.depth_m),
+            position_m=np.array(position) + POSITION_NOISE_M * noise[:3],
+            velocity_mps=np.array(velocity) + VELOCITY_NOISE_MPS * noise[3:],
+            attitude=np.array(attitude),
         )
         command: Command = self._ask("step", lambda: self.system.step(observation))
         self._refuse(problem_with_command(command), "step")
@@ -434,11 +410,6 @@ def crash_of(error: Exception, method: str) -> Crash:
         where=where,
         traceback=text,
     )
-
-
-def _frozen(array: Array) -> Array:
-    array.flags.writeable = False
-    return array
 
 
 @functools.cache
