@@ -11,9 +11,10 @@ from typing import Any
 from pytest_garl.scenarios.maps import Map, load_map
 from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.simulation.flight import PACKAGES, Flight
-from pytest_garl.simulation.loop import Loop, StepGuard
+from pytest_garl.simulation.loop import Loop
 from pytest_garl.simulation.policy import PolicySpec
 from pytest_garl.simulation.record import cpu_class, hash_of
+from pytest_garl.simulation.system_calls import StepGuard
 
 
 def fly(

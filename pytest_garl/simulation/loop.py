@@ -4,10 +4,8 @@ from __future__ import annotations
 
 import functools
 import math
-import traceback
 from collections.abc import Callable, Sequence
-from pathlib import Path
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 
@@ -27,7 +25,7 @@ from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.simulation.camera import Frame, Renderer
 from pytest_garl.simulation.commands import problem_with_command, problem_with_thrusts
 from pytest_garl.simulation.environment import changed
-from pytest_garl.simulation.flight import Crash, Flight, Outcome
+from pytest_garl.simulation.flight import Flight, Outcome
 from pytest_garl.simulation.flight_control import FlightControl
 from pytest_garl.simulation.mission import mission_for
 from pytest_garl.simulation.objects import MovingObject
@@ -35,6 +33,7 @@ from pytest_garl.simulation.observing import observe
 from pytest_garl.simulation.policy import DECISION_STEP_S, Change, ObjectPolicy, Situation
 from pytest_garl.simulation.randomness import generator
 from pytest_garl.simulation.recorder import Recorder
+from pytest_garl.simulation.system_calls import BrokenError, StepGuard, SystemCalls
 from pytest_garl.simulation.truth import Truth, TruthObject
 from pytest_garl.simulation.vehicle import (
     Motion,
@@ -67,23 +66,6 @@ VELOCITY_NOISE_MPS = 0.05
 """Engineering estimate: RTK gives centimetres; 0.05 m/s is u-blox's stated accuracy (M8)."""
 
 
-class StepGuard(Protocol):
-    """Told before and after each call of the landing system's code; the pool's watchdog."""
-
-    def step_begins(self) -> None:
-        """User code is about to run."""
-
-    def step_ends(self) -> None:
-        """User code has returned or raised."""
-
-
-class BrokenError(Exception):
-    """The landing system broke down; carries what the flight records."""
-
-    def __init__(self, crash: Crash) -> None:
-        self.crash = crash
-
-
 class Loop:
     """One flight under way; ``begin`` it, then ``tick`` until there is an outcome."""
 
@@ -96,10 +78,11 @@ class Loop:
         time_limit_s: float,
         guard: StepGuard | None,
     ) -> None:
-        self.scenario, self.map, self.guard = scenario, map, guard
+        self.scenario, self.map = scenario, map
         self.time_limit_s = time_limit_s
         self.last_tick = round(time_limit_s * PHYSICS_RATE_HZ)
         self.make_system = system
+        self.calls = SystemCalls(system, guard)
         self.airframe: Airframe = airframe_of(system)
         self.marker = marker_position_m(scenario, map)
         self.model = vehicle_model(self.airframe)
@@ -151,9 +134,9 @@ class Loop:
 
     def _start_system(self) -> None:
         self.recorder.begin(*self.world.uav()[:3])
-        self.system = self._ask("reset", lambda: self.make_system())
+        self.system = self.calls.ask("reset", lambda: self.make_system())
         mission = mission_for(self.scenario, self.map, self.airframe, self.time_limit_s)
-        self._ask("reset", lambda: self.system.reset(mission))
+        self.calls.ask("reset", lambda: self.system.reset(mission))
         self.sees = bool(getattr(self.system, "needs_camera", True))
         self.tells_truth = getattr(self.system, "observe_truth", None)
         camera = self.airframe.camera
@@ -205,8 +188,8 @@ class Loop:
         elif self.airframe.control_rate_hz and not isinstance(self.command, Abort):
             if tick % self.control_every == 0:
                 state = self._state(tick, motion)
-                answer: MotorThrusts = self._ask("control", lambda: self.system.control(state))
-                self._refuse(problem_with_thrusts(answer), "control")
+                answer: MotorThrusts = self.calls.ask("control", lambda: self.system.control(state))
+                self.calls.refuse(problem_with_thrusts(answer), "control")
                 a, b, c, d = (float(value) for value in answer.newtons)
                 self.motors = (a, b, c, d)
             wanted = self.motors
@@ -326,7 +309,7 @@ class Loop:
                 ),
                 map=self.map,
             )
-            self._ask("observe_truth", lambda: self.system.observe_truth(truth))
+            self.calls.ask("observe_truth", lambda: self.system.observe_truth(truth))
         camera = self.airframe.camera
         if self.renderer:
             eye = eye_under(position, attitude)
@@ -343,8 +326,8 @@ class Loop:
             velocity_mps=np.array(velocity) + VELOCITY_NOISE_MPS * noise[3:],
             attitude=np.array(attitude),
         )
-        command: Command = self._ask("step", lambda: self.system.step(observation))
-        self._refuse(problem_with_command(command), "step")
+        command: Command = self.calls.ask("step", lambda: self.system.step(observation))
+        self.calls.refuse(problem_with_command(command), "step")
         self.recorder.step(command, visible)
         delay = round(self.airframe.latency_s * PHYSICS_RATE_HZ)
         self.pending.append((tick + delay, command))
@@ -371,45 +354,6 @@ class Loop:
         above_ground = position[2] - self.model.size_m
         self.nothing_near = min(least, above_ground) > CLEAR_OF_CONTACT_M
         self.recorder.pose(now, position, attitude, velocity, gaps)
-
-    def _ask(self, method: str, call: Callable[[], Any]) -> Any:
-        if self.guard:
-            self.guard.step_begins()
-        try:
-            return call()
-        except Exception as error:
-            raise BrokenError(crash_of(error, method)) from error
-        finally:
-            if self.guard:
-                self.guard.step_ends()
-
-    def _refuse(self, problem: str | None, method: str) -> None:
-        if problem:
-            name = getattr(self.make_system, "__name__", "system")
-            raise BrokenError(
-                Crash(
-                    kind="nonsense",
-                    error="BadCommand",
-                    message=problem,
-                    where=f"{name}.{method}",
-                    traceback="",
-                )
-            )
-
-
-def crash_of(error: Exception, method: str) -> Crash:
-    """Return the record of what a landing system raised in one of its methods."""
-    frames = traceback.extract_tb(error.__traceback__)
-    theirs = [frame for frame in frames if Path(frame.filename).resolve() != Path(__file__)]
-    where = f"{Path(theirs[-1].filename).stem}.{theirs[-1].name}" if theirs else method
-    text = "".join(traceback.format_list(theirs)) + "".join(traceback.format_exception_only(error))
-    return Crash(
-        kind="raised",
-        error=type(error).__name__,
-        message=str(error),
-        where=where,
-        traceback=text,
-    )
 
 
 @functools.cache
