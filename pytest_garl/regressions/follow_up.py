@@ -48,8 +48,9 @@ def inquiries(
     """Return what is to be found out about signatures that no saved case has.
 
     ``budget`` is for all signatures of one search together.  Where it does not reach for all, the
-    most frequent come first and the others have none.  ``own`` are assertions of tests that
-    failed where the verdict is content, by search and signature.
+    most frequent come first and the others have none; the first is saved, if unshrunk, however
+    small the budget.  ``own`` are assertions of tests that failed where the verdict is content, by
+    search and signature.
     """
     found = []
     asks = own or {}
@@ -72,7 +73,7 @@ def inquiries(
             if signature not in known
         }
         order = sorted(new, key=lambda signature: (-len(new[signature]), signature))
-        reached = min(len(order), budget // LEAST)
+        reached = min(len(order), max(1, budget // LEAST))
         map = load_map(job.map, place.map_folders)
         for number, signature in enumerate(order):
             found.append(

@@ -99,9 +99,10 @@ def test_cases_of_a_search_with_destinations_keep_them_and_are_flown(
     run(pytester, *CASES).assert_outcomes(passed=2, skipped=2, xfailed=2)
 
 
-def test_what_the_budget_does_not_reach_is_told(pytester: pytest.Pytester) -> None:
+@pytest.mark.parametrize("budget", [1, 6])
+def test_what_the_budget_does_not_reach_is_told(pytester: pytest.Pytester, budget: int) -> None:
     project(pytester)
-    result = run(pytester, *SEARCH, "--garl-shrink=6")
+    result = run(pytester, *SEARCH, f"--garl-shrink={budget}")
     assert len(cases(pytester)) == 1
     told = "not saved: Good on lawn: IV:dog:*: the budget of --garl-shrink did not reach it"
     result.stdout.fnmatch_lines(["*confirming and shrinking 1 new kinds*", told])
