@@ -1,8 +1,8 @@
 """What the shrinker's passes are worth, on violations of OpenCV-MLS that a search found.
 
-``python -m benchmarks.shrinking`` takes twenty violations, kind after kind, from ``garl``, seed 0,
-of ``benchmarks.methods`` (flown first where it is missing), shrinks each by both passes and
-by each alone, and appends to ``docs/shrinking.csv`` what that lacks; ``--report`` prints the table.
+``python -m benchmarks.shrinking`` searches with the defaults of pytest-garl, takes twenty of the
+violations, kind after kind, shrinks each by both passes and by each alone, and appends to
+``docs/shrinking.csv`` what that lacks; ``--report`` prints the table.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks.methods import search
+from benchmarks.methods import run
 from benchmarks.rows import append, read
 from pytest_garl.regressions.pursuit import culprit_of
 from pytest_garl.regressions.shrink import (
@@ -38,8 +38,12 @@ from pytest_garl.search.ledger import Ledger, Row
 from pytest_garl.search.local_pool import local_pool
 
 FILE = Path("docs/shrinking.csv")
+TESTS = "landing_systems/test_opencv_mls.py"
 COUNT = 20
-BUDGET = 60
+SEARCHED = 60
+"""Flights of the search on each map that the violations are taken from."""
+BUDGET = 40
+AT_A_TIME = 5
 PASSES: dict[str, tuple[Callable[..., None], ...]] = {
     "both": (reset_and_bisect, by_hypothesis, tidy),
     "reset and bisect": (reset_and_bisect,),
@@ -94,13 +98,21 @@ def _violation(ledger: Ledger, row: Row) -> Violation:
     )
 
 
-def shrink_one(violation: Violation, passes: str, fly: Fly) -> dict[str, Any]:
-    """Shrink a violation by some passes; return a row."""
-    map = load_map(violation.job.map)
+def shrink_one(violation: Violation, fly: Fly) -> list[dict[str, Any]]:
+    """Shrink a violation by all passes and by each alone; return a row for each."""
+    known: dict[Scenario, bool] = {}
 
     def fails(scenario: Scenario) -> bool:
-        return fly(violation.job, scenario).signature == violation.signature
+        # What one pass has flown the next need not fly again; it counts for both.
+        if scenario not in known:
+            known[scenario] = fly(violation.job, scenario).signature == violation.signature
+        return known[scenario]
 
+    return [_row(violation, passes, fails) for passes in PASSES]
+
+
+def _row(violation: Violation, passes: str, fails: Callable[[Scenario], bool]) -> dict[str, Any]:
+    map = load_map(violation.job.map)
     found = shrink(
         violation.scenario,
         fails,
@@ -159,31 +171,31 @@ def main() -> None:
     parser.add_argument("--report", action="store_true")
     parser.add_argument("--count", type=int, default=COUNT)
     parser.add_argument("--workers", type=int, default=os.cpu_count() or 1)
-    parser.add_argument("--ledger", type=Path, help="of a finished search, instead of flying one")
     arguments = parser.parse_args()
     known = read(FILE)
     if arguments.report:
         print(report(known))
         return
-    done = {(row["passes"], row["map"], row["slot"]) for row in known}
-    source = Ledger(arguments.ledger or search("garl", 0, 400))
+    done = {(row["map"], row["slot"]) for row in known}
+    folder = Path(".garl/shrinking/search")
+    source = Ledger(run(folder, TESTS, [f"--garl-budget={SEARCHED}"]))
     wanted = [
-        (each, passes)
+        each
         for each in violations(source, arguments.count)
-        for passes in PASSES
-        if (passes, each.job.map, each.slot) not in done
+        if (each.job.map, each.slot) not in done
     ]
     path = Path(".garl/shrinking/ledger.sqlite")
     ledger = Ledger(path) if path.is_file() else Ledger.create(path, {})
     pool = local_pool(ledger, arguments.workers)
     try:
         # As many at a time as keep the workers busy; what is done is written down.
-        for start in range(0, len(wanted), 6):
+        for start in range(0, len(wanted), AT_A_TIME):
             functions = {
-                f"{each.job.map} {each.slot} {passes}": functools.partial(shrink_one, each, passes)
-                for each, passes in wanted[start : start + 6]
+                f"{each.job.map} {each.slot}": functools.partial(shrink_one, each)
+                for each in wanted[start : start + AT_A_TIME]
             }
-            append(FILE, FIELDS, Errands(ledger, pool, lambda: None).run(functions).values())
+            found = Errands(ledger, pool, lambda: None).run(functions)
+            append(FILE, FIELDS, itertools.chain.from_iterable(found.values()))
     finally:
         pool.close()
 
