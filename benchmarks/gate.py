@@ -11,7 +11,6 @@ import argparse
 import dataclasses
 import itertools
 import os
-import sqlite3
 import statistics
 import subprocess
 import sys
@@ -21,6 +20,7 @@ from collections import Counter
 from collections.abc import Iterator
 from concurrent.futures import ProcessPoolExecutor
 from pathlib import Path
+from xml.etree import ElementTree
 
 from pytest_garl.regressions.case import Case
 from pytest_garl.regressions.files import dumps, load
@@ -31,7 +31,7 @@ from pytest_garl.search.child import THREADS
 
 CASES = Path("scenarios/regressions")
 COUNT = 30
-LINES = ("PASSED", "FAILED", "ERROR", "XFAIL", "XPASS")
+OUTCOMES = ("skipped", "failure", "error")
 
 
 def mixed(found: list[Case]) -> Iterator[Case]:
@@ -47,25 +47,30 @@ def mixed(found: list[Case]) -> Iterator[Case]:
             yield dataclasses.replace(case, scenario=beside, status=status)
 
 
-def gate(cases: Path, folder: Path) -> tuple[float, str]:
-    """Fly all cases as pytest items; return the wall time, and outcomes and hashes as text."""
-    options = ("-q", "-rA", "-p", "no:cacheprovider", "--tb=no", "landing_systems")
-    ini = ("-o", f"garl_cases={cases}", "-o", f"garl_dir={folder}")
+def gate(cases: Path, folder: Path) -> tuple[float, dict[str, str]]:
+    """Fly all cases as pytest items; return the wall time, and each one's outcome and hash."""
+    folder.mkdir()
+    options = ("-q", "-p", "no:cacheprovider", "--tb=no", f"--junitxml={folder / 'junit.xml'}")
+    ini = ("-o", f"garl_cases={cases}", "-o", f"garl_dir={folder / 'garl'}")
     began = time.perf_counter()
     done = subprocess.run(
-        [sys.executable, "-m", "pytest", *options, *ini],
-        capture_output=True,
-        text=True,
+        [sys.executable, "-m", "pytest", *options, *ini, "landing_systems"],
+        stdout=subprocess.DEVNULL,
         check=False,
     )
     took = time.perf_counter() - began
-    told = sorted(line for line in done.stdout.splitlines() if line.startswith(LINES))
-    with sqlite3.connect(folder / "ledger.sqlite") as ledger:
-        rows = ledger.execute(
-            "SELECT system, map, scenario, sha256 FROM slot JOIN search ON search.id = slot.search "
-            "ORDER BY system, map, scenario, sha256"
-        ).fetchall()
-    return took, "\n".join((*told, *map(repr, rows)))
+    if done.returncode not in (0, 1):
+        sys.exit(f"pytest ended with {done.returncode}")
+    items = ElementTree.parse(folder / "junit.xml").iter("testcase")
+    flown = {f"{each.get('classname')}.{each.get('name')}": _told(each) for each in items}
+    return took, {name: told for name, told in flown.items() if "[case-" in name}
+
+
+def _told(item: ElementTree.Element) -> str:
+    """Return what came of an item: its outcome, and its flight's hash where it has one."""
+    outcome = next((each.get("type", each.tag) for each in item if each.tag in OUTCOMES), "passed")
+    values = {each.get("name"): each.get("value") for each in item.iter("property")}
+    return f"{outcome} {values.get('garl.trajectory_sha256', '')}"
 
 
 def hash_of_flight(path: Path) -> str:
@@ -94,13 +99,15 @@ def main() -> None:
         count = sum(1 for _ in cases.rglob("*.toml"))
         gates = [gate(cases, Path(name, f"run-{run}")) for run in range(arguments.runs)]
     times = [took for took, _ in gates]
-    outcomes = Counter(line.split()[0] for line in gates[0][1].splitlines()[:-1] if line[0] != "(")
-    print(f"{count} cases, {arguments.runs} runs: {len({told for _, told in gates})} result(s)")
+    outcomes = Counter(told.split()[0] for told in gates[0][1].values())
+    hashes = {told.split()[1] for told in gates[0][1].values() if " " in told.strip()}
+    results = {tuple(sorted(told.items())) for _, told in gates}
+    print(f"{count} cases, {arguments.runs} runs: {len(results)} result(s), {len(hashes)} flights")
     print(f"  {dict(outcomes)}; {statistics.median(times):.0f} s (most {max(times):.0f} s)")
     os.environ.update(THREADS)
     with ProcessPoolExecutor() as pool:
-        hashes = Counter(pool.map(hash_of_flight, [paths[0]] * arguments.replays))
-    print(f"{paths[0].name}: {arguments.replays} flights, {len(hashes)} hash(es)")
+        again = Counter(pool.map(hash_of_flight, [paths[0]] * arguments.replays))
+    print(f"{paths[0].name}: {arguments.replays} flights, {len(again)} hash(es)")
 
 
 if __name__ == "__main__":

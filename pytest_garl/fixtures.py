@@ -125,6 +125,7 @@ def landing(request: pytest.FixtureRequest, garl_slot: Target, npcs: PolicySpec)
         ("garl.signature", verdict["signature"]),
         ("garl.final_distance_m", result["final_distance_m"]),
         ("garl.elapsed_s", result["elapsed_s"]),
+        ("garl.trajectory_sha256", run.trajectory_sha256(garl_slot)),
     ]
     first = run.first_item(garl_slot) == request.node.nodeid
     if result["outcome"] == "inconclusive":

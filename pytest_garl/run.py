@@ -120,6 +120,10 @@ class Run:
         name = flight_name(target.search, slot.generation, slot.index, target.map)
         return self.options.folder / "flights" / f"{name}.npz"
 
+    def trajectory_sha256(self, target: Target) -> str:
+        """Return the hash of a slot's flight."""
+        return self.ledger.sha256(target.search, target.slot.generation, target.slot.index)
+
     def scenario(self, target: Target) -> Scenario:
         """Return what a slot flies."""
         from pytest_garl.search.job import load_scenario

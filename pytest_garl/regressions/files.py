@@ -304,5 +304,8 @@ def _changes(changes: ChangeList) -> str:
 
 
 def _moves(moves: MoveList) -> str:
-    runs = [(len(list(run)), x, y) for (x, y), run in itertools.groupby(moves)]
-    return f"[{', '.join(f'[{count}, {x!r}, {y!r}]' for count, x, y in runs)}]"
+    # By what is written: -0.0 equals 0.0 and is another number.
+    runs = [
+        (len(list(run)), text) for text, run in itertools.groupby(f"{x!r}, {y!r}" for x, y in moves)
+    ]
+    return f"[{', '.join(f'[{count}, {text}]' for count, text in runs)}]"

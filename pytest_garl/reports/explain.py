@@ -146,8 +146,7 @@ def _doubt(run: Run, target: Target, result: dict[str, Any]) -> str:
     """Fly a new violation again; return what is doubtful about it, or nothing."""
     if target.deterministic:
         _, hashes = run.again(target, 1)
-        slot = target.slot
-        if hashes[0] == run.ledger.sha256(target.search, slot.generation, slot.index):
+        if hashes[0] == run.trajectory_sha256(target):
             return ""
         return (
             "Nondeterministic landing system: the same flight again came to other trajectories"

@@ -83,8 +83,10 @@ class MovingObject:
     def take(self, move: Move) -> None:
         """Go where ``move`` says until the next decision."""
         self.changes += [(len(self.moves), key, float(by)) for key, by in move.changes]
-        self.moves.append((move.x, move.y))
-        self._wanted = (move.x * self.speed_mps, move.y * self.speed_mps)
+        # Without negative zeros, so that moves that compare equal are the same to the byte.
+        x, y = move.x + 0.0, move.y + 0.0
+        self.moves.append((x, y))
+        self._wanted = (x * self.speed_mps, y * self.speed_mps)
         # What it can reach before the next decision; few, and mostly none.
         reach = self.type.radius_m + self.speed_mps * DECISION_STEP_S + _LOOK_AHEAD_M
         self._near = [solid for solid in self._solids if _gap(solid, self.x_m, self.y_m) < reach]

@@ -191,9 +191,11 @@ def test_junit_carries_what_was_found(pytester: pytest.Pytester, parallel: tuple
             "garl.signature",
             "garl.final_distance_m",
             "garl.elapsed_s",
+            "garl.trajectory_sha256",
         }
         assert f"[{found['garl.slot']}]" in str(case.get("name"))
         assert float(found["garl.elapsed_s"]) == 14.2
+        assert found["garl.trajectory_sha256"]
 
 
 def test_the_line_tells_of_shrinking_and_goes(pytester: pytest.Pytester) -> None:

@@ -117,6 +117,15 @@ def test_an_unknown_object_changes_nothing() -> None:
         loads(text, load_map)
 
 
+def test_a_negative_zero_survives_the_file_with_the_name() -> None:
+    plain = dataclasses.replace(
+        case(), moves=((NAMES[-1], ((0.0, 0.0), (0.0, -0.0), (-0.0, 0.0))),)
+    )
+    again = loads(dumps(plain), load_map)
+    assert repr(again.moves) == repr(plain.moves)
+    assert again.id == plain.id
+
+
 def test_moves_are_written_as_runs() -> None:
     assert f"{NAMES[-1]} = [[2, 0.0, 0.0], [1, 0.6, -0.8]]" in dumps(case())
 
