@@ -66,6 +66,7 @@ VARIANTS: dict[str, Callable[[Plan], Method]] = {
     "without aimed steps": functools.partial(Garl, aims=0.0),
     "without other weather": functools.partial(Garl, weathers=0.0),
     "without crossover": functools.partial(Garl, crossover=0.0),
+    "without spreading": functools.partial(Garl, spreads=0.0),
     "garl-paper": find_method("garl-paper"),
     "random": find_method("random"),
 }

@@ -4,7 +4,9 @@ MAP-Elites (Mouret and Clune 2015, "Illuminating search spaces by mapping elites
 paper's chromosomes and crossover.  A cell is a way to fail: a violation's signature, or that which
 a near miss would have had.  Which cell is bred from is decided by Thompson sampling (Thompson
 1933) of what its children came to: a first violation of a kind counts most, the twentieth little,
-so that near misses of another kind are worth more than one more of the same.
+so that near misses of another kind are worth more than one more of the same.  Places and speeds are
+spread out as the paper's mutation does, away from all that was flown before; weather and light
+are not: at their ends a flight is aborted rather than failed.
 """
 
 from __future__ import annotations
@@ -15,6 +17,7 @@ from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from pytest_garl.scenarios.chromosome import decode, encode
 from pytest_garl.scenarios.scenario import Scenario
@@ -22,9 +25,11 @@ from pytest_garl.scenarios.validity import repair
 from pytest_garl.search.method import Flown, Plan
 from pytest_garl.search.objectives import threat
 from pytest_garl.search.operators import (
+    CANDIDATES,
     CROSSOVER_PROBABILITY,
     LARGEST_STEP,
     Matrix,
+    farthest_from_all,
     local_steps,
     nuclear_gene_crossover,
 )
@@ -40,20 +45,28 @@ PROGRESS = 0.01
 """A child that raises its cell's threat by so much has succeeded."""
 NEAREST = 0.1
 """The largest step shrinks with the distance to a violation, down to this share of it."""
+SPREADS = 0.75
+"""Share of places and speeds that are put away from all that were flown, in a scenario without
+parents and in one bred far from its parent."""
 MEMORY = 0.9
-"""What a trial still counts for after one more of its cell: cells change as they are searched."""
-
+"""What a trial still counts for after one more of its arm: cells change as they are searched."""
+NEAR, FAR = "near", "far"
+"""Ways to breed: by small steps, or with all but the nearest object spread out."""
 
 Genes = tuple[tuple[str, float], ...]
+Arm = tuple[str, str]
+"""What is chosen between: a cell and a way to breed from it; ("", "") for no parents."""
+ORPHAN: Arm = ("", "")
 
 
 class Garl:
     """The archive of cells, and how it is bred from.
 
-    ``explores`` is the share of scenarios without parents, ``aims`` that of children whose
-    steps are aimed, ``weathers`` that of these in another weather, ``crossover`` the paper's
-    probability for the others, ``cell`` names the cell of a flight's result; ``learns_cells``
-    is whether cells are chosen by their success instead of in turn.
+    ``explores`` is the share of scenarios without parents, ``aims`` that of children bred near
+    whose steps are aimed, ``weathers`` that of these in another weather, ``crossover`` the
+    paper's probability for the others, ``spreads`` the share of genes that are spread out,
+    ``cell`` names the cell of a flight's result; ``learns_cells`` is whether cells are chosen by
+    their success instead of in turn.
     """
 
     learns = True
@@ -67,18 +80,20 @@ class Garl:
         weathers: float = WEATHERS,
         learns_cells: bool = True,
         crossover: float = CROSSOVER_PROBABILITY,
+        spreads: float = SPREADS,
         cell: Callable[[dict[str, Any]], str] | None = None,
     ) -> None:
         self._plan, self._explores, self._aims = plan, explores, aims
         self._weathers, self._learns_cells = weathers, learns_cells
-        self._crossover = crossover
+        self._crossover, self._spreads = crossover, spreads
         self._cell = cell or cell_of
         place = hashlib.sha256(f"garl {plan.map.name}".encode()).digest()
         key = int.from_bytes(place[:4], "big")
         self._rng = np.random.default_rng(np.random.SeedSequence(plan.seed, spawn_key=(key,)))
         self._cells: defaultdict[str, list[Flown]] = defaultdict(list)
-        self._trials: defaultdict[str, tuple[float, float]] = defaultdict(lambda: (0.0, 0.0))
-        self._parents: dict[Genes, str] = {}
+        self._trials: defaultdict[Arm, tuple[float, float]] = defaultdict(lambda: (0.0, 0.0))
+        self._arms: dict[Genes, Arm] = {}
+        self._asked: list[Matrix] = []
         self._signatures: Counter[str] = Counter()
         keys = plan.genome.keys
         self._weather = np.array([key.startswith("environment.") for key in keys])
@@ -92,9 +107,9 @@ class Garl:
         for item in flown:
             name = self._cell(item.result)
             worth = self._worth(name, item)
-            parent = self._parents[item.scenario.genes]
-            wins, losses = self._trials[parent]
-            self._trials[parent] = MEMORY * wins + worth, MEMORY * losses + 1 - worth
+            arm = self._arms[item.scenario.genes]
+            wins, losses = self._trials[arm]
+            self._trials[arm] = MEMORY * wins + worth, MEMORY * losses + 1 - worth
             self._cells[name].append(item)
         return [(threat(item.result),) for item in flown]
 
@@ -111,26 +126,38 @@ class Garl:
         """Return a scenario that was not asked for before."""
         while True:
             explores = not self._cells or self._rng.random() < self._explores
-            name = "" if explores else self._choose()
-            scenario = self._child(name) if name else self._random()
-            if scenario.genes not in self._parents:
-                self._parents[scenario.genes] = name
+            arm = ORPHAN if explores else self._choose()
+            scenario = self._random() if explores else self._child(*arm)
+            if scenario.genes not in self._arms:
+                self._arms[scenario.genes] = arm
+                self._asked.append(encode(scenario, self._plan.genome))
                 return scenario
 
-    def _choose(self) -> str:
-        """Return the cell that looks most promising in a draw from what is known of each."""
-        names = sorted(self._cells)
+    def _choose(self) -> Arm:
+        """Return the arm that looks most promising in a draw from what is known of each."""
+        arms = [(name, NEAR) for name in sorted(self._cells)]
+        # What is but nearly a violation hangs on all of its genes.
+        arms += [(name, FAR) for name, _ in arms if name in self._signatures]
         if not self._learns_cells:
-            bred = Counter(self._parents.values())
-            return min(names, key=lambda name: bred[name])
-        trials = np.array([self._trials[name] for name in names])
-        return names[int(np.argmax(self._rng.beta(1 + trials[:, 0], 1 + trials[:, 1])))]
+            bred = Counter(self._arms.values())
+            return min(arms, key=lambda arm: bred[arm])
+        trials = np.array([self._trials[arm] for arm in arms])
+        return arms[int(np.argmax(self._rng.beta(1 + trials[:, 0], 1 + trials[:, 1])))]
 
     def _random(self) -> Scenario:
-        row = self._plan.genome.random(self._rng)
+        row = self._spread(self._plan.genome.random(self._rng), ~self._weather)
         return self._scenario(row, int(self._rng.integers(2**32)))
 
-    def _child(self, name: str) -> Scenario:
+    def _spread(self, row: Matrix, which: NDArray[np.bool_]) -> Matrix:
+        """Return a copy with a share of some genes away from all that were flown (paper, eq. 2)."""
+        rng, genome, spread = self._rng, self._plan.genome, row.copy()
+        flown = np.array(self._asked) if self._asked else row[None]
+        for column in np.flatnonzero(which & (rng.random(row.size) < self._spreads)):
+            drawn = rng.uniform(genome.lower[column], genome.upper[column], CANDIDATES)
+            spread[column] = drawn[farthest_from_all(drawn, flown[:, column])]
+        return spread
+
+    def _child(self, name: str, way: str) -> Scenario:
         """Return a child of one of a cell's flights.
 
         A scenario's own seed is inherited with the tail of the chromosome, where the objects
@@ -143,6 +170,8 @@ class Garl:
         largest = LARGEST_STEP * max(NEAREST, 1 - threat(first.result))
         body = f"{first.result['closest_body']}."
         aim = np.array([key.startswith(body) for key in genome.keys])
+        if way == FAR:
+            return self._scenario(self._spread(row, ~(aim | self._weather)), seed)
         if aim.any() and rng.random() < self._aims:
             moved = local_steps(
                 row[None], genome.lower, genome.upper, rng, probability=1.0, largest=largest

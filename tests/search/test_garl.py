@@ -1,14 +1,20 @@
 from __future__ import annotations
 
 from collections import Counter
+from collections.abc import Iterable
 from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
+
+from pytest_garl.scenarios.chromosome import encode
 from pytest_garl.scenarios.genes import genome_for
 from pytest_garl.scenarios.maps import load_map
 from pytest_garl.scenarios.scenario import Scenario
-from pytest_garl.search.garl import EXPLORES, Garl, cell_of
+from pytest_garl.search.garl import EXPLORES, FAR, NEAR, Garl, cell_of
 from pytest_garl.search.method import Flown, Plan
 from pytest_garl.search.random_search import RandomSearch
+from pytest_garl.verdicts.metrics import mean_distance
 
 MAP = load_map("court")
 PLAN = Plan(map=MAP, genome=genome_for(MAP), seed=0, population=20)
@@ -42,7 +48,7 @@ def common_and_rare(scenario: Scenario) -> dict[str, Any]:
     return result("", "rare" if far < 0.4 else "", 3 * far)
 
 
-def search(method: Any, generations: int = 20) -> Counter[str]:
+def search(method: Any, generations: int) -> Counter[str]:
     found: Counter[str] = Counter()
     for _ in range(generations):
         flown = [Flown(scenario=s, result=common_and_rare(s)) for s in method.ask()]
@@ -52,7 +58,7 @@ def search(method: Any, generations: int = 20) -> Counter[str]:
 
 
 def test_a_rare_way_to_fail_is_found_by_way_of_its_near_misses() -> None:
-    found, by_chance = search(Garl(PLAN)), search(RandomSearch(PLAN))
+    found, by_chance = search(Garl(PLAN), 40), search(RandomSearch(PLAN), 40)
     assert by_chance["rare"] <= 1
     assert found["rare"] >= 5
     assert found["common"] >= by_chance["common"] / 2
@@ -62,7 +68,8 @@ def test_cells_of_which_nothing_is_known_are_bred_from_alike() -> None:
     search_ = Garl(PLAN)
     first = search_.ask()
     cells = ["a"] * 17 + ["b", "c", ""]
-    search_.tell([Flown(scenario=s, result=result(c)) for s, c in zip(first, cells, strict=True)])
+    near = [result("", cell) for cell in cells]
+    search_.tell([Flown(scenario=s, result=r) for s, r in zip(first, near, strict=True)])
     seeds = {scenario.seed: cell for scenario, cell in zip(first, cells, strict=True)}
     bred: Counter[str] = Counter()
     for _ in range(30):
@@ -101,3 +108,53 @@ def test_a_flights_cell_is_how_it_failed_or_nearly_did() -> None:
     )
     assert cell_of(result("", "IV:person:take-off:seen")) == "IV:person:take-off:seen"
     assert cell_of(result("")) == "landed"
+
+
+def genes(scenarios: Iterable[Scenario]) -> NDArray[np.float64]:
+    """Return normalised chromosomes, one a row."""
+    genome = PLAN.genome
+    return np.array([genome.normalise(encode(each, genome)) for each in scenarios])
+
+
+WEATHER = np.array([key.startswith("environment.") for key in PLAN.genome.keys])
+
+
+def test_places_and_speeds_are_spread_out_and_weather_is_not() -> None:
+    spread, plain = Garl(PLAN), Garl(PLAN, spreads=0.0)
+    found, by_chance = (
+        genes(each for _ in range(10) for each in method.ask()) for method in (spread, plain)
+    )
+    assert mean_distance(found) > 1.2 * mean_distance(by_chance)
+    at_an_end = (found < 0.02) | (found > 0.98)
+    assert at_an_end[:, WEATHER].mean() < 0.06
+    # Away from all that was asked for means at both ends alike.
+    speeds = found[:, [key.endswith(".velocity") for key in PLAN.genome.keys]]
+    assert 0.4 < speeds.mean() < 0.6
+
+
+def test_what_is_bred_far_from_a_violation_keeps_its_weather_and_who_was_hit() -> None:
+    method = Garl(PLAN, explores=0.0)
+    first = method.ask()[:1]
+    told = {**result("IV:dog"), "closest_body": "dog-1"}
+    method.tell([Flown(scenario=each, result=told) for each in first])
+    (parent,) = genes(first)
+    kept = WEATHER | np.array([key.startswith("dog-1.") for key in PLAN.genome.keys])
+    children = genes(method._child("IV:dog", FAR) for _ in range(50))
+    assert np.abs(children - parent)[:, kept].max() < 1e-9
+    assert np.abs(children - parent)[:, ~kept].mean() > 0.2
+
+
+def test_only_from_what_violates_is_bred_far() -> None:
+    method = Garl(PLAN)
+    told = [result("", "near")] * 10 + [result("hit")] * 10
+    method.tell([Flown(scenario=s, result=r) for s, r in zip(method.ask(), told, strict=True)])
+    chosen = {method._choose() for _ in range(200)}
+    assert chosen == {("near", NEAR), ("hit", NEAR), ("hit", FAR)}
+
+
+def test_one_cell_for_all_is_bred_from() -> None:
+    method = Garl(PLAN, explores=0.0, cell=lambda result: "")
+    first = method.ask()
+    method.tell([Flown(scenario=each, result=result("", "near")) for each in first])
+    seeds = {each.seed for each in first}
+    assert all(child.seed in seeds for child in method.ask())
