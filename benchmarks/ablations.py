@@ -22,6 +22,7 @@ from scipy.stats import t
 from benchmarks.rows import append, read
 from pytest_garl.adversary.pilots import StraightPilot
 from pytest_garl.adversary.policies import policy_spec
+from pytest_garl.scenarios.chromosome import encode
 from pytest_garl.scenarios.genes import genome_for
 from pytest_garl.scenarios.maps import load_map
 from pytest_garl.scenarios.scenario import Scenario
@@ -31,14 +32,14 @@ from pytest_garl.search.method import Flown, Method, Plan
 from pytest_garl.search.methods import find_method
 from pytest_garl.simulation.fly import fly
 from pytest_garl.verdicts.judge import closest_call, judge, undecided
-from pytest_garl.verdicts.metrics import top_k
+from pytest_garl.verdicts.metrics import mean_distance, top_k
 from pytest_garl.verdicts.serialise import from_dict, to_dict
 from pytest_garl.verdicts.verdict import Limits
 
 FILE = Path("docs/ablations.csv")
 MAPS = ("court", "lawn")
 BUDGET, POPULATION = 400, 20
-FIELDS = ("variant", "seed", "map", "budget", "violations", "top10", "signatures")
+FIELDS = ("variant", "seed", "map", "budget", "violations", "top10", "signatures", "distance")
 
 
 def found(result: dict[str, Any]) -> str:
@@ -91,12 +92,13 @@ def search(name: str, seed: int, map: str, pool: Executor) -> dict[str, Any]:
     """Run one search to the end of its budget."""
     place = load_map(map)
     plan = Plan(map=place, genome=genome_for(place), seed=seed, population=POPULATION)
-    method, verdicts = VARIANTS[name](plan), []
+    method, verdicts, chromosomes = VARIANTS[name](plan), [], []
     for _ in range(BUDGET // POPULATION):
         scenarios = method.ask()
         results = list(pool.map(fly_one, scenarios))
         method.tell([Flown(scenario=s, result=r) for s, r in zip(scenarios, results, strict=True)])
         verdicts += [from_dict(result["verdict"]) for result in results]
+        chromosomes += [plan.genome.normalise(encode(each, plan.genome)) for each in scenarios]
     return {
         "variant": name,
         "seed": seed,
@@ -105,14 +107,15 @@ def search(name: str, seed: int, map: str, pool: Executor) -> dict[str, Any]:
         "violations": sum(verdict.paper_violation for verdict in verdicts),
         "top10": top_k(verdicts) or "",
         "signatures": len({each.signature for each in verdicts if each.paper_violation}),
+        "distance": f"{mean_distance(np.array(chromosomes)):.3f}",
     }
 
 
 def report(rows: list[dict[str, str]]) -> str:
     """Return a Markdown table: means over searches, the flights of one being no sample."""
     lines = [
-        "| variant | searches | violations, % | Top-10 | signatures |",
-        "| --- | --- | --- | --- | --- |",
+        "| variant | searches | violations, % | Top-10 | signatures | distance |",
+        "| --- | --- | --- | --- | --- | --- |",
     ]
     for name in VARIANTS:
         own = [row for row in rows if row["variant"] == name]
@@ -123,6 +126,7 @@ def report(rows: list[dict[str, str]]) -> str:
             [100 * int(row["violations"]) / int(row["budget"]) for row in own],
             [float(row["top10"] or BUDGET + 1) for row in own],
             [float(row["signatures"]) for row in own],
+            [float(row["distance"]) for row in own],
         )
         cells = " | ".join(_mean(values) for values in figures)
         lines.append(f"| {name} | {len(own)} | {cells} |")
@@ -133,10 +137,10 @@ def _mean(values: Sequence[float]) -> str:
     """Return the mean with its 95 % interval (Student's t), which says something from three on."""
     mean = float(np.mean(values))
     if len(values) < 3:
-        return f"{mean:.1f}"
+        return f"{mean:.3g}"
     error = float(np.std(values, ddof=1)) / len(values) ** 0.5
     half = float(t.ppf(0.975, len(values) - 1)) * error
-    return f"{mean:.1f} ± {half:.1f}"
+    return f"{mean:.3g} ± {half:.2g}"
 
 
 def main() -> None:
