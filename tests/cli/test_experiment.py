@@ -120,7 +120,9 @@ def test_the_figures_are_those_of_the_ledger(project: Path) -> None:
     for flight in bad:
         x, y = marker_position_m(load_scenario(flight.scenario), map)
         off = flight.result["final_distance_m"]
-        cells |= {((x + off) // 2, y // 2, z) for z in (0, 6)}
+        # Some places lie beyond the lawn, which counts as nowhere.
+        if abs(x + off) < 10:
+            cells |= {((x + off) // 2, y // 2, z) for z in (0, 6)}
     assert row.covered == len(cells)
     assert row.cells == 10 * 20 * 15
     genome = genome_for(map)
