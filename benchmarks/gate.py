@@ -32,6 +32,8 @@ from pytest_garl.search.child import THREADS
 CASES = Path("scenarios/regressions")
 COUNT = 30
 OUTCOMES = ("skipped", "failure", "error")
+Told = tuple[str, str]
+"""An item's outcome, and its flight's hash, empty where it has none."""
 
 
 def mixed(found: list[Case]) -> Iterator[Case]:
@@ -46,7 +48,7 @@ def mixed(found: list[Case]) -> Iterator[Case]:
         yield dataclasses.replace(case, scenario=beside, status=status)
 
 
-def gate(cases: Path, folder: Path) -> tuple[float, dict[str, str]]:
+def gate(cases: Path, folder: Path) -> tuple[float, dict[str, Told]]:
     """Fly all cases as pytest items; return the wall time, and each one's outcome and hash."""
     folder.mkdir()
     options = ("-q", "-p", "no:cacheprovider", "--tb=no", f"--junitxml={folder / 'junit.xml'}")
@@ -65,11 +67,11 @@ def gate(cases: Path, folder: Path) -> tuple[float, dict[str, str]]:
     return took, {name: told for name, told in flown.items() if "[case-" in name}
 
 
-def _told(item: ElementTree.Element) -> str:
-    """Return what came of an item: its outcome, and its flight's hash where it has one."""
+def _told(item: ElementTree.Element) -> Told:
+    """Return what came of an item."""
     outcome = next((each.get("type", each.tag) for each in item if each.tag in OUTCOMES), "passed")
-    values = {each.get("name"): each.get("value") for each in item.iter("property")}
-    return f"{outcome} {values.get('garl.trajectory_sha256', '')}"
+    values = {each.get("name"): each.get("value", "") for each in item.iter("property")}
+    return outcome, values.get("garl.trajectory_sha256", "")
 
 
 def hash_of_flight(path: Path) -> str:
@@ -98,8 +100,8 @@ def main() -> None:
         count = sum(1 for _ in cases.rglob("*.toml"))
         gates = [gate(cases, Path(name, f"run-{run}")) for run in range(arguments.runs)]
     times = [took for took, _ in gates]
-    outcomes = Counter(told.split()[0] for told in gates[0][1].values())
-    hashes = {told.split()[1] for told in gates[0][1].values() if " " in told.strip()}
+    outcomes = Counter(outcome for outcome, _ in gates[0][1].values())
+    hashes = {sha256 for _, sha256 in gates[0][1].values()} - {""}
     results = {tuple(sorted(told.items())) for _, told in gates}
     print(f"{count} cases, {arguments.runs} runs: {len(results)} result(s), {len(hashes)} flights")
     print(f"  {dict(outcomes)}; {statistics.median(times):.0f} s (most {max(times):.0f} s)")

@@ -83,7 +83,7 @@ def inquiries(
                     violations=new[signature],
                     job=job,
                     map=map,
-                    budget=budget // reached if number < reached else 0,
+                    budget=max(LEAST, budget // reached) if number < reached else 0,
                     asks=asks.get((search, signature)),
                 )
             )

@@ -5,7 +5,7 @@ paper's chromosomes and crossover.  A cell is a way to fail: a violation's signa
 a near miss would have had.  Which cell is bred from is decided by Thompson sampling (Thompson
 1933) of what its children came to: a first violation of a kind counts most, the twentieth little,
 so that near misses of another kind are worth more than one more of the same.  Places and speeds are
-spread out as the paper's mutation does, away from all that was flown before; weather and light
+spread out as the paper's mutation does, away from all asked for before; weather and light
 are not: at their ends a flight is aborted rather than failed.
 """
 
@@ -46,7 +46,7 @@ PROGRESS = 0.01
 NEAREST = 0.1
 """The largest step shrinks with the distance to a violation, down to this share of it."""
 SPREADS = 0.75
-"""Share of places and speeds that are put away from all that were flown, in a scenario without
+"""Share of places and speeds that are put away from all asked for before, in a scenario without
 parents and in one bred far from its parent."""
 MEMORY = 0.9
 """What a trial still counts for after one more of its arm: cells change as they are searched."""
@@ -55,8 +55,9 @@ NEAR, FAR = "near", "far"
 
 Genes = tuple[tuple[str, float], ...]
 Arm = tuple[str, str]
-"""What is chosen between: a cell and a way to breed from it; ("", "") for no parents."""
+"""What is chosen between: a cell and a way to breed from it."""
 ORPHAN: Arm = ("", "")
+"""What has no parents."""
 
 
 class Garl:
@@ -127,7 +128,7 @@ class Garl:
         while True:
             explores = not self._cells or self._rng.random() < self._explores
             arm = ORPHAN if explores else self._choose()
-            scenario = self._random() if explores else self._child(*arm)
+            scenario = self._random() if arm == ORPHAN else self._child(*arm)
             if scenario.genes not in self._arms:
                 self._arms[scenario.genes] = arm
                 self._asked.append(encode(scenario, self._plan.genome))
@@ -149,12 +150,12 @@ class Garl:
         return self._scenario(row, int(self._rng.integers(2**32)))
 
     def _spread(self, row: Matrix, which: NDArray[np.bool_]) -> Matrix:
-        """Return a copy with a share of some genes away from all that were flown (paper, eq. 2)."""
+        """Return a copy with a share of some genes away from all asked for (paper, eq. 2)."""
         rng, genome, spread = self._rng, self._plan.genome, row.copy()
-        flown = np.array(self._asked) if self._asked else row[None]
+        asked = np.array(self._asked) if self._asked else row[None]
         for column in np.flatnonzero(which & (rng.random(row.size) < self._spreads)):
             drawn = rng.uniform(genome.lower[column], genome.upper[column], CANDIDATES)
-            spread[column] = drawn[farthest_from_all(drawn, flown[:, column])]
+            spread[column] = drawn[farthest_from_all(drawn, asked[:, column])]
         return spread
 
     def _child(self, name: str, way: str) -> Scenario:

@@ -44,6 +44,7 @@ class SystemCalls:
         try:
             return call()
         except Exception as error:
+            # Not ours to name: whatever a landing system raises is how it fails, and a finding.
             raise BrokenError(crash_of(error, method)) from error
         finally:
             if self._guard:
