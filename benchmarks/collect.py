@@ -1,7 +1,7 @@
 """How long pytest takes to collect.
 
-7,200 items of a search (3 systems, 2 maps, budget 400, 3 tests), and 3,000 of 1,000 saved cases; beside
-no items at all, since pytest counts its own start.
+7,200 items of a search (3 systems, 2 maps, budget 400, 3 tests), and 3,000 of 1,000 saved cases;
+beside no items at all, since pytest counts its own start.
 """
 
 from __future__ import annotations
