@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 
 from pytest_garl.simulation.flight import Contact, Flight, Separation
+from pytest_garl.simulation.vehicle import BODY_ABOVE_FEET_M
 from pytest_garl.verdicts.compass import compass_point
 from pytest_garl.verdicts.moments import last_sighting_s, moment, speaks, was_in_view
 from pytest_garl.verdicts.verdict import (
@@ -227,4 +228,5 @@ def _where(flight: Flight) -> str:
         hidden = (
             f" In the last 2 s {100 * share:.0f} % of the marker was hidden or out of the frame."
         )
-    return f"At {flight.elapsed_s:.1f} s the UAV was {max(0.0, z - 0.2):.1f} m up, {place}.{hidden}"
+    up = max(0.0, z - BODY_ABOVE_FEET_M)
+    return f"At {flight.elapsed_s:.1f} s the UAV was {up:.1f} m up, {place}.{hidden}"
