@@ -101,7 +101,7 @@ def train(**asked: Any) -> None:
     """Train a policy in the surrogate and write its weights.
 
     The surrogate is a landing on the project's own simulator: one object, a marker at a fixed
-    place, a UAV that knows where it is. It takes some four minutes per seed on two cores.
+    place, a UAV that knows where it is. It takes some five minutes per seed on two cores.
     Then steer with it: pytest --garl-budget=40 --garl-npcs=policy.npz
     """
     if asked["out"].suffix != ".npz":
