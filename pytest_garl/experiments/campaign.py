@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Protocol
 
+from pytest_garl.adversary.policies import policy_spec
 from pytest_garl.errors import GarlError
 from pytest_garl.experiments import rows as files
 from pytest_garl.experiments.avoiding import pilot
@@ -78,7 +79,8 @@ def check(experiment: Experiment, root: Path) -> None:
     for run in experiment.runs:
         for key, what, find in (
             ("maps", run.maps, functools.partial(load_map, search_path=(_maps(root),))),
-            ("methods", (run.method,), _known_method),
+            ("methods", (run.search,), _known_method),
+            ("methods", (run.npcs,) if run.npcs else (), policy_spec),
         ):
             for each in what:
                 _found(experiment, key, each, find)

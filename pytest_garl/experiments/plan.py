@@ -13,6 +13,8 @@ from pytest_garl.errors import ScenarioError
 from pytest_garl.scenarios.toml_reader import Table, parse
 
 NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9 ._-]*")
+WITH = " with "
+"""Between a search and who steers its objects."""
 KINDS = ("I", "II", "III", "IV", "V")
 TOP_KEYS = frozenset(
     {
@@ -36,7 +38,8 @@ TOP_KEYS = frozenset(
 class Run:
     """One pytest session: a method's searches on all maps, from one seed.
 
-    ``system`` is the name in tables and rows, ``tests`` what pytest is given.
+    ``system`` is the name in tables and rows, ``tests`` what pytest is given.  ``method`` is a
+    search, or "search with policy" where its objects are steered by another than its own.
     """
 
     system: str
@@ -45,6 +48,16 @@ class Run:
     method: str
     seed: int
     budget: int
+
+    @property
+    def search(self) -> str:
+        """The search method alone."""
+        return self.method.partition(WITH)[0]
+
+    @property
+    def npcs(self) -> str:
+        """Who steers the objects; empty: as the search has it."""
+        return self.method.partition(WITH)[2]
 
     @property
     def title(self) -> str:

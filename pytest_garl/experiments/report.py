@@ -117,7 +117,7 @@ def _identity(rows: Iterable[Row]) -> Iterator[str]:
     ]
     for fact in facts:
         for text, count in sorted(fact.items()):
-            yield f"- {text} ({count} searches)"
+            yield f"- {text} ({count} search{'es' * (count > 1)})"
 
 
 def _policy(row: Row) -> str:

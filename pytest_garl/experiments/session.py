@@ -60,7 +60,7 @@ def _command(run: Run, folder: Path, workers: int) -> list[str]:
     words = [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", "--tb=no", "-r", ""]
     words += [
         f"--garl-budget={run.budget}",
-        f"--garl-method={run.method}",
+        f"--garl-method={run.search}",
         f"--garl-seed={run.seed}",
         f"--garl-map={','.join(run.maps)}",
         f"--garl-workers={workers}",
@@ -72,6 +72,8 @@ def _command(run: Run, folder: Path, workers: int) -> list[str]:
         f"garl_cases={folder.resolve() / 'no-cases'}",
         run.tests,
     ]
+    if run.npcs:
+        words.append(f"--garl-npcs={run.npcs}")
     return [*words, "--garl-resume"] if _begun(folder / "ledger.sqlite") else words
 
 

@@ -5,7 +5,9 @@ from pathlib import Path
 import pytest
 
 from pytest_garl.errors import ScenarioError
+from pytest_garl.experiments.campaign import check
 from pytest_garl.experiments.plan import Experiment, read
+from pytest_garl.experiments.rows import ExperimentError
 
 DOCS = Path(__file__).parents[2] / "docs" / "experiments"
 TEXT = """
@@ -68,6 +70,37 @@ def test_every_run_is_flown_once_first_seeds_first(tmp_path: Path) -> None:
     ]
     assert {run.budget for run in found} == {40}
     assert found[0].tests == "test_one.py"
+
+
+def test_objects_may_be_steered_by_another_policy_than_the_searchs_own(tmp_path: Path) -> None:
+    found = plan(
+        tmp_path, TEXT.replace('"garl", "ga"', '"garl", "ga", "random with dqn-paper"')
+    ).runs
+    assert [(run.search, run.npcs) for run in found if run.seed == 4] == [
+        ("garl", ""),
+        ("ga", ""),
+        ("random", "dqn-paper"),
+    ]
+    assert len({run.folder for run in found}) == len(found)
+
+
+@pytest.mark.parametrize(
+    ("method", "words"),
+    [
+        ("gral with dqn", "search method 'gral'"),
+        ("garl with dnq", "unknown object policy 'dnq'; expected one of"),
+    ],
+)
+def test_an_unknown_search_or_policy_is_found_before_anything_flies(
+    tmp_path: Path, method: str, words: str
+) -> None:
+    for name in ("test_one.py", "test_two.py"):
+        (tmp_path / name).touch()
+    found = plan(tmp_path, TEXT.replace('"garl", "ga"', f'"garl", "ga", "{method}"'))
+    with pytest.raises(ExperimentError) as caught:
+        check(found, tmp_path)
+    assert "key 'methods'" in str(caught.value)
+    assert words in str(caught.value)
 
 
 def test_runs_that_differ_have_folders_of_their_own(tmp_path: Path) -> None:
@@ -141,13 +174,14 @@ def test_without_grids_there_is_nothing_to_fly(tmp_path: Path) -> None:
 
 def test_the_campaign_asks_the_papers_questions() -> None:
     found = read(DOCS / "rq.toml")
-    first, second = found.grids
+    first, second, third = found.grids
     assert [len(first.systems), len(first.maps), first.methods] == [3, 2, ("garl", "garl-paper")]
     assert second.systems == ("MM-MLS",)
     assert len(second.methods) == 7
+    assert third.methods == ("garl", "random with dqn", "garl with waypoint", "random")
     assert found.report.resolve() == DOCS.parent / "experiments.md"
     named = {(each.system, each.map, name) for each in found.published for name in each.methods}
-    for grid in found.grids:
+    for grid in (first, second):
         for system in grid.systems:
             for map in grid.maps:
                 assert {(system, map, method) for method in grid.methods} <= named

@@ -124,7 +124,7 @@ def test_it_says_what_was_flown_and_what_was_not(experiment: Experiment) -> None
     assert "- Lander, ga, on court: seed 0, 1\n- Lander, random, on court: seed 1" in text
     assert "- pytest-garl 0.1.0, sources dddddddddddd (3 searches)" in text
     assert "- Lander: `stack.lander:Lander`, sources aaaaaaaaaaaa (3 searches)" in text
-    assert "- random: objects steered by waypoint (1 searches)" in text
+    assert "- random: objects steered by waypoint (1 search)" in text
     assert "more than one state" not in text
     assert "**These searches are of more than one state of pytest-garl.**" in report(
         experiment, (GARL[0], row(seed=1, package_sha256="0"))

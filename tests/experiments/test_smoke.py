@@ -27,11 +27,11 @@ def test_a_toy_experiment_is_flown_measured_and_reported(tmp_path: Path) -> None
 
     garl(f"--folder={tmp_path / 'runs'}")
     rows = read(tmp_path / "smoke.csv")
-    assert [(row.method, row.seed) for row in rows] == [
-        ("garl", 0),
-        ("random", 0),
-        ("garl", 1),
-        ("random", 1),
+    assert [(row.method, row.policy, row.seed) for row in rows] == [
+        ("garl", "dqn", 0),
+        ("random with dqn", "dqn", 0),
+        ("garl", "dqn", 1),
+        ("random with dqn", "dqn", 1),
     ]
     for row in rows:
         assert row.budget == 3
