@@ -4,9 +4,10 @@ MAP-Elites (Mouret and Clune 2015, "Illuminating search spaces by mapping elites
 paper's chromosomes and crossover.  A cell is a way to fail: a violation's signature, or that which
 a near miss would have had.  Which cell is bred from is decided by Thompson sampling (Thompson
 1933) of what its children came to: a first violation of a kind counts most, the twentieth little,
-so that near misses of another kind are worth more than one more of the same.  Places and speeds are
-spread out as the paper's mutation does, away from all asked for before; weather and light
-are not: at their ends a flight is aborted rather than failed.
+so that near misses of another kind are worth more than one more of the same.  The objects' places
+and speeds are spread out as the paper's mutation does, away from all asked for before, which is to
+the ends of their ranges; the marker, which decides where the UAV flies, is put where none has been
+near.  Weather and light are not spread: at their ends a flight is aborted rather than failed.
 """
 
 from __future__ import annotations
@@ -30,6 +31,7 @@ from pytest_garl.search.operators import (
     LARGEST_STEP,
     Matrix,
     farthest_from_all,
+    farthest_from_nearest,
     local_steps,
     nuclear_gene_crossover,
 )
@@ -98,6 +100,7 @@ class Garl:
         self._signatures: Counter[str] = Counter()
         keys = plan.genome.keys
         self._weather = np.array([key.startswith("environment.") for key in keys])
+        self._marker = np.array([key.startswith("marker.") for key in keys])
 
     def ask(self) -> Sequence[Scenario]:
         """Return the next generation."""
@@ -153,9 +156,14 @@ class Garl:
         """Return a copy with a share of some genes away from all asked for (paper, eq. 2)."""
         rng, genome, spread = self._rng, self._plan.genome, row.copy()
         asked = np.array(self._asked) if self._asked else row[None]
-        for column in np.flatnonzero(which & (rng.random(row.size) < self._spreads)):
+        marker = self._marker
+        for column in np.flatnonzero(which & ~marker & (rng.random(row.size) < self._spreads)):
             drawn = rng.uniform(genome.lower[column], genome.upper[column], CANDIDATES)
             spread[column] = drawn[farthest_from_all(drawn, asked[:, column])]
+        if rng.random() < self._spreads:
+            shape = CANDIDATES, int(marker.sum())
+            places = rng.uniform(genome.lower[marker], genome.upper[marker], shape)
+            spread[marker] = places[farthest_from_nearest(places, asked[:, marker])]
         return spread
 
     def _child(self, name: str, way: str) -> Scenario:

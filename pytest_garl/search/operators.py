@@ -49,6 +49,16 @@ def farthest_from_all(candidates: Matrix, values: Matrix) -> int:
     return int(np.argmax(np.abs(candidates[:, None] - values[None, :]).sum(axis=1)))
 
 
+def farthest_from_nearest(candidates: Matrix, values: Matrix) -> int:
+    """Index of the candidate (n, d) whose nearest of ``values`` (m, d) is farthest away.
+
+    Mitchell's best candidate (1991, "Spectrally optimal sampling for distribution ray tracing"):
+    what is drawn so, one after another, fills the range evenly.
+    """
+    apart = np.linalg.norm(candidates[:, None] - values[None, :], axis=2)
+    return int(np.argmax(apart.min(axis=1)))
+
+
 def property_mutation(
     offspring: Matrix,
     lower: Matrix,

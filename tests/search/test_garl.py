@@ -132,6 +132,19 @@ def test_places_and_speeds_are_spread_out_and_weather_is_not() -> None:
     assert 0.4 < speeds.mean() < 0.6
 
 
+def test_the_marker_is_put_where_none_has_been_near() -> None:
+    marker = np.array([key.startswith("marker.") for key in PLAN.genome.keys])
+
+    def apart(method: Garl) -> float:
+        """Return how far the nearest other marker is, on average."""
+        places = genes(each for _ in range(10) for each in method.ask())[:, marker]
+        every = np.linalg.norm(places[:, None] - places[None, :], axis=2)
+        np.fill_diagonal(every, np.inf)
+        return float(every.min(axis=1).mean())
+
+    assert apart(Garl(PLAN)) > 1.2 * apart(Garl(PLAN, spreads=0.0))
+
+
 def test_what_is_bred_far_from_a_violation_keeps_its_weather_and_who_was_hit() -> None:
     method = Garl(PLAN, explores=0.0)
     first = method.ask()[:1]

@@ -7,6 +7,7 @@ from hypothesis import strategies as st
 
 from pytest_garl.search.operators import (
     farthest_from_all,
+    farthest_from_nearest,
     local_steps,
     nuclear_gene_crossover,
     property_mutation,
@@ -46,6 +47,12 @@ def test_crossover_happens_at_the_stated_rate() -> None:
 def test_paper_candidate_rule_takes_the_largest_sum_of_distances() -> None:
     # Sums to {0, 0.2, 1}: 0.5 -> 1.3; 0.9 -> 1.7; 0.1 -> 1.1.
     assert farthest_from_all(np.array([0.5, 0.9, 0.1]), np.array([0.0, 0.2, 1.0])) == 1
+
+
+def test_the_candidate_with_the_farthest_neighbour_is_the_one_between() -> None:
+    values = np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0]])
+    candidates = np.array([[0.1, 0.1], [0.5, 0.4], [1.0, 0.8], [0.0, 0.5]])
+    assert farthest_from_nearest(candidates, values) == 1
 
 
 def test_local_steps_are_of_all_sizes_and_never_none() -> None:
