@@ -17,7 +17,7 @@ from pytest_garl.scenarios.placement import (
 )
 from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.simulation.flight import Contact, Flight, ObjectRecord
-from pytest_garl.simulation.vehicle import BODY_ABOVE_FEET_M
+from pytest_garl.simulation.vehicle import up_m
 from pytest_garl.verdicts.compass import compass_point
 from pytest_garl.verdicts.verdict import Verdict
 
@@ -42,7 +42,7 @@ def _entrance(flight: Flight, culprit: ObjectRecord, contact: Contact) -> str:
     outside = np.flatnonzero(away > NEAR_M)
     entered = int(outside[-1]) + 1 if len(outside) else 0
     entered = min(entered, len(away) - 1)
-    up = max(0.0, float(there[entered, 2]) - BODY_ABOVE_FEET_M)
+    up = up_m(float(there[entered, 2]))
     speeds = np.hypot(culprit.track.velocity_mps[:, 0], culprit.track.velocity_mps[:, 1])
     speed = float(speeds[entered:].max())
     kind = f"{_article(culprit.type)} {culprit.type}"

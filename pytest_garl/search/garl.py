@@ -153,14 +153,17 @@ class Garl:
         return self._scenario(row, int(self._rng.integers(2**32)))
 
     def _spread(self, row: Matrix, which: NDArray[np.bool_]) -> Matrix:
-        """Return a copy with a share of some genes away from all asked for (paper, eq. 2)."""
+        """Return a copy, a share of whose genes among ``which`` is away from all asked for.
+
+        One by one (paper, eq. 2); but for the marker, whose place is drawn as a whole.
+        """
         rng, genome, spread = self._rng, self._plan.genome, row.copy()
         asked = np.array(self._asked) if self._asked else row[None]
         marker = self._marker
         for column in np.flatnonzero(which & ~marker & (rng.random(row.size) < self._spreads)):
             drawn = rng.uniform(genome.lower[column], genome.upper[column], CANDIDATES)
             spread[column] = drawn[farthest_from_all(drawn, asked[:, column])]
-        if rng.random() < self._spreads:
+        if (which & marker).any() and rng.random() < self._spreads:
             shape = CANDIDATES, int(marker.sum())
             places = rng.uniform(genome.lower[marker], genome.upper[marker], shape)
             spread[marker] = places[farthest_from_nearest(places, asked[:, marker])]

@@ -46,6 +46,11 @@ class VehicleModel:
     drag_n_per_mps2: float
 
 
+def up_m(body_m: float) -> float:
+    """Return how high the feet are above the ground, as stories tell it, for a body's height."""
+    return max(0.0, body_m - BODY_ABOVE_FEET_M)
+
+
 def vehicle_model(airframe: Airframe) -> VehicleModel:
     """Scale the reference vehicle to an airframe; the thrust-to-weight ratio is kept.
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from pytest_garl.simulation.flight import Contact, Flight, Separation
-from pytest_garl.simulation.vehicle import BODY_ABOVE_FEET_M
+from pytest_garl.simulation.vehicle import up_m
 from pytest_garl.verdicts.compass import compass_point
 from pytest_garl.verdicts.moments import last_sighting_s, moment, speaks, was_in_view
 from pytest_garl.verdicts.verdict import (
@@ -228,5 +228,4 @@ def _where(flight: Flight) -> str:
         hidden = (
             f" In the last 2 s {100 * share:.0f} % of the marker was hidden or out of the frame."
         )
-    up = max(0.0, z - BODY_ABOVE_FEET_M)
-    return f"At {flight.elapsed_s:.1f} s the UAV was {up:.1f} m up, {place}.{hidden}"
+    return f"At {flight.elapsed_s:.1f} s the UAV was {up_m(z):.1f} m up, {place}.{hidden}"

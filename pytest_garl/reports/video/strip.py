@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from pytest_garl.reports.video import ink
 from pytest_garl.reports.video.moment import Moment
 from pytest_garl.simulation.flight import Flight, Step
-from pytest_garl.simulation.vehicle import BODY_ABOVE_FEET_M
+from pytest_garl.simulation.vehicle import up_m
 
 WIDTH, HEIGHT = 640, 176
 _LEFT, _RIGHT, _TOP, _BOTTOM = 44, WIDTH - 14, 62, 134
@@ -27,7 +27,8 @@ class Strip:
 
     def __init__(self, flight: Flight, signature: str) -> None:
         self._flight, self._signature = flight, signature or "no violation"
-        self._times, self._heights = flight.uav.time_s, _up(flight.uav.position_m[:, 2])
+        self._times = flight.uav.time_s
+        self._heights = np.array([up_m(height) for height in flight.uav.position_m[:, 2].tolist()])
         self._longest = max(float(flight.elapsed_s), 1.0)
         self._highest = max(float(self._heights.max()), 1.0)
         self._still = ink.sheet(WIDTH, HEIGHT)
@@ -36,7 +37,7 @@ class Strip:
     def draw(self, moment: Moment, step: Step | None, *, ended: bool = False) -> ink.Image:
         """Return the strip at one moment; an ``ended`` flight shows its outcome."""
         strip = self._still.copy()
-        height = float(_up(moment.position_m[2]))
+        height = up_m(float(moment.position_m[2]))
         past = self._times < moment.time_s
         line = self._pixels(self._times[past], self._heights[past])
         present = self._pixels(np.array([moment.time_s]), np.array([height]))
@@ -89,11 +90,6 @@ class Strip:
         for colour, words in _LEGEND:
             ink.disc(image, (x + 4, HEIGHT - 13), 5, colour)
             x = ink.text(image, words, (x + 14, HEIGHT - 8), ink.INK, 13) + 20
-
-
-def _up(height_m: NDArray[np.float64] | float) -> NDArray[np.float64]:
-    """Return how far the feet are above the ground, as stories tell it, for a body's height."""
-    return np.maximum(0.0, np.asarray(height_m) - BODY_ABOVE_FEET_M)
 
 
 def _ticks(most: float, count: int) -> list[float]:
