@@ -90,6 +90,9 @@ def _panel(
     axes.set_yticks(range(len(found)), names, fontsize="x-small")
     axes.set_ylim(len(found) - 0.4, -0.6)
     if figure is not DISTANCE:
+        # The margin at the far end is a share of what is shown, zero included.
+        axes.update_datalim([(0.0, 0.0)], updatey=False)
+        axes.autoscale_view(scaley=False)
         axes.set_xlim(left=0)
     axes.tick_params(axis="x", labelsize="x-small")
     axes.set_title(f"{figure.title}, {found[0].map}", loc="left", fontsize="small")
