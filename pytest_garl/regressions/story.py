@@ -82,6 +82,6 @@ def meanings(scenario: Scenario, map_folders: tuple[Path, ...]) -> list[tuple[st
         speed = object_speed_mps(scenario, map, name)
         way = f"from ({x:.1f}, {y:.1f}) m"
         goal = object_destination_m(scenario, map, name)
-        way += f" to ({goal[0]:.1f}, {goal[1]:.1f}) m" if goal else ""
+        way += f" to ({goal[0]:.1f}, {goal[1]:.1f}) m and back" if goal else ""
         rows.append((name, "", f"a {kind} of up to {speed:.2f} m/s, {way}"))
     return rows

@@ -4,15 +4,17 @@ The paper's second baseline (after Tian et al. 2022, MOSAT), GARL without reinfo
 fitness, chromosome, sorting and crossover are GARL's, "however, this baseline adds the dynamic
 object's destination into the dynamic object composite gene and utilizes a standard mutation
 strategy".  So all but genes and mutation is that of ``garl-paper``, rates among it.  The policy
-``destination`` walks each object to its destination, where it stays.
+``destination`` walks each object to its destination and back, over and over.
 
-Paper and code differ in three places.  Which mutation is standard the paper does not say; the code
-adds or subtracts a fixed step.  Taken is polynomial mutation (Deb and Agrawal 1999), which belongs
-to the NSGA-II that the paper cites (Deb et al. 2002) and reaches every value, as steps from a
-grid do not.  The code measures diversity by the weather alone; taken is the whole chromosome, the
-paper's definition, destinations included.  The code crosses objects over as one list; taken
-is the paper's border between nuclear genes, so that an object keeps its destination with its
-start.
+Paper and code differ in four places.  The code lets an object stand at its destination, of which
+the paper says nothing; here it turns back, which makes the stronger rival: a system that sees what
+stands goes around it, and the objects of ``random`` never stand either.  Which mutation is
+standard the paper does not say; the code adds or subtracts a fixed step.  Taken is polynomial
+mutation (Deb and Agrawal 1999), which belongs to the NSGA-II that the paper cites (Deb et al.
+2002) and reaches every value, as steps from a grid do not.  The code measures diversity by the
+weather alone; taken is the whole chromosome, the paper's definition, destinations included.  The
+code crosses objects over as one list; taken is the paper's border between nuclear genes, so that
+an object keeps its destination with its start.
 """
 
 from __future__ import annotations

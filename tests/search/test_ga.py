@@ -50,7 +50,7 @@ def test_mutation_moves_as_many_properties_as_the_papers_and_mostly_a_little() -
 
 
 @pytest.mark.sim
-def test_objects_walk_to_their_destination_and_stay() -> None:
+def test_objects_walk_to_their_destination_and_back() -> None:
     scenario = propose(MAP, with_destinations(genome_for(MAP)), 2, 0, 1)[0]
     scenario = scenario.replace({f"{name}.velocity": 1.0 for name in NAMES})
     # Clear of bodies, and of each other.
@@ -63,9 +63,13 @@ def test_objects_walk_to_their_destination_and_stay() -> None:
     flight = fly(scenario.replace(ends), ReferencePilot, policy_spec("destination"), map=MAP)
     for item in flight.objects:
         goal = object_destination_m(scenario.replace(ends), MAP, item.name)
-        late = item.track.position_m[-48:, :2]
         assert goal is not None
-        assert np.linalg.norm(late - np.array(goal), axis=1).max() < 0.3, item.name
+        way = item.track.position_m[:, :2]
+        from_goal = np.linalg.norm(way - np.array(goal), axis=1)
+        there = int(from_goal.argmin())
+        assert from_goal[there] < 1.5, item.name
+        from_start = np.linalg.norm(way[there:] - way[0], axis=1)
+        assert from_start.min() < 0.5 * from_start[0], item.name
 
 
 def test_objects_without_a_destination_are_told() -> None:
