@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -12,9 +13,9 @@ from numpy.typing import NDArray
 from pytest_garl.experiments.plan import KINDS, Run
 from pytest_garl.experiments.rows import ExperimentError, Row
 from pytest_garl.regressions.follow_up import done_of
-from pytest_garl.scenarios.chromosome import encode
 from pytest_garl.scenarios.genes import WEATHER, genome_for
 from pytest_garl.scenarios.maps import Map, load_map
+from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.search import ledger as ledgers
 from pytest_garl.search.job import Job, load_scenario, loads
 from pytest_garl.search.ledger import Ledger
@@ -91,7 +92,8 @@ def row_of(
     """Return the figures of one search of a run."""
     job, verdicts = search.job, search.verdicts
     kinds = Counter((each.violation_type or "").rstrip("?") for each in verdicts if each.violation)
-    weather_of, genes = _chromosomes(search, str(ledger.fact("weather")))
+    scenarios = [load_scenario(flight.scenario) for flight in search.flights]
+    weather_of, genes = chromosomes(scenarios, search.map, str(ledger.fact("weather")))
     violating = np.array([each.paper_violation for each in verdicts])
     cells = covered(search)
     flying_s = ledger.flying_s(search.key)
@@ -133,13 +135,18 @@ def row_of(
     )
 
 
-def _chromosomes(search: Search, weather: str) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return all scenarios' weather as it is, (n, 8), and their whole normalised genes, (n, d)."""
-    genome = genome_for(search.map, weather="full" if weather == "full" else "confined")
-    scenarios = [load_scenario(flight.scenario) for flight in search.flights]
+def chromosomes(
+    scenarios: Sequence[Scenario], map: Map, weather: str
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return the scenarios' weather as it is, (n, 8), and their normalised genes, (n, d).
+
+    The genes are those that every method breeds, so that distances can be compared: where objects
+    are bound for, which only ``ga`` and ``offline-rl`` have as genes, is left out.
+    """
+    genome = genome_for(map, weather="full" if weather == "full" else "confined")
     raw = [[each[f"environment.{name}"] for name, _ in WEATHER] for each in scenarios]
-    whole = [genome.normalise(encode(each, genome)) for each in scenarios]
-    return np.array(raw), np.array(whole)
+    whole = [[each[key] for key in genome.keys] for each in scenarios]
+    return np.array(raw), genome.normalise(np.array(whole))
 
 
 def covered(search: Search) -> NDArray[np.bool_]:

@@ -1,0 +1,26 @@
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from pytest_garl.experiments.measure import chromosomes
+from pytest_garl.scenarios.genes import genome_for, with_destinations
+from pytest_garl.scenarios.maps import load_map
+from pytest_garl.search.random_search import propose
+
+MAP = load_map("lawn")
+
+
+@pytest.mark.parametrize("weather", ["confined", "full"])
+def test_where_objects_are_bound_for_counts_in_no_distance(weather: str) -> None:
+    genome = genome_for(MAP, weather="full" if weather == "full" else "confined")
+    bound = propose(MAP, with_destinations(genome), 3, 0, 5)
+    raw, genes = chromosomes(bound, MAP, weather)
+    assert raw.shape == (5, 8)
+    assert genes.shape == (5, genome.size)
+    assert genes.min() >= 0
+    assert genes.max() <= 1
+    for scenario, weather_of, row in zip(bound, raw, genes, strict=True):
+        assert weather_of[0] == scenario["environment.dust"]
+        known = np.array([scenario[key] for key in genome.keys])
+        assert np.allclose(genome.normalise(known), row)
