@@ -29,9 +29,9 @@ HOW_TO_READ = f"""\
 - *Hours*: of one search on its workers, idle ones included, and after "+" the training of the
   policy, which is done once for all searches.
 - *Parameter distance*: the mean Euclidean distance between all scenarios of a search (the paper's
-  equation), every gene normalised to [0, 1]; the same of the violating ones alone; and that of the
-  eight weather genes as they are. The paper's code measured weather alone, without normalising
-  it, so its figures stand beside that.
+  equation), every gene that all methods have, normalised to [0, 1]; the same of the violating ones
+  alone; and that of the eight weather genes as they are. The paper's code measured weather alone,
+  without normalising it, so its figures stand beside that.
 - *Coverage*: the share of cells of {CELL_M:g} m, up to {HEIGHT_M:g} m above the map, that
   violating flights pass through.
 - *Signatures*: distinct mechanisms and moments of violations, such as
