@@ -79,12 +79,19 @@ def _panel(
                 medianprops={"color": COLOUR},
             )
         if values:
+            # Whole, and above the axis, where a figure is 0.
             axes.plot(
-                values, [place] * len(values), "o", color=COLOUR, markersize=3.5, clip_on=False
+                values,
+                [place] * len(values),
+                "o",
+                color=COLOUR,
+                markersize=3.5,
+                clip_on=False,
+                zorder=3,
             )
         theirs = _published(experiment, each, figure)
         if theirs is not None:
-            axes.plot([theirs], [place], "x", color=PAPER, markersize=5)
+            axes.plot([theirs], [place], "x", color=PAPER, markersize=5, zorder=3)
     single = len(grid.systems) == 1
     names = [each.method if single else f"{each.system} {each.method}" for each in found]
     axes.set_yticks(range(len(found)), names, fontsize="x-small")
