@@ -52,12 +52,9 @@ class Waypoint:
 
     def decide(self, situation: Situation) -> Move:
         """Go straight towards the destination."""
-        x, y, _ = situation.self.position_m
         if _arrived(self._goal, situation):
             self._draw(situation)
-        dx, dy = self._goal[0] - x, self._goal[1] - y
-        length = math.hypot(dx, dy)
-        return Move(x=dx / length, y=dy / length) if length > 0 else STAY
+        return _towards(self._goal, situation)
 
     def _draw(self, situation: Situation) -> None:
         x_min, x_max, y_min, y_max = situation.map.bounds_m
@@ -119,9 +116,8 @@ class Stand:
 class Destination:
     """Walks from its start to the place that its genes say, back, and there again.
 
-    The paper's baselines whose objects have a start and an end: ``ga`` and ``offline-rl``.  The
-    published code lets an object stand at its end; the paper does not say.  Taken is the stronger
-    rival: what stands is easily flown around, and the random baseline's objects never stand.
+    The paper's baselines whose objects have a start and an end: ``ga``, where it stands why they
+    turn back, and ``offline-rl``.
     """
 
     def reset(self, situation: Situation, rng: np.random.Generator) -> None:
@@ -145,7 +141,7 @@ class Destination:
 
 
 def _arrived(goal: tuple[float, float], situation: Situation) -> bool:
-    """Whether a place is so near that the next decision would overshoot it."""
+    """Whether a place is within half a metre, or within the stride of one decision."""
     reach = max(ARRIVED_M, DECISION_STEP_S * situation.self.speed_mps)
     return math.dist(situation.self.position_m[:2], goal) < reach
 

@@ -16,6 +16,7 @@ Where paper and code differ, or say nothing:
   longest distance between two chromosomes, so that none drowns the others.
 - 0.1 is meant in gene units for weather and marker, as the paper writes it, and as a share of the
   range for objects, of which it names directions only.  What leaves the range ends on its border.
+- Objects walk to their end and back, as those of ``ga``.
 - Exploration decays per edit, as in the code: a chain has no episodes.
 - The paper tests one scenario after the other.  Here each slot index of a generation is a chain of
   its own, from a random scenario that keeps its seed and speeds; all share one network, which

@@ -47,7 +47,7 @@ class VehicleModel:
 
 
 def up_m(body_m: float) -> float:
-    """Return how high the feet are above the ground, as stories tell it, for a body's height."""
+    """Return how high the feet are above the ground, for a body's height; never below it."""
     return max(0.0, body_m - BODY_ABOVE_FEET_M)
 
 
