@@ -116,8 +116,8 @@ class Stand:
 class Destination:
     """Walks from its start to the place that its genes say, back, and there again.
 
-    The paper's baselines whose objects have a start and an end: ``ga``, where it stands why they
-    turn back, and ``offline-rl``.
+    For the paper's baselines whose objects have a start and an end, ``ga`` and ``offline-rl``;
+    the module of ``ga`` says why they turn back.
     """
 
     def reset(self, situation: Situation, rng: np.random.Generator) -> None:
