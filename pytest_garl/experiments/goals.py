@@ -107,7 +107,10 @@ def _judge(goal: Goal, own: Sample, others: Sequence[Sample]) -> Judged:
             continue
         theirs = other.mean(goal.figure, common)
         answers.append(goal.holds(own.mean(goal.figure, common), theirs))
-        words.append(f"{other.method} {mean_text(other, goal.figure, common)}")
+        text = f"{other.method} {mean_text(other, goal.figure, common)}"
+        if common != sorted(own.seeds):
+            text += f" (to {mean_text(own, goal.figure, common)})"
+        words.append(text)
     verdict: Verdict = "met"
     if False in answers:
         verdict = "missed"

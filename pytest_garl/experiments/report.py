@@ -59,7 +59,8 @@ def write(experiment: Experiment, rows: Sequence[Row], source: str, path: Path) 
         found = goals.judged(experiment, experiment.goals, rows)
         sections += [
             f"## Goals of {experiment.goals.method} on {experiment.goals.system}",
-            "Means over seeds; two methods are compared on the seeds that both have flown.",
+            "Means over seeds. Two methods are compared on the seeds that both have flown;\n"
+            f"in brackets the mean of {experiment.goals.method} from those, where it flew more.",
             goals.table(found, experiment.goals.method),
             experiment.goals.remarks,
         ]

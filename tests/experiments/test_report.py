@@ -204,3 +204,5 @@ def test_methods_are_compared_on_the_seeds_that_both_have(experiment: Experiment
     assert found["violations, % at least 2 × chance"] == "met"
     found = dict(verdicts(experiment, (*GARL, row(method="random", seed=1, violations=8))))
     assert found["violations, % at least 2 × chance"] == "missed"
+    text = report(experiment, (*GARL, row(method="random", seed=1, violations=8)))
+    assert "| 30.0 | random 20.0 (to 35.0) |" in text
