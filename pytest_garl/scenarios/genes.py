@@ -173,7 +173,7 @@ PURSUIT = CompositeGene(
             "begin",
             1.0,
             0.0,
-            "when a learned policy takes over from wandering (0: at once, 1: after 30 s)",
+            "when a learned policy takes over from wandering (0: at once, 1: after 20 s)",
         ),
     ),
 )

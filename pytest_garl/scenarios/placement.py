@@ -18,8 +18,9 @@ TOP_WIND_MPS = 10.0
 TOP_GPS_ERROR_M = 2.5
 """Horizontal accuracy (CEP) that u-blox states for its M8 receivers; here a bound per axis."""
 
-LATEST_PURSUIT_S = 30.0
-"""As long as a landing takes: MM-MLS lands after 25 to 35 s, the others after 19 to 24 s."""
+LATEST_PURSUIT_S = 20.0
+"""About when the first land: OpenCV-MLS and TPHYolo-MLS after 18 to 24 s, MM-MLS after 23 to 35 s.
+Whom nobody pursues before, nobody hits."""
 
 
 def square_to_disc(x: float, y: float) -> tuple[float, float]:

@@ -56,9 +56,9 @@ def test_weights_survive_their_file_and_are_the_same_bytes(tmp_path: Path) -> No
 
 @pytest.mark.parametrize("name", ["dqn", "dqn-paper"])
 def test_before_its_moment_an_object_wanders(name: str) -> None:
-    """The moment is a gene, 0 to 30 s; until then moves are those of waypoint."""
+    """The moment is a gene, 0 to 20 s; until then moves are those of waypoint."""
     genome = with_pursuit(genome_for(MAP))
-    scenario = decode(genome.nominal, genome, map="court", seed=0).replace({"pursuit.begin": 0.4})
+    scenario = decode(genome.nominal, genome, map="court", seed=0).replace({"pursuit.begin": 0.6})
     waits, learned, wanders = (policy_spec(each).make() for each in (name, name, "waypoint"))
     me = situation(being((6.0, -3.0)), scenario=scenario)
     waits.reset(me, np.random.default_rng(5))
