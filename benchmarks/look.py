@@ -70,7 +70,15 @@ def main() -> None:
     name, generation, index = arguments.slot.rsplit("-", 2)
     ledger = Ledger(arguments.garl_dir / "ledger.sqlite")
     scenarios = ledger.scenarios(int(generation[1:]), int(index[1:]), name)
-    for path in sorted((arguments.garl_dir / "flights").glob(f"*-{arguments.slot}.npz")):
+    flights = arguments.garl_dir / "flights"
+    paths = sorted(flights.glob(f"*-{arguments.slot}.npz"))
+    if not paths:
+        parser.error(
+            f"there is no record of {arguments.slot} in {flights}, where those of violations are "
+            f"kept, but not after an experiment; fly it again: pytest FILE "
+            f"--garl-repeat={arguments.slot} -o garl_dir={arguments.garl_dir}"
+        )
+    for path in paths:
         flight = load(path)
         scenario = load_scenario(next(iter(scenarios.values())))
         map = load_map(name)
