@@ -144,8 +144,14 @@ def repeated(options: Options, target: Target) -> Scenario:
 def _repeated_targets(subject: Subject, map: str, options: Options) -> list[Target]:
     if Path(options.repeat).is_file():
         from pytest_garl.scenarios.files import map_name_in
+        from pytest_garl.scenarios.toml_reader import parse
 
         text = Path(options.repeat).read_text(encoding="utf-8")
+        if "violation" in parse(text, options.repeat):
+            raise GarlError(
+                f"--garl-repeat={options.repeat}: found a saved case, expected a slot or a file "
+                f"with a scenario; cases are flown by: garl cases replay {options.repeat}"
+            )
         if map_name_in(text, source=options.repeat) != map:
             return []
         return [dataclasses.replace(subject.target(map, FIRST), file=options.repeat)]

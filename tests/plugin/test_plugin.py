@@ -13,6 +13,8 @@ from pytest_garl.search.methods import METHODS
 from pytest_garl.search.slots import population, slots
 from pytest_garl.switches import METHODS as OFFERED
 
+SAVED = Path(__file__).parents[2] / "docs" / "tutorial" / "scenarios"
+
 SYSTEMS = """
 import os, time, math
 from pytest_garl import Land, VelocitySetpoint
@@ -256,6 +258,14 @@ def test_importlib_mode_reaches_the_children(pytester: pytest.Pytester) -> None:
         "pythonpath=.",
     )
     result.stdout.fnmatch_lines(["*8 flown*"])
+
+
+def test_a_saved_case_is_not_repeated_but_replayed(pytester: pytest.Pytester) -> None:
+    project(pytester)
+    case = next(SAVED.rglob("*.toml"))
+    result = run(pytester, f"--garl-repeat={case}")
+    assert result.ret == pytest.ExitCode.INTERRUPTED
+    result.stdout.fnmatch_lines([f"*found a saved case*garl cases replay {case}*"])
 
 
 @pytest.mark.parametrize(
