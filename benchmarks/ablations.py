@@ -1,7 +1,8 @@
 """What the parts of ``garl`` are worth: the search without them, and with others instead.
 
-The system under test is a pilot that knows the marker's place and avoids nothing: it needs no
-camera, so a search of 400 flights takes three quarters of a minute.  Objects walk to random places.
+The system under test is a pilot that knows the marker's place, climbs away from what it could see
+below, and goes home where it has not landed after a minute: it needs no camera, so a search of 400
+flights takes a minute or two.  Objects are steered as each method has it.
 ``python -m benchmarks.ablations`` flies what ``docs/ablations.csv`` lacks; ``--report`` prints the
 table.
 """
@@ -20,9 +21,9 @@ import numpy as np
 from scipy.stats import t
 
 from benchmarks.rows import append, read
-from pytest_garl.adversary.pilots import StraightPilot
+from pytest_garl.adversary.pilots import AvoidingPilot
 from pytest_garl.adversary.policies import policy_spec
-from pytest_garl.scenarios.chromosome import encode
+from pytest_garl.landing_system import Abort, Command, Observation
 from pytest_garl.scenarios.genes import genome_for
 from pytest_garl.scenarios.maps import load_map
 from pytest_garl.scenarios.scenario import Scenario
@@ -39,6 +40,7 @@ from pytest_garl.verdicts.verdict import Limits
 FILE = Path("docs/ablations.csv")
 MAPS = ("court", "lawn")
 BUDGET, POPULATION = 400, 20
+PATIENCE_S = 60.0
 FIELDS = ("variant", "seed", "map", "budget", "violations", "top10", "signatures", "distance")
 
 
@@ -70,12 +72,23 @@ VARIANTS: dict[str, Callable[[Plan], Method]] = {
     "without spreading": functools.partial(Garl, spreads=0.0),
     "garl-paper": find_method("garl-paper"),
     "random": find_method("random"),
+    "random with dqn": find_method("random"),
 }
+POLICIES = {"garl-paper": "dqn-paper", "random": "waypoint"}
+"""Who moves the objects; ``dqn`` where nothing is said."""
 
 
-def fly_one(scenario: Scenario) -> dict[str, Any]:
+class Pilot(AvoidingPilot):
+    """Avoids what is below, and does not wait for ever."""
+
+    def step(self, observation: Observation) -> Command:
+        """Fly, or go home."""
+        return Abort() if observation.time_s > PATIENCE_S else super().step(observation)
+
+
+def fly_one(scenario: Scenario, policy: str) -> dict[str, Any]:
     """Return the result of one flight, as a ledger holds it."""
-    flight = fly(scenario, StraightPilot, policy_spec("waypoint"))
+    flight = fly(scenario, Pilot, policy_spec(policy))
     call, body = closest_call(flight)
     return {
         "outcome": flight.outcome,
@@ -92,13 +105,15 @@ def search(name: str, seed: int, map: str, pool: Executor) -> dict[str, Any]:
     """Run one search to the end of its budget."""
     place = load_map(map)
     plan = Plan(map=place, genome=genome_for(place), seed=seed, population=POPULATION)
+    flown = functools.partial(fly_one, policy=POLICIES.get(name, "dqn"))
     method, verdicts, chromosomes = VARIANTS[name](plan), [], []
     for _ in range(BUDGET // POPULATION):
         scenarios = method.ask()
-        results = list(pool.map(fly_one, scenarios))
+        results = list(pool.map(flown, scenarios))
         method.tell([Flown(scenario=s, result=r) for s, r in zip(scenarios, results, strict=True)])
         verdicts += [from_dict(result["verdict"]) for result in results]
-        chromosomes += [plan.genome.normalise(encode(each, plan.genome)) for each in scenarios]
+        whole = [np.array([each[key] for key in plan.genome.keys]) for each in scenarios]
+        chromosomes += [plan.genome.normalise(each) for each in whole]
     return {
         "variant": name,
         "seed": seed,

@@ -15,10 +15,8 @@ from zipfile import BadZipFile
 import numpy as np
 from numpy.typing import NDArray
 
-from pytest_garl.adversary.policies import Waypoint
 from pytest_garl.adversary.states import VIEWS, on_turn
 from pytest_garl.errors import PolicyError
-from pytest_garl.scenarios.placement import pursuit_begins_s
 from pytest_garl.simulation.policy import STAY, Move, PolicySpec, Situation
 
 Array = NDArray[np.float64]
@@ -46,26 +44,17 @@ class Network:
 
 
 class LearnedPolicy:
-    """Takes the action that the network values most; one instance steers one object.
-
-    In a scenario whose gene ``pursuit.begin`` says so, the object wanders first, as ``waypoint``
-    has it: whom it meets in the last metre is somebody else than whom it would have met before.
-    """
+    """Takes the action that the network values most; one instance steers one object."""
 
     def __init__(self, weights: str, sha256: str) -> None:
         self._network = _load(weights, sha256)
         self._view = VIEWS[self._network.state]
 
     def reset(self, situation: Situation, rng: np.random.Generator) -> None:
-        """Look up when to begin."""
-        self._begins_s = pursuit_begins_s(situation.scenario)
-        self._wander = Waypoint()
-        self._wander.reset(situation, rng)
+        """Nothing to prepare: the state says everything."""
 
     def decide(self, situation: Situation) -> Move:
         """Return the best action, or stay where it is another's turn."""
-        if situation.time_s < self._begins_s:
-            return self._wander.decide(situation)
         if self._view.in_turn and not on_turn(situation):
             return STAY
         values = self._network.values(self._view.state(situation))

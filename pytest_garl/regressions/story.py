@@ -14,7 +14,6 @@ from pytest_garl.scenarios.placement import (
     object_destination_m,
     object_speed_mps,
     object_start_m,
-    pursuit_begins_s,
 )
 from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.simulation.flight import Contact, Flight, ObjectRecord
@@ -85,6 +84,4 @@ def meanings(scenario: Scenario, map_folders: tuple[Path, ...]) -> list[tuple[st
         goal = object_destination_m(scenario, map, name)
         way += f" to ({goal[0]:.1f}, {goal[1]:.1f}) m and back" if goal else ""
         rows.append((name, "", f"a {kind} of up to {speed:.2f} m/s, {way}"))
-    if begins := pursuit_begins_s(scenario):
-        rows.append(("pursuit", "", f"all wander for {begins:.1f} s before the policy steers them"))
     return rows

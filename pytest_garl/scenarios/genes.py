@@ -165,19 +165,7 @@ GPS_ERROR = CompositeGene(
     name="gps_error",
     genes=(_place("gps_error", "gps_error", "error of the told coordinate, share of 2.5 m"),),
 )
-PURSUIT = CompositeGene(
-    name="pursuit",
-    genes=(
-        _scalar(
-            "pursuit",
-            "begin",
-            1.0,
-            0.0,
-            "when a learned policy takes over from wandering (0: at once, 1: after 20 s)",
-        ),
-    ),
-)
-EXTRAS = {"wind": WIND, "gps_error": GPS_ERROR, "pursuit": PURSUIT}
+EXTRAS = {"wind": WIND, "gps_error": GPS_ERROR}
 """Genes that exist but are off by default; so are destinations (``with_destinations``)."""
 
 
@@ -207,11 +195,6 @@ def genome_for(
         name="objects", genes=tuple(_object_gene(name) for name, _ in map.object_names)
     )
     return Genome(composites=(environment, marker, objects, *extras))
-
-
-def with_pursuit(genome: Genome) -> Genome:
-    """Return the genome with the moment at which a learned policy begins to steer the objects."""
-    return Genome(composites=(*genome.composites, PURSUIT))
 
 
 def with_destinations(genome: Genome) -> Genome:

@@ -18,10 +18,6 @@ TOP_WIND_MPS = 10.0
 TOP_GPS_ERROR_M = 2.5
 """Horizontal accuracy (CEP) that u-blox states for its M8 receivers; here a bound per axis."""
 
-LATEST_PURSUIT_S = 20.0
-"""About when the first land: OpenCV-MLS and TPHYolo-MLS after 18 to 24 s, MM-MLS after 23 to 35 s.
-Whom nobody pursues before, nobody hits."""
-
 
 def square_to_disc(x: float, y: float) -> tuple[float, float]:
     """Map [-1, 1]² onto the unit disc, areas in proportion (Shirley and Chiu 1997)."""
@@ -103,11 +99,6 @@ def object_speed_mps(scenario: Scenario, map: Map, name: str) -> float:
     """How fast an object may move: its velocity gene times its type's top speed."""
     kind = dict(map.object_names)[name]
     return scenario[f"{name}.velocity"] * OBJECT_TYPES[kind].top_speed_mps
-
-
-def pursuit_begins_s(scenario: Scenario) -> float:
-    """When a learned policy takes the objects over; at once unless the genome has the gene."""
-    return scenario.get("pursuit.begin", 0.0) * LATEST_PURSUIT_S
 
 
 def wind_mps(scenario: Scenario) -> tuple[float, float]:

@@ -8,15 +8,10 @@ so that near misses of another kind are worth more than one more of the same.  T
 and speeds are spread out as the paper's mutation does, away from all asked for before, which is to
 the ends of their ranges; the marker, which decides where the UAV flies, is put where none has been
 near.  Weather and light are not spread: at their ends a flight is aborted rather than failed.
-
-The chromosome has one gene more than the paper's: the moment from which on the objects' policy
-steers them; until then they wander.  A policy that hits whom it can hits in the descent, so that
-hardly any flight comes to the last metre: what fails there shows only if it holds back.
 """
 
 from __future__ import annotations
 
-import dataclasses
 import hashlib
 from collections import Counter, defaultdict
 from collections.abc import Callable, Sequence
@@ -26,7 +21,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pytest_garl.scenarios.chromosome import decode, encode
-from pytest_garl.scenarios.genes import with_pursuit
 from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.scenarios.validity import repair
 from pytest_garl.search.method import Flown, Plan
@@ -56,9 +50,6 @@ NEAREST = 0.1
 SPREADS = 0.75
 """Share of places and speeds that are put away from all asked for before, in a scenario without
 parents and in one bred far from its parent."""
-SLOW = 0.25
-"""Where all objects are slower than this share of their top speeds nothing happens: so were none of
-333 collisions, but 22 of 24 landings in a search that let them be (MM-MLS, court, seed 1)."""
 MEMORY = 0.9
 """What a trial still counts for after one more of its arm: cells change as they are searched."""
 NEAR, FAR = "near", "far"
@@ -95,7 +86,6 @@ class Garl:
         spreads: float = SPREADS,
         cell: Callable[[dict[str, Any]], str] | None = None,
     ) -> None:
-        plan = dataclasses.replace(plan, genome=with_pursuit(plan.genome))
         self._plan, self._explores, self._aims = plan, explores, aims
         self._weathers, self._learns_cells = weathers, learns_cells
         self._crossover, self._spreads = crossover, spreads
@@ -111,8 +101,6 @@ class Garl:
         keys = plan.genome.keys
         self._weather = np.array([key.startswith("environment.") for key in keys])
         self._marker = np.array([key.startswith("marker.") for key in keys])
-        self._speed = np.array([key.endswith(".velocity") for key in keys])
-        self._pursuit = np.array([key.startswith("pursuit.") for key in keys])
 
     def ask(self) -> Sequence[Scenario]:
         """Return the next generation."""
@@ -161,7 +149,7 @@ class Garl:
         return arms[int(np.argmax(self._rng.beta(1 + trials[:, 0], 1 + trials[:, 1])))]
 
     def _random(self) -> Scenario:
-        row = self._spread(self._plan.genome.random(self._rng), ~(self._weather | self._pursuit))
+        row = self._spread(self._plan.genome.random(self._rng), ~self._weather)
         return self._scenario(row, int(self._rng.integers(2**32)))
 
     def _spread(self, row: Matrix, which: NDArray[np.bool_]) -> Matrix:
@@ -179,10 +167,6 @@ class Garl:
             shape = CANDIDATES, int(marker.sum())
             places = rng.uniform(genome.lower[marker], genome.upper[marker], shape)
             spread[marker] = places[farthest_from_nearest(places, asked[:, marker])]
-        slow = which & self._speed
-        if slow.any() and (spread[self._speed] < SLOW).all():
-            column = rng.choice(np.flatnonzero(slow))
-            spread[column] = genome.lower[column] + genome.upper[column] - spread[column]
         return spread
 
     def _child(self, name: str, way: str) -> Scenario:
@@ -197,11 +181,10 @@ class Garl:
         # What nearly fails needs a small change, and so does what shall fail again.
         largest = LARGEST_STEP * max(NEAREST, 1 - threat(first.result))
         body = f"{first.result['closest_body']}."
-        hit = np.array([key.startswith(body) for key in genome.keys])
-        aim = hit | self._pursuit
+        aim = np.array([key.startswith(body) for key in genome.keys])
         if way == FAR:
             return self._scenario(self._spread(row, ~(aim | self._weather)), seed)
-        if hit.any() and rng.random() < self._aims:
+        if aim.any() and rng.random() < self._aims:
             moved = local_steps(
                 row[None], genome.lower, genome.upper, rng, probability=1.0, largest=largest
             )[0]

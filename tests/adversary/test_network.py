@@ -1,6 +1,5 @@
 from __future__ import annotations
 
-import dataclasses
 import json
 from collections.abc import Callable
 from pathlib import Path
@@ -9,11 +8,7 @@ import numpy as np
 import pytest
 
 from pytest_garl.adversary.network import WEIGHTS, Network, learned_spec, read_manifest, save
-from pytest_garl.adversary.policies import policy_spec
 from pytest_garl.errors import PolicyError
-from pytest_garl.scenarios.chromosome import decode
-from pytest_garl.scenarios.genes import genome_for, with_pursuit
-from tests.adversary.situations import MAP, being, situation
 
 
 def network(outputs: int = 5, state: str = "paper") -> Network:
@@ -52,25 +47,6 @@ def test_weights_survive_their_file_and_are_the_same_bytes(tmp_path: Path) -> No
     loaded = policy._network.values(state)  # type: ignore[attr-defined]
     assert loaded == pytest.approx(net.values(state), abs=1e-4)
     assert read_manifest(tmp_path / "a.npz")["seed"] == 1
-
-
-@pytest.mark.parametrize("name", ["dqn", "dqn-paper"])
-def test_before_its_moment_an_object_wanders(name: str) -> None:
-    """The moment is a gene, 0 to 20 s; until then moves are those of waypoint."""
-    genome = with_pursuit(genome_for(MAP))
-    scenario = decode(genome.nominal, genome, map="court", seed=0).replace({"pursuit.begin": 0.6})
-    waits, learned, wanders = (policy_spec(each).make() for each in (name, name, "waypoint"))
-    me = situation(being((6.0, -3.0)), scenario=scenario)
-    waits.reset(me, np.random.default_rng(5))
-    wanders.reset(me, np.random.default_rng(5))
-    learned.reset(situation(being((6.0, -3.0))), np.random.default_rng(5))
-    moves = []
-    for tick in range(40):
-        now = dataclasses.replace(me, time_s=0.5 * tick)
-        move = waits.decide(now)
-        assert move == (wanders if now.time_s < 12 else learned).decide(now)
-        moves.append(move)
-    assert moves[23] != moves[24]
 
 
 def _truncate(path: Path) -> None:
