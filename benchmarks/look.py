@@ -32,10 +32,12 @@ Image = NDArray[np.uint8]
 
 
 def sheet(flight: Flight, renderer: Renderer, spacing_s: float) -> Image:
-    """Return the last moments, one a column."""
+    """Return the last moments, one a column, fewer where a flight was short."""
     columns = []
     for index in range(MOMENTS):
         when = flight.elapsed_s - (MOMENTS - 1 - index) * spacing_s
+        if when < 0:
+            continue
         row = int(np.argmin(np.abs(flight.uav.time_s - when)))
         x, y, z = (float(value) for value in flight.uav.position_m[row])
         a, b, c, d = (float(value) for value in flight.uav.attitude[row])
@@ -54,7 +56,7 @@ def sheet(flight: Flight, renderer: Renderer, spacing_s: float) -> Image:
         cv2.circle(side, (int(u), int(v)), 14, (255, 40, 255), 1)
         step = min(flight.steps, key=lambda each: abs(each.time_s - when))
         phase = step.diagnostics.phase if step.diagnostics else ""
-        text = f"{when:.1f} s {z - 0.2:.1f} m {phase}"
+        text = f"{when:.1f} s {max(0.0, z - 0.2):.1f} m {phase}"
         cv2.putText(below, text, (4, 14), cv2.FONT_HERSHEY_SIMPLEX, 0.45, (255, 255, 0))
         columns.append(np.vstack([below, side]))
     return np.asarray(np.hstack(columns), np.uint8)
