@@ -1,4 +1,10 @@
-"""Random search: every scenario drawn uniformly and repaired."""
+"""random: every scenario drawn uniformly and repaired.
+
+The paper's first baseline: "all the static environments are randomly generated", objects' starts
+and destinations too.  In its code the objects never move.  Taken is the paper's: the policy
+``waypoint`` walks each to a random place, and then, of which the paper says nothing, to the next;
+objects that stand at their first would be the weaker rival.
+"""
 
 from __future__ import annotations
 
