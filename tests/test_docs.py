@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import csv
 import dataclasses
 import re
 import subprocess
@@ -34,3 +35,20 @@ def test_the_page_of_experiments_tells_every_column_and_every_key() -> None:
     assert [name for name in columns if f"`{name}`" not in text] == []
     told = {name.strip("[]") for name in re.findall(r"`([a-z_\[\]]+)`", text)}
     assert told >= TOP_KEYS
+
+
+def test_what_remarks_count_agrees_with_the_rows() -> None:
+    from pytest_garl.experiments.rows import read
+
+    rows = {row.result_hash: row for row in read(DOCS / "experiments" / "rq.csv")}
+    with (DOCS / "experiments" / "counts.csv").open(newline="") as file:
+        lines = list(csv.DictReader(file))
+    assert lines
+    for line in lines:
+        row = rows[line["result_hash"]]
+        kinds = dict(each.split("=") for each in line["kinds"].split("|") if each)
+        assert (row.system, row.map, row.method) == (line["system"], line["map"], line["method"])
+        assert tuple(kinds) == row.signatures
+        assert sum(map(int, kinds.values())) == row.violations
+        assert int(line["aborted"]) == row.aborted
+        assert row.violations + row.aborted + int(line["landed"]) == row.budget
