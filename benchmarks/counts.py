@@ -17,7 +17,7 @@ from pathlib import Path
 
 from benchmarks.rows import read
 from pytest_garl.experiments.measure import HASH
-from pytest_garl.experiments.rows import Row
+from pytest_garl.experiments.rows import SEPARATOR
 from pytest_garl.experiments.rows import read as rows_of
 from pytest_garl.scenarios.genes import genome_for
 from pytest_garl.scenarios.maps import load_map
@@ -32,7 +32,7 @@ SLOW = 0.25
 
 
 def count(ledger: Ledger, search: str, map: str) -> dict[str, int | str]:
-    """Return a search's counts; ``kinds`` is ``signature=flights``, separated by ``|``."""
+    """Return a search's counts; ``kinds`` is ``signature=flights``, separated as in rows."""
     counts, kinds = Counter[str](), Counter[str]()
     genome = genome_for(load_map(map))
     speeds = [
@@ -53,7 +53,7 @@ def count(ledger: Ledger, search: str, map: str) -> dict[str, int | str]:
     names = ("landed", "aborted", "dark", "dark_aborted", "slow_landed", "slow_collision")
     return {
         **{name: counts[name] for name in names},
-        "kinds": "|".join(f"{name}={times}" for name, times in sorted(kinds.items())),
+        "kinds": SEPARATOR.join(f"{name}={times}" for name, times in sorted(kinds.items())),
     }
 
 
@@ -67,7 +67,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--folder", type=Path, default=Path(".garl/experiments"))
     folder = parser.parse_args().folder
-    rows: dict[str, Row] = {row.result_hash: row for row in rows_of(ROWS)}
+    rows = {row.result_hash: row for row in rows_of(ROWS)}
     lines: dict[str, dict[str, int | str]] = {
         line["result_hash"]: dict(line) for line in read(FILE) if line["result_hash"] in rows
     }

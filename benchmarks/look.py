@@ -34,10 +34,8 @@ Image = NDArray[np.uint8]
 def sheet(flight: Flight, renderer: Renderer, spacing_s: float) -> Image:
     """Return the last moments, one a column, fewer where a flight was short."""
     columns = []
-    for index in range(MOMENTS):
-        when = flight.elapsed_s - (MOMENTS - 1 - index) * spacing_s
-        if when < 0:
-            continue
+    moments = (flight.elapsed_s - back * spacing_s for back in reversed(range(MOMENTS)))
+    for when in (each for each in moments if each >= 0):
         row = int(np.argmin(np.abs(flight.uav.time_s - when)))
         x, y, z = (float(value) for value in flight.uav.position_m[row])
         a, b, c, d = (float(value) for value in flight.uav.attitude[row])
