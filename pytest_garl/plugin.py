@@ -11,7 +11,7 @@ import pytest
 from pytest_garl import hookspecs
 from pytest_garl.errors import GarlError
 from pytest_garl.fixtures import garl_slot, landing, npcs, scenario
-from pytest_garl.switches import FATAL, OWN, RUN, add_options, asked, flies, target_of
+from pytest_garl.switches import FATAL, FOUND, OWN, RUN, add_options, asked, flies, target_of
 
 __all__ = ["garl_slot", "landing", "npcs", "scenario"]
 
@@ -153,6 +153,9 @@ def pytest_runtest_logreport(report: pytest.TestReport) -> None:
         worker = getattr(report, "node", None)
         if key == OWN and worker is not None:
             worker.config.stash[RUN].told[report.nodeid] = str(value)
+        if key == FOUND and worker is not None:
+            search, _, signature = str(value).partition(" ")
+            worker.config.stash[RUN].note_test(search, signature, report.nodeid)
 
 
 def pytest_report_header(config: pytest.Config) -> str | None:

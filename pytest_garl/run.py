@@ -60,6 +60,9 @@ class Run:
     own: dict[tuple[str, str], Asks] = field(default_factory=dict)
     """Assertions of tests that failed where the built-in verdict is content, by search and
     signature."""
+    found_by: dict[tuple[str, str], str] = field(default_factory=dict)
+    """The test that failed for a violation, by search and signature: its node id, without
+    parameters."""
     told: dict[str, str] = field(default_factory=dict)
     """Tests of which xdist's workers say that they failed so, with the signature."""
     lock: TextIO | None = None
@@ -89,6 +92,12 @@ class Run:
                         f"it was: {', '.join(differing)} changed; run without --garl-resume to "
                         "begin anew"
                     )
+
+    def note_test(self, search: str, signature: str, nodeid: str) -> None:
+        """Remember which test failed for a violation: of several the first by name."""
+        test = nodeid.partition("[")[0]
+        known = self.found_by.setdefault((search, signature), test)
+        self.found_by[search, signature] = min(known, test)
 
     def close(self) -> None:
         """End the flying children and let others have the ledger."""

@@ -20,6 +20,8 @@ FATAL = "garl.fatal"
 """The user property by which an xdist worker tells the controller that the run cannot go on."""
 OWN = "garl.own"
 """The user property by which it tells of a test that failed in an assertion of its own."""
+FOUND = "garl.found"
+"""The user property by which it tells that a test failed for a search's violation."""
 METHODS = ("garl", "garl-paper", "ga", "offline-rl", "online-rl", "random", "surrogate-random")
 POLICIES = (
     "dqn",

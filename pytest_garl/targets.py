@@ -121,7 +121,7 @@ def _saved_targets(subject: Subject, options: Options, test: str) -> Iterator[Ta
         if head is None or head.map not in there:
             yield dataclasses.replace(subject.target("", FIRST), entry=entry)
             continue
-        if head.map not in subject.maps or head.test not in ("", test):
+        if head.map not in subject.maps or head.own_test not in ("", test):
             continue
         target = dataclasses.replace(subject.target(head.map, FIRST), entry=entry)
         yield target

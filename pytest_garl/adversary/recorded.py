@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import json
+import math
 from collections.abc import Mapping, Sequence
 from types import MappingProxyType
 
 import numpy as np
 
 from pytest_garl.errors import PolicyError
-from pytest_garl.simulation.policy import STAY, Move, PolicySpec, Situation
+from pytest_garl.simulation.policy import DECISION_STEP_S, STAY, Move, PolicySpec, Situation
 
 Moves = Mapping[str, Sequence[tuple[float, float]]]
 """The wanted velocities (x, y) of each object, one for every half second, as shares of its
@@ -21,10 +22,22 @@ Changes = Mapping[str, Sequence[tuple[int, str, float]]]
 NONE: Changes = MappingProxyType({})
 
 
-class Recorded:
-    """Repeats an object's moves, decision by decision, and stands still when they end.
+LANDING_ZONE_M = 5.0
+"""Horizontal distance from the marker's centre to an object that is out of the way.  Engineering
+estimate: half the UAV and half a bird's span are 1.2 m together; the rest is room to drift."""
+_STUCK = 0.1
+"""An object that comes less far in one decision than this share of its speed stands against
+something."""
+_TURN_RAD = math.radians(70)
+"""No whole part of a circle, so that each try has a direction of its own."""
 
-    What its policy changed of the environment is changed again, at the same decisions.
+
+class Recorded:
+    """Repeats an object's moves, decision by decision, and leaves the landing zone when they end.
+
+    A recording ends when the UAV was hit.  If the object stood on the marker for ever after, a
+    repaired landing system that waits could never land.  What its policy changed of the environment
+    is changed again, at the same decisions.
     """
 
     def __init__(self, moves: str, changes: str = "{}") -> None:
@@ -40,14 +53,56 @@ class Recorded:
             )
         self._moves = enumerate(self._all[name])
         self._own = self._changes.get(name, [])
+        self._last: tuple[float, float] = (0.0, 0.0)
+        self._exit: _Exit | None = None
 
     def decide(self, situation: Situation) -> Move:
         """Repeat the next move."""
         number, move = next(self._moves, (-1, None))
-        if move is None:
+        if move is None and self._exit is None:
+            # Not at once: the flight of a shortened record may last a moment longer.
+            self._exit = _Exit(situation, self._last)
             return STAY
+        if move is None:
+            assert self._exit is not None
+            return self._exit.decide(situation)
+        self._last = (move[0], move[1])
         changes = tuple((key, by) for decision, key, by in self._own if decision == number)
         return Move(x=move[0], y=move[1], changes=changes)
+
+
+class _Exit:
+    """The way out of the landing zone: straight on, or away from the marker for one that stood.
+
+    An object that comes no farther turns, first away from the marker, then on from there.
+    """
+
+    def __init__(self, situation: Situation, last: tuple[float, float]) -> None:
+        self._heading = math.atan2(last[1], last[0]) if any(last) else _away(situation)
+        self._place: tuple[float, float] | None = None
+        self._waited, self._turns = 0, 0
+
+    def decide(self, situation: Situation) -> Move:
+        """Return the next move: at full speed until the object is clear of the landing zone."""
+        x, y, _ = situation.self.position_m
+        if math.dist((x, y), situation.marker_position_m) >= LANDING_ZONE_M:
+            return STAY
+        least = _STUCK * situation.self.speed_mps * DECISION_STEP_S
+        stuck = self._place is not None and math.dist((x, y), self._place) < least
+        # Twice: one that turns back stands for a moment.
+        self._waited = self._waited + 1 if stuck else 0
+        if self._waited == 2:
+            self._heading = _away(situation) + self._turns * _TURN_RAD
+            self._turns, self._waited = self._turns + 1, 0
+        self._place = (x, y)
+        return Move(x=math.cos(self._heading), y=math.sin(self._heading))
+
+
+def _away(situation: Situation) -> float:
+    """Return the direction from the marker to the object; east for one right on it."""
+    x, y, _ = situation.self.position_m
+    mx, my = situation.marker_position_m
+    return math.atan2(y - my, x - mx)
 
 
 def recorded_spec(moves: Moves, changes: Changes = NONE) -> PolicySpec:

@@ -40,7 +40,8 @@ class Evidence:
 
     ``neighbours_failed`` of ``neighbours`` slightly different scenarios failed with the same
     signature; ``trajectory_sha256`` is that of the flight, on CPUs of the class ``cpu``;
-    ``removed`` says what shrinking took away.
+    ``removed`` says what shrinking took away.  ``system_sha256`` and ``simulator_sha256`` are of
+    the sources that flew it; empty in files that were written before they were stored.
     """
 
     trajectory_sha256: str
@@ -50,6 +51,8 @@ class Evidence:
     neighbours_failed: int
     removed: str
     versions: tuple[tuple[str, str], ...]
+    system_sha256: str = ""
+    simulator_sha256: str = ""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -70,9 +73,9 @@ class Case:
 
     ``system`` is "module:class"; ``moves`` are what each object did, ``changes`` what of the
     environment, so that no policy is needed to fly it again; ``policy`` and ``policy_sha256``
-    name who moved them when it was found.  ``test`` and ``assertion`` are set where a test's own
-    assertion failed and the built-in verdict is content: the test's name and the hash of the
-    assertion's source.
+    name who moved them when it was found.  ``test`` is the node id of the test that failed, without
+    parameters; empty where none is known.  ``assertion`` is set where a test's own assertion failed
+    and the built-in verdict is content: the hash of the assertion's source.
     ``avoidable`` says what may be asked of a repair: not to outrun a pursuer that nobody outruns.
     ``limits`` are those of the tests when it was found; pytest flies it with those of today.
     """
@@ -92,15 +95,30 @@ class Case:
     assertion: str = ""
 
     @property
+    def own_test(self) -> str:
+        """The name of the test whose own assertion failed; empty for the built-in verdict."""
+        return own_test(self.test, self.assertion)
+
+    @property
+    def edge(self) -> bool:
+        """Whether a neighbour does not fail: such a case decides nothing and gates nothing."""
+        return self.evidence.neighbours_failed < self.evidence.neighbours
+
+    @property
     def id(self) -> str:
         """A name such as ``court-IV-dog-3f9a12``, the same for the same scenario."""
-        facts = (self.system, self.scenario, self.violation.signature, self.moves, self.test)
+        facts = (self.system, self.scenario, self.violation.signature, self.moves, self.own_test)
         # Nothing where nothing was changed, so that the names of other cases stay.
         changes = repr(self.changes) if self.changes else ""
         digest = hashlib.sha256(f"{facts!r}{changes}".encode()).hexdigest()
         words = self.violation.signature.split(":")[:2] or [self.violation.type]
         subject = "-".join(_SAFE.sub("_", word.partition("@")[0]).strip("_") for word in words)
         return f"{self.scenario.map}-{subject}-{digest[:6]}"
+
+
+def own_test(test: str, assertion: str) -> str:
+    """Return the function's name in a test's node id if the failure is its own assertion."""
+    return test.rpartition("::")[2] if assertion else ""
 
 
 _SAFE = re.compile(r"[^A-Za-z0-9]+")

@@ -122,7 +122,7 @@ def _key(case: Case) -> tuple[str, ...]:
         case.system,
         case.scenario.map,
         case.violation.signature,
-        case.test,
+        case.own_test,
         case.assertion,
     )
 

@@ -20,6 +20,7 @@ from pytest_garl.regressions.case import (
     MoveList,
     Status,
     Violation,
+    own_test,
 )
 from pytest_garl.scenarios.files import gene_lines, read_genes
 from pytest_garl.scenarios.genes import ENVIRONMENT
@@ -44,7 +45,7 @@ class Head:
     status: Status
     avoidable: Avoidable
     map: str
-    test: str
+    own_test: str
 
 
 def dumps(case: Case) -> str:
@@ -54,14 +55,16 @@ def dumps(case: Case) -> str:
     lines = [f"# {line}" for line in textwrap.wrap(story, _WIDTH)]
     lines += [
         f"schema = {SCHEMA}",
-        f'system = "{case.system}"',
+        f"system = {_text(case.system)}",
         f'status = "{case.status}"',
         f'avoidable = "{case.avoidable}"  # among which objects the reference pilot comes through',
-        f'map = "{scenario.map}"',
+        f"map = {_text(scenario.map)}",
         f"seed = {scenario.seed}",
     ]
     if case.test:
-        lines += [f"test = {_text(case.test)}", f"assertion = {_text(case.assertion)}"]
+        lines.append(f"test = {_text(case.test)}")
+    if case.assertion:
+        lines.append(f"assertion = {_text(case.assertion)}")
     if scenario.absent:
         lines.append(f"absent = [{', '.join(_text(name) for name in scenario.absent)}]")
     lines += [
@@ -92,7 +95,7 @@ def dumps(case: Case) -> str:
         f"sha256 = {_text(case.policy_sha256)}",
         "",
         "# What they did: [times, x, y], each for half a second; x east and y north as shares of",
-        "# the object's speed. After the last they stand still.",
+        "# the object's speed. After the last they leave the marker's surroundings.",
         "[moves]",
     ]
     lines += [f"{name} = {_moves(moves)}" for name, moves in case.moves]
@@ -113,6 +116,14 @@ def dumps(case: Case) -> str:
         f"neighbours = {evidence.neighbours}  # slightly different scenarios flown",
         f"neighbours_failed = {evidence.neighbours_failed}",
         f"removed = {_text(evidence.removed)}",
+        *(
+            f'{key} = "{value}"'
+            for key, value in (
+                ("system_sha256", evidence.system_sha256),
+                ("simulator_sha256", evidence.simulator_sha256),
+            )
+            if value
+        ),
         "",
         "[evidence.versions]",
         *(f"{_text(name)} = {_text(version)}" for name, version in evidence.versions),
@@ -174,7 +185,7 @@ def loads(text: str, load_map: Callable[[str], Map], *, source: str = "case") ->
         else (),
         evidence=_read_evidence(top.table("evidence")),
         limits=read_limits(top.table("limits")),
-        test=head.test,
+        test=top.text("test", ""),
         assertion=top.text("assertion", ""),
     )
 
@@ -196,7 +207,7 @@ def _read_head(top: Table) -> Head:
         status=cast(Status, top.text("status", among=_STATUSES)),
         avoidable=cast(Avoidable, top.text("avoidable", among=_AVOIDABLE)),
         map=top.text("map"),
-        test=top.text("test", ""),
+        own_test=own_test(top.text("test", ""), top.text("assertion", "")),
     )
 
 
@@ -283,6 +294,8 @@ def _read_evidence(table: Table) -> Evidence:
             "neighbours",
             "neighbours_failed",
             "removed",
+            "system_sha256",
+            "simulator_sha256",
             "versions",
         }
     )
@@ -295,6 +308,8 @@ def _read_evidence(table: Table) -> Evidence:
         neighbours_failed=table.integer("neighbours_failed"),
         removed=table.text("removed"),
         versions=tuple((name, versions.text(name)) for name in versions.values),
+        system_sha256=table.text("system_sha256", ""),
+        simulator_sha256=table.text("simulator_sha256", ""),
     )
 
 

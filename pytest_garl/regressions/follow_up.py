@@ -43,17 +43,21 @@ class Pursued:
 
 
 def inquiries(
-    ledger: Ledger, place: Place, budget: int, own: Mapping[tuple[str, str], Asks] | None = None
+    ledger: Ledger,
+    place: Place,
+    budget: int,
+    own: Mapping[tuple[str, str], Asks] | None = None,
+    found_by: Mapping[tuple[str, str], str] | None = None,
 ) -> tuple[Inquiry, ...]:
     """Return what is to be found out about signatures that no saved case has.
 
     ``budget`` is for all signatures of one search together.  Where it does not reach for all, the
     most frequent come first and the others have none; the first is saved, if unshrunk, however
     small the budget.  ``own`` are assertions of tests that failed where the verdict is content, by
-    search and signature.
+    search and signature; ``found_by`` are the node ids of the tests that failed.
     """
     found = []
-    asks = own or {}
+    asks, tests = own or {}, found_by or {}
     groups = _by_search(ledger)
     for search, signature in asks:
         groups.setdefault(search, {})[signature] = []
@@ -85,6 +89,7 @@ def inquiries(
                     map=map,
                     budget=max(LEAST, budget // reached) if number < reached else 0,
                     asks=asks.get((search, signature)),
+                    test=tests.get((search, signature), ""),
                 )
             )
     return tuple(found)

@@ -18,7 +18,7 @@ from pytest_garl.scenarios.maps import Map
 from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.search.errands import Done, Fly
 from pytest_garl.search.job import Job
-from pytest_garl.search.reference import reference_to
+from pytest_garl.search.reference import reference_to, simulator_sha256
 from pytest_garl.simulation.flight import Flight
 from pytest_garl.simulation.record import load
 from pytest_garl.simulation.reference_pilot import ReferencePilot
@@ -53,7 +53,8 @@ class Inquiry:
     """What is to be found out about one signature of one search.
 
     ``violations`` are scenarios with the flights that violated.  ``budget`` bounds the flights.
-    ``asks`` is the test's own assertion that failed, None for the built-in verdict.
+    ``asks`` is the test's own assertion that failed, None for the built-in verdict; ``test`` is the
+    node id of the test that found it.
     """
 
     name: str
@@ -63,6 +64,7 @@ class Inquiry:
     map: Map
     budget: int
     asks: Asks | None = None
+    test: str = ""
 
     def failed(self, scenario: Scenario, done: Done) -> bool:
         """Whether a flight failed in the way that is asked about."""
@@ -247,9 +249,11 @@ class Pursuit:
                 neighbours_failed=failure.robust,
                 removed=removed(first, failure.scenario, inquiry.map),
                 versions=flight.versions if flight else (),
+                system_sha256=job.system_sha256,
+                simulator_sha256=simulator_sha256(job.simulator),
             ),
             limits=job.limits,
-            test=own.test if own else "",
+            test=inquiry.test or (own.test if own else ""),
             assertion=own.assertion if own else "",
         )
 

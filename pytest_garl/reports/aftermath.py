@@ -37,7 +37,7 @@ def pursue(run: Run, session: pytest.Session) -> None:
         for nodeid, signature in sorted(run.told.items()):
             target, asks = asks_of(session, nodeid)
             run.own[target.search, signature] = asks
-        wanted = inquiries(run.ledger, place, options.shrink, run.own)
+        wanted = inquiries(run.ledger, place, options.shrink, run.own, run.found_by)
         reached = [each for each in wanted if each.budget]
         if reached:
             reporter.ensure_newline()

@@ -10,7 +10,7 @@ import pytest
 from pytest_garl.fixtures import Landing
 from pytest_garl.own import Asks, failure_of
 from pytest_garl.run import Run, again_key
-from pytest_garl.switches import OWN
+from pytest_garl.switches import FOUND, OWN
 from pytest_garl.targets import FIRST, Target
 
 if TYPE_CHECKING:
@@ -61,6 +61,7 @@ def _explain_violation(
     doubt = "" if twin or run.options.repeat else _doubt(run, target, result)
     if doubt.startswith(FLAKY):
         return _expected(report, doubt)
+    _note_test(report, item, run, target, signature)
     told = [result["verdict"]["story"], *_unusual(run, target), *filter(None, [doubt])]
     return _tell(report, [signature, *_wrapped(told), repeat_line(item, run, target)])
 
@@ -89,9 +90,19 @@ def _explain_own(
     if twin and run.options.duplicates == "xfail":
         return _expected(report, f"same violation as {twin} ({failure.signature})")
     run.own[target.search, failure.signature] = asks
+    _note_test(report, item, run, target, failure.signature)
     if hasattr(item.config, "workerinput"):
         report.user_properties.append((OWN, failure.signature))
     return _tell(report, lines)
+
+
+def _note_test(
+    report: pytest.TestReport, item: pytest.Item, run: Run, target: Target, signature: str
+) -> None:
+    """Remember which test found a violation; it judges the case that is saved."""
+    run.note_test(target.search, signature, item.nodeid)
+    if hasattr(item.config, "workerinput"):
+        report.user_properties.append((FOUND, f"{target.search} {signature}"))
 
 
 def _explain_case(
@@ -133,7 +144,7 @@ def _explain_case(
 
 def _same_assertion(case: Case, item: pytest.Item, error: BaseException | None) -> bool:
     """Whether a case's own test fails in the assertion that it was saved for."""
-    if not case.test or error is None or not isinstance(item, pytest.Function):
+    if not case.assertion or error is None or not isinstance(item, pytest.Function):
         return False
     failure = failure_of(item.originalname, error)
     return failure is not None and failure.signature == case.violation.signature

@@ -9,6 +9,7 @@ from pytest_garl.scenarios.genes import genome_like
 from pytest_garl.scenarios.maps import Map
 from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.scenarios.toml_reader import Table, parse
+from pytest_garl.scenarios.toml_writer import quoted
 
 SCHEMA = 1
 
@@ -19,7 +20,7 @@ def dumps(scenario: Scenario) -> str:
         "# A scenario of pytest-garl. Genes are without unit: weather 0 to 1, places -1 to 1,",
         "# velocity as a share of the type's top speed.",
         f"schema = {SCHEMA}",
-        f'map = "{scenario.map}"',
+        f"map = {quoted(scenario.map)}",
         f"seed = {scenario.seed}",
     ]
     if scenario.absent:

@@ -92,6 +92,12 @@ def package_sha256() -> str:
     return digest.hexdigest()
 
 
+def simulator_sha256(simulator: Reference) -> str:
+    """Hash what of a flight is not the landing system's: this package, another simulator's file."""
+    own = Path(simulator.file).read_bytes() if simulator.file else b""
+    return hashlib.sha256(package_sha256().encode() + own).hexdigest()
+
+
 def system_named(name: str) -> Any:
     """Import a landing system by "module:class"; raise LandingSystemError for what is none."""
     module, _, qualname = name.partition(":")

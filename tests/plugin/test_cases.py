@@ -60,6 +60,8 @@ def test_what_a_search_finds_is_saved_small_and_then_expected(searched: pytest.P
     assert found.scenario["environment.fog"] == 0.0
     assert 0.7 < found.scenario["dog-1.velocity"] < 0.8
     assert load(fog).scenario["environment.fog"] < 0.12
+    assert load(dog).test == "test_it.py::test_collisions"
+    assert load(fog).test == "test_it.py::test_distance"
     result = run(searched, *CASES, "-rx")
     result.assert_outcomes(passed=2, skipped=2, xfailed=2)
     result.stdout.fnmatch_lines(["*case-lawn-I*known: I?:unknown (scenarios/regressions/*"])
@@ -270,7 +272,8 @@ def test_a_property_of_ones_own_is_shrunk_and_saved_for_its_test(
     result.stdout.fnmatch_lines(["own:test_own:*: a property of your own"])
     (own,) = [path for path in cases(pytester) if "-own-" in path.name]
     case = load(own)
-    assert (case.test, case.violation.type) == ("test_own", "own")
+    assert (case.test, case.own_test) == ("test_it.py::test_own", "test_own")
+    assert case.violation.type == "own"
     assert case.violation.story.startswith("test_own: too much snow")
     assert len(case.scenario.absent) == 4
     assert 0.1 <= case.scenario["environment.snow"] <= 0.11

@@ -91,6 +91,34 @@ def test_what_a_policy_changed_of_the_environment_survives_the_file() -> None:
     assert "[changes]" not in dumps(case())
 
 
+def test_names_with_quotes_and_backslashes_survive_the_file() -> None:
+    strange = dataclasses.replace(case(), system='stack:La"nd\\er', test='te"st.py::test\\it')
+    odd = dataclasses.replace(LAWN, name='la"wn\\')
+    strange = dataclasses.replace(
+        strange, scenario=dataclasses.replace(strange.scenario, map=odd.name)
+    )
+    assert loads(dumps(strange), lambda _: odd) == strange
+
+
+def test_a_case_keeps_the_test_that_found_it_and_the_hashes_of_the_sources() -> None:
+    plain = case()
+    evidence = dataclasses.replace(
+        plain.evidence, system_sha256="ef" * 32, simulator_sha256="12" * 32
+    )
+    told = dataclasses.replace(plain, test="tests/test_it.py::TestIt::test_a", evidence=evidence)
+    assert loads(dumps(told), load_map) == told
+    assert told.id == plain.id
+    assert told.own_test == ""
+
+
+def test_a_case_of_a_tests_own_assertion_belongs_to_that_test_wherever_its_file_is() -> None:
+    old = dataclasses.replace(case(), test="test_own", assertion="12345678")
+    told = dataclasses.replace(old, test="tests/test_it.py::test_own")
+    assert loads(dumps(old), load_map) == old
+    assert (told.own_test, told.id) == ("test_own", old.id)
+    assert told.id != case().id
+
+
 @pytest.mark.parametrize(
     ("old", "new"),
     [

@@ -1,0 +1,95 @@
+from __future__ import annotations
+
+import dataclasses
+import math
+
+import numpy as np
+import pytest
+
+from pytest_garl.adversary.recorded import LANDING_ZONE_M, recorded_spec
+from pytest_garl.scenarios.chromosome import decode
+from pytest_garl.scenarios.genes import genome_for
+from pytest_garl.scenarios.maps import load_map
+from pytest_garl.scenarios.placement import start_genes
+from pytest_garl.simulation.objects import MovingObject
+from pytest_garl.simulation.policy import DECISION_STEP_S, Situation
+
+LAWN = load_map("lawn")
+GENOME = genome_for(LAWN)
+STEPS = 30
+MoveList = tuple[tuple[float, float], ...]
+
+
+def walked(
+    moves: MoveList,
+    start: tuple[float, float],
+    *,
+    marker: tuple[float, float] = (0.0, 0.0),
+    name: str = "person-1",
+    seconds: float = 30.0,
+) -> list[tuple[float, float]]:
+    """Return where an object is at each decision that repeats ``moves`` from ``start``."""
+    scenario = decode(GENOME.nominal, GENOME, map="lawn", seed=1)
+    genes = {**start_genes(name, start, LAWN), f"{name}.velocity": 0.5}
+    scenario = scenario.replace(genes)
+    thing = MovingObject(scenario, LAWN, name, recorded_spec({name: moves}).make())
+    situation = Situation(
+        time_s=0.0,
+        self=thing.state,
+        others=(),
+        uav_position_m=(0.0, 0.0, 9.0),
+        uav_velocity_mps=(0.0, 0.0, 0.0),
+        marker_position_m=marker,
+        map=LAWN,
+        scenario=scenario,
+    )
+    thing.policy.reset(situation, np.random.default_rng(0))
+    places = []
+    for _ in range(round(seconds / DECISION_STEP_S)):
+        places.append((thing.x_m, thing.y_m))
+        thing.decide(dataclasses.replace(situation, self=thing.state))
+        for _ in range(STEPS):
+            thing.advance(DECISION_STEP_S / STEPS)
+    assert thing.moves[: len(moves)] == [*moves]
+    return places
+
+
+def away(place: tuple[float, float], marker: tuple[float, float] = (0.0, 0.0)) -> float:
+    return math.dist(place, marker)
+
+
+@pytest.mark.parametrize("name", ["person-1", "dog-1", "bird-1"])
+def test_an_object_goes_on_over_the_marker_and_leaves(name: str) -> None:
+    places = walked(((0.0, 1.0),) * 2, (0.0, -3.0), name=name)
+    assert min(map(away, places)) < 1.5
+    assert away(places[-1]) >= LANDING_ZONE_M
+    assert places[-1][1] > 0
+    assert places[-1] == places[-4], "it stands once it is out of the way"
+
+
+def test_an_object_that_stood_leaves_away_from_the_marker() -> None:
+    places = walked(((0.0, -1.0), (0.0, 0.0), (0.0, 0.0)), (-1.0, 1.0))
+    assert [away(place) for place in places[4:]] == sorted(away(place) for place in places[4:])
+    assert away(places[-1]) >= LANDING_ZONE_M
+
+
+def test_an_object_on_the_marker_that_never_moved_leaves() -> None:
+    assert away(walked((), (0.0, 0.0))[-1]) >= LANDING_ZONE_M
+
+
+def test_an_object_that_is_out_of_the_way_stays_there() -> None:
+    places = walked(((0.0, 0.5),), (0.0, -9.0))
+    assert away(places[-1]) > 8.0
+
+
+@pytest.mark.parametrize("marker", [(7.4, 0.0), (-5.0, 5.0), (3.5, 3.0), (0.0, 7.4)])
+@pytest.mark.parametrize("heading", [(1.0, 0.0), (0.0, 1.0), (-0.6, 0.8)])
+def test_the_edge_of_the_map_and_trees_do_not_hold_it(
+    marker: tuple[float, float], heading: tuple[float, float]
+) -> None:
+    start = (marker[0] - heading[0], marker[1] - heading[1])
+    assert away(walked((heading,), start, marker=marker)[-1], marker) >= LANDING_ZONE_M - 0.5
+
+
+def test_the_way_out_is_always_the_same() -> None:
+    assert walked(((0.6, 0.8),), (-1.0, 0.0)) == walked(((0.6, 0.8),), (-1.0, 0.0))
