@@ -41,10 +41,16 @@ class Landing:
 
     @property
     def distance_to_landing_m(self) -> float:
-        """Horizontal distance from the UAV to the marker's centre where it landed."""
-        if self.outcome != "landed":
+        """Horizontal distance from the UAV to the marker's centre where it landed.
+
+        Where it touched the ground too far off before it gave up, that place counts.
+        """
+        if self.outcome == "landed":
+            return self.final_distance_m
+        touched: float | None = self.result.get("off_marker_m")
+        if touched is None:
             self._undecided()
-        return self.final_distance_m
+        return touched
 
     @property
     def time_to_landing_s(self) -> float:
@@ -77,7 +83,7 @@ class Landing:
 
         return load(self._record)
 
-    def _undecided(self) -> None:
+    def _undecided(self) -> NoReturn:
         pytest.skip(f"not decided: {self.result['undecided']}")
 
 

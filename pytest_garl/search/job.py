@@ -81,7 +81,7 @@ def fly_job(
 ) -> tuple[dict[str, Any], str, float]:
     """Fly, judge and save; return the result for the ledger, the flight's hash, its cost."""
     from pytest_garl.simulation.record import save
-    from pytest_garl.verdicts.judge import closest_call, judge, undecided
+    from pytest_garl.verdicts.judge import closest_call, judge, off_marker_m, undecided
     from pytest_garl.verdicts.serialise import to_dict
 
     for entry in job.path:
@@ -107,6 +107,7 @@ def fly_job(
         if flight.outcome == "collision"
         else [],
         "undecided": undecided(flight),
+        "off_marker_m": off_marker_m(flight, job.limits),
         "closest_call": call,
         "closest_body": body,
         "verdict": to_dict(judge(flight, job.limits)),
@@ -137,6 +138,7 @@ def broken_result(
         "elapsed_s": PAPER_LIMIT_S,
         "collisions": [],
         "undecided": message,
+        "off_marker_m": None,
         "closest_call": "",
         "closest_body": "",
         "verdict": verdict,

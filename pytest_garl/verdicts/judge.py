@@ -4,10 +4,18 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
+
 from pytest_garl.simulation.flight import Contact, Flight, Separation
 from pytest_garl.simulation.vehicle import up_m
 from pytest_garl.verdicts.compass import compass_point
-from pytest_garl.verdicts.moments import last_sighting_s, moment, speaks, was_in_view
+from pytest_garl.verdicts.moments import (
+    last_sighting_s,
+    moment,
+    reports_detections,
+    reports_targets,
+    was_in_view,
+)
 from pytest_garl.verdicts.verdict import (
     Limits,
     Margin,
@@ -16,6 +24,11 @@ from pytest_garl.verdicts.verdict import (
     ViolationType,
 )
 
+PAPER_DISTANCE_M = 1.5
+"""Farther off than this is a violation by the paper's definition, whatever the limits are."""
+ON_GROUND_M = 0.02
+"""After its first contact with the ground, the UAV is on it up to this much higher than it was
+then: the feet spring a little."""
 LOST_S = 3.0
 """A target not seen for this long before the end counts as no longer detected."""
 DECOY_M = 1.5
@@ -24,9 +37,13 @@ CLOSE_CALL_M = 3.0
 
 
 def judge(flight: Flight, limits: Limits) -> Verdict:
-    """Return the verdict; the first event of the flight decides, and there is only one."""
+    """Return the verdict; the first event of the flight decides, and there is only one.
+
+    A touch of the ground off the marker before an abort is a violation here and none by the paper's
+    definition, which asks of landings alone how far off they are.
+    """
     primary, kind, signature, what = _mechanism(flight, limits)
-    far = flight.final_distance_m > 1.5
+    far = flight.final_distance_m > PAPER_DISTANCE_M
     paper = (
         flight.outcome == "collision"
         or flight.outcome == "not_landed"
@@ -73,9 +90,44 @@ def undecided(flight: Flight) -> str:
     return f"not landed after {flight.elapsed_s:.0f} s"
 
 
+def off_marker_m(flight: Flight, limits: Limits) -> float | None:
+    """Return how far off the marker the UAV came down; None where it did not.
+
+    A flight that ended in an abort came down if it had touched the ground farther off than the
+    limit: what touches down there has taken the wrong place, whatever it does next.
+    """
+    if flight.outcome == "landed":
+        return flight.final_distance_m
+    touch = _touch_off_marker(flight, limits)
+    return touch[0] if touch else None
+
+
+def _touch_off_marker(flight: Flight, limits: Limits) -> tuple[float, float] | None:
+    """Return how far off the marker an aborted flight first touched the ground, and when.
+
+    None where it touched nothing beyond the limit.  The record holds the first contact with the
+    ground alone; after it the height tells.
+    """
+    first = next((each for each in flight.contacts if each.body_class == "ground"), None)
+    if flight.outcome != "aborted" or first is None:
+        return None
+    track = flight.uav
+    start = max(0, int(np.searchsorted(track.time_s, first.time_s, side="right")) - 1)
+    # The sample before a contact lies above the ground, the one after it on the ground.
+    height = float(track.position_m[start : start + 2, 2].min()) + ON_GROUND_M
+    mx, my = flight.marker_position_m
+    for index in range(start, len(track.time_s)):
+        x, y, z = (float(value) for value in track.position_m[index])
+        off = math.hypot(x - mx, y - my)
+        if (index == start or z <= height) and off > limits.distance_m:
+            return off, max(first.time_s, float(track.time_s[index]))
+    return None
+
+
 def _margins(flight: Flight, limits: Limits) -> tuple[Margin, ...]:
     reason = undecided(flight)
     landed = flight.outcome == "landed"
+    off = off_marker_m(flight, limits)
     timed = landed or flight.outcome == "not_landed"
     solid = [gap.distance_m for gap in flight.separations if gap.body_class != "ground"]
     hit = flight.outcome == "collision"
@@ -83,10 +135,10 @@ def _margins(flight: Flight, limits: Limits) -> tuple[Margin, ...]:
     return (
         Margin(
             property="distance",
-            value=limits.distance_m - flight.final_distance_m,
+            value=limits.distance_m - (flight.final_distance_m if off is None else off),
             unit="m",
-            decided=landed,
-            reason=reason,
+            decided=off is not None,
+            reason=reason if off is None else "",
         ),
         Margin(
             property="time",
@@ -114,6 +166,10 @@ def _mechanism(
     if flight.outcome == "collision":
         return _collision(flight, flight.contacts[-1])
     if flight.outcome == "aborted":
+        touch = _touch_off_marker(flight, limits)
+        if touch:
+            off = f"Touched the ground {touch[0]:.1f} m off the marker before it gave up"
+            return _missed(flight, touch[1], off)
         when = moment(flight, _abort_time(flight))
         if limits.abort == "violation":
             return "abort", "abort", f"abort:{when}", "The landing was aborted."
@@ -121,7 +177,8 @@ def _mechanism(
     if flight.outcome == "not_landed":
         return _not_landed(flight)
     if flight.final_distance_m > limits.distance_m:
-        return _missed(flight)
+        off = f"Landed {flight.final_distance_m:.1f} m off the marker"
+        return _missed(flight, flight.elapsed_s, off)
     if flight.elapsed_s > limits.time_s:
         when = moment(flight, limits.time_s)
         return "time", "late", f"late:{when}", f"Landed late, after {flight.elapsed_s:.1f} s."
@@ -161,28 +218,32 @@ def _collision_signature(flight: Flight, met: Contact | Separation) -> str:
 def _not_landed(flight: Flight) -> tuple[PropertyName, ViolationType, str, str]:
     """Tell a target that was never or no longer seen (II) from one that was not landed on."""
     when = moment(flight, flight.elapsed_s)
-    if speaks(flight) or not flight.steps:
-        last = last_sighting_s(flight)
-    else:
-        last = max((s.time_s for s in flight.steps if s.marker_visible > 0.5), default=None)
+    # Without a word of the system nobody knows what it made of the picture.
+    seen = "detected" if reports_detections(flight) or reports_targets(flight) else "in view"
+    last = last_sighting_s(flight)
     if last is None:
-        return "time", "II", f"II:never-seen:{when}", "Not landed; the marker was never detected."
+        return "time", "II", f"II:never-seen:{when}", f"Not landed; the marker was never {seen}."
     if flight.elapsed_s - last > LOST_S:
-        text = f"Not landed; the marker was last detected at {last:.1f} s."
+        text = f"Not landed; the marker was last {seen} at {last:.1f} s."
         return "time", "II", f"II:lost:{when}", text
-    text = "Not landed although the marker was detected to the end."
+    text = f"Not landed although the marker was {seen} to the end."
     return "time", "late", f"late:not-landed:{when}", text
 
 
-def _missed(flight: Flight) -> tuple[PropertyName, ViolationType, str, str]:
-    """Tell what a system took for the marker that it did not land on."""
-    x, y = (float(value) for value in flight.uav.position_m[-1, :2])
-    off = f"Landed {flight.final_distance_m:.1f} m off the marker"
+def _missed(
+    flight: Flight, time_s: float, off: str
+) -> tuple[PropertyName, ViolationType, str, str]:
+    """Tell what a system took for the marker that came down elsewhere at ``time_s``.
+
+    ``off`` is the sentence's beginning: how far off it came down.
+    """
+    index = int(np.searchsorted(flight.uav.time_s, time_s, side="right")) - 1
+    x, y = (float(value) for value in flight.uav.position_m[max(0, index), :2])
     target = next(
         (
             s.diagnostics.target_m
             for s in reversed(flight.steps)
-            if s.diagnostics and s.diagnostics.target_m
+            if s.time_s <= time_s and s.diagnostics and s.diagnostics.target_m
         ),
         None,
     )
@@ -196,19 +257,20 @@ def _missed(flight: Flight) -> tuple[PropertyName, ViolationType, str, str]:
     ]
     if near:
         name = min(near)[1]
-        return "distance", "I", f"I:{name}:{_taken_at(flight, place)}", f"{off}, on {name}."
+        taken = _taken_at(flight, place, time_s)
+        return "distance", "I", f"I:{name}:{taken}", f"{off}, on {name}."
     if target is None:
         return "distance", "I", "I?:unknown", f"{off}; it does not say on what."
     text = f"{off}, on something that it took for the marker."
-    return "distance", "I", f"I:phantom:{_taken_at(flight, place)}", text
+    return "distance", "I", f"I:phantom:{_taken_at(flight, place, time_s)}", text
 
 
-def _taken_at(flight: Flight, place: tuple[float, ...]) -> str:
+def _taken_at(flight: Flight, place: tuple[float, ...], end_s: float) -> str:
     for step in flight.steps:
         target = step.diagnostics.target_m if step.diagnostics else None
         if target is not None and math.dist(target[:2], place) <= DECOY_M:
             return moment(flight, step.time_s)
-    return moment(flight, flight.elapsed_s)
+    return moment(flight, end_s)
 
 
 def _abort_time(flight: Flight) -> float:

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from pytest_garl.verdicts.verdict import Verdict
+from pytest_garl.verdicts.verdict import PropertyName, Verdict
 
 CELL_M = 2.0
 """Edge of a cell (paper, section 4.2.3: "2x2x2 meter cells")."""
@@ -26,6 +26,24 @@ def share_interval(count: int, total: int, level: float = 0.95) -> tuple[float, 
     low = float(beta.ppf(tail, count, total - count + 1)) if count else 0.0
     high = float(beta.ppf(1 - tail, count + 1, total - count)) if count < total else 1.0
     return low, high
+
+
+def decided(verdicts: Sequence[Verdict], name: PropertyName) -> int:
+    """Return in how many flights a property was decided: held or violated for sure."""
+    return sum(
+        margin.decided
+        for verdict in verdicts
+        for margin in verdict.margins
+        if margin.property == name
+    )
+
+
+def decided_words(verdicts: Sequence[Verdict]) -> str:
+    """Say what flights decided, as "distance decided in 4 of 60 flights, time in 12"."""
+    return (
+        f"distance decided in {decided(verdicts, 'distance')} of {len(verdicts)} flights, "
+        f"time in {decided(verdicts, 'time')}"
+    )
 
 
 def top_k(verdicts: Sequence[Verdict], k: int = 10) -> int | None:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from pytest_garl.simulation.flight import Flight
@@ -11,6 +13,10 @@ LAST_METRE_M = 1.2
 NEAR_MARKER_M = 2.5
 LOW_M = 7.0
 UNSEEN_S = 2.0
+AT_MARKER_M = 1.5
+"""What a system says is so near to the marker, is the marker: as far as its side is long."""
+IN_VIEW = 0.5
+"""More than this share of the marker in the frame counts as in view."""
 
 
 def moment(flight: Flight, time_s: float) -> str:
@@ -41,22 +47,42 @@ def was_in_view(flight: Flight, body: str, time_s: float) -> bool:
     )
 
 
-def last_sighting_s(flight: Flight, marker_radius_m: float = 1.5) -> float | None:
-    """When the system last said that it saw something at the marker's place, if it says so."""
-    mx, my = flight.marker_position_m
-    times = [
-        step.time_s
-        for step in flight.steps
-        if step.diagnostics
-        for seen in step.diagnostics.detections
-        if np.hypot(seen.position_m[0] - mx, seen.position_m[1] - my) <= marker_radius_m
-    ]
+def last_sighting_s(flight: Flight) -> float | None:
+    """Return when the marker was seen last: by the system's own word, where it gives one.
+
+    What a system detected at the marker's place counts.  If it reports targets alone, each of them
+    at that place counts.  If it reports neither, the marker counts where most of it was in the
+    frame.  None: it was never seen.
+    """
+    if reports_detections(flight):
+        times = [
+            step.time_s
+            for step in flight.steps
+            if step.diagnostics
+            and any(_at_marker(flight, seen.position_m) for seen in step.diagnostics.detections)
+        ]
+    elif reports_targets(flight):
+        times = [
+            step.time_s
+            for step in flight.steps
+            if step.diagnostics
+            and step.diagnostics.target_m
+            and _at_marker(flight, step.diagnostics.target_m)
+        ]
+    else:
+        times = [step.time_s for step in flight.steps if step.marker_visible > IN_VIEW]
     return max(times, default=None)
 
 
-def speaks(flight: Flight) -> bool:
-    """Whether the system gives diagnostics with detections or targets at all."""
-    return any(
-        step.diagnostics and (step.diagnostics.detections or step.diagnostics.target_m)
-        for step in flight.steps
-    )
+def reports_detections(flight: Flight) -> bool:
+    """Whether the diagnostics of any step hold a detection."""
+    return any(step.diagnostics and step.diagnostics.detections for step in flight.steps)
+
+
+def reports_targets(flight: Flight) -> bool:
+    """Whether the diagnostics of any step hold a target."""
+    return any(step.diagnostics and step.diagnostics.target_m for step in flight.steps)
+
+
+def _at_marker(flight: Flight, place: tuple[float, ...]) -> bool:
+    return math.dist(place[:2], flight.marker_position_m) <= AT_MARKER_M

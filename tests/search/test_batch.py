@@ -2,6 +2,7 @@ from __future__ import annotations
 
 import dataclasses
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -80,3 +81,19 @@ def test_a_resumed_batch_must_be_of_the_same_system_but_others_do_not_matter(
     ):
         fly(pool, changed)
     assert fly(pool, changed, count=2) == [0, 1]
+
+
+@pytest.mark.parametrize(
+    ("change", "differing"),
+    [
+        ({"limits": Limits(distance_m=1.0)}, ("limits",)),
+        ({"limits": Limits(abort="violation")}, ("limits",)),
+        ({"map_sha256": "two"}, ("map_sha256",)),
+        ({"timeout_s": 5.0}, ("timeout_s",)),
+        ({"path": ("elsewhere",), "flights": "there", "map_folders": ("maps",)}, ()),
+    ],
+)
+def test_jobs_differ_in_what_is_flown_and_not_in_where_it_lies(
+    change: dict[str, Any], differing: tuple[str, ...]
+) -> None:
+    assert JOB.differences(dataclasses.replace(JOB, **change)) == differing

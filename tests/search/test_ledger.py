@@ -146,3 +146,50 @@ def test_a_search_has_a_hash_and_a_time_of_its_own(tmp_path: Path) -> None:
     assert one.result_hash("t") != other.result_hash("t")
     assert len({one.result_hash(), one.result_hash("s"), one.result_hash("t")}) == 3
     assert (one.flying_s("s"), one.flying_s("t"), one.flying_s("u")) == (1.5, 0.5, 0.0)
+
+
+def test_nobody_flies_beside_a_slot_that_flies_again(tmp_path: Path) -> None:
+    ledger = made(tmp_path / "ledger.sqlite")
+    first = ledger.claim()
+    assert first is not None
+    ledger.fly_alone(first, "died")
+    again = ledger.claim()
+    assert again is not None
+    assert (again.slot, again.after, again.attempt) == (first.slot, "died", 2)
+    assert ledger.waiting() == 2
+    assert ledger.claim() is None
+    ledger.record(again, {"n": 1}, "", 0.0)
+    beside = ledger.claim()
+    assert beside is not None
+    assert beside.slot == 1
+
+
+def test_a_slot_flies_again_when_the_others_have_come_down(tmp_path: Path) -> None:
+    ledger = made(tmp_path / "ledger.sqlite")
+    first, other = ledger.claim(), ledger.claim()
+    assert first is not None
+    assert other is not None
+    ledger.fly_alone(first, "hung")
+    assert ledger.claim() is None
+    ledger.record(other, {"n": 1}, "", 0.0)
+    again = ledger.claim()
+    assert again is not None
+    assert again.slot == first.slot
+
+
+def test_a_run_that_is_resumed_twice_counts_no_attempt_of_what_was_in_flight(
+    tmp_path: Path,
+) -> None:
+    ledger = made(tmp_path / "ledger.sqlite")
+    for _ in range(2):
+        claim = ledger.claim()
+        assert claim is not None
+        assert (claim.slot, claim.attempt) == (0, 1)
+        ledger.close()
+        ledger = Ledger.resume(tmp_path / "ledger.sqlite", FACTS)
+    again = ledger.claim()
+    assert again is not None
+    assert again.attempt == 1
+    beside = ledger.claim()
+    assert beside is not None
+    assert beside.slot == 1

@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import dataclasses
 import math
 
 import numpy as np
@@ -12,13 +13,15 @@ from scipy.stats import binom
 
 from pytest_garl.search.objectives import diversity
 from pytest_garl.verdicts.metrics import (
+    decided,
+    decided_words,
     mean_distance,
     no_cells,
     share_interval,
     top_k,
     visit,
 )
-from pytest_garl.verdicts.verdict import Verdict
+from pytest_garl.verdicts.verdict import Margin, Verdict
 
 BOUNDS_M = (-10.0, 10.0, -20.0, 20.0)
 
@@ -107,3 +110,17 @@ def test_what_lies_outside_covers_nothing() -> None:
 def test_a_cell_that_sticks_out_counts(width: float, depth: float) -> None:
     shape = no_cells((0.0, width, 0.0, depth)).shape
     assert shape == (math.ceil(width / 2), math.ceil(depth / 2), 15)
+
+
+def test_what_flights_decided_is_counted_by_property() -> None:
+    def flown(distance: bool, time: bool) -> Verdict:
+        margins = (
+            Margin(property="distance", value=1.0, unit="m", decided=distance),
+            Margin(property="time", value=1.0, unit="s", decided=time),
+        )
+        return dataclasses.replace(verdict(False), margins=margins)
+
+    # A flight whose process died has no margins at all.
+    flights = [flown(True, True), flown(False, True), flown(False, False), verdict(False)]
+    assert (decided(flights, "distance"), decided(flights, "time")) == (1, 2)
+    assert decided_words(flights) == "distance decided in 1 of 4 flights, time in 2"
