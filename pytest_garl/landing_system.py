@@ -19,9 +19,39 @@ import math
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Protocol, runtime_checkable
 
+from pytest_garl.errors import LandingSystemError
+
 if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
+
+WORLD_M = 1_000.0
+"""No coordinate of a setpoint may be farther than this from the map's centre.  Maps are some tens
+of metres wide: what is beyond is a mistake in units or an estimate that diverged."""
+MAX_SPEED_MPS = 100.0
+"""No commanded speed may be higher: no multirotor is so fast."""
+MAX_RATE_HZ = 240.0
+"""The rate of the physics: nothing can be asked more often."""
+
+
+_MOST_PIXELS = 3840 * 2160
+
+
+def _check(
+    kind: str, name: str, value: object, low: float, high: float, unit: str, *, whole: bool = False
+) -> None:
+    """Raise LandingSystemError unless a value is a number in a range; NaN is in none."""
+    try:
+        fits = low <= value <= high and not (whole and value != int(value))  # type: ignore[operator, call-overload]
+    except (TypeError, ValueError, OverflowError):
+        fits = False
+    if not fits:
+        number = "a whole number" if whole else "a number"
+        text = repr(value)
+        found = text if len(text) <= 80 else f"{text[:77]}..."
+        raise LandingSystemError(
+            f"{kind}.{name} = {found}; expected {number} from {low:g} to {high:g} {unit}"
+        )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -31,13 +61,27 @@ class Camera:
     Image right (+u) is the body's right (-y); image down (+v) is the body's back (-x).
     At zero yaw (nose east) the image's top is east and its right is south.  There is no
     lens distortion.  The default is 320x240 at 10 Hz with 90 degrees of horizontal field
-    of view; the paper's code used 640x480.
+    of view; the paper's code used 640x480.  Raises LandingSystemError for what cannot be
+    simulated: fewer than 16 pixels on a side, more than 3840x2160 in all, a field of view
+    outside 0.05 to 3 rad (towards pi the image plane grows without limit), a rate outside
+    0.1 to 240 Hz.
     """
 
     width_px: int = 320
     height_px: int = 240
     field_of_view_rad: float = math.pi / 2
     rate_hz: float = 10.0
+
+    def __post_init__(self) -> None:
+        for name in ("width_px", "height_px"):
+            _check("Camera", name, getattr(self, name), 16, _MOST_PIXELS // 16, "px", whole=True)
+        if self.width_px * self.height_px > _MOST_PIXELS:
+            raise LandingSystemError(
+                f"Camera of {self.width_px} x {self.height_px} px: expected at most "
+                f"{_MOST_PIXELS} pixels (3840 x 2160)"
+            )
+        _check("Camera", "field_of_view_rad", self.field_of_view_rad, 0.05, 3.0, "rad")
+        _check("Camera", "rate_hz", self.rate_hz, 0.1, MAX_RATE_HZ, "Hz")
 
     @property
     def focal_px(self) -> float:
@@ -65,7 +109,9 @@ class Airframe:
     ``latency_s`` is the delay between an image and the command that it leads to.
     ``control_rate_hz`` is how often ``control`` is asked for motor thrusts; ``None``
     means that the simulator's own simple flight control follows the commands.  The
-    mass and size are those of the DJI Matrice 100 (see ``simulation/vehicle.py``).
+    mass and size are those of the DJI Matrice 100 (see ``simulation/vehicle.py``).  Raises
+    LandingSystemError for a mass outside 0.1 to 100 kg, a size outside 0.1 to 5 m, a
+    latency outside 0 to 5 s, a control rate outside 1 to 240 Hz.
     """
 
     mass_kg: float = 2.355
@@ -73,6 +119,17 @@ class Airframe:
     camera: Camera = field(default_factory=Camera)
     latency_s: float = 0.1
     control_rate_hz: float | None = None
+
+    def __post_init__(self) -> None:
+        camera: object = self.camera
+        if not isinstance(camera, Camera):
+            found = type(camera).__name__
+            raise LandingSystemError(f"Airframe.camera is of type {found}; expected Camera(...)")
+        _check("Airframe", "mass_kg", self.mass_kg, 0.1, 100.0, "kg")
+        _check("Airframe", "size_m", self.size_m, 0.1, 5.0, "m")
+        _check("Airframe", "latency_s", self.latency_s, 0.0, 5.0, "s")
+        if self.control_rate_hz is not None:
+            _check("Airframe", "control_rate_hz", self.control_rate_hz, 1.0, MAX_RATE_HZ, "Hz")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -128,9 +185,11 @@ class Detection:
 class Diagnostics:
     """What a landing system may tell about its thoughts; no system is obliged to.
 
-    ``phase`` is the system's own name of what it is doing; ``target_m`` (x, y, z) is what
-    it takes for the marker; ``planned_path_m`` are the (x, y, z) points that it means to
-    fly; ``note`` is a sentence for a reader.
+    ``phase`` is the system's own name of what it is doing (100 characters are kept);
+    ``target_m`` (x, y, z) is what it takes for the marker; ``planned_path_m`` are the
+    (x, y, z) points that it means to fly, at most 1,000; ``note`` is a sentence for a
+    reader (1,000 characters are kept).  At most 100 detections a frame.  All numbers are
+    finite: a NaN here is a finding, as it is in a command.
     """
 
     phase: str = ""
@@ -142,7 +201,10 @@ class Diagnostics:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PositionSetpoint:
-    """Fly to ``position_m`` (x, y, z), no faster than ``speed_mps``, nose at ``yaw_rad``."""
+    """Fly to ``position_m`` (x, y, z), no faster than ``speed_mps``, nose at ``yaw_rad``.
+
+    No coordinate beyond 1,000 m; more than 0 and at most 100 m/s.
+    """
 
     position_m: tuple[float, float, float]
     speed_mps: float = 3.0
@@ -152,7 +214,10 @@ class PositionSetpoint:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class VelocitySetpoint:
-    """Fly at ``velocity_mps`` (vx, vy, vz) in the world frame, nose at ``yaw_rad``."""
+    """Fly at ``velocity_mps`` (vx, vy, vz) in the world frame, nose at ``yaw_rad``.
+
+    No component beyond 100 m/s.
+    """
 
     velocity_mps: tuple[float, float, float]
     yaw_rad: float = 0.0
@@ -161,7 +226,10 @@ class VelocitySetpoint:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class AttitudeSetpoint:
-    """Hold ``attitude`` (x, y, z, w) with collective ``thrust`` as a share of the maximum."""
+    """Hold ``attitude`` (x, y, z, w) with collective ``thrust`` as a share of the maximum.
+
+    The quaternion's length is 0.9 to 1.1 and is made 1; the thrust is 0 to 1.
+    """
 
     attitude: tuple[float, float, float, float]
     thrust: float
@@ -170,7 +238,11 @@ class AttitudeSetpoint:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Land:
-    """Descend straight down at ``speed_mps`` and stop the motors on the ground."""
+    """Descend straight down at ``speed_mps`` and stop the motors on the ground.
+
+    The nose stays at the yaw that was commanded last.  More than 0 and at most 100 m/s; the
+    flight control descends at 4 m/s at the most.
+    """
 
     speed_mps: float = 0.5
     diagnostics: Diagnostics | None = None
@@ -178,7 +250,11 @@ class Land:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Abort:
-    """Give the landing up: the flight control climbs away and the flight ends when clear."""
+    """Give the landing up: the flight control climbs away and the flight ends when clear.
+
+    The nose stays at the yaw that was commanded last.  It is the last command: ``step`` is
+    not called again.
+    """
 
     diagnostics: Diagnostics | None = None
 
@@ -205,7 +281,11 @@ class VehicleState:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class MotorThrusts:
-    """Wanted thrust of each motor in newtons: front left, front right, rear right, rear left."""
+    """Wanted thrust of each motor in newtons: front left, front right, rear right, rear left.
+
+    A motor gives from nothing to its maximum, whatever is wanted; beyond ten times the
+    maximum is refused.
+    """
 
     newtons: tuple[float, float, float, float]
 
@@ -213,6 +293,9 @@ class MotorThrusts:
 @runtime_checkable
 class LandingSystem(Protocol):
     """Any class with these two methods; see the module's docstring.
+
+    A value that breaks the contract (NaN, out of range, a wrong type or shape) ends the
+    flight as a crash of the landing system, and the message names the field.
 
     A class may also declare ``airframe: Airframe``.  One that flies the motors itself
     declares ``Airframe(control_rate_hz=...)`` and offers
@@ -227,6 +310,32 @@ class LandingSystem(Protocol):
 
 
 def airframe_of(system: object) -> Airframe:
-    """Return the airframe that a landing system (class or instance) declares, or the default."""
+    """Return the airframe that a landing system (class or instance) declares, or the default.
+
+    Raises LandingSystemError where ``airframe`` is something else.
+    """
     airframe = getattr(system, "airframe", None)
-    return airframe if isinstance(airframe, Airframe) else Airframe()
+    if airframe is None:
+        return Airframe()
+    if not isinstance(airframe, Airframe):
+        what = "a property" if isinstance(airframe, property) else repr(airframe)
+        name = getattr(system, "__name__", type(system).__name__)
+        raise LandingSystemError(
+            f"{name}.airframe is {what[:80]}; expected pytest_garl.Airframe(...) in the class"
+        )
+    camera = airframe.camera
+    # Rebuilt, so that what flies is what was checked, whatever a subclass does.
+    return Airframe(
+        mass_kg=float(airframe.mass_kg),
+        size_m=float(airframe.size_m),
+        camera=Camera(
+            width_px=int(camera.width_px),
+            height_px=int(camera.height_px),
+            field_of_view_rad=float(camera.field_of_view_rad),
+            rate_hz=float(camera.rate_hz),
+        ),
+        latency_s=float(airframe.latency_s),
+        control_rate_hz=None
+        if airframe.control_rate_hz is None
+        else float(airframe.control_rate_hz),
+    )

@@ -79,8 +79,11 @@ def load_scenario(text: str) -> Scenario:
 def fly_job(
     job: Job, scenario: Scenario, slot_id: str, guard: Any
 ) -> tuple[dict[str, Any], str, float]:
-    """Fly, judge and save; return the result for the ledger, the flight's hash, its cost."""
-    from pytest_garl.simulation.record import save
+    """Fly, judge and save; return the result for the ledger, the flight's hash, its cost.
+
+    A flight that is not one of finite numbers is a finding, and leaves no record.
+    """
+    from pytest_garl.simulation.record import NotFiniteError, save
     from pytest_garl.verdicts.judge import closest_call, judge, off_marker_m, undecided
     from pytest_garl.verdicts.serialise import to_dict
 
@@ -97,7 +100,11 @@ def fly_job(
         guard=guard,
     )
     file = Path(job.flights) / f"{slot_id}.npz"
-    save(flight, file)
+    try:
+        save(flight, file)
+    except NotFiniteError as error:
+        lost = broken_result("nonsense", "NotFinite", str(error), "", map.diagonal_m)
+        return lost, "", flight.wall_s
     call, body = closest_call(flight)
     result = {
         "outcome": flight.outcome,
@@ -119,8 +126,9 @@ def fly_job(
 def broken_result(
     kind: str, error: str, message: str, text: str, diagonal_m: float, *, inconclusive: bool = False
 ) -> dict[str, Any]:
-    """Return the result of a flight whose process did not live to record it."""
-    story = f"The landing system {kind}: {message}."
+    """Return the result of a flight of which there is no record."""
+    verb = "made nonsense" if kind == "nonsense" else kind
+    story = f"The landing system {verb}: {message}."
     signature = "" if inconclusive else f"V:{kind}:{error}"
     verdict: dict[str, Any] = {
         "outcome": "crashed",

@@ -1,81 +1,100 @@
-"""What is wrong with a value that a landing system returned."""
+"""Commands as the simulator takes them: plain values, or an error that says what is wrong."""
 
 from __future__ import annotations
 
-import dataclasses
 import math
+from typing import Any
 
 from pytest_garl.landing_system import (
+    MAX_SPEED_MPS,
+    WORLD_M,
     Abort,
     AttitudeSetpoint,
-    Diagnostics,
+    Command,
     Land,
     MotorThrusts,
     PositionSetpoint,
     VelocitySetpoint,
 )
+from pytest_garl.simulation.diagnostics import read_diagnostics
+from pytest_garl.simulation.reading import NonsenseError, number, numbers, vector
+from pytest_garl.simulation.texts import shown
 
 COMMANDS = (PositionSetpoint, VelocitySetpoint, AttitudeSetpoint, Land, Abort)
-_LENGTHS = {"position_m": 3, "velocity_mps": 3, "attitude": 4}
+QUATERNION_SLACK = 0.1
+"""How far from 1 a quaternion's length may be: rounding in float16 stays far below."""
+MAX_THRUST_FACTOR = 10.0
+"""A mixer may ask a saturated motor for more than there is, and for less than nothing; ten times
+what it has is no mixer's answer."""
+
+_Thrusts = tuple[float, float, float, float]
 
 
-def problem_with_command(command: object) -> str | None:
-    """Say what is wrong with the answer of ``step``, or None."""
-    if not isinstance(command, COMMANDS):
+def read_command(answer: Any) -> Command:
+    """Return the answer of ``step`` rebuilt from plain floats, or raise NonsenseError.
+
+    Each field is read once, so what comes back later is what was checked.
+    """
+    kind = next((kind for kind in COMMANDS if isinstance(answer, kind)), None)
+    if kind is None:
         names = ", ".join(kind.__name__ for kind in COMMANDS)
-        return f"step returned {_short(command)}; expected one of {names}"
-    for field in dataclasses.fields(command):
-        value = getattr(command, field.name)
-        if field.name == "diagnostics":
-            if value is not None and not isinstance(value, Diagnostics):
-                return (
-                    f"{type(command).__name__}.diagnostics is {_short(value)}; expected Diagnostics"
-                )
-            continue
-        count = _LENGTHS.get(field.name)
-        found = _problem(value, count)
-        if found:
-            return f"step returned {type(command).__name__} with {field.name} {found}"
-    return None
+        raise NonsenseError(f"step returned {shown(answer)}; expected one of {names}")
+    at = f"step returned {kind.__name__} with "
+    thoughts = read_diagnostics(answer.diagnostics, f"{at}diagnostics")
+    if kind is Abort:
+        return Abort(diagnostics=thoughts)
+    if kind is Land:
+        return Land(speed_mps=_speed(answer, at), diagnostics=thoughts)
+    if kind is AttitudeSetpoint:
+        return AttitudeSetpoint(
+            attitude=_quaternion(answer.attitude, f"{at}attitude"),
+            thrust=number(answer.thrust, f"{at}thrust", 0.0, 1.0, "of the maximum"),
+            diagnostics=thoughts,
+        )
+    if kind is VelocitySetpoint:
+        return VelocitySetpoint(
+            velocity_mps=vector(answer.velocity_mps, f"{at}velocity_mps", MAX_SPEED_MPS, "m/s"),
+            yaw_rad=number(answer.yaw_rad, f"{at}yaw_rad"),
+            diagnostics=thoughts,
+        )
+    return PositionSetpoint(
+        position_m=vector(answer.position_m, f"{at}position_m", WORLD_M, "m"),
+        speed_mps=_speed(answer, at),
+        yaw_rad=number(answer.yaw_rad, f"{at}yaw_rad"),
+        diagnostics=thoughts,
+    )
 
 
-def problem_with_thrusts(thrusts: object) -> str | None:
-    """Say what is wrong with the answer of ``control``, or None."""
-    if isinstance(thrusts, MotorThrusts) and _are_four_floats(thrusts.newtons):
-        return None
-    if not isinstance(thrusts, MotorThrusts):
-        return f"control returned {_short(thrusts)}; expected MotorThrusts"
-    found = _problem(thrusts.newtons, 4)
-    return f"control returned MotorThrusts with newtons {found}" if found else None
+def read_thrusts(answer: Any, max_thrust_n: float) -> _Thrusts:
+    """Return the answer of ``control`` as plain floats, or raise NonsenseError."""
+    if not isinstance(answer, MotorThrusts):
+        raise NonsenseError(f"control returned {shown(answer)}; expected MotorThrusts")
+    values, most = answer.newtons, MAX_THRUST_FACTOR * max_thrust_n
+    # The usual case, 240 times a second; what is not finite fails the comparison.
+    if (
+        type(values) is tuple
+        and len(values) == 4
+        and all(type(each) is float and -most <= each <= most for each in values)
+    ):
+        return values
+    a, b, c, d = numbers(values, "control returned MotorThrusts with newtons", 4, most, "N")
+    return a, b, c, d
 
 
-def _are_four_floats(values: object) -> bool:
-    """Whether values are a tuple of four finite floats: the usual case, 240 times a second."""
-    if type(values) is not tuple or len(values) != 4:
-        return False
-    a, b, c, d = values
-    return type(a) is type(b) is type(c) is type(d) is float and math.isfinite(a + b + c + d)
+def _speed(answer: Any, at: str) -> float:
+    value = answer.speed_mps
+    found = number(value, f"{at}speed_mps", 0.0, MAX_SPEED_MPS, "m/s")
+    if found == 0:
+        raise NonsenseError(f"{at}speed_mps = {shown(value)}; expected more than 0 m/s")
+    return found
 
 
-def _problem(value: object, count: int | None) -> str | None:
-    if count is None:
-        return None if _finite(value) else f"= {_short(value)}; expected a finite number"
-    try:
-        items = list(value)  # type: ignore[call-overload]  # any sequence of numbers will do
-    except TypeError:
-        return f"= {_short(value)}; expected {count} finite numbers"
-    if len(items) != count or not all(_finite(item) for item in items):
-        return f"= {_short(value)}; expected {count} finite numbers"
-    return None
-
-
-def _finite(value: object) -> bool:
-    try:
-        return math.isfinite(value)  # type: ignore[arg-type]  # that is the question
-    except TypeError:
-        return False
-
-
-def _short(value: object) -> str:
-    text = repr(value)
-    return text if len(text) <= 80 else text[:77] + "..."
+def _quaternion(value: object, field: str) -> tuple[float, float, float, float]:
+    x, y, z, w = numbers(value, field, 4)
+    length = math.hypot(x, y, z, w)
+    if not abs(length - 1) <= QUATERNION_SLACK:
+        raise NonsenseError(
+            f"{field} = {shown((x, y, z, w))}, of length {length:.3g}; "
+            "expected a unit quaternion x, y, z, w"
+        )
+    return x / length, y / length, z / length, w / length

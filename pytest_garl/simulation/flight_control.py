@@ -54,6 +54,17 @@ class FlightControl:
         self._integral = [0.0, 0.0, 0.0]
         self._hold: Vector | None = None
         self._command: Command | None = None
+        self._yaw_rad = 0.0
+
+    def take(self, command: Command) -> None:
+        """Note a command's yaw: what lands or aborts keeps the one that was commanded last.
+
+        It is told of every command, also while a landing system flies the motors itself.
+        """
+        if isinstance(command, PositionSetpoint | VelocitySetpoint):
+            self._yaw_rad = command.yaw_rad
+        elif isinstance(command, AttitudeSetpoint):
+            self._yaw_rad = _yaw(command.attitude)
 
     def thrusts(self, motion: Motion, command: Command | None, dt_s: float) -> Thrusts:
         """Return wanted motor thrusts (front left, front right, rear right, rear left)."""
@@ -93,7 +104,7 @@ class FlightControl:
         if isinstance(command, Land):
             climb = -command.speed_mps
         vx, vy = POSITION_P * (hold[0] - position[0]), POSITION_P * (hold[1] - position[1])
-        return (vx, vy, climb), 0.0
+        return (vx, vy, climb), self._yaw_rad
 
     def _acceleration(self, motion: Motion, wanted: Vector, dt_s: float) -> Vector:
         (wx, wy, wz), (vx, vy, vz) = wanted, motion.velocity_mps

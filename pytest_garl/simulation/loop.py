@@ -14,16 +14,14 @@ from pytest_garl.landing_system import (
     Airframe,
     Command,
     Land,
-    MotorThrusts,
     VehicleState,
-    airframe_of,
 )
 from pytest_garl.scenarios.bodies import rotate
 from pytest_garl.scenarios.maps import Map
 from pytest_garl.scenarios.placement import marker_position_m, wind_mps
 from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.simulation.camera import Frame, Renderer
-from pytest_garl.simulation.commands import problem_with_command, problem_with_thrusts
+from pytest_garl.simulation.commands import read_command, read_thrusts
 from pytest_garl.simulation.environment import changed
 from pytest_garl.simulation.flight import Flight, Outcome
 from pytest_garl.simulation.flight_control import FlightControl
@@ -33,7 +31,12 @@ from pytest_garl.simulation.observing import observe
 from pytest_garl.simulation.policy import DECISION_STEP_S, Change, ObjectPolicy, Situation
 from pytest_garl.simulation.randomness import generator
 from pytest_garl.simulation.recorder import Recorder
-from pytest_garl.simulation.system_calls import BrokenError, StepGuard, SystemCalls
+from pytest_garl.simulation.system_calls import (
+    BrokenError,
+    StepGuard,
+    SystemCalls,
+    read_airframe,
+)
 from pytest_garl.simulation.truth import Truth, TruthObject
 from pytest_garl.simulation.vehicle import (
     Motion,
@@ -83,7 +86,7 @@ class Loop:
         self.last_tick = round(time_limit_s * PHYSICS_RATE_HZ)
         self.make_system = system
         self.calls = SystemCalls(system, guard)
-        self.airframe: Airframe = airframe_of(system)
+        self.airframe, self._no_airframe = self._read_airframe()
         self.marker = marker_position_m(scenario, map)
         self.model = vehicle_model(self.airframe)
         self.objects = [MovingObject(scenario, map, name, policy()) for name, _ in map.object_names]
@@ -97,6 +100,7 @@ class Loop:
         self.thrusts: Thrusts = (0.0, 0.0, 0.0, 0.0)
         self.pending: list[tuple[int, Command]] = []
         self.command: Command | None = None
+        self.gave_up = False
         self.airborne = False
         self.landed_since: float | None = None
         self.gaps: dict[str, float] = {}
@@ -112,7 +116,8 @@ class Loop:
             while outcome is None:
                 outcome = self.tick()
         except BrokenError as broken:
-            self._record_pose(self.recorder.time_s)
+            if self._is_finite():
+                self._record_pose(self.recorder.time_s)
             self.recorder.event("crashed", broken.crash.message)
             outcome, crash = "crashed", broken.crash
         finally:
@@ -132,13 +137,26 @@ class Loop:
         """Free the physics."""
         self.world.close()
 
+    def _read_airframe(self) -> tuple[Airframe, BrokenError | None]:
+        """Return the airframe, or the default and what ends the flight when it has begun."""
+        try:
+            return self.calls.ask("airframe", lambda: read_airframe(self.make_system)), None
+        except BrokenError as broken:
+            return Airframe(), broken
+
     def _start_system(self) -> None:
         self.recorder.begin(*self.world.uav()[:3])
+        if self._no_airframe:
+            raise self._no_airframe
         self.system = self.calls.ask("reset", lambda: self.make_system())
         mission = mission_for(self.scenario, self.map, self.airframe, self.time_limit_s)
         self.calls.ask("reset", lambda: self.system.reset(mission))
-        self.sees = bool(getattr(self.system, "needs_camera", True))
-        self.tells_truth = getattr(self.system, "observe_truth", None)
+        self.sees: bool = self.calls.ask(
+            "needs_camera", lambda: bool(getattr(self.system, "needs_camera", True))
+        )
+        self.tells_truth: bool = self.calls.ask(
+            "observe_truth", lambda: getattr(self.system, "observe_truth", None) is not None
+        )
         camera = self.airframe.camera
         self.renderer = (
             Renderer(self.scenario, self.map, camera, generator(self.scenario.seed, "sensor"))
@@ -165,6 +183,13 @@ class Loop:
         now = tick / PHYSICS_RATE_HZ
         self.recorder.time_s = now
         position, attitude, velocity, spin = self.world.uav()
+        if not math.isfinite(sum(position) + sum(attitude) + sum(velocity) + sum(spin)):
+            raise self.calls.nonsense(
+                "NotFinite",
+                f"after {now:.2f} s the flight is no longer one of finite numbers; expected "
+                "commands and an airframe that the physics can follow",
+                "step",
+            )
         if tick % OBJECTS_EVERY == 0:
             self._move_objects(tick)
         if tick % TRACK_EVERY == 0:
@@ -188,10 +213,10 @@ class Loop:
         elif self.airframe.control_rate_hz and not isinstance(self.command, Abort):
             if tick % self.control_every == 0:
                 state = self._state(tick, motion)
-                answer: MotorThrusts = self.calls.ask("control", lambda: self.system.control(state))
-                self.calls.refuse(problem_with_thrusts(answer), "control")
-                a, b, c, d = (float(value) for value in answer.newtons)
-                self.motors = (a, b, c, d)
+                most_n = self.model.max_thrust_n
+                self.motors = self.calls.ask(
+                    "control", lambda: read_thrusts(self.system.control(state), most_n)
+                )
             wanted = self.motors
         else:
             wanted = self.control.thrusts(motion, self.command, dt)
@@ -296,7 +321,7 @@ class Loop:
 
     def _see(self, tick: int, position: Vector, attitude: Quaternion, velocity: Vector) -> None:
         now = tick / PHYSICS_RATE_HZ
-        if self.tells_truth:
+        if self.tells_truth and not self.gave_up:
             truth = Truth(
                 marker_m=self.marker,
                 objects=tuple(
@@ -318,6 +343,10 @@ class Loop:
             visible = self.recorder.sight(frame, self.renderer, eye, attitude)
         else:
             frame, visible = _blank(camera.height_px, camera.width_px), (0.0, 0.0, ())
+        if self.gave_up:
+            # What there was to see explains a collision on the way up.
+            self.recorder.step(Abort(), visible)
+            return
         noise = self.pose_rng.standard_normal(6)
         observation = observe(
             frame,
@@ -326,19 +355,23 @@ class Loop:
             velocity_mps=np.array(velocity) + VELOCITY_NOISE_MPS * noise[3:],
             attitude=np.array(attitude),
         )
-        command: Command = self.calls.ask("step", lambda: self.system.step(observation))
-        self.calls.refuse(problem_with_command(command), "step")
+        command: Command = self.calls.ask(
+            "step", lambda: read_command(self.system.step(observation))
+        )
+        self.gave_up = isinstance(command, Abort)
         self.recorder.step(command, visible)
         delay = round(self.airframe.latency_s * PHYSICS_RATE_HZ)
         self.pending.append((tick + delay, command))
 
     def _take(self, command: Command) -> None:
-        if isinstance(self.command, Abort):
-            return
         if type(command) is not type(self.command) and isinstance(command, Abort | Land):
             word = "abort_command" if isinstance(command, Abort) else "land_command"
             self.recorder.event(word, f"the system said {type(command).__name__}()")
         self.command = command
+        self.control.take(command)
+
+    def _is_finite(self) -> bool:
+        return all(math.isfinite(value) for part in self.world.uav() for value in part)
 
     def _clear(self, position: Vector) -> bool:
         return position[2] >= ABORT_HEIGHT_M and all(

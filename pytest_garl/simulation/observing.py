@@ -57,4 +57,5 @@ def observe(
 
 def _frozen(array: Array) -> Array:
     array.flags.writeable = False
-    return array
+    # A view of what is read-only cannot be made writeable again, as its owner could.
+    return array.view()

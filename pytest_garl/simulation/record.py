@@ -73,14 +73,24 @@ def parted_s(first: Flight, second: Flight) -> float:
     return float(first.uav.time_s[int(np.argmax(differ)) if differ.any() else length - 1])
 
 
+class NotFiniteError(GarlError):
+    """A flight with a NaN or an infinity in it: it is written nowhere."""
+
+
 def save(flight: Flight, path: Path) -> None:
-    """Write the flight atomically as one .npz that holds arrays and a JSON header."""
+    """Write the flight atomically as one .npz that holds arrays and a JSON header.
+
+    Raises NotFiniteError for a flight that is not one of finite numbers.
+    """
     arrays: dict[str, np.ndarray[Any, Any]] = {}
     for index, track in enumerate((flight.uav, *(item.track for item in flight.objects))):
         for name in _TRACK:
             arrays[f"{index}.{name}"] = getattr(track, name)
     for index, item in enumerate(flight.objects, start=1):
         arrays[f"{index}.moves"] = item.moves
+    for name, array in arrays.items():
+        if not np.isfinite(array).all():
+            raise NotFiniteError(f"the flight's record holds a NaN or an infinity in {name}")
     header: dict[str, Any] = {
         "outcome": flight.outcome,
         "final_distance_m": flight.final_distance_m,
@@ -100,7 +110,11 @@ def save(flight: Flight, path: Path) -> None:
     }
     if any(item.changes for item in flight.objects):
         header["changes"] = [item.changes for item in flight.objects]
-    text = json.dumps(header, allow_nan=False)
+    try:
+        text = json.dumps(header, allow_nan=False)
+    except ValueError:
+        held = ", ".join(name for name, value in header.items() if _holds_nan(value))
+        raise NotFiniteError(f"the flight's record holds a NaN or an infinity in {held}") from None
     arrays["header"] = np.frombuffer(text.encode(), dtype=np.uint8)
     buffer = io.BytesIO()
     np.savez_compressed(buffer, allow_pickle=False, **arrays)
@@ -108,6 +122,14 @@ def save(flight: Flight, path: Path) -> None:
     scratch = path.with_name(f".{path.name}.{os.getpid()}")
     scratch.write_bytes(buffer.getvalue())
     scratch.replace(path)
+
+
+def _holds_nan(value: Any) -> bool:
+    try:
+        json.dumps(value, allow_nan=False)
+    except ValueError:
+        return True
+    return False
 
 
 def load(path: Path) -> Flight:

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from pytest_garl.landing_system import Command, Detection, Diagnostics
+from pytest_garl.landing_system import Command
 from pytest_garl.scenarios.maps import Map
 from pytest_garl.simulation.camera import Frame, Renderer
 from pytest_garl.simulation.flight import (
@@ -116,7 +116,7 @@ class Recorder:
 
     def step(self, command: Command, sight: Sight) -> None:
         """Note one answer of the landing system with what there was to see."""
-        thoughts = _plain(command.diagnostics)
+        thoughts = command.diagnostics
         if thoughts and thoughts.phase != self._phase:
             self._phase = thoughts.phase
             self.event("phase", thoughts.phase)
@@ -182,33 +182,3 @@ def _track(times: Any, samples: list[tuple[float, ...]]) -> Track:
         attitude=table[:, 3:7],
         velocity_mps=table[:, 7:10],
     )
-
-
-def _plain(thoughts: Diagnostics | None) -> Diagnostics | None:
-    """Copy diagnostics into plain, finite Python values: what is not finite is absent."""
-    if thoughts is None:
-        return None
-    target = thoughts.target_m
-    return Diagnostics(
-        phase=str(thoughts.phase),
-        detections=tuple(
-            Detection(
-                marker_id=int(seen.marker_id),
-                confidence=float(seen.confidence),
-                position_m=_vector(seen.position_m),
-                corners_px=tuple((float(u), float(v)) for u, v in seen.corners_px),
-            )
-            for seen in thoughts.detections
-            if np.isfinite(np.array(seen.position_m, dtype=float)).all()
-        ),
-        target_m=_vector(target)
-        if target is not None and np.isfinite(np.array(target, dtype=float)).all()
-        else None,
-        planned_path_m=tuple(_vector(point) for point in thoughts.planned_path_m),
-        note=str(thoughts.note),
-    )
-
-
-def _vector(value: Sequence[float]) -> Vector:
-    x, y, z = (float(item) for item in value)
-    return x, y, z

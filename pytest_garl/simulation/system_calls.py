@@ -7,9 +7,21 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any, Protocol
 
+from pytest_garl.errors import LandingSystemError
+from pytest_garl.landing_system import Airframe, airframe_of
 from pytest_garl.simulation.flight import Crash
+from pytest_garl.simulation.reading import NonsenseError
+from pytest_garl.simulation.texts import (
+    MESSAGE_CHARS,
+    TRACEBACK_CHARS,
+    as_word,
+    middle_cut,
+    name_of,
+    told,
+)
 
-_OURS = {Path(__file__), Path(__file__).with_name("loop.py")}
+_HERE = Path(__file__).parent
+_OURS = {_HERE.parent / "landing_system.py", *_HERE.glob("*.py")}
 """Whose lines are no part of a landing system's traceback."""
 
 
@@ -31,49 +43,81 @@ class BrokenError(Exception):
 
 
 class SystemCalls:
-    """Calls a landing system under a guard; whatever it raises becomes a BrokenError."""
+    """Calls a landing system under a guard; whatever it raises becomes a BrokenError.
+
+    That holds for SystemExit too; KeyboardInterrupt alone passes, it is the user's.
+    """
 
     def __init__(self, system: Callable[[], Any], guard: StepGuard | None) -> None:
-        self._name = getattr(system, "__name__", "system")
+        self._name = _name(system)
         self._guard = guard
 
     def ask(self, method: str, call: Callable[[], Any]) -> Any:
-        """Return what ``call``, of the system's ``method``, returns."""
+        """Return what ``call``, of the system's ``method``, returns.
+
+        All that touches what the system made belongs into ``call``: a property or a generator
+        runs its code as well.
+        """
         if self._guard:
             self._guard.step_begins()
         try:
             return call()
-        except Exception as error:
+        except KeyboardInterrupt:
+            raise
+        except NonsenseError as error:
+            raise self.nonsense(error.error, str(error), method) from error
+        except BaseException as error:
             # Not ours to name: whatever a landing system raises is how it fails, and a finding.
             raise BrokenError(crash_of(error, method)) from error
         finally:
             if self._guard:
                 self._guard.step_ends()
 
-    def refuse(self, problem: str | None, method: str) -> None:
-        """End the flight where there is a problem with what ``method`` returned."""
-        if problem:
-            raise BrokenError(
-                Crash(
-                    kind="nonsense",
-                    error="BadCommand",
-                    message=problem,
-                    where=f"{self._name}.{method}",
-                    traceback="",
-                )
+    def nonsense(self, error: str, message: str, method: str) -> BrokenError:
+        """Return what ends the flight where the system made a value that nobody can fly."""
+        return BrokenError(
+            Crash(
+                kind="nonsense",
+                error=error,
+                message=message,
+                where=f"{self._name}.{method}",
+                traceback="",
             )
+        )
 
 
-def crash_of(error: Exception, method: str) -> Crash:
-    """Return the record of what a landing system raised in one of its methods."""
-    frames = traceback.extract_tb(error.__traceback__)
-    theirs = [frame for frame in frames if Path(frame.filename).resolve() not in _OURS]
-    where = f"{Path(theirs[-1].filename).stem}.{theirs[-1].name}" if theirs else method
-    text = "".join(traceback.format_list(theirs)) + "".join(traceback.format_exception_only(error))
+def read_airframe(system: object) -> Airframe:
+    """Return a system's airframe; raise NonsenseError for what is none."""
+    try:
+        return airframe_of(system)
+    except LandingSystemError as error:
+        raise NonsenseError(str(error), "BadAirframe") from None
+
+
+def crash_of(error: BaseException, method: str) -> Crash:
+    """Return the record of what a landing system raised in one of its methods.
+
+    A message is cut after 1,000 characters, a traceback in the middle, to 20,000.
+    """
+    kind = name_of(type(error))
+    try:
+        frames = traceback.extract_tb(error.__traceback__)
+        theirs = [frame for frame in frames if Path(frame.filename).resolve() not in _OURS]
+        lines = traceback.format_list(theirs) + traceback.format_exception_only(error)
+        text = middle_cut("".join(lines), TRACEBACK_CHARS)
+    except Exception as second:  # noqa: BLE001 (an exception's own code may raise what it likes)
+        theirs, text = [], f"{kind}, whose traceback raised {name_of(type(second))}"
+    where = (
+        f"{as_word(Path(theirs[-1].filename).stem)}.{as_word(theirs[-1].name)}" if theirs else ""
+    )
     return Crash(
         kind="raised",
-        error=type(error).__name__,
-        message=str(error),
-        where=where,
+        error=kind,
+        message=told(lambda: str(error), MESSAGE_CHARS, f"<{kind}>, whose str()"),
+        where=where or method,
         traceback=text,
     )
+
+
+def _name(system: Callable[[], Any]) -> str:
+    return name_of(system) if isinstance(system, type) else "system"

@@ -1,0 +1,69 @@
+"""Texts of a landing system's making: of bounded length, the same in every process."""
+
+from __future__ import annotations
+
+import re
+import reprlib
+from collections.abc import Callable
+
+MESSAGE_CHARS = 1_000
+"""How much of an exception's message is kept."""
+TRACEBACK_CHARS = 20_000
+NAME_CHARS = 80
+"""How much of a name is kept: it becomes part of signatures and of the names of files."""
+VALUE_CHARS = 80
+
+_ADDRESS = re.compile(r"\bat 0x[0-9A-Fa-f]{6,}")
+
+
+def cut(text: str, limit: int) -> str:
+    """Return plain text of at most ``limit`` characters and a note that says what was cut.
+
+    Addresses differ in each process and are left out.  What cannot be written as UTF-8 is escaped.
+    """
+    whole = str.__len__(text)
+    # The slot of the class itself: a subclass of str may do as it likes.
+    kept = str.__getitem__(text, slice(0, limit)).encode("utf-8", "backslashreplace").decode()
+    note = f"... (cut, {whole} characters)" if whole > limit else ""
+    return _ADDRESS.sub("at 0x...", kept) + note
+
+
+def middle_cut(text: str, limit: int) -> str:
+    """Cut a text in its middle: of a traceback both ends matter."""
+    if len(text) <= limit:
+        return cut(text, limit)
+    half = limit // 2
+    note = f"\n... (cut, {len(text)} characters)\n"
+    return cut(text[:half], half) + note + cut(text[-half:], half)
+
+
+def name_of(kind: type) -> str:
+    """Return the name of a class as part of a signature: a word of at most 80 characters."""
+    name: str = type.__dict__["__name__"].__get__(kind)
+    return as_word(name)
+
+
+def as_word(name: str) -> str:
+    """Return a name without what no identifier has, cut where a file's name would be too long."""
+    return re.sub(r"[^\w.<>-]", "_", cut(name, NAME_CHARS))[:NAME_CHARS]
+
+
+def told(tell: Callable[[], str], limit: int, otherwise: str) -> str:
+    """Return what ``tell`` returns, cut; ``otherwise`` and the error's name if it raises."""
+    try:
+        return cut(tell(), limit)
+    except Exception as error:  # noqa: BLE001 (code of a landing system, which raises what it likes)
+        return f"{otherwise} raised {name_of(type(error))}"
+
+
+class _Short(reprlib.Repr):
+    def __init__(self) -> None:
+        super().__init__()
+        self.maxstring = self.maxother = self.maxlong = VALUE_CHARS
+
+
+def shown(value: object) -> str:
+    """Return the start of a value's repr, whatever the value is."""
+    name = name_of(type(value))
+    text = told(lambda: _Short().repr(value), 10 * VALUE_CHARS, f"<{name}>, whose repr()")
+    return text if len(text) <= VALUE_CHARS else text[: VALUE_CHARS - 3] + "..."
