@@ -83,6 +83,7 @@ def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
     metafunc.parametrize("garl_slot", targets, ids=ids, indirect=True)
 
 
+@pytest.hookimpl(tryfirst=True)
 def pytest_collection_finish(session: pytest.Session) -> None:
     """Tell the run which slots are wanted; where there is none yet, saved cases begin one."""
     config = session.config
@@ -166,6 +167,17 @@ def pytest_report_header(config: pytest.Config) -> str | None:
     from pytest_garl.reports.terminal import header
 
     return header(run)
+
+
+def pytest_report_collectionfinish(config: pytest.Config) -> str | None:
+    """Say where only accepted cases are known."""
+    run = config.stash.get(RUN, None)
+    if run is None or not run.acceptance.problem:
+        return None
+    return (
+        f"garl: nobody can tell which cases are committed ({run.acceptance.problem}); known are "
+        "only those that `garl cases accept` has marked"
+    )
 
 
 def pytest_terminal_summary(terminalreporter: Any, config: pytest.Config) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import hashlib
 import os
 import sys
@@ -23,6 +24,7 @@ from pytest_garl.targets import FIRST, Target, name_of, repeated
 
 if TYPE_CHECKING:
     from pytest_garl.own import Asks
+    from pytest_garl.regressions.acceptance import Acceptance
     from pytest_garl.regressions.follow_up import Pursued
     from pytest_garl.scenarios.scenario import Scenario
     from pytest_garl.search.breeder import Breeder
@@ -143,16 +145,30 @@ class Run:
         return load_scenario(text)
 
     def known(self, target: Target) -> dict[str, str]:
-        """Return the signatures that saved cases expect of a system on a map, with their files."""
+        """Return the signatures that known cases expect of a system on a map, with their files.
+
+        What is repeated is to be seen, known or not.
+        """
         from pytest_garl.regressions.corpus import entries
         from pytest_garl.regressions.follow_up import is_known
 
         options = self.options
+        if options.repeat:
+            return {}
         return {
             entry.case.violation.signature: entry.path.name
             for entry in entries(options.cases, name_of(target.system), options.map_folders)
-            if entry.case is not None and is_known(entry.case, target.map)
+            if entry.case is not None
+            and is_known(entry.case, target.map)
+            and self.acceptance.covers(entry.path, entry.case)
         }
+
+    @functools.cached_property
+    def acceptance(self) -> Acceptance:
+        """Which saved cases are known: what git said when it was first asked."""
+        from pytest_garl.regressions.acceptance import acceptance_of
+
+        return acceptance_of(self.options.cases)
 
     def searched(self, session: pytest.Session) -> bool:
         """Whether this process has seen a search to its end and may save what it found."""

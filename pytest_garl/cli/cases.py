@@ -44,7 +44,7 @@ class _Folders:
 )
 @click.pass_context
 def cases(context: click.Context, folder: Path) -> None:
-    """Look after saved violations: list, show, replay, promote, shrink, prune, check.
+    """Look after saved violations: list, show, replay, accept, promote, shrink, prune, check.
 
     A case is a file under scenarios/regressions/<system>/. Run these commands where you run pytest.
     """
@@ -156,6 +156,26 @@ def _answer(result: Replay) -> None:
 
 
 @cases.command()
+@click.argument(
+    "files",
+    metavar="FILE...",
+    nargs=-1,
+    required=True,
+    type=click.Path(path_type=Path, exists=True, dir_okay=False),
+)
+@click.pass_obj
+def accept(folders: _Folders, files: tuple[Path, ...]) -> None:
+    """Say that cases are known: they are expected to fail until they are fixed.
+
+    A case that is committed is known without that; this is for a project without git.
+    """
+    found = [(file, folders.case(file)) for file in files]
+    for file, case in found:
+        corpus.replace(file, dataclasses.replace(case, accepted=True))
+        click.echo(f"{file}: accepted; it is expected to fail ({case.violation.signature})")
+
+
+@cases.command()
 @FILE
 @click.pass_obj
 def promote(folders: _Folders, file: Path) -> None:
@@ -190,7 +210,7 @@ def shrink(folders: _Folders, file: Path, flights: int, workers: int) -> None:
     finding = shrink_case(case, folders.root, folders.maps, flights, workers)
     if finding.case is None:
         raise GarlError(f"{file}: {finding.reason}; `garl cases replay {file}` tells more")
-    path = corpus.replace(file, dataclasses.replace(finding.case, status=case.status))
+    path = corpus.replace(file, dataclasses.replace(finding.case, status=case.status, accepted=case.accepted))
     click.echo(f"{path}: removed {finding.case.evidence.removed} ({finding.flights} flights)")
 
 

@@ -78,6 +78,7 @@ class Case:
     and the built-in verdict is content: the hash of the assertion's source.
     ``avoidable`` says what may be asked of a repair: not to outrun a pursuer that nobody outruns.
     ``limits`` are those of the tests when it was found; pytest flies it with those of today.
+    ``accepted`` says that somebody knows of it, where git does not say so.
     """
 
     system: str
@@ -93,6 +94,7 @@ class Case:
     changes: Changes = ()
     test: str = ""
     assertion: str = ""
+    accepted: bool = False
 
     @property
     def own_test(self) -> str:

@@ -57,6 +57,7 @@ def dumps(case: Case) -> str:
         f"schema = {SCHEMA}",
         f"system = {_text(case.system)}",
         f'status = "{case.status}"',
+        *(["accepted = true"] if case.accepted else []),
         f'avoidable = "{case.avoidable}"  # among which objects the reference pilot comes through',
         f"map = {_text(scenario.map)}",
         f"seed = {scenario.seed}",
@@ -139,6 +140,7 @@ def loads(text: str, load_map: Callable[[str], Map], *, source: str = "case") ->
             "schema",
             "system",
             "status",
+            "accepted",
             "avoidable",
             "map",
             "seed",
@@ -187,6 +189,7 @@ def loads(text: str, load_map: Callable[[str], Map], *, source: str = "case") ->
         limits=read_limits(top.table("limits")),
         test=top.text("test", ""),
         assertion=top.text("assertion", ""),
+        accepted=top.truth("accepted", default=False),
     )
 
 

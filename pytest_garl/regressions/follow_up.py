@@ -96,8 +96,11 @@ def inquiries(
 
 
 def is_known(case: Case, map: str) -> bool:
-    """Whether a case says that violations with its signature are expected on a map."""
-    return case.scenario.map == map and case.status != "fixed"
+    """Whether a case says that violations with its signature are expected on a map.
+
+    One that nobody could avoid says nothing of others with its signature.
+    """
+    return case.scenario.map == map and case.status == "open"
 
 
 def _by_search(ledger: Ledger) -> dict[str, dict[str, list[Row]]]:

@@ -70,7 +70,7 @@ def told(pursued: tuple[Pursued, ...], root: Path) -> list[str]:
             lines.append(f"not saved: {name}: {each.finding.reason}")
             continue
         if each.file is None:
-            lines.append(f"not saved: {name}: another process has just saved the same")
+            lines.append(f"not saved: {name}: the same case is saved already")
             continue
         patches |= each.file.suffix == ".patch"
         shown = each.file.relative_to(root) if each.file.is_relative_to(root) else each.file

@@ -119,17 +119,27 @@ def _explain_case(
     verdict, file = result["verdict"], _relative(target.entry.path, run)
     same = verdict["signature"] == case.violation.signature
     if report.failed:
-        if case.status == "unavoidable":
+        known = run.acceptance.covers(target.entry.path, case)
+        as_saved = case.status == "open" and (same or _same_assertion(case, item, error))
+        if case.status == "unavoidable" and known:
             return _expected(report, f"unavoidable: {case.violation.signature} ({file})")
-        if case.status == "open" and (same or _same_assertion(case, item, error)):
+        if as_saved and known:
             return _expected(report, f"known: {case.violation.signature} ({file})")
-        state = "was fixed and fails again" if case.status == "fixed" else "fails in another way"
+        if as_saved or case.status == "unavoidable":
+            state = "is new and not accepted yet"
+        elif case.status == "fixed":
+            state = "was fixed and fails again"
+        else:
+            state = "fails in another way"
         told = [
             f"The case {file} {state}.",
             f"Saved: {case.violation.signature}. {case.violation.story}",
             f"Flown: {verdict['signature'] or 'no violation of its own'}. {verdict['story']}",
         ]
-        return _tell(report, [*_wrapped(told), f"See it: garl cases replay {file}"])
+        lines = [*_wrapped(told), f"See it: garl cases replay {file}"]
+        if as_saved or (case.status == "unavoidable" and not known):
+            lines.append(f"If that is known: commit it, or: garl cases accept {file}")
+        return _tell(report, lines)
     first = run.first_item(target) == item.nodeid
     if report.passed and case.status == "open" and verdict["primary"] is None and first:
         report.user_properties.append((MAYBE_FIXED, file))

@@ -63,6 +63,13 @@ class Table:
             raise self.error(key, f"found {value!r}, expected a list of strings")
         return tuple(value)
 
+    def truth(self, key: str, *, default: bool) -> bool:
+        """Return true or false."""
+        value = self.get(key, default=default)
+        if not isinstance(value, bool):
+            raise self.error(key, f"found {value!r}, expected true or false")
+        return value
+
     def integer(self, key: str, default: int | None = None, low: int = 0) -> int:
         """Return a whole number of at least ``low``."""
         value = self.get(key, default)

@@ -6,8 +6,11 @@ import sys
 from pathlib import Path
 
 import pytest
+from click.testing import CliRunner
 
+from pytest_garl.cli import main
 from pytest_garl.regressions.files import dumps, load
+from pytest_garl.search.ledger import Ledger
 from tests.plugin.test_plugin import project, result_hash, write_project
 
 SEARCH = ("--garl-budget=24", "--garl-workers=0", "--garl-shrink=60")
@@ -26,9 +29,18 @@ def saved(pytester: pytest.Pytester) -> dict[str, str]:
     return {path.name: path.read_text() for path in cases(pytester)}
 
 
+def commit(folder: Path) -> None:
+    """Put the project under git's care, so that its cases are known."""
+    for command in (["init", "-q"], ["add", "scenarios"]):
+        subprocess.run(["git", *command], check=True, cwd=folder)
+
+
 @pytest.fixture(scope="module")
 def template(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Return a project whose search has saved two cases: a dog, and fog that misleads."""
+    """Return a project whose search has saved two cases: a dog, and fog that misleads.
+
+    They are committed.
+    """
     folder = tmp_path_factory.mktemp("searched")
     write_project(folder)
     command = [sys.executable, "-m", "pytest", "-p", "no:cacheprovider", *SEARCH]
@@ -36,6 +48,7 @@ def template(tmp_path_factory: pytest.TempPathFactory) -> Path:
     assert done.returncode == pytest.ExitCode.TESTS_FAILED, done.stdout
     assert "confirming and shrinking 2 new kinds of violation" in done.stdout
     assert "saved scenarios/regressions/systems/lawn-IV-dog-" in done.stdout
+    commit(folder)
     return folder
 
 
@@ -44,6 +57,14 @@ def searched(pytester: pytest.Pytester, template: Path) -> pytest.Pytester:
     """Return a copy of that project."""
     shutil.copytree(template, pytester.path, dirs_exist_ok=True)
     return pytester
+
+
+def violations(pytester: pytest.Pytester) -> list[tuple[int, int, str]]:
+    ledger = Ledger(pytester.path / ".garl" / "ledger.sqlite")
+    try:
+        return [(row.generation, row.slot, row.signature) for row in ledger.violating()]
+    finally:
+        ledger.close()
 
 
 def change(path: Path, old: str, new: str) -> None:
@@ -98,6 +119,7 @@ def test_cases_of_a_search_with_destinations_keep_them_and_are_flown(
     (dog,) = [case for case in found if case.violation.signature.startswith("IV:dog")]
     assert -1 <= dog.scenario["dog-1.destination_x"] <= 1
     assert not any(key.startswith("person-1") for key, _ in dog.scenario.genes)
+    commit(pytester.path)
     run(pytester, *CASES).assert_outcomes(passed=2, skipped=2, xfailed=2)
 
 
@@ -160,7 +182,51 @@ def test_what_cannot_be_avoided_gates_nothing(pytester: pytest.Pytester) -> None
     result = run(pytester, *SEARCH)
     result.stdout.fnmatch_lines(["*UNAVOIDABLE, gates nothing*"])
     assert {load(path).status for path in cases(pytester)} == {"unavoidable"}
+    commit(pytester.path)
     assert run(pytester).ret == 0
+
+
+def test_what_cannot_be_avoided_excuses_no_other_violation_of_its_kind(
+    pytester: pytest.Pytester,
+) -> None:
+    project(pytester)
+    change(pytester.path / "tiny_simulator.py", "is False", "is None")
+    run(pytester, *SEARCH)
+    commit(pytester.path)
+    again = run(pytester, *SEARCH, "--garl-seed=1")
+    assert again.parseoutcomes()["failed"] == 2
+    assert again.ret == pytest.ExitCode.TESTS_FAILED
+
+
+def test_a_case_is_known_when_it_is_committed_or_accepted(searched: pytest.Pytester) -> None:
+    shutil.rmtree(searched.path / ".git")
+    files = [str(path) for path in cases(searched)]
+    for _ in range(2):
+        result = run(searched, *CASES)
+        result.assert_outcomes(passed=2, skipped=2, failed=2)
+        result.stdout.fnmatch_lines(
+            [
+                "garl: nobody can tell which cases are committed (*not a git repository*",
+                "If that is known: commit it, or: garl cases accept *IV-dog*.toml",
+            ]
+        )
+        # A search says the same, however often.
+        assert run(searched, *SEARCH).parseoutcomes()["failed"] == 4
+    assert CliRunner().invoke(main, ["cases", "accept", *files]).exit_code == 0
+    run(searched).assert_outcomes(passed=2, skipped=2, xfailed=2)
+    assert run(searched, *SEARCH).ret == 0
+
+
+def test_a_repeat_shows_the_failure_of_a_known_case(searched: pytest.Pytester) -> None:
+    run(searched, *SEARCH)
+    slot = next(
+        f"lawn-g{generation:02d}-s{slot:02d}"
+        for generation, slot, signature in violations(searched)
+        if signature.startswith("IV:dog")
+    )
+    result = run(searched, "--garl-workers=0", f"--garl-repeat={slot}")
+    result.assert_outcomes(failed=1, skipped=2)
+    result.stdout.fnmatch_lines(["*Collided with dog-1*"])
 
 
 def test_who_repairs_need_not_outrun_what_the_reference_pilot_does_not(
@@ -200,6 +266,7 @@ def test_with_ci_set_the_tree_is_left_alone_and_a_patch_brings_the_case(
     subprocess.run(["git", "apply", *map(str, patches)], check=True, cwd=pytester.path)
     for path in cases(pytester):
         assert dumps(load(path)) == path.read_text()
+    commit(pytester.path)
     assert run(pytester).ret == 0
 
 
@@ -277,6 +344,7 @@ def test_a_property_of_ones_own_is_shrunk_and_saved_for_its_test(
     assert case.violation.story.startswith("test_own: too much snow")
     assert len(case.scenario.absent) == 4
     assert 0.1 <= case.scenario["environment.snow"] <= 0.11
+    commit(pytester.path)
     known = run(pytester)
     # Four tests fly each of the two built-in cases, one flies its own.
     assert sum(known.parseoutcomes().values()) == 4 * 2 + 1
