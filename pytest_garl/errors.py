@@ -2,13 +2,19 @@
 
 from __future__ import annotations
 
+from pytest_garl.messages import printable
+
 
 class GarlError(Exception):
     """Base of every error that pytest-garl raises.
 
     The message says what was found, where, what was expected and what to do next; it
-    is shown to the user as it is, without a traceback.
+    is shown to the user as it is, without a traceback.  Control characters in it are written out:
+    names and values of files stand in it, and it goes to a terminal.
     """
+
+    def __init__(self, message: str) -> None:
+        super().__init__(printable(message))
 
 
 class ScenarioError(GarlError):

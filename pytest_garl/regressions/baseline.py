@@ -2,24 +2,27 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from pytest_garl.errors import GarlError, ScenarioError
+from pytest_garl.messages import listed, printable, shown
+from pytest_garl.reading import MEGABYTE, read_text
 from pytest_garl.regressions.files import read_limits
 from pytest_garl.saving import save_text
 from pytest_garl.scenarios.genes import Property, genome_like
 from pytest_garl.scenarios.maps import Map
 from pytest_garl.scenarios.scenario import Scenario
-from pytest_garl.scenarios.toml_reader import Table, parse
+from pytest_garl.scenarios.toml_reader import LARGEST, Table, finite, parse
 from pytest_garl.scenarios.toml_writer import quoted
 from pytest_garl.verdicts.gate import Answer
 from pytest_garl.verdicts.verdict import Limits
 
 SCHEMA = 1
+LARGEST_BYTES = 8 * MEGABYTE
+"""Some ten thousand flights, each a line of 600 bytes."""
 _KEYS = {
     "system",
     "map",
@@ -139,7 +142,7 @@ def loads(text: str, load_map: Callable[[str], Map], *, source: str = "baseline"
     top = Table(parse(text, source), source)
     top.only({"schema", "cpu", "versions", "set"})
     if top.integer("schema") != SCHEMA:
-        raise top.error("schema", f"found {top.get('schema')}, expected {SCHEMA}")
+        raise top.error("schema", f"found {shown(top.get('schema'))}, expected {SCHEMA}")
     versions = top.table("versions")
     baseline = Baseline(
         cpu=top.text("cpu"),
@@ -154,19 +157,22 @@ def load(path: Path, search_path: tuple[Path, ...] = ()) -> Baseline:
     """Return the baseline in a file."""
     from pytest_garl.scenarios.maps import load_map
 
-    try:
-        text = path.read_text(encoding="utf-8")
-    except (OSError, UnicodeDecodeError) as error:
-        raise ScenarioError(
-            f"{path}: cannot be read ({error}); expected a file that `garl baseline save` wrote"
-        ) from error
+    hint = "; expected a file that `garl baseline save` wrote"
+    text = read_text(path, LARGEST_BYTES, hint=hint)
     return loads(text, lambda name: load_map(name, search_path), source=str(path))
 
 
 def save(path: Path, baseline: Baseline) -> None:
     """Write the file; what stood there before is replaced as a whole."""
     _checked(baseline, lambda problem: BaselineError(f"{path}: {problem}"))
-    save_text(path, dumps(baseline))
+    text = dumps(baseline)
+    if len(text.encode()) > LARGEST_BYTES:
+        flights = sum(len(each.samples) for each in baseline.sets)
+        raise BaselineError(
+            f"{path}: found {flights} flights in {len(text.encode())} bytes, expected at most "
+            f"{LARGEST_BYTES}; save fewer flights"
+        )
+    save_text(path, text)
 
 
 def _checked(baseline: Baseline, wrong: Callable[[str], GarlError]) -> None:
@@ -195,7 +201,7 @@ def _read_set(table: Table, load_map: Callable[[str], Map]) -> SampleSet:
     table.only(_KEYS)
     for key in ("system", "simulator"):
         if not all(table.text(key).partition(":")):
-            raise table.error(key, f"found {table.text(key)!r}, expected 'module:name'")
+            raise table.error(key, f"found {shown(table.text(key))}, expected 'module:name'")
     try:
         map = load_map(table.text("map"))
     except ScenarioError as error:
@@ -203,7 +209,7 @@ def _read_set(table: Table, load_map: Callable[[str], Map]) -> SampleSet:
     properties = _read_genes(table, map)
     rows = table.get("flights")
     if not isinstance(rows, list):
-        raise table.error("flights", f"found {rows!r}, expected a list of flights")
+        raise table.error("flights", f"found {shown(rows)}, expected a list of flights")
     return SampleSet(
         system=table.text("system"),
         map=map.name,
@@ -227,7 +233,7 @@ def _read_genes(table: Table, map: Map) -> tuple[Property, ...]:
         raise table.error(
             "genes",
             f"found others than those of the map {map.name!r}, or in another order "
-            f"({', '.join(wrong) or 'order'}); if the map has changed, save a baseline anew",
+            f"({listed(wrong) or 'order'}); if the map has changed, save a baseline anew",
         )
     return genome.properties
 
@@ -244,25 +250,31 @@ def _read_row(
     ):
         raise table.error(
             key,
-            f"found {row!r}, expected [seed, outcome, signature, true or false, hash, [genes]]",
+            f"found {shown(row)}, expected "
+            "[seed, outcome, signature, true or false, hash, [genes]]",
         )
     seed, outcome, signature, paper_violation, sha256, values = row
-    if seed < 0:
-        raise table.error(key, f"found the seed {seed}, expected a whole number of at least 0")
+    if not 0 <= seed <= LARGEST:
+        raise table.error(
+            key, f"found the seed {shown(seed)}, expected a whole number from 0 to {LARGEST}"
+        )
     if outcome not in _OUTCOMES:
-        raise table.error(key, f"found {outcome!r}, expected one of {', '.join(_OUTCOMES)}")
+        raise table.error(key, f"found {shown(outcome)}, expected one of {', '.join(_OUTCOMES)}")
     if len(values) != len(properties):
         raise table.error(key, f"found {len(values)} values of genes, expected {len(properties)}")
     for item, value in zip(properties, values, strict=True):
-        number = isinstance(value, int | float) and not isinstance(value, bool)
-        if not number or not math.isfinite(value) or not item.low <= value <= item.high:
+        number = finite(value)
+        if number is None or not item.low <= number <= item.high:
             raise table.error(
-                key, f"{item.key}: found {value!r}, expected {item.low:g} to {item.high:g}"
+                key, f"{item.key}: found {shown(value)}, expected {item.low:g} to {item.high:g}"
             )
     genes = tuple((item.key, float(value)) for item, value in zip(properties, values, strict=True))
     return Sample(
         scenario=Scenario(map=map, seed=seed, genes=genes),
         answer=Answer(
-            outcome=outcome, signature=signature, paper_violation=paper_violation, sha256=sha256
+            outcome=outcome,
+            signature=printable(signature),
+            paper_violation=paper_violation,
+            sha256=printable(sha256),
         ),
     )

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from pytest_garl.errors import GarlError, ScenarioError
+from pytest_garl.messages import printable
 from pytest_garl.regressions.case import Case
 from pytest_garl.regressions.files import Head, dumps, load, load_head
 from pytest_garl.saving import alone, save_text
@@ -62,7 +63,11 @@ def entries(cases: Path, system: str, map_folders: tuple[Path, ...]) -> tuple[En
 
 def every_entry(cases: Path, map_folders: tuple[Path, ...]) -> tuple[Entry, ...]:
     """Return all files of the corpus, system by system."""
-    folders = sorted(each for each in cases.iterdir() if each.is_dir()) if cases.is_dir() else ()
+    try:
+        there = sorted(cases.iterdir()) if cases.is_dir() else ()
+    except OSError as error:
+        raise CorpusError(f"{cases}: cannot be read: {error.strerror}") from error
+    folders = [each for each in there if each.is_dir() or each.is_symlink()]
     return tuple(entry for folder in folders for entry in _in_folder(folder, map_folders))
 
 
@@ -70,10 +75,23 @@ def _in_folder(folder: Path, map_folders: tuple[Path, ...]) -> Iterator[Entry]:
     for path in sorted(folder.glob("*.toml")):
         try:
             changed = path.stat().st_mtime_ns
-        except OSError:
-            # Gone since it was listed: somebody is cleaning up.
+        except OSError as error:
+            if path.is_symlink():
+                yield _lost(path, map_folders, str(error.strerror))
+            # Else it is gone since it was listed: somebody is cleaning up.
             continue
         yield _read(path, changed, map_folders)
+    if folder.is_symlink() and not folder.is_dir():
+        yield _lost(folder, map_folders, "it leads to no folder")
+
+
+def _lost(path: Path, map_folders: tuple[Path, ...], reason: str) -> Entry:
+    """Return an entry that tells of a symbolic link without a file: a case may be lost."""
+    fault = (
+        f"{path}: cannot be read: found a symbolic link that leads nowhere ({reason}), expected "
+        "a file; remove it, or bring back what it meant"
+    )
+    return Entry(path=path, changed=0, map_folders=map_folders, head=None, fault=printable(fault))
 
 
 @functools.lru_cache(maxsize=10_000)

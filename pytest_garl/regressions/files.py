@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import itertools
-import math
+import re
 import textwrap
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -11,6 +11,8 @@ from pathlib import Path
 from typing import Literal, cast
 
 from pytest_garl.errors import ScenarioError
+from pytest_garl.messages import shown
+from pytest_garl.reading import read_text
 from pytest_garl.regressions.case import (
     Avoidable,
     Case,
@@ -25,9 +27,16 @@ from pytest_garl.regressions.case import (
 from pytest_garl.scenarios.files import gene_lines, read_genes
 from pytest_garl.scenarios.genes import ENVIRONMENT
 from pytest_garl.scenarios.maps import Map
-from pytest_garl.scenarios.toml_reader import Table, parse
+from pytest_garl.scenarios.toml_reader import Table, finite, parse
 from pytest_garl.scenarios.toml_writer import quoted as _text
-from pytest_garl.verdicts.verdict import Limits, PropertyName, ViolationType
+from pytest_garl.simulation.policy import DECISION_STEP_S
+from pytest_garl.verdicts.verdict import (
+    FARTHEST_M,
+    LONGEST_S,
+    Limits,
+    PropertyName,
+    ViolationType,
+)
 
 SCHEMA = 1
 _TYPES = ("I", "II", "III", "IV", "V", "late", "off", "hard", "abort", "own")
@@ -35,6 +44,9 @@ _PROPERTIES = ("distance", "time", "collision", "crash", "abort", "own")
 _STATUSES = ("open", "fixed", "unavoidable")
 _AVOIDABLE = ("live", "recorded", "no")
 _WIDTH = 98
+_MOST_MOVES = round(LONGEST_S / DECISION_STEP_S)
+_SYSTEM = re.compile(r"\w[\w-]*(\.\w[\w-]*)*:[^\W\d]\w*(\.[^\W\d]\w*)*")
+"""Names with dots between: what is imported must not be a path to somewhere else."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -195,16 +207,18 @@ def loads(text: str, load_map: Callable[[str], Map], *, source: str = "case") ->
 
 def load_head(path: Path) -> Head:
     """Return the keys above a file's first table, in a fraction of the time of all of it."""
-    head, _, _ = _text_of(path).partition("\n[")
+    head, _, _ = read_text(path).partition("\n[")
     return _read_head(Table(parse(head, str(path)), str(path)))
 
 
 def _read_head(top: Table) -> Head:
     if top.integer("schema") != SCHEMA:
-        raise top.error("schema", f"found {top.get('schema')}, expected {SCHEMA}")
+        raise top.error("schema", f"found {shown(top.get('schema'))}, expected {SCHEMA}")
     system = top.text("system")
-    if not all(system.partition(":")):
-        raise top.error("system", f"found {system!r}, expected 'module:class'")
+    if not _SYSTEM.fullmatch(system):
+        raise top.error(
+            "system", f"found {shown(system)}, expected 'module:class', names with dots between"
+        )
     return Head(
         system=system,
         status=cast(Status, top.text("status", among=_STATUSES)),
@@ -218,14 +232,7 @@ def load(path: Path, search_path: tuple[Path, ...] = ()) -> Case:
     """Return the case in a file."""
     from pytest_garl.scenarios.maps import load_map
 
-    return loads(_text_of(path), lambda name: load_map(name, search_path), source=str(path))
-
-
-def _text_of(path: Path) -> str:
-    try:
-        return path.read_text(encoding="utf-8")
-    except (OSError, UnicodeDecodeError) as error:
-        raise ScenarioError(f"{path}: cannot be read: {error}") from error
+    return loads(read_text(path), lambda name: load_map(name, search_path), source=str(path))
 
 
 def read_limits(table: Table) -> Limits:
@@ -233,8 +240,8 @@ def read_limits(table: Table) -> Limits:
     table.only({"distance_m", "time_s", "abort"})
     abort = table.text("abort", among=("ok", "violation"))
     return Limits(
-        distance_m=table.number("distance_m", low=0.0),
-        time_s=table.number("time_s", low=0.0),
+        distance_m=table.number("distance_m", low=0.0, high=FARTHEST_M),
+        time_s=table.number("time_s", low=0.0, high=LONGEST_S),
         abort=cast(Literal["ok", "violation"], abort),
     )
 
@@ -249,17 +256,22 @@ def _read_runs(table: Table, name: str) -> MoveList:
     runs = table.get(name)
     expected = "expected a list of [times, x, y] with times of at least 1 and x² + y² of at most 1"
     if not isinstance(runs, list):
-        raise table.error(name, f"found {runs!r}, {expected}")
+        raise table.error(name, f"found {shown(runs)}, {expected}")
     moves: list[tuple[float, float]] = []
     for run in runs:
-        numbers = isinstance(run, list) and all(
-            isinstance(item, int | float) and not isinstance(item, bool) for item in run
-        )
-        if not numbers or len(run) != 3 or not isinstance(run[0], int) or not 1 <= run[0] <= 10_000:
-            raise table.error(name, f"found {run!r}, {expected}")
-        if not run[1] ** 2 + run[2] ** 2 <= 1 + 1e-9:
-            raise table.error(name, f"found {run!r}, {expected}")
-        moves += [(float(run[1]), float(run[2]))] * run[0]
+        times, x, y = run if isinstance(run, list) and len(run) == 3 else (0, None, None)
+        x, y = finite(x), finite(y)
+        if type(times) is not int or times < 1 or x is None or y is None:
+            raise table.error(name, f"found {shown(run)}, {expected}")
+        if not max(abs(x), abs(y)) <= 1 or not x**2 + y**2 <= 1 + 1e-9:
+            raise table.error(name, f"found {shown(run)}, {expected}")
+        if len(moves) + times > _MOST_MOVES:
+            raise table.error(
+                name,
+                f"found {shown(run)} after {len(moves)} moves, expected at most {_MOST_MOVES} "
+                f"moves in all: no flight is longer than {LONGEST_S:g} s",
+            )
+        moves += [(x, y)] * times
     return tuple(moves)
 
 
@@ -270,8 +282,11 @@ def _read_changes(table: Table, map: Map, absent: Sequence[str]) -> Changes:
     found = []
     for name in (each for each in names if each in table.values):
         rows = table.get(name)
-        if not isinstance(rows, list) or not all(_is_change(row) for row in rows):
-            raise table.error(name, f"found {rows!r}, {expected}")
+        if not isinstance(rows, list):
+            raise table.error(name, f"found {shown(rows)}, {expected}")
+        wrong = next((row for row in rows if not _is_change(row)), None)
+        if wrong is not None:
+            raise table.error(name, f"found {shown(wrong)}, {expected}")
         found.append((name, tuple((row[0], row[1], float(row[2])) for row in rows)))
     return tuple(found)
 
@@ -281,10 +296,9 @@ def _is_change(row: object) -> bool:
         return False
     return (
         len(row) == 3
-        and 0 <= row[0] <= 10_000
+        and 0 <= row[0] < _MOST_MOVES
         and row[1] in ENVIRONMENT
-        and type(row[2]) in (int, float)
-        and math.isfinite(row[2])
+        and finite(row[2]) is not None
     )
 
 

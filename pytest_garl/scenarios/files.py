@@ -5,6 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 
 from pytest_garl.errors import ScenarioError
+from pytest_garl.messages import shown
+from pytest_garl.reading import read_text
 from pytest_garl.scenarios.genes import genome_like
 from pytest_garl.scenarios.maps import Map
 from pytest_garl.scenarios.scenario import Scenario
@@ -24,7 +26,7 @@ def dumps(scenario: Scenario) -> str:
         f"seed = {scenario.seed}",
     ]
     if scenario.absent:
-        names = ", ".join(f'"{name}"' for name in scenario.absent)
+        names = ", ".join(quoted(name) for name in scenario.absent)
         lines.append(f"absent = [{names}]")
     return "\n".join([*lines, *gene_lines(scenario)]) + "\n"
 
@@ -49,9 +51,9 @@ def loads(text: str, map: Map, *, source: str = "scenario") -> Scenario:
     top = Table(parse(text, source), source)
     top.only({"schema", "map", "seed", "absent", "genes"})
     if top.integer("schema") != SCHEMA:
-        raise top.error("schema", f"found {top.get('schema')}, expected {SCHEMA}")
+        raise top.error("schema", f"found {shown(top.get('schema'))}, expected {SCHEMA}")
     if top.text("map") != map.name:
-        raise top.error("map", f"found {top.text('map')!r}, expected {map.name!r}")
+        raise top.error("map", f"found {shown(top.text('map'))}, expected {map.name!r}")
     return read_genes(top, map)
 
 
@@ -91,9 +93,6 @@ def load(path: Path, search_path: tuple[Path, ...] = ()) -> Scenario:
     """Return the scenario in a file."""
     from pytest_garl.scenarios.maps import load_map
 
-    try:
-        text = path.read_text(encoding="utf-8")
-    except (OSError, UnicodeDecodeError) as error:
-        raise ScenarioError(f"{path}: cannot be read: {error}") from error
+    text = read_text(path)
     map = load_map(map_name_in(text, source=str(path)), search_path)
     return loads(text, map, source=str(path))

@@ -3,41 +3,72 @@
 from __future__ import annotations
 
 import math
+import re
 import tomllib
 from collections.abc import Collection, Mapping
 from typing import Any
 
 from pytest_garl.errors import ScenarioError
+from pytest_garl.messages import listed, printable, shortened, shown
+
+LARGEST = 2**63 - 1
+"""The largest whole number that TOML promises to keep."""
+_DEEP = 32
+_PART = r"""(?:[\w-]++|"(?:[^"\\\n]|\\.)*+"|'[^'\n]*+')"""
+_DEEP_KEY = re.compile(rf"(?<![\w.-])(?:{_PART}[ \t]*+\.[ \t]*+){{{_DEEP}}}")
+"""A key of so many parts: the parser's time grows with the square of their number."""
 
 
 def parse(text: str, source: str) -> dict[str, Any]:
     """Return the document; raise ScenarioError with the line for bad TOML."""
+    if _DEEP_KEY.search(text):
+        raise ScenarioError(
+            f"{source}: not valid TOML: found a name of more than {_DEEP} parts with dots "
+            "between, expected fewer"
+        )
     try:
         return tomllib.loads(text)
-    except tomllib.TOMLDecodeError as error:
-        raise ScenarioError(f"{source}: not valid TOML: {error}") from error
+    except RecursionError as error:
+        raise ScenarioError(
+            f"{source}: not valid TOML: found lists or tables nested too deeply, expected a few "
+            "levels"
+        ) from error
+    except ValueError as error:
+        # Beside the parser's own errors these are numbers of more digits than Python takes.
+        raise ScenarioError(f"{source}: not valid TOML: {shortened(str(error), 200)}") from error
+
+
+def finite(value: object) -> float | None:
+    """Return a finite number as float, or None for everything else."""
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        return None
+    try:
+        number = float(value)
+    except OverflowError:
+        return None
+    return number if math.isfinite(number) else None
 
 
 class Table:
     """One table of a document that remembers where it stands, so that errors can say it."""
 
     def __init__(self, values: Any, source: str, path: str = "") -> None:
-        self.source = source
+        self.source = printable(source, keep="")
         self.path = path
         if not isinstance(values, Mapping):
-            raise self.error("", f"found {values!r}, expected a table")
+            raise self.error("", f"found {shown(values)}, expected a table")
         self.values: Mapping[str, Any] = values
 
     def error(self, key: str, problem: str) -> ScenarioError:
         """Return an error about a key of this table."""
         where = ".".join(part for part in (self.path, key) if part)
-        return ScenarioError(f"{self.source}: key {where!r}: {problem}")
+        return ScenarioError(f"{self.source}: key {shown(where)}: {problem}")
 
     def only(self, known: Collection[str]) -> None:
         """Refuse keys that nobody reads."""
         for key in self.values:
             if key not in known:
-                raise self.error(key, f"unknown key; expected one of {', '.join(sorted(known))}")
+                raise self.error(key, f"unknown key; expected one of {listed(sorted(known))}")
 
     def get(self, key: str, default: Any = None) -> Any:
         """Return a value; without default a missing key is an error."""
@@ -48,33 +79,36 @@ class Table:
         return default
 
     def text(self, key: str, default: str | None = None, among: Collection[str] = ()) -> str:
-        """Return a string, one of ``among`` if given."""
+        """Return a string, control characters written out, one of ``among`` if given."""
         value = self.get(key, default)
         if not isinstance(value, str):
-            raise self.error(key, f"found {value!r}, expected a string")
+            raise self.error(key, f"found {shown(value)}, expected a string")
         if among and value not in among:
-            raise self.error(key, f"found {value!r}, expected one of {', '.join(sorted(among))}")
-        return value
+            raise self.error(key, f"found {shown(value)}, expected one of {listed(sorted(among))}")
+        return printable(value)
 
     def texts(self, key: str) -> tuple[str, ...]:
         """Return a list of strings, empty if absent."""
         value = self.values.get(key, [])
         if not isinstance(value, list) or not all(isinstance(item, str) for item in value):
-            raise self.error(key, f"found {value!r}, expected a list of strings")
-        return tuple(value)
+            raise self.error(key, f"found {shown(value)}, expected a list of strings")
+        return tuple(printable(item) for item in value)
 
     def truth(self, key: str, *, default: bool) -> bool:
         """Return true or false."""
         value = self.get(key, default=default)
         if not isinstance(value, bool):
-            raise self.error(key, f"found {value!r}, expected true or false")
+            raise self.error(key, f"found {shown(value)}, expected true or false")
         return value
 
-    def integer(self, key: str, default: int | None = None, low: int = 0) -> int:
-        """Return a whole number of at least ``low``."""
+    def integer(
+        self, key: str, default: int | None = None, low: int = 0, high: int = LARGEST
+    ) -> int:
+        """Return a whole number within [low, high]."""
         value = self.get(key, default)
-        if not isinstance(value, int) or isinstance(value, bool) or value < low:
-            raise self.error(key, f"found {value!r}, expected a whole number of at least {low}")
+        if not isinstance(value, int) or isinstance(value, bool) or not low <= value <= high:
+            bounds = f"of at least {low}" if high == LARGEST else f"from {low} to {high}"
+            raise self.error(key, f"found {shown(value)}, expected a whole number {bounds}")
         return value
 
     def number(
@@ -88,17 +122,24 @@ class Table:
         return self._number(key, self.get(key, default), low, high)
 
     def numbers(
-        self, key: str, count: int, default: tuple[float, ...] | None = None
+        self,
+        key: str,
+        count: int,
+        default: tuple[float, ...] | None = None,
+        high: float = math.inf,
     ) -> tuple[float, ...]:
-        """Return exactly ``count`` finite numbers."""
-        return self._numbers(key, self.get(key, default), count)
+        """Return exactly ``count`` finite numbers within [-high, high]."""
+        return self._numbers(key, self.get(key, default), count, high)
 
-    def points(self, key: str) -> tuple[tuple[float, float], ...]:
-        """Return a list of (x, y) pairs."""
+    def points(self, key: str, low: int, most: int, high: float) -> tuple[tuple[float, float], ...]:
+        """Return ``low`` to ``most`` pairs (x, y) of numbers within [-high, high]."""
         value = self.get(key)
-        if not isinstance(value, list) or not value:
-            raise self.error(key, f"found {value!r}, expected a list of [x, y] pairs")
-        pairs = [self._numbers(key, pair, 2) for pair in value]
+        if not isinstance(value, list):
+            raise self.error(key, f"found {shown(value)}, expected a list of [x, y] pairs")
+        if not low <= len(value) <= most:
+            count = f"{low} to {most}" if most > low else f"exactly {low}"
+            raise self.error(key, f"found {len(value)} points, expected {count}, each [x, y]")
+        pairs = [self._numbers(key, pair, 2, high) for pair in value]
         return tuple((x, y) for x, y in pairs)
 
     def colour(self, key: str, default: tuple[int, int, int] | None = None) -> tuple[int, int, int]:
@@ -107,10 +148,12 @@ class Table:
         good = (
             isinstance(value, list | tuple)
             and len(value) == 3
-            and all(isinstance(item, int) and 0 <= item <= 255 for item in value)
+            and all(type(item) is int and 0 <= item <= 255 for item in value)
         )
         if not good:
-            raise self.error(key, f"found {value!r}, expected three whole numbers from 0 to 255")
+            raise self.error(
+                key, f"found {shown(value)}, expected three whole numbers from 0 to 255"
+            )
         red, green, blue = value
         return red, green, blue
 
@@ -118,24 +161,29 @@ class Table:
         """Return a sub-table."""
         return Table(self.get(key), self.source, ".".join(p for p in (self.path, key) if p))
 
-    def tables(self, key: str) -> tuple[Table, ...]:
-        """Return an array of tables, empty if absent."""
+    def tables(self, key: str, most: int = 10_000) -> tuple[Table, ...]:
+        """Return an array of at most ``most`` tables, empty if absent."""
         value = self.values.get(key, [])
         if not isinstance(value, list):
-            raise self.error(key, f"found {value!r}, expected an array of tables")
+            raise self.error(key, f"found {shown(value)}, expected an array of tables")
+        if len(value) > most:
+            raise self.error(key, f"found {len(value)} tables, expected at most {most}")
         prefix = f"{self.path}." if self.path else ""
         return tuple(
             Table(item, self.source, f"{prefix}{key}[{index}]") for index, item in enumerate(value)
         )
 
-    def _numbers(self, key: str, value: Any, count: int) -> tuple[float, ...]:
+    def _numbers(self, key: str, value: Any, count: int, high: float) -> tuple[float, ...]:
         if not isinstance(value, list | tuple) or len(value) != count:
-            raise self.error(key, f"found {value!r}, expected {count} numbers")
-        return tuple(self._number(key, item, -math.inf, math.inf) for item in value)
+            raise self.error(key, f"found {shown(value)}, expected {count} numbers")
+        return tuple(self._number(key, item, -high, high) for item in value)
 
     def _number(self, key: str, value: Any, low: float, high: float) -> float:
         if isinstance(value, bool) or not isinstance(value, int | float):
-            raise self.error(key, f"found {value!r}, expected a number")
-        if not math.isfinite(value) or not low <= value <= high:
-            raise self.error(key, f"found {value!r}, expected a number from {low:g} to {high:g}")
-        return float(value)
+            raise self.error(key, f"found {shown(value)}, expected a number")
+        number = finite(value)
+        if number is None or not low <= number <= high:
+            raise self.error(
+                key, f"found {shown(value)}, expected a number from {low:g} to {high:g}"
+            )
+        return number

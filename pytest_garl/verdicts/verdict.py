@@ -5,6 +5,14 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal
 
+from pytest_garl.errors import OptionError
+from pytest_garl.messages import shown
+
+LONGEST_S = 300.0
+"""The longest flight that may be asked for, in seconds: more than twice the paper's two minutes,
+and short enough that one landing system that hovers does not hold up a search."""
+FARTHEST_M = 1000.0
+"""The largest limit of distance that may be asked for: no map is so wide."""
 PropertyName = Literal["distance", "time", "collision", "crash", "abort", "own"]
 ViolationType = Literal["I", "II", "III", "IV", "V", "late", "off", "hard", "abort", "own"]
 """The paper's five types and ours; "own" is what a test asserts beyond them."""
@@ -22,6 +30,19 @@ class Limits:
     distance_m: float = 1.5
     time_s: float = 120.0
     abort: Literal["ok", "violation"] = "ok"
+
+    def __post_init__(self) -> None:
+        for name, high in (("distance_m", FARTHEST_M), ("time_s", LONGEST_S)):
+            value = getattr(self, name)
+            good = isinstance(value, int | float) and not isinstance(value, bool)
+            if not good or not 0 <= value <= high:
+                raise OptionError(
+                    f"limits: found {name}={shown(value)}, expected a number from 0 to {high:g}"
+                )
+        if self.abort not in ("ok", "violation"):
+            raise OptionError(
+                f"limits: found abort={shown(self.abort)}, expected 'ok' or 'violation'"
+            )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Literal
 
 from pytest_garl.errors import ScenarioError
+from pytest_garl.messages import listed, shown
 from pytest_garl.scenarios.bodies import Body
 
 LayerKind = Literal["rectangle", "line", "circle", "arc", "polygon", "roots", "patches", "marker"]
@@ -90,7 +91,7 @@ class Map:
         unknown = [name for name in names if name not in known]
         if unknown:
             raise ScenarioError(
-                f"map {self.name!r} has no object {', '.join(unknown)}; it has {', '.join(known)}"
+                f"map {self.name!r} has no object {listed(unknown)}; it has {listed(known)}"
             )
         return dataclasses.replace(self, absent=names)
 
@@ -117,11 +118,19 @@ def load_map(name: str, search_path: Sequence[Path] = ()) -> Map:
     for folder in _folders(search_path):
         file = folder / f"{name}.toml"
         if file in _maps_in(folder):
-            return _read(file, file.stat().st_mtime_ns)
+            return _read(file, _changed(file))
     raise ScenarioError(
-        f"unknown map {name!r}; expected one of {', '.join(map_names(search_path))}. "
+        f"unknown map {shown(name)}; expected one of {listed(map_names(search_path))}. "
         "A map of your own is a file scenarios/maps/<name>.toml"
     )
+
+
+def _changed(file: Path) -> int:
+    try:
+        return file.stat().st_mtime_ns
+    except OSError as error:
+        # A link to nothing, or to itself.
+        raise ScenarioError(f"{file}: cannot be read: {error.strerror}") from error
 
 
 @functools.lru_cache(maxsize=64)

@@ -9,6 +9,8 @@ from pathlib import Path
 from typing import cast, get_args
 
 from pytest_garl.errors import ScenarioError
+from pytest_garl.messages import printable
+from pytest_garl.reading import read_bytes
 from pytest_garl.scenarios.bodies import Body
 from pytest_garl.scenarios.furniture import FURNITURE
 from pytest_garl.scenarios.maps import Ground, Layer, LayerKind, Map, Texture
@@ -16,14 +18,32 @@ from pytest_garl.scenarios.object_types import OBJECT_TYPES
 from pytest_garl.scenarios.toml_reader import Table, parse
 
 _GPS_DISC_M = 7.5
+LARGEST_AREA_M2 = 10_000.0
+"""The ground's picture takes some 25 kB a square metre while it is painted, its margin included:
+about half a gigabyte for a map of this size."""
+_FAR_M = 300.0
+"""No coordinate is larger.  Single precision, in which the camera and the physics compute, is
+exact to a few hundredths of a millimetre there."""
+_MOST_LAYERS = 200
+_MOST_POINTS = 1000
+_MOST_BODIES = 200
+_MOST_BRANCHES = 50
+_MOST_OBJECTS = 50
+"""Of a kind: ten times the shipped maps, twice.  Each is five genes and a body of the physics."""
+_LARGEST_MARKER_ID = 49
+"""The last one of the dictionary DICT_5X5_50."""
+_FULL_TURN_DEG = 360.0
+_POINTS = {"rectangle": (2, 2), "line": (2, _MOST_POINTS), "polygon": (3, _MOST_POINTS)}
+"""How many points a kind of layer has, at least and at most; the others have one."""
 
 
 def read_map(file: Path) -> Map:
     """Return the map in ``file``; raise ScenarioError that names file and key."""
+    _check_name(file)
+    content = read_bytes(file)
     try:
-        content = file.read_bytes()
         text = content.decode()
-    except (OSError, UnicodeDecodeError) as error:
+    except UnicodeDecodeError as error:
         raise ScenarioError(f"{file}: cannot be read: {error}") from error
     top = Table(parse(text, str(file)), str(file))
     top.only(
@@ -38,7 +58,7 @@ def read_map(file: Path) -> Map:
             "objects",
         }
     )
-    x_min, x_max, y_min, y_max = top.numbers("bounds_m", 4)
+    x_min, x_max, y_min, y_max = _bounds(top)
     gps_x, gps_y = top.numbers("gps_position_m", 2, (0.0, 0.0))
     start_x, start_y, start_z = top.numbers("uav_start_m", 3)
     if min(gps_x - x_min, x_max - gps_x, gps_y - y_min, y_max - gps_y) < _GPS_DISC_M:
@@ -61,6 +81,27 @@ def read_map(file: Path) -> Map:
     )
 
 
+def _check_name(file: Path) -> None:
+    """Refuse names that cannot stand in a patch, a test's id or a line of a terminal."""
+    if not file.stem.isprintable():
+        raise ScenarioError(
+            f"{printable(str(file), keep='')}: the name of a map holds characters that cannot be "
+            "seen, expected none; rename the file"
+        )
+
+
+def _bounds(top: Table) -> tuple[float, float, float, float]:
+    x_min, x_max, y_min, y_max = top.numbers("bounds_m", 4, high=_FAR_M)
+    area = (x_max - x_min) * (y_max - y_min)
+    if x_max > x_min and y_max > y_min and area > LARGEST_AREA_M2:
+        raise top.error(
+            "bounds_m",
+            f"found {area:g} square metres, expected at most {LARGEST_AREA_M2:g}: the picture of "
+            "the ground would not fit into the memory",
+        )
+    return x_min, x_max, y_min, y_max
+
+
 def _ground(top: Table) -> Ground:
     ground = top.table("ground")
     ground.only({"texture", "seed", "colour"})
@@ -69,7 +110,7 @@ def _ground(top: Table) -> Ground:
         texture=cast(Texture, texture),
         texture_seed=ground.integer("seed"),
         colour=ground.colour("colour"),
-        layers=tuple(_layer(layer) for layer in top.tables("layers")),
+        layers=tuple(_layer(layer) for layer in top.tables("layers", most=_MOST_LAYERS)),
     )
 
 
@@ -88,44 +129,52 @@ def _layer(table: Table) -> Layer:
         }
     )
     kind = table.text("kind", among=get_args(LayerKind))
-    start, end = table.numbers("angles_deg", 2, (0.0, 0.0))
+    start, end = table.numbers("angles_deg", 2, (0.0, 0.0), high=_FULL_TURN_DEG)
+    low, high = _POINTS.get(kind, (1, 1))
+    marker_id = (
+        table.integer("marker_id", low=1, high=_LARGEST_MARKER_ID) if kind == "marker" else -1
+    )
     return Layer(
         kind=cast(LayerKind, kind),
-        points_m=table.points("points_m"),
+        points_m=table.points("points_m", low, high, _FAR_M),
         colour=table.colour("colour", (255, 255, 255)),
-        size_m=table.number("size_m", 0.0, low=0.0),
-        width_m=table.number("width_m", 0.0, low=0.0),
+        size_m=table.number("size_m", 0.0, low=0.0, high=_FAR_M),
+        width_m=table.number("width_m", 0.0, low=0.0, high=_FAR_M),
         angles_rad=(math.radians(start), math.radians(end)),
-        yaw_rad=math.radians(table.number("yaw_deg", 0.0)),
-        marker_id=table.integer("marker_id", low=1) if kind == "marker" else -1,
-        name=table.text("name", f"marker-{table.get('marker_id')}" if kind == "marker" else kind),
+        yaw_rad=_yaw(table),
+        marker_id=marker_id,
+        name=table.text("name", f"marker-{marker_id}" if kind == "marker" else kind),
     )
+
+
+def _yaw(table: Table) -> float:
+    return math.radians(table.number("yaw_deg", 0.0, low=-_FULL_TURN_DEG, high=_FULL_TURN_DEG))
 
 
 def _bodies(top: Table) -> tuple[Body, ...]:
     counts: dict[str, int] = {}
     bodies = []
-    for table in top.tables("bodies"):
+    for table in top.tables("bodies", most=_MOST_BODIES):
         kind = table.text("kind", among=FURNITURE)
         build = FURNITURE[kind]
         arguments = set(inspect.signature(build).parameters)
         table.only({"kind", "position_m", "yaw_deg"} | arguments)
         values = {
-            key: table.integer(key, low=1)
+            key: table.integer(key, low=1, high=_MOST_BRANCHES)
             if key == "branches"
             else table.number(key, low=0.01, high=100.0)
             for key in table.values
             if key in arguments
         }
         counts[kind] = counts.get(kind, 0) + 1
-        x, y = table.numbers("position_m", 2)
+        x, y = table.numbers("position_m", 2, high=_FAR_M)
         bodies.append(
             Body(
                 name=f"{kind}-{counts[kind]}",
                 kind=kind,
                 parts=build(**values),
                 position_m=(x, y, 0.0),
-                yaw_rad=math.radians(table.number("yaw_deg", 0.0)),
+                yaw_rad=_yaw(table),
             )
         )
     return tuple(bodies)
@@ -134,4 +183,4 @@ def _bodies(top: Table) -> tuple[Body, ...]:
 def _objects(top: Table) -> tuple[tuple[str, int], ...]:
     objects = top.table("objects")
     objects.only(OBJECT_TYPES)
-    return tuple((kind, objects.integer(kind)) for kind in objects.values)
+    return tuple((kind, objects.integer(kind, high=_MOST_OBJECTS)) for kind in objects.values)
