@@ -18,6 +18,12 @@ if TYPE_CHECKING:
 
 SLOT_ID = re.compile(r"(?P<map>.+)-g(?P<generation>\d{2,})-s(?P<slot>\d{2,})")
 
+SHRINK = 12
+"""Flights for each new kind of violation: enough for the barest scenario, its neighbours, the
+reference pilot and a shorter record of moves."""
+LEAST_SHRINK = 9
+"""Fewer say nothing: ``pursuit.LEAST``, which to import takes long."""
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Options:
@@ -42,6 +48,9 @@ class Options:
     baseline: Path | None
     level: float
     shrink: int
+    """Flights for each new kind of violation."""
+    shrink_capped: bool
+    """Whether all kinds of a search together have no more flights than the search."""
     xfail_strict: bool
     cases: Path
     folder: Path
@@ -95,7 +104,8 @@ def read_options(config: pytest.Config) -> Options:
         npcs=_npcs(text["npcs"] or _npcs_then(config, text["repeat"]), text["method"]),
         baseline=_baseline(config),
         level=_number("level", text["level"], 1, "a number between 0 and 1"),
-        shrink=_integer("shrink", text["shrink"], 0) if text["shrink"] else budget // 4,
+        shrink=_shrink(text["shrink"]),
+        shrink_capped=not text["shrink"],
         xfail_strict=bool(config.getini("garl_xfail_strict")),
         cases=config.rootpath / str(config.getini("garl_cases")),
         folder=config.rootpath / str(config.getini("garl_dir")),
@@ -138,6 +148,15 @@ def _population(budget: int) -> int:
     from pytest_garl.search.slots import population
 
     return population(budget)
+
+
+def _shrink(text: str) -> int:
+    if not text:
+        return SHRINK
+    number = _integer("shrink", text, 0)
+    if 0 < number < LEAST_SHRINK:
+        raise _wrong("shrink", text, f"0, or at least {LEAST_SHRINK} flights per new kind")
+    return number
 
 
 def _number(name: str, text: str, below: float, expected: str) -> float:

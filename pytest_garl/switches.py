@@ -113,8 +113,9 @@ OPTIONS = (
     Option(
         name="shrink",
         metavar="N",
-        help="Flights per landing system and map for confirming and shrinking what a search found, "
-        "before it is saved; 0 saves nothing (default: a quarter of the budget).",
+        help="Flights for each new kind of violation that a search found, to confirm, shrink and "
+        "save it; a Python exception takes 2. 0: nothing is confirmed, shrunk or saved (default: "
+        "12, but for all kinds together no more than the search itself).",
     ),
     Option(
         name="baseline",

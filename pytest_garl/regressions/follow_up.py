@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import functools
 from collections import defaultdict
 from collections.abc import Callable, Mapping, Sequence
@@ -10,7 +11,16 @@ from pathlib import Path
 
 from pytest_garl.regressions.case import Case
 from pytest_garl.regressions.corpus import entries, save, save_patch
-from pytest_garl.regressions.pursuit import LEAST, Asks, Finding, Inquiry, Pursuit
+from pytest_garl.regressions.pursuit import (
+    EXCEPTION,
+    LEAST,
+    PILOTS,
+    Asks,
+    Finding,
+    Inquiry,
+    Pursuit,
+    as_found,
+)
 from pytest_garl.scenarios.maps import load_map
 from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.search.errands import Done, Errands, Fly
@@ -19,7 +29,17 @@ from pytest_garl.search.ledger import Ledger, Row
 from pytest_garl.search.pool import Pool
 from pytest_garl.search.slots import flight_name
 
-UNREACHED = "the budget of --garl-shrink did not reach it"
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Shrinking:
+    """How many flights each new signature has, and whether a search's signatures have a cap.
+
+    The cap is as many flights of the landing system as the search itself; one signature is always
+    shrunk.
+    """
+
+    each: int
+    capped: bool
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -45,18 +65,17 @@ class Pursued:
 def inquiries(
     ledger: Ledger,
     place: Place,
-    budget: int,
+    shrinking: Shrinking,
     own: Mapping[tuple[str, str], Asks] | None = None,
     found_by: Mapping[tuple[str, str], str] | None = None,
 ) -> tuple[Inquiry, ...]:
     """Return what is to be found out about signatures that no saved case has.
 
-    ``budget`` is for all signatures of one search together.  Where it does not reach for all, the
-    most frequent come first and the others have none; the first is saved, if unshrunk, however
-    small the budget.  ``own`` are assertions of tests that failed where the verdict is content, by
-    search and signature; ``found_by`` are the node ids of the tests that failed.
+    The most frequent come first; each wants the flights that it may have at most.  ``own`` are
+    assertions of tests that failed where the verdict is content, by search and signature;
+    ``found_by`` are the node ids of the tests that failed.
     """
-    found = []
+    found: list[Inquiry] = []
     asks, tests = own or {}, found_by or {}
     groups = _by_search(ledger)
     for search, signature in asks:
@@ -76,23 +95,67 @@ def inquiries(
             for signature, those in rows.items()
             if signature not in known
         }
-        order = sorted(new, key=lambda signature: (-len(new[signature]), signature))
-        reached = min(len(order), max(1, budget // LEAST))
+        cap = len(ledger.flown(search)) if shrinking.capped else None
         map = load_map(job.map, place.map_folders)
-        for number, signature in enumerate(order):
-            found.append(
-                Inquiry(
-                    name=f"{search} {signature}",
-                    signature=signature,
-                    violations=new[signature],
-                    job=job,
-                    map=map,
-                    budget=max(LEAST, budget // reached) if number < reached else 0,
-                    asks=asks.get((search, signature)),
-                    test=tests.get((search, signature), ""),
-                )
+        found += [
+            Inquiry(
+                name=f"{search} {signature}",
+                signature=signature,
+                violations=new[signature],
+                job=job,
+                map=map,
+                budget=shrinking.each,
+                asks=asks.get((search, signature)),
+                test=tests.get((search, signature), ""),
+                cap=cap,
             )
+            for signature in sorted(new, key=lambda signature: (-len(new[signature]), signature))
+        ]
     return tuple(found)
+
+
+def shares(
+    wanted: Sequence[Inquiry], findings: Mapping[str, Finding] | None = None
+) -> tuple[Inquiry, ...]:
+    """Return signatures with the flights that each may have.
+
+    Where a search's cap is too low for all of its signatures, as many are reached as can be, and
+    one in any case; the others have none.  ``findings`` have had their share.
+    """
+    found = []
+    for search in dict.fromkeys(each.search for each in wanted):
+        before = [each for name, each in (findings or {}).items() if name.startswith(f"{search} ")]
+        kinds = [each for each in wanted if each.search == search]
+        # The reference pilot's flights take a fraction of the time and are not counted.
+        most = [EXCEPTION if kind.exception else kind.budget - PILOTS for kind in kinds]
+        given = most
+        if kinds[0].cap is not None:
+            left = kinds[0].cap - sum(each.flights - each.piloted for each in before)
+            given = _divided(most, max(left, 0 if before else most[0]))
+        found += [
+            dataclasses.replace(kind, budget=_with_pilots(kind, flights))
+            for kind, flights in zip(kinds, given, strict=True)
+        ]
+    return tuple(found)
+
+
+def _with_pilots(kind: Inquiry, flights: int) -> int:
+    return flights if kind.exception or not flights else flights + PILOTS
+
+
+def _divided(most: Sequence[int], flights: int) -> list[int]:
+    """Return how many of ``flights`` each has that wants at most so many and can do with few."""
+    given = []
+    for wanted in most:
+        least = min(wanted, LEAST - PILOTS)
+        given.append(least if least <= flights else 0)
+        flights -= given[-1]
+    for number, wanted in enumerate(most):
+        if given[number]:
+            more = min(wanted - given[number], flights)
+            given[number] += more
+            flights -= more
+    return given
 
 
 def is_known(case: Case, map: str) -> bool:
@@ -136,17 +199,29 @@ def follow_up(
     wanted: Sequence[Inquiry],
     tick: Callable[[], None],
 ) -> tuple[Pursued, ...]:
-    """Pursue all signatures at once and save their cases; the order is always the same."""
-    functions: dict[str, Callable[[Fly], Finding]] = {
-        each.name: functools.partial(_pursue, each) for each in wanted
-    }
-    findings = Errands(ledger, pool, tick).run(functions)
+    """Pursue all signatures at once and save their cases; the order is always the same.
+
+    What some leave of a search's cap goes to those that had no share.
+    """
+    findings: dict[str, Finding] = {}
+    while reached := _reached(wanted, findings):
+        functions: dict[str, Callable[[Fly], Finding]] = {
+            each.name: functools.partial(_pursue, each) for each in reached
+        }
+        findings |= Errands(ledger, pool, tick).run(functions)
+    for each in wanted:
+        if each.name not in findings:
+            findings[each.name] = as_found(each)
     return tuple(_saved(each, findings[each.name], place) for each in wanted)
 
 
+def _reached(wanted: Sequence[Inquiry], findings: Mapping[str, Finding]) -> list[Inquiry]:
+    """Return the signatures that are next to be pursued, each with its flights."""
+    waiting = [each for each in wanted if each.name not in findings]
+    return [each for each in shares(waiting, findings) if each.budget]
+
+
 def _pursue(inquiry: Inquiry, fly: Fly) -> Finding:
-    if inquiry.budget == 0:
-        return Finding(signature=inquiry.signature, case=None, flights=0, reason=UNREACHED)
     return Pursuit(inquiry, fly).run()
 
 

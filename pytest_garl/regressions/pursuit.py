@@ -12,7 +12,7 @@ from pytest_garl.adversary.recorded import recorded_spec
 from pytest_garl.regressions.case import Avoidable, Case, Deeds, Evidence, Violation
 from pytest_garl.regressions.moves import simpler
 from pytest_garl.regressions.neighbours import COUNT, neighbours
-from pytest_garl.regressions.shrink import complexity, genome_of, shrink
+from pytest_garl.regressions.shrink import bare, complexity, genome_of, nobody, shrink
 from pytest_garl.regressions.story import tell
 from pytest_garl.scenarios.maps import Map
 from pytest_garl.scenarios.scenario import Scenario
@@ -28,8 +28,12 @@ from pytest_garl.verdicts.verdict import Verdict
 PILOTS = 3
 """Flights of the reference pilot: against the recorded moves, against the live policy, and one more
 where the shortest record leaves nobody a way out."""
-LEAST = 1 + COUNT + 2
-"""Flights without which nothing can be said: once more, three neighbours, the reference pilot."""
+LEAST = 3 + COUNT + PILOTS
+"""Flights without which nothing can be said: two without what the failure should not need, one as
+found, three neighbours, the reference pilot."""
+EXCEPTION = 2
+"""Flights for a Python exception, which hardly depends on the scenario: bare, and as found."""
+UNLIKE = "its flights with the recorded moves do not fail in the same way"
 CANDIDATES = 3
 """So many violations of a signature are tried for one whose neighbours fail as well."""
 
@@ -52,9 +56,10 @@ Asks = Callable[[dict[str, Any], Path, Scenario], OwnFailure | None]
 class Inquiry:
     """What is to be found out about one signature of one search.
 
-    ``violations`` are scenarios with the flights that violated.  ``budget`` bounds the flights.
-    ``asks`` is the test's own assertion that failed, None for the built-in verdict; ``test`` is the
-    node id of the test that found it.
+    ``violations`` are scenarios with the flights that violated.  ``name`` begins with the search.
+    ``budget`` bounds the flights, ``cap`` those of the landing system for all signatures of the
+    search together unless it is None.  ``asks`` is the test's own assertion that failed, None for
+    the built-in verdict; ``test`` is the node id of the test that found it.
     """
 
     name: str
@@ -65,6 +70,20 @@ class Inquiry:
     budget: int
     asks: Asks | None = None
     test: str = ""
+    cap: int | None = None
+
+    @property
+    def search(self) -> str:
+        """The search that found it."""
+        return self.name.partition(" ")[0]
+
+    @property
+    def exception(self) -> bool:
+        """Whether the landing system raised or returned nonsense."""
+        if self.asks is not None or not self.violations:
+            return False
+        crash = self.violations[0][1].result["crash"]
+        return crash is not None and crash["kind"] in ("raised", "nonsense")
 
     def failed(self, scenario: Scenario, done: Done) -> bool:
         """Whether a flight failed in the way that is asked about."""
@@ -81,54 +100,82 @@ class Finding:
     signature: str
     case: Case | None
     flights: int
+    piloted: int = 0
+    """How many of the flights are the reference pilot's, which sees without a camera: they take a
+    fraction of the time."""
     reason: str = ""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _Failure:
-    """A scenario that fails, what its objects did, its flight, how many neighbours fail too."""
+    """A scenario that fails, what its objects did, its flight, how many neighbours fail too.
 
+    ``first`` is the search's scenario that it was made from; ``asked`` how many neighbours were
+    flown.
+    """
+
+    first: Scenario
     scenario: Scenario
     deeds: Deeds
     done: Done
     robust: int
+    asked: int = COUNT
 
 
 class Pursuit:
     """The train of thought about one signature; every flight goes through ``fly``."""
 
     def __init__(self, inquiry: Inquiry, fly: Fly) -> None:
-        self._inquiry, self._fly, self._flights = inquiry, fly, 0
+        self._inquiry, self._fly, self._flights, self._piloted = inquiry, fly, 0, 0
         self._flown: dict[Scenario, Done] = dict(inquiry.violations)
 
     def run(self) -> Finding:
         """Return what was found out."""
         inquiry = self._inquiry
-        map = inquiry.map
-        simple = sorted(
-            (scenario for scenario, _ in inquiry.violations),
-            key=lambda each: complexity(each, genome_of(each, map)),
-        )
-        best = self._most_robust(simple[:CANDIDATES])
+        simple = simplest_first(inquiry)
+        if not simple:
+            return self._finding(None, UNLIKE)
+        if inquiry.exception:
+            return self._exception(simple[0])
+        best = self._barest(simple[0])
+        if best is None or (best.robust < COUNT and self._left > COUNT):
+            best = self._most_robust(simple[:CANDIDATES], best)
         if best is None:
-            reason = "its flights with the recorded moves do not fail in the same way"
-            return self._finding(None, reason)
+            return self._finding(None, UNLIKE)
         # A case that nobody can avoid gates nothing: rather a longer record that leaves a way out.
         *others, simplest = self._shrunk(best)
         failure, avoidable = simplest, self._avoidable(simplest)
         for longer in others:
             if avoidable == "no" and (found := self._avoidable(longer)) != "no":
                 failure, avoidable = longer, found
-        return self._finding(self._case(best.scenario, failure, avoidable))
+        return self._finding(_case(inquiry, failure, avoidable))
+
+    def _exception(self, first: Scenario) -> Finding:
+        """Return a Python exception in the barest scenario, or as it was found."""
+        found = deeds_of(self._flown[first], first, self._map)
+        for scenario, deeds in ((nobody(first, self._map), Deeds(moves=())), (first, found)):
+            done = self._again(scenario, deeds)
+            if self._inquiry.failed(scenario, done):
+                failure = _unasked(first, scenario, deeds, done)
+                return self._finding(_case(self._inquiry, failure, _nobody_asked(failure)))
+        return self._finding(None, UNLIKE)
+
+    @property
+    def _map(self) -> Map:
+        return self._inquiry.map
 
     @property
     def _left(self) -> int:
         """Flights that may be spent before the reference pilot's."""
-        return self._inquiry.budget - self._flights - PILOTS
+        return self._inquiry.budget - PILOTS - (self._flights - self._piloted)
 
     def _finding(self, case: Case | None, reason: str = "") -> Finding:
         return Finding(
-            signature=self._inquiry.signature, case=case, flights=self._flights, reason=reason
+            signature=self._inquiry.signature,
+            case=case,
+            flights=self._flights,
+            piloted=self._piloted,
+            reason=reason,
         )
 
     def _go(self, job: Job, scenario: Scenario) -> Done:
@@ -140,19 +187,47 @@ class Pursuit:
         spec = recorded_spec(dict(deeds.moves), dict(deeds.changes))
         return self._go(dataclasses.replace(self._inquiry.job, npcs=spec), scenario)
 
-    def _most_robust(self, scenarios: Sequence[Scenario]) -> _Failure | None:
+    def _barest(self, first: Scenario) -> _Failure | None:
+        """Return the failure with all that it should not need taken away, if it still fails.
+
+        First the policy steers; then what was hit repeats its moves around the same marker.
+        """
+        found = self._flown[first]
+        culprit = culprit_of(found)
+        scenario = bare(first, self._map, culprit)
+        if scenario != first:
+            done = self._flown[scenario] = self._go(self._inquiry.job, scenario)
+            if self._inquiry.failed(scenario, done):
+                deeds = deeds_of(done, scenario, self._map)
+                return self._asked(first, scenario, deeds, done)
+        scenario = bare(first, self._map, culprit, keeps_places=True)
+        if culprit and scenario != first:
+            deeds = _only(deeds_of(found, first, self._map), culprit)
+            done = self._again(scenario, deeds)
+            if self._inquiry.failed(scenario, done):
+                return self._asked(first, scenario, deeds, done)
+        return None
+
+    def _asked(self, first: Scenario, scenario: Scenario, deeds: Deeds, done: Done) -> _Failure:
+        robust = self._robust(scenario, deeds)
+        return _Failure(first=first, scenario=scenario, deeds=deeds, done=done, robust=robust)
+
+    def _most_robust(self, scenarios: Sequence[Scenario], best: _Failure | None) -> _Failure | None:
         """Return the first violation all of whose neighbours fail, or the best of those tried."""
-        best: _Failure | None = None
+        tried = False
         for scenario in scenarios:
-            if best is not None and self._left < 1 + COUNT + LEAST:
+            if tried and best is not None and self._left < 1 + COUNT + LEAST:
                 break
+            tried = True
             deeds = deeds_of(self._flown[scenario], scenario, self._inquiry.map)
             done = self._again(scenario, deeds)
             if not self._inquiry.failed(scenario, done):
                 continue
             robust = self._robust(scenario, deeds)
             if best is None or robust > best.robust:
-                best = _Failure(scenario=scenario, deeds=deeds, done=done, robust=robust)
+                best = _Failure(
+                    first=scenario, scenario=scenario, deeds=deeds, done=done, robust=robust
+                )
             if robust == COUNT:
                 break
         return best
@@ -178,6 +253,7 @@ class Pursuit:
         return "live" if alone or self._comes_through(pilot, scenario) else "recorded"
 
     def _comes_through(self, pilot: Job, scenario: Scenario) -> bool:
+        self._piloted += 1
         done = self._go(pilot, scenario)
         return not done.signature and not self._inquiry.failed(scenario, done)
 
@@ -190,9 +266,10 @@ class Pursuit:
             return inquiry.failed(scenario, done)
 
         # Steps back from an edge want a share as well, and a shorter record of moves.
-        budget = self._left - COUNT - self._left // 3
-        if budget <= 0:
-            return (best,)
+        reserve = self._left // 3 if any(own for _, own in best.deeds.moves) else 0
+        budget = self._left - COUNT - reserve
+        if budget < 2:
+            return self._with_record(best)
         found = shrink(best.scenario, fails, inquiry.map, budget, culprit=culprit_of(best.done))
         for scenario in _ever_further_back(found.history[1:]):
             if self._left < COUNT:
@@ -201,10 +278,16 @@ class Pursuit:
             deeds = deeds_of(done, scenario, inquiry.map)
             robust = self._robust(scenario, deeds, best.robust)
             if robust >= best.robust:
-                failure = _Failure(scenario=scenario, deeds=deeds, done=done, robust=robust)
-                shorter = self._recorded(failure)
-                return (failure,) if shorter is failure else (failure, shorter)
-        return (best,)
+                failure = _Failure(
+                    first=best.first, scenario=scenario, deeds=deeds, done=done, robust=robust
+                )
+                return self._with_record(failure)
+        return self._with_record(best)
+
+    def _with_record(self, failure: _Failure) -> tuple[_Failure, ...]:
+        """Return the failure with all moves, and with few where it survives that."""
+        shorter = self._recorded(failure)
+        return (failure,) if shorter is failure else (failure, shorter)
 
     def _recorded(self, failure: _Failure) -> _Failure:
         """Return the failure with the shortest record of moves that it survives."""
@@ -224,38 +307,68 @@ class Pursuit:
                 continue
             robust = self._robust(scenario, deeds, failure.robust)
             if robust >= failure.robust:
-                return _Failure(scenario=scenario, deeds=deeds, done=done, robust=robust)
+                return dataclasses.replace(
+                    failure, scenario=scenario, deeds=deeds, done=done, robust=robust
+                )
         return failure
 
-    def _case(self, first: Scenario, failure: _Failure, avoidable: Avoidable) -> Case:
-        inquiry, done, job = self._inquiry, failure.done, self._inquiry.job
-        flight = load(done.record) if done.record.exists() else None
-        own = inquiry.asks(done.result, done.record, failure.scenario) if inquiry.asks else None
-        return Case(
-            system=job.system.name,
-            status="unavoidable" if avoidable == "no" else "open",
-            avoidable=avoidable,
-            scenario=failure.scenario,
-            violation=_violation(from_dict(done.result["verdict"]), flight, own),
-            policy=job.npcs.name,
-            policy_sha256=job.npcs.sha256,
-            moves=failure.deeds.moves,
-            changes=failure.deeds.changes,
-            evidence=Evidence(
-                trajectory_sha256=done.sha256,
-                cpu=flight.cpu if flight else "",
-                map_sha256=job.map_sha256,
-                neighbours=COUNT,
-                neighbours_failed=failure.robust,
-                removed=removed(first, failure.scenario, inquiry.map),
-                versions=flight.versions if flight else (),
-                system_sha256=job.system_sha256,
-                simulator_sha256=simulator_sha256(job.simulator),
-            ),
-            limits=job.limits,
-            test=inquiry.test or (own.test if own else ""),
-            assertion=own.assertion if own else "",
-        )
+
+def as_found(inquiry: Inquiry) -> Finding:
+    """Return the search's own flight as a case, without another flight."""
+    scenario = simplest_first(inquiry)[0]
+    done = dict(inquiry.violations)[scenario]
+    failure = _unasked(scenario, scenario, deeds_of(done, scenario, inquiry.map), done)
+    case = _case(inquiry, failure, _nobody_asked(failure))
+    return Finding(signature=inquiry.signature, case=case, flights=0)
+
+
+def simplest_first(inquiry: Inquiry) -> list[Scenario]:
+    """Return the violations' scenarios, the simplest first."""
+    return sorted(
+        (scenario for scenario, _ in inquiry.violations),
+        key=lambda each: complexity(each, genome_of(each, inquiry.map)),
+    )
+
+
+def _unasked(first: Scenario, scenario: Scenario, deeds: Deeds, done: Done) -> _Failure:
+    """Return a failure of which no neighbour was flown."""
+    return _Failure(first=first, scenario=scenario, deeds=deeds, done=done, robust=0, asked=0)
+
+
+def _nobody_asked(failure: _Failure) -> Avoidable:
+    """Return what may be demanded without asking the reference pilot: where nothing moves, all."""
+    return "recorded" if failure.deeds.moves else "live"
+
+
+def _case(inquiry: Inquiry, failure: _Failure, avoidable: Avoidable) -> Case:
+    done, job = failure.done, inquiry.job
+    flight = load(done.record) if done.record.exists() else None
+    own = inquiry.asks(done.result, done.record, failure.scenario) if inquiry.asks else None
+    return Case(
+        system=job.system.name,
+        status="unavoidable" if avoidable == "no" else "open",
+        avoidable=avoidable,
+        scenario=failure.scenario,
+        violation=_violation(from_dict(done.result["verdict"]), flight, own),
+        policy=job.npcs.name,
+        policy_sha256=job.npcs.sha256,
+        moves=failure.deeds.moves,
+        changes=failure.deeds.changes,
+        evidence=Evidence(
+            trajectory_sha256=done.sha256,
+            cpu=flight.cpu if flight else "",
+            map_sha256=job.map_sha256,
+            neighbours=failure.asked,
+            neighbours_failed=failure.robust,
+            removed=removed(failure.first, failure.scenario, inquiry.map),
+            versions=flight.versions if flight else (),
+            system_sha256=job.system_sha256,
+            simulator_sha256=simulator_sha256(job.simulator),
+        ),
+        limits=job.limits,
+        test=inquiry.test or (own.test if own else ""),
+        assertion=own.assertion if own else "",
+    )
 
 
 def _ever_further_back(history: Sequence[Scenario]) -> Iterator[Scenario]:
@@ -306,6 +419,13 @@ def deeds_of(done: Done, scenario: Scenario, map: Map) -> Deeds:
             (name, tuple((float(x), float(y)) for x, y in made.get(name, ()))) for name in names
         ),
         changes=tuple((item.name, item.changes) for item in objects if item.changes),
+    )
+
+
+def _only(deeds: Deeds, name: str) -> Deeds:
+    return Deeds(
+        moves=tuple(each for each in deeds.moves if each[0] == name),
+        changes=tuple(each for each in deeds.changes if each[0] == name),
     )
 
 

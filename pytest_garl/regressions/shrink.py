@@ -28,6 +28,8 @@ BISECTIONS = 3
 """Flights spent on how near to nominal one gene can go: to an eighth of its distance."""
 _PLACES = ("start_x", "start_y", "destination_x", "destination_y")
 """No place of an object is simpler than another; only their digits count."""
+PLACES = ("marker.x", "marker.y")
+"""Where the marker lies; what an object did around it would go past it elsewhere."""
 Change = Callable[[Scenario], Scenario]
 
 
@@ -133,6 +135,32 @@ def reset_and_bisect(trials: Trials, culprit: str) -> None:
     for group in groups:
         _reset(trials, group)
     return _bisect(trials)
+
+
+def bare(first: Scenario, map: Map, culprit: str, *, keeps_places: bool = False) -> Scenario:
+    """Return a scenario without all that its failure should not need.
+
+    A collision needs the object that was hit, everything else is nominal (but for the marker's
+    place, if ``keeps_places``); any other failure has its cause in weather, light or place, and
+    needs no object.
+    """
+    if culprit:
+        return _nominal(first, map, culprit, keeps_places)
+    names = [key.partition(".")[0] for key, _ in first.genes if key.endswith(".velocity")]
+    return repair(first.without(*names), map)
+
+
+def nobody(first: Scenario, map: Map) -> Scenario:
+    """Return a scenario with everything nominal and no object."""
+    return _nominal(first, map, "", False)
+
+
+def _nominal(first: Scenario, map: Map, culprit: str, keeps_places: bool) -> Scenario:
+    groups = _simplifications(Trials(first, lambda _: False, map, 0), culprit)
+    last = _applied(first, [change for group in groups for change in group])
+    if keeps_places:
+        last = last.replace({key: value for key, value in first.genes if key in PLACES})
+    return repair(last, map)
 
 
 def _simplifications(trials: Trials, culprit: str) -> list[list[Change]]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import shlex
 import textwrap
 from pathlib import Path
 from typing import Any
@@ -10,8 +11,17 @@ from typing import Any
 import pytest
 
 from pytest_garl.errors import GarlError
+from pytest_garl.options import SHRINK
 from pytest_garl.own import asks_of
-from pytest_garl.regressions.follow_up import Place, Pursued, follow_up, inquiries
+from pytest_garl.regressions.case import Case
+from pytest_garl.regressions.follow_up import (
+    Place,
+    Pursued,
+    Shrinking,
+    follow_up,
+    inquiries,
+    shares,
+)
 from pytest_garl.reports.progress import live
 from pytest_garl.run import Run
 
@@ -37,13 +47,14 @@ def pursue(run: Run, session: pytest.Session) -> None:
         for nodeid, signature in sorted(run.told.items()):
             target, asks = asks_of(session, nodeid)
             run.own[target.search, signature] = asks
-        wanted = inquiries(run.ledger, place, options.shrink, run.own, run.found_by)
-        reached = [each for each in wanted if each.budget]
-        if reached:
+        shrinking = Shrinking(each=options.shrink, capped=options.shrink_capped)
+        wanted = inquiries(run.ledger, place, shrinking, run.own, run.found_by)
+        if wanted:
+            most = sum(each.budget for each in shares(wanted))
             reporter.ensure_newline()
             reporter.write_line(
-                f"garl: confirming and shrinking {len(reached)} new kinds of violation, at most "
-                f"{sum(each.budget for each in reached)} flights"
+                f"garl: confirming and shrinking {counted(len(wanted), 'new kind')} of violation, "
+                f"at most {counted(most, 'flight')}"
             )
         with live(run, config):
             run.pursued = follow_up(run.ledger, run.pool, place, wanted, run.tick)
@@ -59,10 +70,10 @@ def pursue(run: Run, session: pytest.Session) -> None:
         run.troubled = True
 
 
-def told(pursued: tuple[Pursued, ...], root: Path) -> list[str]:
+def told(pursued: tuple[Pursued, ...], root: Path, width: int) -> list[str]:
     """Return the summary's lines about saved cases."""
     lines: list[str] = []
-    patches = False
+    patches = []
     for each in pursued:
         case = each.finding.case
         name = f"{each.system.split(':')[-1]} on {each.map}: {each.finding.signature}"
@@ -72,19 +83,47 @@ def told(pursued: tuple[Pursued, ...], root: Path) -> list[str]:
         if each.file is None:
             lines.append(f"not saved: {name}: the same case is saved already")
             continue
-        patches |= each.file.suffix == ".patch"
-        shown = each.file.relative_to(root) if each.file.is_relative_to(root) else each.file
+        shown = str(each.file.relative_to(root) if each.file.is_relative_to(root) else each.file)
+        if each.file.suffix == ".patch":
+            patches.append(shown)
         lines.append(f"{'patch' if each.file.suffix == '.patch' else 'saved'} {shown}")
-        evidence = case.evidence
-        facts = [
-            f"{evidence.neighbours_failed} of {evidence.neighbours} neighbours fail too",
-            PILOT[case.avoidable],
-            f"shrinking removed {evidence.removed}",
-            f"{each.finding.flights} flights",
-        ]
-        text = f"{case.violation.story} ({'; '.join(facts)})"
-        lines += textwrap.wrap(text, 96, initial_indent="    ", subsequent_indent="    ")
+        text = f"{case.violation.story} ({'; '.join(_facts(each, case))})"
+        lines += textwrap.wrap(text, width, initial_indent="    ", subsequent_indent="    ")
     if patches:
         lines.append("Nothing in the tree was changed (CI is set). To keep the cases:")
-        lines.append("    git apply .garl/patches/*.patch")
-    return lines
+        lines.append(f"    git apply {' '.join(shlex.quote(patch) for patch in patches)}")
+    return [*lines, *_unreached(pursued, width)]
+
+
+def _facts(each: Pursued, case: Case) -> list[str]:
+    """Return in words why a case may be believed, and what it cost."""
+    evidence = case.evidence
+    if not each.finding.flights:
+        return ["as the search found it: neither confirmed nor shrunk"]
+    asked = [
+        f"{evidence.neighbours_failed} of {evidence.neighbours} neighbours fail too",
+        PILOT[case.avoidable],
+    ]
+    return [
+        *(asked if evidence.neighbours else []),
+        f"shrinking removed {evidence.removed}",
+        counted(each.finding.flights, "flight"),
+    ]
+
+
+def _unreached(pursued: tuple[Pursued, ...], width: int) -> list[str]:
+    """Say which kinds are not shrunk, and how many flights would reach them."""
+    left = sum(not each.finding.flights for each in pursued)
+    if not left:
+        return []
+    text = (
+        f"{counted(left, 'kind')} of violation not shrunk: shrinking has no more flights than the "
+        f"search. --garl-shrink={SHRINK} has no such limit and reaches all of them (at most "
+        f"{SHRINK * len(pursued)} flights); `garl cases shrink FILE` shrinks a saved one."
+    )
+    return textwrap.wrap(text, width)
+
+
+def counted(number: int, noun: str) -> str:
+    """Return a number with its noun: ``1 flight``, ``2 flights``."""
+    return f"{number} {noun}{'' if number == 1 else 's'}"

@@ -42,7 +42,7 @@ def _workers(run: Run) -> str:
 def summary(reporter: Any, run: Run) -> None:
     """Write a table per system and map, then what was saved, and which cases may be fixed."""
     _searches(reporter, run)
-    lines = [*told(run.pursued, run.options.root), *_maybe_fixed(reporter)]
+    lines = [*told(run.pursued, run.options.root, reporter._tw.fullwidth), *_maybe_fixed(reporter)]
     if lines:
         reporter.section("garl: cases", sep="=")
     for line in lines:

@@ -123,13 +123,48 @@ def test_cases_of_a_search_with_destinations_keep_them_and_are_flown(
     run(pytester, *CASES).assert_outcomes(passed=2, skipped=2, xfailed=2)
 
 
-@pytest.mark.parametrize("budget", [1, 6])
-def test_what_the_budget_does_not_reach_is_told(pytester: pytest.Pytester, budget: int) -> None:
+def test_what_the_cap_does_not_reach_is_saved_unshrunk_and_told(
+    pytester: pytest.Pytester,
+) -> None:
     project(pytester)
-    result = run(pytester, *SEARCH, f"--garl-shrink={budget}")
-    assert len(cases(pytester)) == 1
-    told = "not saved: Good on lawn: *: the budget of --garl-shrink did not reach it"
-    result.stdout.fnmatch_lines(["*confirming and shrinking 1 new kinds*", told])
+    result = run(pytester, "--garl-budget=8", "--garl-workers=0")
+    fog, dog = (load(path) for path in cases(pytester))
+    assert (fog.evidence.neighbours, dog.evidence.neighbours) == (3, 0)
+    assert fog.evidence.removed.startswith("4 of 4 objects")
+    assert dog.evidence.removed == "nothing"
+    result.stdout.fnmatch_lines(
+        [
+            "*confirming and shrinking 2 new kinds of violation, at most * flights",
+            "*(as the search found it:*",
+            "1 kind of violation not shrunk: *",
+        ]
+    )
+    assert "--garl-shrink=12" in result.stdout.str()
+    run(pytester, *CASES).assert_outcomes(passed=2, skipped=2, xfailed=2)
+
+
+def test_each_new_kind_has_flights_of_its_own(pytester: pytest.Pytester) -> None:
+    project(pytester)
+    result = run(pytester, "--garl-budget=8", "--garl-workers=0", "--garl-shrink=12")
+    assert [load(path).evidence.neighbours for path in cases(pytester)] == [3, 3]
+    assert "not shrunk" not in result.stdout.str()
+
+
+def test_a_python_exception_takes_two_flights_at_most(pytester: pytest.Pytester) -> None:
+    project(pytester, "Raises")
+    result = run(pytester, "--garl-budget=4", "--garl-workers=0", "--garl-shrink=100")
+    result.stdout.fnmatch_lines(["*1 new kind of violation, at most 2 flights"])
+    (path,) = cases(pytester)
+    assert len(load(path).scenario.absent) == 4
+    assert "; 1 flight)" in result.stdout.str().replace("\n    ", " ")
+
+
+@pytest.mark.parametrize("few", ["1", "8"])
+def test_too_few_flights_to_shrink_are_refused(pytester: pytest.Pytester, few: str) -> None:
+    project(pytester)
+    result = run(pytester, "--garl-budget=8", f"--garl-shrink={few}")
+    assert result.ret == pytest.ExitCode.USAGE_ERROR
+    result.stderr.fnmatch_lines([f"*--garl-shrink: found '{few}', expected 0, or at least 9 *"])
 
 
 def test_cases_fly_under_xdist(searched: pytest.Pytester) -> None:
