@@ -129,10 +129,13 @@ def landing(request: pytest.FixtureRequest, garl_slot: Target, npcs: PolicySpec)
         ("garl.slot", garl_slot.name),
         ("garl.outcome", result["outcome"]),
         ("garl.signature", verdict["signature"]),
+        ("garl.story", verdict["story"]),
         ("garl.final_distance_m", result["final_distance_m"]),
         ("garl.elapsed_s", result["elapsed_s"]),
         ("garl.trajectory_sha256", run.trajectory_sha256(garl_slot)),
     ]
+    if reasons := run.unproven(garl_slot):
+        request.node.user_properties.append(("garl.unproven", "; ".join(reasons)))
     first = run.first_item(garl_slot) == request.node.nodeid
     if result["outcome"] == "inconclusive":
         pytest.skip(f"inconclusive: {result['undecided']}")

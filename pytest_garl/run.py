@@ -17,7 +17,12 @@ from pytest_garl.errors import LedgerError
 from pytest_garl.options import Options
 from pytest_garl.search.ledger import Kind, Ledger
 from pytest_garl.search.pool import Pool, wait_for
-from pytest_garl.search.reference import Reference, reference_to, sources_sha256
+from pytest_garl.search.reference import (
+    Reference,
+    reference_to,
+    simulator_sha256,
+    sources_sha256,
+)
 from pytest_garl.search.slots import Slot, flight_name
 from pytest_garl.switches import POLICIES, target_of
 from pytest_garl.targets import FIRST, Target, name_of, repeated
@@ -134,6 +139,21 @@ class Run:
     def trajectory_sha256(self, target: Target) -> str:
         """Return the hash of a slot's flight."""
         return self.ledger.sha256(target.search, target.slot.generation, target.slot.index)
+
+    def unproven(self, target: Target) -> tuple[str, ...]:
+        """Return why it proves nothing that a case passes; nothing if the system was repaired."""
+        from pytest_garl.regressions.staleness import Sources, unproven
+        from pytest_garl.scenarios.maps import load_map
+
+        case = target.entry.case if target.entry else None
+        if case is None:
+            return ()
+        sources = Sources(
+            system_sha256=sources_sha256(target.system),
+            simulator_sha256=simulator_sha256(self.simulator),
+            map_sha256=load_map(target.map, self.options.map_folders).sha256,
+        )
+        return unproven(case, sources, self.trajectory_sha256(target))
 
     def scenario(self, target: Target) -> Scenario:
         """Return what a slot flies."""

@@ -17,8 +17,9 @@ from pytest_garl.regressions.replay import Replay, replay, system_of
 from pytest_garl.regressions.story import meanings
 
 DEFAULT = Path("scenarios/regressions")
-STALE = 3
+NO_PROOF = 3
 """Exit status of a replay that proves nothing; 1 says that the case fails."""
+STATUS = {"FIXED": 0, "FAILED": 1, "STALE": NO_PROOF, "UNDECIDED": NO_PROOF}
 
 
 @dataclasses.dataclass(frozen=True, slots=True, kw_only=True)
@@ -129,28 +130,33 @@ def _totals(case: Case) -> list[tuple[str, float]]:
 )
 @click.pass_context
 def replay_(context: click.Context, file: Path, live: bool, video: Path | None) -> None:
-    """Fly a case again and answer FIXED, FAILED or STALE (exit status 0, 1, 3)."""
+    """Fly a case again and answer FIXED, FAILED, STALE or UNDECIDED (exit status 0, 1, 3, 3).
+
+    The tests that found it judge: pytest flies this one case in a process of its own.  Where the
+    case names no test, the built-in verdict judges.
+    """
     folders: _Folders = context.obj
     case = folders.case(file)
     result = replay(case, folders.root, folders.maps, live=live)
     _answer(result)
     if video is not None:
+        if result.flight is None:
+            raise GarlError(f"{file}: its process did not live to record the flight: no video")
         from pytest_garl.landing_system import airframe_of
         from pytest_garl.reports.video import save_video
 
         camera = airframe_of(system_of(case, folders.root)).camera
-        save_video(
-            video, result.flight, case.scenario, result.map, camera, result.verdict.signature
-        )
+        save_video(video, result.flight, case.scenario, result.map, camera, result.signature)
         click.echo(f"drawn: {video}")
-    context.exit({"FIXED": 0, "FAILED": 1, "STALE": STALE}[result.answer])
+    context.exit(STATUS[result.answer])
 
 
 def _answer(result: Replay) -> None:
     click.secho(result.answer, bold=True, fg="green" if result.answer == "FIXED" else "red")
-    click.echo(f"{result.verdict.signature or 'no violation'}: {result.verdict.story}")
-    if result.changed:
-        click.echo(f"changed since it was saved: {'; '.join(result.changed)}")
+    click.echo(f"{result.signature or 'no violation'}: {result.story}")
+    for reason in result.reasons:
+        click.echo(reason)
+    click.echo(f"judged by {result.judge}")
     if result.same is not None:
         click.echo("the same flight to the byte" if result.same else "another flight than recorded")
 
@@ -182,19 +188,28 @@ def promote(folders: _Folders, file: Path) -> None:
     """Say that a case is fixed: from now on it must pass.
 
     It is flown first, with its recorded moves and, where the reference pilot gets away from it,
-    with a live policy; if it fails, it stays open.
+    with a live policy.  It stays open if it fails, if nobody can tell, or if it passes for another
+    reason than a change of the landing system.
     """
     case = folders.case(file)
     for live in (False, True) if case.avoidable == "live" else (False,):
         result = replay(case, folders.root, folders.maps, live=live)
-        if result.answer == "FAILED":
-            how = "a live policy" if live else "its recorded moves"
-            raise GarlError(
-                f"{file}: still fails with {how} ({result.verdict.signature}); it stays "
-                f"{case.status}"
-            )
+        how = "a live policy" if live else "its recorded moves"
+        if result.answer != "FIXED":
+            raise GarlError(f"{file}: {_refusal(result, how)}; it stays {case.status}")
+        if result.outcome == "aborted":
+            click.echo(f"{file}: with {how} the landing system gave up; it did not land")
+        if not live:
+            click.echo(f"{file}: judged by {result.judge}")
     corpus.replace(file, dataclasses.replace(case, status="fixed"))
     click.echo(f"{file}: fixed; from now on it must pass")
+
+
+def _refusal(result: Replay, how: str) -> str:
+    if result.answer == "FAILED":
+        return f"still fails with {how} ({result.signature or '; '.join(result.reasons)})"
+    said = "passes, but is stale" if result.answer == "STALE" else "is not decided"
+    return f"{said} with {how}: {'; '.join(result.reasons)}"
 
 
 @cases.command()
@@ -218,9 +233,10 @@ def shrink(folders: _Folders, file: Path, flights: int, workers: int) -> None:
 @click.option("--yes", is_flag=True, help="Delete without asking.")
 @click.pass_obj
 def prune(folders: _Folders, yes: bool) -> None:
-    """Fly all cases that are not fixed and delete those that say nothing any more.
+    """Fly all cases that are not fixed and delete those that are stale.
 
-    That is: they pass, but the map or pytest-garl is not what it was, so nobody knows why.
+    That is: they pass, but not because the landing system was repaired, as far as anybody knows.
+    A case that fails, or that nobody can decide, stays.
     """
     kept = 0
     for entry in corpus.every_entry(folders.cases, folders.maps):
@@ -230,7 +246,7 @@ def prune(folders: _Folders, yes: bool) -> None:
         if result.answer != "STALE":
             kept += 1
             continue
-        click.echo(f"{entry.path}: passes, but {'; '.join(result.changed)}")
+        click.echo(f"{entry.path}: passes, but {'; '.join(result.reasons)}")
         if yes or click.confirm("delete it?"):
             entry.path.unlink()
     click.echo(f"{kept} cases still say something")

@@ -20,6 +20,8 @@ AGAIN = 4
 """How often a violation of a system that need not be deterministic is flown once more."""
 MAYBE_FIXED = "garl.maybe_fixed"
 """The user property that names the file of an open case that passes."""
+STALE = "garl.stale"
+"""The user property that names the file of one that passes without proof, and tells why."""
 
 
 def crash_text(landing: Landing) -> str:
@@ -142,12 +144,15 @@ def _explain_case(
         return _tell(report, lines)
     first = run.first_item(target) == item.nodeid
     if report.passed and case.status == "open" and verdict["primary"] is None and first:
-        report.user_properties.append((MAYBE_FIXED, file))
+        stale = "; ".join(run.unproven(target))
+        said = (STALE, f"{file} passes, but {stale}") if stale else (MAYBE_FIXED, file)
+        report.user_properties.append(said)
         if run.options.xfail_strict:
+            maybe = f"stale, {stale}" if stale else "maybe fixed"
             report.outcome = "failed"
             report.longrepr = (
-                f"{file} is open but passes (garl_xfail_strict): maybe fixed; "
-                f"if so: garl cases promote {file}"
+                f"{file} is open but passes (garl_xfail_strict): {maybe}; "
+                f"if it is fixed: garl cases promote {file}"
             )
     return None
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from pytest_garl.reports.aftermath import told
-from pytest_garl.reports.explain import MAYBE_FIXED
+from pytest_garl.reports.explain import MAYBE_FIXED, STALE
 from pytest_garl.reports.progress import duration
 from pytest_garl.run import Run
 from pytest_garl.search.slots import Slot
@@ -55,7 +55,11 @@ def _maybe_fixed(reporter: Any) -> list[str]:
         each for report in reporter.getreports("passed") for each in report.user_properties
     ]
     files = sorted({str(value) for key, value in properties if key == MAYBE_FIXED})
-    return [f"maybe fixed: {file} passes; if so: garl cases promote {file}" for file in files]
+    stale = sorted({str(value) for key, value in properties if key == STALE})
+    return [
+        *(f"maybe fixed: {file} passes; if so: garl cases promote {file}" for file in files),
+        *(f"stale: {told}" for told in stale),
+    ]
 
 
 def _searches(reporter: Any, run: Run) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import hashlib
 import importlib
 import importlib.util
@@ -81,6 +82,7 @@ def sources_sha256(thing: Any) -> str:
     return digest.hexdigest()
 
 
+@functools.cache
 def package_sha256() -> str:
     """Hash what of this package shapes a search: its sources, maps and shipped weights."""
     home = Path(__file__).parents[1]

@@ -123,7 +123,7 @@ def test_what_passes_in_another_world_is_stale_and_can_be_pruned(file: Path) -> 
     repaired()
     stale = garl("replay", file)
     assert stale.output.startswith("STALE")
-    assert "changed since it was saved: the map 'lawn' has changed" in stale.output
+    assert "the map 'lawn' has changed\njudged by the built-in verdict" in stale.output
     assert stale.exit_code == 3
     assert "passes, but the map 'lawn' has changed" in garl("prune", "--yes").output
     assert not file.exists()

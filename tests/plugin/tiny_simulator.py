@@ -23,7 +23,7 @@ def fly(
     time_limit_s: float = 120.0,
     guard: Any = None,
 ) -> Flight:
-    """Fog lets it land off; a fast dog hits it; calls the system once."""
+    """Fog lets it land off; a fast dog hits it unless it dodges; calls the system once."""
     import dataclasses
 
     del npcs, time_limit_s
@@ -35,7 +35,8 @@ def fly(
     off = 0.0 if knows else off
     contacts: tuple[Contact, ...] = ()
     crash = None
-    if scenario.get("dog-1.velocity", 0.0) > 0.7 and not knows:
+    dodges = getattr(system, "dodges", False)
+    if not dodges and scenario.get("dog-1.velocity", 0.0) > 0.7 and not knows:
         outcome = "collision"
         contacts = (
             Contact(

@@ -1,0 +1,182 @@
+"""Cases that pytest judges: by the tests of the project that found them."""
+
+from __future__ import annotations
+
+import dataclasses
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from click.testing import CliRunner, Result
+
+from pytest_garl.cli import main
+from pytest_garl.regressions.corpus import replace
+from pytest_garl.regressions.files import load
+from tests.plugin.test_cases import OWN, change, dodge
+from tests.plugin.test_plugin import write_project
+
+SEARCH = ("--garl-budget=24", "--garl-workers=0", "--garl-shrink=60")
+CLOCK = """
+
+def test_clock(landing):
+    assert landing.elapsed_s < 100
+"""
+
+
+@pytest.fixture(scope="module")
+def template(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Return a project with three saved cases: a dog, fog, and a property of its own."""
+    folder = tmp_path_factory.mktemp("judged")
+    write_project(folder)
+    tests = folder / "test_it.py"
+    tests.write_text(tests.read_text() + OWN + CLOCK)
+    command = [sys.executable, "-m", "pytest", "-p", "no:cacheprovider", *SEARCH]
+    subprocess.run(command, cwd=folder, capture_output=True, check=False)
+    assert len(list((folder / "scenarios/regressions/systems").glob("*.toml"))) == 3
+    return folder
+
+
+@pytest.fixture
+def project(template: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """Return a copy of it in which the test runs."""
+    shutil.copytree(template, tmp_path, dirs_exist_ok=True)
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+def garl(*args: str | Path) -> Result:
+    return CliRunner().invoke(main, ["cases", *map(str, args)], env={"COLUMNS": "200"})
+
+
+def saved(project: Path, kind: str) -> Path:
+    (path,) = (project / "scenarios/regressions/systems").glob(f"lawn-{kind}-*.toml")
+    return path.relative_to(project)
+
+
+def test_a_repaired_system_is_fixed_and_promoted(project: Path) -> None:
+    dog = saved(project, "IV-dog")
+    failed = garl("replay", dog)
+    assert failed.output.startswith("FAILED\nIV:dog:")
+    assert "test_collisions: " in failed.output
+    assert "the same flight to the byte" in failed.output
+    assert failed.exit_code == 1
+    assert "still fails with its recorded moves (IV:dog:" in garl("promote", dog).output
+    dodge(project)
+    fixed = garl("replay", dog)
+    assert fixed.output.startswith("FIXED\nno violation")
+    assert "judged by test_it.py::test_collisions" in fixed.output
+    assert fixed.exit_code == 0
+    assert "fixed; from now on it must pass" in garl("promote", dog).output
+    assert load(dog).status == "fixed"
+
+
+def test_a_property_of_ones_own_is_judged_by_its_own_test(project: Path) -> None:
+    own = saved(project, "own")
+    failed = garl("replay", own)
+    assert failed.output.startswith("FAILED\n")
+    assert "test_own: AssertionError: too much snow" in failed.output
+    assert "still fails" in garl("promote", own).output
+    assert load(own).status == "open"
+
+
+def test_a_case_that_still_fails_under_its_own_test_is_never_pruned(project: Path) -> None:
+    own = saved(project, "own")
+    change(own, 'map_sha256 = "', 'map_sha256 = "0')
+    before = own.read_text()
+    assert "3 cases still say something" in garl("prune", "--yes").output
+    assert own.read_text() == before
+
+
+def test_a_case_of_an_older_file_finds_its_own_test_by_name(project: Path) -> None:
+    own = saved(project, "own")
+    change(own, '"test_it.py::test_own"', '"test_own"')
+    assert garl("replay", own).output.startswith("FAILED\n")
+
+
+def test_a_pass_since_the_simulator_changed_is_stale_for_all(project: Path) -> None:
+    dog = saved(project, "IV-dog")
+    change(project / "tiny_simulator.py", "> 0.7 and", "> 7 and")
+    stale = garl("replay", dog)
+    assert stale.output.startswith("STALE\nno violation")
+    assert "the simulator has changed" in stale.output
+    assert stale.exit_code == 3
+    assert "passes, but is stale with its recorded moves" in garl("promote", dog).output
+    assert load(dog).status == "open"
+    done = subprocess.run(
+        [sys.executable, "-m", "pytest", "--garl-workers=0"],
+        cwd=project,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert f"stale: {dog} passes, but the simulator has changed" in done.stdout
+    assert "maybe fixed" not in done.stdout
+    assert f"{dog}: passes, but the simulator has changed" in garl("prune", "--yes").output
+    assert not dog.exists()
+
+
+def test_a_test_that_asks_less_does_not_make_a_case_fixed(project: Path) -> None:
+    dog = saved(project, "IV-dog")
+    change(project / "test_it.py", "assert not landing.collisions", "assert True")
+    assert "the recorded one to the byte" in garl("replay", dog).output
+    assert "is stale" in garl("promote", dog).output
+    assert load(dog).status == "open"
+
+
+def test_another_test_of_the_file_that_fails_keeps_it_open(project: Path) -> None:
+    dog = saved(project, "IV-dog")
+    dodge(project)
+    change(project / "test_it.py", "< 100", "< 1")
+    assert "still fails with its recorded moves" in garl("promote", dog).output
+
+
+@pytest.mark.parametrize("outcome", ["aborted", "inconclusive"])
+def test_what_gave_up_is_told_and_what_is_undecided_is_refused(project: Path, outcome: str) -> None:
+    dog = saved(project, "IV-dog")
+    dodge(project)
+    end = "    flight = Flight(\n"
+    simulator = project / "tiny_simulator.py"
+    if outcome == "aborted":
+        change(simulator, end, f"    outcome = 'aborted'\n{end}")
+        simulator_is_as_it_was(dog)
+        told = garl("promote", dog).output
+        assert "with its recorded moves the landing system gave up; it did not land" in told
+        assert load(dog).status == "fixed"
+    else:
+        change(project / "test_it.py", "not landing.collisions", "landing.time_to_landing_s")
+        change(simulator, end, f"    outcome, contacts = 'collision', {CONTACT}\n{end}")
+        simulator_is_as_it_was(dog)
+        assert "is not decided with its recorded moves" in garl("promote", dog).output
+        assert load(dog).status == "open"
+
+
+CONTACT = (
+    "(Contact(time_s=1.0, body='tree', kind='tree', body_class='static', "
+    "position_m=(0.0, 0.0, 1.0), speed_mps=1.0, tilt_rad=0.0),)"
+)
+
+
+def simulator_is_as_it_was(file: Path) -> None:
+    """Let a case have been saved before its simulator was hashed."""
+    case = load(file)
+    replace(
+        file,
+        dataclasses.replace(case, evidence=dataclasses.replace(case.evidence, simulator_sha256="")),
+    )
+
+
+def test_a_case_whose_test_is_gone_is_judged_by_the_verdict_which_is_told(project: Path) -> None:
+    dog = saved(project, "IV-dog")
+    change(project / "test_it.py", "def test_collisions", "def test_hits")
+    replayed = garl("replay", dog)
+    assert "judged by the built-in verdict: the test test_it.py::test_collisions" in replayed.output
+
+
+def test_a_file_that_cannot_be_collected_is_one_clear_error(project: Path) -> None:
+    change(project / "test_it.py", "import pytest", "import pytestt")
+    result = garl("replay", saved(project, "IV-dog"))
+    assert "pytest could not fly the case" in result.output
+    assert "No module named 'pytestt'" in result.output
+    assert result.exit_code == 1
