@@ -225,7 +225,9 @@ def shrink(folders: _Folders, file: Path, flights: int, workers: int) -> None:
     finding = shrink_case(case, folders.root, folders.maps, flights, workers)
     if finding.case is None:
         raise GarlError(f"{file}: {finding.reason}; `garl cases replay {file}` tells more")
-    path = corpus.replace(file, dataclasses.replace(finding.case, status=case.status, accepted=case.accepted))
+    path = corpus.replace(
+        file, dataclasses.replace(finding.case, status=case.status, accepted=case.accepted)
+    )
     click.echo(f"{path}: removed {finding.case.evidence.removed} ({finding.flights} flights)")
 
 

@@ -204,6 +204,30 @@ def test_an_open_case_that_passes_may_be_fixed(searched: pytest.Pytester) -> Non
     strict.stdout.fnmatch_lines(["*is open but passes (garl_xfail_strict)*"])
 
 
+@pytest.mark.parametrize("status", ["open", "fixed", "unavoidable"])
+@pytest.mark.parametrize("repaired", [False, True])
+def test_an_edge_case_fails_no_run_whichever_way_it_goes(
+    searched: pytest.Pytester, status: str, repaired: bool
+) -> None:
+    dog = cases(searched)[1]
+    change(dog, "neighbours_failed = 3", "neighbours_failed = 2")
+    change(dog, 'status = "open"', f'status = "{status}"')
+    if repaired:
+        dodge(searched.path)
+    result = run(searched, "--garl-workers=0", "-rx", "-o", "garl_xfail_strict=true", "-kIV")
+    ends = "passes" if repaired else "fails"
+    result.stdout.fnmatch_lines([f"*case-lawn-IV-dog*edge: {ends}; IV:dog:*"])
+    assert result.ret == 0
+    result.stdout.no_fnmatch_line("maybe fixed*")
+
+
+def test_an_edge_case_does_not_hide_a_mistake_in_a_test(searched: pytest.Pytester) -> None:
+    change(cases(searched)[1], "neighbours_failed = 3", "neighbours_failed = 2")
+    change(searched.path / "test_it.py", "not landing.collisions", "not landing.colisions")
+    result = run(searched, "--garl-workers=0", "-kIV")
+    assert result.ret == pytest.ExitCode.TESTS_FAILED
+
+
 def test_an_open_case_that_fails_in_another_way_fails(searched: pytest.Pytester) -> None:
     change(searched.path / "tiny_simulator.py", 'body="dog-1"', 'body="tree-1"')
     change(searched.path / "tiny_simulator.py", 'kind="dog"', 'kind="tree"')
