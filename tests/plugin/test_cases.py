@@ -145,7 +145,7 @@ def test_what_the_cap_does_not_reach_is_saved_unshrunk_and_told(
         ]
     )
     assert "--garl-shrink=12" in result.stdout.str()
-    run(pytester, *CASES).assert_outcomes(passed=2, skipped=2, xfailed=2)
+    run(pytester, *CASES).assert_outcomes(passed=2, skipped=2, failed=2)
 
 
 def test_each_new_kind_has_flights_of_its_own(pytester: pytest.Pytester) -> None:
