@@ -4,6 +4,11 @@ from __future__ import annotations
 
 import os
 
+from pytest_garl import dispatch
+
+# Before a test module loads NumPy: what is flown inside pytest is flown as in a child.
+dispatch.pin()
+
 pytest_plugins = ["pytester"]
 
 # Where CI is set a search writes patches instead of cases, and pytest prints its summary

@@ -21,6 +21,7 @@ import numpy as np
 from scipy.stats import t
 
 from benchmarks.rows import append, read
+from pytest_garl import dispatch
 from pytest_garl.adversary.pilots import AvoidingPilot
 from pytest_garl.adversary.policies import policy_spec
 from pytest_garl.landing_system import Abort, Command, Observation
@@ -28,7 +29,6 @@ from pytest_garl.scenarios.chromosome import encode
 from pytest_garl.scenarios.genes import genome_for
 from pytest_garl.scenarios.maps import load_map
 from pytest_garl.scenarios.scenario import Scenario
-from pytest_garl.search.child import THREADS
 from pytest_garl.search.garl import Garl
 from pytest_garl.search.method import Flown, Method, Plan
 from pytest_garl.search.methods import find_method
@@ -171,7 +171,7 @@ def main() -> None:
         print(report(known))
         return
     done = {(row["variant"], int(row["seed"]), row["map"]) for row in known}
-    os.environ.update(THREADS)
+    dispatch.pin()
     with ProcessPoolExecutor(os.cpu_count()) as pool:
         for seed in arguments.seeds:
             for map in MAPS:

@@ -17,11 +17,11 @@ from typing import Any
 
 from benchmarks.oracle import oracle_spec
 from benchmarks.rows import append, read, share
+from pytest_garl import dispatch
 from pytest_garl.adversary.policies import policy_spec
 from pytest_garl.scenarios.genes import WEATHER, genome_for
 from pytest_garl.scenarios.maps import load_map
 from pytest_garl.scenarios.scenario import Scenario
-from pytest_garl.search.child import THREADS
 from pytest_garl.search.random_search import propose
 from pytest_garl.simulation.policy import PolicySpec
 
@@ -156,7 +156,7 @@ def main() -> None:
         print(report(known))
         return
     done = {tuple(row[name] for name in KEY) for row in known}
-    os.environ.update(THREADS)
+    dispatch.pin()
     with ProcessPoolExecutor(arguments.workers) as pool:
         for chunk in range(-(-arguments.flights // CHUNK)):
             for system in arguments.systems:

@@ -10,7 +10,6 @@ from __future__ import annotations
 import argparse
 import dataclasses
 import itertools
-import os
 import statistics
 import subprocess
 import sys
@@ -22,12 +21,12 @@ from concurrent.futures import ProcessPoolExecutor
 from pathlib import Path
 from xml.etree import ElementTree
 
+from pytest_garl import dispatch
 from pytest_garl.regressions.case import Case
 from pytest_garl.regressions.files import dumps, load
 from pytest_garl.regressions.neighbours import neighbours
 from pytest_garl.regressions.replay import replay
 from pytest_garl.scenarios.maps import load_map
-from pytest_garl.search.child import THREADS
 
 CASES = Path("scenarios/regressions")
 COUNT = 30
@@ -107,7 +106,7 @@ def main() -> None:
     results = {tuple(sorted(told.items())) for _, told in gates}
     print(f"{count} cases, {arguments.runs} runs: {len(results)} result(s), {len(hashes)} flights")
     print(f"  {dict(outcomes)}; {statistics.median(times):.0f} s (most {max(times):.0f} s)")
-    os.environ.update(THREADS)
+    dispatch.pin()
     with ProcessPoolExecutor() as pool:
         again = Counter(pool.map(hash_of_flight, [paths[0]] * arguments.replays))
     print(f"{paths[0].name}: {arguments.replays} flights, {len(again)} hash(es)")

@@ -22,6 +22,7 @@ from rich.progress import Progress
 
 from benchmarks.adversary import CHUNK, MAPS, SYSTEMS
 from benchmarks.rows import append, read, share
+from pytest_garl import dispatch
 from pytest_garl.adversary import rewards
 from pytest_garl.adversary.dqn import Experience, Learner, Training
 from pytest_garl.adversary.episode import Episode, draw_episode
@@ -32,7 +33,6 @@ from pytest_garl.adversary.states import VIEWS
 from pytest_garl.scenarios.genes import WEATHER, genome_for
 from pytest_garl.scenarios.maps import Map, load_map
 from pytest_garl.scenarios.scenario import Scenario
-from pytest_garl.search.child import THREADS
 from pytest_garl.search.random_search import propose
 
 FILE = Path("docs/team.csv")
@@ -181,7 +181,7 @@ def main() -> None:
         save(TOGETHER, train_together(training, 2).policy("fellow"), {"policy": "together"})
         return
     done = {tuple(row[name] for name in FIELDS[:5]) for row in known}
-    os.environ.update(THREADS)
+    dispatch.pin()
     with ProcessPoolExecutor(os.cpu_count()) as pool:
         for chunk in range(-(-arguments.flights // CHUNK // len(MAPS))):
             for system in SYSTEMS:

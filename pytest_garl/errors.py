@@ -39,3 +39,7 @@ class LedgerError(GarlError):
 
 class PoolError(GarlError):
     """Flying processes that cannot be started, or cannot go on."""
+
+
+class DispatchError(GarlError):
+    """A process whose libraries compute with other instructions than all that fly do."""

@@ -11,7 +11,17 @@ import pytest
 from pytest_garl import hookspecs
 from pytest_garl.errors import GarlError
 from pytest_garl.fixtures import garl_slot, landing, npcs, scenario
-from pytest_garl.switches import FATAL, FOUND, OWN, RUN, add_options, asked, flies, target_of
+from pytest_garl.switches import (
+    FATAL,
+    FOUND,
+    OWN,
+    RUN,
+    add_options,
+    asked,
+    computes,
+    flies,
+    target_of,
+)
 
 __all__ = ["garl_slot", "landing", "npcs", "scenario"]
 
@@ -26,6 +36,14 @@ def pytest_addoption(parser: pytest.Parser) -> None:
 def pytest_addhooks(pluginmanager: pytest.PytestPluginManager) -> None:
     """Register the hooks that users may implement."""
     pluginmanager.add_hookspecs(hookspecs)
+
+
+def pytest_load_initial_conftests(early_config: pytest.Config) -> None:
+    """Choose the CPU's instructions before a conftest.py loads NumPy, if anything is asked for."""
+    if computes(early_config):
+        from pytest_garl import dispatch
+
+        dispatch.pin()
 
 
 def pytest_configure(config: pytest.Config) -> None:

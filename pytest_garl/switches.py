@@ -176,6 +176,16 @@ def asked(config: pytest.Config) -> bool:
     )
 
 
+def computes(config: pytest.Config) -> bool:
+    """Whether this process breeds or flies, as far as it can be told before conftest.py is read."""
+    given = config.known_args_namespace
+    return (
+        any(getattr(given, f"garl_{option.name}", None) is not None for option in OPTIONS)
+        or any(config.getini(f"garl_{name}") for name in ("budget", "repeat", "baseline"))
+        or config.getini("garl_workers") == "0"
+    )
+
+
 def flies(item: pytest.Item) -> bool:
     """Whether an item needs a run: a landing test, or a gate against a baseline."""
     return target_of(item) is not None or hasattr(item, "garl_gate")

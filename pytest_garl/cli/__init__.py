@@ -2,17 +2,51 @@
 
 from __future__ import annotations
 
+import importlib
+import os
+import sys
+from typing import Any
+
 import click
 
-from pytest_garl.cli.baseline import baseline, diff
-from pytest_garl.cli.cases import cases
-from pytest_garl.cli.experiment import experiment
-from pytest_garl.cli.train import train
+from pytest_garl import dispatch
 from pytest_garl.errors import GarlError
+
+COMMANDS = {
+    "baseline": "baseline",
+    "cases": "cases",
+    "diff": "baseline",
+    "experiment": "experiment",
+    "train": "train",
+}
+"""The subcommands, and the module of each."""
+_AGAIN = "_PYTEST_GARL_STARTED_AGAIN"
 
 
 class _Group(click.Group):
-    """Shows the project's errors as they are, without a traceback."""
+    """Loads a subcommand when it is asked for, and shows the project's errors without traceback.
+
+    What the subcommands import loads NumPy, which must not happen before it is told by which
+    instructions to compute.
+    """
+
+    def main(self, args: Any = None, *rest: Any, **more: Any) -> Any:
+        if args is None and not dispatch.pin() and _AGAIN not in os.environ:
+            # Something loaded NumPy as the interpreter started; the environment is right now.
+            os.environ[_AGAIN] = "1"
+            os.execv(sys.executable, [sys.executable, *sys.orig_argv[1:]])
+        return super().main(args, *rest, **more)
+
+    def list_commands(self, ctx: click.Context) -> list[str]:
+        return sorted(COMMANDS)
+
+    def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
+        if cmd_name not in COMMANDS:
+            return None
+        dispatch.pin()
+        module = importlib.import_module(f"pytest_garl.cli.{COMMANDS[cmd_name]}")
+        found: click.Command = getattr(module, cmd_name)
+        return found
 
     def invoke(self, ctx: click.Context) -> object:
         try:
@@ -30,10 +64,3 @@ def main() -> None:
     This command prepares what a search uses, and looks after what it found.
     `garl COMMAND --help` explains a command.
     """
-
-
-main.add_command(baseline)
-main.add_command(cases)
-main.add_command(diff)
-main.add_command(experiment)
-main.add_command(train)

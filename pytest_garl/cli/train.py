@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from pytest_garl import dispatch
 from pytest_garl.errors import GarlError
 from pytest_garl.landing_system import Airframe, airframe_of
 from pytest_garl.scenarios.object_types import OBJECT_TYPES
@@ -112,6 +113,7 @@ def train(**asked: Any) -> None:
         raise GarlError(
             f"training needs more than flying does ({error}): pip install 'pytest-garl[train]'"
         ) from error
+    dispatch.check()
     plan = _plan(asked)
     with _Progress(plan) as progress:
         outcome = train_best(plan, progress.episode, progress.validated)

@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from pytest_garl.dispatch import dispatched
 from pytest_garl.experiments.plan import KINDS, Run
 from pytest_garl.experiments.rows import ExperimentError, Row
 from pytest_garl.regressions.follow_up import done_of
@@ -19,7 +20,7 @@ from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.search import ledger as ledgers
 from pytest_garl.search.job import Job, load_scenario, loads
 from pytest_garl.search.ledger import Ledger
-from pytest_garl.simulation.record import cpu_class, load
+from pytest_garl.simulation.record import load
 from pytest_garl.verdicts.metrics import mean_distance, no_cells, top_k, visit
 from pytest_garl.verdicts.serialise import from_dict
 from pytest_garl.verdicts.verdict import Verdict
@@ -130,7 +131,7 @@ def row_of(
         policy_sha256=job.npcs.sha256[:HASH],
         version=str(ledger.fact(FACT_VERSION)),
         package_sha256=str(ledger.fact(FACT_SOURCES)),
-        machine=cpu_class(),
+        machine=dispatched(),
         result_hash=ledger.result_hash(search.key)[:HASH],
     )
 

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
 
+from pytest_garl import dispatch
 from pytest_garl.adversary.policies import policy_spec
 from pytest_garl.adversary.recorded import recorded_spec
 from pytest_garl.errors import GarlError, LandingSystemError
@@ -127,6 +128,7 @@ def _records(folder: Path) -> list[Flight]:
 
 def _by_verdict(case: Case, folder: Path, map: Map, judged_by: str, live: bool) -> Replay:
     system = system_of(case, folder)
+    dispatch.check()
     npcs = policy_spec(case.policy) if live else recorded_spec(dict(case.moves), dict(case.changes))
     limit = max(PAPER_LIMIT_S, case.limits.time_s)
     flight = fly(case.scenario, system, npcs, map=map, time_limit_s=limit)

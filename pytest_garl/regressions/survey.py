@@ -140,11 +140,11 @@ def _set(job: Job, flights: Iterable[tuple[Scenario, Done]]) -> SampleSet:
 
 
 def _baseline(sets: Sequence[SampleSet]) -> Baseline:
+    from pytest_garl.dispatch import dispatched
     from pytest_garl.simulation.flight import PACKAGES
-    from pytest_garl.simulation.record import cpu_class
 
     return Baseline(
-        cpu=cpu_class(),
+        cpu=dispatched(),
         versions=tuple((name, version(name)) for name in PACKAGES),
         sets=tuple(sets),
     )
@@ -169,9 +169,9 @@ def _words(limits: Limits) -> str:
 
 def moved_on(base: Baseline) -> tuple[str, ...]:
     """Return what shapes a flight beside the stack and is not as when the baseline was saved."""
-    from pytest_garl.simulation.record import cpu_class
+    from pytest_garl.dispatch import dispatched
 
-    found = [] if base.cpu == cpu_class() else [f"the CPU was {base.cpu}, is {cpu_class()}"]
+    found = [] if base.cpu == dispatched() else [f"the CPU was {base.cpu}, is {dispatched()}"]
     for name, then in base.versions:
         try:
             today = version(name)

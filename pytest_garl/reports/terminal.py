@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
+from pytest_garl import dispatch
 from pytest_garl.reports.aftermath import told
 from pytest_garl.reports.explain import MAYBE_FIXED, STALE
 from pytest_garl.reports.progress import duration
@@ -16,6 +17,10 @@ from pytest_garl.verdicts.verdict import Verdict
 
 def header(run: Run) -> str:
     """Return the header line: what is searched, and how long it will probably take."""
+    return "\n".join([_header(run), *_computed_otherwise(run)])
+
+
+def _header(run: Run) -> str:
     options = run.options
     if options.repeat:
         return f"garl: repeating {options.repeat}"
@@ -26,6 +31,20 @@ def header(run: Run) -> str:
         f"seed {options.seed}, objects {options.npcs}, weather {options.weather}, "
         f"{_workers(run)}"
     )
+
+
+def _computed_otherwise(run: Run) -> list[str]:
+    """Say what it means that a library was loaded before its instructions could be chosen."""
+    wrong, options = dispatch.disobeying(), run.options
+    means = []
+    if options.workers == 0:
+        means.append("flown in a child process, not inside pytest")
+    if options.searches:
+        means.append("what is bred here may differ from what another make of CPU breeds")
+    if not wrong or not means:
+        return []
+    found = f"loaded before pytest-garl could choose its instructions: {', '.join(wrong)}"
+    return ["; ".join([f"garl: {found}", *means])]
 
 
 def _workers(run: Run) -> str:
@@ -42,7 +61,11 @@ def _workers(run: Run) -> str:
 def summary(reporter: Any, run: Run) -> None:
     """Write a table per system and map, then what was saved, and which cases may be fixed."""
     _searches(reporter, run)
-    lines = [*told(run.pursued, run.options.root, reporter._tw.fullwidth), *_maybe_fixed(reporter)]
+    lines = [
+        *told(run.pursued, run.options.root, reporter._tw.fullwidth),
+        *_maybe_fixed(reporter),
+        *_computed_otherwise(run),
+    ]
     if lines:
         reporter.section("garl: cases", sep="=")
     for line in lines:

@@ -9,15 +9,13 @@ import time
 from pathlib import Path
 from typing import TextIO
 
+from pytest_garl import dispatch
 from pytest_garl.errors import LedgerError
 from pytest_garl.search.checkout import see_only
 from pytest_garl.search.ledger import Ledger
 from pytest_garl.search.processes import end_with_parent, run_child
 from pytest_garl.search.slots import flight_name
 
-THREADS = dict.fromkeys(
-    ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "OPENCV_FOR_THREADS_NUM"), "1"
-)
 IDLE_S = 0.02
 BEAT_S = 5.0
 ALONE_FACTOR = 3.0
@@ -81,7 +79,7 @@ def main(path: str, *checkouts: str) -> None:
     from pytest_garl.search.job import broken_result, fly_job, load_scenario, loads
 
     cv2.setNumThreads(1)
-    assert all(os.environ.get(name) == value for name, value in THREADS.items())
+    dispatch.check()
     ledger = Ledger(Path(path))
     keep_claims(Path(path))
     idle_since = time.monotonic()

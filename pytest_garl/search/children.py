@@ -13,8 +13,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import IO, Protocol
 
+from pytest_garl import dispatch
 from pytest_garl.errors import LedgerError, PoolError
-from pytest_garl.search.child import THREADS, dump_file
+from pytest_garl.search.child import dump_file
 from pytest_garl.search.deaths import Death
 from pytest_garl.search.ledger import Ledger
 from pytest_garl.search.processes import CANNOT_GO_ON
@@ -103,7 +104,7 @@ class ChildPool:
         said = tempfile.TemporaryFile("a+b")  # noqa: SIM115 (closed when the child is gone)
         process = subprocess.Popen(
             [sys.executable, "-m", *self._crew.command(self._ledger.path)],
-            env={**os.environ, **THREADS},
+            env={**os.environ, **dispatch.environment()},
             stdin=subprocess.DEVNULL,
             stdout=subprocess.DEVNULL,
             stderr=said,

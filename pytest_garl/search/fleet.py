@@ -90,7 +90,7 @@ class Fleet:
         if differing:
             raise PoolError(
                 f"Ray's node {node} would not fly the same: it has {differing}. Install the same "
-                "versions on every node"
+                "versions on every node, of CPUs that all have AVX2 or all lack it"
             )
         self._lost_on_arrival = 0
         self._rest(pilot)

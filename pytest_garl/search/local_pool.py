@@ -7,6 +7,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+from pytest_garl import dispatch
 from pytest_garl.search.checkout import Checkout
 from pytest_garl.search.children import POLL_S, ChildPool
 from pytest_garl.search.deaths import Death, settle
@@ -19,12 +20,13 @@ from pytest_garl.search.slots import flight_name
 def local_pool(ledger: Ledger, workers: int, checkout: Checkout | None = None) -> Pool:
     """Return a pool of so many children, or one that flies in this process where it is none.
 
+    Where this process computes otherwise than children do, it takes one child instead of none.
     With a ``checkout`` they see the modules of that landing stack and of no other.
     """
-    if workers == 0:
+    if workers == 0 and dispatch.pin():
         return Here(ledger)
     folders = checkout.arguments if checkout else ()
-    return ChildPool(ledger, Flyers(seats=workers, folders=folders))
+    return ChildPool(ledger, Flyers(seats=max(1, workers), folders=folders))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -13,6 +13,7 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
 
+from pytest_garl import dispatch
 from pytest_garl.search.children import ChildPool
 from pytest_garl.search.deaths import Death
 from pytest_garl.search.job import Job, loads
@@ -115,7 +116,10 @@ class Pilot:
 
 def versions() -> dict[str, str]:
     """Return the installed versions of what decides on a flight's bytes, and our sources' hash."""
-    found = {"sources of pytest-garl": package_sha256()[:12]}
+    found = {
+        "sources of pytest-garl": package_sha256()[:12],
+        "CPU dispatch": dispatch.expected(),
+    }
     for name in PACKAGES:
         try:
             found[name] = version(name)

@@ -8,12 +8,13 @@ from collections.abc import Callable
 from importlib.metadata import version
 from typing import Any
 
+from pytest_garl.dispatch import dispatched
 from pytest_garl.scenarios.maps import Map, load_map
 from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.simulation.flight import PACKAGES, Flight
 from pytest_garl.simulation.loop import Loop
 from pytest_garl.simulation.policy import PolicySpec
-from pytest_garl.simulation.record import cpu_class, hash_of
+from pytest_garl.simulation.record import hash_of
 from pytest_garl.simulation.system_calls import StepGuard
 
 
@@ -37,7 +38,7 @@ def fly(
     flight = Loop(scenario, system, npcs.make, place, time_limit_s, guard).run()
     flight = dataclasses.replace(
         flight,
-        cpu=cpu_class(),
+        cpu=dispatched(),
         versions=tuple((name, version(name)) for name in PACKAGES),
         wall_s=time.perf_counter() - began,
     )

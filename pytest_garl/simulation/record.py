@@ -7,12 +7,10 @@ import hashlib
 import io
 import json
 import os
-import platform
 import zipfile
 from pathlib import Path
 from typing import Any
 
-import cv2
 import numpy as np
 
 from pytest_garl.errors import GarlError
@@ -29,20 +27,6 @@ from pytest_garl.simulation.flight import (
 )
 
 _TRACK = ("time_s", "position_m", "attitude", "velocity_mps")
-
-
-def cpu_class() -> str:
-    """Name the class of CPU on which equal flights have equal bytes."""
-    return f"{platform.machine()}-{_instructions(cv2.getCPUFeaturesLine())}"
-
-
-def _instructions(features: str) -> str:
-    """Name the best instructions of OpenCV's list, in which "?" follows what the CPU lacks."""
-    there = [word for word in features.split() if not word.endswith("?")]
-    for name in ("AVX512", "AVX2"):
-        if any(name in word for word in there):
-            return name.lower()
-    return "base"
 
 
 def hash_of(flight: Flight) -> str:

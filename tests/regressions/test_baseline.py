@@ -8,6 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from pytest_garl.adversary.policies import policy_spec
+from pytest_garl.dispatch import dispatched
 from pytest_garl.errors import ScenarioError
 from pytest_garl.messages import printable
 from pytest_garl.regressions.baseline import (
@@ -33,7 +34,6 @@ from pytest_garl.search.job import Job, dump_scenario
 from pytest_garl.search.ledger import Ledger
 from pytest_garl.search.random_search import propose
 from pytest_garl.search.reference import BUILT_IN, Reference
-from pytest_garl.simulation.record import cpu_class
 from pytest_garl.verdicts.gate import Answer
 from pytest_garl.verdicts.verdict import Limits
 
@@ -196,7 +196,7 @@ def test_versions_that_moved_on_are_told() -> None:
     assert "numpy was 2.0.0, is " in " ".join(moved_on(baseline()))
     gone = Baseline(cpu="z80", versions=(("no-such-package", "1"),), sets=())
     assert moved_on(gone) == (
-        f"the CPU was z80, is {cpu_class()}",
+        f"the CPU was z80, is {dispatched()}",
         "no-such-package was 1, is absent",
     )
 
