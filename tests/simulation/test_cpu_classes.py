@@ -1,4 +1,4 @@
-"""The same verdict on every class of CPU: here the newer instructions are switched off."""
+"""The same bytes whatever the environment says about the CPU, and other bytes without the pin."""
 
 from __future__ import annotations
 
@@ -6,62 +6,169 @@ import json
 import os
 import subprocess
 import sys
+from pathlib import Path
+from typing import Any
 
 import pytest
 
-from pytest_garl.simulation.record import _instructions
+from pytest_garl import dispatch
+from pytest_garl.adversary.recorded import recorded_spec
+from pytest_garl.regressions.case import Case
+from pytest_garl.regressions.corpus import every_entry
+from pytest_garl.scenarios.maps import load_map
+from pytest_garl.search.batch import fly_all, own_pool
+from pytest_garl.search.job import Job
+from pytest_garl.search.reference import BUILT_IN, Reference
 
-OLD = {
-    "OPENCV_CPU_DISABLE": "AVX512-SKX,AVX2,FMA3,AVX",
-    "NPY_DISABLE_CPU_FEATURES": "AVX512F AVX512CD AVX512_SKX AVX512_CLX AVX512_CNL AVX512_ICL "
-    "AVX2 FMA3",
+ROOT = Path(__file__).parents[2]
+WITHOUT_AVX512 = {
+    "OPENCV_CPU_DISABLE": "AVX512-SKX",
+    "OPENCV_IPP": "avx2",
+    "NPY_DISABLE_CPU_FEATURES": "X86_V4 AVX512_ICL AVX512_SPR",
+}
+WITHOUT_AVX2 = {
     "OPENBLAS_CORETYPE": "Nehalem",
+    "OPENCV_CPU_DISABLE": "AVX512-SKX,AVX2,FP16,AVX",
+    "OPENCV_IPP": "sse42",
+    "NPY_DISABLE_CPU_FEATURES": "X86_V3 X86_V4 AVX512_ICL AVX512_SPR",
+}
+SETTINGS: dict[str, dict[str, str]] = {
+    "Haswell": {"OPENBLAS_CORETYPE": "Haswell"},
+    "SkylakeX": {"OPENBLAS_CORETYPE": "SkylakeX"},
+    "Zen": {"OPENBLAS_CORETYPE": "Zen"},
+    "Nehalem": {"OPENBLAS_CORETYPE": "Nehalem"},
+    "without AVX-512": WITHOUT_AVX512,
+    "without AVX2": WITHOUT_AVX2,
 }
 FLY = """
-import json
-import cv2
-cv2.setNumThreads(1)
-from landing_systems.opencv_mls import OpenCvLandingSystem
-from pytest_garl.adversary.policies import policy_spec
-from pytest_garl.scenarios.genes import genome_for
-from pytest_garl.scenarios.maps import load_map
-from pytest_garl.search.random_search import propose
-from pytest_garl.simulation.fly import fly
-from pytest_garl.verdicts.judge import judge
-from pytest_garl.verdicts.verdict import Limits
-map = load_map("lawn")
-for scenario in propose(map, genome_for(map), 5, 0, 6)[4:]:
-    flight = fly(scenario, OpenCvLandingSystem, policy_spec("waypoint"), map=map)
-    verdict = judge(flight, Limits())
-    print(json.dumps([verdict.outcome, verdict.signature, flight.sha256]))
+import json, sys
+import numpy as np
+from pathlib import Path
+from pytest_garl import dispatch
+from pytest_garl.regressions.files import load
+from pytest_garl.regressions.replay import replay
+rng = np.random.default_rng(0)
+product = rng.random((31, 57)) @ rng.random((57, 23))
+refused = ""
+try:
+    dispatch.check()
+except Exception as error:
+    refused = str(error)
+dispatch.check = lambda: None
+flown = [replay(load(Path(file)), Path.cwd()) for file in sys.argv[1:]]
+print(json.dumps({
+    "refused": refused,
+    "product": product.tobytes().hex(),
+    "verdicts": [each.verdict.signature for each in flown],
+    "hashes": [each.flight.sha256 for each in flown],
+    "cpus": [each.flight.cpu for each in flown],
+}))
 """
+GARL = "from pytest_garl.cli import main; main()"
+needs_avx2 = pytest.mark.skipif(not dispatch.has_baseline(), reason="this CPU has no AVX2")
 
 
-def flown(environment: dict[str, str]) -> list[list[str]]:
+def longest_cases() -> list[tuple[Path, Case]]:
+    """Return of each landing system the robust case whose objects move the longest."""
+    found: dict[str, tuple[Path, Case]] = {}
+    for entry in every_entry(ROOT / "scenarios" / "regressions", ()):
+        case = entry.case
+        if case is not None and not case.edge:
+            known = found.get(case.system)
+            if known is None or length(case) > length(known[1]):
+                found[case.system] = (entry.path, case)
+    return [found[system] for system in sorted(found)]
+
+
+def length(case: Case) -> int:
+    return max(len(moves) for _, moves in case.moves)
+
+
+CASES = longest_cases()
+
+
+def flown_by_a_child() -> list[tuple[str, str]]:
+    """Return verdict and hash of each case, flown as a search flies."""
+    flown = []
+    with own_pool(1) as (ledger, pool):
+        for _, case in CASES:
+            map = load_map(case.scenario.map)
+            module, _, qualname = case.system.partition(":")
+            job = Job(
+                system=Reference(module=module, file="", qualname=qualname),
+                system_sha256="",
+                simulator=BUILT_IN,
+                map=map.name,
+                map_sha256=map.sha256,
+                map_folders=(),
+                npcs=recorded_spec(dict(case.moves), dict(case.changes)),
+                limits=case.limits,
+                timeout_s=60.0,
+                path=(str(ROOT),),
+                flights=str(ledger.path.parent / "flights"),
+            )
+            done = next(iter(fly_all(ledger, pool, job, [case.scenario])))
+            flown.append((done.result["verdict"]["signature"], done.sha256))
+    return flown
+
+
+def flown_unpinned(setting: dict[str, str]) -> dict[str, Any]:
+    """Fly in a process that chooses its instructions by itself, as this setting lets it."""
+    pinned = dispatch.environment()
+    outside = {name: value for name, value in os.environ.items() if name not in pinned}
+    # That NumPy does not know a group, or the CPU does not have it, is only a warning.
     done = subprocess.run(
-        [sys.executable, "-W", "ignore", "-c", FLY],
-        env={**os.environ, **environment},
+        [sys.executable, "-W", "ignore", "-c", FLY, *(str(path) for path, _ in CASES)],
+        env={**outside, **dispatch.THREADS, **setting},
+        cwd=ROOT,
         capture_output=True,
         text=True,
         check=True,
     )
-    return [json.loads(line) for line in done.stdout.splitlines()]
+    found: dict[str, Any] = json.loads(done.stdout.splitlines()[-1])
+    return found
 
 
+def test_there_is_a_case_of_each_landing_system() -> None:
+    assert len(CASES) == 3
+
+
+@needs_avx2
 @pytest.mark.sim
-def test_the_verdict_does_not_depend_on_the_instructions() -> None:
-    new, old = flown({}), flown(OLD)
-    assert [each[:2] for each in new] == [each[:2] for each in old]
-    assert {each[0] for each in new} == {"aborted", "collision"}
+def test_one_hash_under_every_setting(monkeypatch: pytest.MonkeyPatch) -> None:
+    flown = {}
+    for name, setting in SETTINGS.items():
+        with monkeypatch.context() as outside:
+            for key, value in setting.items():
+                outside.setenv(key, value)
+            flown[name] = flown_by_a_child()
+    assert flown == dict.fromkeys(SETTINGS, flown["Haswell"])
 
 
-@pytest.mark.parametrize(
-    ("features", "name"),
-    [
-        ("SSE SSE2 SSE3 *SSE4.1 *SSE4.2 *AVX *FP16 *AVX2 *AVX512-SKX", "avx512"),
-        ("SSE SSE2 SSE3 *SSE4.1 *SSE4.2 *AVX *FP16 *AVX2 *AVX512-SKX?", "avx2"),
-        ("SSE SSE2 SSE3 *SSE4.1 *SSE4.2 *AVX? *FP16? *AVX2? *AVX512-SKX?", "base"),
-    ],
-)
-def test_instructions_that_the_cpu_lacks_make_no_class(features: str, name: str) -> None:
-    assert _instructions(features) == name
+@needs_avx2
+@pytest.mark.sim
+def test_the_command_flies_as_children_do() -> None:
+    path, case = CASES[0]
+    found = subprocess.run(
+        [sys.executable, "-c", GARL, "cases", "replay", str(path)],
+        env={**os.environ, **WITHOUT_AVX2},
+        cwd=ROOT,
+        capture_output=True,
+        text=True,
+    )
+    assert "the same flight to the byte" in found.stdout, found.stderr
+    assert case.violation.signature in found.stdout
+
+
+@needs_avx2
+@pytest.mark.sim
+def test_without_the_pin_bytes_differ_and_are_refused() -> None:
+    avx2, old = flown_unpinned(dispatch.environment()), flown_unpinned(WITHOUT_AVX2)
+    assert not avx2["refused"]
+    assert "expected x86_64-avx2-haswell" in old["refused"]
+    assert avx2["cpus"] == [dispatch.BASELINE] * 3
+    assert dispatch.BASELINE not in old["cpus"]
+    assert avx2["product"] != old["product"]
+    assert avx2["hashes"] != old["hashes"]
+    # Where there is no AVX2 not the bytes are promised but the verdict, of robust cases.
+    assert avx2["verdicts"] == old["verdicts"]

@@ -1,0 +1,118 @@
+from __future__ import annotations
+
+import os
+import platform
+import subprocess
+import sys
+
+import pytest
+
+from pytest_garl import dispatch
+
+OLD = frozenset({"sse2", "avx"})
+AVX2 = frozenset({"avx", "avx2", "fma", "f16c", "bmi1", "bmi2", "movbe", "abm"})
+SKYLAKE = AVX2 | {"avx512f", "avx512cd", "avx512vl", "avx512bw", "avx512dq"}
+ICE_LAKE = (
+    SKYLAKE
+    | {"avx512ifma", "avx512vbmi", "avx512_vbmi2", "avx512_bitalg"}
+    | {
+        "avx512_vnni",
+        "avx512_vpopcntdq",
+    }
+)
+needs_avx2 = pytest.mark.skipif(not dispatch.has_baseline(), reason="this CPU has no AVX2")
+
+
+def cpu(monkeypatch: pytest.MonkeyPatch, flags: frozenset[str], machine: str = "x86_64") -> None:
+    monkeypatch.setattr(dispatch, "_flags", lambda: flags)
+    monkeypatch.setattr(platform, "machine", lambda: machine)
+
+
+@pytest.mark.parametrize(
+    ("flags", "numpy", "opencv"),
+    [
+        (AVX2, "", ""),
+        (SKYLAKE, "X86_V4", "AVX512-SKX"),
+        (ICE_LAKE, "X86_V4 AVX512_ICL", "AVX512-SKX"),
+        (ICE_LAKE | {"avx512_fp16"}, "X86_V4 AVX512_ICL AVX512_SPR", "AVX512-SKX"),
+    ],
+)
+def test_only_what_the_cpu_has_is_switched_off(
+    flags: frozenset[str], numpy: str, opencv: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    cpu(monkeypatch, flags)
+    monkeypatch.setattr("importlib.metadata.version", lambda name: "2.4.6")
+    found = dispatch.environment()
+    assert found["NPY_DISABLE_CPU_FEATURES"] == numpy
+    assert found["OPENCV_CPU_DISABLE"] == opencv
+    assert found["OPENBLAS_CORETYPE"] == "Haswell"
+
+
+def test_numpy_before_2_4_names_its_groups_otherwise(monkeypatch: pytest.MonkeyPatch) -> None:
+    cpu(monkeypatch, SKYLAKE)
+    monkeypatch.setattr("importlib.metadata.version", lambda name: "2.3.5")
+    names = dispatch.environment()["NPY_DISABLE_CPU_FEATURES"]
+    assert names == "AVX512F AVX512CD AVX512_SKX"
+
+
+@pytest.mark.parametrize(("flags", "machine"), [(OLD, "x86_64"), (AVX2, "aarch64")])
+def test_a_machine_without_avx2_is_left_as_it_is(
+    flags: frozenset[str], machine: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    cpu(monkeypatch, flags, machine)
+    assert dispatch.environment() == dispatch.THREADS
+    assert dispatch.expected() != dispatch.BASELINE
+    assert not dispatch.disobeying()
+    dispatch.check()
+
+
+@needs_avx2
+def test_this_process_flies_by_the_baseline() -> None:
+    import cv2  # noqa: F401 (loaded to be looked at)
+    import numpy  # noqa: F401
+
+    assert dispatch.pin()
+    assert dispatch.dispatched() == dispatch.expected() == dispatch.BASELINE
+    dispatch.check()
+
+
+@needs_avx2
+@pytest.mark.parametrize(
+    ("outside", "found"),
+    [
+        ({"OPENBLAS_CORETYPE": "Nehalem"}, "with kernels for nehalem"),
+        ({"NPY_DISABLE_CPU_FEATURES": "X86_V3 X86_V4 AVX512_ICL"}, "numpy with base"),
+        ({"OPENCV_CPU_DISABLE": "AVX512-SKX,AVX2"}, "opencv with base"),
+    ],
+)
+def test_a_library_that_was_loaded_before_is_told(outside: dict[str, str], found: str) -> None:
+    code = (
+        "import cv2\n"
+        "from pytest_garl import dispatch, errors\n"
+        "assert not dispatch.pin()\n"
+        "try:\n    dispatch.check()\n"
+        "except errors.DispatchError as error:\n    print(error)\n"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", code],
+        env={**os.environ, **dispatch.environment(), **outside},
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    assert found in done.stdout
+    assert "expected x86_64-avx2-haswell" in done.stdout
+
+
+@needs_avx2
+def test_libraries_are_loaded_without_a_word() -> None:
+    code = "from pytest_garl import dispatch; assert dispatch.pin(); import cv2, scipy.linalg"
+    code += "; dispatch.check(); print(dispatch.dispatched())"
+    done = subprocess.run(
+        [sys.executable, "-W", "error", "-c", code],
+        env={**os.environ, "NPY_ENABLE_CPU_FEATURES": "X86_V3"},
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    assert (done.stdout, done.stderr) == ("x86_64-avx2-haswell\n", "")
