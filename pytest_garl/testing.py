@@ -2,50 +2,244 @@
 
 from __future__ import annotations
 
+import contextlib
 import inspect
-from typing import Any
+import threading
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, NamedTuple
 
 from pytest_garl.adversary.policies import policy_spec
 from pytest_garl.errors import LandingSystemError
-from pytest_garl.landing_system import Airframe, Mission, Observation, airframe_of
+from pytest_garl.landing_system import Mission, Observation, airframe_of
+from pytest_garl.metering import Meter, OutOfTimeError
 from pytest_garl.scenarios.chromosome import decode
 from pytest_garl.scenarios.genes import genome_for
-from pytest_garl.scenarios.maps import load_map
+from pytest_garl.scenarios.maps import Map, load_map
+from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.scenarios.validity import repair
+from pytest_garl.search.job import PAPER_LIMIT_S
+from pytest_garl.search.random_search import propose
 from pytest_garl.search.reference import check_system
+from pytest_garl.simulation.flight import Flight
 from pytest_garl.simulation.fly import fly
 from pytest_garl.simulation.record import parted_s
+from pytest_garl.verdicts.judge import judge
+from pytest_garl.verdicts.moments import reports_detections, reports_targets
+from pytest_garl.verdicts.verdict import Limits
+
+FLIGHTS = 40
+"""What the estimate of a search's time is for: the budget that the README begins with."""
+SLOW_FLIGHT_S = 10.0
+"""Computing time of one flight above which the check warns: a night has some 3,000 such flights."""
+SLOW_CALL_S = 3.0
+"""A search takes a call of 10 s for hanging by default; a loaded machine may be thrice as slow."""
+LEAST_S = 2.0
+"""Shortest flights that are still compared."""
 
 
-def check_landing_system(system: type, *, seconds: float = 5.0, map: str = "lawn") -> None:
-    """Fly a class for a few seconds and raise LandingSystemError that names what is wrong.
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Check:
+    """What a check showed: how the flights ended, what a search will meet, what a flight costs.
 
-    Checks that it has the contract's methods and can be imported by a child process, that
-    its airframe is one, that it returns commands, leaves its observations alone, decides
-    the same in the same flight, and that ``reset`` forgets the flight before.
+    ``flights`` and ``warnings`` are sentences; ``cpu_s`` is the computing time of one flight in
+    seconds, the simulator's included.
+    """
+
+    system: str
+    flights: tuple[str, ...]
+    warnings: tuple[str, ...]
+    cpu_s: float
+
+    def __str__(self) -> str:
+        cost = (
+            f"a flight takes {self.cpu_s:.1f} s of computing: {FLIGHTS} flights take about "
+            f"{FLIGHTS * self.cpu_s:.0f} s, divided by the number of workers"
+        )
+        warned = [f"warning: {text}" for text in self.warnings]
+        return "\n".join([f"{self.system}: {text}" for text in (*self.flights, cost)] + warned)
+
+
+def check_landing_system(
+    system: type,
+    *,
+    seconds: float | None = None,
+    map: str = "lawn",
+    deterministic: bool = True,
+    limit_s: float = 120.0,
+) -> Check:
+    """Fly a class in two scenarios and return what it showed; raise LandingSystemError for a fault.
+
+    Checks that the class has the contract's methods and can be imported by a child process, that
+    its airframe is one, that it returns commands, leaves its observations alone, decides the same
+    in the same flight, and that ``reset`` forgets the flight before: one instance flies the first
+    scenario, the second and the first again, and each flight is compared with that of a fresh
+    instance.
+
+    ``seconds`` ends each flight early (simulated time; by default it flies until it landed, or
+    120 s).  ``deterministic=False`` turns a difference between equal flights into a warning.
+    ``limit_s`` is the computing time (CPU) for all flights; a slow system is compared over shorter
+    ones.  A call that takes 30 s is taken for hanging.
     """
     check_system(system)
     _check_airframe(system)
     _check_signature(system, "reset", 1)
     _check_signature(system, "step", 1)
-    first, again = (_fly(system, seconds, map) for _ in range(2))
-    _compare(system, first, again, "two flights of the same scenario part")
-    kept: Any = _keep_one(system)
-    _fly(kept, seconds, map)
-    _compare(
-        system,
-        first,
-        _fly(kept, seconds, map),
-        "a second flight of one instance differs; reset(mission) must forget the flight before",
-    )
+    return _Checker(system, map, seconds, deterministic, limit_s).run()
+
+
+class _Flown(NamedTuple):
+    flight: Flight
+    cpu_s: float
+
+
+class _Checker:
+    """Flies one class in a calm scenario and in a drawn one, both without moving objects."""
+
+    def __init__(
+        self, system: type, map: str, seconds: float | None, deterministic: bool, limit_s: float
+    ) -> None:
+        self._system, self._deterministic = system, deterministic
+        self._seconds = seconds or PAPER_LIMIT_S
+        self._whole = seconds is None or seconds >= PAPER_LIMIT_S
+        self._map = load_map(map, (Path.cwd() / "scenarios" / "maps",))
+        self._calm, self._drawn = _scenarios(self._map)
+        self._meter = Meter(limit_s)
+        self._limit_s = limit_s
+        self._warnings: list[str] = []
+
+    def run(self) -> Check:
+        """Fly and compare."""
+        flights: list[str] = []
+        cpu_s = self._limit_s
+        with _told_of_leftovers(self._warnings.append):
+            try:
+                first = self._fly(self._system, self._calm, self._seconds)
+                flights.append(f"{self._map.name}: {_ending(first.flight)}")
+                cpu_s = first.cpu_s
+                self._look_at(first)
+                other = self._compare(first)
+                flights.append(f"{self._map.name}, another scenario: {_ending(other.flight)}")
+                if {first.flight.outcome, other.flight.outcome} == {"aborted"}:
+                    self._warnings.append("gave up in both scenarios; a search can tell nothing")
+            except OutOfTimeError:
+                self._warnings.append(
+                    f"stopped after {self._limit_s:g} s of computing; not all flights were flown"
+                )
+        if self._meter.slowest_s > SLOW_CALL_S:
+            self._warnings.append(
+                f"one call took {self._meter.slowest_s:.1f} s of computing; a search takes a call "
+                "of 10 s for hanging (--garl-timeout)"
+            )
+        return Check(
+            system=self._system.__name__,
+            flights=tuple(flights),
+            warnings=tuple(self._warnings),
+            cpu_s=cpu_s,
+        )
+
+    def _compare(self, first: _Flown) -> _Flown:
+        """Fly both scenarios by fresh instances and by one that keeps what it remembers."""
+        seconds = self._seconds
+        if 5 * first.cpu_s > self._limit_s:
+            share = (self._limit_s - first.cpu_s) / (6 * first.cpu_s)
+            seconds = max(LEAST_S, share * first.flight.elapsed_s)
+            first = self._fly(self._system, self._calm, seconds)
+        other = self._fly(self._system, self._drawn, seconds)
+        kept = _keep_one(self._system)
+        for fresh, scenario, problem in (
+            (first, self._calm, "two flights of the same scenario part"),
+            (other, self._drawn, _FORGETS_NOT),
+            (first, self._calm, _FORGETS_NOT),
+        ):
+            again = self._fly(kept, scenario, seconds)
+            self._demand_equal(fresh.flight, again.flight, problem)
+        return other
+
+    def _demand_equal(self, fresh: Flight, again: Flight, problem: str) -> None:
+        if fresh.sha256 == again.sha256:
+            return
+        text = f"{self._system.__name__}: {problem}, first at {parted_s(fresh, again):.2f} s"
+        if self._deterministic:
+            raise LandingSystemError(
+                f"{text}; where that is meant, say deterministic=False here and in the marker"
+            )
+        if text not in self._warnings:
+            self._warnings.append(text)
+
+    def _look_at(self, first: _Flown) -> None:
+        """Warn of what a search will meet."""
+        flight, warn = first.flight, self._warnings.append
+        limits = Limits()
+        if flight.outcome == "not_landed" and self._whole:
+            warn(f"did not land within {self._seconds:.0f} s, in a calm scenario without objects")
+        if flight.outcome == "aborted":
+            warn("gave up in a calm scenario without objects")
+        if flight.outcome == "collision":
+            warn("collided in a calm scenario without moving objects")
+        if flight.outcome == "landed" and flight.final_distance_m > limits.distance_m:
+            warn(
+                f"landed {flight.final_distance_m:.1f} m off in a calm scenario; the limit is "
+                f"{limits.distance_m:g} m"
+            )
+        if not any(step.diagnostics for step in flight.steps):
+            warn(
+                "returns no diagnostics: findings cannot say what it saw or meant to do "
+                "(Land(diagnostics=Diagnostics(...)))"
+            )
+        elif self._whole and not (reports_detections(flight) or reports_targets(flight)):
+            warn("its diagnostics never name a detection or a target")
+        if first.cpu_s > SLOW_FLIGHT_S:
+            warn(
+                f"slow: {first.cpu_s:.0f} s of computing for {flight.elapsed_s:.0f} s of flight, "
+                f"{self._meter.mean_s * 1e3:.0f} ms in each call"
+            )
+
+    def _fly(self, system: Any, scenario: Scenario, seconds: float) -> _Flown:
+        began = time.process_time()
+        with self._meter.timed():
+            flight = fly(
+                scenario,
+                system,
+                policy_spec("stationary"),
+                map=self._map,
+                time_limit_s=seconds,
+                guard=self._meter,
+            )
+        if flight.crash is not None:
+            crash, hint = flight.crash, ""
+            if "read-only" in crash.message:
+                hint = "; observations are read-only, copy the array before changing it"
+            raise LandingSystemError(
+                f"{crash.where}: {crash.error}: {crash.message}{hint}\n{crash.traceback}".rstrip()
+            )
+        return _Flown(flight, time.process_time() - began)
+
+
+_FORGETS_NOT = (
+    "a later flight of one instance differs from the first of a fresh one; reset(mission) must "
+    "forget the flight before"
+)
+
+
+def _scenarios(map: Map) -> tuple[Scenario, Scenario]:
+    """Return the map's nominal scenario and one that a search might draw, without objects."""
+    genome = genome_for(map)
+    names = [name for name, _ in map.object_names]
+    calm = repair(decode(genome.nominal, genome, map=map.name, seed=1), map)
+    drawn = propose(map, genome, 1, 0, 1)[0]
+    return calm.without(*names), drawn.without(*names)
+
+
+def _ending(flight: Flight) -> str:
+    if flight.outcome == "landed":
+        return f"landed {flight.final_distance_m:.2f} m off after {flight.elapsed_s:.0f} s"
+    return judge(flight, Limits()).story
 
 
 def _check_airframe(system: type) -> None:
-    airframe = getattr(system, "airframe", None)
-    if airframe is not None and not isinstance(airframe, Airframe):
-        raise LandingSystemError(
-            f"{system.__name__}.airframe is {airframe!r}; expected pytest_garl.Airframe(...)"
-        )
     flies = callable(getattr(system, "control", None))
     if flies != (airframe_of(system).control_rate_hz is not None):
         raise LandingSystemError(
@@ -63,45 +257,44 @@ def _check_signature(system: type, method: str, count: int) -> None:
         ) from error
 
 
-def _fly(system: Any, seconds: float, name: str) -> Any:
-    place = load_map(name)
-    genome = genome_for(place)
-    scenario = repair(decode(genome.nominal, genome, map=name, seed=1), place)
-    flight = fly(scenario, system, policy_spec("waypoint"), map=place, time_limit_s=seconds)
-    if flight.crash is not None:
-        crash = flight.crash
-        hint = ""
-        if "read-only" in crash.message:
-            hint = "; observations are read-only, copy the array before changing it"
-        raise LandingSystemError(
-            f"{crash.where}: {crash.error}: {crash.message}{hint}\n{crash.traceback}".rstrip()
-        )
-    return flight
+@contextlib.contextmanager
+def _told_of_leftovers(warn: Callable[[str], None]) -> Iterator[None]:
+    """Warn of threads and processes that a landing system leaves running."""
+    threads, processes = set(threading.enumerate()), _children()
+    yield
+    left = [item for item in threading.enumerate() if item not in threads and item.is_alive()]
+    if left:
+        warn(f"leaves {len(left)} threads running ({left[0].name})")
+    started = _children() - processes
+    if started:
+        warn(f"leaves {len(started)} processes running; a search ends them after each run")
 
 
-def _compare(system: type, first: Any, again: Any, problem: str) -> None:
-    if first.sha256 == again.sha256:
-        return
-    parted = parted_s(first, again)
-    raise LandingSystemError(f"{system.__name__}: {problem}, first at {parted:.2f} s")
+def _children() -> set[str]:
+    files = Path("/proc/self/task").glob("*/children")
+    return {pid for file in files for pid in file.read_text().split()}
 
 
 def _keep_one(system: type) -> Any:
     """Return a stand-in for the class that hands out one and the same instance."""
-    instance = system()
+    instances: list[Any] = []
 
     class Kept:
         airframe = airframe_of(system)
-        needs_camera = getattr(system, "needs_camera", True)
+
+        def __init__(self) -> None:
+            if not instances:
+                instances.append(system())
+            self._instance = instances[0]
+
+        def __getattr__(self, name: str) -> Any:
+            return getattr(self._instance, name)
 
         def reset(self, mission: Mission) -> None:
-            instance.reset(mission)
+            self._instance.reset(mission)
 
         def step(self, observation: Observation) -> Any:
-            return instance.step(observation)
-
-        def control(self, state: Any) -> Any:
-            return instance.control(state)
+            return self._instance.step(observation)
 
     Kept.__name__ = system.__name__
     return Kept

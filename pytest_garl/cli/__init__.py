@@ -15,6 +15,7 @@ from pytest_garl.errors import GarlError
 COMMANDS = {
     "baseline": "baseline",
     "cases": "cases",
+    "check": "check",
     "diff": "baseline",
     "experiment": "experiment",
     "train": "train",

@@ -1,0 +1,70 @@
+"""``garl check``: fly a landing system before a search does, and say what is wrong with it."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+import click
+
+from pytest_garl.errors import GarlError, LandingSystemError
+
+
+@click.command()
+@click.argument("system", metavar="MODULE:CLASS")
+@click.option(
+    "--map",
+    "maps",
+    multiple=True,
+    default=("lawn",),
+    show_default=True,
+    help="Where to fly; may be given several times.",
+)
+@click.option(
+    "--seconds",
+    type=click.FloatRange(min=0, min_open=True),
+    help="End each flight after so many simulated seconds.  [default: when it landed, or 120]",
+)
+@click.option(
+    "--nondeterministic",
+    is_flag=True,
+    help="Only warn where equal flights differ (deterministic=False in the marker).",
+)
+def check(
+    system: str, maps: tuple[str, ...], seconds: float | None, nondeterministic: bool
+) -> None:
+    """Fly a landing system in two calm scenarios and name what is wrong with it.
+
+    Run it where you run pytest.  It ends with status 1 for a fault that a search would meet in
+    every flight; warnings tell what a search will meet beside that.
+    """
+    from pytest_garl.testing import check_landing_system
+
+    found = _imported(system)
+    for name in maps:
+        result = check_landing_system(
+            found, map=name, seconds=seconds, deterministic=not nondeterministic
+        )
+        click.echo(result)
+
+
+def _imported(name: str) -> type:
+    if str(Path.cwd()) not in sys.path:
+        sys.path.insert(0, str(Path.cwd()))
+    from pytest_garl.search.reference import system_named
+
+    try:
+        system: type = system_named(name)
+    except LandingSystemError as error:
+        raise LandingSystemError(
+            f"{name!r} is no landing system ({error}); expected MODULE:CLASS, as "
+            "my_landing:MyLandingSystem, importable from the current folder"
+        ) from error
+    except GarlError:
+        raise
+    except Exception as error:
+        # The user's module runs when it is imported and raises what it likes.
+        raise LandingSystemError(
+            f"{name!r}: importing it raised {type(error).__name__}: {error}"
+        ) from error
+    return system
