@@ -10,18 +10,24 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
-from zipfile import BadZipFile
 
 import numpy as np
 from numpy.typing import NDArray
 
 from pytest_garl.adversary.states import VIEWS, on_turn
+from pytest_garl.arrays import unpack
 from pytest_garl.errors import PolicyError
+from pytest_garl.messages import listed, shown
+from pytest_garl.plain import parsed
+from pytest_garl.reading import MEGABYTE, read_bytes
 from pytest_garl.simulation.policy import STAY, Move, PolicySpec, Situation
 
 Array = NDArray[np.float64]
 WEIGHTS = Path(__file__).with_name("weights")
 FORMAT = 1
+_LARGEST = MEGABYTE
+"""Bytes of weights, packed or not: two hundred times those that are shipped."""
+_REMEDY = "; train it again with `garl train`, or restore the file"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -106,37 +112,41 @@ def read_manifest(path: Path) -> dict[str, Any]:
         )
     file = path.with_suffix(".json")
     try:
-        manifest = json.loads(file.read_text(encoding="utf-8"))
-        known = {"format", "state", "sha256"} <= manifest.keys()
-    except (OSError, ValueError, AttributeError) as error:
+        manifest = parsed(read_bytes(file, error=PolicyError))
+    except (PolicyError, ValueError) as error:
         raise _wrong(file, f"is no readable manifest ({error})") from error
+    if not isinstance(manifest, dict):
+        raise _wrong(file, f"is no readable manifest (found {shown(manifest)}, expected a table)")
+    known = {"format", "state", "sha256"} <= manifest.keys()
     if not known or manifest["format"] != FORMAT:
         raise _wrong(file, f"is not a manifest of format {FORMAT}")
     if str(manifest["state"]) not in VIEWS:
-        raise _wrong(file, f"names the state {manifest['state']!r}; known: {', '.join(VIEWS)}")
-    return dict(manifest)
+        state = shown(manifest["state"])
+        raise _wrong(file, f"names the state {state}; known: {', '.join(VIEWS)}")
+    return manifest
 
 
 @functools.lru_cache(maxsize=8)
 def _load(weights: str, sha256: str) -> Network:
     path = _path(weights)
     manifest = read_manifest(path)
-    data = path.read_bytes()
+    data = read_bytes(path, _LARGEST, PolicyError, _REMEDY)
     found = hashlib.sha256(data).hexdigest()
     if not found == sha256 == manifest["sha256"]:
         raise _wrong(path, f"has the hash {found[:16]}…, its manifest says {sha256[:16]}…")
     try:
-        with np.load(io.BytesIO(data), allow_pickle=False) as arrays:
-            count = len(arrays.files) // 2
-            layers = [
-                (
-                    arrays[f"weight_{index}"].astype(np.float64),
-                    arrays[f"bias_{index}"].astype(np.float64),
-                )
-                for index in range(count)
-            ]
-    except (ValueError, KeyError, TypeError, BadZipFile, EOFError) as error:
+        arrays = unpack(data, _LARGEST)
+    except ValueError as error:
         raise _wrong(path, f"is no file of weights ({error})") from error
+    count = len(arrays) // 2
+    expected = {f"{kind}_{index}" for index in range(count) for kind in ("weight", "bias")}
+    if arrays.keys() != expected:
+        found = listed(sorted(arrays))
+        raise _wrong(path, f"is no file of weights (found {found}; expected weight_0, bias_0, …)")
+    layers = [
+        (arrays[f"weight_{index}"].astype(np.float64), arrays[f"bias_{index}"].astype(np.float64))
+        for index in range(count)
+    ]
     _check(path, layers, manifest["state"])
     return Network(state=manifest["state"], layers=tuple(layers))
 
@@ -158,6 +168,4 @@ def _path(name: str) -> Path:
 
 
 def _wrong(path: Path, problem: str) -> PolicyError:
-    return PolicyError(
-        f"object policy: {path} {problem}; train it again with `garl train`, or restore the file"
-    )
+    return PolicyError(f"object policy: {path} {problem}{_REMEDY}")

@@ -9,10 +9,15 @@ from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
-from pytest_garl.errors import ScenarioError
-from pytest_garl.scenarios.toml_reader import Table, parse
+from pytest_garl.messages import listed, shown
+from pytest_garl.reading import read_text
+from pytest_garl.scenarios.toml_reader import LARGEST, Table, parse
 
 NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9 ._-]*")
+_MOST_GRIDS = 100
+_MOST_SEARCHES = 10_000
+_MOST_FLIGHTS = 1_000_000
+"""Of a search: more than a year of flying."""
 WITH = " with "
 """Between a search and who steers its objects."""
 KINDS = ("I", "II", "III", "IV", "V")
@@ -169,20 +174,21 @@ class Experiment:
 
 def read(file: Path) -> Experiment:
     """Return the experiment in ``file``; raise ScenarioError that names file and key."""
-    try:
-        text = file.read_text(encoding="utf-8")
-    except (OSError, UnicodeDecodeError) as error:
-        raise ScenarioError(f"{file}: cannot be read: {error}") from error
-    top = Table(parse(text, str(file)), str(file))
+    top = Table(parse(read_text(file), str(file)), str(file))
     top.only(TOP_KEYS)
     systems = top.table("systems")
     names = {_named(systems, name): systems.text(name) for name in systems.values}
-    grids = tuple(_grid(top, each, names) for each in top.tables("grids"))
+    grids = tuple(_grid(top, each, names) for each in top.tables("grids", most=_MOST_GRIDS))
     if not grids:
         raise top.error("grids", "missing; expected at least one [[grids]] with methods to fly")
     twice = {grid.name for grid in grids if sum(grid.name == each.name for each in grids) > 1}
     if twice:
-        raise top.error("grids", f"found {', '.join(sorted(twice))} twice, expected other names")
+        raise top.error("grids", f"found {listed(sorted(twice))} twice, expected other names")
+    searches = sum(
+        len(each.systems) * len(each.maps) * len(each.methods) * len(each.seeds) for each in grids
+    )
+    if searches > _MOST_SEARCHES:
+        raise top.error("grids", f"found {searches} searches, expected at most {_MOST_SEARCHES}")
     training = top.table("training_hours") if "training_hours" in top.values else None
     return Experiment(
         file=file,
@@ -190,7 +196,7 @@ def read(file: Path) -> Experiment:
         report=Path(os.path.normpath(file.parent / top.text("report", f"{file.stem}.md"))),
         title=top.text("title"),
         text=top.text("text", "").strip(),
-        budget=top.integer("budget", low=1),
+        budget=top.integer("budget", low=1, high=_MOST_FLIGHTS),
         unavoidable=top.integer("unavoidable", 0),
         systems=names,
         grids=grids,
@@ -229,20 +235,22 @@ def _some(table: Table, key: str, among: Collection[str] = ()) -> tuple[str, ...
     """Return a list of strings that is not empty and says nothing twice."""
     found = table.texts(key)
     if not found or len(set(found)) < len(found):
-        raise table.error(key, f"found {list(found)!r}, expected names, each once")
+        raise table.error(key, f"found {shown(list(found))}, expected names, each once")
     for name in found:
         if among and name not in among:
-            raise table.error(key, f"found {name!r}, expected some of {', '.join(among)}")
+            raise table.error(key, f"found {shown(name)}, expected some of {listed(among)}")
     return found
 
 
 def _seeds(table: Table) -> tuple[int, ...]:
     found = table.get("seeds")
     good = isinstance(found, list) and all(
-        isinstance(seed, int) and not isinstance(seed, bool) and seed >= 0 for seed in found
+        type(seed) is int and 0 <= seed <= LARGEST for seed in found
     )
     if not good or not found or len(set(found)) < len(found):
-        raise table.error("seeds", f"found {found!r}, expected whole numbers from 0, each once")
+        raise table.error(
+            "seeds", f"found {shown(found)}, expected whole numbers from 0, each once"
+        )
     return tuple(found)
 
 

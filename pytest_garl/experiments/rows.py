@@ -6,15 +6,19 @@ import csv
 import dataclasses
 import io
 import math
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any
 
 from pytest_garl.errors import GarlError
+from pytest_garl.messages import listed, printable, shown
+from pytest_garl.reading import MEGABYTE, read_text
 from pytest_garl.saving import alone, save_text
 
+LARGEST_BYTES = 16 * MEGABYTE
+"""Some ten thousand searches, each a row of a kilobyte."""
 SEPARATOR = "|"
 """Between signatures in a cell."""
 
@@ -87,21 +91,31 @@ def _number(cell: str) -> float:
     return value
 
 
+def _whole(cell: str) -> int:
+    value = int(cell)
+    if not 0 <= value <= _LARGEST:
+        raise ValueError(cell)
+    return value
+
+
+_LARGEST = 2**63 - 1
+
+
 def _optional(kind: Callable[[str], Any]) -> Callable[[str], Any]:
     return lambda cell: kind(cell) if cell else None
 
 
 _READERS: Mapping[str, Callable[[str], Any]] = MappingProxyType(
     {
-        "str": str,
-        "int": int,
+        "str": printable,
+        "int": _whole,
         "float": _number,
-        "int | None": _optional(int),
+        "int | None": _optional(_whole),
         "float | None": _optional(_number),
-        "tuple[str, ...]": lambda cell: tuple(cell.split(SEPARATOR)) if cell else (),
+        "tuple[str, ...]": lambda cell: tuple(printable(cell).split(SEPARATOR)) if cell else (),
     }
 )
-_EXPECTED = {"int": "a whole number", "float": "a number"}
+_EXPECTED = {"int": "a whole number from 0", "float": "a number"}
 _FIELDS = {field.name: str(field.type) for field in dataclasses.fields(Row)}
 
 
@@ -110,26 +124,28 @@ def read(path: Path) -> tuple[Row, ...]:
 
     Raises ExperimentError that names file, line and column.
     """
-    try:
-        text = path.read_text(encoding="utf-8") if path.exists() else ""
-    except (OSError, UnicodeDecodeError) as error:
-        raise ExperimentError(f"{path}: cannot be read ({error})") from error
+    there = path.exists() or path.is_symlink()
+    text = read_text(path, LARGEST_BYTES, ExperimentError) if there else ""
     if not text:
         return ()
     lines = csv.DictReader(io.StringIO(text, newline=""), strict=True)
-    if lines.fieldnames != [*_FIELDS]:
-        wrong = {*(lines.fieldnames or ())} ^ {*_FIELDS}
-        raise ExperimentError(
-            f"{path}: found other columns than expected"
-            f"{': ' + ', '.join(sorted(wrong)) if wrong else ', in another order'}. Were its rows "
-            "written by another version of pytest-garl? Keep them under another name"
-        )
     try:
+        _check_columns(path, lines.fieldnames or ())
         return tuple(_row(path, lines.line_num, cells) for cells in lines)
     except csv.Error as error:
         raise ExperimentError(
             f"{path}, line {lines.line_num + 1}: not valid CSV: {error}"
         ) from error
+
+
+def _check_columns(path: Path, found: Sequence[str]) -> None:
+    if [*found] != [*_FIELDS]:
+        wrong = {*found} ^ {*_FIELDS}
+        raise ExperimentError(
+            f"{path}: found other columns than expected"
+            f"{': ' + listed(sorted(wrong)) if wrong else ', in another order'}. Were its rows "
+            "written by another version of pytest-garl? Keep them under another name"
+        )
 
 
 def _row(path: Path, line: int, cells: Mapping[str, str | None]) -> Row:
@@ -146,7 +162,7 @@ def _row(path: Path, line: int, cells: Mapping[str, str | None]) -> Row:
         except ValueError as error:
             expected = _EXPECTED[kind.partition(" ")[0]]
             raise ExperimentError(
-                f"{path}, line {line}: column {name!r}: found {cell!r}, expected {expected}"
+                f"{path}, line {line}: column {name!r}: found {shown(cell)}, expected {expected}"
             ) from error
     return Row(**values)
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import sqlite3
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -14,6 +15,27 @@ REMEDY = (
     "Is it a ledger, is there space, may it be written? Mend that and go on with --garl-resume, or "
     "choose another folder with the ini key garl_dir"
 )
+_LONGEST = 64_000_000
+"""Bytes in one value: a damaged file may say that one fills the memory."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Rows:
+    """What a statement returned, and how many rows it changed."""
+
+    rows: list[tuple[Any, ...]]
+    rowcount: int
+
+    def __iter__(self) -> Iterator[tuple[Any, ...]]:
+        return iter(self.rows)
+
+    def fetchone(self) -> Any:
+        """Return the first row, or None."""
+        return self.rows[0] if self.rows else None
+
+    def fetchall(self) -> list[tuple[Any, ...]]:
+        """Return all rows."""
+        return self.rows
 
 
 class Database:
@@ -23,11 +45,13 @@ class Database:
         self._path = path
         with self._explained():
             self._connection = sqlite3.connect(path, timeout=30, isolation_level=None)
+            self._connection.setlimit(sqlite3.SQLITE_LIMIT_LENGTH, _LONGEST)
 
-    def execute(self, sql: str, values: Sequence[Any] = ()) -> sqlite3.Cursor:
-        """Run one statement."""
+    def execute(self, sql: str, values: Sequence[Any] = ()) -> Rows:
+        """Run one statement and fetch what it returns: a damaged page may show only then."""
         with self._explained():
-            return self._connection.execute(sql, values)
+            cursor = self._connection.execute(sql, values)
+            return Rows(rows=cursor.fetchall(), rowcount=cursor.rowcount)
 
     def executemany(self, sql: str, rows: Sequence[Sequence[Any]]) -> None:
         """Run one statement for each row."""

@@ -5,11 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Literal
 
+from pytest_garl.landing_system import Diagnostics
+
 if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
-
-    from pytest_garl.landing_system import Diagnostics
 
 Outcome = Literal["landed", "collision", "not_landed", "aborted", "crashed"]
 BodyClass = Literal["static", "dynamic", "ground"]

@@ -7,25 +7,37 @@ import hashlib
 import io
 import json
 import os
-import zipfile
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
+from pytest_garl.arrays import unpack
 from pytest_garl.errors import GarlError
-from pytest_garl.landing_system import Detection, Diagnostics
+from pytest_garl.messages import listed
+from pytest_garl.plain import made, parsed
+from pytest_garl.reading import MEGABYTE, read_bytes
 from pytest_garl.simulation.flight import (
     Contact,
     Crash,
     Event,
     Flight,
     ObjectRecord,
+    Outcome,
     Separation,
     Step,
     Track,
 )
 
+Array = NDArray[Any]
+LARGEST_BYTES = 32 * MEGABYTE
+LARGEST_UNPACKED_BYTES = 128 * MEGABYTE
+"""The tracks of 150 objects over five minutes are 95 megabytes."""
+LARGEST_HEADER_BYTES = 32 * MEGABYTE
+"""What landing systems tell of their thoughts is some kilobytes a frame; reading takes ten times
+as much memory."""
 _TRACK = ("time_s", "position_m", "attitude", "velocity_mps")
 
 
@@ -118,66 +130,97 @@ def _holds_nan(value: Any) -> bool:
 
 def load(path: Path) -> Flight:
     """Return a saved flight; raise GarlError for a file that is none."""
+    content = read_bytes(path, LARGEST_BYTES, GarlError)
     try:
-        with np.load(path, allow_pickle=False) as file:
-            arrays = dict(file)
-        header = json.loads(arrays["header"].tobytes())
-    except (OSError, KeyError, ValueError, zipfile.BadZipFile) as error:
+        arrays = unpack(content, LARGEST_UNPACKED_BYTES)
+        header = arrays.pop("header", np.empty(0))
+        if header.nbytes > LARGEST_HEADER_BYTES:
+            raise ValueError(
+                f"header: found {header.nbytes} bytes, expected at most {LARGEST_HEADER_BYTES}"
+            )
+        values = parsed(header.tobytes())
+        # Files of flights in which no policy changed the environment do not have it.
+        told = made(_Header, {"changes": None, **values} if isinstance(values, dict) else values)
+        return _flight(told, arrays)
+    except ValueError as error:
         raise GarlError(f"{path}: not a saved flight: {error}") from error
 
-    changes = header.get("changes") or [()] * len(header["objects"])
 
-    def track(index: int) -> Track:
-        return Track(**{name: arrays[f"{index}.{name}"] for name in _TRACK})
-
+def _flight(told: _Header, arrays: dict[str, Array]) -> Flight:
+    count = len(told.objects)
+    changes = told.changes if told.changes is not None else ((),) * count
+    tracks = [_track(arrays, index) for index in range(count + 1)]
+    moves = [_array(arrays, f"{index + 1}.moves", (-1, 2)) for index in range(count)]
+    if arrays:
+        raise ValueError(f"found more arrays than {count} objects have: {listed(sorted(arrays))}")
+    if len(changes) != count:
+        raise ValueError(f"changes: found those of {len(changes)} objects, expected {count}")
+    values = {name: getattr(told, name) for name in _SAME}
     return Flight(
-        outcome=header["outcome"],
-        final_distance_m=header["final_distance_m"],
-        elapsed_s=header["elapsed_s"],
-        marker_position_m=_pair(header["marker_position_m"]),
-        uav=track(0),
+        uav=tracks[0],
         objects=tuple(
-            ObjectRecord(
-                name=name,
-                type=kind,
-                track=track(i),
-                moves=arrays[f"{i}.moves"],
-                changes=_tuple(changes[i - 1]),
+            ObjectRecord(name=name, type=kind, track=track, moves=own, changes=changed)
+            for (name, kind), track, own, changed in zip(
+                told.objects, tracks[1:], moves, changes, strict=True
             )
-            for i, (name, kind) in enumerate(header["objects"], start=1)
         ),
-        contacts=tuple(Contact(**_tuples(item)) for item in header["contacts"]),
-        separations=tuple(Separation(**item) for item in header["separations"]),
-        events=tuple(Event(**item) for item in header["events"]),
-        steps=tuple(_step(item) for item in header["steps"]),
-        decoys=tuple((name, x, y) for name, x, y in header["decoys"]),
-        crash=Crash(**header["crash"]) if header["crash"] else None,
-        sha256=header["sha256"],
-        cpu=header["cpu"],
-        versions=tuple((name, version) for name, version in header["versions"]),
-        wall_s=header["wall_s"],
+        **values,
     )
 
 
-def _step(item: dict[str, Any]) -> Step:
-    thoughts = item.pop("diagnostics")
-    diagnostics = None
-    if thoughts is not None:
-        seen = thoughts.pop("detections")
-        diagnostics = Diagnostics(
-            detections=tuple(Detection(**_tuples(each)) for each in seen), **_tuples(thoughts)
+def _track(arrays: dict[str, Array], index: int) -> Track:
+    time_s = _array(arrays, f"{index}.time_s", (-1,))
+    length = len(time_s)
+    if not length:
+        raise ValueError(f"{index}.time_s: found no times, expected one at least")
+    return Track(
+        time_s=time_s,
+        position_m=_array(arrays, f"{index}.position_m", (length, 3)),
+        attitude=_array(arrays, f"{index}.attitude", (length, 4)),
+        velocity_mps=_array(arrays, f"{index}.velocity_mps", (length, 3)),
+    )
+
+
+def _array(arrays: dict[str, Array], name: str, shape: tuple[int, ...]) -> Array:
+    """Take a float64 array of finite numbers; -1 in the shape stands for any length."""
+    if name not in arrays:
+        raise ValueError(f"{name}: missing")
+    found = arrays.pop(name)
+    alike = found.ndim == len(shape) and all(
+        want in (-1, size) for size, want in zip(found.shape, shape, strict=True)
+    )
+    if not alike or found.dtype != np.float64:
+        words = ", ".join("any" if want == -1 else str(want) for want in shape)
+        raise ValueError(
+            f"{name}: found {found.dtype} of the shape {found.shape}, expected float64 of ({words})"
         )
-    return Step(diagnostics=diagnostics, **_tuples(item))
+    if not np.isfinite(found).all():
+        raise ValueError(f"{name}: found a number that is not finite")
+    return found
 
 
-def _tuples(item: dict[str, Any]) -> dict[str, Any]:
-    return {key: _tuple(value) for key, value in item.items()}
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Header:
+    """What of a flight is no array."""
+
+    outcome: Outcome
+    final_distance_m: float
+    elapsed_s: float
+    marker_position_m: tuple[float, float]
+    objects: tuple[tuple[str, str], ...]
+    contacts: tuple[Contact, ...]
+    separations: tuple[Separation, ...]
+    events: tuple[Event, ...]
+    steps: tuple[Step, ...]
+    decoys: tuple[tuple[str, float, float], ...]
+    crash: Crash | None
+    sha256: str
+    cpu: str
+    versions: tuple[tuple[str, str], ...]
+    wall_s: float
+    changes: tuple[tuple[tuple[int, str, float], ...], ...] | None
 
 
-def _tuple(value: Any) -> Any:
-    return tuple(_tuple(each) for each in value) if isinstance(value, list) else value
-
-
-def _pair(value: list[float]) -> tuple[float, float]:
-    x, y = value
-    return x, y
+_SAME = tuple(
+    field.name for field in dataclasses.fields(_Header) if field.name not in ("objects", "changes")
+)

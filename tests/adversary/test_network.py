@@ -1,8 +1,12 @@
 from __future__ import annotations
 
+import io
 import json
+import os
+import zipfile
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -68,6 +72,50 @@ def _restamp(path: Path) -> None:
     )
 
 
+def _bomb(path: Path) -> None:
+    """Write some kilobytes that hold two megabytes of zeros."""
+    with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as archive:
+        for name in ("weight_0", "bias_0"):
+            with archive.open(f"{name}.npy", "w") as member:
+                np.lib.format.write_array_header_1_0(
+                    member, {"descr": "<f8", "fortran_order": False, "shape": (125_000,)}
+                )
+                member.write(bytes(1_000_000))
+    _restamp(path)
+
+
+def _claim(path: Path) -> None:
+    """Say in an array's header that it is as large as a terabyte."""
+    buffer = io.BytesIO()
+    np.lib.format.write_array_header_1_0(
+        buffer, {"descr": "<f8", "fortran_order": False, "shape": (10**11, 4)}
+    )
+    with zipfile.ZipFile(path, "w") as archive:
+        archive.writestr("weight_0.npy", buffer.getvalue())
+    _restamp(path)
+
+
+def _extra(path: Path) -> None:
+    arrays: dict[str, Any] = {"weight_0": np.zeros((5, 4)), "bias_1": np.zeros(5)}
+    np.savez(path, **arrays)
+    _restamp(path)
+
+
+def _large(path: Path) -> None:
+    path.write_bytes(bytes(1_000_001))
+    _restamp(path)
+
+
+def _pipe(path: Path) -> None:
+    path.with_suffix(".json").unlink()
+    os.mkfifo(path.with_suffix(".json"))
+
+
+def _escape(path: Path) -> None:
+    file = path.with_suffix(".json")
+    file.write_text(json.dumps({**json.loads(file.read_text()), "sha256": "\x1b[2J"}))
+
+
 def _list(path: Path) -> None:
     path.with_suffix(".json").write_text("[]")
 
@@ -97,6 +145,14 @@ def _unknown_state(path: Path) -> None:
         (lambda path: path.with_suffix(".json").unlink(), "no readable manifest"),
         (_array, "is no file of weights"),
         (_list, "no readable manifest"),
+        (_bomb, "found 2000256 bytes when unpacked, expected at most 1000000"),
+        (_claim, r"found 0 bytes for the shape \(100000000000, 4\)"),
+        (_extra, "found bias_1, weight_0; expected weight_0, bias_0"),
+        (_large, "found 1000001 bytes, expected at most 1000000"),
+        (_pipe, "found a pipe, expected a regular file"),
+        (_escape, r"its manifest says \\x1b\[2J"),
+        (lambda path: path.with_suffix(".json").write_text("[" * 99_999), "nested too deeply"),
+        (lambda path: path.with_suffix(".json").write_text("9" * 5000), "Exceeds the limit"),
         (lambda path: path.with_suffix(".json").write_text("{}"), "not a manifest of format 1"),
         (_other_state, "where 9 numbers go in"),
         (_unknown_state, "names the state 'psychic'; known: paper"),

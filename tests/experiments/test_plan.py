@@ -135,7 +135,11 @@ def test_what_is_not_said_is_left_out(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("before", "after", "words"),
     [
-        ("budget = 40", "budget = 0", "'budget': found 0, expected a whole number of at least 1"),
+        (
+            "budget = 40",
+            "budget = 0",
+            "'budget': found 0, expected a whole number from 1 to",
+        ),
         ("budget = 40", "", "'budget': missing"),
         ("budget = 40", "budget = 40\nrepeat = 3", "'repeat': unknown key; expected one of budget"),
         ("seeds = [3, 4]", "seeds = [3, 3]", "'seeds': found [3, 3], expected whole numbers"),
