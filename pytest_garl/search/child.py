@@ -2,117 +2,179 @@
 
 from __future__ import annotations
 
-import faulthandler
+import dataclasses
 import os
-import threading
-import time
+import resource
+import traceback
+from os import _exit, getpid
 from pathlib import Path
-from typing import TextIO
+from time import monotonic, sleep
 
 from pytest_garl import dispatch
-from pytest_garl.errors import LedgerError
+from pytest_garl.errors import GarlError, LandingSystemError, LedgerError
 from pytest_garl.search.checkout import see_only
-from pytest_garl.search.ledger import Ledger
-from pytest_garl.search.processes import end_with_parent, run_child
+from pytest_garl.search.ledger import Claim, Ledger
+from pytest_garl.search.processes import Parent, run_child
 from pytest_garl.search.slots import flight_name
+from pytest_garl.search.supervisor import Watch, supervise
 
 IDLE_S = 0.02
-BEAT_S = 5.0
 ALONE_FACTOR = 3.0
-_STDERR = 2
+RESTART_S = 1.0
+"""How long a child that has flown leaves a slot to a fresh one before it makes way for another."""
+SIMULATOR = "the simulator"
 
 
-class Watchdog:
-    """Ends the process when a call of the landing system takes too long.
+def main(parent: Parent, path: str, *checkouts: str) -> None:
+    """Fly until the parent process is gone; with checkouts, see only the first of them."""
+    owner = getpid()
 
-    faulthandler's timer is a C thread: it works while the system holds the interpreter.  To start
-    one takes as long as three calls of a flight control, so a timer that has just been started
-    serves the calls after it too, and lets them take up to a twentieth longer than the limit.
+    def fly(watch: Watch) -> None:
+        if checkouts:
+            see_only(checkouts)
+        Flyer(Path(path), owner, watch).run()
+
+    supervise(parent, fly, SIMULATOR)
+
+
+class Flyer:
+    """Claims, flies and records slot after slot, under the name of the supervisor ``owner``.
+
+    It ends where a fresh process shall go on: after a flight that left something behind.
     """
 
-    def __init__(self, file: TextIO) -> None:
-        self._file = file
-        self._renew_at = 0.0
-        self.limit_s = 10.0
+    def __init__(self, path: Path, owner: int, watch: Watch) -> None:
+        self._path, self._owner, self._watch = path, owner, watch
+        self._me = getpid()
+        self._flown = 0
 
-    def step_begins(self) -> None:
-        """See that the timer runs."""
-        now = time.monotonic()
-        if now >= self._renew_at:
-            slack_s = self.limit_s / 20
-            faulthandler.dump_traceback_later(self.limit_s + slack_s, exit=True, file=self._file)
-            self._renew_at = now + slack_s
+    def run(self) -> None:
+        """Fly until the supervisor is gone, or until a fresh process shall go on."""
+        import cv2
 
-    def step_ends(self) -> None:
-        """Let it run on: the next call renews it, ``flight_ends`` stops it."""
+        import pytest_garl.search.job  # noqa: F401 (before the landing system's modules)
 
-    def flight_ends(self) -> None:
-        """Stop the timer."""
-        faulthandler.cancel_dump_traceback_later()
-        self._renew_at = 0.0
-
-
-def dump_file(folder: Path, pid: int) -> Path:
-    """Where a child leaves its last words."""
-    return folder / f"child-{pid}.txt"
-
-
-def keep_claims(path: Path) -> None:
-    """Renew this process's claims from a thread, until the process ends."""
-
-    def beat() -> None:
-        ledger = Ledger(path)
-        while True:
-            time.sleep(BEAT_S)
-            ledger.renew()
-
-    threading.Thread(target=beat, daemon=True).start()
-
-
-def main(path: str, *checkouts: str) -> None:
-    """Fly until the parent process is gone; with checkouts, see only the first of them."""
-    parent_lives = end_with_parent()
-    if checkouts:
-        see_only(checkouts)
-    import cv2
-
-    from pytest_garl.search.job import broken_result, fly_job, load_scenario, loads
-
-    cv2.setNumThreads(1)
-    dispatch.check()
-    ledger = Ledger(Path(path))
-    keep_claims(Path(path))
-    idle_since = time.monotonic()
-    with dump_file(Path(path).parent, os.getpid()).open("w") as words:
-        watchdog = Watchdog(words)
-        while parent_lives():
-            claim = ledger.claim()
+        cv2.setNumThreads(1)
+        dispatch.check()
+        limits = _limits()
+        idle_since = monotonic()
+        ledger = Ledger(self._path, self._owner)
+        while os.getppid() == self._owner:
+            claim = ledger.claim(fresh=not self._flown)
             if claim is None:
-                time.sleep(IDLE_S)
+                if self._flown and monotonic() > idle_since + RESTART_S and ledger.alone_waits():
+                    break
+                sleep(IDLE_S)
                 continue
-            ledger.count("idle_s", time.monotonic() - idle_since)
-            # What was said in earlier flights explains nothing about this one's death.
-            os.ftruncate(_STDERR, 0)
-            job = loads(claim.job)
-            watchdog.limit_s = job.timeout_s * (ALONE_FACTOR if claim.after else 1.0)
-            slot_id = flight_name(claim.search, claim.generation, claim.slot, job.map)
+            ledger.count("idle_s", monotonic() - idle_since)
+            # A landing system may close all files: what is written then would go anywhere.
+            ledger.close()
             try:
-                result, sha256, wall_s = fly_job(
-                    job, load_scenario(claim.scenario), slot_id, watchdog
-                )
-            except OSError as error:
-                # The landing system's own are part of its flight; this one is of the record.
-                raise LedgerError(f"{job.flights}: {error.strerror or error}") from error
-            finally:
-                watchdog.flight_ends()
-            if claim.after == "hung":
-                # It hung once and not again: the machine's doing as likely as the system's.
-                text = f"one call took longer than {job.timeout_s:g} s once, but not again"
-                distance = float(result["final_distance_m"])
-                result = broken_result("hung", "Timeout", text, "", distance, inconclusive=True)
-            ledger.record(claim, result, sha256, wall_s)
-            idle_since = time.monotonic()
+                result, sha256, wall_s = self._fly(claim)
+                ledger = Ledger(self._path, self._owner)
+                ledger.record(claim, result, sha256, wall_s)
+            except Exception as error:
+                if _cannot_go_on(error) and limits == _limits() and _can_open():
+                    raise
+                self._watch.tell(failure=_described(error))
+                break
+            self._flown += 1
+            if _left_processes():
+                break
+            idle_since = monotonic()
+
+    def _fly(self, claim: Claim) -> tuple[dict[str, object], str, float]:
+        from pytest_garl.search.job import fly_job, load_scenario, loads, record_file
+
+        job, scenario = loads(claim.job), load_scenario(claim.scenario)
+        name = flight_name(claim.search, claim.generation, claim.slot, job.map)
+        limit_s = job.timeout_s * (ALONE_FACTOR if claim.after else 1.0)
+        if "failed" in claim.after:
+            self._prove_simulator(claim)
+        try:
+            record_file(job, claim).unlink(missing_ok=True)
+            self._watch.flight_begins(limit_s)
+            return fly_job(job, scenario, name, self._watch)
+        except OSError as error:
+            # The landing system's own are part of its flight; this one is of the record.
+            raise LedgerError(f"{job.flights}: {error.strerror or error}") from error
+        finally:
+            if getpid() != self._me:
+                # The landing system has forked: only one of the two flies on.
+                _exit(0)
+            self._watch.flight_ends()
+
+    def _prove_simulator(self, claim: Claim) -> None:
+        """Fly what failed with the reference pilot; raise GarlError if that fails as well."""
+        from pytest_garl.search.job import fly_job, load_scenario, loads
+        from pytest_garl.search.reference import reference_to
+        from pytest_garl.simulation.reference_pilot import ReferencePilot
+
+        job = dataclasses.replace(loads(claim.job), system=reference_to(ReferencePilot))
+        name = flight_name(claim.search, claim.generation, claim.slot, job.map)
+        try:
+            fly_job(job, load_scenario(claim.scenario), name, None)
+        except GarlError:
+            raise
+        except Exception as error:
+            raise SimulatorError(
+                f"{SIMULATOR} failed in a child process:\n{_text(error)}"
+            ) from error
+
+
+class SimulatorError(GarlError):
+    """A simulator that fails in a fresh process, with a landing system that is known to be good."""
+
+
+def _cannot_go_on(error: Exception) -> bool:
+    """Whether an error is none of the landing system's doing, if it left files and limits alone."""
+    return isinstance(error, GarlError) and not isinstance(error, LandingSystemError)
+
+
+def _described(error: Exception) -> dict[str, str]:
+    from pytest_garl.simulation.texts import MESSAGE_CHARS, TRACEBACK_CHARS, name_of, told
+
+    kind = name_of(type(error))
+    return {
+        "error": kind,
+        "message": told(lambda: str(error), MESSAGE_CHARS, f"{kind}, whose str()"),
+        "traceback": told(lambda: _text(error), TRACEBACK_CHARS, f"{kind}, whose traceback"),
+    }
+
+
+def _text(error: Exception) -> str:
+    return "".join(traceback.format_exception(error))
+
+
+def _limits() -> list[tuple[int, int]]:
+    """Return what this process may use of the machine."""
+    names = (
+        resource.RLIMIT_NOFILE,
+        resource.RLIMIT_FSIZE,
+        resource.RLIMIT_AS,
+        resource.RLIMIT_DATA,
+    )
+    return [resource.getrlimit(name) for name in names]
+
+
+def _can_open() -> bool:
+    """Whether a file can be opened: a landing system may have used up how many there may be."""
+    try:
+        os.close(os.open(os.devnull, os.O_RDONLY))
+    except OSError:
+        return False
+    return True
+
+
+def _left_processes() -> bool:
+    """Whether a process that flights have started lives on; those that have ended are let go."""
+    try:
+        while os.waitpid(-1, os.WNOHANG)[0]:
+            pass
+    except ChildProcessError:
+        return False
+    return True
 
 
 if __name__ == "__main__":
-    run_child(main, "the simulator")
+    run_child(main, SIMULATOR)

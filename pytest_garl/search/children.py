@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import os
+import signal
 import subprocess
 import sys
 import tempfile
@@ -11,21 +12,17 @@ import time
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import IO, Protocol
+from typing import IO, Any, Protocol
 
 from pytest_garl import dispatch
 from pytest_garl.errors import LedgerError, PoolError
-from pytest_garl.search.child import dump_file
 from pytest_garl.search.deaths import Death
 from pytest_garl.search.ledger import Ledger
-from pytest_garl.search.processes import CANNOT_GO_ON
+from pytest_garl.search.processes import read_report, report_file
 
 POLL_S = 0.02
 MOST_LOSSES = 3
-"""Children that may die without a flight before the pool gives up."""
-PATIENCE_S = 30.0
-"""How long a child may take to end when it is asked to; one that ends a Ray cluster needs a second
-or two, and more on a busy machine."""
+"""Children that may end, one after the other, before anything is flown: then the pool gives up."""
 COMPLAINT_BYTES = 2**16
 """How much is read of what a child said on stderr: its end says why it died."""
 
@@ -36,6 +33,10 @@ class Crew(Protocol):
     @property
     def seats(self) -> int:
         """How many there may be, with those of other pools on the ledger."""
+
+    @property
+    def patience_s(self) -> float:
+        """How long a child may take to end when it is asked to."""
 
     def command(self, ledger: Path) -> Sequence[str]:
         """Return the module that a child runs, and its arguments."""
@@ -49,24 +50,49 @@ class _Child:
     process: subprocess.Popen[bytes]
     said: IO[bytes]
     """Its stderr: a file, since a pipe that nobody reads blocks a child that says much."""
+    report: int
 
-    def end(self) -> None:
-        """End it, gently if it lets itself."""
-        self.process.terminate()
-        try:
-            self.process.wait(PATIENCE_S)
-        except subprocess.TimeoutExpired:
-            self.process.kill()
+    def has_ended(self) -> bool:
+        """Return whether it has; then nothing of its session is left."""
+        pid = self.process.pid
+        # Not by Popen.poll: that frees the id, and what is left of the session is ended by it.
+        if os.waitid(os.P_PID, pid, os.WEXITED | os.WNOHANG | os.WNOWAIT) is None:
+            return False
+        self._end_session()
+        self.process.wait()
+        return True
+
+    def ask_to_end(self) -> None:
+        """Ask it to end; Popen.terminate would free the id of one that has ended."""
+        os.kill(self.process.pid, signal.SIGTERM)
+
+    def end(self, patience_s: float) -> None:
+        """See that it ends, which it was asked to, and that nothing of its session is left."""
+        until = time.monotonic() + patience_s
+        while time.monotonic() < until and not self.has_ended():
+            time.sleep(POLL_S / 4)
+        if self.process.returncode is None:
+            self._end_session()
             self.process.wait()
-        self.said.close()
+
+    def _end_session(self) -> None:
+        with contextlib.suppress(ProcessLookupError):
+            os.killpg(self.process.pid, signal.SIGKILL)
+
+    def reported(self) -> dict[str, Any]:
+        """Return what it, or its supervisor, reported when it ended."""
+        return read_report(self.report)
 
     def complaint(self) -> str:
         """Return the last it said."""
         size = self.said.seek(0, os.SEEK_END)
         self.said.seek(max(0, size - COMPLAINT_BYTES))
-        text = self.said.read().decode(errors="replace")
+        return self.said.read().decode(errors="replace")
+
+    def close(self) -> None:
+        """Close its files."""
         self.said.close()
-        return text
+        os.close(self.report)
 
 
 class ChildPool:
@@ -76,11 +102,12 @@ class ChildPool:
         self._ledger, self._crew = ledger, crew
         self._children: dict[int, _Child] = {}
         self._losses = 0
+        self._flown = 0.0
 
     def turn(self) -> None:
         """Look after the children for a moment."""
         for pid, child in list(self._children.items()):
-            if child.process.poll() is not None:
+            if child.has_ended():
                 del self._children[pid]
                 self._bury(pid, child)
         self._ledger.release_dead()
@@ -91,46 +118,64 @@ class ChildPool:
 
     def close(self) -> None:
         """End the children and give back what they had in flight."""
+        for child in self._children.values():
+            child.ask_to_end()
         for pid, child in self._children.items():
-            child.end()
+            child.end(self._crew.patience_s)
+            child.close()
             with contextlib.suppress(LedgerError):
                 # What cannot be given back is given back when the run is resumed.
                 self._ledger.release(pid)
                 self._ledger.leave_seat(pid)
-            dump_file(self._ledger.path.parent, pid).unlink(missing_ok=True)
         self._children.clear()
 
     def _spawn(self) -> int:
         said = tempfile.TemporaryFile("a+b")  # noqa: SIM115 (closed when the child is gone)
+        report = report_file()
+        module, *arguments = self._crew.command(self._ledger.path)
+        parent = [str(os.getpid()), str(report)]
         process = subprocess.Popen(
-            [sys.executable, "-m", *self._crew.command(self._ledger.path)],
+            [sys.executable, "-m", module, *parent, *arguments],
             env={**os.environ, **dispatch.environment()},
             stdin=subprocess.DEVNULL,
             stdout=subprocess.DEVNULL,
             stderr=said,
+            pass_fds=[report],
             start_new_session=True,
         )
-        self._children[process.pid] = _Child(process=process, said=said)
+        self._children[process.pid] = _Child(process=process, said=said, report=report)
         return process.pid
 
     def _bury(self, pid: int, child: _Child) -> None:
-        """Decide what a child's death means."""
+        """Decide what a child's end means."""
         try:
-            file = dump_file(self._ledger.path.parent, pid)
-            words = file.read_text() if file.exists() else ""
-            file.unlink(missing_ok=True)
-            status = child.process.returncode
-            death = Death(status=status, words=words, complaint=child.complaint())
-            self._settle(pid, death)
+            facts, status = child.reported(), child.process.wait()
+            if "cannot_go_on" in facts:
+                self._ledger.release(pid)
+                raise PoolError(facts["cannot_go_on"].strip())
+            failure = facts.get("failure")
+            death = Death(
+                status=facts.get("status", status),
+                words=facts.get("words", ""),
+                complaint=facts.get("complaint") or child.complaint(),
+                hung=facts.get("hung", ""),
+                failure=(failure["error"], failure["message"], failure["traceback"])
+                if failure
+                else None,
+                watched=bool(facts),
+            )
+            if not self._crew.bury(self._ledger, pid, death):
+                self._lose(death)
         finally:
             self._ledger.leave_seat(pid)
+            child.close()
 
-    def _settle(self, pid: int, death: Death) -> None:
-        if CANNOT_GO_ON in death.complaint:
-            self._ledger.release(pid)
-            raise PoolError(death.complaint.partition(CANNOT_GO_ON)[2].strip())
-        if self._crew.bury(self._ledger, pid, death):
-            return
-        self._losses += 1
+    def _lose(self, death: Death) -> None:
+        """Give up if child after child ends without a flight; one may end between two flights."""
+        flown = self._ledger.flights()
+        if flown > self._flown:
+            self._flown, self._losses = flown, 0
+        if death.status != 0 or not death.watched:
+            self._losses += 1
         if self._losses > MOST_LOSSES:
             raise PoolError(f"flying children die before they fly:\n{death.complaint.strip()}")

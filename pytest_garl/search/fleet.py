@@ -7,16 +7,14 @@ import os
 import time
 from collections import Counter
 from collections.abc import Mapping
-from pathlib import Path
 from typing import Any
 
 from pytest_garl.errors import LedgerError, PoolError
 from pytest_garl.search.child import IDLE_S
 from pytest_garl.search.deaths import Death, settle
-from pytest_garl.search.job import loads
+from pytest_garl.search.job import loads, record_file
 from pytest_garl.search.ledger import Claim, Ledger
 from pytest_garl.search.pilot import Base, Landed, Pilot, versions
-from pytest_garl.search.slots import flight_name
 
 MOST_LOSSES = 3
 """Workers of Ray that may be lost with the same slot, or one after the other before they fly."""
@@ -102,6 +100,7 @@ class Fleet:
         while self._idle and (claim := self._ledger.claim()):
             pilot, since = self._idle.pop()
             self._ledger.count("idle_s", time.monotonic() - since)
+            record_file(loads(claim.job), claim).unlink(missing_ok=True)
             self._flying[pilot.fly.remote(claim)] = pilot, claim
 
     def _take_in(self, ref: Any, pilot: Any, claim: Claim) -> None:
@@ -143,9 +142,7 @@ def unlike(ours: Mapping[str, str], theirs: Mapping[str, str]) -> str:
 
 def _keep(flight: Landed, claim: Claim) -> None:
     """Write a flight's record where the job wants it, whole or not at all."""
-    job = loads(claim.job)
-    name = flight_name(claim.search, claim.generation, claim.slot, job.map)
-    path = Path(job.flights) / f"{name}.npz"
+    path = record_file(loads(claim.job), claim)
     scratch = path.with_name(f".{path.name}.{os.getpid()}")
     try:
         path.parent.mkdir(parents=True, exist_ok=True)

@@ -11,7 +11,9 @@ from typing import Any
 
 from pytest_garl.scenarios.maps import load_map
 from pytest_garl.scenarios.scenario import Scenario
+from pytest_garl.search.ledger import Claim
 from pytest_garl.search.reference import Reference
+from pytest_garl.search.slots import flight_name
 from pytest_garl.simulation.policy import PolicySpec
 from pytest_garl.verdicts.verdict import Limits
 
@@ -74,6 +76,12 @@ def load_scenario(text: str) -> Scenario:
     genes = tuple((key, float(value)) for key, value in values["genes"])
     absent = tuple(values.get("absent", ()))
     return Scenario(map=values["map"], seed=values["seed"], genes=genes, absent=absent)
+
+
+def record_file(job: Job, claim: Claim) -> Path:
+    """Return where the record of a claimed slot's flight goes."""
+    name = flight_name(claim.search, claim.generation, claim.slot, job.map)
+    return Path(job.flights) / f"{name}.npz"
 
 
 def fly_job(

@@ -8,11 +8,11 @@ import json
 import os
 import re
 import sqlite3
-import time
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
+from time import monotonic
 from typing import Any, Literal
 
 from pytest_garl.errors import LedgerError
@@ -44,16 +44,16 @@ violation once more.  Figures and the result hash are those of the searches."""
 _METERS = {"search": "flights", "case": "cases", "errand": "errands"}
 _ADDRESS = re.compile(r"0x[0-9a-f]+")
 LEASE_S = 30.0
-"""A claim that is not renewed for so long is free again: its process hangs or its id was given
-to another."""
+"""So long the claim of a dead process is left to those who watched it, and that of a living one to
+it where nobody watches: its id was given to another."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Claim:
     """One slot that the process ``pid`` shall fly, or see to it that it is flown.
 
-    ``after`` is what its first flight did to its process, "hung" or "died"; then it is
-    flown once more, alone.  ``attempt`` counts from 1.
+    ``after`` is how earlier flights of it ended their processes, such as "hung" or "hung killed";
+    then it is flown once more, alone.  ``attempt`` counts from 1.
     """
 
     search: str
@@ -95,10 +95,14 @@ class Row:
 
 
 class Ledger:
-    """A run's searches, slots and results; safe for several processes."""
+    """A run's searches, slots and results; safe for several processes.
 
-    def __init__(self, path: Path) -> None:
+    Slots are claimed for the process ``pid``: this one, or the one that watches it.
+    """
+
+    def __init__(self, path: Path, pid: int | None = None) -> None:
         self.path = path
+        self._pid = os.getpid() if pid is None else pid
         self._db = Database(path)
         self._db.execute("PRAGMA journal_mode=WAL")
         self._db.execute("PRAGMA synchronous=NORMAL")
@@ -204,7 +208,7 @@ class Ledger:
     ) -> None:
         """Hand out a generation's slots; once is enough, and twice must be the same.
 
-        ``after`` is what an earlier flight of them did to its process, as in a Claim.
+        ``after`` is how earlier flights of them ended their processes, as in a Claim.
         """
         with self.transaction():
             self._db.executemany(
@@ -251,14 +255,15 @@ class Ledger:
                 ],
             )
 
-    def claim(self, lease_s: float | None = LEASE_S) -> Claim | None:
-        """Take the next unflown slot; one that hung or died is handed out while nobody flies.
+    def claim(self, lease_s: float | None = LEASE_S, *, fresh: bool = True) -> Claim | None:
+        """Take the next unflown slot; one that ended its process is handed out while nobody flies.
 
-        The claim lapses after ``lease_s`` unless it is renewed; None: while the process lives.
+        Only a process that has not flown yet, a ``fresh`` one, gets such a slot.  ``lease_s`` is
+        how long the claim is kept as in ``release_dead``; None: while the process lives.
         """
         with self.transaction():
             flying, alone = self._db.execute(
-                "SELECT count(*), coalesce(sum(attempts > 1), 0) FROM slot WHERE state = 'claimed'"
+                "SELECT count(*), coalesce(sum(after != ''), 0) FROM slot WHERE state = 'claimed'"
             ).fetchone()
             if alone:
                 return None
@@ -266,12 +271,12 @@ class Ledger:
                 "SELECT search, generation, slot, scenario, after, attempts FROM slot "
                 "WHERE state = 'waiting' ORDER BY after DESC, generation, slot, search LIMIT 1"
             ).fetchone()
-            if row is None or (row[4] and flying):
+            if row is None or (row[4] and (flying or not fresh)):
                 return None
             self._db.execute(
                 "UPDATE slot SET state = 'claimed', pid = ?, lease = ?, attempts = attempts + 1 "
                 "WHERE search = ? AND generation = ? AND slot = ?",
-                (os.getpid(), None if lease_s is None else time.time() + lease_s, *row[:3]),
+                (self._pid, None if lease_s is None else monotonic() + lease_s, *row[:3]),
             )
             job = self._db.execute("SELECT job FROM search WHERE id = ?", row[:1]).fetchone()[0]
         return Claim(
@@ -282,15 +287,16 @@ class Ledger:
             job=job,
             after=row[4],
             attempt=row[5] + 1,
-            pid=os.getpid(),
+            pid=self._pid,
         )
 
-    def renew(self) -> None:
-        """Prolong this process's claims."""
-        self._db.execute(
-            "UPDATE slot SET lease = ? WHERE pid = ? AND state = 'claimed'",
-            (time.time() + LEASE_S, os.getpid()),
-        )
+    def alone_waits(self) -> bool:
+        """Return whether nobody flies and a slot waits for a fresh process to fly it alone."""
+        flying, waiting = self._db.execute(
+            "SELECT coalesce(sum(state = 'claimed'), 0), coalesce(sum(after != ''), 0) FROM slot "
+            "WHERE state IN ('claimed', 'waiting')"
+        ).fetchone()
+        return not flying and bool(waiting)
 
     def count(self, meter: str, amount: float = 1.0) -> None:
         """Add to a meter: what the run spent, beside its results."""
@@ -303,6 +309,11 @@ class Ledger:
     def meters(self) -> dict[str, float]:
         """Return what the run spent so far."""
         return dict(self._db.execute("SELECT name, value FROM meter ORDER BY name").fetchall())
+
+    def flights(self) -> float:
+        """Return how many flights came to their end, whatever they were for."""
+        meters = self.meters()
+        return sum(meters.get(name, 0.0) for name in _METERS.values())
 
     def record(self, claim: Claim, result: dict[str, Any], sha256: str, wall_s: float) -> None:
         """Write down what a flight came to; a slot that has a result keeps it."""
@@ -353,8 +364,8 @@ class Ledger:
         """Give back one slot, as if it had not been claimed."""
         self._hand_out(claim, claim.attempt - 1, claim.after)
 
-    def fly_alone(self, claim: Claim, after: Literal["hung", "died"]) -> None:
-        """Hand out a slot once more, when nobody else flies; say what its flight did."""
+    def fly_alone(self, claim: Claim, after: str) -> None:
+        """Hand out a slot once more, when nobody else flies; say how its flights ended."""
         self._hand_out(claim, claim.attempt, after)
 
     def _hand_out(self, claim: Claim, attempts: int, after: str) -> None:
@@ -501,8 +512,7 @@ class Ledger:
             (search,),
         )
         for row in rows:
-            # Addresses in a traceback differ from run to run and mean nothing.
-            digest.update(_ADDRESS.sub("0x", json.dumps(row)).encode())
+            digest.update(_comparable(row).encode())
         return digest.hexdigest()
 
     def seconds_per_flight(self) -> float | None:
@@ -534,19 +544,34 @@ class Ledger:
         self._db.execute("DELETE FROM seat WHERE pid = ?", (pid,))
 
     def release_dead(self) -> None:
-        """Give back the slots of processes that are silent, or gone with those who watched them.
+        """Give back the slots of processes that are gone with those who watched them.
 
-        A dead child whose pool lives is left to it: it knows what the death means.
+        A dead child whose pool lives is left to it for a while: it knows what the death means.
+        A living one is never silent: its supervisor ends it where it hangs.
         """
         rows = self._db.execute(
             "SELECT slot.pid, lease, owner FROM slot LEFT JOIN seat ON seat.pid = slot.pid "
             "WHERE state = 'claimed'"
         ).fetchall()
         for pid, lease, owner in rows:
-            silent = lease is not None and lease < time.time()
-            watched = owner is not None and alive(owner)
-            if silent or not (alive(pid) or watched):
+            lapsed = lease is not None and lease < monotonic()
+            flies, watched = alive(pid), owner is not None and alive(owner)
+            if not (flies or watched) or (lapsed and not (flies and watched)):
                 self.release(pid)
+
+
+def _comparable(row: tuple[Any, ...]) -> str:
+    """Return a slot without what differs from run to run and means nothing.
+
+    These are addresses, and where a process was when it was ended.
+    """
+    *before, result, objectives, sha256 = row
+    if result is not None:
+        values = json.loads(result)
+        if values.get("crash"):
+            values["crash"].pop("traceback", None)
+        result = json.dumps(values, sort_keys=True)
+    return _ADDRESS.sub("0x", json.dumps([*before, result, objectives, sha256]))
 
 
 def _set_aside(path: Path) -> None:

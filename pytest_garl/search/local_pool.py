@@ -11,7 +11,7 @@ from pytest_garl import dispatch
 from pytest_garl.search.checkout import Checkout
 from pytest_garl.search.children import POLL_S, ChildPool
 from pytest_garl.search.deaths import Death, settle
-from pytest_garl.search.job import fly_job, load_scenario, loads
+from pytest_garl.search.job import fly_job, load_scenario, loads, record_file
 from pytest_garl.search.ledger import Claim, Ledger
 from pytest_garl.search.pool import Pool
 from pytest_garl.search.slots import flight_name
@@ -35,6 +35,7 @@ class Flyers:
 
     seats: int
     folders: tuple[str, ...] = ()
+    patience_s: float = 3.0
     settle: Callable[[Ledger, Claim, Death], None] = settle
     """Decides what a death means for the slot that was in flight."""
 
@@ -66,6 +67,7 @@ class Here:
             return
         job = loads(claim.job)
         slot_id = flight_name(claim.search, claim.generation, claim.slot, job.map)
+        record_file(job, claim).unlink(missing_ok=True)
         result, sha256, wall_s = fly_job(job, load_scenario(claim.scenario), slot_id, None)
         self._ledger.record(claim, result, sha256, wall_s)
 

@@ -83,8 +83,12 @@ class Pilot:
         result = wait_for(self._ledger, self._pool, search, _FIRST, lambda: None)
         if self._death is not None:
             death, self._death = self._death, None
+            error, message, text = death.failure or ("", "", "")
             return dataclasses.replace(
-                death, words=self._at_home(death.words), complaint=self._at_home(death.complaint)
+                death,
+                words=self._at_home(death.words),
+                complaint=self._at_home(death.complaint),
+                failure=(error, self._at_home(message), self._at_home(text)) if error else None,
             )
         file = flights / f"{flight_name(search, 0, 0, job.map)}.npz"
         record = file.read_bytes()

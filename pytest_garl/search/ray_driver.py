@@ -21,11 +21,10 @@ from pathlib import Path
 from typing import Any
 
 from pytest_garl.errors import PoolError
-from pytest_garl.search.child import keep_claims
 from pytest_garl.search.fleet import Fleet
 from pytest_garl.search.ledger import Ledger
 from pytest_garl.search.pilot import Base
-from pytest_garl.search.processes import CANNOT_GO_ON, end_with_parent, named, run_child
+from pytest_garl.search.processes import Parent, named, run_child
 
 PATIENCE_S = 180.0
 """How long Ray may take to connect, with the upload of the project; alone it goes on for ever."""
@@ -35,19 +34,17 @@ STORE_BYTES = 128 * 2**20
 """Object store of a cluster started here: records of flights, some 100 kB each, pass through it."""
 
 
-def main(ledger: str, root: str, workers: str) -> None:
+def main(parent: Parent, ledger: str, root: str, workers: str) -> None:
     """Fly until the parent process is gone; ``workers`` is 0 for all CPUs of the cluster."""
-    parent_lives = end_with_parent()
     # Until Ray sets a handler of its own, which does the same.
     signal.signal(signal.SIGTERM, lambda number, _: sys.exit(number))
     path = Path(ledger)
-    keep_claims(path)
     address = os.environ.get("RAY_ADDRESS") or "local"
     there = own(int(workers)) if address == "local" else joined(address, Path(root), path.parent)
     with there as (ray, base, cpus):
         fleet = Fleet(ray, Ledger(path), base, int(workers) or cpus)
         try:
-            while parent_lives():
+            while parent.lives():
                 fleet.turn()
         finally:
             fleet.close()
@@ -141,8 +138,7 @@ def unreachable(address: str, reason: str) -> str:
 def _give_up(address: str) -> None:
     """End the process from a thread: the call of Ray does not come back."""
     reason = unreachable(address, f"no cluster after {PATIENCE_S:g} s")
-    sys.stderr.write(f"{CANNOT_GO_ON}{reason}")
-    sys.stderr.flush()
+    Parent.of_this_process().tell(cannot_go_on=reason)
     os._exit(1)
 
 

@@ -55,6 +55,8 @@ class Driver:
 
     workers: int | None
     root: Path
+    patience_s: float = 30.0
+    """To end a cluster takes a second or two, and more on a busy machine."""
 
     @property
     def seats(self) -> int:

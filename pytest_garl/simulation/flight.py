@@ -107,12 +107,13 @@ class Step:
 class Crash:
     """How a landing system broke down.
 
-    ``kind`` is "raised", "nonsense" (a wrong return value), "died" (its process ended) or
-    "hung"; ``error`` the exception's type or the exit status; ``where`` the module and
-    function that failed, as "planning_ego" or "MySystem.step".
+    ``kind`` is "raised", "nonsense" (a wrong return value), "died" (its process ended), "hung" or
+    "broke" (the simulator fails with it and with no other); ``error`` the exception's type or the
+    exit status; ``where`` the module and function that failed, as "planning_ego" or
+    "MySystem.step".
     """
 
-    kind: Literal["raised", "nonsense", "died", "hung"]
+    kind: Literal["raised", "nonsense", "died", "hung", "broke"]
     error: str
     message: str
     where: str

@@ -49,6 +49,14 @@ class Sleeps(Good):
         return Land()
 
 
+class Slow(Good):
+    """Takes longer in each call than a limit of 0.5 s allows, and less than three of them."""
+
+    def step(self, observation: Observation) -> Land:
+        time.sleep(0.7)
+        return Land()
+
+
 class Loud(Good):
     """Says in two flights more than a pipe holds that nobody reads."""
 

@@ -16,7 +16,7 @@ from pytest_garl.search.pilot import Base, Landed, versions
 from tests.search.flying import Good, job_of, scenario
 
 LANDED = Landed(result={"outcome": "landed"}, sha256="hash", wall_s=1.5, record=b"record")
-DIED = Death(status=3, words="", complaint="")
+KILLED = Death(status=-9)
 
 
 class RayError(Exception):
@@ -162,18 +162,18 @@ def test_a_death_is_settled_as_in_the_local_pool(ledger: Ledger) -> None:
 
     def die(claim: Claim) -> object:
         claims.append(claim)
-        return DIED if claim.slot == 0 else LANDED
+        return KILLED if claim.slot == 0 else LANDED
 
     fly(FakeRay(fly=die), ledger)
     result = ledger.result("search", 0, 0)
     assert result is not None
-    assert result["verdict"]["signature"] == "V:died:exit-status-3"
-    assert [claim.after for claim in claims if claim.slot == 0] == ["", "died"]
+    assert result["verdict"]["signature"] == "V:died:signal-9"
+    assert [claim.after for claim in claims if claim.slot == 0] == ["", "killed"]
     assert ledger.meters()["retried"] == 1
 
 
 def test_a_slot_to_fly_alone_is_flown_even_if_its_worker_is_lost(ledger: Ledger) -> None:
-    answers = iter([LANDED, LANDED, DIED, WorkerLostError("killed"), LANDED])
+    answers = iter([LANDED, LANDED, KILLED, WorkerLostError("killed"), LANDED])
     fly(FakeRay(fly=lambda claim: next(answers)), ledger, size=1)
     assert ledger.unflown("search", 0) == 0
 

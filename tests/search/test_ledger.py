@@ -46,7 +46,6 @@ def test_a_claim_of_a_silent_process_lapses(tmp_path: Path) -> None:
     again = ledger.claim()
     assert again is not None
     assert again.slot == first.slot
-    ledger.renew()
     ledger.release_dead()
     other = ledger.claim(lease_s=None)
     assert other is not None

@@ -17,7 +17,7 @@ from pytest_garl.search.pilot import Base, Landed, Pilot
 from pytest_garl.search.reference import Reference, reference_to
 from pytest_garl.simulation.record import load
 from tests.plugin.test_plugin import write_project
-from tests.search.flying import Exits, Good, Loud, Reports, Sleeps, job_of, scenario
+from tests.search.flying import Exits, Good, Loud, Reports, Sleeps, Slow, job_of, scenario
 
 
 def claim(system: type, after: str = "", timeout_s: float = 10.0) -> Claim:
@@ -54,34 +54,40 @@ def test_a_pilot_flies_what_a_child_of_the_local_pool_would(pilot: Pilot, tmp_pa
 
 def test_a_pilot_outlives_what_it_flies(pilot: Pilot) -> None:
     death = pilot.fly(claim(Exits))
-    assert death == Death(status=3, words="", complaint="no fuel\n")
+    assert death == Death(status=3, complaint="no fuel\n")
     assert isinstance(pilot.fly(claim(Good)), Landed)
 
 
 def test_a_traceback_on_stderr_is_the_landing_systems_own(pilot: Pilot) -> None:
     death = pilot.fly(claim(Reports))
     assert isinstance(death, Death)
-    assert (death.status, death.hung) == (1, False)
+    assert (death.status, death.cause) == (1, "died")
 
 
 def test_a_simulator_that_fails_is_no_death_of_the_landing_system(pilot: Pilot) -> None:
     job = loads(claim(Good).job)
     broken = dataclasses.replace(job, simulator=reference_to(scenario))
+    first = pilot.fly(dataclasses.replace(claim(Good), job=broken.dumps()))
+    assert isinstance(first, Death)
+    assert first.cause == "failed"
+    again = dataclasses.replace(claim(Good, after="failed"), job=broken.dumps())
     with pytest.raises(PoolError, match=r"^the simulator failed in a child process:\nTraceback"):
-        pilot.fly(dataclasses.replace(claim(Good), job=broken.dumps()))
+        pilot.fly(again)
 
 
 def test_a_call_that_hangs_is_told_from_a_death(pilot: Pilot) -> None:
     death = pilot.fly(claim(Sleeps, timeout_s=0.3))
     assert isinstance(death, Death)
-    assert death.hung
+    assert death.hung == "one call took longer than 0.3 s of wall time"
     assert "in step" in death.words
 
 
-def test_what_hung_before_has_three_times_the_time_and_is_inconclusive(pilot: Pilot) -> None:
-    found = pilot.fly(claim(Good, after="hung"))
+def test_a_flight_that_hung_before_has_three_times_the_time_and_counts(pilot: Pilot) -> None:
+    """A machine that is slow once changes nothing that the search learns from."""
+    found, calm = pilot.fly(claim(Slow, after="hung", timeout_s=0.5)), pilot.fly(claim(Slow))
     assert isinstance(found, Landed)
-    assert found.result["outcome"] == "inconclusive"
+    assert isinstance(calm, Landed)
+    assert (found.result, found.sha256) == (calm.result, calm.sha256)
 
 
 def test_a_system_that_says_much_is_not_taken_for_one_that_hangs(pilot: Pilot) -> None:

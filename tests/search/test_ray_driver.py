@@ -12,7 +12,7 @@ import pytest
 from pytest_garl.errors import PoolError
 from pytest_garl.search import ray_driver
 from pytest_garl.search.pilot import Base
-from pytest_garl.search.processes import CANNOT_GO_ON
+from pytest_garl.search.processes import read_report, report_file
 from pytest_garl.search.ray_pool import check_ray
 
 
@@ -149,11 +149,14 @@ def test_a_connection_that_never_comes_ends_the_driver() -> None:
         "ray_driver.version = lambda name: '2.60.0'\n"
         "with ray_driver._connected('head:6379'): pass\n"
     )
-    done = subprocess.run(
-        [sys.executable, "-c", code], capture_output=True, text=True, check=False, timeout=50
-    )
+    report = report_file()
+    command = [sys.executable, "-c", code, str(os.getpid()), str(report)]
+    done = subprocess.run(command, check=False, timeout=50, pass_fds=[report])
     assert done.returncode == 1
-    assert f"{CANNOT_GO_ON}RAY_ADDRESS=head:6379: no cluster after 0.1 s" in done.stderr
+    assert read_report(report)["cannot_go_on"].startswith(
+        "RAY_ADDRESS=head:6379: no cluster after 0.1 s"
+    )
+    os.close(report)
 
 
 def test_only_an_address_with_a_port_is_tried(monkeypatch: pytest.MonkeyPatch) -> None:
