@@ -1,0 +1,110 @@
+"""Flights inside pytest are flown by the baseline, or by a child where that comes too late."""
+
+from __future__ import annotations
+
+import os
+import sys
+from pathlib import Path
+
+import pytest
+
+from pytest_garl import dispatch
+from tests.plugin.test_plugin import TESTS, write_project
+
+SYSTEM = """
+import os
+from pathlib import Path
+from pytest_garl import Land, dispatch
+
+class Tells:
+    def reset(self, mission): pass
+    def step(self, observation):
+        Path("told.txt").write_text(f"{os.getpid()} {dispatch.dispatched()}")
+        return Land()
+"""
+CONFTEST = """
+import os
+from pathlib import Path
+import numpy
+import tiny_simulator
+from pytest_garl import dispatch
+Path("here.txt").write_text(f"{os.getpid()} {dispatch.dispatched()}")
+def pytest_garl_fly(config):
+    return tiny_simulator.fly
+"""
+pytestmark = pytest.mark.skipif(not dispatch.has_baseline(), reason="this CPU has no AVX2")
+
+
+@pytest.fixture
+def unpinned(pytester: pytest.Pytester, monkeypatch: pytest.MonkeyPatch) -> pytest.Pytester:
+    """Return a project whose conftest.py loads NumPy, and an environment that misleads it."""
+    write_project(pytester.path)
+    (pytester.path / "systems.py").write_text(SYSTEM)
+    (pytester.path / "test_it.py").write_text(TESTS.format(system="Tells", maps="['lawn']"))
+    (pytester.path / "conftest.py").write_text(CONFTEST)
+    for name in dispatch.environment():
+        monkeypatch.delenv(name, raising=False)
+    monkeypatch.setenv("OPENBLAS_CORETYPE", "Nehalem")
+    return pytester
+
+
+def flown(pytester: pytest.Pytester, *args: str) -> tuple[pytest.RunResult, list[str], list[str]]:
+    """Return what pytest and the landing system say of themselves: process, instructions."""
+    result = pytester.runpytest_subprocess("-p", "no:cacheprovider", "--garl-shrink=0", *args)
+    here, told = (Path(pytester.path / name).read_text() for name in ("here.txt", "told.txt"))
+    return result, here.split(), told.split()
+
+
+@pytest.mark.parametrize(
+    "args", [("--garl-workers=0", "--garl-budget=1"), ("-o", "garl_workers=0", "--garl-budget=1")]
+)
+def test_before_conftest_is_early_enough(unpinned: pytest.Pytester, args: tuple[str, ...]) -> None:
+    result, here, told = flown(unpinned, *args)
+    assert told == here
+    assert told[1] == dispatch.BASELINE
+    result.stdout.no_fnmatch_line("*loaded before*")
+
+
+def test_a_search_is_bred_by_the_baseline(unpinned: pytest.Pytester) -> None:
+    _, here, told = flown(unpinned, "--garl-workers=1", "--garl-budget=1")
+    assert here[1] == told[1] == dispatch.BASELINE
+    assert here[0] != told[0]
+
+
+def test_other_runs_are_left_alone(unpinned: pytest.Pytester) -> None:
+    unpinned.runpytest_subprocess("-p", "no:cacheprovider")
+    assert (unpinned.path / "here.txt").read_text().endswith("-nehalem")
+
+
+def test_what_is_loaded_before_that_sends_the_flight_to_a_child(unpinned: pytest.Pytester) -> None:
+    unpinned.makepyfile(early="import numpy")
+    unpinned.syspathinsert()
+    result, here, told = flown(unpinned, "-p", "early", "--garl-workers=0", "--garl-budget=1")
+    assert here[1].endswith("-nehalem")
+    assert told[1] == dispatch.BASELINE
+    assert here[0] != told[0]
+    result.stdout.fnmatch_lines(
+        ["garl: loaded before*kernels for nehalem*flown in a child process, not inside pytest;*"]
+    )
+
+
+def test_the_command_starts_again_where_numpy_was_loaded_first(
+    unpinned: pytest.Pytester, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """As by a .pth file or sitecustomize.py."""
+    customs = unpinned.mkdir("customs")
+    (customs / "sitecustomize.py").write_text("import numpy")
+    paths = [str(customs), *filter(None, [os.environ.get("PYTHONPATH")])]
+    monkeypatch.setenv("PYTHONPATH", os.pathsep.join(paths))
+    code = (
+        "import sys, numpy\n"
+        "from pytest_garl import dispatch\n"
+        "from pytest_garl.cli import main\n"
+        "sys.argv = ['garl', '--version']\n"
+        "print('began')\n"
+        "try:\n    main()\n"
+        "finally:\n    print(dispatch.dispatched())\n"
+    )
+    result = unpinned.run(sys.executable, "-u", "-c", code)
+    assert result.outlines.count("began") == 2
+    assert result.outlines[-1] == dispatch.BASELINE
