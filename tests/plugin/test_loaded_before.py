@@ -108,3 +108,39 @@ def test_the_command_starts_again_where_numpy_was_loaded_first(
     result = unpinned.run(sys.executable, "-u", "-c", code)
     assert result.outlines.count("began") == 2
     assert result.outlines[-1] == dispatch.BASELINE
+
+
+CHECKED = """
+import numpy, os
+from pathlib import Path
+from pytest_garl import Land, VelocitySetpoint, dispatch
+from pytest_garl.testing import check_landing_system
+
+class Good:
+    def reset(self, mission): pass
+    def step(self, observation):
+        Path("told.txt").write_text(dispatch.dispatched())
+        return Land()
+
+class Wrong(Good):
+    def step(self, observation): return "down"
+
+if __name__ == "__main__":
+    print(dispatch.dispatched())
+    print(check_landing_system(Good, seconds=2.0).flights)
+    try:
+        check_landing_system(Wrong, seconds=2.0)
+    except Exception as error:
+        print(type(error).__name__, error)
+"""
+
+
+@pytest.mark.sim
+def test_the_checker_flies_in_a_child_where_numpy_was_loaded_first(
+    unpinned: pytest.Pytester,
+) -> None:
+    script = unpinned.makepyfile(checked=CHECKED)
+    result = unpinned.run(sys.executable, script)
+    result.stdout.fnmatch_lines(["*-nehalem", "*lawn*", "LandingSystemError *down*"])
+    assert (unpinned.path / "told.txt").read_text() == dispatch.BASELINE
+    assert result.ret == 0
