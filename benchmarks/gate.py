@@ -1,5 +1,6 @@
 """The gate of saved cases: how long it takes, and whether it ever says anything else.
 
+``python -m benchmarks.gate rates`` simulates the gate against a baseline: see ``gate_rates``.
 ``python -m benchmarks.gate`` makes thirty cases of the committed ones and their neighbours, some of
 them called fixed, lets pytest fly them twenty times over and compares outcomes and trajectories;
 then it flies one case three hundred times and counts the hashes.
@@ -84,11 +85,21 @@ def hash_of_flight(path: Path) -> str:
 
 
 def main() -> None:
-    """Print times, how many different gates there were, and how many different flights."""
+    """Print times, how many different gates there were and how many different flights; or rates."""
     parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("what", nargs="?", choices=("cases", "rates"), default="cases")
+    parser.add_argument("--draws", type=int, default=4000, help="Of each false alarm's rate.")
     parser.add_argument("--runs", type=int, default=20)
     parser.add_argument("--replays", type=int, default=300)
     arguments = parser.parse_args()
+    if arguments.what == "rates":
+        from benchmarks.gate_rates import write
+
+        return write(arguments.draws)
+    return _cases(arguments.runs, arguments.replays)
+
+
+def _cases(runs: int, replays: int) -> None:
     paths = sorted(CASES.rglob("*.toml"))
     if not paths:
         sys.exit(f"no cases in {CASES}; a search saves what it finds")
@@ -99,17 +110,17 @@ def main() -> None:
             file.parent.mkdir(parents=True, exist_ok=True)
             file.write_text(dumps(case))
         count = sum(1 for _ in cases.rglob("*.toml"))
-        gates = [gate(cases, Path(name, f"run-{run}")) for run in range(arguments.runs)]
+        gates = [gate(cases, Path(name, f"run-{run}")) for run in range(runs)]
     times = [took for took, _ in gates]
     outcomes = Counter(outcome for outcome, _ in gates[0][1].values())
     hashes = {sha256 for _, sha256 in gates[0][1].values()} - {""}
     results = {tuple(sorted(told.items())) for _, told in gates}
-    print(f"{count} cases, {arguments.runs} runs: {len(results)} result(s), {len(hashes)} flights")
+    print(f"{count} cases, {runs} runs: {len(results)} result(s), {len(hashes)} flights")
     print(f"  {dict(outcomes)}; {statistics.median(times):.0f} s (most {max(times):.0f} s)")
     dispatch.pin()
     with ProcessPoolExecutor() as pool:
-        again = Counter(pool.map(hash_of_flight, [paths[0]] * arguments.replays))
-    print(f"{paths[0].name}: {arguments.replays} flights, {len(again)} hash(es)")
+        again = Counter(pool.map(hash_of_flight, [paths[0]] * replays))
+    print(f"{paths[0].name}: {replays} flights, {len(again)} hash(es)")
 
 
 if __name__ == "__main__":

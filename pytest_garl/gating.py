@@ -18,7 +18,8 @@ from pytest_garl.regressions.survey import compare_flights, moved_on, unlike
 from pytest_garl.run import Run
 from pytest_garl.switches import RUN
 from pytest_garl.targets import FIRST, Target, name_of, read_marker
-from pytest_garl.verdicts.gate import Comparison, Fate
+from pytest_garl.verdicts.gate import Comparison
+from pytest_garl.verdicts.pairs import Fate
 
 TOLD = "garl.gate"
 """The user property under which a gate's sentences reach the summary, also from xdist's workers."""
@@ -44,6 +45,8 @@ class Gate(pytest.Item):
 
     def runtest(self) -> None:
         """Fly and compare."""
+        from pytest_garl.scenarios.maps import load_map
+
         run: Run = self.config.stash[RUN]
         base = self.garl_gate
         try:
@@ -54,12 +57,18 @@ class Gate(pytest.Item):
                 lines = [refused, "If that is wanted, save the baseline anew."]
                 self._tell(lines)
                 pytest.fail("\n".join(lines), pytrace=False)
-            flights = run.fly_all(self._target, npcs, [each.scenario for each in base.samples])
-            known = run.known(self._target)
+            found = compare_flights(
+                base,
+                run.fly_all(self._target, npcs, [each.scenario for each in base.samples]),
+                load_map(base.map, run.options.map_folders),
+                lambda scenarios: run.fly_all(self._target, npcs, scenarios),
+                level=run.options.level,
+                known=run.known(self._target),
+            )
         except GarlError as error:
             stop(self, error)
-        found = compare_flights(base, flights, level=run.options.level, known=known)
-        self._tell([*found.sentences(), *self._hint(found, run.options.baseline)])
+        caution = [f"note: {base.caution}"] if base.caution else []
+        self._tell([*found.sentences(), *self._hint(found, run.options.baseline), *caution])
         if not found.passed:
             # The pairs are listed once, in the summary.
             pytest.fail("\n".join(found.summary()), pytrace=False)

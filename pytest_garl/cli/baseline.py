@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 FAILED = 1
 """Exit status of a comparison that fails; a usage error is 2."""
-COLOURS = {"broke": "red", "mended": "green", "changed": "yellow"}
+COLOURS = {"broke": "red", "fixed": "green", "changed": "yellow"}
 _FOLDER = click.Path(path_type=Path, file_okay=False, exists=True)
 _FILE = click.Path(path_type=Path, dir_okay=False)
 
@@ -127,7 +127,12 @@ def save(
     for each in made.sets:
         bad = sum(sample.answer.violated for sample in each.samples)
         given_up = sum(sample.answer.aborted for sample in each.samples)
-        click.echo(f"{each.title}: {len(each.samples)} flown, {bad} violations, {given_up} aborts")
+        unsure = sum(not sample.answer.decided for sample in each.samples)
+        count = f"{len(each.samples)} flown, {bad} violations, {given_up} aborts"
+        left_out = f", {unsure} inconclusive, which the gate leaves out" if unsure else ""
+        click.echo(f"{each.title}: {count}{left_out}")
+        if each.caution:
+            click.echo(f"    note: {each.caution}")
     click.echo(f"saved {out}; the gate: pytest --garl-baseline={out}")
 
 
@@ -170,22 +175,28 @@ def diff(
     """Fly the same scenarios with two checkouts of a landing stack and compare pair by pair.
 
     BASE and HEAD are folders, such as two git worktrees. The exit status is 1 if HEAD is worse: a
-    violation of a new kind, or significantly more violations or aborts. The simulator and the
+    new type of violation, significantly more violations or aborts, or a flight of HEAD that
+    decided nothing. The simulator and the
     policies are this installation's for both, and a map of your own is this folder's.
     """
-    from pytest_garl.regressions.survey import compare_sets, survey_checkout
+    from pytest_garl.regressions.survey import compare_sets, fly_beside, survey_checkout
+    from pytest_garl.scenarios.maps import load_map
     from pytest_garl.search.checkout import Checkout
 
     if not systems:
         raise OptionError("garl diff: --system is missing; give MODULE:CLASS of the landing system")
     survey = _survey(**chosen)
+    checkouts = [
+        Checkout(folder=one, others=(other,)) for one, other in ((base, head), (head, base))
+    ]
     before, after = (
-        survey_checkout(survey, Checkout(folder=one, others=(other,)), systems, workers, _progress)
-        for one, other in ((base, head), (head, base))
+        survey_checkout(survey, each, systems, workers, _progress) for each in checkouts
     )
     passed = True
     for old, new in zip(before.sets, after.sets, strict=True):
-        found = compare_sets(old, new, level=level)
+        map = load_map(old.map, survey.map_folders)
+        fly = fly_beside(survey, checkouts[1], new, workers, _progress)
+        found = compare_sets(old, new, map, fly, level=level)
         passed = passed and found.passed
         _show(old.title, found)
     if not passed:
@@ -239,7 +250,7 @@ def _progress(flights: Iterator[Done], title: str, total: int) -> Iterable[Done]
 
 
 def _show(title: str, found: Comparison) -> None:
-    from pytest_garl.verdicts.gate import DIFFERENT
+    from pytest_garl.verdicts.pairs import DIFFERENT
 
     table = Table(box=None, header_style="bold")
     for name in ("scenario", "", "base", "head"):

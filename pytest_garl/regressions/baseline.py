@@ -17,7 +17,7 @@ from pytest_garl.scenarios.maps import Map
 from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.scenarios.toml_reader import LARGEST, Table, finite, parse
 from pytest_garl.scenarios.toml_writer import quoted
-from pytest_garl.verdicts.gate import Answer
+from pytest_garl.verdicts.pairs import Answer
 from pytest_garl.verdicts.verdict import Limits
 
 SCHEMA = 1
@@ -30,6 +30,7 @@ _KEYS = {
     "simulator",
     "npcs",
     "npcs_sha256",
+    "method",
     "limits",
     "genes",
     "flights",
@@ -54,7 +55,8 @@ class SampleSet:
     """What one landing system made of scenarios on one map, and all that they were flown with.
 
     ``system`` and ``simulator`` are "module:name"; ``npcs`` names who moved the objects, and
-    ``npcs_sha256`` is that of a learned policy's weights, else empty.
+    ``npcs_sha256`` is that of a learned policy's weights, else empty.  ``method`` is the search
+    method that chose the scenarios, empty where that is not known.
     """
 
     system: str
@@ -65,11 +67,23 @@ class SampleSet:
     npcs_sha256: str
     limits: Limits
     samples: tuple[Sample, ...]
+    method: str = ""
 
     @property
     def title(self) -> str:
         """Name for people and item ids, such as ``Lander-court``."""
         return f"{self.system.rpartition(':')[2]}-{self.map}"
+
+    @property
+    def caution(self) -> str:
+        """What somebody must know who compares a landing system with this set, or nothing."""
+        if self.method in ("", "random"):
+            return ""
+        return (
+            f"the search method {self.method!r} chose these scenarios where the landing system "
+            "failed; some failed by chance, so this baseline is kinder to a change than random "
+            "scenarios are"
+        )
 
     def name(self, index: int) -> str:
         """Return a sample's name, such as ``court-17``."""
@@ -117,6 +131,7 @@ def _set_lines(each: SampleSet) -> list[str]:
         f"simulator = {quoted(each.simulator)}",
         f"npcs = {quoted(each.npcs)}",
         f"npcs_sha256 = {quoted(each.npcs_sha256)}",
+        f"method = {quoted(each.method)}  # which chose the scenarios",
         f"limits = {{ distance_m = {limits.distance_m!r}, time_s = {limits.time_s!r}, "
         f'abort = "{limits.abort}" }}',
         f"genes = [{', '.join(quoted(key) for key in keys)}]",
@@ -217,6 +232,7 @@ def _read_set(table: Table, load_map: Callable[[str], Map]) -> SampleSet:
         simulator=table.text("simulator"),
         npcs=table.text("npcs"),
         npcs_sha256=table.text("npcs_sha256"),
+        method=table.text("method", ""),
         limits=read_limits(table.table("limits")),
         samples=tuple(
             _read_row(table, index, row, map.name, properties) for index, row in enumerate(rows)

@@ -11,6 +11,7 @@ from pathlib import Path
 from pytest_garl.adversary.policies import check_policy, policy_spec
 from pytest_garl.errors import PolicyError
 from pytest_garl.regressions.baseline import Baseline, BaselineError, Sample, SampleSet
+from pytest_garl.regressions.neighbours import COUNT, neighbours
 from pytest_garl.scenarios.genes import WeatherRange, genome_for
 from pytest_garl.scenarios.maps import Map, load_map
 from pytest_garl.scenarios.scenario import Scenario
@@ -22,12 +23,15 @@ from pytest_garl.search.ledger import VERSION, Ledger
 from pytest_garl.search.random_search import propose
 from pytest_garl.search.reference import BUILT_IN, Reference
 from pytest_garl.simulation.policy import PolicySpec
-from pytest_garl.verdicts.gate import LEVEL, Comparison, Pair, answer_of, compare
+from pytest_garl.verdicts.gate import LEVEL, Comparison, compare
+from pytest_garl.verdicts.pairs import Answer, Pair, answer_of
 from pytest_garl.verdicts.verdict import Limits
 
 TIMEOUT_S = 10.0
 Track = Callable[[Iterator[Done], str, int], Iterable[Done]]
 """Shows how far flights are: (flights, title, how many) -> the same flights."""
+Fly = Callable[[Sequence[Scenario]], Sequence[Done]]
+"""Flies scenarios with the head."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -61,24 +65,51 @@ def survey_checkout(
     sets = []
     with own_pool(workers, checkout) as (ledger, pool):
         for (reference, sources), map in itertools.product(found, maps):
-            job = Job(
-                system=reference,
-                system_sha256=sources,
-                simulator=survey.simulator,
-                map=map.name,
-                map_sha256=map.sha256,
-                map_folders=tuple(str(folder.resolve()) for folder in survey.map_folders),
-                npcs=npcs,
-                limits=survey.limits,
-                timeout_s=TIMEOUT_S,
-                path=(str(checkout.folder.resolve()),),
-                flights=str(ledger.path.parent / "flights"),
-            )
+            job = _job(survey, checkout, reference, sources, map, ledger.path.parent)
             scenarios = survey.scenarios(map)
             title = f"{checkout.folder}: {reference.qualname} on {map.name}"
             flights = track(fly_all(ledger, pool, job, scenarios), title, len(scenarios))
-            sets.append(_set(job, zip(scenarios, flights, strict=True)))
+            sets.append(_set(job, zip(scenarios, flights, strict=True), "random"))
     return _baseline(sets)
+
+
+def fly_beside(
+    survey: Survey, checkout: Checkout, of: SampleSet, workers: int, track: Track
+) -> Fly:
+    """Return what flies more scenarios with the landing system of a set that was surveyed."""
+
+    def fly(scenarios: Sequence[Scenario]) -> Sequence[Done]:
+        reference, sources = describe(checkout, of.system)
+        map = load_map(of.map, survey.map_folders)
+        with own_pool(workers, checkout) as (ledger, pool):
+            job = _job(survey, checkout, reference, sources, map, ledger.path.parent)
+            title = f"{checkout.folder}: neighbours"
+            return list(track(fly_all(ledger, pool, job, scenarios), title, len(scenarios)))
+
+    return fly
+
+
+def _job(
+    survey: Survey,
+    checkout: Checkout,
+    system: Reference,
+    sources: str,
+    map: Map,
+    scratch: Path,
+) -> Job:
+    return Job(
+        system=system,
+        system_sha256=sources,
+        simulator=survey.simulator,
+        map=map.name,
+        map_sha256=map.sha256,
+        map_folders=tuple(str(folder.resolve()) for folder in survey.map_folders),
+        npcs=policy_spec(survey.npcs),
+        limits=survey.limits,
+        timeout_s=TIMEOUT_S,
+        path=(str(checkout.folder.resolve()),),
+        flights=str(scratch / "flights"),
+    )
 
 
 def from_ledger(path: Path) -> Baseline:
@@ -91,6 +122,7 @@ def from_ledger(path: Path) -> Baseline:
         if found != VERSION:
             raise BaselineError(f"{path}: found a ledger of version {found}, expected {VERSION}")
         searches = [(loads(job), ledger.flown(search)) for search, job in ledger.searches()]
+        method = str(ledger.fact("method") or "")
     finally:
         ledger.close()
     sets = []
@@ -104,7 +136,7 @@ def from_ledger(path: Path) -> Baseline:
             for row in rows
         ]
         if flights:
-            sets.append(_set(job, flights))
+            sets.append(_set(job, flights, method))
     if not sets:
         raise BaselineError(f"{path}: no search has flown anything yet")
     return _baseline(sets)
@@ -123,7 +155,7 @@ def _check_npcs(path: Path, npcs: PolicySpec) -> None:
         )
 
 
-def _set(job: Job, flights: Iterable[tuple[Scenario, Done]]) -> SampleSet:
+def _set(job: Job, flights: Iterable[tuple[Scenario, Done]], method: str) -> SampleSet:
     return SampleSet(
         system=job.system.name,
         map=job.map,
@@ -131,6 +163,7 @@ def _set(job: Job, flights: Iterable[tuple[Scenario, Done]]) -> SampleSet:
         simulator=job.simulator.name,
         npcs=job.npcs.name,
         npcs_sha256=job.npcs.sha256,
+        method=method,
         limits=job.limits,
         samples=tuple(
             Sample(scenario=scenario, answer=answer_of(done.result, done.sha256))
@@ -183,22 +216,51 @@ def moved_on(base: Baseline) -> tuple[str, ...]:
 
 
 def compare_flights(
-    base: SampleSet, flights: Iterable[Done], *, level: float = LEVEL, known: Collection[str] = ()
+    base: SampleSet,
+    flights: Iterable[Done],
+    map: Map,
+    fly: Fly,
+    *,
+    level: float = LEVEL,
+    known: Collection[str] = (),
 ) -> Comparison:
-    """Return how flights of the base's scenarios, in its order, compare with it."""
-    pairs = [
-        Pair(name=base.name(index), base=sample.answer, head=answer_of(done.result, done.sha256))
-        for index, (sample, done) in enumerate(zip(base.samples, flights, strict=True))
-    ]
-    return compare(pairs, level=level, known=known)
+    """Return how flights of the base's scenarios, in its order, compare with it.
+
+    ``fly`` flies neighbours of those in which a new type of violation shows.
+    """
+    answers = [answer_of(done.result, done.sha256) for done in flights]
+    return _compare(base, answers, map, fly, level, known)
 
 
-def compare_sets(base: SampleSet, head: SampleSet, *, level: float = LEVEL) -> Comparison:
+def compare_sets(
+    base: SampleSet, head: SampleSet, map: Map, fly: Fly, *, level: float = LEVEL
+) -> Comparison:
     """Return how two sets of the same scenarios compare; raise BaselineError for others."""
     if [each.scenario for each in base.samples] != [each.scenario for each in head.samples]:
         raise BaselineError(f"{base.title}: the two stacks did not fly the same scenarios")
+    return _compare(base, [each.answer for each in head.samples], map, fly, level, ())
+
+
+def _compare(
+    base: SampleSet,
+    head: Sequence[Answer],
+    map: Map,
+    fly: Fly,
+    level: float,
+    known: Collection[str],
+) -> Comparison:
     pairs = [
-        Pair(name=base.name(index), base=before.answer, head=after.answer)
-        for index, (before, after) in enumerate(zip(base.samples, head.samples, strict=True))
+        Pair(name=base.name(index), base=sample.answer, head=answer)
+        for index, (sample, answer) in enumerate(zip(base.samples, head, strict=True))
     ]
-    return compare(pairs, level=level)
+    found = compare(pairs, level=level, known=known)
+    asked = [pair.name for pair in found.to_confirm]
+    if not asked:
+        return found
+    scenarios = {base.name(index): each.scenario for index, each in enumerate(base.samples)}
+    done = fly([each for name in asked for each in neighbours(scenarios[name], map)])
+    answers = [answer_of(flight.result, flight.sha256) for flight in done]
+    beside = {
+        name: answers[index * COUNT : (index + 1) * COUNT] for index, name in enumerate(asked)
+    }
+    return compare(pairs, level=level, known=known, neighbours=beside)

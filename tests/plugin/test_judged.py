@@ -6,21 +6,27 @@ import pytest
 
 from tests.plugin.test_plugin import project, run
 
-LANDED = '    outcome: Any = "landed"\n'
-GAVE_UP = '    outcome: Any = "aborted"\n'
-UNTOUCHED = "    contacts: tuple[Contact, ...] = ()\n"
-TOUCHED = """\
-    contacts: tuple[Contact, ...] = (
-        Contact(
-            time_s=14.2,
-            body="ground",
-            kind="ground",
-            body_class="ground",
-            position_m=(0.0, 0.0, 0.0),
-            speed_mps=0.5,
-            tilt_rad=0.0,
-        ),
+TOUCHES_AND_GIVES_UP = """
+import dataclasses
+
+import tiny_simulator
+from pytest_garl.simulation.flight import Contact
+from pytest_garl.simulation.record import hash_of
+
+
+def fly(*args, **options):
+    flight = tiny_simulator.fly(*args, **options)
+    touch = Contact(
+        time_s=14.2,
+        body="ground",
+        kind="ground",
+        body_class="ground",
+        position_m=(0.0, 0.0, 0.0),
+        speed_mps=0.5,
+        tilt_rad=0.0,
     )
+    changed = dataclasses.replace(flight, outcome="aborted", contacts=(touch,), crash=None)
+    return dataclasses.replace(changed, sha256=hash_of(changed))
 """
 
 
@@ -28,12 +34,10 @@ def test_touching_the_ground_off_the_marker_before_an_abort_fails_the_search(
     pytester: pytest.Pytester,
 ) -> None:
     project(pytester)
-    path = pytester.path / "tiny_simulator.py"
-    text = path.read_text()
-    for old, new in ((LANDED, GAVE_UP), (UNTOUCHED, TOUCHED), ("if scenario.get(", "if 0 and (")):
-        assert old in text
-        text = text.replace(old, new)
-    path.write_text(text)
+    pytester.makepyfile(gives_up=TOUCHES_AND_GIVES_UP)
+    conftest = pytester.path / "conftest.py"
+    conftest.write_text(conftest.read_text().replace("tiny_simulator", "gives_up"))
+    # In fog it comes down 3 m off the marker.
     result = run(pytester, "--garl-budget=6", "--garl-workers=0", "--garl-weather=full")
     outcomes = result.parseoutcomes()
     assert outcomes["failed"] == 1

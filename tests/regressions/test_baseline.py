@@ -1,7 +1,9 @@
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 import pytest
 from hypothesis import given, settings
@@ -21,6 +23,7 @@ from pytest_garl.regressions.baseline import (
     loads,
     save,
 )
+from pytest_garl.regressions.neighbours import neighbours
 from pytest_garl.regressions.survey import (
     Survey,
     compare_sets,
@@ -30,11 +33,13 @@ from pytest_garl.regressions.survey import (
 )
 from pytest_garl.scenarios.genes import WIND, genome_for, with_destinations
 from pytest_garl.scenarios.maps import load_map
+from pytest_garl.scenarios.scenario import Scenario
+from pytest_garl.search.errands import Done
 from pytest_garl.search.job import Job, dump_scenario
 from pytest_garl.search.ledger import Ledger
 from pytest_garl.search.random_search import propose
 from pytest_garl.search.reference import BUILT_IN, Reference
-from pytest_garl.verdicts.gate import Answer
+from pytest_garl.verdicts.pairs import Answer
 from pytest_garl.verdicts.verdict import Limits
 
 LAWN, COURT = load_map("lawn"), load_map("court")
@@ -83,7 +88,7 @@ def test_a_baseline_survives_its_file_exactly_and_has_the_same_bytes_again(tmp_p
     court = dataclasses.replace(
         court, samples=tuple(Sample(scenario=each, answer=DOG) for each in scenarios)
     )
-    both = baseline(sample_set(), court)
+    both = baseline(dataclasses.replace(sample_set(), method="garl"), court)
     save(tmp_path / "new" / "base.toml", both)
     assert load(tmp_path / "new" / "base.toml") == both
     assert dumps(loads(dumps(both), load_map)) == dumps(both)
@@ -205,19 +210,31 @@ def test_two_sets_are_compared_scenario_by_scenario_and_only_equal_ones() -> Non
     before, after = sample_set(), sample_set()
     broken = dataclasses.replace(after.samples[2], answer=DOG)
     after = dataclasses.replace(after, samples=(*after.samples[:2], broken))
-    found = compare_sets(before, after)
+    flown: list[Scenario] = []
+
+    def fly(scenarios: Sequence[Scenario]) -> list[Done]:
+        flown.extend(scenarios)
+        violation = {**result(), "outcome": "collision"}
+        violation["verdict"] = {"signature": DOG.signature, "paper_violation": True}
+        return [Done(result=violation, sha256="", record=Path())] * len(scenarios)
+
+    found = compare_sets(before, after, LAWN, fly)
     assert [pair.words for pair in found.of("broke")] == ["lawn-2: landed -> IV:dog:descent:seen"]
+    # The type is new: the neighbours of its scenario are flown, and say that it is real.
+    assert flown == list(neighbours(after.samples[2].scenario, LAWN))
+    assert [each.words for each in found.new_types] == ["IV in lawn-2, in 3 of 3 neighbours"]
+    assert [each.alike for each in found.new_types] == [((3, 3),)]
     with pytest.raises(BaselineError, match="did not fly the same scenarios"):
-        compare_sets(before, sample_set(2))
+        compare_sets(before, sample_set(2), LAWN, fly)
 
 
-def result() -> dict[str, object]:
+def result() -> dict[str, Any]:
     verdict = {"primary": None, "signature": "", "paper_violation": False}
     return {"outcome": "landed", "verdict": verdict}
 
 
-def write_ledger(path: Path, of: Job) -> None:
-    ledger = Ledger.create(path, {})
+def write_ledger(path: Path, of: Job, method: str = "") -> None:
+    ledger = Ledger.create(path, {"method": method} if method else {})
     ledger.add_search("a", "stack.landing:Lander", "lawn", 2, of.dumps())
     texts = [dump_scenario(each) for each in Survey(count=2).scenarios(LAWN)]
     ledger.add_slots("a", 0, dict(enumerate(texts)))
@@ -227,10 +244,14 @@ def write_ledger(path: Path, of: Job) -> None:
     ledger.close()
 
 
-def test_what_a_search_flew_becomes_a_baseline(tmp_path: Path) -> None:
-    write_ledger(tmp_path / "ledger.sqlite", job())
+@pytest.mark.parametrize("method", ["garl", "random", ""])
+def test_what_a_search_flew_becomes_a_baseline_that_says_who_chose_the_scenarios(
+    tmp_path: Path, method: str
+) -> None:
+    write_ledger(tmp_path / "ledger.sqlite", job(), method)
     (found,) = from_ledger(tmp_path / "ledger.sqlite").sets
-    assert found == sample_set(1)
+    assert found == dataclasses.replace(sample_set(1), method=method)
+    assert bool(found.caution) is (method == "garl")
 
 
 def test_a_ledger_whose_policy_cannot_be_had_again_is_refused(tmp_path: Path) -> None:
