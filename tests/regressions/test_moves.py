@@ -9,12 +9,14 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from pytest_garl.adversary.policies import policy_spec
-from pytest_garl.adversary.recorded import recorded_spec
+from pytest_garl.adversary.recorded import LANDING_ZONE_M, recorded_spec
 from pytest_garl.errors import PolicyError
 from pytest_garl.regressions.moves import _round, simpler
 from pytest_garl.regressions.neighbours import neighbours
+from pytest_garl.scenarios.chromosome import decode
 from pytest_garl.scenarios.genes import genome_for
 from pytest_garl.scenarios.maps import load_map
+from pytest_garl.scenarios.placement import start_genes
 from pytest_garl.scenarios.validity import problems
 from pytest_garl.search.random_search import propose
 from pytest_garl.simulation.fly import fly
@@ -58,6 +60,25 @@ def test_a_shorter_record_ends_where_the_longer_one_does() -> None:
     last = fly(waiting, ReferencePilot, recorded_spec(dict(shorter)), time_limit_s=12)
     ends = [f.objects[1].track.position_m[-1, :2] for f in (flight, last)]
     assert np.linalg.norm(ends[0] - ends[1]) < 0.6
+
+
+@pytest.mark.sim
+def test_a_system_that_climbs_and_waits_lands_when_the_recorded_person_has_left() -> None:
+    genome = genome_for(LAWN)
+    nominal = decode(genome.nominal, genome, map="lawn", seed=3)
+    names = [name for name, _ in LAWN.object_names]
+    alone = nominal.without(*(name for name in names if name != "person-1"))
+    start = start_genes("person-1", (4.0, 0.0), LAWN)
+    scenario = alone.replace({**start, "person-1.velocity": 0.5, "marker.x": 0.0, "marker.y": 0.0})
+    # It stands, walks onto the marker while a pilot would come down, and there the record ends.
+    moves = ((0.0, 0.0),) * 20 + ((-1.0, 0.0),) * 6 + ((0.0, 0.0),)
+    flight = fly(scenario, ReferencePilot, recorded_spec({"person-1": moves}), time_limit_s=60)
+    assert flight.outcome == "landed"
+    heights = flight.uav.position_m[:, 2]
+    turns = np.flatnonzero(np.diff(np.sign(np.diff(heights[::20]))))
+    assert len(turns) >= 2, "it climbed again before it landed"
+    x, y = flight.objects[0].track.position_m[-1, :2]
+    assert np.hypot(x, y) >= LANDING_ZONE_M
 
 
 def test_an_object_without_a_record_is_told() -> None:
