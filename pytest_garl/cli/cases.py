@@ -19,6 +19,7 @@ from pytest_garl.regressions.story import meanings
 DEFAULT = Path("scenarios/regressions")
 NO_PROOF = 3
 """Exit status of a replay that proves nothing; 1 says that the case fails."""
+LEAST_FLIGHTS = 9
 STATUS = {"FIXED": 0, "FAILED": 1, "STALE": NO_PROOF, "UNDECIDED": NO_PROOF}
 
 
@@ -214,21 +215,38 @@ def _refusal(result: Replay, how: str) -> str:
 
 @cases.command()
 @FILE
-@click.option("--flights", default=40, show_default=True, help="Flights to spend at most.")
+@click.option(
+    "--flights",
+    type=click.IntRange(min=LEAST_FLIGHTS),
+    default=40,
+    show_default=True,
+    help="Flights to spend at most.",
+)
 @click.option("--workers", default=2, show_default=True, help="Flying child processes.")
 @click.pass_obj
 def shrink(folders: _Folders, file: Path, flights: int, workers: int) -> None:
-    """Go on shrinking a case."""
-    from pytest_garl.regressions.resumed import shrink_case
+    """Go on shrinking a case, from its own record.
+
+    The file is replaced only by a case that is no worse in any respect (objects, genes, moves,
+    size, neighbours that fail) and better in one.
+    """
+    from pytest_garl.cli.collecting import means_of
+    from pytest_garl.regressions.resumed import KEPT, shrink_case
 
     case = folders.case(file)
-    finding = shrink_case(case, folders.root, folders.maps, flights, workers)
-    if finding.case is None:
+    means = means_of(case, folders.root)
+    finding = shrink_case(case, folders.root, folders.maps, flights, workers, means)
+    spent = f"{finding.flights} flights"
+    if finding.case is None and finding.reason != KEPT:
         raise GarlError(f"{file}: {finding.reason}; `garl cases replay {file}` tells more")
-    path = corpus.replace(
-        file, dataclasses.replace(finding.case, status=case.status, accepted=case.accepted)
-    )
-    click.echo(f"{path}: removed {finding.case.evidence.removed} ({finding.flights} flights)")
+    if finding.case is None:
+        click.echo(f"{file}: {finding.reason} ({spent}); it stays as it is")
+        return
+    path = corpus.replace(file, finding.case)
+    evidence = finding.case.evidence
+    renewed = finding.case.id == case.id
+    done = "its evidence is renewed" if renewed else f"all in all removed {evidence.removed}"
+    click.echo(f"{path}: {done} ({spent})")
 
 
 @cases.command()

@@ -144,6 +144,14 @@ def dumps(case: Case) -> str:
     return "\n".join(lines) + "\n"
 
 
+def size_of(case: Case) -> int:
+    """Return how many characters the scenario and the record take in the file."""
+    lines = gene_lines(case.scenario)
+    lines += [f"{name} = {_moves(moves)}" for name, moves in case.moves]
+    lines += [f"{name} = {_changes(own)}" for name, own in case.changes]
+    return sum(len(line) + 1 for line in lines)
+
+
 def loads(text: str, load_map: Callable[[str], Map], *, source: str = "case") -> Case:
     """Return the case in ``text``; raise ScenarioError that names source and key."""
     top = Table(parse(text, source), source)

@@ -46,19 +46,13 @@ def judged(case: Case, root: Path, *, live: bool) -> Iterator[tuple[tuple[Judged
     pytest runs in ``root`` on the file of the test that found the case, or on all if none is known.
     The case is flown as a fixed one, so that no failure is expected.
     """
-    with tempfile.TemporaryDirectory(prefix="garl-") as scratch:
-        folder = Path(scratch)
-        evidence = dataclasses.replace(case.evidence, neighbours_failed=case.evidence.neighbours)
-        flown = dataclasses.replace(
-            case,
-            status="fixed",
-            avoidable="live" if live else "recorded",
-            evidence=evidence,
-        )
-        save_text(folder_of(folder / "cases", case.system) / f"{NAME}.toml", dumps(flown))
+    with alone_in_a_folder(case, live=live) as folder:
         report = folder / "report.xml"
         done = subprocess.run(
-            _command(case, folder, report, live=live),
+            [
+                *(sys.executable, "-m", "pytest", f"--junitxml={report}"),
+                *arguments(case, folder, live=live),
+            ],
             cwd=root,
             stdin=subprocess.DEVNULL,
             capture_output=True,
@@ -73,7 +67,24 @@ def judged(case: Case, root: Path, *, live: bool) -> Iterator[tuple[tuple[Judged
         yield found, folder / "garl" / "flights"
 
 
-def _command(case: Case, folder: Path, report: Path, *, live: bool) -> list[str]:
+@contextmanager
+def alone_in_a_folder(case: Case, *, live: bool) -> Iterator[Path]:
+    """Give a folder with a corpus of this one case, called fixed, so that it must pass."""
+    with tempfile.TemporaryDirectory(prefix="garl-") as scratch:
+        flown = dataclasses.replace(
+            case,
+            status="fixed",
+            avoidable="live" if live else "recorded",
+            # An edge case would fail nothing.
+            evidence=dataclasses.replace(case.evidence, neighbours=0, neighbours_failed=0),
+        )
+        folder = folder_of(Path(scratch, "cases"), case.system)
+        save_text(folder / f"{NAME}.toml", dumps(flown))
+        yield Path(scratch)
+
+
+def arguments(case: Case, folder: Path, *, live: bool) -> list[str]:
+    """Return pytest's arguments that select the tests of the case in ``folder``."""
     file = case.test.partition("::")[0] if "::" in case.test else ""
     ids = f"case-{NAME}-live" if live else f"case-{NAME} and not case-{NAME}-live"
     overrides = {
@@ -83,8 +94,8 @@ def _command(case: Case, folder: Path, report: Path, *, live: bool) -> list[str]
         **{f"garl_{name}": "" for name in _EMPTY},
     }
     return [
-        *(sys.executable, "-m", "pytest", *filter(None, [file])),
-        *("-k", ids, "--maxfail=0", "--garl-workers=1", f"--junitxml={report}"),
+        *filter(None, [file]),
+        *("-k", ids, "--maxfail=0", "--garl-workers=1"),
         *(word for key, value in overrides.items() for word in ("-o", f"{key}={value}")),
     ]
 

@@ -107,7 +107,7 @@ class Finding:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class _Failure:
+class Failure:
     """A scenario that fails, what its objects did, its flight, how many neighbours fail too.
 
     ``first`` is the search's scenario that it was made from; ``asked`` how many neighbours were
@@ -148,7 +148,7 @@ class Pursuit:
         for longer in others:
             if avoidable == "no" and (found := self._avoidable(longer)) != "no":
                 failure, avoidable = longer, found
-        return self._finding(_case(inquiry, failure, avoidable))
+        return self._finding(case_of(inquiry, failure, avoidable))
 
     def _exception(self, first: Scenario) -> Finding:
         """Return a Python exception in the barest scenario, or as it was found."""
@@ -157,7 +157,7 @@ class Pursuit:
             done = self._again(scenario, deeds)
             if self._inquiry.failed(scenario, done):
                 failure = _unasked(first, scenario, deeds, done)
-                return self._finding(_case(self._inquiry, failure, _nobody_asked(failure)))
+                return self._finding(case_of(self._inquiry, failure, _nobody_asked(failure)))
         return self._finding(None, UNLIKE)
 
     @property
@@ -187,7 +187,7 @@ class Pursuit:
         spec = recorded_spec(dict(deeds.moves), dict(deeds.changes))
         return self._go(dataclasses.replace(self._inquiry.job, npcs=spec), scenario)
 
-    def _barest(self, first: Scenario) -> _Failure | None:
+    def _barest(self, first: Scenario) -> Failure | None:
         """Return the failure with all that it should not need taken away, if it still fails.
 
         First the policy steers; then what was hit repeats its moves around the same marker.
@@ -195,37 +195,38 @@ class Pursuit:
         found = self._flown[first]
         culprit = culprit_of(found)
         scenario = bare(first, self._map, culprit)
-        if scenario != first:
+        if scenario != first and self._left >= 2 + COUNT:
             done = self._flown[scenario] = self._go(self._inquiry.job, scenario)
             if self._inquiry.failed(scenario, done):
                 deeds = deeds_of(done, scenario, self._map)
-                return self._asked(first, scenario, deeds, done)
+                done = self._again(scenario, deeds)
+                if self._inquiry.failed(scenario, done):
+                    return self._asked(first, scenario, deeds, done)
         scenario = bare(first, self._map, culprit, keeps_places=True)
-        if culprit and scenario != first:
+        if culprit and scenario != first and self._left >= 1 + COUNT:
             deeds = _only(deeds_of(found, first, self._map), culprit)
             done = self._again(scenario, deeds)
             if self._inquiry.failed(scenario, done):
                 return self._asked(first, scenario, deeds, done)
         return None
 
-    def _asked(self, first: Scenario, scenario: Scenario, deeds: Deeds, done: Done) -> _Failure:
+    def _asked(self, first: Scenario, scenario: Scenario, deeds: Deeds, done: Done) -> Failure:
         robust = self._robust(scenario, deeds)
-        return _Failure(first=first, scenario=scenario, deeds=deeds, done=done, robust=robust)
+        return Failure(first=first, scenario=scenario, deeds=deeds, done=done, robust=robust)
 
-    def _most_robust(self, scenarios: Sequence[Scenario], best: _Failure | None) -> _Failure | None:
+    def _most_robust(self, scenarios: Sequence[Scenario], best: Failure | None) -> Failure | None:
         """Return the first violation all of whose neighbours fail, or the best of those tried."""
-        tried = False
-        for scenario in scenarios:
-            if tried and best is not None and self._left < 1 + COUNT + LEAST:
+        for number, scenario in enumerate(scenarios):
+            needed = 1 + COUNT + (LEAST if number and best is not None else 0)
+            if self._left < needed:
                 break
-            tried = True
             deeds = deeds_of(self._flown[scenario], scenario, self._inquiry.map)
             done = self._again(scenario, deeds)
             if not self._inquiry.failed(scenario, done):
                 continue
             robust = self._robust(scenario, deeds)
             if best is None or robust > best.robust:
-                best = _Failure(
+                best = Failure(
                     first=scenario, scenario=scenario, deeds=deeds, done=done, robust=robust
                 )
             if robust == COUNT:
@@ -241,7 +242,7 @@ class Pursuit:
                 break
         return robust
 
-    def _avoidable(self, failure: _Failure) -> Avoidable:
+    def _avoidable(self, failure: Failure) -> Avoidable:
         """Whether a pilot that knows where everything is comes through, landed or aborted."""
         scenario, job = failure.scenario, self._inquiry.job
         pilot = dataclasses.replace(job, system=reference_to(ReferencePilot))
@@ -257,7 +258,7 @@ class Pursuit:
         done = self._go(pilot, scenario)
         return not done.signature and not self._inquiry.failed(scenario, done)
 
-    def _shrunk(self, best: _Failure) -> tuple[_Failure, ...]:
+    def _shrunk(self, best: Failure) -> tuple[Failure, ...]:
         """Return the simplest failure whose neighbours fail as well: with all moves, with few."""
         inquiry = self._inquiry
 
@@ -267,29 +268,44 @@ class Pursuit:
 
         # Steps back from an edge want a share as well, and a shorter record of moves.
         reserve = self._left // 3 if any(own for _, own in best.deeds.moves) else 0
-        budget = self._left - COUNT - reserve
+        budget = self._left - 1 - COUNT - reserve
         if budget < 2:
             return self._with_record(best)
         found = shrink(best.scenario, fails, inquiry.map, budget, culprit=culprit_of(best.done))
-        for scenario in _ever_further_back(found.history[1:]):
-            if self._left < COUNT:
-                break
-            done = self._flown[scenario]
-            deeds = deeds_of(done, scenario, inquiry.map)
-            robust = self._robust(scenario, deeds, best.robust)
-            if robust >= best.robust:
-                failure = _Failure(
-                    first=best.first, scenario=scenario, deeds=deeds, done=done, robust=robust
-                )
-                return self._with_record(failure)
-        return self._with_record(best)
+        return self._with_record(self._off_the_edge(best, found.history[1:], self._deeds_of))
 
-    def _with_record(self, failure: _Failure) -> tuple[_Failure, ...]:
+    def _deeds_of(self, scenario: Scenario) -> Deeds:
+        return deeds_of(self._flown[scenario], scenario, self._map)
+
+    def _off_the_edge(
+        self, best: Failure, history: Sequence[Scenario], deeds_of: Callable[[Scenario], Deeds]
+    ) -> Failure:
+        """Return the simplest of the failures all of whose neighbours fail, or the most robust.
+
+        Each is flown once with its recorded moves, as the case will be.
+        """
+        kept: Failure | None = None
+        for scenario in _ever_further_back(history):
+            if self._left < 1 + COUNT or (kept is not None and kept.robust == COUNT):
+                break
+            deeds = deeds_of(scenario)
+            done = self._again(scenario, deeds)
+            if not self._inquiry.failed(scenario, done):
+                continue
+            least = best.robust if kept is None else kept.robust + 1
+            robust = self._robust(scenario, deeds, least)
+            if robust >= least:
+                kept = dataclasses.replace(
+                    best, scenario=scenario, deeds=deeds, done=done, robust=robust, asked=COUNT
+                )
+        return best if kept is None else kept
+
+    def _with_record(self, failure: Failure) -> tuple[Failure, ...]:
         """Return the failure with all moves, and with few where it survives that."""
         shorter = self._recorded(failure)
         return (failure,) if shorter is failure else (failure, shorter)
 
-    def _recorded(self, failure: _Failure) -> _Failure:
+    def _recorded(self, failure: Failure) -> Failure:
         """Return the failure with the shortest record of moves that it survives."""
         culprit = culprit_of(failure.done)
         moves = failure.deeds.moves
@@ -301,6 +317,8 @@ class Pursuit:
         ):
             if self._left < 1 + COUNT:
                 break
+            if (scenario, shorter) == (failure.scenario, moves):
+                continue
             deeds = dataclasses.replace(failure.deeds, moves=shorter)
             done = self._again(scenario, deeds)
             if not self._inquiry.failed(scenario, done):
@@ -308,7 +326,7 @@ class Pursuit:
             robust = self._robust(scenario, deeds, failure.robust)
             if robust >= failure.robust:
                 return dataclasses.replace(
-                    failure, scenario=scenario, deeds=deeds, done=done, robust=robust
+                    failure, scenario=scenario, deeds=deeds, done=done, robust=robust, asked=COUNT
                 )
         return failure
 
@@ -318,7 +336,7 @@ def as_found(inquiry: Inquiry) -> Finding:
     scenario = simplest_first(inquiry)[0]
     done = dict(inquiry.violations)[scenario]
     failure = _unasked(scenario, scenario, deeds_of(done, scenario, inquiry.map), done)
-    case = _case(inquiry, failure, _nobody_asked(failure))
+    case = case_of(inquiry, failure, _nobody_asked(failure))
     return Finding(signature=inquiry.signature, case=case, flights=0)
 
 
@@ -330,17 +348,18 @@ def simplest_first(inquiry: Inquiry) -> list[Scenario]:
     )
 
 
-def _unasked(first: Scenario, scenario: Scenario, deeds: Deeds, done: Done) -> _Failure:
+def _unasked(first: Scenario, scenario: Scenario, deeds: Deeds, done: Done) -> Failure:
     """Return a failure of which no neighbour was flown."""
-    return _Failure(first=first, scenario=scenario, deeds=deeds, done=done, robust=0, asked=0)
+    return Failure(first=first, scenario=scenario, deeds=deeds, done=done, robust=0, asked=0)
 
 
-def _nobody_asked(failure: _Failure) -> Avoidable:
+def _nobody_asked(failure: Failure) -> Avoidable:
     """Return what may be demanded without asking the reference pilot: where nothing moves, all."""
     return "recorded" if failure.deeds.moves else "live"
 
 
-def _case(inquiry: Inquiry, failure: _Failure, avoidable: Avoidable) -> Case:
+def case_of(inquiry: Inquiry, failure: Failure, avoidable: Avoidable) -> Case:
+    """Return a failure as what is saved."""
     done, job = failure.done, inquiry.job
     flight = load(done.record) if done.record.exists() else None
     own = inquiry.asks(done.result, done.record, failure.scenario) if inquiry.asks else None

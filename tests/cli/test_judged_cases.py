@@ -50,6 +50,16 @@ def garl(*args: str | Path) -> Result:
     return CliRunner().invoke(main, ["cases", *map(str, args)], env={"COLUMNS": "200"})
 
 
+def shrunk(file: Path, flights: int) -> str:
+    """Shrink a case in a process of its own, as a user does: it imports the project's tests."""
+    start = "from pytest_garl.cli import main; main()"
+    command = [sys.executable, "-c", start, "cases", "shrink", str(file)]
+    options = [f"--flights={flights}", "--workers=0"]
+    done = subprocess.run([*command, *options], capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stdout + done.stderr
+    return done.stdout
+
+
 def saved(project: Path, kind: str) -> Path:
     (path,) = (project / "scenarios/regressions/systems").glob(f"lawn-{kind}-*.toml")
     return path.relative_to(project)
@@ -180,3 +190,34 @@ def test_a_file_that_cannot_be_collected_is_one_clear_error(project: Path) -> No
     assert "pytest could not fly the case" in result.output
     assert "No module named 'pytestt'" in result.output
     assert result.exit_code == 1
+
+
+def test_a_case_of_a_property_of_ones_own_is_shrunk_by_its_test(project: Path) -> None:
+    own = saved(project, "own")
+    case = load(own)
+    foggy = case.scenario.replace({"environment.dust": 0.1, "environment.snow": 0.14})
+    file = replace(own, dataclasses.replace(case, scenario=foggy))
+    shrunk(file, 30)
+    better = load(saved(project, "own"))
+    assert better.scenario["environment.dust"] == 0.0
+    assert 0.1 <= better.scenario["environment.snow"] < 0.14
+    assert (better.test, better.assertion) == (case.test, case.assertion)
+    assert garl("replay", saved(project, "own")).output.startswith("FAILED")
+
+
+def test_a_case_as_simple_as_can_be_stays_as_it_is(project: Path) -> None:
+    dog = saved(project, "IV-dog")
+    shrunk(dog, 60)
+    dog = saved(project, "IV-dog")
+    before = dog.read_bytes()
+    told = shrunk(dog, 30)
+    assert "nothing simpler was found" in told
+    assert told.endswith("it stays as it is\n")
+    assert saved(project, "IV-dog").read_bytes() == before
+
+
+@pytest.mark.parametrize("flights", ["0", "8", "-3"])
+def test_too_few_flights_to_shrink_a_case_are_refused(project: Path, flights: str) -> None:
+    result = garl("shrink", saved(project, "IV-dog"), f"--flights={flights}")
+    assert result.exit_code == 2
+    assert "--flights" in result.output

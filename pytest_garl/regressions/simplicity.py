@@ -1,0 +1,59 @@
+"""What makes a case simple, in every respect: less of each is better."""
+
+from __future__ import annotations
+
+import dataclasses
+import itertools
+from dataclasses import dataclass
+
+from pytest_garl.regressions.case import Avoidable, Case
+from pytest_garl.regressions.files import size_of
+from pytest_garl.regressions.neighbours import COUNT
+from pytest_garl.regressions.shrink import complexity, genome_of
+from pytest_garl.scenarios.maps import Map
+
+_DEMANDED: dict[Avoidable, int] = {"live": 0, "recorded": 1, "no": 2}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Simplicity:
+    """The respects in which two cases of one failure are compared.
+
+    Objects; genes off nominal and their distance from it; decisions at which an object moves, and
+    runs of equal moves; characters of the scenario and the record in the file; neighbours that do
+    not fail, or were not flown; how much less may be demanded of a repair; whether the evidence is
+    of other sources than today's.
+    """
+
+    objects: int
+    genes: int
+    distance: float
+    moving: int
+    runs: int
+    characters: int
+    doubtful_neighbours: int
+    excused: int
+    outdated: bool
+
+
+def simplicity(case: Case, map: Map, *, outdated: bool = False) -> Simplicity:
+    """Return how simple a case is."""
+    objects, genes, distance, _ = complexity(case.scenario, genome_of(case.scenario, map))
+    evidence = case.evidence
+    return Simplicity(
+        objects=objects,
+        genes=genes,
+        distance=distance,
+        moving=sum(move != (0.0, 0.0) for _, own in case.moves for move in own),
+        runs=sum(len(list(itertools.groupby(own))) for _, own in case.moves),
+        characters=size_of(case),
+        doubtful_neighbours=max(COUNT, evidence.neighbours) - evidence.neighbours_failed,
+        excused=_DEMANDED[case.avoidable],
+        outdated=outdated,
+    )
+
+
+def no_worse(one: Simplicity, other: Simplicity) -> bool:
+    """Whether ``one`` is at least as simple as ``other`` in every respect."""
+    names = [field.name for field in dataclasses.fields(Simplicity)]
+    return all(getattr(one, name) <= getattr(other, name) for name in names)
