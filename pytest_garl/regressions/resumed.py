@@ -188,7 +188,9 @@ class Continued(Pursuit):
         share: int,
     ) -> Failure:
         """Shrink with a share of the flights that are left; the last go to neighbours."""
-        budget = (self._left - 2 * (1 + COUNT)) // share
+        # The last are for a result's neighbours and, if there are many, for a shorter record.
+        reserve = 1 + COUNT if self._left < 4 * (1 + COUNT) else 2 * (1 + COUNT)
+        budget = (self._left - reserve) // share
         if budget < 1:
             return first
         culprit = culprit_of(first.done)
