@@ -42,6 +42,11 @@ Kind = Literal["search", "case", "errand"]
 """What flights are for: a search's budget, saved cases, or something beside them, such as flying a
 violation once more.  Figures and the result hash are those of the searches."""
 _METERS = {"search": "flights", "case": "cases", "errand": "errands"}
+_NEXT, _NEXT_OF_SYSTEM = (
+    "SELECT search, generation, slot, scenario, after, attempts FROM slot "
+    f"WHERE state = 'waiting' {condition} ORDER BY after DESC, generation, slot, search"
+    for condition in ("", "AND search IN (SELECT id FROM search WHERE system = ?)")
+)
 _ADDRESS = re.compile(r"0x[0-9a-f]+")
 LEASE_S = 30.0
 """So long the claim of a dead process is left to those who watched it, and that of a living one to
@@ -255,11 +260,12 @@ class Ledger:
                 ],
             )
 
-    def claim(self, lease_s: float | None = LEASE_S, *, fresh: bool = True) -> Claim | None:
+    def claim(self, lease_s: float | None = LEASE_S, *, flown: str = "") -> Claim | None:
         """Take the next unflown slot; one that ended its process is handed out while nobody flies.
 
-        Only a process that has not flown yet, a ``fresh`` one, gets such a slot.  ``lease_s`` is
-        how long the claim is kept as in ``release_dead``; None: while the process lives.
+        ``flown`` names the landing system that this process has flown: it gets slots of that one
+        alone, and none that ended a process.  ``lease_s`` is how long the claim is kept as in
+        ``release_dead``; None: while the process lives.
         """
         with self.transaction():
             flying, alone = self._db.execute(
@@ -267,11 +273,10 @@ class Ledger:
             ).fetchone()
             if alone:
                 return None
-            row = self._db.execute(
-                "SELECT search, generation, slot, scenario, after, attempts FROM slot "
-                "WHERE state = 'waiting' ORDER BY after DESC, generation, slot, search LIMIT 1"
-            ).fetchone()
-            if row is None or (row[4] and (flying or not fresh)):
+            row = self._db.execute(f"{_NEXT} LIMIT 1").fetchone()
+            if row and flown and not row[4]:
+                row = self._db.execute(f"{_NEXT_OF_SYSTEM} LIMIT 1", (flown,)).fetchone()
+            if row is None or (row[4] and (flying or flown)):
                 return None
             self._db.execute(
                 "UPDATE slot SET state = 'claimed', pid = ?, lease = ?, attempts = attempts + 1 "
@@ -289,6 +294,15 @@ class Ledger:
             attempt=row[5] + 1,
             pid=self._pid,
         )
+
+    def others_wait(self, flown: str) -> bool:
+        """Return whether slots wait, but none of the system that a process has flown."""
+        own, others = self._db.execute(
+            "SELECT coalesce(sum(system = ?), 0), coalesce(sum(system != ?), 0) "
+            "FROM slot JOIN search ON search.id = slot.search WHERE state = 'waiting'",
+            (flown, flown),
+        ).fetchone()
+        return bool(others) and not own
 
     def alone_waits(self) -> bool:
         """Return whether nobody flies and a slot waits for a fresh process to fly it alone."""

@@ -57,6 +57,14 @@ class Slow(Good):
         return Land()
 
 
+class Replaces(Good):
+    """Replaces a function that every flight needs."""
+
+    def step(self, observation: Observation) -> Land:
+        vars(tiny_simulator)["hash_of"] = lambda flight: "bent"
+        return Land()
+
+
 class Loud(Good):
     """Says in two flights more than a pipe holds that nobody reads."""
 

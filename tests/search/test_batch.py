@@ -10,11 +10,12 @@ from pytest_garl.adversary.policies import policy_spec
 from pytest_garl.errors import LedgerError
 from pytest_garl.regressions.survey import Survey
 from pytest_garl.scenarios.maps import load_map
-from pytest_garl.search.batch import fly_all
+from pytest_garl.search.batch import fly_all, own_pool
 from pytest_garl.search.job import Job, dump_scenario
 from pytest_garl.search.ledger import Ledger
 from pytest_garl.search.reference import BUILT_IN, Reference
 from pytest_garl.verdicts.verdict import Limits
+from tests.search.flying import Good, Replaces, job_of, scenario
 
 JOB = Job(
     system=Reference(module="stack", file="", qualname="Lander"),
@@ -97,3 +98,18 @@ def test_jobs_differ_in_what_is_flown_and_not_in_where_it_lies(
     change: dict[str, Any], differing: tuple[str, ...]
 ) -> None:
     assert JOB.differences(dataclasses.replace(JOB, **change)) == differing
+
+
+def test_what_one_system_replaces_in_its_process_bends_no_flight_of_another(tmp_path: Path) -> None:
+    with own_pool(1) as (ledger, pool):
+
+        def hash_of(system: type, distance_m: float) -> str:
+            # Limits of their own make a search of their own.
+            job = dataclasses.replace(
+                job_of(system, tmp_path), limits=Limits(distance_m=distance_m)
+            )
+            return next(fly_all(ledger, pool, job, [scenario()])).sha256
+
+        before = hash_of(Good, 1.0)
+        assert hash_of(Replaces, 1.0) == "bent"
+        assert hash_of(Good, 2.0) == before

@@ -49,7 +49,7 @@ def test_what_the_machine_may_have_done_is_flown_again_when_nobody_else_flies(
     assert ledger.result("s", 0, 0) is None
     assert ledger.claim() is None
     ledger.record(other, {}, "", 0.0)
-    assert ledger.claim(fresh=False) is None
+    assert ledger.claim(flown="m:Class") is None
     assert ledger.alone_waits()
     again = claimed(ledger)
     assert (again.slot, again.after, again.attempt) == (0, after, 2)

@@ -192,3 +192,18 @@ def test_a_run_that_is_resumed_twice_counts_no_attempt_of_what_was_in_flight(
     beside = ledger.claim()
     assert beside is not None
     assert beside.slot == 1
+
+
+def test_process_that_has_flown_gets_slots_of_its_own_system_alone(tmp_path: Path) -> None:
+    ledger = made(tmp_path / "ledger.sqlite")
+    ledger.add_search("t", "systems:Other", "court", 2, "{}")
+    ledger.add_slots("t", 0, {0: "d", 1: "e"})
+    first = ledger.claim(flown="systems:Other")
+    again = ledger.claim(flown="systems:Other")
+    assert first is not None
+    assert again is not None
+    assert [(first.search, first.slot), (again.search, again.slot)] == [("t", 0), ("t", 1)]
+    assert ledger.claim(flown="systems:Other") is None
+    assert ledger.others_wait("systems:Other")
+    assert not ledger.others_wait("systems:Good")
+    assert ledger.claim(flown="systems:Good") is not None
