@@ -34,6 +34,11 @@ class Landing:
         self.final_distance_m: float = result["final_distance_m"]
         self.elapsed_s: float = result["elapsed_s"]
 
+    def __repr__(self) -> str:
+        from pytest_garl.verdicts.headline import headline
+
+        return f"<Landing {self.slot}: {headline(self.verdict.story)}>"
+
     @property
     def limits(self) -> Limits:
         """The limits of the marker."""

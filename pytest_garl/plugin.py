@@ -238,7 +238,10 @@ def pytest_unconfigure(config: pytest.Config) -> None:
 @pytest.hookimpl(optionalhook=True)
 def pytest_configure_node(node: Any) -> None:
     """Give an xdist worker the run's name, and its seed, so that a random one is drawn once."""
+    from pytest_garl.reports.wrapping import WIDTH, width_of
+
     node.workerinput["garl_controller"] = str(os.getpid())
+    node.workerinput[WIDTH] = width_of(node.config)
     run = node.config.stash.get(RUN, None)
     if run is not None:
         node.workerinput["garl_seed"] = str(run.options.seed)

@@ -12,7 +12,7 @@ from pytest_garl.adversary.recorded import recorded_spec
 from pytest_garl.regressions.case import Avoidable, Case, Deeds, Evidence, Violation
 from pytest_garl.regressions.moves import simpler
 from pytest_garl.regressions.neighbours import COUNT, neighbours
-from pytest_garl.regressions.shrink import bare, complexity, genome_of, nobody, shrink
+from pytest_garl.regressions.shrink import alone, bare, clear, complexity, genome_of, nobody, shrink
 from pytest_garl.regressions.story import tell
 from pytest_garl.scenarios.maps import Map
 from pytest_garl.scenarios.scenario import Scenario
@@ -28,8 +28,8 @@ from pytest_garl.verdicts.verdict import Verdict
 PILOTS = 3
 """Flights of the reference pilot: against the recorded moves, against the live policy, and one more
 where the shortest record leaves nobody a way out."""
-LEAST = 3 + COUNT + PILOTS
-"""Flights without which nothing can be said: two without what the failure should not need, one as
+LEAST = 4 + COUNT + PILOTS
+"""Flights without which nothing can be said: three without what the failure should not need, one as
 found, three neighbours, the reference pilot."""
 EXCEPTION = 2
 """Flights for a Python exception, which hardly depends on the scenario: bare, and as found."""
@@ -190,21 +190,26 @@ class Pursuit:
     def _barest(self, first: Scenario) -> Failure | None:
         """Return the failure with all that it should not need taken away, if it still fails.
 
-        First the policy steers; then what was hit repeats its moves around the same marker.
+        First the policy steers; then what was hit repeats its moves around the same marker, in
+        clear weather, and lastly in the weather that there was.
         """
         found = self._flown[first]
         culprit = culprit_of(found)
         scenario = bare(first, self._map, culprit)
-        if scenario != first and self._left >= 2 + COUNT:
+        if scenario != first and self._left >= 3 + COUNT:
             done = self._flown[scenario] = self._go(self._inquiry.job, scenario)
             if self._inquiry.failed(scenario, done):
                 deeds = deeds_of(done, scenario, self._map)
                 done = self._again(scenario, deeds)
                 if self._inquiry.failed(scenario, done):
                     return self._asked(first, scenario, deeds, done)
-        scenario = bare(first, self._map, culprit, keeps_places=True)
-        if culprit and scenario != first and self._left >= 1 + COUNT:
-            deeds = _only(deeds_of(found, first, self._map), culprit)
+        if not culprit:
+            return None
+        deeds = _only(deeds_of(found, first, self._map), culprit)
+        for scenario in (clear(first, self._map, culprit), alone(first, self._map, culprit)):
+            # What is left must do for the scenario as it was found.
+            if scenario == first or self._left < 2 + COUNT:
+                continue
             done = self._again(scenario, deeds)
             if self._inquiry.failed(scenario, done):
                 return self._asked(first, scenario, deeds, done)

@@ -137,30 +137,35 @@ def reset_and_bisect(trials: Trials, culprit: str) -> None:
     return _bisect(trials)
 
 
-def bare(first: Scenario, map: Map, culprit: str, *, keeps_places: bool = False) -> Scenario:
+def bare(first: Scenario, map: Map, culprit: str) -> Scenario:
     """Return a scenario without all that its failure should not need.
 
-    A collision needs the object that was hit, everything else is nominal (but for the marker's
-    place, if ``keeps_places``); any other failure has its cause in weather, light or place, and
-    needs no object.
+    A collision needs the object that was hit, everything else is nominal; any other failure has
+    its cause in weather, light or place, and needs no object.
     """
-    if culprit:
-        return _nominal(first, map, culprit, keeps_places)
+    return _nominal(first, map, culprit) if culprit else alone(first, map, "")
+
+
+def clear(first: Scenario, map: Map, culprit: str) -> Scenario:
+    """Return a scenario like ``bare``, but the marker stays where the culprit went around it."""
+    places = {key: value for key, value in first.genes if key in PLACES}
+    return repair(_nominal(first, map, culprit).replace(places), map)
+
+
+def alone(first: Scenario, map: Map, culprit: str) -> Scenario:
+    """Return a scenario with no object but the culprit, everything else as it was."""
     names = [key.partition(".")[0] for key, _ in first.genes if key.endswith(".velocity")]
-    return repair(first.without(*names), map)
+    return repair(first.without(*(name for name in names if name != culprit)), map)
 
 
 def nobody(first: Scenario, map: Map) -> Scenario:
     """Return a scenario with everything nominal and no object."""
-    return _nominal(first, map, "", False)
+    return _nominal(first, map, "")
 
 
-def _nominal(first: Scenario, map: Map, culprit: str, keeps_places: bool) -> Scenario:
+def _nominal(first: Scenario, map: Map, culprit: str) -> Scenario:
     groups = _simplifications(Trials(first, lambda _: False, map, 0), culprit)
-    last = _applied(first, [change for group in groups for change in group])
-    if keeps_places:
-        last = last.replace({key: value for key, value in first.genes if key in PLACES})
-    return repair(last, map)
+    return repair(_applied(first, [change for group in groups for change in group]), map)
 
 
 def _simplifications(trials: Trials, culprit: str) -> list[list[Change]]:

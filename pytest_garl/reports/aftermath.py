@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import os
 import shlex
-import textwrap
-from pathlib import Path
 from typing import Any
 
 import pytest
@@ -22,7 +20,9 @@ from pytest_garl.regressions.follow_up import (
     inquiries,
     shares,
 )
+from pytest_garl.reports.commands import shown
 from pytest_garl.reports.progress import live
+from pytest_garl.reports.wrapping import counted, width_of, wrapped
 from pytest_garl.run import Run
 
 PILOT = {
@@ -70,10 +70,11 @@ def pursue(run: Run, session: pytest.Session) -> None:
         run.troubled = True
 
 
-def told(pursued: tuple[Pursued, ...], root: Path, width: int) -> list[str]:
+def told(pursued: tuple[Pursued, ...], config: pytest.Config) -> list[str]:
     """Return the summary's lines about saved cases."""
     lines: list[str] = []
     patches = []
+    width = width_of(config)
     for each in pursued:
         case = each.finding.case
         name = f"{each.system.split(':')[-1]} on {each.map}: {each.finding.signature}"
@@ -83,15 +84,15 @@ def told(pursued: tuple[Pursued, ...], root: Path, width: int) -> list[str]:
         if each.file is None:
             lines.append(f"not saved: {name}: the same case is saved already")
             continue
-        shown = str(each.file.relative_to(root) if each.file.is_relative_to(root) else each.file)
+        file = shown(each.file, config)
         if each.file.suffix == ".patch":
-            patches.append(shown)
-        lines.append(f"{'patch' if each.file.suffix == '.patch' else 'saved'} {shown}")
+            patches.append(shlex.quote(file))
+        lines.append(f"{'patch' if each.file.suffix == '.patch' else 'saved'} {file}")
         text = f"{case.violation.story} ({'; '.join(_facts(each, case))})"
-        lines += textwrap.wrap(text, width, initial_indent="    ", subsequent_indent="    ")
+        lines.append(wrapped(text, width, first="    ", others="    "))
     if patches:
         lines.append("Nothing in the tree was changed (CI is set). To keep the cases:")
-        lines.append(f"    git apply {' '.join(shlex.quote(patch) for patch in patches)}")
+        lines.append(" \\\n        ".join(["    git apply", *patches]))
     return [*lines, *_unreached(pursued, width)]
 
 
@@ -121,9 +122,4 @@ def _unreached(pursued: tuple[Pursued, ...], width: int) -> list[str]:
         f"search. --garl-shrink={SHRINK} has no such limit and reaches all of them (at most "
         f"{SHRINK * len(pursued)} flights); `garl cases shrink FILE` shrinks a saved one."
     )
-    return textwrap.wrap(text, width)
-
-
-def counted(number: int, noun: str) -> str:
-    """Return a number with its noun: ``1 flight``, ``2 flights``."""
-    return f"{number} {noun}{'' if number == 1 else 's'}"
+    return [wrapped(text, width)]

@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
-import textwrap
+import json
 from typing import TYPE_CHECKING, Any
 
 import pytest
 
 from pytest_garl.fixtures import Landing
 from pytest_garl.own import Asks, failure_of
+from pytest_garl.reports.commands import repeat_line, shown
+from pytest_garl.reports.wrapping import width_of, wrapped
 from pytest_garl.run import Run, again_key
 from pytest_garl.switches import FOUND, OWN
-from pytest_garl.targets import FIRST, Target
+from pytest_garl.targets import FIRST, Target, name_of
+from pytest_garl.verdicts.headline import headline
 
 if TYPE_CHECKING:
     from pytest_garl.regressions.case import Case
@@ -20,6 +23,8 @@ AGAIN = 4
 """How often a violation of a system that need not be deterministic is flown once more."""
 MAYBE_FIXED = "garl.maybe_fixed"
 """The user property that names the file of an open case that passes."""
+OWN_FAILURE = "garl.own_failure"
+"""The user property by which the summary learns of a test's own assertion that failed."""
 STALE = "garl.stale"
 """The user property that names the file of one that passes without proof, and tells why."""
 
@@ -64,8 +69,10 @@ def _explain_violation(
     if doubt.startswith(FLAKY):
         return _expected(report, doubt)
     _note_test(report, item, run, target, signature)
-    told = [result["verdict"]["story"], *_unusual(run, target), *filter(None, [doubt])]
-    return _tell(report, [signature, *_wrapped(told), repeat_line(item, run, target)])
+    story = result["verdict"]["story"]
+    told = [story, *_unusual(item.config, run, target), *filter(None, [doubt])]
+    again = repeat_line(item, target)
+    return _tell(report, [signature, *_wrapped(told, item), again], headline(story), again)
 
 
 def _explain_own(
@@ -75,14 +82,17 @@ def _explain_own(
     failure = failure_of(item.originalname, error)
     if failure is None:
         return None
+    told = [name_of(target.system), target.map, target.name, failure.signature, failure.message]
+    report.user_properties.append((OWN_FAILURE, json.dumps(told)))
     known = run.known(target).get(failure.signature)
     if known is not None:
         return _expected(report, f"known: {failure.signature} ({known})")
     asks = Asks(item, target)
-    lines = [f"{failure.signature}: a property of your own", repeat_line(item, run, target)]
+    again = repeat_line(item, target)
+    lines = [f"{failure.signature}: a property of your own", again]
     if not asks.possible:
         lines.insert(1, "It is not saved: its test takes more than landing and scenario.")
-        return _tell(report, lines)
+        return _tell(report, lines, failure.message, again)
 
     def alike(other: Target, result: dict[str, Any]) -> bool:
         found = asks(result, run.record(other), run.scenario(other))
@@ -95,7 +105,7 @@ def _explain_own(
     _note_test(report, item, run, target, failure.signature)
     if hasattr(item.config, "workerinput"):
         report.user_properties.append((OWN, failure.signature))
-    return _tell(report, lines)
+    return _tell(report, lines, failure.message, again)
 
 
 def _note_test(
@@ -118,7 +128,7 @@ def _explain_case(
 ) -> None:
     """Judge a case: an open one fails as it did before, a fixed one must not fail."""
     assert target.entry is not None
-    verdict, file = result["verdict"], _relative(target.entry.path, run)
+    verdict, file = result["verdict"], shown(target.entry.path, item.config)
     same = verdict["signature"] == case.violation.signature
     if case.edge:
         # What else a test raises is a mistake in the test.
@@ -144,10 +154,11 @@ def _explain_case(
             f"Saved: {case.violation.signature}. {case.violation.story}",
             f"Flown: {verdict['signature'] or 'no violation of its own'}. {verdict['story']}",
         ]
-        lines = [*_wrapped(told), f"See it: garl cases replay {file}"]
+        again = f"See it: garl cases replay {file}"
+        lines = [*_wrapped(told, item), again]
         if as_saved or (case.status == "unavoidable" and not known):
             lines.append(f"If that is known: commit it, or: garl cases accept {file}")
-        return _tell(report, lines)
+        return _tell(report, lines, f"{state}: {headline(verdict['story'])}", again)
     first = run.first_item(target) == item.nodeid
     if report.passed and case.status == "open" and verdict["primary"] is None and first:
         stale = "; ".join(run.unproven(target))
@@ -218,30 +229,29 @@ def _expected(report: pytest.TestReport, reason: str) -> None:
     report.wasxfail = reason
 
 
-def _tell(report: pytest.TestReport, lines: list[str]) -> None:
+def _tell(report: pytest.TestReport, lines: list[str], what: str, again: str) -> None:
+    """Add lines to a failure; say what happened, and how to see it, where one line is shown."""
     report.sections.append(("garl: what happened", "\n".join(lines)))
+    crash = getattr(report.longrepr, "reprcrash", None)
+    if crash is not None:
+        # The short summary shows the first line, JUnit's message as many as fit.
+        crash.message = f"{what}\n{again}"
 
 
-def _wrapped(told: list[str]) -> list[str]:
-    return [textwrap.fill(text, 98, subsequent_indent="  ") for text in told]
+def _wrapped(told: list[str], item: pytest.Item) -> list[str]:
+    width = width_of(item.config)
+    return [wrapped(text, width, others="  ") for text in told]
 
 
-def _relative(path: Any, run: Run) -> str:
-    root = run.options.root
-    return str(path.relative_to(root)) if path.is_relative_to(root) else str(path)
-
-
-def repeat_line(item: pytest.Item, run: Run, target: Target) -> str:
-    """Return the command that flies this scenario again."""
-    return f'Repeat: pytest "{item.nodeid}" --garl-repeat={target.file or target.name}'
-
-
-def _unusual(run: Run, target: Target) -> list[str]:
-    from pytest_garl.regressions.shrink import genome_of
-    from pytest_garl.scenarios.maps import load_map
+def _unusual(config: pytest.Config, run: Run, target: Target) -> list[str]:
+    """Return with ``-v`` what the scenario holds, in physical units."""
+    if config.get_verbosity() < 1:
+        return []
+    from pytest_garl.regressions.story import meanings
 
     scenario = run.scenario(target)
-    map = load_map(target.map, run.options.map_folders)
-    nominal = {item.key: item.nominal for item in genome_of(scenario, map).properties}
-    words = [f"{key}={value:.3g}" for key, value in scenario.genes if value != nominal.get(key)]
-    return [f"Scenario (seed {scenario.seed}): {', '.join(words)}"]
+    words = [
+        meaning if what.startswith("environment.") else f"{what} {meaning}"
+        for what, _, meaning in meanings(scenario, run.options.map_folders)
+    ]
+    return [f"Scenario (seed {scenario.seed}): {'; '.join(words)}"]

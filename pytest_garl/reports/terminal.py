@@ -2,17 +2,20 @@
 
 from __future__ import annotations
 
+import json
 from typing import Any
+
+import pytest
 
 from pytest_garl import dispatch
 from pytest_garl.reports.aftermath import told
-from pytest_garl.reports.explain import MAYBE_FIXED, STALE
+from pytest_garl.reports.commands import repeat_command, shown
+from pytest_garl.reports.explain import MAYBE_FIXED, OWN_FAILURE, STALE
+from pytest_garl.reports.kinds import Found, Kind, Own, found_by, legend
 from pytest_garl.reports.progress import duration
+from pytest_garl.reports.wrapping import counted, width_of, wrapped
 from pytest_garl.run import Run
-from pytest_garl.search.slots import Slot
-from pytest_garl.verdicts.metrics import share_interval, top_k
-from pytest_garl.verdicts.serialise import from_dict
-from pytest_garl.verdicts.verdict import Verdict
+from pytest_garl.verdicts.metrics import decided_words, share_interval, top_k
 
 
 def header(run: Run) -> str:
@@ -55,14 +58,15 @@ def _workers(run: Run) -> str:
     if options.workers is None:
         return f"all workers{place}"
     each = options.budget * run.flight_s / max(1, options.workers)
-    return f"{options.workers} workers{place}; about {duration(each)} per system and map"
+    workers = counted(options.workers, "worker") if options.workers else "no worker"
+    return f"{workers}{place}; about {duration(each)} per system and map"
 
 
 def summary(reporter: Any, run: Run) -> None:
     """Write a table per system and map, then what was saved, and which cases may be fixed."""
     _searches(reporter, run)
     lines = [
-        *told(run.pursued, run.options.root, reporter._tw.fullwidth),
+        *told(run.pursued, reporter.config),
         *_maybe_fixed(reporter),
         *_computed_otherwise(run),
     ]
@@ -86,17 +90,18 @@ def _maybe_fixed(reporter: Any) -> list[str]:
 
 
 def _searches(reporter: Any, run: Run) -> None:
-    groups: dict[tuple[str, str], list[tuple[Slot, dict[str, Any]]]] = {}
-    for system, map, generation, index, result in run.ledger.results():
-        slot = Slot(generation=generation, index=index)
-        groups.setdefault((system, map), []).append((slot, result))
-    if not groups:
+    found = found_by(run.ledger, own_failures(reporter))
+    if not found:
         return
     reporter.section("garl: violations", sep="=")
-    for (system, map), flown in groups.items():
-        files = run.ledger.fact(f"files of {system} on {map}") or ""
-        _table(reporter, system, map, flown, files)
-    reporter.write_line(_spent(run.ledger.meters()))
+    width = width_of(reporter.config)
+    for each in found:
+        for line in _table(each, reporter.config, width):
+            reporter.write_line(line)
+    words = legend(kind for each in found for kind in each.kinds)
+    if words:
+        reporter.write_line(wrapped(words, width))
+    reporter.write_line(wrapped(_spent(run), width))
     searches = run.ledger.progress()
     done, total = sum(each.flown for each in searches), sum(each.all for each in searches)
     if done < total and not run.options.repeat:
@@ -106,43 +111,79 @@ def _searches(reporter: Any, run: Run) -> None:
     reporter.write_line(f"ledger: {run.ledger.path}  results {run.ledger.result_hash()[:16]}")
 
 
-def _table(
-    reporter: Any, system: str, map: str, flown: list[tuple[Slot, dict[str, Any]]], files: str
-) -> None:
-    total = len(flown)
-    verdicts = [from_dict(result["verdict"]) for _, result in flown]
-    bad = sum(verdict.paper_violation for verdict in verdicts)
-    low, high = share_interval(bad, total)
+def own_failures(reporter: Any) -> list[Own]:
+    """Return the tests' own assertions that failed, known and repeated ones among them."""
+    found = []
+    for report in [*reporter.getreports("failed"), *reporter.getreports("xfailed")]:
+        told = dict(report.user_properties)
+        if OWN_FAILURE in told:
+            system, map, slot, signature, message = json.loads(str(told[OWN_FAILURE]))
+            found.append(
+                Own(system=system, map=map, slot=slot, signature=signature, message=message)
+            )
+    return found
+
+
+def _table(found: Found, config: pytest.Config, width: int) -> list[str]:
+    """Return a system's shares on a map, then its kinds of violation with how to see each."""
+    total, verdicts = len(found.verdicts), found.verdicts
+    low, high = share_interval(found.violating, total)
+    paper = sum(verdict.paper_violation for verdict in verdicts)
+    shares = [
+        f"{total} flown",
+        f"violations {_percent(found.violating, total)} [{100 * low:.1f}, {100 * high:.1f}]",
+    ]
+    if paper != found.violating:
+        shares.append(f"by the paper's definition {_percent(paper, total)}")
+    shares += [
+        f"landed {_percent(found.count('landed'), total)}",
+        f"gave up {_percent(found.count('aborted'), total)}",
+    ]
     late = sum(verdict.violation_type == "late" for verdict in verdicts)
-    aborted = sum(verdict.outcome == "aborted" for verdict in verdicts)
-    crashed = sum(verdict.violation_type == "V" for verdict in verdicts)
-    unsure = sum(result["outcome"] == "inconclusive" for _, result in flown)
-    tenth = top_k(verdicts)
-    reporter.write_line(
-        f"{system.split(':')[-1]} on {map}: {total} flown, violations {_percent(bad, total)} "
-        f"[{100 * low:.1f}, {100 * high:.1f}], late {_percent(late, total)}, aborted "
-        f"{_percent(aborted, total)}, crashed {_percent(crashed, total)}, inconclusive {unsure}, "
-        f"Top-10 {tenth if tenth is not None else 'not reached'}"
-    )
-    found: dict[str, list[tuple[Slot, Verdict]]] = {}
-    for (slot, _), verdict in zip(flown, verdicts, strict=True):
-        if verdict.violation:
-            found.setdefault(verdict.signature, []).append((slot, verdict))
-    for signature, cases in sorted(found.items(), key=lambda item: (-len(item[1]), item[0])):
-        first = cases[0][0].id(map)
-        again = " ".join(filter(None, ["pytest", files, f"--garl-repeat={first}"]))
-        reporter.write_line(f"  {len(cases):4d}  {signature:<32}  {again}")
+    rare = {"late": late, **found.crashes}
+    shares += [f"{word} {_percent(count, total)}" for word, count in rare.items() if count]
+    if unsure := found.count("inconclusive"):
+        shares.append(f"inconclusive {unsure}")
+    if tenth := top_k(verdicts):
+        shares.append(f"the tenth violation in flight {tenth}")
+    lines = [
+        wrapped(f"{found.name} on {found.map}: {', '.join(shares)}", width, others="  "),
+        wrapped(decided_words(verdicts), width, first="  ", others="  "),
+    ]
+    longest = max((len(kind.signature) for kind in found.kinds), default=0)
+    for kind in found.kinds:
+        head = f"  {kind.count:4d}  {kind.signature:<{longest}}"
+        again = again_command(found, kind, config)
+        fits = len(head) + 2 + len(again) <= width
+        lines += [f"{head}  {again}"] if fits else [head.rstrip(), f"{'':8}{again}"]
+        lines.append(wrapped(kind.headline, width, first=" " * 8, others=" " * 8))
+    return lines
 
 
-def _spent(meters: dict[str, float]) -> str:
+def again_command(found: Found, kind: Kind, config: pytest.Config) -> str:
+    """Return the command that flies the first flight of a kind again."""
+    files = " ".join(shown(config.rootpath / file, config) for file in found.files)
+    return repeat_command(config, files, kind.first)
+
+
+def _spent(run: Run) -> str:
     """Return what the run cost beside the budget."""
+    meters = run.ledger.meters()
     flying, idle = meters.get("flying_s", 0.0), meters.get("idle_s", 0.0)
-    words = f"flights: {meters.get('flights', 0):.0f}, flown again {meters.get('retried', 0):.0f}"
-    if "errands" in meters:
-        words += f", to confirm and shrink {meters['errands']:.0f}"
+    pursued = sum(each.finding.flights for each in run.pursued)
+    repeats = meters.get("errands", 0) - pursued
+    counts = {
+        "flown again after a hang or death": meters.get("retried", 0),
+        "to see whether violations repeat": max(0, repeats),
+        "to confirm and shrink": pursued,
+    }
+    words = [f"flights: {meters.get('flights', 0):.0f}"]
+    words += [f"{what} {count:.0f}" for what, count in counts.items() if count]
+    if run.options.shrink == 0 and not run.options.repeat:
+        words.append("nothing confirmed, shrunk or saved (--garl-shrink=0)")
     if flying + idle > 0:
-        words += f", workers idle {100 * idle / (flying + idle):.0f} %"
-    return words
+        words.append(f"workers idle {100 * idle / (flying + idle):.0f} %")
+    return ", ".join(words)
 
 
 def _percent(count: int, total: int) -> str:

@@ -72,7 +72,7 @@ def conditions_of(scenario: Scenario) -> Conditions:
     extinction = fog + dust + rain_extinction_per_m(rain) + snow_extinction_per_m(snow)
     grey, brown = (205.0, 210.0, 214.0), (196.0, 164.0, 120.0)
     share = dust / extinction if extinction > 0 else 0.0
-    elevation = TWILIGHT_DEG + (NOON_DEG - TWILIGHT_DEG) * math.sin(math.pi * gene["sun_position"])
+    elevation = sun_elevation_deg(gene["sun_position"])
     azimuth = math.pi * gene["sun_position"]
     height = math.radians(elevation)
     return Conditions(
@@ -107,6 +107,11 @@ _GENES = (
     "road_snow",
     "sun_position",
 )
+
+
+def sun_elevation_deg(position: float) -> float:
+    """Return the sun's elevation: dawn at 0, noon at 0.5, dusk at 1."""
+    return TWILIGHT_DEG + (NOON_DEG - TWILIGHT_DEG) * math.sin(math.pi * position)
 
 
 def rain_extinction_per_m(rate_mmph: float) -> float:

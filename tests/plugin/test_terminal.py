@@ -189,6 +189,7 @@ def test_junit_carries_what_was_found(pytester: pytest.Pytester, parallel: tuple
             "garl.slot",
             "garl.outcome",
             "garl.signature",
+            "garl.story",
             "garl.final_distance_m",
             "garl.elapsed_s",
             "garl.trajectory_sha256",

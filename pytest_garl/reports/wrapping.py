@@ -1,0 +1,39 @@
+"""Text that fits the terminal, also where an xdist worker writes it."""
+
+from __future__ import annotations
+
+import textwrap
+from typing import Any
+
+import pytest
+
+WIDTH = "garl_width"
+"""What xdist's controller tells its workers about the terminal."""
+_NARROW = 40
+_HARD_SPACE = "\N{NO-BREAK SPACE}"
+
+
+def width_of(config: pytest.Config) -> int:
+    """Return how many columns there are; as pytest does, 80 where there is no terminal."""
+    given: dict[str, Any] = getattr(config, "workerinput", {})
+    if WIDTH in given:
+        return max(_NARROW, int(given[WIDTH]))
+    reporter: Any = config.pluginmanager.get_plugin("terminalreporter")
+    return max(_NARROW, reporter._tw.fullwidth) if reporter is not None else 80
+
+
+def wrapped(text: str, width: int, *, first: str = "", others: str = "") -> str:
+    """Return text in lines of at most ``width`` columns; no word is broken, no % left alone."""
+    return textwrap.fill(
+        text.replace(" %", f"{_HARD_SPACE}%"),
+        width,
+        initial_indent=first,
+        subsequent_indent=others,
+        break_long_words=False,
+        break_on_hyphens=False,
+    ).replace(_HARD_SPACE, " ")
+
+
+def counted(number: int, noun: str) -> str:
+    """Return a number with its noun: ``1 flight``, ``2 flights``."""
+    return f"{number} {noun}{'' if number == 1 else 's'}"

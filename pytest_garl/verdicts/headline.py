@@ -1,0 +1,26 @@
+"""The story of a flight in half a line: what happened, and where."""
+
+from __future__ import annotations
+
+import re
+
+_WHERE = re.compile(
+    r"(?P<what>.*?)\.?\s+At [\d.]+ s the UAV was (?P<where>.+?)\.(?: In the last .*)?", re.DOTALL
+)
+_CRASH = "The landing system "
+_RAISED = f"{_CRASH}raised: "
+
+
+def headline(story: str) -> str:
+    """Return ``collided with person-2 at 2.6 m/s, 1.4 m up, over the marker``."""
+    found = _WHERE.fullmatch(story.strip())
+    what, where = (found["what"], f", {found['where']}") if found else (story.strip(), "")
+    if what.startswith(_RAISED):
+        what = f"Python error {what.removeprefix(_RAISED)}"
+    elif not what.startswith(_CRASH):
+        # What a landing system says may hold anything; our own sentences end with a full stop.
+        what = re.split(r"(?<=[a-z\d%])[.;] (?=[A-Z]|it does)", what)[0]
+    what = what.partition("\n")[0].removesuffix(".")
+    if not what.startswith("Python"):
+        what = what[:1].lower() + what[1:]
+    return f"{what}{where}"

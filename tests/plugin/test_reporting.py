@@ -1,0 +1,111 @@
+from __future__ import annotations
+
+import re
+import xml.etree.ElementTree as ElementTree
+from pathlib import Path
+
+import pytest
+
+from tests.plugin.test_plugin import project, run
+
+PARALLEL = pytest.mark.parametrize("parallel", [(), ("-n2",)])
+SEARCH = ("--garl-budget=8", "--garl-workers=1", "-o", "garl_dir=elsewhere")
+HIT = "collided with dog-1 at 1.0 m/s, 0.0 m up, over the marker"
+AGAIN = (
+    'Repeat: pytest "test_it.py::test_collisions[lawn-g00-s01]" --garl-repeat=lawn-g00-s01 '
+    "-o garl_dir=elsewhere"
+)
+
+
+@PARALLEL
+def test_the_sentence_stands_where_people_look(
+    pytester: pytest.Pytester, parallel: tuple[str, ...], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    project(pytester)
+    monkeypatch.setenv("COLUMNS", "150")
+    result = run(pytester, *SEARCH, "--junitxml=out.xml", *parallel)
+    text = result.stdout.str()
+    assert f"<Landing lawn-g00-s01: {HIT}>.collisions" in text
+    assert AGAIN in text
+    assert f"FAILED test_it.py::test_collisions[lawn-g00-s01] - {HIT}" in text
+    messages = [
+        str(failure.get("message"))
+        for failure in ElementTree.parse(Path(pytester.path) / "out.xml").iter("failure")
+    ]
+    assert f"{HIT}\n{AGAIN}" in messages
+
+
+def test_a_printed_command_flies_the_failure_again(pytester: pytest.Pytester) -> None:
+    project(pytester)
+    first = run(pytester, *SEARCH)
+    (line,) = [each for each in first.outlines if each.startswith(AGAIN[:50])]
+    words = re.fullmatch(r'Repeat: pytest "(.+)" (--garl-repeat=\S+) (-o) (\S+)', line)
+    assert words
+    again = run(pytester, *words.groups())
+    again.assert_outcomes(failed=1)
+    assert f"{HIT}" in again.stdout.str()
+
+
+@pytest.mark.parametrize("columns", ["60", "80", "120"])
+def test_lines_of_our_own_fit_the_terminal(
+    pytester: pytest.Pytester, columns: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    project(pytester)
+    monkeypatch.setenv("COLUMNS", columns)
+    result = pytester.runpytest_subprocess("-p", "no:cacheprovider", *SEARCH, "-v")
+    sections = re.split(r"^([-=_]{3}.*)$", result.stdout.str(), flags=re.MULTILINE)
+    ours = [
+        line
+        for title, body in zip(sections[1::2], sections[2::2], strict=True)
+        if " garl: " in title
+        for line in body.splitlines()
+    ]
+    # A command is never broken, so that it can be copied.
+    prose = [line for line in ours if not re.search(r"--garl-repeat=|^ledger: |^saved ", line)]
+    assert len(prose) > 20
+    assert max(len(line) for line in prose) <= int(columns)
+
+
+def test_a_scenario_is_told_with_v_in_physical_units(pytester: pytest.Pytester) -> None:
+    project(pytester)
+    quiet = run(pytester, *SEARCH).stdout.str()
+    assert "Scenario (seed" not in quiet
+    assert "environment." not in quiet
+    told = run(pytester, *SEARCH, "-v").stdout.str().replace("\n  ", " ")
+    assert re.search(r"Scenario \(seed \d+\): dust, visibility \d+ m; fog, visibility \d+ m;", told)
+    assert re.search(r"falling rain, [\d.]+ mm/h", told)
+    assert re.search(r"dog-1 a dog of up to [\d.]+ m/s, from \(-?[\d.]+, -?[\d.]+\) m", told)
+    assert "environment." not in told
+
+
+@PARALLEL
+def test_own_assertions_that_fail_are_violations_in_the_summary(
+    pytester: pytest.Pytester, parallel: tuple[str, ...]
+) -> None:
+    project(pytester)
+    (pytester.path / "test_it.py").write_text(
+        "import pytest\n"
+        "from systems import *\n"
+        "pytestmark = pytest.mark.garl(system=Good, maps=['lawn'])\n\n"
+        "def test_own(landing):\n"
+        "    assert landing.elapsed_s < 14.0, 'too slow for us'\n"
+    )
+    (pytester.path / "conftest.py").write_text(
+        "import dataclasses, tiny_simulator\n"
+        "from pytest_garl.simulation.record import hash_of\n"
+        "def calm(scenario, *args, **kwargs):\n"
+        "    nominal = {'environment.fog': 0.0, 'dog-1.velocity': 0.1}\n"
+        "    return tiny_simulator.fly(scenario.replace(nominal), *args, **kwargs)\n"
+        "def pytest_garl_fly(config): return calm\n"
+    )
+    result = run(pytester, "--garl-budget=4", "--garl-workers=1", *parallel)
+    result.assert_outcomes(failed=1, xfailed=3)
+    result.stdout.fnmatch_lines(
+        [
+            "Good on lawn: 4 flown, violations 100.0 %*",
+            "*distance decided in 4 of 4 flights, time in 4",
+            "*4  own:test_own:*",
+            "*too slow for us",
+            "own: an assertion of a test",
+        ]
+    )
