@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import dataclasses
 import os
-import resource
 import traceback
 from os import _exit, getpid
 from pathlib import Path
@@ -57,11 +56,11 @@ class Flyer:
         """Fly until the supervisor is gone, or until a fresh process shall go on."""
         import cv2
 
-        import pytest_garl.search.job  # noqa: F401 (before the landing system's modules)
+        from pytest_garl.search.process_state import ProcessState
 
         cv2.setNumThreads(1)
         dispatch.check()
-        limits = _limits()
+        state = ProcessState()
         idle_since = monotonic()
         ledger = Ledger(self._path, self._owner)
         while os.getppid() == self._owner:
@@ -81,11 +80,11 @@ class Flyer:
                 ledger = Ledger(self._path, self._owner)
                 ledger.record(claim, result, sha256, wall_s)
             except Exception as error:
-                if _cannot_go_on(error) and limits == _limits() and _can_open():
+                if _cannot_go_on(error) and not state.limited():
                     raise
                 self._watch.tell(failure=_described(error))
                 break
-            if _left_processes():
+            if state.changed():
                 break
             idle_since = monotonic()
 
@@ -150,36 +149,6 @@ def _described(error: Exception) -> dict[str, str]:
 
 def _text(error: Exception) -> str:
     return "".join(traceback.format_exception(error))
-
-
-def _limits() -> list[tuple[int, int]]:
-    """Return what this process may use of the machine."""
-    names = (
-        resource.RLIMIT_NOFILE,
-        resource.RLIMIT_FSIZE,
-        resource.RLIMIT_AS,
-        resource.RLIMIT_DATA,
-    )
-    return [resource.getrlimit(name) for name in names]
-
-
-def _can_open() -> bool:
-    """Whether a file can be opened: a landing system may have used up how many there may be."""
-    try:
-        os.close(os.open(os.devnull, os.O_RDONLY))
-    except OSError:
-        return False
-    return True
-
-
-def _left_processes() -> bool:
-    """Whether a process that flights have started lives on; those that have ended are let go."""
-    try:
-        while os.waitpid(-1, os.WNOHANG)[0]:
-            pass
-    except ChildProcessError:
-        return False
-    return True
 
 
 if __name__ == "__main__":

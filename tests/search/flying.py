@@ -50,10 +50,10 @@ class Sleeps(Good):
 
 
 class Slow(Good):
-    """Takes longer in each call than a limit of 0.5 s allows, and less than three of them."""
+    """Takes longer in each call than a limit of 1 s allows, and less than three of them."""
 
     def step(self, observation: Observation) -> Land:
-        time.sleep(0.7)
+        time.sleep(1.3)
         return Land()
 
 

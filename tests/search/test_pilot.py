@@ -84,7 +84,7 @@ def test_a_call_that_hangs_is_told_from_a_death(pilot: Pilot) -> None:
 
 def test_a_flight_that_hung_before_has_three_times_the_time_and_counts(pilot: Pilot) -> None:
     """A machine that is slow once changes nothing that the search learns from."""
-    found, calm = pilot.fly(claim(Slow, after="hung", timeout_s=0.5)), pilot.fly(claim(Slow))
+    found, calm = pilot.fly(claim(Slow, after="hung", timeout_s=1.0)), pilot.fly(claim(Slow))
     assert isinstance(found, Landed)
     assert isinstance(calm, Landed)
     assert (found.result, found.sha256) == (calm.result, calm.sha256)
