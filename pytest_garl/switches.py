@@ -120,8 +120,8 @@ OPTIONS = (
     Option(
         name="baseline",
         metavar="FILE",
-        help="Gate: fly the scenarios of a file that `garl baseline save` wrote, and fail on a "
-        "violation of a new kind and on a significantly worse rate.",
+        help="Gate: fly the scenarios of a file that `garl baseline save` wrote, and fail on a new "
+        "type of violation, a significantly worse rate, or a flight that decides nothing.",
     ),
     Option(
         name="level",
