@@ -21,7 +21,8 @@ from pytest_garl.verdicts.gate import LEVEL, Comparison, compare
 from pytest_garl.verdicts.gate_statistics import holm
 from pytest_garl.verdicts.pairs import Answer, Pair
 
-COUNTS, PAGE = Path("docs/experiments/counts.csv"), Path("docs/gate.md")
+DOCS = Path(__file__).parents[1] / "docs"
+COUNTS, PAGE = DOCS / "experiments" / "counts.csv", DOCS / "gate.md"
 BEGIN, END = "<!-- Written by `python -m benchmarks.gate rates`: -->\n", "<!-- To here. -->\n"
 BUDGETS = (50, 100, 400)
 SHAKEN = (0.1, 0.25, 0.5, 1.0)

@@ -26,6 +26,7 @@ from pytest_garl.regressions.baseline import (
 from pytest_garl.regressions.neighbours import neighbours
 from pytest_garl.regressions.survey import (
     Survey,
+    compare_flights,
     compare_sets,
     from_ledger,
     moved_on,
@@ -226,6 +227,14 @@ def test_two_sets_are_compared_scenario_by_scenario_and_only_equal_ones() -> Non
     assert [each.alike for each in found.new_types] == [((3, 3),)]
     with pytest.raises(BaselineError, match="did not fly the same scenarios"):
         compare_sets(before, sample_set(2), LAWN, fly)
+
+
+def test_flights_that_decide_nothing_fail_the_gate_by_name() -> None:
+    unsure = {**result(), "outcome": "inconclusive"}
+    flights = [Done(result=each, sha256="", record=Path()) for each in (result(), unsure, result())]
+    found = compare_flights(sample_set(), flights, LAWN, lambda _: [])
+    assert found.reasons == ("inconclusive: lawn-1",)
+    assert [pair.name for pair in found.pairs] == ["lawn-0", "lawn-2"]
 
 
 def result() -> dict[str, Any]:
