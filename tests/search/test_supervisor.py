@@ -222,7 +222,8 @@ def test_nothing_is_left_beside_the_ledger(tmp_path: Path) -> None:
 def test_a_process_that_nothing_changed_flies_on(field: Field) -> None:
     field.fly(Good)
     (first,) = field.pool._children
-    field.ledger.add_search("more", "flying:Good", "lawn", 4, job_of(Good, field.folder).dumps())
+    job = job_of(Good, field.folder)
+    field.ledger.add_search("more", job.system.name, "lawn", 4, job.dumps())
     field.ledger.add_slots("more", 2, {index: dump_scenario(scenario()) for index in range(4)})
     for index in range(4):
         wait_for(field.ledger, field.pool, "more", Slot(generation=2, index=index), lambda: None)
