@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import dataclasses
 import functools
 import json
@@ -59,8 +60,7 @@ def _value(kind: Any, value: Any, where: str) -> Any:
             raise _wrong(where, value, f"one of {', '.join(map(repr, get_args(kind)))}")
         return value
     if origin in (Union, types.UnionType):
-        (other,) = (each for each in get_args(kind) if each is not type(None))
-        return None if value is None else _value(other, value, where)
+        return _one_of(get_args(kind), value, where)
     if origin is tuple:
         return _tuple(get_args(kind), value, where)
     if origin is dict:
@@ -68,6 +68,16 @@ def _value(kind: Any, value: Any, where: str) -> Any:
             raise _wrong(where, value, "a table")
         return value
     return made(kind, value, where)
+
+
+def _one_of(kinds: tuple[Any, ...], value: Any, where: str) -> Any:
+    if value is None and type(None) in kinds:
+        return None
+    *others, last = (kind for kind in kinds if kind is not type(None))
+    for kind in others:
+        with contextlib.suppress(ValueError):
+            return _value(kind, value, where)
+    return _value(last, value, where)
 
 
 _WORDS = {int: "a whole number", str: "a text", bool: "true or false", type(None): "null"}

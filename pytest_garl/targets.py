@@ -170,8 +170,11 @@ def _recorded(options: Options, target: Target) -> dict[str, str]:
             f"--garl-repeat={options.repeat}: there is no ledger at {path}; run a search first, "
             "or give a scenario file"
         )
+    from pytest_garl.search.stored import check_stored
+
     ledger = Ledger(path)
     try:
+        check_stored(ledger)
         return ledger.scenarios(target.slot.generation, target.slot.index, target.map)
     finally:
         ledger.close()

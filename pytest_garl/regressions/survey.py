@@ -19,9 +19,10 @@ from pytest_garl.search.batch import fly_all, own_pool
 from pytest_garl.search.checkout import Checkout, describe
 from pytest_garl.search.errands import Done
 from pytest_garl.search.job import Job, load_scenario, loads
-from pytest_garl.search.ledger import VERSION, Ledger
+from pytest_garl.search.ledger import Ledger
 from pytest_garl.search.random_search import propose
 from pytest_garl.search.reference import BUILT_IN, Reference
+from pytest_garl.search.stored import check_stored
 from pytest_garl.simulation.policy import PolicySpec
 from pytest_garl.verdicts.gate import LEVEL, Comparison, compare
 from pytest_garl.verdicts.pairs import Answer, Pair, answer_of
@@ -118,9 +119,7 @@ def from_ledger(path: Path) -> Baseline:
         raise BaselineError(f"{path}: there is no ledger; run pytest --garl-budget=N first")
     ledger = Ledger(path)
     try:
-        found = ledger.fact("ledger")
-        if found != VERSION:
-            raise BaselineError(f"{path}: found a ledger of version {found}, expected {VERSION}")
+        check_stored(ledger)
         searches = [(loads(job), ledger.flown(search)) for search, job in ledger.searches()]
         method = str(ledger.fact("method") or "")
     finally:

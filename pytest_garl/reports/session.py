@@ -20,6 +20,7 @@ from pytest_garl.search.local_pool import local_pool
 from pytest_garl.search.pool import Pool
 from pytest_garl.search.ray_pool import check_ray, ray_pool
 from pytest_garl.search.reference import BUILT_IN, package_sha256, reference_to
+from pytest_garl.search.stored import check_stored
 
 
 def begin_run(config: pytest.Config, options: Options) -> Run:
@@ -50,6 +51,7 @@ def begin_run(config: pytest.Config, options: Options) -> Run:
         earlier = _seconds_per_flight(options)
         if options.resume:
             ledger = Ledger.resume(options.ledger, facts)
+            check_stored(ledger)
         else:
             ledger = Ledger.create(options.ledger, facts)
         if earlier:
@@ -134,4 +136,4 @@ def _or_default(ledger: Ledger) -> float:
     from pytest_garl.run import FLIGHT_S
 
     known = ledger.fact("seconds_per_flight")
-    return FLIGHT_S if known is None else float(known)
+    return float(known) if isinstance(known, int | float) else FLIGHT_S

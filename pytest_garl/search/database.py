@@ -12,7 +12,7 @@ from typing import Any
 from pytest_garl.errors import LedgerError
 
 REMEDY = (
-    "Is it a ledger, is there space, may it be written? Mend that and go on with --garl-resume, or "
+    "Is it a ledger, is there space, may it be written? Fix that and go on with --garl-resume, or "
     "choose another folder with the ini key garl_dir"
 )
 _LONGEST = 64_000_000

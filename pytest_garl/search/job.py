@@ -9,8 +9,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from pytest_garl.errors import LedgerError
+from pytest_garl.plain import made, parsed
 from pytest_garl.scenarios.maps import load_map
 from pytest_garl.scenarios.scenario import Scenario
+from pytest_garl.search.database import REMEDY
 from pytest_garl.search.ledger import Claim
 from pytest_garl.search.reference import Reference
 from pytest_garl.search.slots import flight_name
@@ -49,19 +52,11 @@ class Job:
 
 
 def loads(text: str) -> Job:
-    """Return the job in ``text``."""
-    values = json.loads(text)
-    npcs = values.pop("npcs")
-    arguments = tuple((key, value) for key, value in npcs["arguments"])
-    return Job(
-        system=Reference(**values.pop("system")),
-        simulator=Reference(**values.pop("simulator")),
-        npcs=PolicySpec(name=npcs["name"], factory=npcs["factory"], arguments=arguments),
-        limits=Limits(**values.pop("limits")),
-        map_folders=tuple(values.pop("map_folders")),
-        path=tuple(values.pop("path")),
-        **values,
-    )
+    """Return the job in ``text``; raise LedgerError for a damaged one."""
+    try:
+        return made(Job, parsed(text))
+    except ValueError as error:
+        raise LedgerError(f"a job in the ledger is damaged: {error}. {REMEDY}") from error
 
 
 def dump_scenario(scenario: Scenario) -> str:
@@ -71,11 +66,14 @@ def dump_scenario(scenario: Scenario) -> str:
 
 
 def load_scenario(text: str) -> Scenario:
-    """Return the scenario in a line of JSON."""
-    values = json.loads(text)
-    genes = tuple((key, float(value)) for key, value in values["genes"])
-    absent = tuple(values.get("absent", ()))
-    return Scenario(map=values["map"], seed=values["seed"], genes=genes, absent=absent)
+    """Return the scenario in a line of JSON; raise LedgerError for a damaged one."""
+    try:
+        values = parsed(text)
+        scenario = made(Scenario, {"absent": [], **values} if isinstance(values, dict) else values)
+    except ValueError as error:
+        raise LedgerError(f"a scenario in the ledger is damaged: {error}. {REMEDY}") from error
+    genes = tuple((key, float(value)) for key, value in scenario.genes)
+    return dataclasses.replace(scenario, genes=genes)
 
 
 def record_file(job: Job, claim: Claim) -> Path:

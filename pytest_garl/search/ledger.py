@@ -16,6 +16,8 @@ from time import monotonic
 from typing import Any, Literal
 
 from pytest_garl.errors import LedgerError
+from pytest_garl.messages import printable, shown
+from pytest_garl.plain import parsed
 from pytest_garl.search.database import REMEDY, Database
 from pytest_garl.search.processes import alive
 
@@ -140,7 +142,7 @@ class Ledger:
             ledger = cls(path)
             version = ledger.fact("ledger")
             problem = ledger._db.execute("PRAGMA quick_check").fetchone()[0]
-        except (LedgerError, json.JSONDecodeError) as error:
+        except LedgerError as error:
             problem, version = str(error.__cause__ or error), VERSION
         if problem != "ok":
             raise LedgerError(
@@ -192,7 +194,14 @@ class Ledger:
     def fact(self, key: str) -> Any:
         """Return a fact about the run, or None."""
         row = self._db.execute("SELECT value FROM run WHERE key = ?", (key,)).fetchone()
-        return None if row is None else json.loads(row[0])
+        try:
+            return None if row is None else parsed(row[0])
+        except ValueError as error:
+            raise LedgerError(f"{self.path}: the fact {key!r} is damaged: {error}") from error
+
+    def select(self, sql: str) -> list[tuple[Any, ...]]:
+        """Return what a query finds, as it is stored."""
+        return self._db.execute(sql).fetchall()
 
     def add_search(
         self, search: str, system: str, map: str, wanted: int, job: str, kind: Kind = "search"
@@ -237,7 +246,7 @@ class Ledger:
             "SELECT scenario, result FROM slot WHERE search = ? AND generation = ? ORDER BY slot",
             (search, generation),
         )
-        return [(text, None if result is None else json.loads(result)) for text, result in rows]
+        return [(text, None if result is None else result_in(result)) for text, result in rows]
 
     def unflown(self, search: str, generation: int) -> int:
         """Return how many of a generation's slots have no result yet."""
@@ -397,8 +406,7 @@ class Ledger:
         ).fetchone()
         if row is None or row[0] is None:
             return None
-        result: dict[str, Any] = json.loads(row[0])
-        return result
+        return result_in(row[0])
 
     def scenario(self, search: str, generation: int, slot: int) -> str | None:
         """Return a slot's scenario, or None where it has not been bred."""
@@ -437,7 +445,7 @@ class Ledger:
             "ORDER BY system, map, generation, slot",
             (kind,),
         )
-        return [(*row[:4], json.loads(row[4])) for row in rows]
+        return [(*row[:4], result_in(row[4])) for row in rows]
 
     def searches(self) -> list[tuple[str, str]]:
         """Return (id, job) of each search."""
@@ -480,7 +488,7 @@ class Ledger:
                 generation=row[1],
                 slot=row[2],
                 scenario=row[3],
-                result=json.loads(row[4]),
+                result=result_in(row[4]),
                 sha256=row[5] or "",
             )
             for row in rows
@@ -586,6 +594,29 @@ def _comparable(row: tuple[Any, ...]) -> str:
             values["crash"].pop("traceback", None)
         result = json.dumps(values, sort_keys=True)
     return _ADDRESS.sub("0x", json.dumps([*before, result, objectives, sha256]))
+
+
+def result_in(text: str) -> dict[str, Any]:
+    """Return a flight's result; control characters in what a landing system said are written out.
+
+    Raises LedgerError for a text that holds none.
+    """
+    try:
+        result = parsed(text)
+    except ValueError as error:
+        raise LedgerError(f"a result in the ledger is damaged: {error}. {REMEDY}") from error
+    if not isinstance(result, dict):
+        raise LedgerError(f"a result in the ledger is damaged: found {shown(result)}. {REMEDY}")
+    # JSON escapes all that is no ASCII, control characters too.
+    return _seen(result) if "\\u" in text else result
+
+
+def _seen(value: Any) -> Any:
+    if isinstance(value, dict):
+        return {key: _seen(item) for key, item in value.items()}
+    if isinstance(value, list):
+        return [_seen(item) for item in value]
+    return printable(value) if isinstance(value, str) else value
 
 
 def _set_aside(path: Path) -> None:

@@ -36,7 +36,7 @@ from pytest_garl.scenarios.genes import WIND, genome_for, with_destinations
 from pytest_garl.scenarios.maps import load_map
 from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.search.errands import Done
-from pytest_garl.search.job import Job, dump_scenario
+from pytest_garl.search.job import Job, broken_result, dump_scenario
 from pytest_garl.search.ledger import Ledger
 from pytest_garl.search.random_search import propose
 from pytest_garl.search.reference import BUILT_IN, Reference
@@ -238,8 +238,9 @@ def test_flights_that_decide_nothing_fail_the_gate_by_name() -> None:
 
 
 def result() -> dict[str, Any]:
-    verdict = {"primary": None, "signature": "", "paper_violation": False}
-    return {"outcome": "landed", "verdict": verdict}
+    crashed = broken_result("died", "E", "", "", 9.0, inconclusive=True)
+    verdict = {**crashed["verdict"], "outcome": "landed"}
+    return {**crashed, "outcome": "landed", "crash": None, "verdict": verdict}
 
 
 def write_ledger(path: Path, of: Job, method: str = "") -> None:
