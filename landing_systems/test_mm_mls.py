@@ -7,7 +7,11 @@ import pytest
 from landing_systems.mm_mls import MultiModuleLandingSystem
 from pytest_garl.fixtures import Landing
 
-pytestmark = pytest.mark.garl(system=MultiModuleLandingSystem, maps=["court", "lawn"])
+pytestmark = pytest.mark.garl(
+    system=MultiModuleLandingSystem,
+    maps=["court", "lawn"],
+    files=["landing_systems/modules/detection_tphyolo/weights"],
+)
 
 
 def test_lands_on_the_marker(landing: Landing) -> None:

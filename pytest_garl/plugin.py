@@ -50,7 +50,8 @@ def pytest_configure(config: pytest.Config) -> None:
     """Register the marker, and join or begin a run if anything is to be flown."""
     config.addinivalue_line(
         "markers",
-        "garl(system, maps, limits, deterministic): search for violations of a landing system",
+        "garl(system, maps, limits, deterministic, files): search for violations of a landing "
+        "system",
     )
     if not asked(config):
         return

@@ -7,7 +7,7 @@ import hashlib
 import os
 import sys
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TextIO
 
@@ -17,13 +17,9 @@ from pytest_garl.errors import LedgerError
 from pytest_garl.options import Options
 from pytest_garl.search.ledger import Kind, Ledger
 from pytest_garl.search.pool import Pool, wait_for
-from pytest_garl.search.reference import (
-    Reference,
-    reference_to,
-    simulator_sha256,
-    sources_sha256,
-)
+from pytest_garl.search.reference import BUILT_IN, Reference, reference_to, simulator_sha256
 from pytest_garl.search.slots import Slot, flight_name
+from pytest_garl.search.sources import combined_sha256, data_files, sources_of
 from pytest_garl.switches import POLICIES, target_of
 from pytest_garl.targets import FIRST, Target, name_of, repeated
 
@@ -92,7 +88,7 @@ class Run:
             text = self.ledger.job(search)
             if text is not None:
                 then = loads(text)
-                differing = self.job(target, then.npcs).differences(then)
+                differing = self.job(target, _of_today(then.npcs)).differences(then)
                 if differing:
                     raise LedgerError(
                         f"--garl-resume: {target.system.__qualname__} on {target.map} is not what "
@@ -149,7 +145,7 @@ class Run:
         if case is None:
             return ()
         sources = Sources(
-            system_sha256=sources_sha256(target.system),
+            system_sha256=combined_sha256(self._sources_of(target)),
             simulator_sha256=simulator_sha256(self.simulator),
             map_sha256=load_map(target.map, self.options.map_folders).sha256,
         )
@@ -299,9 +295,11 @@ class Run:
         from pytest_garl.search.job import Job
 
         map = load_map(target.map, self.options.map_folders)
+        sources = self._sources_of(target)
+        own = sources_of(self.simulator.load()) if self.simulator != BUILT_IN else ()
         return Job(
             system=reference_to(target.system),
-            system_sha256=sources_sha256(target.system),
+            system_sha256=combined_sha256(sources),
             simulator=self.simulator,
             map=map.name,
             map_sha256=map.sha256,
@@ -311,7 +309,11 @@ class Run:
             timeout_s=self.options.timeout_s,
             path=tuple(_path()),
             flights=str(self.options.folder / "flights"),
+            sources=tuple(sorted({*sources, *own})),
         )
+
+    def _sources_of(self, target: Target) -> tuple[tuple[str, str], ...]:
+        return sources_of(target.system, data_files(target.files, self.options.root))
 
     def _method(self, wanted: Mapping[Slot, Target]) -> Method:
         from pytest_garl.scenarios.genes import genome_for
@@ -348,6 +350,14 @@ def _steered(target: Target, npcs: PolicySpec) -> PolicySpec:
     if not target.live:
         return recorded_spec(dict(case.moves), dict(case.changes))
     return policy_spec(case.policy) if case.policy in POLICIES else npcs
+
+
+def _of_today(npcs: PolicySpec) -> PolicySpec:
+    """Return a policy with the weights that its file holds today."""
+    from pytest_garl.adversary.policies import policy_spec
+
+    weights = str(dict(npcs.arguments).get("weights", ""))
+    return replace(npcs, arguments=policy_spec(weights).arguments) if weights else npcs
 
 
 class _Repeat:

@@ -18,6 +18,7 @@ from pytest_garl.options import SLOT_ID, Options
 from pytest_garl.search.ledger import Ledger
 from pytest_garl.search.reference import check_system, reference_to
 from pytest_garl.search.slots import Slot, slots
+from pytest_garl.search.sources import data_files
 
 if TYPE_CHECKING:
     from pytest_garl.regressions.corpus import Entry
@@ -39,6 +40,8 @@ class Target:
     slot: Slot
     deterministic: bool = True
     """Whether the system does the same in the same flight, as its marker says."""
+    files: tuple[str, ...] = ()
+    """Data files of the system, below the project's root."""
     file: str = ""
     """A scenario file to repeat; empty for a slot of a search."""
     entry: Entry | None = None
@@ -81,6 +84,7 @@ class Subject:
     maps: tuple[str, ...]
     limits: Limits
     deterministic: bool
+    files: tuple[str, ...]
 
     def target(self, map: str, slot: Slot) -> Target:
         """Return what an item tests that flies a slot on a map."""
@@ -90,6 +94,7 @@ class Subject:
             limits=self.limits,
             slot=slot,
             deterministic=self.deterministic,
+            files=self.files,
         )
 
 
@@ -190,12 +195,12 @@ def read_marker(marker: pytest.Mark, options: Options) -> Subject:
     from pytest_garl.scenarios.maps import load_map
     from pytest_garl.verdicts.verdict import Limits
 
-    known = {"system", "maps", "limits", "deterministic"}
+    known = {"system", "maps", "limits", "deterministic", "files"}
     unknown = sorted(set(marker.kwargs) - known)
     if unknown or marker.args:
         raise GarlError(
             f"mark.garl: found {', '.join(unknown) or 'positional arguments'}, expected keywords "
-            "system=, maps=, limits= and deterministic="
+            "system=, maps=, limits=, deterministic= and files="
         )
     if "system" not in marker.kwargs:
         raise GarlError("mark.garl: system= is missing; give the landing system's class")
@@ -221,4 +226,21 @@ def read_marker(marker: pytest.Mark, options: Options) -> Subject:
         maps=tuple(m for m in maps if not options.maps or m in options.maps),
         limits=limits,
         deterministic=deterministic,
+        files=_files(marker.kwargs.get("files", ()), options),
     )
+
+
+def _files(given: Any, options: Options) -> tuple[str, ...]:
+    """Return the marker's data files; raise GarlError for what is none."""
+    named = isinstance(given, list | tuple) and all(isinstance(each, str | Path) for each in given)
+    if not named:
+        raise GarlError(f"mark.garl: files={given!r}: expected a list of paths, as ['model.onnx']")
+    files = tuple(str(each) for each in given)
+    try:
+        data_files(files, options.root)
+    except FileNotFoundError as error:
+        raise GarlError(
+            f"mark.garl: files: there is no {str(error)!r} below {options.root}; expected a file "
+            "or a folder"
+        ) from error
+    return files

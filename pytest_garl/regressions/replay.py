@@ -19,9 +19,9 @@ from pytest_garl.search.job import PAPER_LIMIT_S
 from pytest_garl.search.reference import (
     BUILT_IN,
     simulator_sha256,
-    sources_sha256,
     system_named,
 )
+from pytest_garl.search.sources import sources_sha256
 from pytest_garl.simulation.flight import Flight
 from pytest_garl.simulation.fly import fly
 from pytest_garl.simulation.record import load

@@ -36,8 +36,8 @@ from pytest_garl.search.reference import (
     Reference,
     reference_to,
     simulator_sha256,
-    sources_sha256,
 )
+from pytest_garl.search.sources import sources_sha256
 
 TIMEOUT_S = 10.0
 LEAST = 1 + 1 + 1 + COUNT + PILOTS

@@ -13,9 +13,9 @@ from pytest_garl.errors import LandingSystemError
 from pytest_garl.search.reference import (
     Reference,
     reference_to,
-    sources_sha256,
     system_named,
 )
+from pytest_garl.search.sources import sources_sha256
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -21,6 +21,7 @@ from pytest_garl.simulation.policy import PolicySpec
 from pytest_garl.verdicts.verdict import Limits
 
 PAPER_LIMIT_S = 120.0
+_OF_SOURCES = ("sources", "system_sha256")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -38,13 +39,21 @@ class Job:
     timeout_s: float
     path: tuple[str, ...]
     flights: str
+    sources: tuple[tuple[str, str], ...] = ()
+    """What the landing system consists of, by name and hash: ``system_sha256`` taken apart."""
 
     def differences(self, other: Job) -> tuple[str, ...]:
         """Return what makes results of ``other`` not comparable to this one's."""
         mine, theirs = dataclasses.asdict(self), dataclasses.asdict(other)
         # Where things lie may change; what is flown may not.
         indifferent = {"path", "flights", "map_folders"}
-        return tuple(key for key in mine if key not in indifferent and mine[key] != theirs[key])
+        keys = [key for key in mine if key not in indifferent and mine[key] != theirs[key]]
+        if "sources" in keys:
+            names = {name for name, _ in {*self.sources} ^ {*other.sources}}
+            keys = [*sorted(names), *(key for key in keys if key not in _OF_SOURCES)]
+        if self.npcs.sha256 != other.npcs.sha256 and self.npcs.name == other.npcs.name:
+            keys = [f"the weights {self.npcs.name}" if key == "npcs" else key for key in keys]
+        return tuple(keys)
 
     def dumps(self) -> str:
         """Return it as JSON."""

@@ -66,22 +66,6 @@ def reference_to(thing: Any) -> Reference:
     return Reference(module=thing.__module__, file=file, qualname=qualname)
 
 
-def sources_sha256(thing: Any) -> str:
-    """Hash the sources of a landing system: its module, and what it imports of its package."""
-    top = thing.__module__.partition(".")[0]
-    files = {
-        Path(str(module.__file__))
-        for name, module in list(sys.modules.items())
-        if (name == thing.__module__ or name.startswith(f"{top}."))
-        and getattr(module, "__file__", None)
-        and not name.rpartition(".")[2].startswith(("test_", "conftest"))
-    }
-    digest = hashlib.sha256()
-    for file in sorted(files):
-        digest.update(file.name.encode() + file.read_bytes())
-    return digest.hexdigest()
-
-
 @functools.cache
 def package_sha256() -> str:
     """Hash what of this package shapes a search: its sources, maps and shipped weights."""

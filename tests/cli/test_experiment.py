@@ -251,5 +251,5 @@ def test_a_run_that_another_code_began_is_told(slow: Path) -> None:
     (slow / "systems.py").write_text(SLOW + "\nchanged = True\n")
     result = garl("--workers=2")
     assert result.exit_code == 1
-    assert "system_sha256 changed" in result.output
+    assert "systems.py changed" in result.output
     assert "remove .garl/experiments/Good-garl-seed0-12-lawn-court-" in result.output

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 import random
 import signal
@@ -11,8 +12,10 @@ import sys
 import time
 from pathlib import Path
 
+import numpy as np
 import pytest
 
+from pytest_garl.adversary.network import WEIGHTS, Network, save
 from tests.plugin.test_plugin import project, result_hash, run
 
 SLOW = """
@@ -203,8 +206,76 @@ def test_a_changed_system_is_not_resumed(pytester: pytest.Pytester) -> None:
     pytester.makepyfile(systems=SLOW.replace("0.03", "0.04"))
     result = run(pytester, *BUDGET, "--garl-resume")
     assert result.ret == pytest.ExitCode.USAGE_ERROR
-    result.stderr.fnmatch_lines(["*Slow on lawn is not what it was: system_sha256 changed*"])
+    result.stderr.fnmatch_lines(["*Slow on lawn is not what it was: systems.py changed*"])
     assert result_hash(pytester) == before
+
+
+@pytest.fixture
+def composed(pytester: pytest.Pytester) -> pytest.Pytester:
+    """Search with a system of two modules and a folder of data, and with weights in a file."""
+    slow_project(pytester)
+    pytester.makepyfile(systems=f"import helper\n{SLOW}", helper="speed = 1")
+    model = pytester.mkdir("model")
+    (model / "net.bin").write_bytes(b"weights")
+    marked = (pytester.path / "test_it.py").read_text()
+    marker = "maps=['lawn'], files=['model'])"
+    (pytester.path / "test_it.py").write_text(marked.replace("maps=['lawn'])", marker))
+    weigh(pytester.path / "policy.npz", 1.0)
+    run(pytester, *COMPOSED)
+    return pytester
+
+
+COMPOSED = ("--garl-budget=2", "--garl-workers=1", "--garl-npcs=policy.npz")
+
+
+def weigh(path: Path, scale: float) -> None:
+    """Write weights as `garl train` does: the shipped ones, scaled."""
+    with np.load(WEIGHTS / "dqn.npz") as shipped:
+        layers = tuple(
+            (shipped[f"weight_{n}"] * scale, shipped[f"bias_{n}"]) for n in range(len(shipped) // 2)
+        )
+    state = json.loads((WEIGHTS / "dqn.json").read_text())["state"]
+    save(path, Network(state=state, layers=layers), {})
+
+
+@pytest.mark.parametrize(
+    ("file", "text"), [("helper.py", b"speed = 2"), ("model/net.bin", b"other weights")]
+)
+def test_what_a_system_needs_is_part_of_it(
+    composed: pytest.Pytester, file: str, text: bytes
+) -> None:
+    assert run(composed, *COMPOSED, "--garl-resume").ret in (0, 1)
+    before = result_hash(composed)
+    (composed.path / file).write_bytes(text)
+    result = run(composed, *COMPOSED, "--garl-resume")
+    assert result.ret == pytest.ExitCode.USAGE_ERROR
+    result.stderr.fnmatch_lines([f"*Slow on lawn is not what it was: {file} changed*"])
+    assert result_hash(composed) == before
+
+
+def test_other_weights_of_the_policy_are_told(composed: pytest.Pytester) -> None:
+    weigh(composed.path / "policy.npz", 2.0)
+    result = run(composed, *COMPOSED, "--garl-resume")
+    assert result.ret == pytest.ExitCode.USAGE_ERROR
+    result.stderr.fnmatch_lines(["*is not what it was: the weights policy.npz changed*"])
+
+
+@pytest.mark.parametrize(
+    ("files", "words"),
+    [
+        ("['gone.bin']", "*mark.garl: files: there is no 'gone.bin' below *"),
+        ("'net.bin'", "*mark.garl: files='net.bin': expected a list of paths*"),
+    ],
+)
+def test_data_files_must_be_there(pytester: pytest.Pytester, files: str, words: str) -> None:
+    slow_project(pytester)
+    marked = (pytester.path / "test_it.py").read_text()
+    (pytester.path / "test_it.py").write_text(
+        marked.replace("maps=['lawn'])", f"maps=['lawn'], files={files})")
+    )
+    result = run(pytester, "--garl-budget=1", "--garl-workers=1")
+    result.stdout.fnmatch_lines([words])
+    assert result.ret == pytest.ExitCode.INTERRUPTED
 
 
 @pytest.mark.parametrize("budget", [1, 2, 7, 19, 60])

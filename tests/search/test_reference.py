@@ -9,21 +9,27 @@ import pytest
 from pytest_garl.search import reference
 
 
+def fresh() -> str:
+    """Hash this package; within a process that is done once."""
+    reference.package_sha256.cache_clear()
+    return reference.package_sha256()
+
+
 def test_the_package_is_known_by_what_shapes_a_search(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     home = Path(reference.__file__).parents[1]
     copy = tmp_path / "pytest_garl"
     shutil.copytree(home, copy, ignore=shutil.ignore_patterns("__pycache__"))
-    here = reference.package_sha256()
+    here = fresh()
     assert re.fullmatch("[0-9a-f]{64}", here)
     monkeypatch.setattr(reference, "__file__", str(copy / "search" / "reference.py"))
-    assert reference.package_sha256() == here
+    assert fresh() == here
     (copy / "reports" / "terminal.py").write_text("")
     (copy / "verdicts" / "notes.txt").write_text("")
-    assert reference.package_sha256() == here
+    assert fresh() == here
     (copy / "scenarios" / "maps" / "court.toml").write_text("")
-    changed = reference.package_sha256()
+    changed = fresh()
     assert changed != here
     (copy / "verdicts" / "judge.py").rename(copy / "verdicts" / "jury.py")
-    assert reference.package_sha256() != changed
+    assert fresh() != changed
