@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import contextlib
 import ctypes
+import functools
+import os
 import signal
 import subprocess
 import sys
@@ -86,7 +88,7 @@ def _session(command: Sequence[str], output: IO[bytes]) -> Iterator[subprocess.P
         stderr=subprocess.STDOUT,
         # Ctrl-C is passed on once, below, and not by the terminal as well.
         start_new_session=True,
-        preexec_fn=_end_with_parent,
+        preexec_fn=functools.partial(_end_with, os.getpid()),
     )
     try:
         yield session
@@ -100,8 +102,11 @@ def _session(command: Sequence[str], output: IO[bytes]) -> Iterator[subprocess.P
             session.wait()
 
 
-def _end_with_parent() -> None:
+def _end_with(parent: int) -> None:
     ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGTERM)
+    if os.getppid() != parent:
+        # It ended before the kernel was told to say so.
+        os._exit(1)
 
 
 def _begun(ledger: Path) -> bool:
