@@ -41,6 +41,7 @@ def _check(
     kind: str, name: str, value: object, low: float, high: float, unit: str, *, whole: bool = False
 ) -> None:
     """Raise LandingSystemError unless a value is a number in a range; NaN is in none."""
+    __tracebackhide__ = True  # pytest shows the line of the user's module that made it
     try:
         fits = low <= value <= high and not (whole and value != int(value))  # type: ignore[operator, call-overload]
     except (TypeError, ValueError, OverflowError):
@@ -73,6 +74,7 @@ class Camera:
     rate_hz: float = 10.0
 
     def __post_init__(self) -> None:
+        __tracebackhide__ = True
         for name in ("width_px", "height_px"):
             _check("Camera", name, getattr(self, name), 16, _MOST_PIXELS // 16, "px", whole=True)
         if self.width_px * self.height_px > _MOST_PIXELS:
@@ -121,6 +123,7 @@ class Airframe:
     control_rate_hz: float | None = None
 
     def __post_init__(self) -> None:
+        __tracebackhide__ = True
         camera: object = self.camera
         if not isinstance(camera, Camera):
             found = type(camera).__name__
@@ -306,7 +309,10 @@ class LandingSystem(Protocol):
         """Prepare for one flight; called once, on the ground."""
 
     def step(self, observation: Observation) -> Command:
-        """Answer one camera frame with what the UAV shall do until the next."""
+        """Answer one camera frame with what the UAV shall do until the next.
+
+        Not called again after it has returned ``Abort()``.
+        """
 
 
 def airframe_of(system: object) -> Airframe:

@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+import faulthandler
 import sys
 from pathlib import Path
 
 import click
 
 from pytest_garl.errors import GarlError, LandingSystemError
+
+LIMIT_S = 1800.0
+"""Wall time after which the command ends in any case, with a traceback."""
 
 
 @click.command()
@@ -40,12 +44,17 @@ def check(
     """
     from pytest_garl.testing import check_landing_system
 
-    found = _imported(system)
-    for name in maps:
-        result = check_landing_system(
-            found, map=name, seconds=seconds, deterministic=not nondeterministic
-        )
-        click.echo(result)
+    # A call that hangs in C code and holds the interpreter can be interrupted by nothing else.
+    faulthandler.dump_traceback_later(LIMIT_S, exit=True, file=sys.__stderr__ or 2)
+    try:
+        found = _imported(system)
+        for name in maps:
+            result = check_landing_system(
+                found, map=name, seconds=seconds, deterministic=not nondeterministic
+            )
+            click.echo(result)
+    finally:
+        faulthandler.cancel_dump_traceback_later()
 
 
 def _imported(name: str) -> type:

@@ -35,8 +35,8 @@ class Fleet:
         """Pilots by what will tell about them."""
         self._flying: dict[Any, tuple[Any, Claim]] = {}
         """Pilots and what they fly by what will come of it."""
-        self._idle: list[tuple[Any, float]] = []
-        """Pilots, and since when they wait."""
+        self._idle: list[tuple[Any, float, str]] = []
+        """Pilots, since when they wait, and the landing system that each flew last."""
         self._lost: Counter[tuple[str, int, int]] = Counter()
         self._lost_on_arrival = 0
 
@@ -60,7 +60,7 @@ class Fleet:
 
     def close(self) -> None:
         """Let the pilots that do not fly leave nothing behind; the others end with the cluster."""
-        leaving = [pilot.close.remote() for pilot, _ in self._idle]
+        leaving = [pilot.close.remote() for pilot, *_ in self._idle]
         with contextlib.suppress(self._ray.exceptions.RayError):
             self._ray.get(leaving, timeout=PARTING_S)
 
@@ -93,12 +93,17 @@ class Fleet:
         self._lost_on_arrival = 0
         self._rest(pilot)
 
-    def _rest(self, pilot: Any) -> None:
-        self._idle.append((pilot, time.monotonic()))
+    def _rest(self, pilot: Any, flown: str = "") -> None:
+        self._idle.append((pilot, time.monotonic(), flown))
 
     def _hand_out(self) -> None:
-        while self._idle and (claim := self._ledger.claim()):
-            pilot, since = self._idle.pop()
+        while self._idle:
+            pilot, since, flown = self._idle[-1]
+            # A pilot's child flies one landing system; for another it starts anew.
+            claim = self._ledger.claim(flown=flown) or self._ledger.claim()
+            if claim is None:
+                return
+            self._idle.pop()
             self._ledger.count("idle_s", time.monotonic() - since)
             record_file(loads(claim.job), claim).unlink(missing_ok=True)
             self._flying[pilot.fly.remote(claim)] = pilot, claim
@@ -116,7 +121,7 @@ class Fleet:
         else:
             _keep(flight, claim)
             self._ledger.record(claim, flight.result, flight.sha256, flight.wall_s)
-        self._rest(pilot)
+        self._rest(pilot, loads(claim.job).system.name)
 
     def _lose(self, claim: Claim, error: Exception) -> None:
         """Give back a slot whose pilot is gone: Ray's worker was killed, or its node is lost.
