@@ -312,17 +312,14 @@ def test_who_repairs_need_not_outrun_what_the_reference_pilot_does_not(
     hit = "> 0.7 and (not knows or npcs.name != 'recorded')"
     change(simulator, "> 0.7 and not knows", hit)
     result = run(pytester, *SEARCH)
-    result.stdout.fnmatch_lines(
-        [
-            "*neighbours fail too; the reference pilot violates*",
-            "*nothing unless it is pursued as well*",
-        ]
-    )
+    told = " ".join(result.stdout.str().split())
+    assert "the reference pilot violates nothing unless it is pursued as well" in told
     fog, dog = cases(pytester)
     assert (load(fog).avoidable, load(dog).avoidable) == ("live", "recorded")
     assert load(dog).status == "open"
     change(dog, 'status = "open"', 'status = "fixed"')
     change(simulator, hit, "> 7")
+    change(fog, 'status = "open"', 'status = "open"\naccepted = true')
     run(pytester).assert_outcomes(passed=5, xfailed=1)
 
 
