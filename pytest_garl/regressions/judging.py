@@ -122,9 +122,16 @@ def _judged(element: ElementTree.Element) -> Judged:
     return Judged(
         nodeid=f"{element.get('classname', '')}.{name}",
         outcome=outcome,
-        message=told.get("message", "") if told is not None else "",
+        message=_message(told) if told is not None else "",
         facts={each.get("name", ""): each.get("value", "") for each in element.iter("property")},
     )
+
+
+def _message(told: ElementTree.Element) -> str:
+    """Return the error as pytest shows it, or the first line of what was said."""
+    shown = (line for line in (told.text or "").splitlines() if line.startswith("E  "))
+    first = (told.get("message", "").splitlines() or [""])[0]
+    return next(shown, "E")[1:].strip() or first
 
 
 def is_test(found: Judged, test: str) -> bool:
