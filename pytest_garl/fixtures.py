@@ -4,13 +4,17 @@ from __future__ import annotations
 
 import functools
 import math
+import sys
+from collections.abc import Callable
 from pathlib import Path
+from types import FrameType
 from typing import TYPE_CHECKING, Any, NoReturn
 
 import pytest
 
+from pytest_garl.assertions import Read, code_of
 from pytest_garl.errors import GarlError
-from pytest_garl.switches import FATAL, RUN
+from pytest_garl.switches import BEGUN, FATAL, LANDING, RUN, target_of
 
 if TYPE_CHECKING:
     from pytest_garl.scenarios.scenario import Scenario
@@ -24,15 +28,45 @@ class Landing:
     """One flown landing, as a test sees it.
 
     Reading a property that the flight did not decide skips the test with the reason;
-    ``final_distance_m`` and ``elapsed_s`` can always be read.
+    ``final_distance_m`` and ``elapsed_s`` can always be read.  ``reads`` is what ``test`` has read
+    so far, so that a failure can be told from another property's.
     """
 
-    def __init__(self, target: Target, result: dict[str, Any], record: Path) -> None:
-        self._target, self.result, self._record = target, result, record
+    def __init__(
+        self,
+        target: Target,
+        result: dict[str, Any],
+        record: Path,
+        test: Callable[..., Any] | None = None,
+    ) -> None:
+        self._target, self._result, self._record = target, result, record
+        self._code = code_of(test) if test else None
         self.slot: str = target.name
-        self.outcome: str = result["outcome"]
-        self.final_distance_m: float = result["final_distance_m"]
-        self.elapsed_s: float = result["elapsed_s"]
+        self.reads: list[Read] = []
+
+    @property
+    def result(self) -> dict[str, Any]:
+        """The flight's result as it stands in the ledger."""
+        self._note("result")
+        return self._result
+
+    @property
+    def outcome(self) -> str:
+        """How the flight ended: landed, collision, not_landed, aborted."""
+        self._note("outcome")
+        return str(self._result["outcome"])
+
+    @property
+    def final_distance_m(self) -> float:
+        """Horizontal distance from the marker's centre where the flight ended, however it did."""
+        self._note("final_distance_m")
+        return float(self._result["final_distance_m"])
+
+    @property
+    def elapsed_s(self) -> float:
+        """Time from the mission's start to the flight's end, however it ended."""
+        self._note("elapsed_s")
+        return float(self._result["elapsed_s"])
 
     def __repr__(self) -> str:
         from pytest_garl.verdicts.headline import headline
@@ -50,9 +84,10 @@ class Landing:
 
         Where it touched the ground too far off before it gave up, that place counts.
         """
+        self._note("distance_to_landing_m")
         if self.outcome == "landed":
             return self.final_distance_m
-        touched: float | None = self.result.get("off_marker_m")
+        touched: float | None = self._result.get("off_marker_m")
         if touched is None:
             self._undecided()
         return touched
@@ -60,6 +95,7 @@ class Landing:
     @property
     def time_to_landing_s(self) -> float:
         """Time from the mission's start to the landing; infinite if it never landed."""
+        self._note("time_to_landing_s")
         if self.outcome == "not_landed":
             return math.inf
         if self.outcome != "landed":
@@ -72,14 +108,46 @@ class Landing:
     @property
     def collisions(self) -> tuple[str, ...]:
         """Names of the bodies that the UAV hit; "ground" for a hard touchdown."""
-        return tuple(self.result["collisions"])
+        self._note("collisions")
+        return tuple(self._result["collisions"])
 
-    @functools.cached_property
+    @property
     def verdict(self) -> Verdict:
         """The built-in judgement."""
+        self._note("verdict")
+        return self._verdict
+
+    @functools.cached_property
+    def _verdict(self) -> Verdict:
         from pytest_garl.verdicts.serialise import from_dict
 
-        return from_dict(self.result["verdict"])
+        return from_dict(self._result["verdict"])
+
+    @property
+    def inconclusive(self) -> bool:
+        """Whether the flight came to no end, and so decides nothing."""
+        return bool(self._result["outcome"] == "inconclusive")
+
+    @property
+    def unjudged(self) -> str:
+        """Why no assertion can judge the flight, or nothing where one can."""
+        if self.inconclusive:
+            return f"inconclusive: {self._result['undecided']}"
+        if self._verdict.primary == "crash":
+            return f"not decided: {self._verdict.story}"
+        return "not decided: the landing was aborted" if self._verdict.primary == "abort" else ""
+
+    @property
+    def complaint(self) -> str:
+        """The landing system's own traceback below the story of a flight without judge."""
+        if self.inconclusive:
+            return (
+                f"{self.unjudged}. Nothing was decided: fly it again while the machine has nothing "
+                "else to do, or allow more time with --garl-timeout."
+            )
+        crash: dict[str, Any] | None = self._result["crash"]
+        story = self._verdict.story
+        return f"{story}\n\n{crash['traceback']}" if crash and crash["traceback"] else story
 
     @functools.cached_property
     def flight(self) -> Flight:
@@ -89,7 +157,16 @@ class Landing:
         return load(self._record)
 
     def _undecided(self) -> NoReturn:
-        pytest.skip(f"not decided: {self.result['undecided']}")
+        pytest.skip(f"not decided: {self._result['undecided']}")
+
+    def _note(self, name: str) -> None:
+        """Remember what the test reads, and in which line of its own body."""
+        frame: FrameType | None = sys._getframe(2)
+        if frame is None or frame.f_code.co_filename == __file__:
+            return
+        while frame is not None and frame.f_code is not self._code:
+            frame = frame.f_back
+        self.reads.append(Read(name=name, line=frame.f_lineno if frame else 0))
 
 
 @pytest.fixture
@@ -128,9 +205,10 @@ def landing(request: pytest.FixtureRequest, garl_slot: Target, npcs: PolicySpec)
         result = run.fly(garl_slot, npcs)
     except GarlError as error:
         stop(request.node, error)
-    landing = Landing(garl_slot, result, run.record(garl_slot))
+    item = request.node
+    landing = Landing(garl_slot, result, run.record(garl_slot), getattr(item, "obj", None))
     verdict = result["verdict"]
-    request.node.user_properties += [
+    item.user_properties += [
         ("garl.slot", garl_slot.name),
         ("garl.outcome", result["outcome"]),
         ("garl.signature", verdict["signature"]),
@@ -141,20 +219,37 @@ def landing(request: pytest.FixtureRequest, garl_slot: Target, npcs: PolicySpec)
     ]
     if reasons := run.unproven(garl_slot):
         request.node.user_properties.append(("garl.unproven", "; ".join(reasons)))
-    first = run.first_item(garl_slot) == request.node.nodeid
-    if result["outcome"] == "inconclusive":
-        pytest.skip(f"inconclusive: {result['undecided']}")
-    if result["outcome"] == "crashed" and not first:
-        pytest.skip(f"not decided: {verdict['story']}")
-    if verdict["primary"] == "abort" and not first:
-        pytest.skip("not decided: the landing was aborted")
+    item.stash[LANDING] = landing
+    if item.stash.get(BEGUN, False):
+        # Asked for by the test's body, which must not go on.
+        end_unjudged(item)
     return landing
 
 
+def end_unjudged(item: pytest.Item) -> None:
+    """End a test whose flight no assertion can judge.
+
+    The first test of the slot that runs tells of it and fails; the others skip.  A test that is
+    expected to fail anyway tells nobody.  What a search could not decide is counted for all its
+    flights together; of a saved case, or where one flight is repeated, it is a failure.
+    """
+    landing = item.stash.get(LANDING, None)
+    target = target_of(item)
+    if landing is None or target is None or not landing.unjudged:
+        return
+    run = item.config.stash[RUN]
+    one = target.entry is not None or bool(run.options.repeat)
+    if landing.inconclusive and not one:
+        pytest.skip(landing.unjudged)
+    if item.get_closest_marker("xfail") is None and not run.tells(target, item.nodeid):
+        pytest.skip(landing.unjudged)
+    pytest.fail(landing.complaint, pytrace=False)
+
+
 @pytest.fixture
-def scenario(request: pytest.FixtureRequest, garl_slot: Target) -> Scenario:
-    """Return the scenario that the slot holds."""
+def scenario(request: pytest.FixtureRequest, garl_slot: Target, landing: Landing) -> Scenario:
+    """Return the scenario that the slot holds, flown as for ``landing``."""
+    del landing
     run = request.config.stash[RUN]
-    request.getfixturevalue("landing")
     scenario: Scenario = run.scenario(garl_slot)
     return scenario

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import hashlib
 import inspect
 from collections.abc import Callable
 from pathlib import Path
@@ -11,6 +10,7 @@ from typing import Any
 
 import pytest
 
+from pytest_garl.assertions import FAILS, Failure, failure_of
 from pytest_garl.errors import GarlError
 from pytest_garl.fixtures import Landing
 from pytest_garl.regressions.pursuit import OwnFailure
@@ -19,19 +19,6 @@ from pytest_garl.switches import target_of
 from pytest_garl.targets import Target
 
 _GIVEN = {"landing", "scenario"}
-
-
-def failure_of(test: str, error: BaseException) -> OwnFailure | None:
-    """Return what an assertion said, or None for any other exception."""
-    if not isinstance(error, AssertionError):
-        return None
-    caught = pytest.ExceptionInfo.from_exception(error)
-    source = str(caught.traceback[-1].statement)
-    message = str(error).partition("\n")[0] or source.strip()
-    digest = hashlib.sha256(source.encode()).hexdigest()[:8]
-    return OwnFailure(
-        test=test, assertion=digest, signature=f"own:{test}:{digest}", message=message
-    )
 
 
 def asks_of(session: pytest.Session, nodeid: str) -> tuple[Target, Asks]:
@@ -65,15 +52,27 @@ class Asks:
     def __call__(
         self, result: dict[str, Any], record: Path, scenario: Scenario
     ) -> OwnFailure | None:
-        """Return how the test fails on a flight, or None."""
-        landing = Landing(self._target, result, record)
-        if landing.verdict.violation:
+        """Return how the test fails on a flight beyond its verdict, or None."""
+        found = self.failure(result, record, scenario)
+        if found is None or found.is_about(result["verdict"]["primary"]):
+            return None
+        return OwnFailure(
+            test=found.test,
+            assertion=found.digest,
+            signature=found.signature,
+            message=found.message,
+        )
+
+    def failure(self, result: dict[str, Any], record: Path, scenario: Scenario) -> Failure | None:
+        """Return which assertion of the test fails on a flight, or None."""
+        landing = Landing(self._target, result, record, self._function)
+        if landing.unjudged:
             return None
         given = {"landing": landing, "scenario": scenario}
         # What else a test raises, or that it skips, is no failure of an assertion.
         with contextlib.suppress(Exception, pytest.skip.Exception):
             try:
                 self._function(**{name: given[name] for name in self._wanted})
-            except AssertionError as error:
-                return failure_of(self.test, error)
+            except FAILS as error:
+                return failure_of(self.test, self._function, error, landing.reads)
         return None

@@ -10,8 +10,9 @@ import pytest
 
 from pytest_garl import hookspecs
 from pytest_garl.errors import GarlError
-from pytest_garl.fixtures import garl_slot, landing, npcs, scenario
+from pytest_garl.fixtures import end_unjudged, garl_slot, landing, npcs, scenario
 from pytest_garl.switches import (
+    BEGUN,
     FATAL,
     FOUND,
     OWN,
@@ -134,15 +135,13 @@ def pytest_runtestloop(session: pytest.Session) -> Generator[None, object, objec
 
 @pytest.hookimpl(wrapper=True)
 def pytest_pyfunc_call(pyfuncitem: pytest.Function) -> Generator[None, Any, Any]:
-    """Fail the first test of a slot whose system crashed, before its body runs."""
-    subject: Any = pyfuncitem.funcargs.get("landing")
-    if subject is not None and target_of(pyfuncitem) is not None:
-        verdict = subject.verdict
-        if verdict.primary in ("crash", "abort"):
-            from pytest_garl.reports.explain import crash_text
-
-            pytest.fail(crash_text(subject), pytrace=False)
-    return (yield)
+    """End a test before its body runs if the landing system crashed."""
+    pyfuncitem.stash[BEGUN] = True
+    try:
+        end_unjudged(pyfuncitem)
+        return (yield)
+    finally:
+        pyfuncitem.stash[BEGUN] = False
 
 
 @pytest.hookimpl(wrapper=True)
@@ -153,11 +152,13 @@ def pytest_runtest_makereport(
     report = yield
     target = target_of(item)
     run = item.config.stash.get(RUN, None)
-    if target is not None and run is not None and report.when == "call":
+    if target is not None and run is not None and (report.when == "call" or report.skipped):
         from pytest_garl.reports.explain import explain
 
         try:
-            explain(report, item, run, target, call.excinfo.value if call.excinfo else None)
+            if report.when == "call":
+                explain(report, item, run, target, call.excinfo.value if call.excinfo else None)
+            run.note_ran(item.nodeid)
         except GarlError as error:
             # Without a ledger no other item would fare better.
             report.outcome, report.longrepr = "failed", f"garl: {error}"

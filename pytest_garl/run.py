@@ -39,6 +39,38 @@ FLIGHT_S = 2.2
 ``python -m benchmarks``."""
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Selected:
+    """A selected test item of a slot.
+
+    ``test`` is the same for all slots of one test; ``shows`` says whether its failure shows: it is
+    marked neither to be skipped nor to fail, and takes the slot's landing.
+    """
+
+    nodeid: str
+    test: str
+    shows: bool
+
+
+def selected(item: pytest.Item) -> Selected:
+    """Return what a run must know of an item."""
+    marked = any(item.get_closest_marker(name) for name in ("skip", "skipif", "xfail"))
+    return Selected(
+        nodeid=item.nodeid,
+        test=test_of(item),
+        shows=not marked and "landing" in getattr(item, "fixturenames", ()),
+    )
+
+
+def test_of(item: pytest.Item) -> str:
+    """Return an item's test with its parameters but the slot."""
+    callspec: Any = getattr(item, "callspec", None)
+    indices = callspec.indices.items() if callspec else ()
+    others = [f"{name}{index}" for name, index in sorted(indices) if name != "garl_slot"]
+    name = f"{item.nodeid.removesuffix(item.name)}{getattr(item, 'originalname', item.name)}"
+    return f"{name}[{'-'.join(others)}]" if others else name
+
+
 @dataclass(kw_only=True)
 class Run:
     """State of one pytest process; xdist workers each have one and share the ledger."""
@@ -52,7 +84,7 @@ class Run:
     """Called while a flight is waited for."""
     waited: Callable[[], None] = field(default=lambda: None)
     """Called when the waiting is over."""
-    items: dict[str, dict[Slot, list[str]]] = field(default_factory=dict)
+    items: dict[str, dict[Slot, list[Selected]]] = field(default_factory=dict)
     targets: dict[str, dict[Slot, Target]] = field(default_factory=dict)
     breeders: dict[str, Breeder] = field(default_factory=dict)
     results: dict[tuple[str, Slot], dict[str, Any]] = field(default_factory=dict)
@@ -76,7 +108,7 @@ class Run:
             target = target_of(item)
             if target is not None:
                 wanted = self.items.setdefault(target.search, {})
-                wanted.setdefault(target.slot, []).append(item.nodeid)
+                wanted.setdefault(target.slot, []).append(selected(item))
                 self.targets.setdefault(target.search, {})[target.slot] = target
 
     def check_resumed(self) -> None:
@@ -111,9 +143,18 @@ class Run:
         if not self.options.searches and self.options.controller == str(os.getpid()):
             self.ledger.remove()
 
-    def first_item(self, target: Target) -> str:
-        """Return the node id of the first selected item of a slot."""
-        return self.items[target.search][target.slot][0]
+    def tells(self, target: Target, nodeid: str) -> bool:
+        """Whether a test is the first that tells of a slot, in whichever process it runs."""
+        key = f"told slot {target.search} {target.slot.id(target.map)}"
+        return bool(self.ledger.first_fact(key, nodeid) == nodeid)
+
+    def note_ran(self, nodeid: str) -> None:
+        """Write down that a test has run; what it told of is in the ledger by then."""
+        self.ledger.note_fact(f"told ran {nodeid}", value=True)
+
+    def has_run(self, nodeid: str) -> bool:
+        """Whether a test has run, in whichever process."""
+        return bool(self.ledger.fact(f"told ran {nodeid}"))
 
     def fly(self, target: Target, npcs: PolicySpec) -> dict[str, Any]:
         """Return the slot's result after it and all lower selected slots are flown."""
@@ -193,29 +234,36 @@ class Run:
         stopped = bool(session.shouldfail or session.shouldstop)
         return ended and not (stopped or worker or options.repeat) and options.shrink > 0
 
-    def twin(self, target: Target, alike: Callable[[Target, dict[str, Any]], bool]) -> str:
-        """Return the lowest selected slot below whose result is alike, or nothing."""
+    def lower(self, target: Target) -> list[Target]:
+        """Return what the selected tests of lower slots of a search test."""
         search = target.search
-        for slot in self._lower(search, target.slot):
-            if alike(self.targets[search][slot], self._wait(search, slot)):
-                return slot.id(target.map)
-        return ""
+        return [self.targets[search][slot] for slot in self._lower(search, target.slot)]
 
-    def again(self, target: Target, count: int) -> tuple[list[dict[str, Any]], list[str]]:
-        """Fly a flown slot ``count`` times more; return results and trajectories' hashes."""
+    def result(self, target: Target) -> dict[str, Any]:
+        """Return what a slot came to that is flown, or will be."""
+        return self._wait(target.search, target.slot)
+
+    def again(self, target: Target, count: int) -> list[Done]:
+        """Fly a flown slot ``count`` times more."""
+        from pytest_garl.search.errands import Done
+
         job = self.ledger.job(target.search)
         assert job is not None
         name = name_of(target.system)
         text = self.ledger.scenario(target.search, target.slot.generation, target.slot.index)
         assert text is not None
-        results, hashes = [], []
+        flown = []
         for index in range(count):
             errand = again_key(target, index)
             self.ledger.add_search(errand, name, target.map, 1, job, "errand")
             self.ledger.add_slots(errand, 0, {0: text})
-            results.append(self._wait(errand, FIRST))
-            hashes.append(self.ledger.sha256(errand, 0, 0))
-        return results, hashes
+            result = self._wait(errand, FIRST)
+            record = (
+                self.options.folder / "flights" / f"{flight_name(errand, 0, 0, target.map)}.npz"
+            )
+            sha256 = self.ledger.sha256(errand, 0, 0)
+            flown.append(Done(result=result, sha256=sha256, record=record))
+        return flown
 
     def fly_all(
         self, target: Target, npcs: PolicySpec, scenarios: Sequence[Scenario]
@@ -277,7 +325,7 @@ class Run:
             flights = max(slots) * self.options.population + len(slots[max(slots)])
         kind: Kind = "case" if case else "search"
         self.ledger.add_search(search, name, target.map, flights, job.dumps(), kind)
-        nodes = [node for each in self.items[search].values() for node in each]
+        nodes = [item.nodeid for each in self.items[search].values() for item in each]
         files = sorted({node.partition("::")[0] for node in nodes})
         # For the summary, which xdist's controller writes without having had the items.
         self.ledger.note_fact(f"files of {name} on {target.map}", " ".join(files))

@@ -16,12 +16,22 @@ if TYPE_CHECKING:
 
 RUN = pytest.StashKey[Any]()
 """Where a session keeps its run; none if nothing is to be flown."""
+LANDING = pytest.StashKey[Any]()
+"""Where an item keeps the landing that it asked for."""
+BEGUN = pytest.StashKey[bool]()
+"""Where an item keeps whether the test's body runs."""
 FATAL = "garl.fatal"
 """The user property by which an xdist worker tells the controller that the run cannot go on."""
 OWN = "garl.own"
 """The user property by which it tells of a test that failed in an assertion of its own."""
 FOUND = "garl.found"
 """The user property by which it tells that a test failed for a search's violation."""
+FAILURE = "garl.failure"
+"""The user property that names what a failing item tells of."""
+EXCUSED = "garl.excused"
+"""The user property of an item that is excused, with what another item tells of."""
+UNREPEATED = "garl.unrepeated"
+"""The user property of a violation that did not show when it was flown again."""
 METHODS = ("garl", "garl-paper", "ga", "offline-rl", "online-rl", "random", "surrogate-random")
 POLICIES = (
     "dqn",

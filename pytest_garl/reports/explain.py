@@ -3,37 +3,21 @@
 from __future__ import annotations
 
 import json
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import pytest
 
-from pytest_garl.fixtures import Landing
-from pytest_garl.own import Asks, failure_of
-from pytest_garl.reports.commands import repeat_line, shown
-from pytest_garl.reports.wrapping import width_of, wrapped
+from pytest_garl.reports.commands import repeat_line
+from pytest_garl.reports.explain_case import explain_failing, explain_passing
+from pytest_garl.reports.faults import Fault, Repeats, fault_of, repeats, told_by, write_down
+from pytest_garl.reports.rewriting import expect, paragraphs, tell
 from pytest_garl.run import Run, again_key
-from pytest_garl.switches import FOUND, OWN
+from pytest_garl.switches import EXCUSED, FAILURE, FOUND, OWN, UNREPEATED
 from pytest_garl.targets import FIRST, Target, name_of
 from pytest_garl.verdicts.headline import headline
 
-if TYPE_CHECKING:
-    from pytest_garl.regressions.case import Case
-
-AGAIN = 4
-"""How often a violation of a system that need not be deterministic is flown once more."""
-MAYBE_FIXED = "garl.maybe_fixed"
-"""The user property that names the file of an open case that passes."""
 OWN_FAILURE = "garl.own_failure"
 """The user property by which the summary learns of a test's own assertion that failed."""
-STALE = "garl.stale"
-"""The user property that names the file of one that passes without proof, and tells why."""
-
-
-def crash_text(landing: Landing) -> str:
-    """Return the landing system's own traceback, or the story where there is none."""
-    crash: dict[str, Any] | None = landing.result["crash"]
-    story = landing.verdict.story
-    return f"{story}\n\n{crash['traceback']}" if crash and crash["traceback"] else story
 
 
 def explain(
@@ -43,168 +27,102 @@ def explain(
     target: Target,
     error: BaseException | None,
 ) -> None:
-    """Add the story to a failing report; turn a known violation into an xfail."""
+    """Add the story to a failing report; turn what is known, or told already, into an xfail."""
     result = run.ledger.result(target.search, target.slot.generation, target.slot.index)
-    if result is None:
+    if result is None or not isinstance(item, pytest.Function):
         return
-    if target.entry is not None and target.entry.case is not None:
-        _explain_case(report, item, run, target, target.entry.case, result, error)
-    elif report.failed and result["verdict"]["primary"] is not None:
-        _explain_violation(report, item, run, target, result)
-    elif report.failed and isinstance(item, pytest.Function) and error is not None:
-        _explain_own(report, item, run, target, error)
+    case = target.entry.case if target.entry is not None else None
+    if report.failed and error is not None:
+        fault = fault_of(item, target, result, error)
+        again = repeat_line(item, target)
+        if fault is None:
+            lines = [f"The test itself raised {type(error).__name__}; that violates no property."]
+            report.sections.append(("garl: what happened", "\n".join([*lines, again])))
+        elif result["outcome"] == "inconclusive":
+            tell(report, [again], result["undecided"], again)
+        elif case is not None:
+            explain_failing(report, item, run, target, case, fault, result)
+        else:
+            _explain_fault(report, item, run, target, fault, result)
+    elif report.passed and case is not None:
+        explain_passing(report, item, run, target, case, result)
 
 
-def _explain_violation(
-    report: pytest.TestReport, item: pytest.Item, run: Run, target: Target, result: dict[str, Any]
+def _explain_fault(
+    report: pytest.TestReport,
+    item: pytest.Function,
+    run: Run,
+    target: Target,
+    fault: Fault,
+    result: dict[str, Any],
 ) -> None:
-    signature = result["verdict"]["signature"]
-    known = run.known(target).get(signature)
+    """Report what a search found, unless it is known, was told already, or does not repeat."""
+    _note_own(report, target, fault)
+    known = run.known(target).get(fault.signature)
     if known is not None:
-        return _expected(report, f"known: {signature} ({known})")
-    twin = run.twin(target, lambda _, other: other["verdict"]["signature"] == signature)
+        return expect(report, f"known: {fault.signature} ({known})")
+    twin = told_by(run, target, fault, item.nodeid)
+    doubts: list[str] = []
+    if not twin and not run.options.repeat:
+        found = repeats(run, target, fault)
+        if not found.holds:
+            unrepeated = [name_of(target.system), target.map, target.name, fault.signature]
+            report.user_properties.append((UNREPEATED, json.dumps(unrepeated)))
+            return expect(report, f"did not repeat: {found.share} ({fault.signature})")
+        doubts = _doubts(run, target, found)
+        twin = write_down(run, target, fault, item.nodeid)
     if twin and run.options.duplicates == "xfail":
-        return _expected(report, f"same violation as {twin} ({signature})")
-    doubt = "" if twin or run.options.repeat else _doubt(run, target, result)
-    if doubt.startswith(FLAKY):
-        return _expected(report, doubt)
-    _note_test(report, item, run, target, signature)
+        report.user_properties.append((EXCUSED, fault.key(target.search)))
+        return expect(report, f"same violation as {twin} ({fault.signature})")
+    report.user_properties.append((FAILURE, fault.key(target.search)))
+    _note_test(report, item, run, target, fault)
+    lines = [f"{fault.signature}: a property of your own" if fault.own else fault.signature]
+    if fault.own and not fault.asks.possible:
+        lines.append("It is not saved: its test takes more than landing and scenario.")
     story = result["verdict"]["story"]
-    told = [story, *_unusual(item.config, run, target), *filter(None, [doubt])]
+    told = [*_unusual(item.config, run, target), *doubts]
+    what = fault.failure.message if fault.own and fault.failure else headline(story)
     again = repeat_line(item, target)
-    return _tell(report, [signature, *_wrapped(told, item), again], headline(story), again)
+    lines += [*paragraphs(told if fault.own else [story, *told], item), again]
+    return tell(report, lines, what, again)
 
 
-def _explain_own(
-    report: pytest.TestReport, item: pytest.Function, run: Run, target: Target, error: BaseException
-) -> None:
-    """Treat a test's own assertion, where the built-in verdict is content, as another violation."""
-    failure = failure_of(item.originalname, error)
-    if failure is None:
-        return None
-    told = [name_of(target.system), target.map, target.name, failure.signature, failure.message]
-    report.user_properties.append((OWN_FAILURE, json.dumps(told)))
-    known = run.known(target).get(failure.signature)
-    if known is not None:
-        return _expected(report, f"known: {failure.signature} ({known})")
-    asks = Asks(item, target)
-    again = repeat_line(item, target)
-    lines = [f"{failure.signature}: a property of your own", again]
-    if not asks.possible:
-        lines.insert(1, "It is not saved: its test takes more than landing and scenario.")
-        return _tell(report, lines, failure.message, again)
-
-    def alike(other: Target, result: dict[str, Any]) -> bool:
-        found = asks(result, run.record(other), run.scenario(other))
-        return found is not None and found.signature == failure.signature
-
-    twin = run.twin(target, alike)
-    if twin and run.options.duplicates == "xfail":
-        return _expected(report, f"same violation as {twin} ({failure.signature})")
-    run.own[target.search, failure.signature] = asks
-    _note_test(report, item, run, target, failure.signature)
-    if hasattr(item.config, "workerinput"):
-        report.user_properties.append((OWN, failure.signature))
-    return _tell(report, lines, failure.message, again)
+def _note_own(report: pytest.TestReport, target: Target, fault: Fault) -> None:
+    """Tell the summary of a property of the user's own, whatever becomes of its failure."""
+    if fault.own and fault.failure:
+        told = [name_of(target.system), target.map, target.name]
+        told += [fault.signature, fault.failure.message]
+        report.user_properties.append((OWN_FAILURE, json.dumps(told)))
 
 
 def _note_test(
-    report: pytest.TestReport, item: pytest.Item, run: Run, target: Target, signature: str
+    report: pytest.TestReport, item: pytest.Item, run: Run, target: Target, fault: Fault
 ) -> None:
-    """Remember which test found a violation; it judges the case that is saved."""
-    run.note_test(target.search, signature, item.nodeid)
-    if hasattr(item.config, "workerinput"):
-        report.user_properties.append((FOUND, f"{target.search} {signature}"))
+    """Remember which test found a violation: it judges the case that is saved."""
+    if fault.own and not fault.asks.possible:
+        return
+    worker = hasattr(item.config, "workerinput")
+    if fault.own:
+        run.own[target.search, fault.signature] = fault.asks
+        if worker:
+            report.user_properties.append((OWN, fault.signature))
+    run.note_test(target.search, fault.signature, item.nodeid)
+    if worker:
+        report.user_properties.append((FOUND, f"{target.search} {fault.signature}"))
 
 
-def _explain_case(
-    report: pytest.TestReport,
-    item: pytest.Item,
-    run: Run,
-    target: Target,
-    case: Case,
-    result: dict[str, Any],
-    error: BaseException | None,
-) -> None:
-    """Judge a case: an open one fails as it did before, a fixed one must not fail."""
-    assert target.entry is not None
-    verdict, file = result["verdict"], shown(target.entry.path, item.config)
-    same = verdict["signature"] == case.violation.signature
-    if case.edge:
-        # What else a test raises is a mistake in the test.
-        if report.passed or isinstance(error, AssertionError | pytest.fail.Exception):
-            ends = "fails" if report.failed else "passes"
-            _expected(report, f"edge: {ends}; {case.violation.signature} ({file})")
-        return None
-    if report.failed:
-        known = run.acceptance.covers(target.entry.path, case)
-        as_saved = case.status == "open" and (same or _same_assertion(case, item, error))
-        if case.status == "unavoidable" and known:
-            return _expected(report, f"unavoidable: {case.violation.signature} ({file})")
-        if as_saved and known:
-            return _expected(report, f"known: {case.violation.signature} ({file})")
-        if as_saved or case.status == "unavoidable":
-            state = "is new and not accepted yet"
-        elif case.status == "fixed":
-            state = "was fixed and fails again"
-        else:
-            state = "fails in another way"
-        told = [
-            f"The case {file} {state}.",
-            f"Saved: {case.violation.signature}. {case.violation.story}",
-            f"Flown: {verdict['signature'] or 'no violation of its own'}. {verdict['story']}",
-        ]
-        again = f"See it: garl cases replay {file}"
-        lines = [*_wrapped(told, item), again]
-        if as_saved or (case.status == "unavoidable" and not known):
-            lines.append(f"If that is known: commit it, or: garl cases accept {file}")
-        return _tell(report, lines, f"{state}: {headline(verdict['story'])}", again)
-    first = run.first_item(target) == item.nodeid
-    if report.passed and case.status == "open" and verdict["primary"] is None and first:
-        stale = "; ".join(run.unproven(target))
-        said = (STALE, f"{file} passes, but {stale}") if stale else (MAYBE_FIXED, file)
-        report.user_properties.append(said)
-        if run.options.xfail_strict:
-            maybe = f"stale, {stale}" if stale else "maybe fixed"
-            report.outcome = "failed"
-            report.longrepr = (
-                f"{file} is open but passes (garl_xfail_strict): {maybe}; "
-                f"if it is fixed: garl cases promote {file}"
-            )
-    return None
-
-
-def _same_assertion(case: Case, item: pytest.Item, error: BaseException | None) -> bool:
-    """Whether a case's own test fails in the assertion that it was saved for."""
-    if not case.assertion or error is None or not isinstance(item, pytest.Function):
-        return False
-    failure = failure_of(item.originalname, error)
-    return failure is not None and failure.signature == case.violation.signature
-
-
-FLAKY = "FLAKY"
-
-
-def _doubt(run: Run, target: Target, result: dict[str, Any]) -> str:
-    """Fly a new violation again; return what is doubtful about it, or nothing."""
+def _doubts(run: Run, target: Target, found: Repeats) -> list[str]:
+    """Return what is doubtful about a violation that shows again."""
+    if found.same or found.flown == 1:
+        return []
+    told = [f"FLAKY: {found.share}" if found.failed < found.flown else f"{found.share}, each time"]
     if target.deterministic:
-        _, hashes = run.again(target, 1)
-        if hashes[0] == run.trajectory_sha256(target):
-            return ""
-        return (
+        told.append(
             "Nondeterministic landing system: the same flight again came to other trajectories"
             f"{_parting(run, target)}. Seed its generators in reset(mission) and read no clock, or "
             "mark it deterministic=False; what is found cannot be gated otherwise."
         )
-    from pytest_garl.verdicts.metrics import share_interval
-
-    results, _ = run.again(target, AGAIN)
-    failed = 1 + sum(each["verdict"]["primary"] is not None for each in results)
-    low, high = share_interval(failed, 1 + AGAIN)
-    share = f"{failed} of {1 + AGAIN} flights fail [{100 * low:.0f}, {100 * high:.0f}] %"
-    if failed == 1 + AGAIN:
-        return f"Fails each time: {share}."
-    return f"{FLAKY}: {share} ({result['verdict']['signature']})"
+    return told
 
 
 def _parting(run: Run, target: Target) -> str:
@@ -222,25 +140,6 @@ def _parting(run: Run, target: Target) -> str:
         return ""
     first, second = (load(file) for file in files)
     return f", from {parted_s(first, second):.2f} s on"
-
-
-def _expected(report: pytest.TestReport, reason: str) -> None:
-    report.outcome = "skipped"
-    report.wasxfail = reason
-
-
-def _tell(report: pytest.TestReport, lines: list[str], what: str, again: str) -> None:
-    """Add lines to a failure; say what happened, and how to see it, where one line is shown."""
-    report.sections.append(("garl: what happened", "\n".join(lines)))
-    crash = getattr(report.longrepr, "reprcrash", None)
-    if crash is not None:
-        # The short summary shows the first line, JUnit's message as many as fit.
-        crash.message = f"{what}\n{again}"
-
-
-def _wrapped(told: list[str], item: pytest.Item) -> list[str]:
-    width = width_of(item.config)
-    return [wrapped(text, width, others="  ") for text in told]
 
 
 def _unusual(config: pytest.Config, run: Run, target: Target) -> list[str]:

@@ -10,7 +10,8 @@ import pytest
 from pytest_garl import dispatch
 from pytest_garl.reports.aftermath import told
 from pytest_garl.reports.commands import repeat_command, shown
-from pytest_garl.reports.explain import MAYBE_FIXED, OWN_FAILURE, STALE
+from pytest_garl.reports.explain import OWN_FAILURE
+from pytest_garl.reports.explain_case import CASE, MAYBE_FIXED, STALE
 from pytest_garl.reports.kinds import Found, Kind, Own, found_by, legend
 from pytest_garl.reports.progress import duration
 from pytest_garl.reports.wrapping import counted, width_of, wrapped
@@ -77,16 +78,24 @@ def summary(reporter: Any, run: Run) -> None:
 
 
 def _maybe_fixed(reporter: Any) -> list[str]:
-    """Return a line for each open case that passed."""
-    properties = [
-        each for report in reporter.getreports("passed") for each in report.user_properties
-    ]
-    files = sorted({str(value) for key, value in properties if key == MAYBE_FIXED})
-    stale = sorted({str(value) for key, value in properties if key == STALE})
+    """Return a line for each open case of which some test passed and none failed."""
+    fixed = _told(reporter, ("passed",), MAYBE_FIXED) - _told(reporter, ("failed", "xfailed"), CASE)
+    stale = _told(reporter, ("passed",), STALE)
     return [
-        *(f"maybe fixed: {file} passes; if so: garl cases promote {file}" for file in files),
-        *(f"stale: {told}" for told in stale),
+        *(
+            f"maybe fixed: {file} passes; if so: garl cases promote {file}"
+            for file in sorted(fixed)
+        ),
+        *(f"stale: {told}" for told in sorted(stale)),
     ]
+
+
+def _told(reporter: Any, outcomes: tuple[str, ...], key: str) -> set[str]:
+    """Return the values of a user property in reports."""
+    reports = [report for outcome in outcomes for report in reporter.getreports(outcome)]
+    return {
+        str(value) for report in reports for name, value in report.user_properties if name == key
+    }
 
 
 def _searches(reporter: Any, run: Run) -> None:

@@ -159,6 +159,8 @@ class Ledger:
                 "run without --garl-resume to begin anew"
             )
         ledger._db.execute("DELETE FROM seat")
+        # What the tests of the interrupted run told of is told again.
+        ledger._db.execute("DELETE FROM run WHERE key LIKE 'told %'")
         ledger._db.execute(
             "UPDATE slot SET state = 'waiting', pid = NULL, lease = NULL, "
             "attempts = max(0, attempts - 1) WHERE state = 'claimed'"
@@ -202,6 +204,11 @@ class Ledger:
     def select(self, sql: str) -> list[tuple[Any, ...]]:
         """Return what a query finds, as it is stored."""
         return self._db.execute(sql).fetchall()
+
+    def first_fact(self, key: str, value: Any) -> Any:
+        """Write down a fact unless there is one already; return the one that stands."""
+        self._db.execute("INSERT OR IGNORE INTO run VALUES (?, ?)", (key, json.dumps(value)))
+        return self.fact(key)
 
     def add_search(
         self, search: str, system: str, map: str, wanted: int, job: str, kind: Kind = "search"
