@@ -55,12 +55,12 @@ def explain_failing(
     else:
         state = "fails in another way"
     told = [
-        f"The case {file} {state}.",
         f"Saved: {signature}. {case.violation.story}",
         f"Flown: {fault.signature}. {verdict['story']}",
     ]
     again = f"See it: garl cases replay {file}"
-    lines = [*paragraphs(told, item), again]
+    # The first line, which holds a path, is left whole.
+    lines = [f"The case {file} {state}.", *paragraphs(told, item), again]
     if expected:
         lines.append(f"If that is known: commit it, or: garl cases accept {file}")
     return tell(report, lines, f"{state}: {headline(verdict['story'])}", again)
