@@ -21,7 +21,7 @@ import numpy as np
 
 from benchmarks.methods import run
 from benchmarks.rows import append, read
-from pytest_garl.regressions.pursuit import culprit_of
+from pytest_garl.regressions.findings import culprit_of
 from pytest_garl.regressions.shrink import (
     by_hypothesis,
     complexity,

@@ -13,7 +13,7 @@ import pytest
 from pytest_garl.assertions import FAILS, Failure, failure_of
 from pytest_garl.errors import GarlError
 from pytest_garl.fixtures import Landing
-from pytest_garl.regressions.pursuit import OwnFailure
+from pytest_garl.regressions.inquiry import OwnFailure
 from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.switches import target_of
 from pytest_garl.targets import Target

@@ -14,8 +14,8 @@ import numpy as np
 from pytest_garl.adversary.recorded import recorded_spec
 from pytest_garl.errors import LedgerError
 from pytest_garl.experiments.measure import Piloted, Search
+from pytest_garl.regressions.findings import deeds_of
 from pytest_garl.regressions.follow_up import done_of
-from pytest_garl.regressions.pursuit import deeds_of
 from pytest_garl.search.errands import Errands, Fly
 from pytest_garl.search.job import load_scenario
 from pytest_garl.search.ledger import Ledger, Row

@@ -11,15 +11,13 @@ from pathlib import Path
 
 from pytest_garl.regressions.case import Case
 from pytest_garl.regressions.corpus import entries, save, save_patch
+from pytest_garl.regressions.findings import as_found
+from pytest_garl.regressions.inquiry import Asks, Finding, Inquiry
 from pytest_garl.regressions.pursuit import (
     EXCEPTION,
     LEAST,
     PILOTS,
-    Asks,
-    Finding,
-    Inquiry,
     Pursuit,
-    as_found,
 )
 from pytest_garl.scenarios.maps import load_map
 from pytest_garl.scenarios.scenario import Scenario

@@ -4,26 +4,27 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
-from pathlib import Path
-from typing import Any
 
 from pytest_garl.adversary.recorded import recorded_spec
-from pytest_garl.regressions.case import Avoidable, Case, Deeds, Evidence, Violation
+from pytest_garl.regressions.case import Avoidable, Case, Deeds
+from pytest_garl.regressions.findings import (
+    case_of,
+    culprit_of,
+    deeds_of,
+    nobody_asked,
+    unasked,
+)
+from pytest_garl.regressions.inquiry import Failure, Finding, Inquiry, simplest_first
 from pytest_garl.regressions.moves import simpler
 from pytest_garl.regressions.neighbours import COUNT, neighbours
-from pytest_garl.regressions.shrink import alone, bare, clear, complexity, genome_of, nobody, shrink
-from pytest_garl.regressions.story import tell
+from pytest_garl.regressions.shrink import alone, bare, clear, nobody, shrink
 from pytest_garl.scenarios.maps import Map
 from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.search.errands import Done, Fly
 from pytest_garl.search.job import Job
-from pytest_garl.search.reference import reference_to, simulator_sha256
-from pytest_garl.simulation.flight import Flight
+from pytest_garl.search.reference import reference_to
 from pytest_garl.simulation.record import load
 from pytest_garl.simulation.reference_pilot import ReferencePilot
-from pytest_garl.verdicts.serialise import from_dict
-from pytest_garl.verdicts.verdict import Verdict
 
 PILOTS = 3
 """Flights of the reference pilot: against the recorded moves, against the live policy, and one more
@@ -36,90 +37,6 @@ EXCEPTION = 2
 UNLIKE = "its flights with the recorded moves do not fail in the same way"
 CANDIDATES = 3
 """So many violations of a signature are tried for one whose neighbours fail as well."""
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class OwnFailure:
-    """How a test's own assertion failed on a flight."""
-
-    test: str
-    assertion: str
-    signature: str
-    message: str
-
-
-Asks = Callable[[dict[str, Any], Path, Scenario], OwnFailure | None]
-"""A test's own assertion, asked of a flight: result, record, scenario."""
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Inquiry:
-    """What is to be found out about one signature of one search.
-
-    ``violations`` are scenarios with the flights that violated.  ``name`` begins with the search.
-    ``budget`` bounds the flights, ``cap`` those of the landing system for all signatures of the
-    search together unless it is None.  ``asks`` is the test's own assertion that failed, None for
-    the built-in verdict; ``test`` is the node id of the test that found it.
-    """
-
-    name: str
-    signature: str
-    violations: tuple[tuple[Scenario, Done], ...]
-    job: Job
-    map: Map
-    budget: int
-    asks: Asks | None = None
-    test: str = ""
-    cap: int | None = None
-
-    @property
-    def search(self) -> str:
-        """The search that found it."""
-        return self.name.partition(" ")[0]
-
-    @property
-    def exception(self) -> bool:
-        """Whether the landing system raised or returned nonsense."""
-        if self.asks is not None or not self.violations:
-            return False
-        crash = self.violations[0][1].result["crash"]
-        return crash is not None and crash["kind"] in ("raised", "nonsense")
-
-    def failed(self, scenario: Scenario, done: Done) -> bool:
-        """Whether a flight failed in the way that is asked about."""
-        if self.asks is None:
-            return done.signature == self.signature
-        own = self.asks(done.result, done.record, scenario)
-        return own is not None and own.signature == self.signature
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Finding:
-    """What came of it: a case, or the reason why there is none."""
-
-    signature: str
-    case: Case | None
-    flights: int
-    piloted: int = 0
-    """How many of the flights are the reference pilot's, which sees without a camera: they take a
-    fraction of the time."""
-    reason: str = ""
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Failure:
-    """A scenario that fails, what its objects did, its flight, how many neighbours fail too.
-
-    ``first`` is the search's scenario that it was made from; ``asked`` how many neighbours were
-    flown.
-    """
-
-    first: Scenario
-    scenario: Scenario
-    deeds: Deeds
-    done: Done
-    robust: int
-    asked: int = COUNT
 
 
 class Pursuit:
@@ -156,8 +73,8 @@ class Pursuit:
         for scenario, deeds in ((nobody(first, self._map), Deeds(moves=())), (first, found)):
             done = self._again(scenario, deeds)
             if self._inquiry.failed(scenario, done):
-                failure = _unasked(first, scenario, deeds, done)
-                return self._finding(case_of(self._inquiry, failure, _nobody_asked(failure)))
+                failure = unasked(first, scenario, deeds, done)
+                return self._finding(case_of(self._inquiry, failure, nobody_asked(failure)))
         return self._finding(None, UNLIKE)
 
     @property
@@ -336,65 +253,6 @@ class Pursuit:
         return failure
 
 
-def as_found(inquiry: Inquiry) -> Finding:
-    """Return the search's own flight as a case, without another flight."""
-    scenario = simplest_first(inquiry)[0]
-    done = dict(inquiry.violations)[scenario]
-    failure = _unasked(scenario, scenario, deeds_of(done, scenario, inquiry.map), done)
-    case = case_of(inquiry, failure, _nobody_asked(failure))
-    return Finding(signature=inquiry.signature, case=case, flights=0)
-
-
-def simplest_first(inquiry: Inquiry) -> list[Scenario]:
-    """Return the violations' scenarios, the simplest first."""
-    return sorted(
-        (scenario for scenario, _ in inquiry.violations),
-        key=lambda each: complexity(each, genome_of(each, inquiry.map)),
-    )
-
-
-def _unasked(first: Scenario, scenario: Scenario, deeds: Deeds, done: Done) -> Failure:
-    """Return a failure of which no neighbour was flown."""
-    return Failure(first=first, scenario=scenario, deeds=deeds, done=done, robust=0, asked=0)
-
-
-def _nobody_asked(failure: Failure) -> Avoidable:
-    """Return what may be demanded without asking the reference pilot: where nothing moves, all."""
-    return "recorded" if failure.deeds.moves else "live"
-
-
-def case_of(inquiry: Inquiry, failure: Failure, avoidable: Avoidable) -> Case:
-    """Return a failure as what is saved."""
-    done, job = failure.done, inquiry.job
-    flight = load(done.record) if done.record.exists() else None
-    own = inquiry.asks(done.result, done.record, failure.scenario) if inquiry.asks else None
-    return Case(
-        system=job.system.name,
-        status="unavoidable" if avoidable == "no" else "open",
-        avoidable=avoidable,
-        scenario=failure.scenario,
-        violation=_violation(from_dict(done.result["verdict"]), flight, own),
-        policy=job.npcs.name,
-        policy_sha256=job.npcs.sha256,
-        moves=failure.deeds.moves,
-        changes=failure.deeds.changes,
-        evidence=Evidence(
-            trajectory_sha256=done.sha256,
-            cpu=flight.cpu if flight else "",
-            map_sha256=job.map_sha256,
-            neighbours=failure.asked,
-            neighbours_failed=failure.robust,
-            removed=removed(failure.first, failure.scenario, inquiry.map),
-            versions=flight.versions if flight else (),
-            system_sha256=job.system_sha256,
-            simulator_sha256=simulator_sha256(job.simulator),
-        ),
-        limits=job.limits,
-        test=inquiry.test or (own.test if own else ""),
-        assertion=own.assertion if own else "",
-    )
-
-
 def _ever_further_back(history: Sequence[Scenario]) -> Iterator[Scenario]:
     """Yield the last, where the failure may sit on an edge, then some before it, lastly the first.
 
@@ -407,63 +265,8 @@ def _ever_further_back(history: Sequence[Scenario]) -> Iterator[Scenario]:
     yield from history[:1]
 
 
-def _violation(verdict: Verdict, flight: Flight | None, own: OwnFailure | None) -> Violation:
-    """Return what failed, from the verdict or from the test's own assertion."""
-    if own is not None:
-        return Violation(
-            signature=own.signature,
-            type="own",
-            property="own",
-            margin=0.0,
-            unit="1",
-            story=f"{own.test}: {own.message}. {verdict.story}",
-        )
-    assert verdict.primary is not None
-    assert verdict.violation_type is not None
-    margin = next((each for each in verdict.margins if each.property == verdict.primary), None)
-    return Violation(
-        signature=verdict.signature,
-        type=verdict.violation_type,
-        property=verdict.primary,
-        margin=margin.value if margin else 0.0,
-        unit=margin.unit if margin else "1",
-        story=tell(flight, verdict) if flight else verdict.story,
-    )
-
-
-def deeds_of(done: Done, scenario: Scenario, map: Map) -> Deeds:
-    """Return what each object did in a flight; nothing where its process did not live."""
-    names = [name for name, _ in map.without(scenario.absent).object_names]
-    if not done.record.exists():
-        return Deeds(moves=tuple((name, ()) for name in names))
-    objects = load(done.record).objects
-    made = {item.name: item.moves for item in objects}
-    return Deeds(
-        moves=tuple(
-            (name, tuple((float(x), float(y)) for x, y in made.get(name, ()))) for name in names
-        ),
-        changes=tuple((item.name, item.changes) for item in objects if item.changes),
-    )
-
-
 def _only(deeds: Deeds, name: str) -> Deeds:
     return Deeds(
         moves=tuple(each for each in deeds.moves if each[0] == name),
         changes=tuple(each for each in deeds.changes if each[0] == name),
     )
-
-
-def culprit_of(done: Done) -> str:
-    """Return the moving object that the UAV hit, if it did."""
-    hit = done.result["collisions"]
-    kind = done.result["verdict"]["violation_type"]
-    return str(hit[-1]) if hit and kind == "IV" else ""
-
-
-def removed(first: Scenario, last: Scenario, map: Map) -> str:
-    """Say what shrinking took away."""
-    before, after = (complexity(each, genome_of(first, map)) for each in (first, last))
-    if before == after:
-        return "nothing"
-    objects, genes = before[0] - after[0], before[1] - after[1]
-    return f"{objects} of {before[0]} objects, {genes} of {before[1]} genes off nominal"

@@ -11,17 +11,10 @@ from pathlib import Path
 
 from pytest_garl.adversary.policies import policy_spec
 from pytest_garl.regressions.case import Avoidable, Case, Deeds
+from pytest_garl.regressions.findings import case_of, culprit_of
+from pytest_garl.regressions.inquiry import Asks, Failure, Finding, Inquiry
 from pytest_garl.regressions.neighbours import COUNT
-from pytest_garl.regressions.pursuit import (
-    PILOTS,
-    Asks,
-    Failure,
-    Finding,
-    Inquiry,
-    Pursuit,
-    case_of,
-    culprit_of,
-)
+from pytest_garl.regressions.pursuit import PILOTS, Pursuit
 from pytest_garl.regressions.replay import system_of
 from pytest_garl.regressions.shrink import shrink
 from pytest_garl.regressions.simplicity import no_worse, simplicity

@@ -12,7 +12,7 @@ import pytest
 
 from pytest_garl.adversary.policies import policy_spec
 from pytest_garl.regressions.case import Case
-from pytest_garl.regressions.pursuit import deeds_of
+from pytest_garl.regressions.findings import deeds_of
 from pytest_garl.regressions.replay import replay
 from pytest_garl.run import _steered
 from pytest_garl.search.errands import Done

@@ -10,8 +10,9 @@ import pytest
 
 from pytest_garl.adversary.policies import policy_spec
 from pytest_garl.regressions.case import Case
+from pytest_garl.regressions.inquiry import Inquiry
 from pytest_garl.regressions.neighbours import neighbours
-from pytest_garl.regressions.pursuit import LEAST, Inquiry, Pursuit
+from pytest_garl.regressions.pursuit import LEAST, Pursuit
 from pytest_garl.regressions.resumed import LEAST as LEAST_AGAIN
 from pytest_garl.regressions.resumed import Continued, _all_removed
 from pytest_garl.regressions.simplicity import no_worse, simplicity

@@ -12,7 +12,7 @@ from pytest_garl.adversary.policies import policy_spec
 from pytest_garl.adversary.recorded import recorded_spec
 from pytest_garl.landing_system import Airframe, Camera
 from pytest_garl.regressions.case import Deeds
-from pytest_garl.regressions.pursuit import deeds_of
+from pytest_garl.regressions.findings import deeds_of
 from pytest_garl.scenarios.genes import ENVIRONMENT, genome_for
 from pytest_garl.scenarios.maps import load_map
 from pytest_garl.scenarios.scenario import Scenario
