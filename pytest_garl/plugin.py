@@ -189,13 +189,22 @@ def pytest_report_header(config: pytest.Config) -> str | None:
     return header(run)
 
 
-def pytest_report_collectionfinish(config: pytest.Config) -> str | None:
-    """Say where only accepted cases are known."""
+def pytest_report_collectionfinish(config: pytest.Config) -> list[str]:
+    """Say how long all searches take, and where only accepted cases are known."""
     run = config.stash.get(RUN, None)
-    if run is None or not run.acceptance.problem:
-        return None
+    if run is None:
+        return []
+    from pytest_garl.reports.terminal import forecast
+
+    lines = forecast(run)
+    if run.acceptance.problem:
+        lines.append(_known_by_mark(run.acceptance.problem))
+    return lines
+
+
+def _known_by_mark(problem: str) -> str:
     return (
-        f"garl: nobody can tell which cases are committed ({run.acceptance.problem}); known are "
+        f"garl: nobody can tell which cases are committed ({problem}); known are "
         "only those that `garl cases accept` has marked"
     )
 

@@ -27,6 +27,7 @@ if TYPE_CHECKING:
     from pytest_garl.own import Asks
     from pytest_garl.regressions.acceptance import Acceptance
     from pytest_garl.regressions.follow_up import Pursued
+    from pytest_garl.regressions.forecast import Rest
     from pytest_garl.scenarios.scenario import Scenario
     from pytest_garl.search.breeder import Breeder
     from pytest_garl.search.errands import Done
@@ -90,6 +91,8 @@ class Run:
     results: dict[tuple[str, Slot], dict[str, Any]] = field(default_factory=dict)
     pursued: tuple[Pursued, ...] = ()
     """What became of new signatures after the search."""
+    rest: Rest | None = None
+    """What is to come after the search, when it is known."""
     troubled: bool = False
     """Whether that could not be finished."""
     own: dict[tuple[str, str], Asks] = field(default_factory=dict)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import shlex
+from collections.abc import Sequence
 from typing import Any
 
 import pytest
@@ -20,8 +21,10 @@ from pytest_garl.regressions.follow_up import (
     inquiries,
     shares,
 )
+from pytest_garl.regressions.forecast import rest_of
+from pytest_garl.regressions.pursuit import Inquiry
 from pytest_garl.reports.commands import shown
-from pytest_garl.reports.progress import live
+from pytest_garl.reports.progress import duration, live
 from pytest_garl.reports.wrapping import counted, width_of, wrapped
 from pytest_garl.run import Run
 
@@ -51,10 +54,11 @@ def pursue(run: Run, session: pytest.Session) -> None:
         wanted = inquiries(run.ledger, place, shrinking, run.own, run.found_by)
         if wanted:
             most = sum(each.budget for each in shares(wanted))
+            run.rest = rest_of(wanted, _flight_s(run, wanted), options.workers or 1)
             reporter.ensure_newline()
             reporter.write_line(
                 f"garl: confirming and shrinking {counted(len(wanted), 'new kind')} of violation, "
-                f"at most {counted(most, 'flight')}"
+                f"at most {counted(most, 'flight')}, about {duration(run.rest.seconds)}"
             )
         with live(run, config):
             run.pursued = follow_up(run.ledger, run.pool, place, wanted, run.tick)
@@ -68,6 +72,13 @@ def pursue(run: Run, session: pytest.Session) -> None:
         reporter.ensure_newline()
         reporter.write_line(f"garl: {error}", red=True)
         run.troubled = True
+
+
+def _flight_s(run: Run, wanted: Sequence[Inquiry]) -> dict[str, float]:
+    """Return how long a flight of each signature took in the search."""
+    known = run.ledger.kinds()
+    any_s = run.ledger.seconds_per_flight() or run.flight_s
+    return {each.name: known.get((each.search, each.signature)) or any_s for each in wanted}
 
 
 def told(pursued: tuple[Pursued, ...], config: pytest.Config) -> list[str]:

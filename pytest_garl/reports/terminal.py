@@ -8,6 +8,7 @@ from typing import Any
 import pytest
 
 from pytest_garl import dispatch
+from pytest_garl.regressions.forecast import seconds_of_kind
 from pytest_garl.reports.aftermath import told
 from pytest_garl.reports.commands import repeat_command, shown
 from pytest_garl.reports.explain import OWN_FAILURE
@@ -58,9 +59,32 @@ def _workers(run: Run) -> str:
     place = ray if options.pool == "ray" else ""
     if options.workers is None:
         return f"all workers{place}"
-    each = options.budget * run.flight_s / max(1, options.workers)
     workers = counted(options.workers, "worker") if options.workers else "no worker"
-    return f"{workers}{place}; about {duration(each)} per system and map"
+    return f"{workers}{place}; {_times(run, options.budget)} per system and map{_per_kind(run)}"
+
+
+def _times(run: Run, flights: int) -> str:
+    return f"about {duration(flights * run.flight_s / max(1, run.options.workers or 1))}"
+
+
+def _per_kind(run: Run) -> str:
+    if not run.options.shrink:
+        return ""
+    seconds = seconds_of_kind(run.options.shrink, run.flight_s, run.options.workers or 1)
+    return f", then about {duration(seconds)} per new kind of violation"
+
+
+def forecast(run: Run) -> list[str]:
+    """Say how long all searches take together, if there are several."""
+    options = run.options
+    sizes = [
+        len(wanted)
+        for wanted in run.targets.values()
+        if all(target.entry is None for target in wanted.values())
+    ]
+    if not options.budget or options.workers is None or len(sizes) < 2:
+        return []
+    return [f"garl: {len(sizes)} searches, {_times(run, sum(sizes))}{_per_kind(run)}"]
 
 
 def summary(reporter: Any, run: Run) -> None:

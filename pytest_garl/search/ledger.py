@@ -522,6 +522,17 @@ class Ledger:
         )
         return dict(rows.fetchall())
 
+    def kinds(self) -> dict[tuple[str, str], float]:
+        """Return the mean wall time of a flight of each kind of violation: search, signature."""
+        rows = self._db.execute(
+            "SELECT search.id, json_extract(result, '$.verdict.signature') AS signature, "
+            "avg(coalesce(wall_s, 0)) FROM slot JOIN search ON search.id = slot.search "
+            "WHERE kind = 'search' AND state = 'flown' "
+            "AND json_extract(result, '$.verdict.primary') IS NOT NULL "
+            "GROUP BY search.id, signature"
+        )
+        return {(search, signature): float(wall_s) for search, signature, wall_s in rows}
+
     def scenarios(self, generation: int, slot: int, map: str) -> dict[str, str]:
         """Return the scenario of a slot for each system that has one."""
         rows = self._db.execute(

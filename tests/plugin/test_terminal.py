@@ -13,7 +13,7 @@ from pathlib import Path
 
 import pytest
 
-from pytest_garl.reports.progress import text
+from pytest_garl.reports.progress import Stand, text
 from pytest_garl.search.ledger import Ledger, Progress
 from tests.plugin.test_plugin import project, run
 
@@ -26,7 +26,7 @@ class Slow(Good):
         time.sleep(0.4)
         return super().step(observation)
 """
-LINE = re.compile(r"garl: \d+/5 flown")
+LINE = re.compile(r"garl \[[#-]+\]  \d+/\d+ flights")
 PARALLEL = pytest.mark.parametrize("parallel", [(), ("-n2",)])
 WIDTH = 60
 
@@ -101,7 +101,7 @@ def test_the_progress_line_comes_and_goes(pytester: pytest.Pytester, args: tuple
     )
     during = screen(written[: [match.end() for match in LINE.finditer(written)][-1]])
     assert LINE.match(during[-1]), "the line is the last on the screen"
-    drawn = re.findall(r"\r\n(garl: [^\x1b\r\n]*)\x1b", written)
+    drawn = re.findall(r"\r\n(garl \[[^\x1b\r\n]*)\x1b", written)
     assert len(set(drawn)) > 2
     assert all(len(line) < WIDTH for line in drawn)
     after = "\n".join(screen(written))
@@ -121,7 +121,7 @@ def test_no_line_where_it_would_disturb(
     slow_project(pytester)
     written = on_a_terminal(pytester, "--garl-budget=2", "--garl-shrink=0", "-q", *args, term=term)
     assert "garl: violations" in written
-    assert not re.search(r"\d flown  ", written)
+    assert not re.search(r"garl \[", written)
     assert "\x1b7" not in written
 
 
@@ -142,18 +142,51 @@ def test_a_dead_worker_leaves_no_litter(pytester: pytest.Pytester) -> None:
     assert not any(LINE.search(row) for row in rows)
 
 
-def test_the_line_names_what_matters_first() -> None:
-    two = [
-        Progress(system="m:A", map="court", flown=3, all=4, generation=1),
-        Progress(system="m:A", map="lawn", flown=1, all=4, generation=0),
-    ]
-    nearest = {"time": (90.3, "s"), "collision": (0.25, "m"), "crash": (1.0, "1")}
-    assert text(two, {"I": 2, "IV": 1}, nearest, 8.0) == (
-        "garl: 4/8 flown  8 s left  I:2 IV:1  A on court g01 3/4  0.50 flights/s  "
-        "nearest collision 0.25 m, time 90 s"
+TWO = (
+    Progress(system="m:A", map="court", flown=3, all=4, generation=1),
+    Progress(system="m:A", map="lawn", flown=1, all=4, generation=0),
+)
+STAND = Stand(
+    searches=TWO,
+    kinds={"I": 2, "IV": 1},
+    nearest={"time": (90.3, "s"), "collision": (0.25, "m"), "crash": (1.0, "1")},
+    seconds=8.0,
+    expected=8.0,
+)
+
+
+def test_the_line_has_one_total_and_names_what_matters_first() -> None:
+    assert text(STAND, 160) == (
+        "garl [#####---------------]  4/16 flights  24 s left  I:2 IV:1  A on court g01 3/4  "
+        "0.50 flights/s  nearest collision 0.25 m, time 90 s"
     )
-    new = Progress(system="m:A", map="court", flown=0, all=4, generation=0)
-    assert text([new], {}, {}, 0.0) == "garl: 0/4 flown  A on court g00 0/4"
+    new = Stand(searches=TWO[1:], kinds={}, nearest={}, seconds=0.0)
+    assert text(new, 160) == "garl [#####---------------]  1/4 flights  0 s left  A on lawn g00 1/4"
+
+
+@pytest.mark.parametrize("width", range(20, 160, 7))
+def test_a_narrow_terminal_gets_whole_words(width: int) -> None:
+    line = text(STAND, width)
+    assert len(line) <= max(width, len("garl [##--------]"))
+    assert {*line.split("  ")[1:]} <= {*STAND.words}
+    if width >= 80:
+        assert "garl [##--------]  4/16 flights  24 s left  I:2 IV:1" in line or width >= 100
+
+
+def test_the_line_follows_the_forecast_once_there_is_one() -> None:
+    done = Progress(system="m:A", map="court", flown=4, all=4, generation=0)
+    stand = Stand(
+        searches=[done],
+        kinds={"IV": 3},
+        nearest={},
+        seconds=8.0,
+        beside=2,
+        expected=12,
+        left_s=33,
+    )
+    assert text(stand, 79) == (
+        "garl [###-------]  6/16 flights  33 s left  IV:3  confirming and shrinking"
+    )
 
 
 @PARALLEL
@@ -205,7 +238,41 @@ def test_the_line_tells_of_shrinking_and_goes(pytester: pytest.Pytester) -> None
         pytester, "--garl-budget=8", "--garl-shrink=12", "--garl-workers=1", "-q"
     )
     assert "garl: confirming and shrinking" in written
-    assert re.search(r"garl: \d+ flights to confirm and shrink", written)
+    # The forecast leaves no room for more on so narrow a terminal.
+    assert re.search(r"garl \[#+-*\]  \d+/\d+ flights  \d+ s left", written)
     after = "\n".join(screen(written))
     assert "saved scenarios/regressions/slow/lawn-" in after.replace("\n", "")
-    assert "flights to confirm and shrink" not in after
+    assert not LINE.search(after)
+
+
+@PARALLEL
+def test_a_log_shows_that_the_run_lives(
+    pytester: pytest.Pytester, parallel: tuple[str, ...]
+) -> None:
+    slow_project(pytester)
+    pytester.makeconftest(
+        "from tiny_simulator import fly\n"
+        "import pytest_garl.reports.progress as progress\n"
+        "progress.BEAT_S = 0.1\n"
+        "def pytest_garl_fly(config): return fly\n"
+    )
+    result = pytester.runpytest_subprocess(
+        "-p", "no:cacheprovider", "--garl-budget=4", "--garl-workers=1", "-q", *parallel
+    )
+    lines = [line for line in result.outlines if LINE.match(line)]
+    assert len(lines) > 1
+    assert all(len(line) <= 80 for line in lines)
+    assert "\x1b" not in result.stdout.str()
+
+
+def test_the_search_tells_its_time_and_that_of_a_new_kind(pytester: pytest.Pytester) -> None:
+    project(pytester, maps="['lawn', 'court']")
+    args = ("--garl-budget=8", "--garl-workers=1", "-k", "test_collisions")
+    result = pytester.runpytest_subprocess("-p", "no:cacheprovider", *args)
+    result.stdout.fnmatch_lines(
+        [
+            "garl: * 1 worker; about 18 s per system and map, then about 20 s per new kind of *",
+            "garl: 2 searches, about 35 s, then about 20 s per new kind of violation",
+            "garl: confirming and shrinking 4 new kinds of violation, at most * flights, about * s",
+        ]
+    )

@@ -1,0 +1,56 @@
+"""How long a search will take, and what follows it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+from pytest_garl.regressions.follow_up import shares
+from pytest_garl.regressions.pursuit import LEAST, PILOTS, Inquiry
+
+SPENT = 0.85
+"""Share of its flights that a kind of violation spends: many stop before the last is needed."""
+PILOTED = 2
+"""Flights of the reference pilot for a kind."""
+PILOTED_S = 0.2
+"""What such a flight takes of the time of another: it needs no camera."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Rest:
+    """What is to come after a search: flights, and the time that they take."""
+
+    flights: float
+    seconds: float
+
+
+def of_kind(each: int) -> float:
+    """Return the flights that a new kind of violation takes, the one that repeats it included."""
+    return 1 + SPENT * (each - PILOTS) + PILOTED
+
+
+def seconds_of_kind(each: int, flight_s: float, workers: int) -> float:
+    """Return how long one of several new kinds of violation takes."""
+    flights = 1 + SPENT * (each - PILOTS) + PILOTED * PILOTED_S
+    return flights * flight_s / max(1, workers)
+
+
+def rest_of(wanted: Sequence[Inquiry], flight_s: Mapping[str, float], workers: int) -> Rest:
+    """Return what signatures still take; ``flight_s`` is how long a flight of each takes."""
+    flights, each_s = 0.0, []
+    left: dict[str, float] = {each.search: float(each.cap or 0) for each in wanted}
+    for inquiry in sorted(shares(wanted), key=lambda each: not each.budget):
+        budget = inquiry.budget
+        if not budget and left[inquiry.search] >= LEAST - PILOTS:
+            # Others leave something for it.
+            budget = LEAST
+        if not budget:
+            continue
+        own = 1.0 if inquiry.exception else SPENT * (budget - PILOTS)
+        piloted = 0 if inquiry.exception else PILOTED
+        left[inquiry.search] -= own
+        flights += own + piloted
+        each_s.append((own + piloted * PILOTED_S) * flight_s[inquiry.name])
+    # Flights of one kind follow each other; those of several are flown side by side.
+    seconds = max([sum(each_s) / max(1, workers), *each_s], default=0.0)
+    return Rest(flights=flights, seconds=seconds)
