@@ -130,7 +130,9 @@ def pytest_runtestloop(session: pytest.Session) -> Generator[None, object, objec
     from pytest_garl.reports.progress import live
 
     with live(run, session.config):
-        return (yield)
+        result = yield
+    run.ran = True
+    return result
 
 
 @pytest.hookimpl(wrapper=True)

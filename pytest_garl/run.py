@@ -104,6 +104,8 @@ class Run:
     told: dict[str, str] = field(default_factory=dict)
     """Tests of which xdist's workers say that they failed so, with the signature."""
     lock: TextIO | None = None
+    ran: bool = False
+    """Whether all tests ran to the end of the list, and nobody interrupted them."""
 
     def select(self, items: list[pytest.Item]) -> None:
         """Remember which slots the selected items want."""
@@ -235,7 +237,10 @@ class Run:
         options, worker = self.options, hasattr(session.config, "workerinput")
         ended = session.exitstatus in (pytest.ExitCode.OK, pytest.ExitCode.TESTS_FAILED)
         stopped = bool(session.shouldfail or session.shouldstop)
-        return ended and not (stopped or worker or options.repeat) and options.shrink > 0
+        if not (ended and self.ran) or stopped or worker or options.repeat or not options.shrink:
+            return False
+        # Interrupted twice, pytest tells of the status that it began with.
+        return all(each.flown >= each.all for each in self.ledger.progress())
 
     def lower(self, target: Target) -> list[Target]:
         """Return what the selected tests of lower slots of a search test."""

@@ -27,6 +27,9 @@ from pytest_garl.search.ledger import Ledger, Row
 from pytest_garl.search.pool import Pool
 from pytest_garl.search.slots import flight_name
 
+NOTED = "signatures to pursue"
+"""In the ledger: by search, the signatures that no saved case had when the search was done."""
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Shrinking:
@@ -69,6 +72,8 @@ def inquiries(
 ) -> tuple[Inquiry, ...]:
     """Return what is to be found out about signatures that no saved case has.
 
+    Which these are is written down when it is asked first: a run that is resumed after some of its
+    cases were saved asks about the same signatures again, and so saves the same cases.
     The most frequent come first; each wants the flights that it may have at most.  ``own`` are
     assertions of tests that failed where the verdict is content, by search and signature;
     ``found_by`` are the node ids of the tests that failed.
@@ -78,20 +83,28 @@ def inquiries(
     groups = _by_search(ledger)
     for search, signature in asks:
         groups.setdefault(search, {})[signature] = []
+    noted: dict[str, list[str]] | None = ledger.fact(NOTED)
+    wanted: dict[str, list[str]] = {}
     for search, rows in groups.items():
         text = ledger.job(search)
         assert text is not None
         job = loads(text)
         system = job.system.name
-        known = {
-            entry.case.violation.signature
-            for entry in entries(place.cases, system, place.map_folders)
-            if entry.case is not None and is_known(entry.case, job.map)
-        }
+        if noted is None:
+            known = {
+                entry.case.violation.signature
+                for entry in entries(place.cases, system, place.map_folders)
+                if entry.case is not None and is_known(entry.case, job.map)
+            }
+            wanted[search] = [signature for signature in rows if signature not in known]
+        else:
+            wanted[search] = noted.get(search, [])
         new = {
-            signature: _failures(ledger, search, those, asks.get((search, signature)), job)
-            for signature, those in rows.items()
-            if signature not in known
+            signature: _failures(
+                ledger, search, rows[signature], asks.get((search, signature)), job
+            )
+            for signature in wanted[search]
+            if signature in rows
         }
         cap = len(ledger.flown(search)) if shrinking.capped else None
         map = load_map(job.map, place.map_folders)
@@ -109,6 +122,8 @@ def inquiries(
             )
             for signature in sorted(new, key=lambda signature: (-len(new[signature]), signature))
         ]
+    if noted is None:
+        ledger.note_fact(NOTED, wanted)
     return tuple(found)
 
 

@@ -125,12 +125,14 @@ class Errands:
             self._ask(thought, *wanted)
 
     def _ask(self, thought: _Thought, job: Job, scenario: Scenario) -> None:
-        key = f"errand {thought.name} {thought.flown}"
+        text = dump_scenario(scenario)
+        # What is asked belongs to the key: resumed with another budget, a function asks otherwise.
+        key = f"errand {thought.name} {thought.flown} {job.flown_facts()} {text}"
         thought.job, thought.search = job, hashlib.sha256(key.encode()).hexdigest()[:16]
         thought.flown += 1
         name = job.system.name
         self._ledger.add_search(thought.search, name, job.map, 1, job.dumps(), "errand")
-        self._ledger.add_slots(thought.search, 0, {0: dump_scenario(scenario)})
+        self._ledger.add_slots(thought.search, 0, {0: text})
 
     def _done(self, job: Job, search: str) -> Done | None:
         result = self._ledger.result(search, 0, 0)

@@ -22,6 +22,8 @@ from pytest_garl.verdicts.verdict import Limits
 
 PAPER_LIMIT_S = 120.0
 _OF_SOURCES = ("sources", "system_sha256")
+_PLACES = {"path", "flights", "map_folders"}
+"""Where things lie: that may change when a run is resumed, what is flown may not."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -45,15 +47,18 @@ class Job:
     def differences(self, other: Job) -> tuple[str, ...]:
         """Return what makes results of ``other`` not comparable to this one's."""
         mine, theirs = dataclasses.asdict(self), dataclasses.asdict(other)
-        # Where things lie may change; what is flown may not.
-        indifferent = {"path", "flights", "map_folders"}
-        keys = [key for key in mine if key not in indifferent and mine[key] != theirs[key]]
+        keys = [key for key in mine if key not in _PLACES and mine[key] != theirs[key]]
         if "sources" in keys:
             names = {name for name, _ in {*self.sources} ^ {*other.sources}}
             keys = [*sorted(names), *(key for key in keys if key not in _OF_SOURCES)]
         if self.npcs.sha256 != other.npcs.sha256 and self.npcs.name == other.npcs.name:
             keys = [f"the weights {self.npcs.name}" if key == "npcs" else key for key in keys]
         return tuple(keys)
+
+    def flown_facts(self) -> str:
+        """Return as JSON all but where things lie."""
+        facts = {key: each for key, each in dataclasses.asdict(self).items() if key not in _PLACES}
+        return json.dumps(facts, sort_keys=True)
 
     def dumps(self) -> str:
         """Return it as JSON."""

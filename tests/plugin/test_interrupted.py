@@ -1,0 +1,85 @@
+"""Searches that are interrupted, or resumed after they were done: what they save."""
+
+from __future__ import annotations
+
+import signal
+from pathlib import Path
+
+import pytest
+
+from tests.plugin.test_plugin import CONFTEST, project, run
+from tests.plugin.test_resume import BUDGET, query, slow_project, start, wait_for
+
+SEARCH = ("--garl-budget=24", "--garl-shrink=12", "--garl-workers=2", "--garl-map=lawn")
+TWICE = """
+def pytest_keyboard_interrupt(excinfo):
+    raise KeyboardInterrupt
+"""
+"""A second Ctrl-C while pytest tells of the first one."""
+
+
+def cases(folder: Path) -> dict[str, bytes]:
+    """Return the saved cases and what is in them."""
+    return {path.name: path.read_bytes() for path in folder.glob("scenarios/regressions/*/*.toml")}
+
+
+def flown(pytester: pytest.Pytester) -> list[tuple[int, ...]]:
+    return query(
+        pytester.path / ".garl" / "ledger.sqlite",
+        "SELECT CAST(value AS INT) FROM meter WHERE name IN ('flights', 'errands') ORDER BY name",
+    )
+
+
+@pytest.fixture
+def searched(pytester: pytest.Pytester) -> pytest.Pytester:
+    project(pytester, "Good", "['lawn']")
+    run(pytester, *SEARCH)
+    return pytester
+
+
+def test_a_run_that_was_killed_between_two_cases_saves_the_others_when_resumed(
+    searched: pytest.Pytester,
+) -> None:
+    saved, before = cases(searched.path), flown(searched)
+    assert len(saved) > 1
+    for name in list(saved)[1:]:
+        next(searched.path.glob(f"scenarios/**/{name}")).unlink()
+    assert run(searched, *SEARCH, "--garl-resume").ret == pytest.ExitCode.TESTS_FAILED
+    assert (cases(searched.path), flown(searched)) == (saved, before)
+
+
+def test_a_finished_run_that_is_resumed_repeats_its_outcome(searched: pytest.Pytester) -> None:
+    saved, before = cases(searched.path), flown(searched)
+    again = run(searched, *SEARCH, "--garl-resume")
+    assert again.ret == pytest.ExitCode.TESTS_FAILED
+    assert (cases(searched.path), flown(searched)) == (saved, before)
+    again.stdout.fnmatch_lines(["*the same case is saved already*"])
+
+
+@pytest.mark.parametrize("shrink", ["10", "30"])
+def test_a_finished_run_may_be_resumed_with_more_or_less_shrinking(
+    searched: pytest.Pytester, shrink: str
+) -> None:
+    again = run(searched, *SEARCH, f"--garl-shrink={shrink}", "--garl-resume")
+    assert again.ret == pytest.ExitCode.TESTS_FAILED
+    again.stdout.no_fnmatch_line("*bred in another way*")
+
+
+@pytest.mark.parametrize("conftest", ["", TWICE])
+def test_ctrl_c_once_or_twice_saves_nothing_of_half_a_search(
+    pytester: pytest.Pytester, conftest: str
+) -> None:
+    slow_project(pytester)
+    (pytester.path / "test_it.py").write_text(
+        (pytester.path / "test_it.py").read_text() + "\n\ndef test_fails(landing): assert False\n"
+    )
+    pytester.makeconftest(CONFTEST + conftest)
+    process = start(pytester, "--garl-shrink=12")
+    wait_for(pytester.path / ".garl" / "ledger.sqlite", 8, process, patience_s=120)
+    process.send_signal(signal.SIGINT)
+    output, _ = process.communicate(timeout=120)
+    assert "confirming" not in output
+    assert cases(pytester.path) == {}
+    resumed = run(pytester, *BUDGET, "--garl-shrink=12", "--garl-resume")
+    resumed.stdout.fnmatch_lines(["*confirming and shrinking*"])
+    assert cases(pytester.path)
