@@ -6,6 +6,7 @@ import json
 import os
 import subprocess
 import sys
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -20,6 +21,7 @@ from pytest_garl.search.batch import fly_all, own_pool
 from pytest_garl.search.job import Job
 from pytest_garl.search.reference import BUILT_IN, Reference
 
+Found = tuple[Path, Case]
 ROOT = Path(__file__).parents[2]
 WITHOUT_AVX512 = {
     "OPENCV_CPU_DISABLE": "AVX512-SKX",
@@ -75,30 +77,31 @@ GARL = "from pytest_garl.cli import main; main()"
 needs_avx2 = pytest.mark.skipif(not dispatch.has_baseline(), reason="this CPU has no AVX2")
 
 
-def longest_cases() -> list[tuple[Path, Case]]:
-    """Return of each landing system the robust case whose objects move the longest."""
-    found: dict[str, tuple[Path, Case]] = {}
+def case_of_each(wanted: Callable[[Case], bool], best: Callable[..., Any]) -> list[Found]:
+    """Return a saved case of each landing system: of those wanted the shortest, or the longest."""
+    found: dict[str, list[Found]] = {}
     for entry in every_entry(ROOT / "scenarios" / "regressions", ()):
         case = entry.case
-        if case is not None and not case.edge and not case.changes:
-            known = found.get(case.system)
-            if known is None or length(case) > length(known[1]):
-                found[case.system] = (entry.path, case)
-    return [found[system] for system in sorted(found)]
+        if case is not None and not case.changes and wanted(case):
+            found.setdefault(case.system, []).append((entry.path, case))
+    return [best(found[system], key=lambda each: length(each[1])) for system in sorted(found)]
 
 
 def length(case: Case) -> int:
+    """Count the decisions of its objects, one for every half second."""
     return max(len(moves) for _, moves in case.moves)
 
 
-CASES = longest_cases()
+SHORT = case_of_each(lambda case: length(case) >= 25, min)
+"""Long enough that the landing system detects, plans and comes down."""
+ROBUST = case_of_each(lambda case: not case.edge, max)
 
 
 def flown_by_a_child() -> list[tuple[str, str]]:
     """Return verdict and hash of each case, flown as a search flies."""
     flown = []
     with own_pool(1) as (ledger, pool):
-        for _, case in CASES:
+        for _, case in SHORT:
             map = load_map(case.scenario.map)
             module, _, qualname = case.system.partition(":")
             job = Job(
@@ -125,7 +128,7 @@ def flown_unpinned(setting: dict[str, str]) -> dict[str, Any]:
     outside = {name: value for name, value in os.environ.items() if name not in pinned}
     # That NumPy does not know a group, or the CPU does not have it, is only a warning.
     done = subprocess.run(
-        [sys.executable, "-W", "ignore", "-c", FLY, *(str(path) for path, _ in CASES)],
+        [sys.executable, "-W", "ignore", "-c", FLY, *(str(path) for path, _ in ROBUST)],
         env={**outside, **dispatch.THREADS, **setting},
         cwd=ROOT,
         capture_output=True,
@@ -137,7 +140,7 @@ def flown_unpinned(setting: dict[str, str]) -> dict[str, Any]:
 
 
 def test_there_is_a_case_of_each_landing_system() -> None:
-    assert len(CASES) == 3
+    assert len(SHORT) == len(ROBUST) == 3
 
 
 @needs_avx2
@@ -155,7 +158,7 @@ def test_one_hash_under_every_setting(monkeypatch: pytest.MonkeyPatch) -> None:
 @needs_avx2
 @pytest.mark.sim
 def test_the_command_flies_as_children_do() -> None:
-    path, case = CASES[0]
+    path, case = SHORT[0]
     found = subprocess.run(
         [sys.executable, "-c", GARL, "cases", "replay", str(path)],
         env={**os.environ, **WITHOUT_AVX2},
