@@ -31,7 +31,7 @@ def fly(
 
     ``system`` is the landing system's class, ``npcs`` says who moves the dynamic objects.
     Whatever the landing system raises or returns ends in the record, never as an
-    exception; KeyboardInterrupt and SystemExit pass through.
+    exception, its SystemExit included; KeyboardInterrupt passes through.
     """
     began = time.perf_counter()
     place = (map or load_map(scenario.map)).without(scenario.absent)

@@ -45,7 +45,8 @@ class BrokenError(Exception):
 class SystemCalls:
     """Calls a landing system under a guard; whatever it raises becomes a BrokenError.
 
-    That holds for SystemExit too; KeyboardInterrupt alone passes, it is the user's.
+    That holds for its SystemExit too.  KeyboardInterrupt passes, it is the user's, and so does what
+    a signal of the machine raises in this package.
     """
 
     def __init__(self, system: Callable[[], Any], guard: StepGuard | None) -> None:
@@ -67,6 +68,8 @@ class SystemCalls:
         except NonsenseError as error:
             raise self.nonsense(error.error, str(error), method) from error
         except BaseException as error:
+            if _is_asked_to_end(error):
+                raise
             # Not ours to name: whatever a landing system raises is how it fails, and a finding.
             raise BrokenError(crash_of(error, method)) from error
         finally:
@@ -84,6 +87,14 @@ class SystemCalls:
                 traceback="",
             )
         )
+
+
+def _is_asked_to_end(error: BaseException) -> bool:
+    """Whether this package raised a SystemExit itself: a SIGTERM came during the call."""
+    if not isinstance(error, SystemExit):
+        return False
+    last = traceback.extract_tb(error.__traceback__)[-1]
+    return Path(last.filename).is_relative_to(_HERE.parent)
 
 
 def read_airframe(system: object) -> Airframe:

@@ -6,6 +6,7 @@ import dataclasses
 import itertools
 import json
 import math
+import signal
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
@@ -310,6 +311,17 @@ def test_ctrl_c_of_the_user_passes() -> None:
 
     with pytest.raises(KeyboardInterrupt):
         flight_with(answer)
+
+
+def test_sigterm_during_a_call_passes() -> None:
+    from pytest_garl.cli import _exit
+
+    before = signal.getsignal(signal.SIGTERM)
+    try:
+        with pytest.raises(SystemExit, match="143"):
+            flight_with(lambda: _exit(signal.SIGTERM, None))
+    finally:
+        signal.signal(signal.SIGTERM, before)
 
 
 @pytest.mark.parametrize("name", ["needs_camera", "observe_truth", "control", "step"])
