@@ -7,6 +7,7 @@ import math
 import numpy as np
 
 from pytest_garl.simulation.flight import Contact, Flight, Separation
+from pytest_garl.simulation.texts import cut
 from pytest_garl.simulation.vehicle import up_m
 from pytest_garl.verdicts.compass import compass_point
 from pytest_garl.verdicts.moments import (
@@ -31,6 +32,8 @@ ON_GROUND_M = 0.02
 then: the feet spring a little."""
 LOST_S = 3.0
 """A target not seen for this long before the end counts as no longer detected."""
+STORY_CHARS = 300
+"""How much of an exception's message a story repeats; the flight's record has 1,000 characters."""
 DECOY_M = 1.5
 CLOSE_CALL_M = 3.0
 """Bodies farther away than this threaten nobody; exact separations end here as well."""
@@ -159,9 +162,8 @@ def _mechanism(
 ) -> tuple[PropertyName | None, ViolationType | None, str, str]:
     if flight.outcome == "crashed" and flight.crash:
         crash = flight.crash
-        text = f"The landing system {_VERBS[crash.kind]}: {crash.error}: {crash.message}".rstrip(
-            ": "
-        )
+        message = cut(crash.message, STORY_CHARS)
+        text = f"The landing system {_VERBS[crash.kind]}: {crash.error}: {message}".rstrip(": ")
         return "crash", "V", f"V:{crash.error}@{crash.where}", text + "."
     if flight.outcome == "collision":
         return _collision(flight, flight.contacts[-1])

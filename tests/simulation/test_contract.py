@@ -33,6 +33,8 @@ from pytest_garl.landing_system import airframe_of
 from pytest_garl.simulation.commands import read_command, read_thrusts
 from pytest_garl.simulation.fly import fly
 from pytest_garl.simulation.record import load, save
+from pytest_garl.verdicts.judge import judge
+from pytest_garl.verdicts.verdict import Limits
 from tests.simulation.test_flight import EMPTY, STAND, Scripted, nominal
 
 NAN, INF, HUGE = math.nan, math.inf, 10**400
@@ -293,6 +295,7 @@ def test_whatever_is_raised_becomes_a_record_of_bounded_size(
     assert words in crash.message
     assert "in answer" in crash.traceback or name == "BadNotes"
     assert len(json.dumps(dataclasses.asdict(crash))) < 60_000
+    assert len(judge(flight_with(answer), Limits()).story) < 700
     (tmp_path / f"case-{crash.error}.toml").write_text(crash.message, encoding="utf-8")
 
 
