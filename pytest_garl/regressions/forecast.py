@@ -6,7 +6,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from pytest_garl.regressions.follow_up import shares
-from pytest_garl.regressions.pursuit import LEAST, PILOTS, Inquiry
+from pytest_garl.regressions.inquiry import Inquiry
+from pytest_garl.regressions.pursuit import LEAST, PILOTS
 
 SPENT = 0.85
 """Share of its flights that a kind of violation spends: many stop before the last is needed."""

@@ -22,7 +22,7 @@ from pytest_garl.regressions.follow_up import (
     shares,
 )
 from pytest_garl.regressions.forecast import rest_of
-from pytest_garl.regressions.pursuit import Inquiry
+from pytest_garl.regressions.inquiry import Inquiry
 from pytest_garl.reports.commands import shown
 from pytest_garl.reports.progress import duration, live
 from pytest_garl.reports.wrapping import counted, width_of, wrapped
