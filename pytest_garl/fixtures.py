@@ -71,7 +71,7 @@ class Landing:
     def __repr__(self) -> str:
         from pytest_garl.verdicts.headline import headline
 
-        return f"<Landing {self.slot}: {headline(self.verdict.story)}>"
+        return f"<Landing {self.slot}: {headline(self._verdict.story)}>"
 
     @property
     def limits(self) -> Limits:
@@ -189,6 +189,22 @@ def npcs(request: pytest.FixtureRequest) -> PolicySpec:
     return policy_spec(run.options.npcs if run else "dqn")
 
 
+def checked_policy(given: object) -> PolicySpec:
+    """Return what the fixture ``npcs`` names; raise PolicyError for what names no policy."""
+    from pytest_garl.adversary.policies import policy_spec
+    from pytest_garl.errors import PolicyError
+    from pytest_garl.simulation.policy import PolicySpec
+
+    if isinstance(given, str):
+        return policy_spec(given)
+    if not isinstance(given, PolicySpec):
+        raise PolicyError(
+            f"fixture npcs: found {given!r}, expected the name of a policy as --garl-npcs takes it "
+            "('waypoint'), the path of weights (.npz), or a pytest_garl PolicySpec"
+        )
+    return given
+
+
 def stop(item: pytest.Item, error: GarlError) -> NoReturn:
     """End the session: without ledger or policy no other item would fare better."""
     if not hasattr(item.config, "workerinput"):
@@ -202,7 +218,7 @@ def landing(request: pytest.FixtureRequest, garl_slot: Target, npcs: PolicySpec)
     """Return the slot's landing, flown when it is first asked for."""
     run = request.config.stash[RUN]
     try:
-        result = run.fly(garl_slot, npcs)
+        result = run.fly(garl_slot, checked_policy(npcs))
     except GarlError as error:
         stop(request.node, error)
     item = request.node

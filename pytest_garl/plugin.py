@@ -52,7 +52,9 @@ def pytest_configure(config: pytest.Config) -> None:
     config.addinivalue_line(
         "markers",
         "garl(system, maps, limits, deterministic, files): search for violations of a landing "
-        "system",
+        "system: its class; names of maps (default: court and lawn); limits(distance_m=1.5, "
+        "time_s=120, abort='ok'); whether it does the same in the same flight (default: True); "
+        "data files that it reads, so that --garl-resume knows when they change.",
     )
     if not asked(config):
         return
@@ -235,7 +237,7 @@ def pytest_sessionfinish(session: pytest.Session) -> None:
             from pytest_garl.reports.aftermath import pursue
 
             pursue(run, session)
-            if run.troubled:
+            if run.trouble:
                 session.exitstatus = pytest.ExitCode.INTERNAL_ERROR
     finally:
         run.pool.close()

@@ -93,8 +93,8 @@ class Run:
     """What became of new signatures after the search."""
     rest: Rest | None = None
     """What is to come after the search, when it is known."""
-    troubled: bool = False
-    """Whether that could not be finished."""
+    trouble: str = ""
+    """Why that could not be finished, if it could not."""
     own: dict[tuple[str, str], Asks] = field(default_factory=dict)
     """Assertions of tests that failed where the built-in verdict is content, by search and
     signature."""

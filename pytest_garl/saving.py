@@ -38,7 +38,10 @@ def alone(folder: Path) -> Iterator[None]:
         # The folder itself is locked: a file for the purpose would have to be ignored by git.
         handle = os.open(folder, os.O_RDONLY)
     except OSError as error:
-        raise SavingError(f"{folder}: nothing can be saved here ({error})") from error
+        raise SavingError(
+            f"{folder}: nothing can be saved here ({error}); choose another folder of cases "
+            "with the ini key garl_cases"
+        ) from error
     try:
         fcntl.flock(handle, fcntl.LOCK_EX)
         yield

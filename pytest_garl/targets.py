@@ -212,10 +212,7 @@ def read_marker(marker: pytest.Mark, options: Options) -> Subject:
         load_map(map, options.map_folders)
     limits = marker.kwargs.get("limits", Limits())
     if isinstance(limits, dict):
-        try:
-            limits = Limits(**limits)
-        except TypeError as error:
-            raise GarlError(f"mark.garl: limits={limits!r}: {error}") from error
+        limits = _limits(limits)
     if not isinstance(limits, Limits):
         raise GarlError(f"mark.garl: limits={limits!r}: expected pytest_garl.limits(...)")
     deterministic = marker.kwargs.get("deterministic", True)
@@ -228,6 +225,19 @@ def read_marker(marker: pytest.Mark, options: Options) -> Subject:
         deterministic=deterministic,
         files=_files(marker.kwargs.get("files", ()), options),
     )
+
+
+def _limits(given: dict[Any, Any]) -> Limits:
+    from pytest_garl.verdicts.verdict import Limits
+
+    known = [field.name for field in dataclasses.fields(Limits)]
+    unknown = [str(key) for key in given if key not in known]
+    if unknown:
+        raise GarlError(
+            f"mark.garl: limits={given!r}: found {', '.join(unknown)}, expected "
+            f"{', '.join(known[:-1])} or {known[-1]}, such as limits(distance_m=1.0)"
+        )
+    return Limits(**given)
 
 
 def _files(given: Any, options: Options) -> tuple[str, ...]:

@@ -71,7 +71,7 @@ def pursue(run: Run, session: pytest.Session) -> None:
     except GarlError as error:
         reporter.ensure_newline()
         reporter.write_line(f"garl: {error}", red=True)
-        run.troubled = True
+        run.trouble = str(error)
 
 
 def _flight_s(run: Run, wanted: Sequence[Inquiry]) -> dict[str, float]:

@@ -13,6 +13,7 @@ from pytest_garl.reports.aftermath import told
 from pytest_garl.reports.commands import repeat_command, shown
 from pytest_garl.reports.explain import OWN_FAILURE
 from pytest_garl.reports.explain_case import CASE, MAYBE_FIXED, STALE
+from pytest_garl.reports.github import write_summary
 from pytest_garl.reports.kinds import Found, Kind, Own, found_by, legend
 from pytest_garl.reports.progress import duration
 from pytest_garl.reports.wrapping import counted, width_of, wrapped
@@ -89,9 +90,11 @@ def forecast(run: Run) -> list[str]:
 
 def summary(reporter: Any, run: Run) -> None:
     """Write a table per system and map, then what was saved, and which cases may be fixed."""
+    fold_skips(reporter)
     _searches(reporter, run)
     lines = [
         *told(run.pursued, reporter.config),
+        *([f"nothing more was saved: {run.trouble}"] if run.trouble else []),
         *_maybe_fixed(reporter),
         *_computed_otherwise(run),
     ]
@@ -124,6 +127,8 @@ def _told(reporter: Any, outcomes: tuple[str, ...], key: str) -> set[str]:
 
 def _searches(reporter: Any, run: Run) -> None:
     found = found_by(run.ledger, own_failures(reporter))
+    again = [[again_command(each, kind, reporter.config) for kind in each.kinds] for each in found]
+    write_summary(reporter, found, again)
     if not found:
         return
     reporter.section("garl: violations", sep="=")
@@ -142,6 +147,21 @@ def _searches(reporter: Any, run: Run) -> None:
             f"not finished: {done} of {total} flown; the same command with --garl-resume goes on"
         )
     reporter.write_line(f"ledger: {run.ledger.path}  results {run.ledger.result_hash()[:16]}")
+
+
+def fold_skips(reporter: Any) -> None:
+    """Make one line of all tests in a file that were not decided: each has a time of its own."""
+    for report in reporter.stats.get("skipped", ()):
+        if not isinstance(report.longrepr, tuple):
+            continue
+        reason = str(report.longrepr[2])
+        if reason.startswith(_UNDECIDED):
+            file = reporter.config.rootpath / report.nodeid.partition("::")[0]
+            told = f"{_UNDECIDED} the flight ended before (-v tells how)"
+            report.longrepr = (str(file), None, told)
+
+
+_UNDECIDED = "Skipped: not decided:"
 
 
 def own_failures(reporter: Any) -> list[Own]:

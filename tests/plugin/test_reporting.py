@@ -109,3 +109,91 @@ def test_own_assertions_that_fail_are_violations_in_the_summary(
             "own: an assertion of a test",
         ]
     )
+
+
+@PARALLEL
+def test_github_shows_a_table_of_what_was_found(
+    pytester: pytest.Pytester, parallel: tuple[str, ...], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    project(pytester)
+    page = pytester.path / "summary.md"
+    page.write_text("before\n")
+    monkeypatch.setenv("GITHUB_STEP_SUMMARY", str(page))
+    result = run(pytester, *SEARCH, "-rs", *parallel)
+    lines = page.read_text().splitlines()
+    assert lines[:2] == ["before", "## pytest-garl"]
+    assert (
+        f"| Good on lawn | IV:dog:last-metre:unseen | 3 | {HIT} | "
+        "`pytest test_it.py --garl-repeat=lawn-g00-s01 -o garl_dir=elsewhere` |"
+    ) in lines
+    folded = [line for line in result.outlines if line.startswith("SKIPPED")]
+    assert folded == ["SKIPPED [6] test_it.py: not decided: the flight ended before (-v tells how)"]
+
+
+def test_a_command_to_keep_patches_names_those_of_this_run(
+    pytester: pytest.Pytester, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    project(pytester)
+    monkeypatch.setenv("CI", "1")
+    (pytester.path / "elsewhere" / "patches").mkdir(parents=True)
+    (pytester.path / "elsewhere" / "patches" / "older.patch").write_text("another run's")
+    result = pytester.runpytest_subprocess("-p", "no:cacheprovider", *SEARCH)
+    text = result.stdout.str()
+    command = text[text.index("git apply") :].split("\n\n")[0].split("=====")[0]
+    files = re.findall(r"elsewhere/patches/\S+\.patch", command)
+    assert len(files) == 2
+    assert "elsewhere/patches/older.patch" not in files
+    for name in ("git init", "git apply " + " ".join(files)):
+        assert pytester.run(*name.split()).ret == 0
+    assert len(list((pytester.path / "scenarios" / "regressions").rglob("*.toml"))) == 2
+
+
+@pytest.mark.parametrize(
+    ("fixture", "told"),
+    [
+        ("return 'waypoint'", ""),
+        ("return 'wayponit'", "unknown object policy 'wayponit'; expected one of"),
+        (
+            "return 3",
+            "fixture npcs: found 3, expected the name of a policy as --garl-npcs takes it",
+        ),
+    ],
+)
+def test_the_npcs_fixture_takes_a_name(pytester: pytest.Pytester, fixture: str, told: str) -> None:
+    project(pytester)
+    with (pytester.path / "conftest.py").open("a") as file:
+        file.write(f"import pytest\n@pytest.fixture(scope='session')\ndef npcs():\n    {fixture}\n")
+    result = run(pytester, "--garl-budget=2", "--garl-workers=0")
+    both = result.stdout.str() + result.stderr.str()
+    assert (told in both) if told else (result.ret in (0, 1))
+    assert "Traceback" not in both
+
+
+def test_limits_of_another_name_are_refused_with_the_names_that_there_are(
+    pytester: pytest.Pytester,
+) -> None:
+    project(pytester)
+    tests = pytester.path / "test_it.py"
+    tests.write_text(tests.read_text().replace("maps=", "limits={'distance': 1}, maps="))
+    result = run(pytester, "--garl-budget=2")
+    result.stdout.fnmatch_lines(["*found distance, expected distance_m, time_s or abort, such as*"])
+
+
+def test_a_folder_of_cases_that_cannot_be_written_is_told_in_the_summary(
+    pytester: pytest.Pytester,
+) -> None:
+    project(pytester)
+    (pytester.path / "taken").write_text("a file")
+    result = pytester.runpytest_subprocess(
+        "-p", "no:cacheprovider", *SEARCH, "-o", "garl_cases=taken/cases"
+    )
+    assert result.ret == pytest.ExitCode.INTERNAL_ERROR
+    result.stdout.fnmatch_lines(["*garl: cases*", "nothing more was saved: *ini key garl_cases"])
+
+
+def test_landing_is_exported_for_annotations() -> None:
+    import pytest_garl
+    from pytest_garl.fixtures import Landing
+
+    assert pytest_garl.Landing is Landing
+    assert "Landing" in pytest_garl.__all__
