@@ -15,6 +15,8 @@ from typing import Any
 
 import pytest
 
+from pytest_garl.messages import printable
+
 FAILS: tuple[type[BaseException], ...] = (AssertionError, pytest.fail.Exception)
 """How a test says that a property does not hold; any other exception is a fault of the test."""
 
@@ -77,7 +79,7 @@ def failure_of(
     return Failure(
         test=test,
         digest=hashlib.sha256(statement.source.encode()).hexdigest()[:8],
-        message=str(error).partition("\n")[0] or statement.source.partition("\n")[0],
+        message=printable(str(error).partition("\n")[0] or statement.source.partition("\n")[0]),
         read=_read_by(statement, reads),
     )
 

@@ -8,8 +8,10 @@ from pathlib import Path
 import click
 from rich.console import Console
 from rich.table import Table
+from rich.text import Text
 
 from pytest_garl.errors import GarlError
+from pytest_garl.messages import printable
 from pytest_garl.regressions import corpus
 from pytest_garl.regressions.case import Case
 from pytest_garl.regressions.files import load
@@ -68,24 +70,24 @@ def list_(folders: _Folders) -> None:
     for name in ("case", "status", "signature", "robust", "objects"):
         table.add_column(name, no_wrap=True)
     for entry in found:
-        name = f"{entry.path.parent.name}/{entry.name}"
+        where = Text(printable(f"{entry.path.parent.name}/{entry.name}", keep=""))
         if entry.case is None:
-            table.add_row(name, "[red]broken[/red]")
+            table.add_row(where, Text("broken", style="red"))
             continue
         case, evidence = entry.case, entry.case.evidence
         robust = f"{evidence.neighbours_failed}/{evidence.neighbours}"
         objects = str(len(case.moves))
-        table.add_row(name, _coloured(case.status), case.violation.signature, robust, objects)
-    # Or else rich would make an animal of ":dog:".
-    Console(emoji=False).print(table)
+        # As texts: in a string rich would make an animal of ":dog:", and colours of "[red]".
+        signature = Text(printable(case.violation.signature, keep=""))
+        table.add_row(where, _coloured(case.status), signature, robust, objects)
+    Console().print(table)
     for entry in found:
         if entry.case is None:
-            click.echo(entry.problem)
+            click.echo(printable(entry.problem))
 
 
-def _coloured(status: str) -> str:
-    colour = {"open": "yellow", "fixed": "green"}.get(status, "dim")
-    return f"[{colour}]{status}[/{colour}]"
+def _coloured(status: str) -> Text:
+    return Text(status, style={"open": "yellow", "fixed": "green"}.get(status, "dim"))
 
 
 @cases.command()
@@ -101,8 +103,8 @@ def show(folders: _Folders, file: Path) -> None:
     for name in ("what", "value", "meaning"):
         table.add_column(name)
     for row in meanings(case.scenario, folders.maps):
-        table.add_row(*row)
-    Console(emoji=False).print(table)
+        table.add_row(*(Text(cell) for cell in row))
+    Console().print(table)
     for key, by in _totals(case):
         click.echo(f"while it is flown {key} changes by {by:+.2f}")
     click.echo(
@@ -154,7 +156,7 @@ def replay_(context: click.Context, file: Path, live: bool, video: Path | None) 
 
 def _answer(result: Replay) -> None:
     click.secho(result.answer, bold=True, fg="green" if result.answer == "FIXED" else "red")
-    click.echo(f"{result.signature or 'no violation'}: {result.story}")
+    click.echo(printable(f"{result.signature or 'no violation'}: {result.story}"))
     for reason in result.reasons:
         click.echo(reason)
     click.echo(f"judged by {result.judge}")
@@ -266,7 +268,7 @@ def prune(folders: _Folders, yes: bool) -> None:
         if result.answer != "STALE":
             kept += 1
             continue
-        click.echo(f"{entry.path}: passes, but {'; '.join(result.reasons)}")
+        click.echo(printable(f"{entry.path}: passes, but {'; '.join(result.reasons)}"))
         if yes or click.confirm("delete it?"):
             entry.path.unlink()
     click.echo(f"{kept} cases still say something")
@@ -293,7 +295,7 @@ def check(folders: _Folders) -> None:
         except GarlError as error:
             problems.append(f"{entry.path}: {error}")
     for problem in problems:
-        click.echo(problem, err=True)
+        click.echo(printable(problem), err=True)
     click.echo(f"{len(found)} cases, {len(problems)} problems")
     if problems:
         raise SystemExit(1)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import itertools
-import re
 import textwrap
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -29,6 +28,7 @@ from pytest_garl.scenarios.genes import ENVIRONMENT
 from pytest_garl.scenarios.maps import Map
 from pytest_garl.scenarios.toml_reader import Table, finite, parse
 from pytest_garl.scenarios.toml_writer import quoted as _text
+from pytest_garl.search.reference import SYSTEM_NAME
 from pytest_garl.simulation.policy import DECISION_STEP_S
 from pytest_garl.verdicts.verdict import (
     FARTHEST_M,
@@ -45,8 +45,6 @@ _STATUSES = ("open", "fixed", "unavoidable")
 _AVOIDABLE = ("live", "recorded", "no")
 _WIDTH = 98
 _MOST_MOVES = round(LONGEST_S / DECISION_STEP_S)
-_SYSTEM = re.compile(r"\w[\w-]*(\.\w[\w-]*)*:[^\W\d]\w*(\.[^\W\d]\w*)*")
-"""Names with dots between: what is imported must not be a path to somewhere else."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -223,7 +221,7 @@ def _read_head(top: Table) -> Head:
     if top.integer("schema") != SCHEMA:
         raise top.error("schema", f"found {shown(top.get('schema'))}, expected {SCHEMA}")
     system = top.text("system")
-    if not _SYSTEM.fullmatch(system):
+    if not SYSTEM_NAME.fullmatch(system):
         raise top.error(
             "system", f"found {shown(system)}, expected 'module:class', names with dots between"
         )

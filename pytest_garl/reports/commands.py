@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
+from pytest_garl.messages import printable
+
 if TYPE_CHECKING:
     from pytest_garl.targets import Target
 
@@ -41,4 +43,5 @@ def settings(config: pytest.Config) -> list[str]:
 def shown(path: Path, config: pytest.Config) -> str:
     """Return a path as seen from where pytest was called."""
     here = config.invocation_params.dir
-    return str(path.relative_to(here)) if path.is_relative_to(here) else str(path)
+    found = path.relative_to(here) if path.is_relative_to(here) else path
+    return printable(str(found), keep="")

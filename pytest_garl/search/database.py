@@ -71,5 +71,6 @@ class Database:
     def _explained(self) -> Iterator[None]:
         try:
             yield
-        except sqlite3.Error as error:
+        except (sqlite3.Error, UnicodeDecodeError) as error:
+            # What SQLite says of a damaged file may hold bytes of it.
             raise LedgerError(f"{self._path}: {error}. {REMEDY}") from error

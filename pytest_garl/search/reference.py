@@ -7,12 +7,17 @@ import hashlib
 import importlib
 import importlib.util
 import inspect
+import re
 import sys
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from pytest_garl.errors import LandingSystemError
+from pytest_garl.messages import shown
+
+SYSTEM_NAME = re.compile(r"\w[\w-]*(\.\w[\w-]*)*:[^\W\d]\w*(\.[^\W\d]\w*)*")
+"""Of a class, "module:class", names with dots between: what is imported is no path to elsewhere."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -86,14 +91,17 @@ def simulator_sha256(simulator: Reference) -> str:
 
 def system_named(name: str) -> Any:
     """Import a landing system by "module:class"; raise LandingSystemError for what is none."""
+    if not SYSTEM_NAME.fullmatch(name):
+        raise LandingSystemError(
+            f"found {shown(name)}, expected 'module:class', names with dots between"
+        )
     module, _, qualname = name.partition(":")
-    if not module or not qualname:
-        raise LandingSystemError(f"found {name!r}")
     try:
         found: Any = importlib.import_module(module)
         for part in qualname.split("."):
             found = getattr(found, part)
-    except (ImportError, AttributeError) as error:
+    except (Exception, SystemExit) as error:
+        # A module may raise what it likes while it is imported.
         raise LandingSystemError(f"{type(error).__name__}: {error}") from error
     check_system(found)
     return found

@@ -6,6 +6,8 @@ import re
 import reprlib
 from collections.abc import Callable
 
+from pytest_garl.messages import printable
+
 MESSAGE_CHARS = 1_000
 """How much of an exception's message is kept."""
 TRACEBACK_CHARS = 20_000
@@ -19,11 +21,12 @@ _ADDRESS = re.compile(r"\bat 0x[0-9A-Fa-f]{6,}")
 def cut(text: str, limit: int) -> str:
     """Return plain text of at most ``limit`` characters and a note that says what was cut.
 
-    Addresses differ in each process and are left out.  What cannot be written as UTF-8 is escaped.
+    Addresses differ in each process and are left out.  Control characters, and what cannot be
+    written as UTF-8, are escaped.
     """
     whole = str.__len__(text)
     # The slot of the class itself: a subclass of str may do as it likes.
-    kept = str.__getitem__(text, slice(0, limit)).encode("utf-8", "backslashreplace").decode()
+    kept = printable(str.__getitem__(text, slice(0, limit)))
     note = f"... (cut, {whole} characters)" if whole > limit else ""
     return _ADDRESS.sub("at 0x...", kept) + note
 

@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import importlib
 import sys
 from collections.abc import Iterator
 from importlib.metadata import version
@@ -97,7 +98,7 @@ def test_list_and_show_tell_what_it_is(file: Path) -> None:
     assert "open" in listed.output
     shown = garl("show", file).output
     assert "raised: ZeroDivisionError: no plan." in shown
-    assert "fog (1: visibility 10 m)" in shown
+    assert "fog, visibility 100 m" in shown
     assert "a person of up to 0.00 m/s" in shown
 
 
@@ -176,3 +177,55 @@ def test_a_list_shows_signatures_as_they_are_and_no_animals(tmp_path: Path) -> N
         main, ["cases", "--folder", str(tmp_path), "list"], env={"COLUMNS": "200"}
     )
     assert "IV:dog:last-metre:unseen" in listed.output
+
+
+def test_no_escape_sequence_of_a_case_or_a_name_reaches_the_terminal(file: Path) -> None:
+    text = file.read_text()
+    hostile = text.replace("V:ZeroDivisionError@", "[red]\\u001b[2J:[/x]@")
+    hostile = hostile.replace("raised: ZeroDivisionError", "raised \\u202e: ZeroDivisionError")
+    file.with_name("a\x1b[31mb.toml").write_text(hostile)
+    file.with_name("broken\x1b[2J.toml").write_text("schema = ")
+    for command in (["list"], ["check"], ["show", file.with_name("a\x1b[31mb.toml")]):
+        shown = garl(*command)
+        assert "Traceback" not in shown.output
+        assert not {"\x1b", "\u202e"} & {*shown.output}
+        assert "[red]\\x1b[2J:[/x]@stack_of_test" in shown.output or command == ["check"]
+    assert "stack_of_test/a\\x1b[31mb" in garl("list").output
+    assert "broken\\x1b[2J.toml: not valid TOML" in garl("check").output
+
+
+@pytest.mark.parametrize(
+    ("code", "words"),
+    [
+        ("raise SystemExit(3)", "SystemExit: 3"),
+        ("raise RuntimeError('\\x1b[2J')", r"RuntimeError: \x1b[2J"),
+        ("1 / 0", "ZeroDivisionError: division by zero"),
+        ("def", "SyntaxError"),
+    ],
+)
+def test_a_module_that_raises_while_it_is_imported_is_one_problem(
+    file: Path, code: str, words: str
+) -> None:
+    Path("stack_of_test.py").write_text(code)
+    checked = garl("check")
+    assert words in checked.output
+    assert checked.output.endswith("1 cases, 1 problems\n")
+    assert checked.exit_code == 1
+
+
+@pytest.mark.parametrize("system", ["../../x:Straight", "x.:Straight", "x:Stra ight", "/x:y"])
+def test_a_system_that_is_no_name_is_imported_from_nowhere(
+    file: Path, system: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    real = importlib.import_module
+
+    def refuse(name: str) -> object:
+        assert name.startswith("pytest_garl.")
+        return real(name)
+
+    monkeypatch.setattr("importlib.import_module", refuse)
+    file.write_text(file.read_text().replace("stack_of_test:Lander", system))
+    for command in (["check"], ["replay", file]):
+        told = garl(*command)
+        assert f"key 'system': found '{system}', expected 'module:class'" in told.output
+        assert told.exit_code == 1

@@ -1,0 +1,270 @@
+"""The ten kinds of files: good samples of each, and what the project does with one."""
+
+from __future__ import annotations
+
+import hashlib
+import io
+import json
+import random
+import shutil
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from pytest_garl.adversary import network
+from pytest_garl.errors import GarlError
+from pytest_garl.experiments import plan, rows
+from pytest_garl.regressions import baseline, corpus, files, survey
+from pytest_garl.regressions.story import meanings
+from pytest_garl.scenarios import files as scenarios
+from pytest_garl.scenarios import maps
+from pytest_garl.scenarios.chromosome import decode
+from pytest_garl.scenarios.genes import genome_for
+from pytest_garl.scenarios.validity import problems
+from pytest_garl.search.job import fly_job, load_scenario, loads
+from pytest_garl.search.ledger import Ledger
+from pytest_garl.search.objectives import threat
+from pytest_garl.search.stored import check_stored
+from pytest_garl.simulation import record
+from pytest_garl.verdicts.serialise import from_dict
+from tests.experiments.samples import row
+from tests.experiments.test_plan import TEXT as PLAN
+from tests.fuzz import mutations
+from tests.regressions import test_baseline, test_files
+from tests.search.flying import Good, job_of, scenario
+
+Change = Callable[[random.Random], None]
+_COURT = maps.load_map("court")
+_CASES = Path(__file__).parents[2] / "scenarios" / "regressions"
+_RUN = {"seed": 3, "version": "1"}
+
+
+@dataclass(frozen=True, kw_only=True)
+class Loader:
+    """One kind of file: ``prepare`` writes a changed one into a folder, ``load`` uses it."""
+
+    prepare: Callable[[Path, random.Random], Path]
+    load: Callable[[Path, random.Random], None]
+
+
+def _text_file(name: str, samples: Callable[[], list[str]]) -> Callable[..., Path]:
+    kept: list[str] = []
+
+    def prepare(folder: Path, rng: random.Random) -> Path:
+        if not kept:
+            kept.extend(samples())
+        text = rng.choice(kept)
+        path = folder / name
+        path.parent.mkdir(parents=True, exist_ok=True)
+        if rng.random() < 0.3:
+            path.write_bytes(mutations.bytes_changed(text.encode(), rng))
+        else:
+            changed = mutations.text_changed(text, rng)
+            path.write_text(changed, encoding="utf-8", errors="surrogatepass")
+        return path
+
+    return prepare
+
+
+def _cases() -> list[str]:
+    own = [test_files.case(), test_files.changing()]
+    shipped = sorted(_CASES.glob("*/*.toml"))[:4]
+    return [*(files.dumps(each) for each in own), *(file.read_text() for file in shipped)]
+
+
+def _load_case(path: Path, rng: random.Random) -> None:
+    corpus._read.cache_clear()
+    corpus._load.cache_clear()
+    (entry,) = corpus.every_entry(path.parent.parent, ())
+    if entry.problem:
+        raise GarlError(entry.problem)
+    case = entry.case
+    assert case is not None
+    assert files.loads(files.dumps(case), maps.load_map) == case
+    assert case.id
+    list(meanings(case.scenario, ()))
+
+
+def _load_map(path: Path, rng: random.Random) -> None:
+    maps._read.cache_clear()
+    found = maps.load_map(path.stem, (path.parent,))
+    genome = genome_for(found)
+    problems(decode(genome.nominal, genome, map=found.name, seed=1), found)
+
+
+def _load_baseline(path: Path, rng: random.Random) -> None:
+    found = baseline.load(path)
+    assert baseline.loads(baseline.dumps(found), maps.load_map) == found
+
+
+def _load_plan(path: Path, rng: random.Random) -> None:
+    found = plan.read(path)
+    assert all(run.folder and run.title for run in found.runs)
+
+
+def _scenarios() -> list[str]:
+    genome = genome_for(_COURT)
+    whole = decode(genome.nominal, genome, map="court", seed=1)
+    return [scenarios.dumps(whole), scenarios.dumps(whole.without("person-1"))]
+
+
+def _load_scenario(path: Path, rng: random.Random) -> None:
+    found = scenarios.load(path)
+    assert scenarios.loads(scenarios.dumps(found), maps.load_map(found.map)) == found
+
+
+def _weights(folder: Path, *, stamp: bool = True) -> Path:
+    path = folder / "mine.npz"
+    for suffix in (".npz", ".json"):
+        shutil.copy(network.WEIGHTS / f"dqn{suffix}", path.with_suffix(suffix))
+    return path
+
+
+def _prepare_weights(folder: Path, rng: random.Random) -> Path:
+    path = _weights(folder)
+    path.write_bytes(mutations.archive_changed(path.read_bytes(), rng))
+    manifest = json.loads(path.with_suffix(".json").read_text())
+    manifest["sha256"] = hashlib.sha256(path.read_bytes()).hexdigest()
+    path.with_suffix(".json").write_text(json.dumps(manifest))
+    return path
+
+
+def _prepare_manifest(folder: Path, rng: random.Random) -> Path:
+    path = _weights(folder).with_suffix(".json")
+    changed = mutations.json_text_changed(path.read_text(), rng)
+    path.write_bytes(changed.encode("utf-8", "surrogatepass"))
+    return path
+
+
+def _load_weights(path: Path, rng: random.Random) -> None:
+    network._load.cache_clear()
+    spec = network.learned_spec(str(path.with_suffix(".npz")))
+    spec.make()
+
+
+def _prepare_record(folder: Path, rng: random.Random) -> Path:
+    path = folder / "flight.npz"
+    if not hasattr(_prepare_record, "sample"):
+        fly_job(job_of(Good, folder), scenario(0.05), "flight", None)
+        vars(_prepare_record)["sample"] = path.read_bytes()
+    content: bytes = vars(_prepare_record)["sample"]
+    if rng.random() < 0.5:
+        path.write_bytes(mutations.archive_changed(content, rng))
+        return path
+    with np.load(io.BytesIO(content)) as saved:
+        arrays: dict[str, Any] = dict(saved)
+    header = mutations.json_text_changed(arrays["header"].tobytes().decode(), rng)
+    arrays["header"] = np.frombuffer(header.encode("utf-8", "surrogatepass"), dtype=np.uint8)
+    np.savez_compressed(path, **arrays)
+    return path
+
+
+def _load_record(path: Path, rng: random.Random) -> None:
+    record.hash_of(record.load(path))
+
+
+def _prepare_ledger(folder: Path, rng: random.Random) -> Path:
+    path = folder / "ledger.sqlite"
+    for suffix in ("", "-wal", "-shm"):
+        path.with_name(path.name + suffix).unlink(missing_ok=True)
+    if not hasattr(_prepare_ledger, "sample"):
+        _write_ledger(path)
+        vars(_prepare_ledger)["sample"] = path.read_bytes()
+    path.write_bytes(vars(_prepare_ledger)["sample"])
+    mutations.database_changed(path, rng)
+    return path
+
+
+def _write_ledger(path: Path) -> None:
+    job = job_of(Good, path.parent)
+    ledger = Ledger.create(path, _RUN)
+    ledger.add_search("s", "tests.search.flying:Good", "lawn", 8, test_baseline.job().dumps())
+    ledger.add_slots("s", 0, {slot: _dumped(slot) for slot in range(8)})
+    for _ in range(6):
+        claim = ledger.claim()
+        assert claim is not None
+        ledger.record(claim, *fly_job(job, load_scenario(claim.scenario), "one", None))
+    ledger.note_objectives("s", 0, [(0.5, 1.0)] * 8)
+    ledger.select("PRAGMA wal_checkpoint(TRUNCATE)")
+    ledger.close()
+
+
+def _dumped(slot: int) -> str:
+    from pytest_garl.search.job import dump_scenario
+
+    return dump_scenario(scenario(0.02 * slot))
+
+
+def _load_ledger(path: Path, rng: random.Random) -> None:
+    kind = rng.randrange(3)
+    if kind == 0:
+        baseline.dumps(survey.from_ledger(path))
+        return
+    ledger = Ledger.resume(path, _RUN) if kind == 1 else Ledger(path)
+    try:
+        check_stored(ledger)
+        _use(ledger)
+    finally:
+        ledger.close()
+
+
+def _use(ledger: Ledger) -> None:
+    """Do what a resumed search, a repeated slot and the summary do."""
+    for search, job in ledger.searches():
+        loads(job)
+        for text, result in ledger.generation(search, 0):
+            load_scenario(text)
+            if result is not None:
+                threat(result)
+                assert result["verdict"]["signature"] is not None
+        ledger.flown(search)
+    for *_, result in ledger.results():
+        from_dict(result["verdict"])
+    ledger.progress()
+    ledger.violations()
+    ledger.nearest()
+    ledger.violating()
+    ledger.result_hash()
+    ledger.meters()
+    ledger.seconds_per_flight()
+    for text in ledger.scenarios(0, 1, "lawn").values():
+        load_scenario(text)
+
+
+def _rows() -> list[str]:
+    text = rows._dumps([row(), row(seed=2, top10=None), row(map="lawn", signatures=())])
+    return [text]
+
+
+def _load_rows(path: Path, rng: random.Random) -> None:
+    found = rows.read(path)
+    assert len({each.key for each in found}) <= len(found)
+
+
+LOADERS = {
+    "case": Loader(prepare=_text_file("cases/flying/one.toml", _cases), load=_load_case),
+    "map": Loader(
+        prepare=_text_file(
+            "mine.toml",
+            lambda: [
+                (Path(maps.__file__).parent / f"{name}.toml").read_text()
+                for name in ("court", "lawn")
+            ],
+        ),
+        load=_load_map,
+    ),
+    "baseline": Loader(
+        prepare=_text_file("base.toml", lambda: [baseline.dumps(test_baseline.baseline())]),
+        load=_load_baseline,
+    ),
+    "experiment": Loader(prepare=_text_file("plan.toml", lambda: [PLAN]), load=_load_plan),
+    "scenario": Loader(prepare=_text_file("one.toml", _scenarios), load=_load_scenario),
+    "weights": Loader(prepare=_prepare_weights, load=_load_weights),
+    "manifest": Loader(prepare=_prepare_manifest, load=_load_weights),
+    "record": Loader(prepare=_prepare_record, load=_load_record),
+    "ledger": Loader(prepare=_prepare_ledger, load=_load_ledger),
+    "rows": Loader(prepare=_text_file("rows.csv", _rows), load=_load_rows),
+}

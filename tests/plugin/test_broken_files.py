@@ -1,0 +1,112 @@
+"""Broken files in a project: each is told by its own item, and the rest is collected and runs."""
+
+from __future__ import annotations
+
+import os
+import sqlite3
+from pathlib import Path
+
+import pytest
+
+from pytest_garl.regressions.files import dumps
+from tests.plugin.test_plugin import project, run
+from tests.regressions.test_files import case
+
+BROKEN = {
+    "nested": "nested too deeply",
+    "digits": "Exceeds the limit",
+    "large": "found 1000005 bytes, expected at most 1000000",
+    "device": "found a device, expected a regular file",
+    "pipe": "found a pipe, expected a regular file",
+    "lost": "found a symbolic link that leads nowhere",
+    "long": "after 0 moves, expected at most 600",
+}
+
+
+def _break(folder: Path) -> None:
+    """Write one file of each kind that says nothing, and hangs nobody."""
+    folder.mkdir(parents=True)
+    text = dumps(case()).replace("stack.landing:Lander", "systems:Good")
+    (folder / "nested.toml").write_text("seed = " + "[" * 3000)
+    (folder / "digits.toml").write_text("seed = " + "9" * 5000)
+    (folder / "large.toml").write_text("#" * 1_000_005)
+    (folder / "device.toml").symlink_to("/dev/zero")
+    os.mkfifo(folder / "pipe.toml")
+    (folder / "lost.toml").symlink_to("gone.toml")
+    (folder / "long.toml").write_text(text.replace("[[2, 0.0", "[[20000, 0.0"))
+
+
+def test_each_broken_case_is_told_by_its_own_item_and_the_rest_runs(
+    pytester: pytest.Pytester,
+) -> None:
+    project(pytester)
+    _break(pytester.path / "scenarios" / "regressions" / "systems")
+    result = run(pytester, "--garl-workers=0", "--garl-budget=1", "-k", "test_time", "-rA")
+    result.assert_outcomes(passed=1, errors=len(BROKEN), deselected=2 * (1 + len(BROKEN)))
+    for name, words in BROKEN.items():
+        result.stdout.fnmatch_lines([f"* ERROR at setup of test_time?case-{name}? *"])
+        result.stdout.fnmatch_lines([f"*/{name}.toml: *{words}*"])
+    assert "Traceback" not in result.stdout.str() + result.stderr.str()
+
+
+def test_no_escape_sequence_of_a_landing_system_reaches_terminal_or_report(
+    pytester: pytest.Pytester,
+) -> None:
+    project(pytester, system="Owns")
+    systems = pytester.path / "systems.py"
+    hostile = r'"\x1b[2J\x1b]0;owned\x07 and \u202e turned"'
+    systems.write_text(
+        systems.read_text()
+        + f"\nclass Owns(Good):\n    def step(self, observation): raise ValueError({hostile})\n"
+    )
+    folder = pytester.path / "scenarios" / "regressions" / "systems"
+    folder.mkdir(parents=True)
+    (folder / "lawn-\x1b[31m.toml").write_text("schema = \x1b[2J")
+    xml = pytester.path / "report.xml"
+    result = run(pytester, "--garl-workers=0", "--garl-budget=2", "-rA", "-v", f"--junit-xml={xml}")
+    shown = result.stdout.str() + result.stderr.str() + xml.read_text()
+    assert r"\x1b[2J\x1b]0;owned\x07 and \u202e turned" in shown
+    assert r"lawn-\x1b[31m" in shown
+    for char in "\x1b\x07\u202e":
+        assert char not in shown
+
+
+@pytest.mark.parametrize(
+    "option", ["--garl-resume", "--garl-repeat=lawn-g00-s00"], ids=["resume", "repeat"]
+)
+def test_a_damaged_ledger_is_one_message(pytester: pytest.Pytester, option: str) -> None:
+    project(pytester)
+    run(pytester, "--garl-workers=0", "--garl-budget=2", "-k", "test_time")
+    database = sqlite3.connect(pytester.path / ".garl" / "ledger.sqlite")
+    database.execute("UPDATE slot SET result = '{\"outcome\": 3}' WHERE slot = 1")
+    database.commit()
+    database.close()
+    budget = ["--garl-budget=2"] if option == "--garl-resume" else []
+    result = run(pytester, "--garl-workers=0", "-k", "test_time", option, *budget)
+    told = result.stdout.str() + result.stderr.str()
+    assert "ledger.sqlite: is damaged or no ledger of this version: slot 0/1" in told
+    assert "Traceback" not in told
+    assert result.ret != 0
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [("seed = " + "[" * 3000, "nested too deeply"), ("\x00", "not valid TOML")],
+    ids=["nested", "null"],
+)
+def test_a_scenario_that_cannot_be_read_is_one_message(
+    pytester: pytest.Pytester, text: str, words: str
+) -> None:
+    project(pytester)
+    (pytester.path / "one.toml").write_text(text)
+    result = run(pytester, "--garl-workers=0", "--garl-repeat=one.toml")
+    result.stdout.fnmatch_lines([f"*one.toml: *{words}*"])
+    assert "Traceback" not in result.stdout.str() + result.stderr.str()
+
+
+def test_a_baseline_that_cannot_be_read_is_one_message(pytester: pytest.Pytester) -> None:
+    project(pytester)
+    (pytester.path / "base.toml").write_text("cpu = " + "[" * 3000)
+    result = run(pytester, "--garl-workers=0", "--garl-baseline=base.toml")
+    result.stderr.fnmatch_lines(["ERROR: --garl-baseline: *base.toml: *nested too deeply*"])
+    assert result.ret == pytest.ExitCode.USAGE_ERROR
