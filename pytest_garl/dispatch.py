@@ -126,6 +126,11 @@ def expected() -> str:
     return BASELINE if has_baseline() else f"{platform.machine()} without AVX2"
 
 
+def of_children() -> str:
+    """Name the class of this machine's flying processes, whatever this one computes by."""
+    return BASELINE if has_baseline() else dispatched()
+
+
 def has_baseline() -> bool:
     """Whether this machine can fly by the baseline."""
     return platform.machine() == "x86_64" and _flags() >= _NEEDED

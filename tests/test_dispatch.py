@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import importlib.util
 import os
 import platform
 import subprocess
@@ -116,3 +117,33 @@ def test_libraries_are_loaded_without_a_word() -> None:
         check=True,
     )
     assert (done.stdout, done.stderr) == ("x86_64-avx2-haswell\n", "")
+
+
+def test_flying_processes_are_of_the_class_that_was_asked_for(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    cpu(monkeypatch, ICE_LAKE)
+    assert dispatch.of_children() == dispatch.BASELINE
+    cpu(monkeypatch, OLD)
+    assert dispatch.of_children() == dispatch.dispatched()
+
+
+@needs_avx2
+@pytest.mark.skipif(importlib.util.find_spec("torch") is None, reason="PyTorch is not installed")
+def test_training_computes_by_the_baseline() -> None:
+    code = (
+        "from pytest_garl.cli import main\n"
+        "assert main.get_command(None, 'train')\n"
+        "from pytest_garl import dispatch\n"
+        "import pytest_garl.adversary.training, torch\n"
+        "print(torch.backends.cpu.get_cpu_capability(), dispatch.dispatched())\n"
+    )
+    outside = {"ATEN_CPU_CAPABILITY": "default", "OPENBLAS_CORETYPE": "Nehalem"}
+    done = subprocess.run(
+        [sys.executable, "-c", code],
+        env={**os.environ, **outside},
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    assert done.stdout.split() == ["AVX2", dispatch.BASELINE]

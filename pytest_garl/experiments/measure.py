@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from pytest_garl.dispatch import dispatched
+from pytest_garl.dispatch import of_children
 from pytest_garl.experiments.plan import KINDS, Run
 from pytest_garl.experiments.rows import ExperimentError, Row
 from pytest_garl.regressions.follow_up import done_of
@@ -131,7 +131,7 @@ def row_of(
         policy_sha256=job.npcs.sha256[:HASH],
         version=str(ledger.fact(FACT_VERSION)),
         package_sha256=str(ledger.fact(FACT_SOURCES)),
-        machine=dispatched(),
+        machine=of_children(),
         result_hash=ledger.result_hash(search.key)[:HASH],
     )
 

@@ -172,11 +172,11 @@ def _set(job: Job, flights: Iterable[tuple[Scenario, Done]], method: str) -> Sam
 
 
 def _baseline(sets: Sequence[SampleSet]) -> Baseline:
-    from pytest_garl.dispatch import dispatched
+    from pytest_garl.dispatch import of_children
     from pytest_garl.simulation.flight import PACKAGES
 
     return Baseline(
-        cpu=dispatched(),
+        cpu=of_children(),
         versions=tuple((name, version(name)) for name in PACKAGES),
         sets=tuple(sets),
     )
@@ -201,9 +201,10 @@ def _words(limits: Limits) -> str:
 
 def moved_on(base: Baseline) -> tuple[str, ...]:
     """Return what shapes a flight beside the stack and is not as when the baseline was saved."""
-    from pytest_garl.dispatch import dispatched
+    from pytest_garl.dispatch import of_children
 
-    found = [] if base.cpu == dispatched() else [f"the CPU was {base.cpu}, is {dispatched()}"]
+    cpu = of_children()
+    found = [] if base.cpu == cpu else [f"the CPU was {base.cpu}, is {cpu}"]
     for name, then in base.versions:
         try:
             today = version(name)

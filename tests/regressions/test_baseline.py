@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from pytest_garl.adversary.policies import policy_spec
-from pytest_garl.dispatch import dispatched
+from pytest_garl.dispatch import of_children
 from pytest_garl.errors import ScenarioError
 from pytest_garl.messages import printable
 from pytest_garl.regressions.baseline import (
@@ -202,7 +202,7 @@ def test_versions_that_moved_on_are_told() -> None:
     assert "numpy was 2.0.0, is " in " ".join(moved_on(baseline()))
     gone = Baseline(cpu="z80", versions=(("no-such-package", "1"),), sets=())
     assert moved_on(gone) == (
-        f"the CPU was z80, is {dispatched()}",
+        f"the CPU was z80, is {of_children()}",
         "no-such-package was 1, is absent",
     )
 
