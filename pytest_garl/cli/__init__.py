@@ -21,6 +21,7 @@ COMMANDS = {
     "check": "check",
     "diff": "baseline",
     "experiment": "experiment",
+    "report": "report",
     "train": "train",
 }
 """The subcommands, and the module of each."""

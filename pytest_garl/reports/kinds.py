@@ -42,6 +42,7 @@ class Found:
     system: str
     map: str
     files: tuple[str, ...]
+    slots: Mapping[str, Slot]
     results: tuple[dict[str, Any], ...]
     verdicts: tuple[Verdict, ...]
     kinds: tuple[Kind, ...]
@@ -71,9 +72,9 @@ class Found:
 
 def found_by(ledger: Ledger, own: Iterable[Own] = ()) -> list[Found]:
     """Return what each search of a ledger found."""
-    flown: dict[tuple[str, str], list[tuple[str, dict[str, Any]]]] = {}
+    flown: dict[tuple[str, str], list[tuple[Slot, dict[str, Any]]]] = {}
     for system, map, generation, index, result in ledger.results():
-        slot = Slot(generation=generation, index=index).id(map)
+        slot = Slot(generation=generation, index=index)
         flown.setdefault((system, map), []).append((slot, result))
     mine: dict[tuple[str, str], list[Own]] = {}
     for each in own:
@@ -88,14 +89,14 @@ def _found(
     ledger: Ledger,
     system: str,
     map: str,
-    rows: list[tuple[str, dict[str, Any]]],
+    rows: list[tuple[Slot, dict[str, Any]]],
     own: list[Own],
 ) -> Found:
     verdicts = [from_dict(result["verdict"]) for _, result in rows]
     slots: dict[str, list[tuple[str, str]]] = {}
     for (slot, _), verdict in zip(rows, verdicts, strict=True):
         if verdict.violation:
-            slots.setdefault(verdict.signature, []).append((slot, verdict.story))
+            slots.setdefault(verdict.signature, []).append((slot.id(map), verdict.story))
     for each in sorted(own, key=lambda each: each.slot):
         slots.setdefault(each.signature, []).append((each.slot, each.message))
     kinds = [
@@ -113,6 +114,7 @@ def _found(
         system=system,
         map=map,
         files=tuple(files.split()),
+        slots={slot.id(map): slot for slot, _ in rows},
         results=tuple(result for _, result in rows),
         verdicts=tuple(verdicts),
         kinds=tuple(sorted(kinds, key=lambda each: (-each.count, each.signature))),

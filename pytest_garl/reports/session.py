@@ -14,6 +14,7 @@ import pytest
 from pytest_garl.adversary.policies import policy_spec
 from pytest_garl.errors import LedgerError
 from pytest_garl.options import Options
+from pytest_garl.reports.record import BEGAN, utc
 from pytest_garl.run import Run
 from pytest_garl.search.ledger import Ledger
 from pytest_garl.search.local_pool import local_pool
@@ -54,6 +55,7 @@ def begin_run(config: pytest.Config, options: Options) -> Run:
             check_stored(ledger)
         else:
             ledger = Ledger.create(options.ledger, facts)
+            ledger.note_fact(BEGAN, utc())
         if earlier:
             ledger.note_fact("seconds_per_flight", earlier)
     own = config.hook.pytest_garl_fly(config=config)

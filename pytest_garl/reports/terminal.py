@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import json
 from typing import Any
 
@@ -16,6 +17,7 @@ from pytest_garl.reports.explain_case import CASE, MAYBE_FIXED, STALE
 from pytest_garl.reports.github import write_summary
 from pytest_garl.reports.kinds import Found, Kind, Own, found_by, legend
 from pytest_garl.reports.progress import duration
+from pytest_garl.reports.record import ENDED, OWN_FACT, utc
 from pytest_garl.reports.wrapping import counted, width_of, wrapped
 from pytest_garl.run import Run
 from pytest_garl.verdicts.metrics import decided_words, share_interval, top_k
@@ -126,7 +128,11 @@ def _told(reporter: Any, outcomes: tuple[str, ...], key: str) -> set[str]:
 
 
 def _searches(reporter: Any, run: Run) -> None:
-    found = found_by(run.ledger, own_failures(reporter))
+    own = own_failures(reporter)
+    if run.options.searches:
+        run.ledger.note_fact(OWN_FACT, [dataclasses.asdict(each) for each in own])
+        run.ledger.note_fact(ENDED, utc())
+    found = found_by(run.ledger, own)
     again = [[again_command(each, kind, reporter.config) for kind in each.kinds] for each in found]
     write_summary(reporter, found, again)
     if not found:

@@ -20,6 +20,7 @@ from pytest_garl.messages import printable, shown
 from pytest_garl.plain import parsed
 from pytest_garl.search.database import REMEDY, Database
 from pytest_garl.search.processes import alive
+from pytest_garl.search.slots import Slot
 
 VERSION = 4
 """Of the tables below; a ledger of another version is not continued."""
@@ -521,6 +522,16 @@ class Ledger:
             "AND state = 'flown' AND type IS NOT NULL GROUP BY type ORDER BY type"
         )
         return dict(rows.fetchall())
+
+    def flight(self, system: str, map: str, slot: Slot) -> tuple[dict[str, Any], str, str]:
+        """Return result, trajectory's hash and scenario of a search's flown slot."""
+        row = self._db.execute(
+            "SELECT result, coalesce(sha256, ''), scenario FROM slot "
+            "JOIN search ON search.id = slot.search WHERE kind = 'search' AND system = ? "
+            "AND map = ? AND generation = ? AND slot = ?",
+            (system, map, slot.generation, slot.index),
+        ).fetchone()
+        return json.loads(row[0]), str(row[1]), str(row[2])
 
     def kinds(self) -> dict[tuple[str, str], float]:
         """Return the mean wall time of a flight of each kind of violation: search, signature."""

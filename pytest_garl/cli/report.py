@@ -1,0 +1,59 @@
+"""``garl report``: what a run found, for people and for programs."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import click
+
+from pytest_garl.cli.cases import DEFAULT
+from pytest_garl.reports.record import report_of
+from pytest_garl.saving import save_text
+
+
+@click.command()
+@click.argument(
+    "ledger",
+    type=click.Path(path_type=Path, dir_okay=False),
+    default=Path(".garl/ledger.sqlite"),
+)
+@click.option("--json", "as_json", is_flag=True, help="Write JSON, as docs/report.md says.")
+@click.option(
+    "--out", type=click.Path(path_type=Path, dir_okay=False), help="Write into this file."
+)
+@click.option(
+    "--folder",
+    type=click.Path(path_type=Path, file_okay=False),
+    default=DEFAULT,
+    show_default=True,
+    help="Where the cases are (the ini key garl_cases).",
+)
+def report(ledger: Path, as_json: bool, out: Path | None, folder: Path) -> None:
+    """Tell what the run in LEDGER (default .garl/ledger.sqlite) found.
+
+    It works while the run goes on, and after one that was killed.
+    """
+    found = report_of(ledger, folder, (Path.cwd() / "scenarios" / "maps",))
+    text = json.dumps(found, indent=2) + "\n" if as_json else _words(found)
+    if out is None:
+        click.echo(text, nl=False)
+    else:
+        save_text(out, text)
+
+
+def _words(found: dict[str, Any]) -> str:
+    lines = []
+    for search in found["searches"]:
+        name = search["system"].split(":")[-1]
+        lines.append(
+            f"{name} on {search['map']}: {search['flown']} of {search['wanted']} flown, "
+            f"{search['violating']} violate"
+        )
+        for kind in search["signatures"]:
+            lines += [
+                f"  {kind['count']:4d}  {kind['signature']}: {kind['headline']}",
+                f"        {kind['repeat']}",
+            ]
+    return "\n".join([*lines, ""]) if lines else "nothing flown\n"

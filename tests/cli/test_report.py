@@ -1,0 +1,111 @@
+from __future__ import annotations
+
+import json
+import shutil
+import sqlite3
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import pytest
+from jsonschema import Draft202012Validator
+
+from pytest_garl.reports.record import SCHEMA
+from tests.plugin.test_plugin import result_hash, write_project
+
+VALIDATOR = Draft202012Validator(json.loads(SCHEMA.read_text()))
+
+
+def garl(folder: Path, *args: str) -> str:
+    code = "import sys; from pytest_garl.cli import main; main()"
+    command = [sys.executable, "-c", code, *args]
+    done = subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    return done.stdout
+
+
+def report(folder: Path, *args: str) -> dict[str, Any]:
+    found: dict[str, Any] = json.loads(garl(folder, "report", "--json", *args))
+    VALIDATOR.validate(found)
+    return found
+
+
+def search(folder: Path, *args: str) -> None:
+    command = [sys.executable, "-m", "pytest", "-q", "--garl-budget=8", "--garl-workers=1", *args]
+    subprocess.run(command, cwd=folder, capture_output=True, check=False)
+
+
+@pytest.fixture(scope="module")
+def searched(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("searched")
+    write_project(folder)
+    tests = folder / "test_it.py"
+    own = "\ndef test_own(landing):\n    assert landing.elapsed_s < 14.0, 'too slow'\n"
+    tests.write_text(tests.read_text() + own)
+    search(folder)
+    return folder
+
+
+def test_the_schema_is_one() -> None:
+    Draft202012Validator.check_schema(VALIDATOR.schema)
+
+
+def test_a_report_holds_what_the_search_found(searched: Path) -> None:
+    found = report(searched)
+    assert found["complete"]
+    assert (found["version"], found["run"]["seed"], found["run"]["budget"]) == (1, 0, 8)
+    assert found["flights"]["wanted"] == found["flights"]["flown"] == 8
+    assert found["time"]["began"] <= found["time"]["ended"]
+    (one,) = found["searches"]
+    assert (one["system"], one["map"], one["flown"]) == ("systems:Good", "lawn", 8)
+    assert one["outcomes"] == {"collision": 3, "landed": 5}
+    assert one["decided"] == {"distance": 5, "time": 5}
+    kinds = {kind["signature"]: kind for kind in one["signatures"]}
+    dog = kinds["IV:dog:last-metre:unseen"]
+    assert (dog["type"], dog["count"], dog["first"]["slot"]) == ("IV", 3, "lawn-g00-s01")
+    assert dog["headline"] == "collided with dog-1 at 1.0 m/s, 0.0 m up, over the marker"
+    assert dog["repeat"] == "pytest test_it.py --garl-repeat=lawn-g00-s01"
+    (own,) = [kind for kind in one["signatures"] if kind["type"] == "own"]
+    assert own["story"] == "too slow"
+    assert one["violating"] == 8
+    assert {case["signature"] for case in found["cases"]} <= set(kinds)
+    files = [file for kind in kinds.values() for file in kind["cases"]]
+    assert {*files} == {case["file"] for case in found["cases"]}
+    assert files
+    assert all((searched / file).is_file() for file in files)
+    assert not any(case["known"] for case in found["cases"])
+
+
+def test_a_report_of_a_killed_run_tells_what_there_is(searched: Path, tmp_path: Path) -> None:
+    (tmp_path / "elsewhere").mkdir()
+    path = tmp_path / "elsewhere" / "ledger.sqlite"
+    with (
+        sqlite3.connect(searched / ".garl" / "ledger.sqlite") as before,
+        sqlite3.connect(path) as after,
+    ):
+        before.backup(after)
+        # A kill leaves slots that are in flight, and no fact about the end.
+        after.execute("DELETE FROM run WHERE key IN ('ended', 'own failures')")
+        after.execute(
+            "UPDATE slot SET state = 'claimed', result = NULL, sha256 = NULL WHERE slot > 3"
+        )
+    found = report(tmp_path, str(path))
+    assert not found["complete"]
+    assert found["flights"]["flown"] == 4
+    assert found["searches"][0]["signatures"][0]["repeat"].endswith("-o garl_dir=elsewhere")
+    assert found["cases"] == []
+
+
+def test_a_report_goes_into_a_file_or_in_words_to_the_terminal(searched: Path) -> None:
+    assert garl(searched, "report", "--json", "--out", "report.json") == ""
+    VALIDATOR.validate(json.loads((searched / "report.json").read_text()))
+    words = garl(searched, "report")
+    assert "Good on lawn: 8 of 8 flown, 8 violate" in words
+    assert "IV:dog:last-metre:unseen: collided with dog-1" in words
+
+
+def test_a_report_leaves_the_results_as_they_are(pytester: pytest.Pytester, searched: Path) -> None:
+    shutil.copytree(searched, pytester.path, dirs_exist_ok=True)
+    before = result_hash(pytester)
+    assert report(pytester.path)["results_sha256"] == before == result_hash(pytester)
