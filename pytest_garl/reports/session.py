@@ -19,6 +19,7 @@ from pytest_garl.run import Run
 from pytest_garl.search.ledger import Ledger
 from pytest_garl.search.local_pool import local_pool
 from pytest_garl.search.pool import Pool
+from pytest_garl.search.processes import alive
 from pytest_garl.search.ray_pool import check_ray, ray_pool
 from pytest_garl.search.reference import BUILT_IN, package_sha256, reference_to
 from pytest_garl.search.stored import check_stored
@@ -82,6 +83,7 @@ def _shared(options: Options) -> Ledger:
     path = options.ledger
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
+        _remove_stale(path.parent)
         with path.with_suffix(".lock").open("a") as file:
             fcntl.flock(file, fcntl.LOCK_EX)
             if path.is_file():
@@ -91,6 +93,14 @@ def _shared(options: Options) -> Ledger:
         raise LedgerError(
             f"{path}: cannot be written ({error}); choose another folder with the ini key garl_dir"
         ) from error
+
+
+def _remove_stale(folder: Path) -> None:
+    """Remove the ledgers of runs of saved cases that were killed; each has its process's id."""
+    for path in folder.glob("cases-*.*"):
+        number = path.name.removeprefix("cases-").partition(".")[0]
+        if number.isdigit() and not alive(int(number)):
+            path.unlink(missing_ok=True)
 
 
 def _lock(ledger: Path) -> TextIO:

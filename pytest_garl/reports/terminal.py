@@ -232,7 +232,7 @@ def _spent(run: Run) -> str:
     pursued = sum(each.finding.flights for each in run.pursued)
     repeats = meters.get("errands", 0) - pursued
     counts = {
-        "flown again after a hang or death": meters.get("retried", 0),
+        "flown again after a time-out or a kill": meters.get("retried", 0),
         "to see whether violations repeat": max(0, repeats),
         "to confirm and shrink": pursued,
     }

@@ -83,3 +83,16 @@ def test_ctrl_c_once_or_twice_saves_nothing_of_half_a_search(
     resumed = run(pytester, *BUDGET, "--garl-shrink=12", "--garl-resume")
     resumed.stdout.fnmatch_lines(["*confirming and shrinking*"])
     assert cases(pytester.path)
+
+
+@pytest.mark.parametrize("parallel", [(), ("-n2",)])
+def test_a_run_leaves_its_ledger_and_its_flights_and_nothing_beside(
+    pytester: pytest.Pytester, parallel: tuple[str, ...]
+) -> None:
+    project(pytester, "Good", "['lawn']")
+    folder = pytester.path / ".garl"
+    folder.mkdir()
+    (folder / "cases-4194303.sqlite-wal").touch()
+    run(pytester, *SEARCH, *parallel)
+    run(pytester, *parallel)
+    assert {path.name for path in folder.iterdir()} == {"flights", "ledger.lock", "ledger.sqlite"}

@@ -15,9 +15,10 @@ from pytest_garl.search.ledger import Ledger
 from pytest_garl.search.local_pool import Flyers
 from pytest_garl.search.pool import wait_for
 from pytest_garl.search.reference import reference_to
-from pytest_garl.search.slots import Slot
+from pytest_garl.search.slots import Slot, flight_name
+from pytest_garl.search.supervisor import LEAST_STANDSTILL_S, Watch
 from tests.plugin import tiny_simulator
-from tests.search.flying import Good, Slow, job_of, scenario
+from tests.search.flying import Exits, Good, Slow, job_of, scenario
 from tests.search.misbehaving import (
     ClosesFiles,
     DiesOnce,
@@ -25,6 +26,7 @@ from tests.search.misbehaving import (
     Forks,
     HoldsTheLock,
     KilledOnce,
+    LeavesLock,
     LeavesProcesses,
     OpensNothing,
     Pretends,
@@ -148,6 +150,16 @@ def test_a_process_that_dies_once_is_a_finding(field: Field, undisturbed: str) -
     assert flown.neighbour == undisturbed
 
 
+def test_a_process_that_dies_leaves_no_record_of_an_earlier_run(field: Field) -> None:
+    flights = field.folder / "flights"
+    flights.mkdir()
+    stale = flights / f"{flight_name('bad', 0, 0, 'lawn')}.npz"
+    stale.write_bytes(b"of an earlier run")
+    assert field.fly(Exits).signature == "V:died:exit-status-3"
+    assert not stale.exists()
+    assert (flights / f"{flight_name('good', 1, 0, 'lawn')}.npz").is_file()
+
+
 def test_a_process_that_is_killed_once_is_flown_again(field: Field) -> None:
     flown = field.fly(KilledOnce)
     assert flown.signature == ""
@@ -228,3 +240,37 @@ def test_a_process_that_nothing_changed_flies_on(field: Field) -> None:
     for index in range(4):
         wait_for(field.ledger, field.pool, "more", Slot(generation=2, index=index), lambda: None)
     assert list(field.pool._children) == [first]
+
+
+def test_only_a_call_is_charged_until_nothing_goes_on_at_all(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    now = 1000.0
+    monkeypatch.setattr("pytest_garl.search.supervisor.monotonic", lambda: now)
+    monkeypatch.setattr("pytest_garl.search.supervisor.os.write", lambda *_: 0)
+    watch = Watch()
+    assert watch.overdue() == ""
+    watch.flight_begins(2.0)
+    now += 60.0
+    assert watch.overdue() == ""
+    watch.step_begins()
+    now += 1.9
+    assert watch.overdue() == ""
+    now += 0.2
+    assert watch.overdue() == "one call took longer than 2 s of wall time"
+    watch.step_ends()
+    now += LEAST_STANDSTILL_S - 1
+    assert watch.overdue() == ""
+    now += 2
+    assert watch.overdue() == "neither it nor the simulator went on for 120 s"
+    watch.flight_ends()
+    assert watch.overdue() == ""
+
+
+@pytest.mark.long
+def test_a_thread_that_holds_the_interpreter_between_calls_is_a_finding(
+    field: Field, undisturbed: str
+) -> None:
+    flown = field.fly(LeavesLock)
+    assert flown.signature == "V:hung:Timeout"
+    assert flown.neighbour == undisturbed
