@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import sys
 from pathlib import Path
 
 import click
@@ -23,6 +24,9 @@ NO_PROOF = 3
 """Exit status of a replay that proves nothing; 1 says that the case fails."""
 LEAST_FLIGHTS = 9
 STATUS = {"FIXED": 0, "FAILED": 1, "STALE": NO_PROOF, "UNDECIDED": NO_PROOF}
+
+_ENDLESS = 100_000
+"""Columns of what is no terminal: nobody looks at them, and names shall not be cut."""
 
 
 @dataclasses.dataclass(frozen=True, slots=True, kw_only=True)
@@ -68,7 +72,7 @@ def list_(folders: _Folders) -> None:
         return
     table = Table(box=None, header_style="bold")
     for name in ("case", "status", "signature", "robust", "objects"):
-        table.add_column(name, no_wrap=True)
+        table.add_column(name, overflow="fold")
     for entry in found:
         where = Text(printable(f"{entry.path.parent.name}/{entry.name}", keep=""))
         if entry.case is None:
@@ -80,10 +84,15 @@ def list_(folders: _Folders) -> None:
         # As texts: in a string rich would make an animal of ":dog:", and colours of "[red]".
         signature = Text(printable(case.violation.signature, keep=""))
         table.add_row(where, _coloured(case.status), signature, robust, objects)
-    Console().print(table)
+    _console().print(table)
     for entry in found:
         if entry.case is None:
             click.echo(printable(entry.problem))
+
+
+def _console() -> Console:
+    """Return where tables go: on a terminal they are folded, in a pipe no line ends early."""
+    return Console(width=None if sys.stdout.isatty() else _ENDLESS)
 
 
 def _coloured(status: str) -> Text:
@@ -104,7 +113,7 @@ def show(folders: _Folders, file: Path) -> None:
         table.add_column(name)
     for row in meanings(case.scenario, folders.maps):
         table.add_row(*(Text(cell) for cell in row))
-    Console().print(table)
+    _console().print(table)
     for key, by in _totals(case):
         click.echo(f"while it is flown {key} changes by {by:+.2f}")
     click.echo(
@@ -140,6 +149,11 @@ def replay_(context: click.Context, file: Path, live: bool, video: Path | None) 
     """
     folders: _Folders = context.obj
     case = folders.case(file)
+    if video is not None:
+        from pytest_garl.reports.video.encoder import program
+
+        # Before the flight: it is for nothing if it cannot be drawn.
+        program()
     result = replay(case, folders.root, folders.maps, live=live)
     _answer(result)
     if video is not None:

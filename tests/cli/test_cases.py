@@ -229,3 +229,21 @@ def test_a_system_that_is_no_name_is_imported_from_nowhere(
         told = garl(*command)
         assert f"key 'system': found '{system}', expected 'module:class'" in told.output
         assert told.exit_code == 1
+
+
+def test_a_list_in_a_pipe_has_whole_names(file: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("COLUMNS", "40")
+    output = garl("list").output
+    assert f"{file.parent.name}/{file.stem} " in output
+    assert "V:ZeroDivisionError@stack_of_test.step " in output
+    assert "…" not in output
+
+
+def test_a_video_without_an_encoder_is_refused_before_the_flight(
+    file: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setitem(sys.modules, "imageio_ffmpeg", None)
+    result = garl("replay", file, "--video=flight.mp4")
+    assert result.exit_code == 1
+    assert "pip install 'pytest-garl[video]'" in result.output
+    assert "FAILED" not in result.output

@@ -197,3 +197,20 @@ def test_landing_is_exported_for_annotations() -> None:
 
     assert pytest_garl.Landing is Landing
     assert "Landing" in pytest_garl.__all__
+
+
+def test_an_own_method_that_breaks_is_told_once(pytester: pytest.Pytester) -> None:
+    project(pytester)
+    (pytester.path / "broken_method.py").write_text(
+        "class Broken:\n"
+        "    learns = False\n"
+        "    def __init__(self, plan): pass\n"
+        "    def ask(self): return 3\n"
+        "    def tell(self, flown): return []\n"
+    )
+    method = ("--garl-method=broken_method:Broken", "-o", "pythonpath=.")
+    result = run(pytester, "--garl-budget=2", "--garl-workers=0", *method)
+    both = result.stdout.str() + result.stderr.str()
+    told = "search method 'broken_method:Broken': ask() returned 3, expected a list of 2"
+    assert both.count(told) == 1
+    assert "Traceback" not in both

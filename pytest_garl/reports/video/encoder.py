@@ -26,7 +26,7 @@ def write(frames: Iterable[Image], path: Path, rate_hz: float) -> None:
     The file appears once it is complete.  Raises GarlError where imageio-ffmpeg is missing,
     where the pictures do not fit together, or with the encoder's own words where it fails.
     """
-    program = _program()
+    ffmpeg = program()
     pictures = iter(frames)
     first = next(pictures, None)
     if first is None:
@@ -39,7 +39,7 @@ def write(frames: Iterable[Image], path: Path, rate_hz: float) -> None:
     path.parent.mkdir(parents=True, exist_ok=True)
     scratch = path.with_name(f".{path.name}.{os.getpid()}")
     try:
-        _encode(_command(program, width, height, rate_hz, scratch), chain([first], pictures), path)
+        _encode(_command(ffmpeg, width, height, rate_hz, scratch), chain([first], pictures), path)
         scratch.replace(path)
     finally:
         scratch.unlink(missing_ok=True)
@@ -87,7 +87,8 @@ def _command(program: str, width: int, height: int, rate_hz: float, path: Path) 
     return [program, *words.split(), "-f", "mp4", str(path)]
 
 
-def _program() -> str:
+def program() -> str:
+    """Return where ffmpeg is; raise GarlError where there is none."""
     try:
         import imageio_ffmpeg
     except ImportError as error:
