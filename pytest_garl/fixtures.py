@@ -225,7 +225,6 @@ def landing(request: pytest.FixtureRequest, garl_slot: Target, npcs: PolicySpec)
     landing = Landing(garl_slot, result, run.record(garl_slot), getattr(item, "obj", None))
     verdict = result["verdict"]
     item.user_properties += [
-        ("garl.slot", garl_slot.name),
         ("garl.outcome", result["outcome"]),
         ("garl.signature", verdict["signature"]),
         ("garl.story", verdict["story"]),

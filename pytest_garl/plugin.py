@@ -17,12 +17,15 @@ from pytest_garl.switches import (
     FOUND,
     OWN,
     RUN,
+    TALLY,
     add_options,
     asked,
     computes,
     flies,
+    name_slots,
     target_of,
 )
+from pytest_garl.tally import Tally
 
 __all__ = ["garl_slot", "landing", "npcs", "scenario"]
 
@@ -56,6 +59,9 @@ def pytest_configure(config: pytest.Config) -> None:
         "time_s=120, abort='ok'); whether it does the same in the same flight (default: True); "
         "data files that it reads, so that --garl-resume knows when they change.",
     )
+    if not hasattr(config, "workerinput"):
+        config.stash[TALLY] = Tally()
+        config.pluginmanager.register(config.stash[TALLY], "garl_tally")
     if not asked(config):
         return
     from pytest_garl.options import read_options
@@ -111,6 +117,7 @@ def pytest_collection_finish(session: pytest.Session) -> None:
     config = session.config
     if config.option.collectonly:
         return
+    name_slots(session.items)
     if RUN not in config.stash and any(flies(item) for item in session.items):
         _begin(config)
     run = config.stash.get(RUN, None)
@@ -225,22 +232,33 @@ def pytest_terminal_summary(terminalreporter: Any, config: pytest.Config) -> Non
         from pytest_garl.reports.terminal import summary
 
         summary(terminalreporter, run)
+    tally = config.stash.get(TALLY, None)
+    if tally is not None and tally.items:
+        from pytest_garl.reports.terminal import colour
+
+        colour(terminalreporter, tally)
 
 
 def pytest_sessionfinish(session: pytest.Session) -> None:
-    """Pursue and save what a search found, then end the flying children."""
+    """Pursue and save what a search found; say whether the session may be green."""
     run = session.config.stash.get(RUN, None)
-    if run is None:
-        return
-    try:
-        if run.searched(session):
-            from pytest_garl.reports.aftermath import pursue
+    if run is not None:
+        try:
+            if run.searched(session):
+                from pytest_garl.reports.aftermath import pursue
 
-            pursue(run, session)
-            if run.trouble:
-                session.exitstatus = pytest.ExitCode.INTERNAL_ERROR
-    finally:
-        run.pool.close()
+                pursue(run, session)
+                if run.trouble:
+                    session.exitstatus = pytest.ExitCode.INTERNAL_ERROR
+        finally:
+            run.pool.close()
+    tally = session.config.stash.get(TALLY, None)
+    if tally is not None and tally.items:
+        from pytest_garl.reports.colour import problems
+
+        tally.problems = list(problems(tally, run))
+        if tally.problems and session.exitstatus == pytest.ExitCode.OK:
+            session.exitstatus = pytest.ExitCode.TESTS_FAILED
 
 
 def pytest_unconfigure(config: pytest.Config) -> None:

@@ -7,6 +7,7 @@ values mean is read in ``options.py`` once there is something to fly.
 from __future__ import annotations
 
 from collections import namedtuple
+from collections.abc import Iterable
 from typing import TYPE_CHECKING, Any
 
 import pytest
@@ -26,6 +27,12 @@ OWN = "garl.own"
 """The user property by which it tells of a test that failed in an assertion of its own."""
 FOUND = "garl.found"
 """The user property by which it tells that a test failed for a search's violation."""
+TALLY = pytest.StashKey[Any]()
+"""Where a session that is no xdist worker keeps what its items say."""
+SLOT = "garl.slot"
+"""The user property that names the slot of an item."""
+NOTHING = "garl.nothing"
+"""The user property of an item that has nothing to fly, with the reason."""
 FAILURE = "garl.failure"
 """The user property that names what a failing item tells of."""
 EXCUSED = "garl.excused"
@@ -207,3 +214,14 @@ def target_of(item: pytest.Item) -> Target | None:
     target = callspec.params.get("garl_slot") if callspec else None
     # Where there is nothing to fly the parameter is the reason, a string.
     return None if isinstance(target, str) else target
+
+
+def name_slots(items: Iterable[pytest.Item]) -> None:
+    """Let the reports of landing tests tell what they test, whether or not it is flown."""
+    for item in items:
+        callspec: Any = getattr(item, "callspec", None)
+        slot = callspec.params.get("garl_slot") if callspec else None
+        if isinstance(slot, str):
+            item.user_properties += [(SLOT, ""), (NOTHING, slot)]
+        elif slot is not None:
+            item.user_properties.append((SLOT, slot.name))

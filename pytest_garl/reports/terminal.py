@@ -11,6 +11,7 @@ import pytest
 from pytest_garl import dispatch
 from pytest_garl.regressions.forecast import seconds_of_kind
 from pytest_garl.reports.aftermath import told
+from pytest_garl.reports.colour import notes
 from pytest_garl.reports.commands import repeat_command, shown
 from pytest_garl.reports.explain import OWN_FAILURE
 from pytest_garl.reports.explain_case import CASE, MAYBE_FIXED, STALE
@@ -20,6 +21,7 @@ from pytest_garl.reports.progress import duration
 from pytest_garl.reports.record import ENDED, OWN_FACT, utc
 from pytest_garl.reports.wrapping import counted, width_of, wrapped
 from pytest_garl.run import Run
+from pytest_garl.tally import Tally
 from pytest_garl.verdicts.metrics import decided_words, share_interval, top_k
 
 
@@ -104,6 +106,18 @@ def summary(reporter: Any, run: Run) -> None:
         reporter.section("garl: cases", sep="=")
     for line in lines:
         reporter.write_line(line)
+
+
+def colour(reporter: Any, tally: Tally) -> None:
+    """Write why the session fails beside its items, or what its colour leaves open."""
+    width = width_of(reporter.config)
+    if tally.problems:
+        reporter.section("garl: this run is not green", sep="=", red=True)
+    for problem in tally.problems:
+        reporter.write_line(wrapped(problem, width, others="  "), red=True)
+    if not tally.problems:
+        for note in notes(tally):
+            reporter.write_line(wrapped(f"garl: {note}", width, others="  "), yellow=True)
 
 
 def _maybe_fixed(reporter: Any) -> list[str]:
