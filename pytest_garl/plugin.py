@@ -29,7 +29,7 @@ from pytest_garl.tally import Tally
 
 __all__ = ["garl_slot", "landing", "npcs", "scenario"]
 
-NOTHING_TO_FLY = "nothing to fly: no --garl-budget given and no committed cases"
+NOTHING_TO_FLY = "no --garl-budget given and no saved cases; to search: pytest --garl-budget=40"
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
@@ -65,8 +65,10 @@ def pytest_configure(config: pytest.Config) -> None:
     if not asked(config):
         return
     from pytest_garl.options import read_options
+    from pytest_garl.usage import check_usage
 
     options = read_options(config)
+    check_usage(config, options)
     if options.baseline is not None:
         from pytest_garl.gating import register
 
@@ -118,6 +120,10 @@ def pytest_collection_finish(session: pytest.Session) -> None:
     if config.option.collectonly:
         return
     name_slots(session.items)
+    if asked(config) and not hasattr(config, "workerinput"):
+        from pytest_garl.usage import check_selection
+
+        check_selection(config, session.items)
     if RUN not in config.stash and any(flies(item) for item in session.items):
         _begin(config)
     run = config.stash.get(RUN, None)
@@ -256,7 +262,8 @@ def pytest_sessionfinish(session: pytest.Session) -> None:
     if tally is not None and tally.items:
         from pytest_garl.reports.colour import problems
 
-        tally.problems = list(problems(tally, run))
+        maps = session.config.getoption("--garl-map")
+        tally.problems = list(problems(tally, run, maps=maps))
         if tally.problems and session.exitstatus == pytest.ExitCode.OK:
             session.exitstatus = pytest.ExitCode.TESTS_FAILED
 

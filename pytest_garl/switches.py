@@ -188,6 +188,8 @@ def add_options(parser: pytest.Parser) -> None:
 def asked(config: pytest.Config) -> bool:
     """Whether the command line or the configuration says anything about flying."""
     names = [option.name for option in OPTIONS]
+    if config.getoption("--garl-resume"):
+        return True
     return any(config.getoption(f"--garl-{name}") is not None for name in names) or any(
         config.getini(f"garl_{name}") for name in ("budget", "repeat", "baseline")
     )

@@ -10,6 +10,7 @@ import pytest
 from pytest_garl.switches import EXCUSED, FAILURE, NOTHING, SLOT, UNREPEATED
 
 FLOWN = "garl.outcome"
+SIGNATURE = "garl.signature"
 
 
 class Tally:
@@ -21,6 +22,8 @@ class Tally:
         self.flown = False
         self.unrepeated: set[tuple[str, ...]] = set()
         self.problems: list[str] = []
+        self._violating: dict[tuple[str, str], str] = {}
+        self._answered: set[tuple[str, str]] = set()
         self._failures: dict[str, str] = {}
         self._excused: dict[str, set[str]] = {}
 
@@ -34,6 +37,11 @@ class Tally:
             self.nothing[str(told[NOTHING])] += 1
         self.items.add(report.nodeid)
         self.flown = self.flown or FLOWN in told
+        flight = (report.nodeid.partition("::")[0], str(told[SLOT]))
+        if told.get(SIGNATURE):
+            self._violating[flight] = str(told[SIGNATURE])
+        if report.failed or hasattr(report, "wasxfail"):
+            self._answered.add(flight)
         # A test that is run again tells anew.
         self._failures.pop(report.nodeid, None)
         if FAILURE in told and report.failed:
@@ -42,6 +50,15 @@ class Tally:
             self._excused.setdefault(str(told[EXCUSED]), set()).add(report.nodeid)
         if UNREPEATED in told:
             self.unrepeated.add(tuple(json.loads(str(told[UNREPEATED]))))
+
+    @property
+    def unasserted(self) -> Counter[str]:
+        """Violations for which no selected test fails, by signature: how many flights."""
+        return Counter(
+            signature
+            for flight, signature in self._violating.items()
+            if flight not in self._answered
+        )
 
     def unfounded(self) -> list[str]:
         """Return the items that are excused by a failure that no item shows."""

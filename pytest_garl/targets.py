@@ -192,7 +192,7 @@ def name_of(system: type) -> str:
 
 def read_marker(marker: pytest.Mark, options: Options) -> Subject:
     """Return what a marker says; raise GarlError for one that makes no sense."""
-    from pytest_garl.scenarios.maps import load_map
+    from pytest_garl.scenarios.maps import load_map, map_names
     from pytest_garl.verdicts.verdict import Limits
 
     known = {"system", "maps", "limits", "deterministic", "files"}
@@ -208,6 +208,9 @@ def read_marker(marker: pytest.Mark, options: Options) -> Subject:
     check_system(system)
     maps = marker.kwargs.get("maps", ("court", "lawn"))
     maps = (maps,) if isinstance(maps, str) else tuple(maps)
+    if not maps:
+        there = ", ".join(map_names(options.map_folders))
+        raise GarlError(f"mark.garl: maps=[]: nothing to fly on; expected one or more of {there}")
     for map in maps:
         load_map(map, options.map_folders)
     limits = marker.kwargs.get("limits", Limits())

@@ -15,8 +15,8 @@ NAMED = 5
 """So many flights are named; the rest are counted."""
 
 
-def problems(tally: Tally, run: Run | None) -> Iterator[str]:
-    """Yield why the session fails, beside its items."""
+def problems(tally: Tally, run: Run | None, *, maps: str | None) -> Iterator[str]:
+    """Yield why the session fails, beside its items; ``maps`` are those of the command line."""
     unfounded = tally.unfounded()
     if unfounded:
         yield (
@@ -26,14 +26,18 @@ def problems(tally: Tally, run: Run | None) -> Iterator[str]:
     if run is not None and run.options.searches:
         yield from _undecided(run)
         yield from _unrepeated(tally, run)
-        if tally.items and not tally.flown:
-            yield f"nothing was flown, but a search was asked for: {_why(tally)}"
+    asked = maps or (run is not None and run.options.searches)
+    if asked and tally.items and not tally.flown:
+        yield f"nothing was flown, though it was asked for: {_why(tally)}"
 
 
 def notes(tally: Tally) -> Iterator[str]:
     """Yield what a green session leaves open."""
     if tally.items and not tally.flown:
         yield f"nothing was flown: {_why(tally)}"
+    if tally.unasserted:
+        kinds = [f"{name} ({_counted(n, 'flight')})" for name, n in tally.unasserted.most_common()]
+        yield f"no selected test fails for these violations: {', '.join(kinds)}"
     for (system, map), slots in sorted(_by_search(tally).items()):
         words = _counted(len(slots), "violation")
         yield f"{_name(system, map)}: {words} did not repeat: {_names(slots)}"

@@ -69,7 +69,9 @@ def project(pytester: pytest.Pytester, system: str = "Good", maps: str = "['lawn
 
 def run(pytester: pytest.Pytester, *args: str) -> pytest.RunResult:
     """Run pytest; what a search finds is saved only where a test asks for it."""
-    return pytester.runpytest_subprocess("-p", "no:cacheprovider", "--garl-shrink=0", *args)
+    searches = any(arg.startswith("--garl-budget") for arg in args)
+    off = ("--garl-shrink=0",) if searches else ()
+    return pytester.runpytest_subprocess("-p", "no:cacheprovider", *off, *args)
 
 
 def result_hash(pytester: pytest.Pytester) -> str:
