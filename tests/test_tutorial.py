@@ -52,7 +52,7 @@ def test_every_command_of_the_tutorial_prints_what_it_says(
     for command in ("git init -q", "git add *.py *.patch", "git commit -qm stack"):
         subprocess.run(command, shell=True, cwd=stack, check=True)
     commands = transcript()
-    assert len(commands) == 15
+    assert len(commands) == 14
     for command, told in commands:
         if SEARCH in command and not searches:
             continue
@@ -69,6 +69,7 @@ def test_every_command_of_the_tutorial_prints_what_it_says(
             assert files(stack / CASES) == files(kept)
 
 
-def files(folder: Path) -> dict[str, bytes]:
-    """Return what a folder's files hold."""
-    return {path.name: path.read_bytes() for path in folder.iterdir()}
+def files(folder: Path) -> dict[str, str]:
+    """Return what a folder's files hold, but for the hashes of sources, which change every day."""
+    hashes = re.compile(r"^(system|simulator)_sha256 = .*\n", re.MULTILINE)
+    return {path.name: hashes.sub("", path.read_text()) for path in folder.iterdir()}

@@ -83,7 +83,8 @@ def list_(folders: _Folders) -> None:
         objects = str(len(case.moves))
         # As texts: in a string rich would make an animal of ":dog:", and colours of "[red]".
         signature = Text(printable(case.violation.signature, keep=""))
-        table.add_row(where, _coloured(case.status), signature, robust, objects)
+        status = _coloured(case.status) + (" (edge)" if case.edge else "")
+        table.add_row(where, status, signature, robust, objects)
     _console().print(table)
     for entry in found:
         if entry.case is None:
@@ -116,6 +117,8 @@ def show(folders: _Folders, file: Path) -> None:
     _console().print(table)
     for key, by in _totals(case):
         click.echo(f"while it is flown {key} changes by {by:+.2f}")
+    if case.edge:
+        click.echo("\nIt sits on an edge: not all of its neighbours fail, so it gates nothing.")
     click.echo(
         f"\n{evidence.neighbours_failed} of {evidence.neighbours} neighbours fail too; shrinking "
         f"removed {evidence.removed}; objects were moved by {case.policy}"
@@ -172,8 +175,8 @@ def _answer(result: Replay) -> None:
     click.secho(result.answer, bold=True, fg="green" if result.answer == "FIXED" else "red")
     click.echo(printable(f"{result.signature or 'no violation'}: {result.story}"))
     for reason in result.reasons:
-        click.echo(reason)
-    click.echo(f"judged by {result.judge}")
+        click.echo(printable(reason))
+    click.echo(printable(f"judged by {result.judge}"))
     if result.same is not None:
         click.echo("the same flight to the byte" if result.same else "another flight than recorded")
 
@@ -208,18 +211,20 @@ def promote(folders: _Folders, file: Path) -> None:
     with a live policy.  It stays open if it fails, if nobody can tell, or if it passes for another
     reason than a change of the landing system.
     """
-    case = folders.case(file)
+    case, told = folders.case(file), []
     for live in (False, True) if case.avoidable == "live" else (False,):
         result = replay(case, folders.root, folders.maps, live=live)
         how = "a live policy" if live else "its recorded moves"
         if result.answer != "FIXED":
             raise GarlError(f"{file}: {_refusal(result, how)}; it stays {case.status}")
         if result.outcome == "aborted":
-            click.echo(f"{file}: with {how} the landing system gave up; it did not land")
+            told.append(f"with {how} the landing system gave up; it did not land")
         if not live:
-            click.echo(f"{file}: judged by {result.judge}")
+            told.append(f"judged by {result.judge}")
     corpus.replace(file, dataclasses.replace(case, status="fixed"))
     click.echo(f"{file}: fixed; from now on it must pass")
+    for line in told:
+        click.echo(line)
 
 
 def _refusal(result: Replay, how: str) -> str:

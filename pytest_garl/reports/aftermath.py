@@ -114,6 +114,7 @@ def _facts(each: Pursued, case: Case) -> list[str]:
         return ["as the search found it: neither confirmed nor shrunk"]
     asked = [
         f"{evidence.neighbours_failed} of {evidence.neighbours} neighbours fail too",
+        *(["EDGE, gates nothing"] if case.edge else []),
         PILOT[case.avoidable],
     ]
     return [
