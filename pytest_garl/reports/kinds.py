@@ -65,7 +65,7 @@ class Found:
         for result, verdict in zip(self.results, self.verdicts, strict=True):
             if verdict.violation_type == "V":
                 kind = result["crash"]["kind"] if result["crash"] else "raised"
-                word = kind if kind in ("died", "hung") else "Python error"
+                word = kind if kind in ("died", "hung", "broke") else "Python error"
                 counts[word] = counts.get(word, 0) + 1
         return counts
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import importlib
 import json
 import os
+import signal
 import subprocess
 import sys
 import tempfile
@@ -15,6 +16,7 @@ from typing import Any
 
 from pytest_garl import dispatch
 from pytest_garl.errors import GarlError, LandingSystemError
+from pytest_garl.search.processes import end_with
 from pytest_garl.search.reference import Reference, reference_to
 
 
@@ -37,7 +39,7 @@ def ask_apart(function: str, system: type, options: Mapping[str, Any]) -> dict[s
         asked = {"function": function, "system": asdict(where), "options": dict(options)}
         question.write_text(json.dumps({**asked, "path": [entry for entry in sys.path if entry]}))
         done = subprocess.run(
-            [sys.executable, "-m", "pytest_garl.search.apart", str(question), str(answer)],
+            [sys.executable, "-m", __name__, str(os.getpid()), str(question), str(answer)],
             env={**os.environ, **dispatch.environment()},
             check=False,
         )
@@ -52,8 +54,9 @@ def ask_apart(function: str, system: type, options: Mapping[str, Any]) -> dict[s
     return told
 
 
-def main(question: str, answer: str) -> None:
-    """Answer a question that stands in one file, in another."""
+def main(parent: str, question: str, answer: str) -> None:
+    """Answer a question that stands in one file, in another, while the parent lives."""
+    end_with(int(parent), signal.SIGKILL)
     asked = json.loads(Path(question).read_text())
     sys.path.extend(entry for entry in asked["path"] if entry not in sys.path)
     module, _, name = asked["function"].partition(":")

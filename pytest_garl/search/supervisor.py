@@ -21,6 +21,7 @@ import sys
 import traceback
 from collections.abc import Callable
 from os import _exit, getpid
+from pathlib import Path
 from time import monotonic, sleep
 from typing import Any, NoReturn
 
@@ -147,6 +148,9 @@ def _fly(supervisor: int, watch: Watch, fly: Callable[[Watch], None], failing: s
     try:
         end_with(supervisor, signal.SIGKILL)
         adopt_orphans()
+        with contextlib.suppress(OSError):
+            # Short of memory the kernel shall end the flight, and neither pytest nor a neighbour.
+            Path("/proc/self/oom_score_adj").write_text("1000")
         faulthandler.enable()
         faulthandler.register(_DUMP, all_threads=True)
         fly(watch)

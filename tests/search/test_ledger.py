@@ -2,6 +2,7 @@ from __future__ import annotations
 
 import os
 import sqlite3
+import subprocess
 from pathlib import Path
 from typing import Any
 
@@ -50,6 +51,50 @@ def test_a_claim_of_a_silent_process_lapses(tmp_path: Path) -> None:
     other = ledger.claim(lease_s=None)
     assert other is not None
     assert other.slot == 1
+
+
+def test_a_claim_of_a_child_that_lives_never_lapses(tmp_path: Path) -> None:
+    """Its pool watches it: it may be silent for as long as it flies."""
+    ledger = made(tmp_path / "ledger.sqlite")
+    assert ledger.take_seat(1, os.getpid)
+    assert ledger.claim(lease_s=-1.0)
+    ledger.release_dead()
+    assert ledger.claim_of(os.getpid())
+
+
+@pytest.mark.parametrize(("lease_s", "kept"), [(3600.0, True), (-1.0, False)])
+def test_a_dead_child_is_left_to_its_pool_for_as_long_as_the_lease(
+    tmp_path: Path, lease_s: float, kept: bool
+) -> None:
+    path = tmp_path / "ledger.sqlite"
+    ledger = made(path)
+    with subprocess.Popen(["true"]) as child:
+        child.wait()
+    assert ledger.take_seat(1, lambda: child.pid)
+    assert Ledger(path, child.pid).claim(lease_s=lease_s)
+    ledger.release_dead()
+    assert (ledger.claim_of(child.pid) is not None) == kept
+
+
+def test_a_dead_child_whose_pool_is_gone_is_given_back_at_once(tmp_path: Path) -> None:
+    path = tmp_path / "ledger.sqlite"
+    ledger = made(path)
+    with subprocess.Popen(["true"]) as child:
+        child.wait()
+    assert Ledger(path, child.pid).claim()
+    ledger.release_dead()
+    assert ledger.claim_of(child.pid) is None
+
+
+def test_where_a_process_was_when_it_was_ended_is_no_part_of_the_hash(tmp_path: Path) -> None:
+    def flown(path: Path, text: str) -> str:
+        ledger = made(path)
+        claim = ledger.claim()
+        assert claim is not None
+        ledger.record(claim, {"crash": {"error": "Timeout", "traceback": text}}, "", 0.0)
+        return ledger.result_hash()
+
+    assert flown(tmp_path / "one.sqlite", "line 3") == flown(tmp_path / "two.sqlite", "line 4")
 
 
 def test_resuming_gives_back_what_was_in_flight(tmp_path: Path) -> None:

@@ -2,6 +2,8 @@ from __future__ import annotations
 
 import dataclasses
 import json
+import os
+import signal
 import time
 from collections.abc import Iterator
 from pathlib import Path
@@ -9,7 +11,8 @@ from typing import Any
 
 import pytest
 
-from pytest_garl.search.children import ChildPool
+from pytest_garl.errors import PoolError
+from pytest_garl.search.children import MOST_LOSSES, ChildPool
 from pytest_garl.search.job import dump_scenario, fly_job
 from pytest_garl.search.ledger import Ledger
 from pytest_garl.search.local_pool import Flyers
@@ -221,6 +224,30 @@ def test_children_end_when_asked_whatever_flew_in_them(tmp_path: Path) -> None:
     # Nobody had to kill it.
     assert [child.returncode for child in children] == [0]
     field.ledger.close()
+
+
+def test_children_that_end_between_flights_end_no_run(field: Field) -> None:
+    job = job_of(Good, field.folder / "flights")
+    field.ledger.add_search("one", job.system.name, "lawn", 9, job.dumps())
+    for index in range(MOST_LOSSES + 2):
+        field.ledger.add_slots("one", index, {0: dump_scenario(scenario())})
+        slot = Slot(generation=index, index=0)
+        wait_for(field.ledger, field.pool, "one", slot, lambda: None)
+        (child,) = field.pool._children
+        os.kill(child, signal.SIGKILL)
+        while child in field.pool._children:
+            field.pool.turn()
+    assert field.ledger.meters()["flights"] == MOST_LOSSES + 2
+
+
+def test_children_that_end_before_they_fly_end_the_run(field: Field) -> None:
+    def kill_all() -> None:
+        for child in field.pool._children:
+            os.kill(child, signal.SIGKILL)
+
+    field.ledger.add_search("one", "s", "lawn", 1, "{}")
+    with pytest.raises(PoolError, match="flying children die before they fly"):
+        wait_for(field.ledger, field.pool, "one", NEXT, kill_all)
 
 
 def test_nothing_is_left_beside_the_ledger(tmp_path: Path) -> None:
