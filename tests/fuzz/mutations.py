@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import io
 import json
 import random
@@ -182,19 +183,20 @@ def json_changed(value: Any, rng: random.Random) -> Any:
     for _ in range(rng.choice((1, 1, 1, 3))):
         place = rng.choice([*_places(value)] or [None])
         if place is None:
-            return rng.choice(RUDE_JSON)
+            return copy.deepcopy(rng.choice(RUDE_JSON))
         owner, key = place
         kind = rng.randrange(8)
         if kind == 0 and isinstance(owner, dict):
             del owner[key]
         elif kind == 1 and isinstance(owner, dict):
-            owner[rng.choice(("a", "", "\x1b", "x" * 5000))] = owner[key]
+            owner[rng.choice(("a", "", "\x1b", "x" * 5000))] = copy.deepcopy(owner[key])
         elif kind == 2 and isinstance(owner, list):
             owner.extend(owner * rng.choice((1, 100)))
         elif kind == 3 and isinstance(owner, list):
             del owner[key]
         else:
-            owner[key] = rng.choice(RUDE_JSON)
+            # A copy: what is put there may be changed next.
+            owner[key] = copy.deepcopy(rng.choice(RUDE_JSON))
     return value
 
 
