@@ -237,7 +237,10 @@ def pytest_terminal_summary(terminalreporter: Any, config: pytest.Config) -> Non
     if run is not None:
         from pytest_garl.reports.terminal import summary
 
-        summary(terminalreporter, run)
+        try:
+            summary(terminalreporter, run)
+        except GarlError as error:
+            terminalreporter.write_line(f"garl: {error}", red=True)
     tally = config.stash.get(TALLY, None)
     if tally is not None and tally.items:
         from pytest_garl.reports.terminal import colour
@@ -256,6 +259,8 @@ def pytest_sessionfinish(session: pytest.Session) -> None:
                 pursue(run, session)
                 if run.trouble:
                     session.exitstatus = pytest.ExitCode.INTERNAL_ERROR
+        except GarlError as error:
+            _lost_ledger(session, run, error)
         finally:
             run.pool.close()
     tally = session.config.stash.get(TALLY, None)
@@ -263,9 +268,19 @@ def pytest_sessionfinish(session: pytest.Session) -> None:
         from pytest_garl.reports.colour import problems
 
         maps = session.config.getoption("--garl-map")
-        tally.problems = list(problems(tally, run, maps=maps))
+        try:
+            tally.problems = list(problems(tally, run, maps=maps))
+        except GarlError as error:
+            _lost_ledger(session, run, error)
         if tally.problems and session.exitstatus == pytest.ExitCode.OK:
             session.exitstatus = pytest.ExitCode.TESTS_FAILED
+
+
+def _lost_ledger(session: pytest.Session, run: Any, error: GarlError) -> None:
+    """End a session without its ledger: nothing can be saved, and the summary says why."""
+    session.exitstatus = pytest.ExitCode.INTERNAL_ERROR
+    if run is not None:
+        run.trouble = run.trouble or str(error)
 
 
 def pytest_unconfigure(config: pytest.Config) -> None:

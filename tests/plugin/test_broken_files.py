@@ -110,3 +110,32 @@ def test_a_baseline_that_cannot_be_read_is_one_message(pytester: pytest.Pytester
     result = run(pytester, "--garl-workers=0", "--garl-baseline=base.toml")
     result.stderr.fnmatch_lines(["ERROR: --garl-baseline: *base.toml: *nested too deeply*"])
     assert result.ret == pytest.ExitCode.USAGE_ERROR
+
+
+SPOILS = """
+import pathlib
+import sqlite3
+import pytest
+
+@pytest.hookimpl(tryfirst=True)
+def {hook}(session):
+    with sqlite3.connect(pathlib.Path(session.config.rootpath, ".garl", "ledger.sqlite")) as db:
+        db.execute("DROP TABLE slot")
+"""
+
+
+@pytest.mark.parametrize("hook", ["pytest_sessionfinish", "pytest_runtestloop"])
+def test_a_ledger_that_breaks_while_it_is_used_is_one_message(
+    pytester: pytest.Pytester, hook: str
+) -> None:
+    project(pytester)
+    conftest = pytester.path / "conftest.py"
+    conftest.write_text(conftest.read_text() + SPOILS.format(hook=hook))
+    result = pytester.runpytest_subprocess(
+        "-p", "no:cacheprovider", "--garl-workers=0", "--garl-budget=2", "-k", "test_time"
+    )
+    told = result.stdout.str() + result.stderr.str()
+    assert "ledger.sqlite: " in told
+    assert "Traceback" not in told
+    assert "INTERNALERROR" not in told
+    assert result.ret == pytest.ExitCode.INTERNAL_ERROR
