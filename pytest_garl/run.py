@@ -35,6 +35,8 @@ if TYPE_CHECKING:
     from pytest_garl.search.method import Flown, Method
     from pytest_garl.simulation.policy import PolicySpec
 
+SELECTED = "selected flights"
+"""The ledger's fact: how many flights of searches the selected tests want."""
 FLIGHT_S = 2.2
 """Wall time of one flight on one core where no earlier run tells: OpenCV-MLS, measured by
 ``python -m benchmarks``."""
@@ -115,6 +117,12 @@ class Run:
                 wanted = self.items.setdefault(target.search, {})
                 wanted.setdefault(target.slot, []).append(selected(item))
                 self.targets.setdefault(target.search, {})[target.slot] = target
+        searched = sum(
+            target.entry is None for slots in self.targets.values() for target in slots.values()
+        )
+        if searched:
+            # For the bar, which xdist's controller draws without having had the items.
+            self.ledger.note_fact(SELECTED, searched)
 
     def check_resumed(self) -> None:
         """Raise LedgerError if a search to resume flew something else."""

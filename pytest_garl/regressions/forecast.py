@@ -25,9 +25,16 @@ class Rest:
     seconds: float
 
 
-def of_kind(each: int) -> float:
-    """Return the flights that a new kind of violation takes, the one that repeats it included."""
-    return 1 + SPENT * (each - PILOTS) + PILOTED
+def of_search(kinds: int, each: int, cap: int | None) -> float:
+    """Return the flights that the new kinds of a search take, those that repeat them included."""
+    if not kinds or not each:
+        return 0.0
+    own = SPENT * (each - PILOTS)
+    least = SPENT * (LEAST - PILOTS)
+    if cap is None or kinds * own <= cap:
+        return kinds * (1 + own + PILOTED)
+    reached = max(1, min(kinds, int(cap / least)))
+    return kinds + max(own, min(reached * own, cap)) + reached * PILOTED
 
 
 def seconds_of_kind(each: int, flight_s: float, workers: int) -> float:

@@ -7,6 +7,7 @@ import sqlite3
 import sys
 import threading
 import time
+from collections import Counter
 from collections.abc import Callable, Generator, Iterator, Mapping, Sequence
 from contextlib import closing, contextmanager, nullcontext
 from dataclasses import dataclass
@@ -17,9 +18,9 @@ from typing import Any
 import pytest
 
 from pytest_garl.errors import LedgerError
-from pytest_garl.regressions.forecast import Rest, of_kind
+from pytest_garl.regressions.forecast import Rest, of_search
 from pytest_garl.reports.wrapping import width_of
-from pytest_garl.run import Run
+from pytest_garl.run import SELECTED, Run
 from pytest_garl.search.ledger import Ledger, Progress
 
 REFRESH_S = 0.5
@@ -73,6 +74,8 @@ class Stand:
     nearest: Mapping[str, tuple[float, str]]
     seconds: float
     """Since flying began."""
+    selected: int = 0
+    """Flights that the selected tests want, of searches that have not begun as well."""
     beside: float = 0
     """Flights flown beside the searches."""
     expected: float = 0
@@ -88,7 +91,8 @@ class Stand:
     @property
     def all(self) -> float:
         """The one total: the searches' flights, and those that are expected beside them."""
-        return sum(each.all for each in self.searches) + max(self.expected, self.beside)
+        wanted = max(self.selected, sum(each.all for each in self.searches))
+        return wanted + max(self.expected, self.beside)
 
     @property
     def words(self) -> list[str]:
@@ -105,7 +109,7 @@ class Stand:
         if flying:
             where = f"{flying.system.split(':')[-1]} on {flying.map}"
             words.append(f"{where} g{flying.generation:02d} {flying.flown}/{flying.all}")
-        else:
+        elif self.left_s is not None:
             words.append("confirming and shrinking")
         if self.flown and self.seconds > 0:
             words.append(f"{self.flown / self.seconds:.2f} flights/s")
@@ -170,8 +174,10 @@ class Reader:
         beside = ledger.meters().get("errands", 0)
         left_s = None
         if self._run.rest is None:
-            new = len(ledger.kinds()) if self._run.options.shrink else 0
-            self._expected = new * of_kind(self._run.options.shrink)
+            options = self._run.options
+            cap = options.budget if options.shrink_capped else None
+            new = Counter(search for search, _ in ledger.kinds())
+            self._expected = sum(of_search(each, options.shrink, cap) for each in new.values())
         else:
             if self._rest is None:
                 self._rest, self._rest_began = self._run.rest, now
@@ -182,6 +188,7 @@ class Reader:
             kinds=ledger.violations(),
             nearest=ledger.nearest(),
             seconds=now - self._began,
+            selected=int(ledger.fact(SELECTED) or 0),
             beside=beside,
             expected=self._expected,
             left_s=left_s,

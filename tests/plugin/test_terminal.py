@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import dataclasses
 import fcntl
 import os
 import pty
@@ -160,6 +161,8 @@ def test_the_line_has_one_total_and_names_what_matters_first() -> None:
         "garl [#####---------------]  4/16 flights  24 s left  I:2 IV:1  A on court g01 3/4  "
         "0.50 flights/s  nearest collision 0.25 m, time 90 s"
     )
+    more = dataclasses.replace(STAND, selected=40)
+    assert "4/48 flights" in text(more, 160)
     new = Stand(searches=TWO[1:], kinds={}, nearest={}, seconds=0.0)
     assert text(new, 160) == "garl [#####---------------]  1/4 flights  0 s left  A on lawn g00 1/4"
 

@@ -1,0 +1,91 @@
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from pytest_garl.regressions.follow_up import shares
+from pytest_garl.regressions.forecast import of_search, rest_of
+from pytest_garl.regressions.inquiry import Finding, Inquiry
+from pytest_garl.regressions.pursuit import EXCEPTION, LEAST, PILOTS
+from pytest_garl.scenarios.chromosome import decode
+from pytest_garl.scenarios.genes import genome_for
+from pytest_garl.scenarios.maps import load_map
+from pytest_garl.search.errands import Done
+
+LAWN = load_map("lawn")
+GENOME = genome_for(LAWN)
+
+
+def kind(number: int, *, cap: int | None, budget: int = 12, crash: str = "") -> Inquiry:
+    scenario = decode(GENOME.nominal, GENOME, map="lawn", seed=number)
+    result: dict[str, Any] = {"crash": {"kind": crash} if crash else None}
+    done = Done(result=result, sha256="", record=Path("none"))
+    job: Any = None
+    return Inquiry(
+        name=f"search {number}",
+        signature=str(number),
+        violations=((scenario, done),),
+        job=job,
+        map=LAWN,
+        budget=budget,
+        cap=cap,
+    )
+
+
+def budgets(*kinds: Inquiry) -> list[int]:
+    return [each.budget for each in shares(kinds)]
+
+
+@pytest.mark.parametrize("cap", [None, 100])
+def test_each_kind_has_its_flights_where_they_reach(cap: int | None) -> None:
+    kinds = [kind(0, cap=cap), kind(1, cap=cap, crash="raised"), kind(2, cap=cap, crash="hung")]
+    assert budgets(*kinds) == [12, EXCEPTION, 12]
+
+
+def test_a_cap_reaches_as_many_kinds_as_it_can_the_first_with_most() -> None:
+    own = LEAST - PILOTS
+    cap = 2 * own + 1
+    given = budgets(*(kind(number, cap=cap) for number in range(4)))
+    assert given == [LEAST + 1, LEAST, 0, 0]
+    assert sum(each - PILOTS for each in given if each) == cap
+
+
+def test_one_kind_is_shrunk_however_low_the_cap() -> None:
+    assert budgets(kind(0, cap=1), kind(1, cap=1)) == [12, 0]
+
+
+def test_an_exception_leaves_room_for_others() -> None:
+    own = LEAST - PILOTS
+    cap = 2 * EXCEPTION + own
+    kinds = [kind(n, cap=cap, crash="nonsense" if n < 2 else "") for n in range(3)]
+    assert budgets(*kinds) == [EXCEPTION, EXCEPTION, LEAST]
+
+
+def test_what_some_leave_reaches_others_and_the_reference_pilot_is_not_counted() -> None:
+    own = LEAST - PILOTS
+    wanted = [kind(number, cap=2 * own) for number in range(3)]
+    assert budgets(*wanted) == [LEAST, LEAST, 0]
+    spent = Finding(signature="0", case=None, flights=4 + PILOTS, piloted=PILOTS)
+    done = {"search 0": spent, "search 1": spent}
+    left = 2 * own - 8
+    (last,) = shares(wanted[2:], done)
+    assert last.budget == (left + PILOTS if left >= own else 0)
+
+
+def test_the_forecast_is_that_of_the_longest_kind_or_of_all_side_by_side() -> None:
+    kinds = [kind(number, cap=None) for number in range(4)]
+    times = {each.name: 2.0 for each in kinds}
+    alone = rest_of(kinds, times, 1)
+    assert rest_of(kinds, times, 2).seconds == pytest.approx(alone.seconds / 2)
+    assert rest_of(kinds, times, 100).seconds == pytest.approx(alone.seconds / 4)
+    assert rest_of((), {}, 2).seconds == 0
+    assert rest_of(kinds, times, 1).flights == rest_of(kinds, times, 2).flights
+
+
+def test_the_bar_expects_no_more_than_the_cap_allows() -> None:
+    assert of_search(0, 12, 40) == of_search(3, 0, 40) == 0
+    assert of_search(2, 12, None) == 2 * of_search(1, 12, None)
+    assert of_search(20, 12, 8) < 20 + 12 + 4
+    assert of_search(20, 12, 8) <= of_search(20, 12, 80) <= of_search(20, 12, None)
