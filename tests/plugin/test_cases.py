@@ -228,6 +228,31 @@ def test_an_edge_case_does_not_hide_a_mistake_in_a_test(searched: pytest.Pyteste
     assert result.ret == pytest.ExitCode.TESTS_FAILED
 
 
+def test_an_open_case_that_passes_is_told_though_its_flight_ends_in_an_abort(
+    searched: pytest.Pytester,
+) -> None:
+    change(searched.path / "tiny_simulator.py", 'outcome = "collision"', 'outcome = "aborted"')
+    result = run(searched)
+    result.assert_outcomes(passed=3, skipped=2, xfailed=1)
+    result.stdout.fnmatch_lines(["stale: scenarios/*IV-dog*.toml passes, but the simulator*"])
+    strict = run(searched, *CASES, "-o", "garl_xfail_strict=true")
+    strict.assert_outcomes(passed=2, skipped=2, xfailed=1, failed=1)
+    assert strict.ret == pytest.ExitCode.TESTS_FAILED
+
+
+def test_a_case_hides_no_property_that_it_is_not_about(searched: pytest.Pytester) -> None:
+    tests = searched.path / "test_it.py"
+    own = "\ndef test_own(landing):\n    assert landing.flight.elapsed_s < 14\n"
+    tests.write_text(tests.read_text() + own + "\ndef test_typo(landing):\n    landing.hits\n")
+    result = run(searched)
+    # Both fail in each of the two cases, whose own failures stay expected.
+    result.assert_outcomes(passed=2, skipped=2, xfailed=2, failed=4)
+    again = run(searched, *SEARCH)
+    kinds = [line for line in again.outlines if line.startswith("FAILED")]
+    assert sum("test_own[lawn" in line for line in kinds) == 1
+    assert sum("test_typo[lawn" in line for line in kinds) == 24
+
+
 def test_an_open_case_that_fails_in_another_way_fails(searched: pytest.Pytester) -> None:
     change(searched.path / "tiny_simulator.py", 'body="dog-1"', 'body="tree-1"')
     change(searched.path / "tiny_simulator.py", 'kind="dog"', 'kind="tree"')
@@ -411,7 +436,13 @@ def test_a_violation_in_one_of_five_flights_did_not_repeat(pytester: pytest.Pyte
     result = run(pytester, *FLAKY)
     assert "failed" not in result.parseoutcomes()
     assert result.parseoutcomes()["xfailed"] >= 1
-    result.stdout.fnmatch_lines(["*did not repeat: 1 of 5 flights fail [[]*[]] % (IV:dog*"])
+    result.stdout.fnmatch_lines(
+        [
+            "Good on lawn: * violations in 24 flights did not repeat, at most 1 may:*",
+            "*did not repeat: 1 of 5 flights fail [[]*[]] % (IV:dog*",
+        ]
+    )
+    assert result.ret == pytest.ExitCode.TESTS_FAILED
 
 
 OWN = """

@@ -22,15 +22,17 @@ COLLISIONS = "\ndef test_collisions(landing):\n    assert not landing.collisions
 DISTANCE = "\ndef test_distance(landing):\n    assert landing.distance_to_landing_m <= 1.5\n"
 
 
-@PARALLEL
 @pytest.mark.parametrize(
-    "first",
+    ("first", "parallel"),
     [
-        "\n@pytest.mark.skip\ndef test_first(landing): pass\n",
-        "\n@pytest.mark.xfail(reason='known')\ndef test_first(landing): pass\n",
-        "\ndef test_first(scenario): assert scenario.map == 'lawn'\n",
-        "\n@pytest.fixture\ndef absent(landing): pytest.skip('no camera')\n"
-        "def test_first(absent, landing): pass\n",
+        ("\n@pytest.mark.skip\ndef test_first(landing): pass\n", ()),
+        ("\n@pytest.mark.xfail(reason='known')\ndef test_first(landing): pass\n", ("-n2",)),
+        ("\ndef test_first(scenario): assert scenario.map == 'lawn'\n", ()),
+        (
+            "\n@pytest.fixture\ndef absent(landing): pytest.skip('no camera')\n"
+            "def test_first(absent, landing): pass\n",
+            (),
+        ),
     ],
     ids=["skipped", "xfailed", "scenario", "fixture"],
 )
@@ -43,6 +45,20 @@ def test_a_crash_fails_an_item_whatever_happens_to_the_first(
     assert (found["failed"], found.get("passed", 0), found.get("errors", 0)) == (1, 0, 0)
     assert result.ret == pytest.ExitCode.TESTS_FAILED
     result.stdout.fnmatch_lines(["*ZeroDivisionError: no plan*"])
+
+
+def test_a_violating_abort_fails_an_item_though_the_first_is_skipped(
+    pytester: pytest.Pytester,
+) -> None:
+    skipped = "\n@pytest.mark.skip\ndef test_first(landing): pass\n"
+    write_tests(pytester, "Good", skipped + DISTANCE + COLLISIONS)
+    tests = pytester.path / "test_it.py"
+    limited = tests.read_text().replace("maps=", "limits={'abort': 'violation'}, maps=")
+    tests.write_text(limited)
+    write_simulator(pytester, "dataclasses.replace(flight, outcome='aborted')", "True")
+    result = run(pytester, "--garl-budget=4", "--garl-workers=0")
+    assert result.parseoutcomes()["failed"] == 1
+    assert "passed" not in result.parseoutcomes()
 
 
 SEARCH = ("--garl-budget=24", "--garl-workers=0", "-rfx")
