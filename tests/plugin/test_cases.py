@@ -139,7 +139,7 @@ def test_what_the_cap_does_not_reach_is_saved_unshrunk_and_told(
     assert dog.evidence.removed == "nothing"
     result.stdout.fnmatch_lines(
         [
-            "*confirming and shrinking 2 new kinds of violation, at most * flights",
+            "*confirming and shrinking 2 new kinds of violation, at most * flights, about * s",
             "*(as the search found it:*",
             "1 kind of violation not shrunk: *",
         ]
@@ -158,7 +158,7 @@ def test_each_new_kind_has_flights_of_its_own(pytester: pytest.Pytester) -> None
 def test_a_python_exception_takes_two_flights_at_most(pytester: pytest.Pytester) -> None:
     project(pytester, "Raises")
     result = run(pytester, "--garl-budget=4", "--garl-workers=0", "--garl-shrink=100")
-    result.stdout.fnmatch_lines(["*1 new kind of violation, at most 2 flights"])
+    result.stdout.fnmatch_lines(["*1 new kind of violation, at most 2 flights, *"])
     (path,) = cases(pytester)
     assert len(load(path).scenario.absent) == 4
     assert "; 1 flight)" in result.stdout.str().replace("\n    ", " ")
