@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+import dataclasses
 import os
+import subprocess
 from pathlib import Path
 
 import pytest
 
 from pytest_garl.errors import OptionError, ScenarioError
 from pytest_garl.regressions import baseline as baselines
-from pytest_garl.regressions.corpus import CorpusError, entries, every_entry
+from pytest_garl.regressions.corpus import CorpusError, entries, every_entry, save_patch
 from pytest_garl.regressions.files import dumps, load, load_head, loads
+from pytest_garl.scenarios import maps as package
 from pytest_garl.scenarios.maps import load_map
 from pytest_garl.verdicts.verdict import Limits
 from tests.regressions.test_baseline import baseline
@@ -200,3 +203,23 @@ def test_no_baseline_is_saved_that_could_not_be_read(
     (tmp_path / "base.toml").write_text(BASELINE)
     with pytest.raises(ScenarioError, match=r"bytes, expected at most .* `garl baseline save`"):
         baselines.load(tmp_path / "base.toml")
+
+
+@pytest.mark.parametrize("name", ['la"wn', "la\\wn", "la wn", "ländle", "a'b;c$d", "-m", "m" * 50])
+def test_the_patch_of_a_case_on_a_map_with_a_strange_name_applies(
+    tmp_path: Path, name: str
+) -> None:
+    maps = tmp_path / "scenarios" / "maps"
+    maps.mkdir(parents=True)
+    (maps / f"{name}.toml").write_text((Path(package.__file__).parent / "lawn.toml").read_text())
+    plain = case()
+    strange = dataclasses.replace(
+        plain, scenario=dataclasses.replace(plain.scenario, map=load_map(name, [maps]).name)
+    )
+    folder = tmp_path / "cases"
+    patch = save_patch(tmp_path / "patches", folder, tmp_path, strange)
+    subprocess.run(["git", "init", "-q"], cwd=tmp_path, check=True)
+    subprocess.run(["git", "apply", str(patch)], cwd=tmp_path, check=True)
+    (entry,) = every_entry(folder, (maps,))
+    assert entry.problem == ""
+    assert entry.case == strange

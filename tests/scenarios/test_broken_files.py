@@ -160,6 +160,14 @@ def test_a_map_whose_name_cannot_be_seen_is_refused(tmp_path: Path, name: str) -
     assert str(caught.value).isprintable()
 
 
+def test_a_map_with_a_long_name_is_refused(tmp_path: Path) -> None:
+    for length in (50, 51):
+        (tmp_path / f"{'m' * length}.toml").write_text(LAWN)
+    assert load_map("m" * 50, [tmp_path])
+    with pytest.raises(ScenarioError, match="has 51 characters, expected at most 50"):
+        load_map("m" * 51, [tmp_path])
+
+
 @pytest.mark.parametrize("name", ['la"wn', "la\\wn", "la wn", "ländle"])
 def test_a_map_with_a_strange_name_is_written_so_that_it_can_be_read(
     tmp_path: Path, name: str

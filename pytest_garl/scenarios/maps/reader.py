@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import cast, get_args
 
 from pytest_garl.errors import ScenarioError
-from pytest_garl.messages import printable
+from pytest_garl.messages import printable, shown
 from pytest_garl.reading import read_bytes
 from pytest_garl.scenarios.bodies import Body
 from pytest_garl.scenarios.furniture import FURNITURE
@@ -24,6 +24,8 @@ about half a gigabyte for a map of this size."""
 _FAR_M = 300.0
 """No coordinate is larger.  Single precision, in which the camera and the physics compute, is
 exact to a few hundredths of a millimetre there."""
+_LONGEST_NAME = 50
+"""It begins the names of cases and of recorded flights, which may not exceed 255 bytes."""
 _MOST_LAYERS = 200
 _MOST_POINTS = 1000
 _MOST_BODIES = 200
@@ -82,7 +84,12 @@ def read_map(file: Path) -> Map:
 
 
 def _check_name(file: Path) -> None:
-    """Refuse names that cannot stand in a patch, a test's id or a line of a terminal."""
+    """Refuse names that cannot stand in a patch, a test's id, a file's name or a line."""
+    if len(file.stem) > _LONGEST_NAME:
+        raise ScenarioError(
+            f"{file.parent}: the name of the map {shown(file.stem)} has {len(file.stem)} "
+            f"characters, expected at most {_LONGEST_NAME}; rename the file"
+        )
     if not file.stem.isprintable():
         raise ScenarioError(
             f"{printable(str(file), keep='')}: the name of a map holds characters that cannot be "
