@@ -34,8 +34,8 @@ def _written_out(char: str) -> str:
 def shortened(text: str, limit: int = SHOWN) -> str:
     """Return one printable line of at most ``limit`` characters, cut in the middle."""
     # No more than this can be left after cutting: a file may hold a megabyte in one word.
-    head = printable(text[: 2 * limit], keep="")
-    tail = printable(text[-2 * limit :], keep="")
+    head = printable(text[:limit], keep="")
+    tail = printable(text[-limit:], keep="")
     if len(text) <= limit and len(head) <= limit:
         return head
     side = (limit - 1) // 2

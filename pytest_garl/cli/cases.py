@@ -59,6 +59,11 @@ def cases(context: click.Context, folder: Path) -> None:
     context.obj = _Folders(cases=folder, root=Path.cwd())
 
 
+def _say(text: str, *, err: bool = False) -> None:
+    """Show a text in which names of files and what files hold may stand."""
+    click.echo(printable(text), err=err)
+
+
 FILE = click.argument("file", type=click.Path(path_type=Path, exists=True, dir_okay=False))
 
 
@@ -68,7 +73,7 @@ def list_(folders: _Folders) -> None:
     """List all cases with what they say."""
     found = corpus.every_entry(folders.cases, folders.maps)
     if not found:
-        click.echo(f"no cases in {folders.cases}; a search saves what it finds")
+        _say(f"no cases in {folders.cases}; a search saves what it finds")
         return
     table = Table(box=None, header_style="bold")
     for name in ("case", "status", "signature", "robust", "objects"):
@@ -88,7 +93,7 @@ def list_(folders: _Folders) -> None:
     _console().print(table)
     for entry in found:
         if entry.case is None:
-            click.echo(printable(entry.problem))
+            _say(entry.problem)
 
 
 def _console() -> Console:
@@ -107,8 +112,8 @@ def show(folders: _Folders, file: Path) -> None:
     """Tell what happens in a case, in words and physical units."""
     case = folders.case(file)
     evidence = case.evidence
-    click.echo(f"{case.id}  {case.status}  {case.system}")
-    click.echo(f"{case.violation.signature}: {case.violation.story}\n")
+    _say(f"{case.id}  {case.status}  {case.system}")
+    _say(f"{case.violation.signature}: {case.violation.story}\n")
     table = Table(box=None, header_style="bold")
     for name in ("what", "value", "meaning"):
         table.add_column(name)
@@ -116,14 +121,14 @@ def show(folders: _Folders, file: Path) -> None:
         table.add_row(*(Text(cell) for cell in row))
     _console().print(table)
     for key, by in _totals(case):
-        click.echo(f"while it is flown {key} changes by {by:+.2f}")
+        _say(f"while it is flown {key} changes by {by:+.2f}")
     if case.edge:
-        click.echo("\nIt sits on an edge: not all of its neighbours fail, so it gates nothing.")
-    click.echo(
+        _say("\nIt sits on an edge: not all of its neighbours fail, so it gates nothing.")
+    _say(
         f"\n{evidence.neighbours_failed} of {evidence.neighbours} neighbours fail too; shrinking "
         f"removed {evidence.removed}; objects were moved by {case.policy}"
     )
-    click.echo(f"Fly it: garl cases replay {file}")
+    _say(f"Fly it: garl cases replay {file}")
 
 
 def _totals(case: Case) -> list[tuple[str, float]]:
@@ -167,18 +172,18 @@ def replay_(context: click.Context, file: Path, live: bool, video: Path | None) 
 
         camera = airframe_of(system_of(case, folders.root)).camera
         save_video(video, result.flight, case.scenario, result.map, camera, result.signature)
-        click.echo(f"drawn: {video}")
+        _say(f"drawn: {video}")
     context.exit(STATUS[result.answer])
 
 
 def _answer(result: Replay) -> None:
     click.secho(result.answer, bold=True, fg="green" if result.answer == "FIXED" else "red")
-    click.echo(printable(f"{result.signature or 'no violation'}: {result.story}"))
+    _say(f"{result.signature or 'no violation'}: {result.story}")
     for reason in result.reasons:
-        click.echo(printable(reason))
-    click.echo(printable(f"judged by {result.judge}"))
+        _say(reason)
+    _say(f"judged by {result.judge}")
     if result.same is not None:
-        click.echo("the same flight to the byte" if result.same else "another flight than recorded")
+        _say("the same flight to the byte" if result.same else "another flight than recorded")
 
 
 @cases.command()
@@ -198,7 +203,7 @@ def accept(folders: _Folders, files: tuple[Path, ...]) -> None:
     found = [(file, folders.case(file)) for file in files]
     for file, case in found:
         corpus.replace(file, dataclasses.replace(case, accepted=True))
-        click.echo(f"{file}: accepted; it is expected to fail ({case.violation.signature})")
+        _say(f"{file}: accepted; it is expected to fail ({case.violation.signature})")
 
 
 @cases.command()
@@ -222,9 +227,9 @@ def promote(folders: _Folders, file: Path) -> None:
         if not live:
             told.append(f"judged by {result.judge}")
     corpus.replace(file, dataclasses.replace(case, status="fixed"))
-    click.echo(f"{file}: fixed; from now on it must pass")
+    _say(f"{file}: fixed; from now on it must pass")
     for line in told:
-        click.echo(line)
+        _say(line)
 
 
 def _refusal(result: Replay, how: str) -> str:
@@ -261,13 +266,13 @@ def shrink(folders: _Folders, file: Path, flights: int, workers: int) -> None:
     if finding.case is None and finding.reason != KEPT:
         raise GarlError(f"{file}: {finding.reason}; `garl cases replay {file}` tells more")
     if finding.case is None:
-        click.echo(f"{file}: {finding.reason} ({spent}); it stays as it is")
+        _say(f"{file}: {finding.reason} ({spent}); it stays as it is")
         return
     path = corpus.replace(file, finding.case)
     evidence = finding.case.evidence
     renewed = finding.case.id == case.id
     done = "its evidence is renewed" if renewed else f"all in all removed {evidence.removed}"
-    click.echo(f"{path}: {done} ({spent})")
+    _say(f"{path}: {done} ({spent})")
 
 
 @cases.command()
@@ -287,10 +292,10 @@ def prune(folders: _Folders, yes: bool) -> None:
         if result.answer != "STALE":
             kept += 1
             continue
-        click.echo(printable(f"{entry.path}: passes, but {'; '.join(result.reasons)}"))
+        _say(f"{entry.path}: passes, but {'; '.join(result.reasons)}")
         if yes or click.confirm("delete it?"):
             entry.path.unlink()
-    click.echo(f"{kept} cases still say something")
+    _say(f"{kept} cases still say something")
 
 
 @cases.command()
@@ -314,7 +319,7 @@ def check(folders: _Folders) -> None:
         except GarlError as error:
             problems.append(f"{entry.path}: {error}")
     for problem in problems:
-        click.echo(printable(problem), err=True)
-    click.echo(f"{len(found)} cases, {len(problems)} problems")
+        _say(problem, err=True)
+    _say(f"{len(found)} cases, {len(problems)} problems")
     if problems:
         raise SystemExit(1)
