@@ -12,20 +12,18 @@ from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from types import MappingProxyType
 
-from pytest_garl.verdicts.gate_statistics import holm, looks_new, worse
+from pytest_garl.verdicts.gate_statistics import CONFIRMED, holm, looks_new, worse
 from pytest_garl.verdicts.pairs import DIFFERENT, Answer, Fate, Pair, type_of
 
 LEVEL = 0.05
 """How often a stack that is no worse may fail the gate, per system and map."""
 LEFT_OUT = 0.05
 """This share of the baseline may be inconclusive, or one flight of it."""
-RARE = 3
+RARE = 5
 """A type in more flights of the base than this would hardly be missed by chance: one that is
-expected in four flights occurs in none of them once in fifty times."""
+expected in six flights occurs in none of them once in four hundred times."""
 SHOWN = 20
 """Pairs that a report in words lists of each kind."""
-CONFIRMED = 3
-"""Pairs of a new type whose neighbours are flown."""
 ENOUGH_PAIRS = 2
 """So many pairs of a new type fail the gate ..."""
 ENOUGH_NEIGHBOURS = 2
@@ -263,7 +261,7 @@ def _new_types(
             base=len(pairs),
             drawn=drawn,
             found=len(having),
-            neighbours=sum(count for _, count in alike),
+            beside=max((count for _, count in alike), default=0),
             alike=sum(count for count, _ in alike),
         )
         found.append(NewType(type=kind, pairs=having, alike=alike, p=p, adjusted=1.0))

@@ -86,8 +86,8 @@ def test_nine_broken_against_one_fixed_fail_the_gate() -> None:
 
 
 def test_a_rare_type_is_a_test_as_well() -> None:
-    assert gate((9, LANDED, DOG), (3, DOG, DOG)).violations.adjusted == 3 / 512
-    assert gate((9, LANDED, DOG), (4, DOG, DOG)).violations.adjusted == 2 / 512
+    assert gate((9, LANDED, DOG), (5, DOG, DOG)).violations.adjusted == 3 / 512
+    assert gate((9, LANDED, DOG), (6, DOG, DOG)).violations.adjusted == 2 / 512
 
 
 def test_one_in_ten_that_broke_is_no_proof() -> None:
@@ -163,9 +163,7 @@ def test_a_new_type_in_two_pairs_fails_if_few_flights_changed() -> None:
     assert gate((1, SAME, LOST), *few[1:]).passed
 
 
-def test_a_new_type_in_two_pairs_of_a_stack_all_of_whose_flights_changed_needs_one_neighbour() -> (
-    None
-):
+def test_a_new_type_in_two_pairs_needs_neighbours_if_all_flights_changed() -> None:
     counted = ((2, LANDED, LOST), (98, LANDED, LANDED))
     assert gate(*counted).passed
     assert gate(*counted, beside=(LANDED, LANDED, LANDED)).passed
@@ -183,8 +181,8 @@ def test_what_is_new_and_no_proof_is_told() -> None:
     found = gate((1, LANDED, LOST), (49, LANDED, LANDED), beside=(LANDED, LANDED, LOST))
     assert found.passed
     assert list(found.summary())[4] == (
-        "new type of violation: II in lawn-0, in 1 of 3 neighbours: p 0.015, for all 3 tests "
-        "0.045, level 0.05: may be chance, look at it"
+        "new type of violation: II in lawn-0, in 1 of 3 neighbours: p 0.022, for all 3 tests "
+        "0.067, level 0.05: may be chance, look at it"
     )
 
 
@@ -231,9 +229,11 @@ def test_a_type_looks_new_by_chance_most_often_if_the_base_missed_one_flight_of_
     # (1 - v)^n (1 - (1 - v)^n) is largest where both factors are 1/2.
     assert looks_new(base=100, drawn=100, found=1) == pytest.approx(0.25, rel=1e-3)
     assert looks_new(base=100, drawn=0, found=1) == 0.0
+    # A type in so many flights is new however many flights there are.
+    assert looks_new(base=5000, drawn=5000, found=2500, beside=3, alike=9) < 1e-9
     values = [looks_new(base=100, drawn=drawn, found=2) for drawn in (10, 25, 50, 100)]
     assert values == sorted(values)
-    assert looks_new(base=100, drawn=100, found=1, neighbours=3, alike=2) < 0.001
+    assert looks_new(base=100, drawn=100, found=1, beside=3, alike=2) < 0.001
 
 
 # What was not decided.
