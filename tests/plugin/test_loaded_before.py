@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from pytest_garl import dispatch
-from tests.plugin.test_plugin import TESTS, write_project
+from tests.plugin.test_plugin import TESTS, result_hash, run, write_project
 
 SYSTEM = """
 import os
@@ -69,6 +69,23 @@ def test_a_search_is_bred_by_the_baseline(unpinned: pytest.Pytester) -> None:
     _, here, told = flown(unpinned, "--garl-workers=1", "--garl-budget=1")
     assert here[1] == told[1] == dispatch.BASELINE
     assert here[0] != told[0]
+
+
+def test_a_search_breeds_the_same_whatever_the_environment_says(
+    pytester: pytest.Pytester, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The method ga raises numbers to powers, which NumPy does otherwise by AVX-512 or SSE."""
+    write_project(pytester.path)
+    found = set()
+    for setting in ({}, {"NPY_DISABLE_CPU_FEATURES": "X86_V3", "OPENBLAS_CORETYPE": "Nehalem"}):
+        with monkeypatch.context() as outside:
+            for name in dispatch.environment():
+                outside.delenv(name, raising=False)
+            for name, value in setting.items():
+                outside.setenv(name, value)
+            run(pytester, "--garl-budget=32", "--garl-method=ga", "--garl-workers=1")
+        found.add(result_hash(pytester))
+    assert len(found) == 1
 
 
 def test_other_runs_are_left_alone(unpinned: pytest.Pytester) -> None:
