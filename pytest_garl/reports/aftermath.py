@@ -25,7 +25,7 @@ from pytest_garl.regressions.forecast import rest_of
 from pytest_garl.regressions.inquiry import Inquiry
 from pytest_garl.reports.commands import shown
 from pytest_garl.reports.progress import duration, live
-from pytest_garl.reports.wrapping import counted, width_of, wrapped
+from pytest_garl.reports.wrapping import begin_line, counted, width_of, wrapped
 from pytest_garl.run import Run
 
 PILOT = {
@@ -55,7 +55,7 @@ def pursue(run: Run, session: pytest.Session) -> None:
         if wanted:
             most = sum(each.budget for each in shares(wanted))
             run.rest = rest_of(wanted, _flight_s(run, wanted), options.workers or 1)
-            reporter.ensure_newline()
+            begin_line(reporter)
             reporter.write_line(
                 f"garl: confirming and shrinking {counted(len(wanted), 'new kind')} of violation, "
                 f"at most {counted(most, 'flight')}, about {duration(run.rest.seconds)}"
@@ -63,13 +63,13 @@ def pursue(run: Run, session: pytest.Session) -> None:
         with live(run, config):
             run.pursued = follow_up(run.ledger, run.pool, place, wanted, run.tick)
     except KeyboardInterrupt:
-        reporter.ensure_newline()
+        begin_line(reporter)
         reporter.write_line(
             "garl: interrupted before everything was saved; the same command with --garl-resume "
             "goes on"
         )
     except GarlError as error:
-        reporter.ensure_newline()
+        begin_line(reporter)
         reporter.write_line(f"garl: {error}", red=True)
         run.trouble = str(error)
 

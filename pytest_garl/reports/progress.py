@@ -19,7 +19,7 @@ import pytest
 
 from pytest_garl.errors import LedgerError
 from pytest_garl.regressions.forecast import Rest, of_search
-from pytest_garl.reports.wrapping import width_of
+from pytest_garl.reports.wrapping import begin_line, width_of
 from pytest_garl.run import SELECTED, Run
 from pytest_garl.search.ledger import Ledger, Progress
 
@@ -210,7 +210,7 @@ class Beat:
             return
         capture: Any = self._config.pluginmanager.get_plugin("capturemanager")
         with capture.global_and_fixture_disabled() if capture else nullcontext():
-            reporter.ensure_newline()
+            begin_line(reporter)
             reporter.write_line(text(stand, width_of(self._config)))
 
 

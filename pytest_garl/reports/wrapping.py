@@ -37,3 +37,10 @@ def wrapped(text: str, width: int, *, first: str = "", others: str = "") -> str:
 def counted(number: int, noun: str) -> str:
     """Return a number with its noun: ``1 flight``, ``2 flights``."""
     return f"{number} {noun}{'' if number == 1 else 's'}"
+
+
+def begin_line(reporter: Any) -> None:
+    """Have pytest's reporter begin a line, also where it believes that it has just begun one."""
+    reporter.ensure_newline()
+    if reporter._tw.width_of_current_line:
+        reporter.line("")

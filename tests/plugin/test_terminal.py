@@ -264,6 +264,8 @@ def test_a_log_shows_that_the_run_lives(
     )
     lines = [line for line in result.outlines if LINE.match(line)]
     assert len(lines) > 1
+    told = [line for line in result.outlines if re.search(r"garl(:| \[)", line)]
+    assert all(line.startswith(("garl", "---", "===")) for line in told)
     assert all(len(line) <= 80 for line in lines)
     assert "\x1b" not in result.stdout.str()
 
