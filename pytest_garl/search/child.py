@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import dataclasses
-import os
 import traceback
-from os import _exit, getpid
+from contextlib import closing
+from os import _exit, getpid, getppid
 from pathlib import Path
 from time import monotonic, sleep
 
@@ -51,6 +51,7 @@ class Flyer:
         self._path, self._owner, self._watch = path, owner, watch
         self._me = getpid()
         self._system = ""
+        self._idle_s = 0.0
 
     def run(self) -> None:
         """Fly until the supervisor is gone, or until a fresh process shall go on."""
@@ -61,24 +62,12 @@ class Flyer:
         cv2.setNumThreads(1)
         dispatch.check()
         state = ProcessState()
-        idle_since = monotonic()
-        ledger = Ledger(self._path, self._owner)
-        while os.getppid() == self._owner:
-            claim = ledger.claim(flown=self._system)
-            if claim is None:
-                if self._system and ledger.others_wait(self._system):
-                    break
-                if self._system and monotonic() > idle_since + RESTART_S and ledger.alone_waits():
-                    break
-                sleep(IDLE_S)
-                continue
-            ledger.count("idle_s", monotonic() - idle_since)
-            # A landing system may close all files: what is written then would go anywhere.
-            ledger.close()
+        while (claim := self._next()) is not None:
             try:
                 result, sha256, wall_s = self._fly(claim)
-                ledger = Ledger(self._path, self._owner)
-                ledger.record(claim, result, sha256, wall_s)
+                with closing(Ledger(self._path, self._owner)) as ledger:
+                    ledger.record(claim, result, sha256, wall_s)
+                    ledger.count("idle_s", self._idle_s)
             except Exception as error:
                 if _cannot_go_on(error) and not state.limited():
                     raise
@@ -86,7 +75,35 @@ class Flyer:
                 break
             if state.changed():
                 break
-            idle_since = monotonic()
+
+    def _next(self) -> Claim | None:
+        """Wait for a slot and return it; None where a fresh process shall go on, or none at all.
+
+        The ledger is closed in between: a landing system may close all files, and what is written
+        to one of them then would go anywhere.
+        """
+        try:
+            with closing(Ledger(self._path, self._owner)) as ledger:
+                return self._claimed(ledger)
+        except GarlError:
+            if not self._system:
+                raise
+            # What flew here may be the reason; otherwise a fresh process will say the same.
+            return None
+
+    def _claimed(self, ledger: Ledger) -> Claim | None:
+        idle_since = monotonic()
+        while getppid() == self._owner:
+            claim = ledger.claim(flown=self._system)
+            self._idle_s = monotonic() - idle_since
+            if claim is not None:
+                return claim
+            if self._system and ledger.others_wait(self._system):
+                break
+            if self._system and self._idle_s > RESTART_S and ledger.alone_waits():
+                break
+            sleep(IDLE_S)
+        return None
 
     def _fly(self, claim: Claim) -> tuple[dict[str, object], str, float]:
         from pytest_garl.search.job import fly_job, load_scenario, loads, record_file
