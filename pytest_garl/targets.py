@@ -115,7 +115,7 @@ def targets_for(marker: pytest.Mark, options: Options, test: str) -> list[Target
 
 
 def _saved_targets(subject: Subject, options: Options, test: str) -> Iterator[Target]:
-    if not options.cases.is_dir():
+    if not options.cases.is_dir() and not options.cases.is_symlink():
         return
     from pytest_garl.regressions.corpus import entries
     from pytest_garl.scenarios.maps import map_names

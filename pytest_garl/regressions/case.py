@@ -115,7 +115,8 @@ class Case:
         digest = hashlib.sha256(f"{facts!r}{changes}".encode()).hexdigest()
         words = self.violation.signature.split(":")[:2] or [self.violation.type]
         subject = "-".join(_SAFE.sub("_", word.partition("@")[0]).strip("_") for word in words)
-        return f"{self.scenario.map}-{subject}-{digest[:6]}"
+        # A file's name has 255 bytes at most, and that of a test may be longer.
+        return f"{self.scenario.map}-{subject[:60]}-{digest[:6]}"
 
 
 def own_test(test: str, assertion: str) -> str:

@@ -56,6 +56,7 @@ def folder_of(cases: Path, system: str) -> Path:
 
 def entries(cases: Path, system: str, map_folders: tuple[Path, ...]) -> tuple[Entry, ...]:
     """Return the files of a system in the order of their names, broken ones among them."""
+    _check_link(cases)
     return tuple(
         _of_system(entry, system) for entry in _in_folder(folder_of(cases, system), map_folders)
     )
@@ -63,12 +64,20 @@ def entries(cases: Path, system: str, map_folders: tuple[Path, ...]) -> tuple[En
 
 def every_entry(cases: Path, map_folders: tuple[Path, ...]) -> tuple[Entry, ...]:
     """Return all files of the corpus, system by system."""
+    _check_link(cases)
     try:
         there = sorted(cases.iterdir()) if cases.is_dir() else ()
     except OSError as error:
         raise CorpusError(f"{cases}: cannot be read: {error.strerror}") from error
     folders = [each for each in there if each.is_dir() or each.is_symlink()]
     return tuple(entry for folder in folders for entry in _in_folder(folder, map_folders))
+
+
+def _check_link(cases: Path) -> None:
+    if cases.is_symlink() and not cases.exists():
+        raise CorpusError(
+            f"{cases}: found a symbolic link that leads nowhere, expected a folder of cases"
+        )
 
 
 def _in_folder(folder: Path, map_folders: tuple[Path, ...]) -> Iterator[Entry]:
@@ -81,8 +90,8 @@ def _in_folder(folder: Path, map_folders: tuple[Path, ...]) -> Iterator[Entry]:
             # Else it is gone since it was listed: somebody is cleaning up.
             continue
         yield _read(path, changed, map_folders)
-    if folder.is_symlink() and not folder.is_dir():
-        yield _lost(folder, map_folders, "it leads to no folder")
+    if folder.is_symlink() and not folder.exists():
+        yield _lost(folder, map_folders, "there is no such folder")
 
 
 def _lost(path: Path, map_folders: tuple[Path, ...], reason: str) -> Entry:

@@ -16,7 +16,7 @@ from time import monotonic
 from typing import Any, Literal
 
 from pytest_garl.errors import LedgerError
-from pytest_garl.messages import printable, shown
+from pytest_garl.messages import printable, shortened, shown
 from pytest_garl.plain import parsed
 from pytest_garl.search.database import REMEDY, Database
 from pytest_garl.search.processes import alive
@@ -154,7 +154,9 @@ class Ledger:
         found = {"ledger": version, **{key: ledger.fact(key) for key in run}}
         differing = [key for key in wanted if wanted[key] != found[key]]
         if differing:
-            facts = "; ".join(f"{key} was {found[key]}, is {wanted[key]}" for key in differing)
+            facts = "; ".join(
+                f"{key} was {shortened(str(found[key]))}, is {wanted[key]}" for key in differing
+            )
             raise LedgerError(
                 f"--garl-resume: {path} belongs to another run: {facts}. Give the same options, or "
                 "run without --garl-resume to begin anew"

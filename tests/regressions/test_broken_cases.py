@@ -11,7 +11,7 @@ import pytest
 
 from pytest_garl.errors import OptionError, ScenarioError
 from pytest_garl.regressions import baseline as baselines
-from pytest_garl.regressions.corpus import CorpusError, entries, every_entry, save_patch
+from pytest_garl.regressions.corpus import CorpusError, entries, every_entry, save, save_patch
 from pytest_garl.regressions.files import dumps, load, load_head, loads
 from pytest_garl.scenarios import maps as package
 from pytest_garl.scenarios.maps import load_map
@@ -223,3 +223,26 @@ def test_the_patch_of_a_case_on_a_map_with_a_strange_name_applies(
     (entry,) = every_entry(folder, (maps,))
     assert entry.problem == ""
     assert entry.case == strange
+
+
+def test_a_corpus_that_is_a_link_to_nothing_is_one_error(tmp_path: Path) -> None:
+    (tmp_path / "regressions").symlink_to("gone")
+    with pytest.raises(CorpusError, match="regressions: found a symbolic link that leads nowhere"):
+        every_entry(tmp_path / "regressions", ())
+    with pytest.raises(CorpusError, match="regressions: found a symbolic link that leads nowhere"):
+        entries(tmp_path / "regressions", SYSTEM, ())
+
+
+def test_a_long_signature_makes_no_file_name_that_is_too_long(tmp_path: Path) -> None:
+    strange = case(signature=f"own:test_{'x' * 400}:12345678")
+    path = save(tmp_path, strange)
+    assert path is not None
+    assert len(path.name) < 100
+    assert load(path) == strange
+
+
+def test_a_link_to_a_file_beside_the_cases_is_no_lost_case(tmp_path: Path) -> None:
+    _folder(tmp_path)
+    (tmp_path / "notes.txt").write_text("")
+    (tmp_path / "link").symlink_to("notes.txt")
+    assert [entry.name for entry in every_entry(tmp_path, ())] == ["good"]
