@@ -88,14 +88,13 @@ def _unknown(options: Options) -> Iterator[str]:
         ledger = Ledger(path)
         try:
             found = ledger.scenarios(int(match["generation"]), int(match["slot"]), match["map"])
-            held = _held(ledger)
+            if not found:
+                held = _held(ledger)
+                yield f"--garl-repeat={options.repeat}: no such slot in {path}; it holds {held}"
         finally:
             ledger.close()
     except GarlError as error:
         yield f"--garl-repeat={options.repeat}: {error}"
-        return
-    if not found:
-        yield f"--garl-repeat={options.repeat}: no such slot in {path}; it holds {held}"
 
 
 def _held(ledger: Ledger) -> str:

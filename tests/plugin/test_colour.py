@@ -313,3 +313,34 @@ def test_a_marker_without_maps_is_refused(pytester: pytest.Pytester) -> None:
     result = run(pytester, "--garl-budget=2")
     assert result.ret == pytest.ExitCode.INTERRUPTED
     result.stdout.fnmatch_lines(["*maps=[[]]: nothing to fly on; expected one or more of court*"])
+
+
+def test_a_resumed_run_shows_all_failures_again(pytester: pytest.Pytester) -> None:
+    project(pytester)
+    first = outcomes_of(run(pytester, *SEARCH), "FAILED")
+    assert outcomes_of(run(pytester, *SEARCH, "--garl-resume"), "FAILED") == first
+    assert len(first) == 2
+
+
+TWICE = """
+from _pytest.runner import runtestprotocol
+
+def pytest_runtest_protocol(item, nextitem):
+    runtestprotocol(item, nextitem=nextitem, log=False)
+    item._initrequest()
+    for report in runtestprotocol(item, nextitem=nextitem, log=False):
+        item.ihook.pytest_runtest_logreport(report=report)
+    return True
+"""
+
+
+@pytest.mark.parametrize(("system", "failures"), [("Good", 2), ("Raises", 1)])
+def test_an_item_that_is_run_again_excuses_not_itself(
+    pytester: pytest.Pytester, system: str, failures: int
+) -> None:
+    project(pytester, system)
+    conftest = (pytester.path / "conftest.py").read_text()
+    pytester.makeconftest(f"{conftest}\n{TWICE}")
+    result = run(pytester, "--garl-budget=8", "--garl-workers=0")
+    assert result.parseoutcomes()["failed"] == failures
+    assert result.parseoutcomes()["xfailed"] > 1
