@@ -64,7 +64,7 @@ def _workers(run: Run) -> str:
     place = ray if options.pool == "ray" else ""
     if options.workers is None:
         return f"all workers{place}"
-    workers = counted(options.workers, "worker") if options.workers else "no worker"
+    workers = counted(options.workers, "worker") if options.workers else "flown inside pytest"
     return f"{workers}{place}; {_times(run, options.budget)} per system and map{_per_kind(run)}"
 
 
