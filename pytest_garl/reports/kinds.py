@@ -122,6 +122,7 @@ def _found(
     )
 
 
+_CRASHES = {"died": "died", "hung": "hung", "broke": "broke the simulator"}
 LEGEND = {
     "I": "landed on something else",
     "I?": "landed elsewhere, unknown on what",
