@@ -314,6 +314,9 @@ def check(folders: _Folders) -> None:
                 f"{entry.path}: its content has the name {case.id}; it was changed by hand, or "
                 "renamed"
             )
+        test = folders.root / case.test.partition("::")[0]
+        if "::" in case.test and not test.is_file():
+            problems.append(f"{entry.path}: key 'test': there is no file {test}")
         try:
             system_of(case, folders.root)
         except GarlError as error:

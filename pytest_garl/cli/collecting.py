@@ -14,6 +14,7 @@ from pytest_garl.regressions.case import Case
 from pytest_garl.regressions.judging import alone_in_a_folder, arguments
 from pytest_garl.regressions.resumed import Means
 from pytest_garl.search.reference import BUILT_IN, Reference, reference_to
+from pytest_garl.search.sources import data_files
 from pytest_garl.switches import target_of
 
 
@@ -48,11 +49,16 @@ def means_of(case: Case, root: Path) -> Means:
     ]
     if status not in (pytest.ExitCode.OK, pytest.ExitCode.NO_TESTS_COLLECTED):
         raise GarlError(f"pytest could not collect {case.test}:\n{told.getvalue()}")
+    for item, target in tests:
+        if case.own_test and item.originalname != case.own_test:
+            continue
+        return Means(
+            asks=Asks(item, target) if case.assertion else None,
+            simulator=collected.simulator,
+            files=tuple(data_files(target.files, root).items()),
+        )
     if not case.assertion:
         return Means(simulator=collected.simulator)
-    for item, target in tests:
-        if item.originalname == case.own_test:
-            return Means(asks=Asks(item, target), simulator=collected.simulator)
     raise GarlError(
         f"the case {case.id} is of a property of your own, and its test {case.test!r} is not found "
         f"in {root}; run this where you run pytest, or correct the case's key 'test'"

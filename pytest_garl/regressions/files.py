@@ -144,10 +144,13 @@ def dumps(case: Case) -> str:
 
 def size_of(case: Case) -> int:
     """Return how many characters the scenario and the record take in the file."""
-    lines = gene_lines(case.scenario)
-    lines += [f"{name} = {_moves(moves)}" for name, moves in case.moves]
-    lines += [f"{name} = {_changes(own)}" for name, own in case.changes]
-    return sum(len(line) + 1 for line in lines)
+    return sum(len(line) for line in (*gene_lines(case.scenario), *record_lines(case)))
+
+
+def record_lines(case: Case) -> list[str]:
+    """Return the lines that hold what the objects did and what their policies changed."""
+    lines = [f"{name} = {_moves(moves)}" for name, moves in case.moves]
+    return lines + [f"{name} = {_changes(own)}" for name, own in case.changes]
 
 
 def loads(text: str, load_map: Callable[[str], Map], *, source: str = "case") -> Case:

@@ -11,6 +11,7 @@ from pathlib import Path
 
 from pytest_garl.adversary.policies import policy_spec
 from pytest_garl.regressions.case import Avoidable, Case, Deeds
+from pytest_garl.regressions.files import size_of
 from pytest_garl.regressions.findings import case_of, culprit_of
 from pytest_garl.regressions.inquiry import Asks, Failure, Finding, Inquiry
 from pytest_garl.regressions.neighbours import COUNT
@@ -43,10 +44,14 @@ _REMOVED = re.compile(r"(\d+) of (\d+) objects, (\d+) of (\d+) genes off nominal
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Means:
-    """With what a case is flown: its test's own assertion, and the simulator of its tests."""
+    """With what the tests of a case fly and judge: their simulator, data files, own assertion.
+
+    ``files`` are what the landing system reads, by the names that their hashes have.
+    """
 
     asks: Asks | None = None
     simulator: Reference = BUILT_IN
+    files: tuple[tuple[str, Path], ...] = ()
 
 
 def shrink_case(
@@ -67,7 +72,7 @@ def shrink_case(
     with own_pool(workers) as (ledger, pool):
         job = Job(
             system=reference_to(system),
-            system_sha256=sources_sha256(system),
+            system_sha256=sources_sha256(system, dict(means.files)),
             simulator=means.simulator,
             map=map.name,
             map_sha256=map.sha256,
@@ -205,7 +210,9 @@ class Continued(Pursuit):
     def _improves(self, case: Case) -> bool:
         one = simplicity(case, self._map)
         other = simplicity(self._case, self._map, outdated=self._outdated())
-        return one != other and no_worse(one, other)
+        if one == other:
+            return size_of(case) < size_of(self._case)
+        return no_worse(one, other)
 
     def _saved_as(self, failure: Failure, avoidable: Avoidable) -> Case:
         """Return a failure as the case that takes the saved one's place."""

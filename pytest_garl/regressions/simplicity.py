@@ -7,7 +7,7 @@ import itertools
 from dataclasses import dataclass
 
 from pytest_garl.regressions.case import Avoidable, Case
-from pytest_garl.regressions.files import size_of
+from pytest_garl.regressions.files import record_lines
 from pytest_garl.regressions.neighbours import COUNT
 from pytest_garl.regressions.shrink import complexity, genome_of
 from pytest_garl.scenarios.maps import Map
@@ -20,9 +20,9 @@ class Simplicity:
     """The respects in which two cases of one failure are compared.
 
     Objects; genes off nominal and their distance from it; decisions at which an object moves, and
-    runs of equal moves; characters of the scenario and the record in the file; neighbours that do
-    not fail, or were not flown; how much less may be demanded of a repair; whether the evidence is
-    of other sources than today's.
+    runs of equal moves; characters of the record in the file; neighbours that do not fail, or were
+    not flown; how much less may be demanded of a repair; whether the evidence is of other sources
+    than today's.
     """
 
     objects: int
@@ -46,7 +46,7 @@ def simplicity(case: Case, map: Map, *, outdated: bool = False) -> Simplicity:
         distance=distance,
         moving=sum(move != (0.0, 0.0) for _, own in case.moves for move in own),
         runs=sum(len(list(itertools.groupby(own))) for _, own in case.moves),
-        characters=size_of(case),
+        characters=sum(len(line) for line in record_lines(case)),
         doubtful_neighbours=max(COUNT, evidence.neighbours) - evidence.neighbours_failed,
         excused=_DEMANDED[case.avoidable],
         outdated=outdated,

@@ -200,7 +200,7 @@ def test_a_case_of_a_property_of_ones_own_is_shrunk_by_its_test(project: Path) -
     shrunk(file, 30)
     better = load(saved(project, "own"))
     assert better.scenario["environment.dust"] == 0.0
-    assert 0.1 <= better.scenario["environment.snow"] < 0.14
+    assert 0.1 <= better.scenario["environment.snow"] <= 0.14
     assert (better.test, better.assertion) == (case.test, case.assertion)
     assert garl("replay", saved(project, "own")).output.startswith("FAILED")
 
@@ -221,3 +221,11 @@ def test_too_few_flights_to_shrink_a_case_are_refused(project: Path, flights: st
     result = garl("shrink", saved(project, "IV-dog"), f"--flights={flights}")
     assert result.exit_code == 2
     assert "--flights" in result.output
+
+
+def test_check_names_a_test_whose_file_is_gone(project: Path) -> None:
+    assert garl("check").exit_code == 0
+    change(saved(project, "IV-dog"), '"test_it.py::', '"test_that.py::')
+    checked = garl("check")
+    assert "key 'test': there is no file" in checked.output
+    assert checked.exit_code == 1
