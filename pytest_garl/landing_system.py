@@ -190,9 +190,11 @@ class Diagnostics:
 
     ``phase`` is the system's own name of what it is doing (100 characters are kept);
     ``target_m`` (x, y, z) is what it takes for the marker; ``planned_path_m`` are the
-    (x, y, z) points that it means to fly, at most 1,000; ``note`` is a sentence for a
-    reader (1,000 characters are kept).  At most 100 detections a frame.  All numbers are
-    finite: a NaN here is a finding, as it is in a command.
+    (x, y, z) points that it means to fly, at most 1,000, of which 100 are kept; ``note`` is
+    a sentence for a reader (1,000 characters are kept).  At most 100 detections a frame.
+    All numbers are finite: a NaN here is a finding, as it is in a command.  A flight's record
+    keeps paths, corners and notes until 6 MB are full; phases, detections and targets that
+    fill 18 MB more are a finding.
     """
 
     phase: str = ""

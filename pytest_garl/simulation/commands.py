@@ -16,7 +16,7 @@ from pytest_garl.landing_system import (
     PositionSetpoint,
     VelocitySetpoint,
 )
-from pytest_garl.simulation.diagnostics import read_diagnostics
+from pytest_garl.simulation.diagnostics import Room, read_diagnostics
 from pytest_garl.simulation.reading import NonsenseError, number, numbers, vector
 from pytest_garl.simulation.texts import shown
 
@@ -30,10 +30,11 @@ what it has is no mixer's answer."""
 _Thrusts = tuple[float, float, float, float]
 
 
-def read_command(answer: Any) -> Command:
+def read_command(answer: Any, room: Room) -> Command:
     """Return the answer of ``step`` rebuilt from plain floats, or raise NonsenseError.
 
-    Each field is read once, so what comes back later is what was checked.
+    Each field is read once, so what comes back later is what was checked.  ``room`` is what the
+    flight's record still takes of diagnostics.
     """
     kind = next((kind for kind in COMMANDS if isinstance(answer, kind)), None)
     if kind is None:
@@ -41,6 +42,8 @@ def read_command(answer: Any) -> Command:
         raise NonsenseError(f"step returned {shown(answer)}; expected one of {names}")
     at = f"step returned {kind.__name__} with "
     thoughts = read_diagnostics(answer.diagnostics, f"{at}diagnostics")
+    if thoughts is not None:
+        thoughts = room.take(thoughts, f"{at}diagnostics")
     if kind is Abort:
         return Abort(diagnostics=thoughts)
     if kind is Land:

@@ -22,6 +22,7 @@ from pytest_garl.scenarios.placement import marker_position_m, wind_mps
 from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.simulation.camera import Frame, Renderer
 from pytest_garl.simulation.commands import read_command, read_thrusts
+from pytest_garl.simulation.diagnostics import Room
 from pytest_garl.simulation.environment import changed
 from pytest_garl.simulation.flight import Flight, Outcome
 from pytest_garl.simulation.flight_control import FlightControl
@@ -100,6 +101,7 @@ class Loop:
         self.thrusts: Thrusts = (0.0, 0.0, 0.0, 0.0)
         self.pending: list[tuple[int, Command]] = []
         self.command: Command | None = None
+        self.room = Room()
         self.gave_up = False
         self.airborne = False
         self.landed_since: float | None = None
@@ -356,7 +358,7 @@ class Loop:
             attitude=np.array(attitude),
         )
         command: Command = self.calls.ask(
-            "step", lambda: read_command(self.system.step(observation))
+            "step", lambda: read_command(self.system.step(observation), self.room)
         )
         self.gave_up = isinstance(command, Abort)
         self.recorder.step(command, visible)

@@ -50,6 +50,16 @@ def numbers(
     return plain
 
 
+def are_floats(value: object, count: int) -> bool:
+    """Whether a value is a tuple of so many finite floats: the usual case, told in no time."""
+    return (
+        type(value) is tuple
+        and len(value) == count
+        and all(type(item) is float for item in value)
+        and math.isfinite(sum(value))
+    )
+
+
 def vector(value: object, field: str, most: float = math.inf, unit: str = "") -> Vector:
     """Return three finite Python floats, none beyond ``most``."""
     x, y, z = numbers(value, field, 3, most, unit)

@@ -101,6 +101,14 @@ class LongNotes(Harmless):
         return told(note="n" * 50_000_000, phase="\ud800" * 10**6)
 
 
+class FloodsTheRecord(Lander):
+    airframe = Airframe(latency_s=0.0, camera=Camera(rate_hz=240.0))
+
+    def step(self, observation: Observation) -> Any:
+        sighting = Detection(marker_id=0, confidence=1.0, position_m=(0.1, 0.2, 0.3))
+        return told(detections=(sighting,) * 100, note="\U0001f6ec" * 1_000)
+
+
 class SpinsBeyondNumbers(Misbehaves):
     def misbehave(self, observation: Observation) -> Any:
         return AttitudeSetpoint(attitude=(1e200, 0.0, 0.0, 1.0), thrust=0.5)
