@@ -21,7 +21,7 @@ SLOT_ID = re.compile(r"(?P<map>.+)-g(?P<generation>\d{2,})-s(?P<slot>\d{2,})")
 SHRINK = 12
 """Flights for each new kind of violation: enough for the barest scenario, its neighbours, the
 reference pilot and a shorter record of moves."""
-LEAST_SHRINK = 10
+LEAST_SHRINK = 8
 """Fewer say nothing: ``pursuit.LEAST``, which to import takes long."""
 
 

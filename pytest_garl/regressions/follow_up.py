@@ -157,17 +157,26 @@ def _with_pilots(kind: Inquiry, flights: int) -> int:
 
 
 def _divided(most: Sequence[int], flights: int) -> list[int]:
-    """Return how many of ``flights`` each has that wants at most so many and can do with few."""
+    """Return how many of ``flights`` each has that wants at most so many and can do with few.
+
+    What is over is spread evenly, unless some have nothing: then it is for them, together with what
+    the others leave.
+    """
     given = []
     for wanted in most:
         least = min(wanted, LEAST - PILOTS)
         given.append(least if least <= flights else 0)
         flights -= given[-1]
-    for number, wanted in enumerate(most):
-        if given[number]:
-            more = min(wanted - given[number], flights)
-            given[number] += more
-            flights -= more
+    if sum(map(bool, given)) == 1:
+        # A single one is shrunk as well as can be.
+        number = next(number for number, each in enumerate(given) if each)
+        given[number] += min(most[number] - given[number], flights)
+    elif all(given):
+        while flights > 0 and given != [*most]:
+            for number, wanted in enumerate(most):
+                more = min(1, wanted - given[number], flights)
+                given[number] += more
+                flights -= more
     return given
 
 

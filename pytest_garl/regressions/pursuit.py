@@ -29,8 +29,8 @@ from pytest_garl.simulation.reference_pilot import ReferencePilot
 PILOTS = 3
 """Flights of the reference pilot: against the recorded moves, against the live policy, and one more
 where the shortest record leaves nobody a way out."""
-LEAST = 4 + COUNT + PILOTS
-"""Flights without which nothing can be said: three without what the failure should not need, one as
+LEAST = 2 + COUNT + PILOTS
+"""Flights without which nothing can be said: one without what the failure should not need, one as
 found, three neighbours, the reference pilot."""
 EXCEPTION = 2
 """Flights for a Python exception, which hardly depends on the scenario: bare, and as found."""
@@ -113,18 +113,19 @@ class Pursuit:
         found = self._flown[first]
         culprit = culprit_of(found)
         scenario = bare(first, self._map, culprit)
-        if scenario != first and self._left >= 3 + COUNT:
+        # What is left must do for the scenario as it was found.
+        if scenario != first and self._left >= (3 if culprit else 2) + COUNT:
             done = self._flown[scenario] = self._go(self._inquiry.job, scenario)
             if self._inquiry.failed(scenario, done):
                 deeds = deeds_of(done, scenario, self._map)
-                done = self._again(scenario, deeds)
+                # Where nothing moves, the record is the flight itself.
+                done = self._again(scenario, deeds) if deeds.moves else done
                 if self._inquiry.failed(scenario, done):
                     return self._asked(first, scenario, deeds, done)
         if not culprit:
             return None
         deeds = _only(deeds_of(found, first, self._map), culprit)
         for scenario in (clear(first, self._map, culprit), alone(first, self._map, culprit)):
-            # What is left must do for the scenario as it was found.
             if scenario == first or self._left < 2 + COUNT:
                 continue
             done = self._again(scenario, deeds)

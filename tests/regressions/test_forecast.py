@@ -44,12 +44,16 @@ def test_each_kind_has_its_flights_where_they_reach(cap: int | None) -> None:
     assert budgets(*kinds) == [12, EXCEPTION, 12]
 
 
-def test_a_cap_reaches_as_many_kinds_as_it_can_the_first_with_most() -> None:
+def test_a_cap_reaches_as_many_kinds_as_it_can_and_keeps_the_rest_for_the_others() -> None:
     own = LEAST - PILOTS
     cap = 2 * own + 1
-    given = budgets(*(kind(number, cap=cap) for number in range(4)))
-    assert given == [LEAST + 1, LEAST, 0, 0]
-    assert sum(each - PILOTS for each in given if each) == cap
+    assert budgets(*(kind(number, cap=cap) for number in range(4))) == [LEAST, LEAST, 0, 0]
+
+
+def test_a_cap_that_reaches_all_is_spread_evenly() -> None:
+    given = budgets(*(kind(number, cap=40) for number in range(6)))
+    assert given == [10, 10, 10, 10, 9, 9]
+    assert sum(each - PILOTS for each in given) == 40
 
 
 def test_one_kind_is_shrunk_however_low_the_cap() -> None:
