@@ -52,9 +52,13 @@ class Asks:
     def __call__(
         self, result: dict[str, Any], record: Path, scenario: Scenario
     ) -> OwnFailure | None:
-        """Return how the test fails on a flight beyond its verdict, or None."""
-        found = self.failure(result, record, scenario)
-        if found is None or found.is_about(result["verdict"]["primary"]):
+        """Return how the test fails on a flight that violates nothing else, or None.
+
+        A case of a property of the user's own is to show that property alone.
+        """
+        violates = result["verdict"]["primary"] is not None
+        found = None if violates else self.failure(result, record, scenario)
+        if found is None:
             return None
         return OwnFailure(
             test=found.test,

@@ -79,6 +79,8 @@ def _explain_fault(
     lines = [f"{fault.signature}: a property of your own" if fault.own else fault.signature]
     if fault.own and not fault.asks.possible:
         lines.append("It is not saved: its test takes more than landing and scenario.")
+    elif fault.own and result["verdict"]["primary"] is not None:
+        lines.append("It is saved only if it fails in a flight that violates nothing else, too.")
     story = result["verdict"]["story"]
     told = [*_unusual(item.config, run, target), *doubts]
     what = fault.failure.message if fault.own and fault.failure else headline(story)

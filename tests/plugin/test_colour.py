@@ -344,3 +344,17 @@ def test_an_item_that_is_run_again_excuses_not_itself(
     result = run(pytester, "--garl-budget=8", "--garl-workers=0")
     assert result.parseoutcomes()["failed"] == failures
     assert result.parseoutcomes()["xfailed"] > 1
+
+
+def test_an_own_property_that_fails_only_in_collisions_is_told_and_not_saved(
+    pytester: pytest.Pytester,
+) -> None:
+    own = "\ndef test_own(landing):\n    assert landing.flight.outcome != 'collision'\n"
+    write_tests(pytester, "Good", COLLISIONS + own)
+    search = ("--garl-budget=12", "--garl-workers=0", "--garl-shrink=10")
+    result = run(pytester, *search)
+    assert result.parseoutcomes()["failed"] == 2
+    result.stdout.fnmatch_lines(["It is saved only if it fails in a flight that violates nothing*"])
+    assert result.ret == pytest.ExitCode.TESTS_FAILED
+    files = (pytester.path / "scenarios" / "regressions" / "systems").glob("*.toml")
+    assert not any("-own-" in path.name for path in files)
