@@ -7,7 +7,7 @@ import sqlite3
 from typing import Any, get_args
 
 from pytest_garl.errors import GarlError, LedgerError
-from pytest_garl.messages import printable, shown
+from pytest_garl.messages import shortened, shown
 from pytest_garl.plain import made
 from pytest_garl.search.job import load_scenario, loads
 from pytest_garl.search.ledger import VERSION, Kind, Ledger, result_in
@@ -98,7 +98,7 @@ def _wrong_slot(ledger: Ledger) -> str:
     searches = {search for (search,) in ledger.select("SELECT id FROM search")}
     rows = ledger.select("SELECT search, generation, slot, state, scenario, result FROM slot")
     for search, generation, slot, state, scenario, result in rows:
-        where = f"slot {generation}/{slot} of {printable(search, keep='')}"
+        where = f"slot {generation}/{slot} of {shortened(search)}"
         if search not in searches or min(generation, slot) < 0 or state not in _STATES:
             return f"{where}: found no such search or the state {shown(state)}"
         if (state == "flown") != (result is not None):

@@ -103,6 +103,13 @@ def test_a_map_that_would_eat_the_machine_is_refused(
         load_map("mine", [tmp_path])
 
 
+def test_a_negative_zero_is_a_size_like_zero(tmp_path: Path) -> None:
+    layer = LAYER.format(kind="patches", points="[[0, 0]]") + "size_m = -0.0\nwidth_m = -0.0\n"
+    (tmp_path / "mine.toml").write_text(LAWN + layer)
+    found = load_map("mine", [tmp_path]).ground.layers[-1]
+    assert (str(found.size_m), str(found.width_m)) == ("0.0", "0.0")
+
+
 def test_the_largest_area_and_count_are_taken(tmp_path: Path) -> None:
     text = LAWN.replace("[-10.0, 10.0, -20.0, 20.0]", "[-50.0, 50.0, -50.0, 50.0]")
     (tmp_path / "mine.toml").write_text(text.replace("person = 2", "person = 50"))

@@ -167,3 +167,32 @@ def test_jobs_and_scenarios_survive_their_text() -> None:
         loads("")
     with pytest.raises(LedgerError, match="a scenario in the ledger is damaged: map: found 1"):
         load_scenario('{"map": 1, "seed": 1, "genes": []}')
+
+
+def test_a_page_that_no_query_reads_is_found_too(path: Path) -> None:
+    database = sqlite3.connect(path)
+    sql = "SELECT rootpage FROM sqlite_master WHERE name = 'slot_state'"
+    (page,) = database.execute(sql).fetchone()
+    database.execute("PRAGMA wal_checkpoint(TRUNCATE)")
+    database.close()
+    content = bytearray(path.read_bytes())
+    content[(page - 1) * 4096] = 0xFF
+    path.write_bytes(content)
+    with pytest.raises(LedgerError, match="is damaged or no ledger"):
+        _checked(path)
+
+
+def test_an_error_that_quotes_damaged_bytes_is_the_ledgers(path: Path) -> None:
+    content = path.read_bytes()
+    start = content.index(b"tablemetermeter")
+    damaged = content[:start] + b"tablem\x8aterm\x8ater" + content[start + 15 :]
+    path.write_bytes(damaged)
+    with pytest.raises(LedgerError, match=r"ledger\.sqlite"):
+        _checked(path)
+
+
+def test_the_name_of_a_search_is_shortened(path: Path) -> None:
+    _run(path, "UPDATE slot SET search = ? WHERE slot = 1", "9" * 5000)
+    with pytest.raises(LedgerError, match=r"slot 0/1 of 999.*…9+: found no such search") as caught:
+        _checked(path)
+    assert len(str(caught.value)) < 500

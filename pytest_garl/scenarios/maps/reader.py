@@ -145,8 +145,9 @@ def _layer(table: Table) -> Layer:
         kind=cast(LayerKind, kind),
         points_m=table.points("points_m", low, high, _FAR_M),
         colour=table.colour("colour", (255, 255, 255)),
-        size_m=table.number("size_m", 0.0, low=0.0, high=_FAR_M),
-        width_m=table.number("width_m", 0.0, low=0.0, high=_FAR_M),
+        # A negative zero is no spread that the generator of random numbers takes.
+        size_m=abs(table.number("size_m", 0.0, low=0.0, high=_FAR_M)),
+        width_m=abs(table.number("width_m", 0.0, low=0.0, high=_FAR_M)),
         angles_rad=(math.radians(start), math.radians(end)),
         yaw_rad=_yaw(table),
         marker_id=marker_id,
