@@ -100,7 +100,7 @@ def summary(reporter: Any, run: Run) -> None:
         *told(run.pursued, reporter.config),
         *([f"nothing more was saved: {run.trouble}"] if run.trouble else []),
         *_maybe_fixed(reporter),
-        *_computed_otherwise(run),
+        *(wrapped(line, width_of(reporter.config)) for line in _computed_otherwise(run)),
     ]
     if lines:
         reporter.section("garl: cases", sep="=")
