@@ -11,7 +11,7 @@ from pytest_garl.regressions.pursuit import LEAST, PILOTS
 
 SPENT = 0.85
 """Share of its flights that a kind of violation spends: many stop before the last is needed.  With
-it the forecast was 1.07 and 1.31 times what came (the tutorial's system, six kinds, two workers)."""
+it the forecast was 1.07 and 1.31 times what came (the tutorial's system, six kinds)."""
 PILOTED = 2
 """Flights of the reference pilot for a kind."""
 PILOTED_S = 0.2
