@@ -8,7 +8,7 @@ from pathlib import Path
 
 import click
 
-from pytest_garl.errors import GarlError, LandingSystemError
+from pytest_garl.errors import LandingSystemError
 
 LIMIT_S = 1800.0
 """Wall time after which the command ends in any case, with a traceback."""
@@ -66,14 +66,7 @@ def _imported(name: str) -> type:
         system: type = system_named(name)
     except LandingSystemError as error:
         raise LandingSystemError(
-            f"{name!r} is no landing system ({error}); expected MODULE:CLASS, as "
-            "my_landing:MyLandingSystem, importable from the current folder"
-        ) from error
-    except GarlError:
-        raise
-    except Exception as error:
-        # The user's module runs when it is imported and raises what it likes.
-        raise LandingSystemError(
-            f"{name!r}: importing it raised {type(error).__name__}: {error}"
+            f"{name!r}: cannot be imported as a landing system ({error}); expected MODULE:CLASS, as "
+            "my_landing:MyLandingSystem, found from the current folder"
         ) from error
     return system
