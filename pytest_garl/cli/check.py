@@ -66,7 +66,7 @@ def _imported(name: str) -> type:
         system: type = system_named(name)
     except LandingSystemError as error:
         raise LandingSystemError(
-            f"{name!r}: cannot be imported as a landing system ({error}); expected MODULE:CLASS, as "
-            "my_landing:MyLandingSystem, found from the current folder"
+            f"{name!r}: cannot be imported as a landing system ({error}); expected "
+            "MODULE:CLASS, as my_landing:MyLandingSystem, found from the current folder"
         ) from error
     return system
