@@ -58,15 +58,15 @@ OPTIONS = (
     Option(
         name="budget",
         metavar="N",
-        help="Search: fly N scenarios per landing system and map. Without it only committed "
-        "cases are flown, and other tests of landings are skipped.",
+        help="Search: fly N scenarios per landing system and map. Without it only saved cases "
+        "are flown, and all other tests of landings are skipped.",
     ),
     Option(
         name="seed",
         metavar="SEED",
         default="0",
-        help="Seed of the search; the same seed finds the same. A whole number, or 'random' to "
-        "draw one, which the header prints (default: 0).",
+        help="Seed of the search: a whole number, or 'random' to draw one, which the header "
+        "prints. The same seed gives the same results (default: 0).",
     ),
     Option(
         name="method",
@@ -83,7 +83,7 @@ OPTIONS = (
     Option(
         name="map",
         metavar="MAPS",
-        help="Fly only on these of the tests' maps, separated by commas, such as court,lawn "
+        help="Fly only on these maps of the tests, separated by commas, such as court,lawn "
         "(default: all).",
     ),
     Option(
@@ -97,8 +97,8 @@ OPTIONS = (
         metavar="WHERE",
         default="local",
         help="Where flights are flown: 'local' in child processes, 'ray' on the Ray cluster of "
-        "RAY_ADDRESS, or without it on one that is started here and ends with the run; that needs "
-        "pytest-garl[ray]. The results are the same (default: local).",
+        "RAY_ADDRESS or, if that is not set, on one that is started here and ends with the run; "
+        "'ray' needs pytest-garl[ray]. The results are the same (default: local).",
     ),
     Option(
         name="weather",
@@ -111,8 +111,8 @@ OPTIONS = (
         name="timeout",
         metavar="SECONDS",
         default="10",
-        help="Wall-clock time that one call of the landing system may take; beyond that it "
-        "counts as hung (default: 10).",
+        help="Wall-clock seconds that one call of the landing system may take; a call that takes "
+        "longer counts as hung (default: 10).",
     ),
     Option(
         name="repeat",
@@ -124,28 +124,28 @@ OPTIONS = (
         name="duplicates",
         metavar="HOW",
         default="xfail",
-        help="Report further violations with a signature already found in the same search as "
-        "'xfail' or as 'fail' (default: xfail).",
+        help="How to report a test that fails in the same assertion and for the same signature "
+        "as an earlier slot of the search: 'xfail' or 'fail' (default: xfail).",
     ),
     Option(
         name="shrink",
         metavar="N",
-        help="Flights for each new kind of violation that a search found, to confirm, shrink and "
-        "save it; a Python exception takes 2. 0: nothing is confirmed, shrunk or saved (default: "
-        "12, but for all kinds together no more than the search itself).",
+        help="Flights to confirm, shrink and save each new kind of violation that a search found: "
+        "8 or more; a Python exception takes 2. With 0 nothing is confirmed, shrunk or saved "
+        "(default: 12, but for all kinds together no more than the search itself).",
     ),
     Option(
         name="baseline",
         metavar="FILE",
         help="Gate: fly the scenarios of a file that `garl baseline save` wrote, and fail on a new "
-        "type of violation, a significantly worse rate, or a flight that decides nothing.",
+        "type of violation, significantly more violations or aborts, or an inconclusive flight.",
     ),
     Option(
         name="level",
         metavar="P",
         default="0.05",
-        help="How often the gate may fail a stack that is no worse than the baseline, per landing "
-        "system and map (default: 0.05).",
+        help="How often the gate may fail a landing system that is no worse than the baseline, per "
+        "map: a share between 0 and 1 (default: 0.05).",
     ),
     Option(
         name="npcs",
@@ -173,13 +173,14 @@ def add_options(parser: pytest.Parser) -> None:
     group.addoption(
         "--garl-resume",
         action="store_true",
-        help="Continue the interrupted run in the ledger; everything else must be as it was.",
+        help="Continue the interrupted run in the ledger. Options, landing system and versions "
+        "must be as they were.",
     )
     parser.addini("garl_dir", help="Folder of the ledger and the flights.", default=".garl")
     parser.addini("garl_cases", help="Folder of the saved cases.", default="scenarios/regressions")
     parser.addini(
         "garl_xfail_strict",
-        help="Whether an open case that passes fails the run.",
+        help="Whether a saved case that is open and passes fails the run.",
         type="bool",
         default=False,
     )

@@ -41,7 +41,7 @@ _SURVEY = (
         type=click.IntRange(min=1),
         default=100,
         show_default=True,
-        help="Scenarios per map. To fail a worse rate takes six that broke at the least.",
+        help="Scenarios per map. A worse rate fails only if at least six of them broke.",
     ),
     click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True),
     click.option(
@@ -57,8 +57,20 @@ _SURVEY = (
         show_default=True,
         help="Who moves people, dogs and birds, as for --garl-npcs.",
     ),
-    click.option("--distance-m", type=float, default=1.5, show_default=True, help="Limit."),
-    click.option("--time-s", type=float, default=120.0, show_default=True, help="Limit."),
+    click.option(
+        "--distance-m",
+        type=float,
+        default=1.5,
+        show_default=True,
+        help="How far off the marker a landing may be.",
+    ),
+    click.option(
+        "--time-s",
+        type=float,
+        default=120.0,
+        show_default=True,
+        help="How long a landing may take.",
+    ),
     click.option(
         "--abort",
         type=click.Choice(["ok", "violation"]),
@@ -70,7 +82,7 @@ _SURVEY = (
         "--simulator",
         metavar="MODULE:FUNCTION",
         default="",
-        help="What the stack's hook pytest_garl_fly returns (default: the built-in simulator).",
+        help="What your hook pytest_garl_fly returns (default: the built-in simulator).",
     ),
     click.option(
         "--workers",
@@ -90,7 +102,7 @@ def _survey_options(command: Callable[..., Any]) -> Callable[..., Any]:
 
 @click.group()
 def baseline() -> None:
-    """Keep what a landing system does today, for pytest --garl-baseline=FILE to compare with."""
+    """Save what a landing system does today; pytest --garl-baseline=FILE compares with it."""
 
 
 @baseline.command()
@@ -99,7 +111,7 @@ def baseline() -> None:
     "--from-ledger",
     "ledger",
     type=_FILE,
-    help="Keep what a finished search flew (.garl/ledger.sqlite) instead of flying.",
+    help="Keep what a finished search flew, such as .garl/ledger.sqlite; fly nothing.",
 )
 @click.option("--out", type=_FILE, required=True, help="The file to write, to be committed.")
 def save(
@@ -162,7 +174,7 @@ def scenario(file: Path, name: str) -> None:
     type=click.FloatRange(min=0, max=1, min_open=True, max_open=True),
     default=0.05,
     show_default=True,
-    help="How often a stack that is no worse may fail, per map.",
+    help="How often a landing system that is no worse may fail, per map.",
 )
 def diff(
     base: Path,
@@ -175,9 +187,8 @@ def diff(
     """Fly the same scenarios with two checkouts of a landing stack and compare pair by pair.
 
     BASE and HEAD are folders, such as two git worktrees. The exit status is 1 if HEAD is worse: a
-    new type of violation, significantly more violations or aborts, or a flight of HEAD that
-    decided nothing. The simulator and the
-    policies are this installation's for both, and a map of your own is this folder's.
+    new type of violation, significantly more violations or aborts, or an inconclusive flight. Both
+    fly with the simulator and the policies of this installation, and with the maps of this folder.
     """
     from pytest_garl.regressions.survey import compare_sets, fly_beside, survey_checkout
     from pytest_garl.scenarios.maps import load_map

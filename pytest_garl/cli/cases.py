@@ -152,8 +152,8 @@ def _totals(case: Case) -> list[tuple[str, float]]:
 def replay_(context: click.Context, file: Path, live: bool, video: Path | None) -> None:
     """Fly a case again and answer FIXED, FAILED, STALE or UNDECIDED (exit status 0, 1, 3, 3).
 
-    The tests that found it judge: pytest flies this one case in a process of its own.  Where the
-    case names no test, the built-in verdict judges.
+    The tests that found it judge: pytest flies this one case in a process of its own.  If the case
+    names no test, the built-in verdict judges.
     """
     folders: _Folders = context.obj
     case = folders.case(file)
@@ -196,9 +196,9 @@ def _answer(result: Replay) -> None:
 )
 @click.pass_obj
 def accept(folders: _Folders, files: tuple[Path, ...]) -> None:
-    """Say that cases are known: they are expected to fail until they are fixed.
+    """Make cases known: they are expected to fail until they are fixed.
 
-    A case that is committed is known without that; this is for a project without git.
+    A committed case is known already; this is for a project without git.
     """
     found = [(file, folders.case(file)) for file in files]
     for file, case in found:
@@ -212,9 +212,9 @@ def accept(folders: _Folders, files: tuple[Path, ...]) -> None:
 def promote(folders: _Folders, file: Path) -> None:
     """Say that a case is fixed: from now on it must pass.
 
-    It is flown first, with its recorded moves and, where the reference pilot gets away from it,
-    with a live policy.  It stays open if it fails, if nobody can tell, or if it passes for another
-    reason than a change of the landing system.
+    It is flown first, with its recorded moves and, if the reference pilot can avoid it, with a
+    live policy too.  It stays open if it fails, if it is undecided, or if nothing shows that a
+    repair of the landing system is why it passes.
     """
     case, told = folders.case(file), []
     for live in (False, True) if case.avoidable == "live" else (False,):
@@ -251,10 +251,10 @@ def _refusal(result: Replay, how: str) -> str:
 @click.option("--workers", default=2, show_default=True, help="Flying child processes.")
 @click.pass_obj
 def shrink(folders: _Folders, file: Path, flights: int, workers: int) -> None:
-    """Go on shrinking a case, from its own record.
+    """Shrink a case further, from its own record.
 
     The file is replaced only by a case that is no worse in any respect (objects, genes, moves,
-    size, neighbours that fail) and better in one.
+    size, neighbours that fail) and better in at least one.
     """
     from pytest_garl.cli.collecting import means_of
     from pytest_garl.regressions.resumed import KEPT, shrink_case
@@ -281,8 +281,8 @@ def shrink(folders: _Folders, file: Path, flights: int, workers: int) -> None:
 def prune(folders: _Folders, yes: bool) -> None:
     """Fly all cases that are not fixed and delete those that are stale.
 
-    That is: they pass, but not because the landing system was repaired, as far as anybody knows.
-    A case that fails, or that nobody can decide, stays.
+    A stale case passes, but nothing shows that the landing system was repaired: see the table in
+    docs/cases.md. A case that fails, or is undecided, stays.
     """
     kept = 0
     for entry in corpus.every_entry(folders.cases, folders.maps):

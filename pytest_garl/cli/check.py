@@ -32,15 +32,16 @@ LIMIT_S = 1800.0
 @click.option(
     "--nondeterministic",
     is_flag=True,
-    help="Only warn where equal flights differ (deterministic=False in the marker).",
+    help="Only warn if equal flights differ (as deterministic=False in the marker).",
 )
 def check(
     system: str, maps: tuple[str, ...], seconds: float | None, nondeterministic: bool
 ) -> None:
-    """Fly a landing system in two calm scenarios and name what is wrong with it.
+    """Fly a landing system without moving objects and name what is wrong with it.
 
-    Run it where you run pytest.  It ends with status 1 for a fault that a search would meet in
-    every flight; warnings tell what a search will meet beside that.
+    It flies two scenarios, and the first one again. Run it where you run pytest. The exit status is
+    1 for a fault that a search would meet in every flight; warnings tell what else a search would
+    meet.
     """
     from pytest_garl.testing import check_landing_system
 

@@ -21,7 +21,9 @@ from pytest_garl.saving import save_text
 )
 @click.option("--json", "as_json", is_flag=True, help="Write JSON, as docs/report.md says.")
 @click.option(
-    "--out", type=click.Path(path_type=Path, dir_okay=False), help="Write into this file."
+    "--out",
+    type=click.Path(path_type=Path, dir_okay=False),
+    help="Write to this file instead of to standard output.",
 )
 @click.option(
     "--folder",
