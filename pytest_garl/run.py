@@ -67,11 +67,11 @@ def selected(item: pytest.Item) -> Selected:
 
 def test_of(item: pytest.Item) -> str:
     """Return an item's test with its parameters but the slot."""
-    callspec: Any = getattr(item, "callspec", None)
-    indices = callspec.indices.items() if callspec else ()
-    others = [f"{name}{index}" for name, index in sorted(indices) if name != "garl_slot"]
+    callspec, target = getattr(item, "callspec", None), target_of(item)
+    # Not pytest's indices of the parameters, which count all items of the test.
+    others = callspec.id.replace(target.name, "", 1).strip("-") if callspec and target else ""
     name = f"{item.nodeid.removesuffix(item.name)}{getattr(item, 'originalname', item.name)}"
-    return f"{name}[{'-'.join(others)}]" if others else name
+    return f"{name}[{others}]" if others else name
 
 
 @dataclass(kw_only=True)

@@ -116,6 +116,21 @@ def test_xdist_fails_the_same_items(pytester: pytest.Pytester) -> None:
         assert outcomes_of(result, "FAILED") == alone
 
 
+@PARALLEL
+def test_each_parameter_of_a_test_fails_once(
+    pytester: pytest.Pytester, parallel: tuple[str, ...]
+) -> None:
+    parametrised = DISTANCE.replace("landing)", "landing, limit_m)").replace("1.5", "limit_m")
+    given = "\n@pytest.mark.parametrize('limit_m', [1.5, 2.0])"
+    write_tests(pytester, "Good", given + parametrised)
+    result = run(pytester, *SEARCH[:1], "--garl-workers=1", "-rf", *parallel)
+    assert outcomes_of(result, "FAILED") == {
+        "test_it.py::test_distance[lawn-g00-s00-1.5]",
+        "test_it.py::test_distance[lawn-g00-s00-2.0]",
+    }
+    assert result.parseoutcomes()["xfailed"] > 1
+
+
 def test_a_session_is_not_green_if_somebody_hides_the_failure_that_excuses_others(
     pytester: pytest.Pytester,
 ) -> None:
