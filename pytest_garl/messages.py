@@ -45,7 +45,7 @@ def shortened(text: str, limit: int = SHOWN) -> str:
 def shown(value: object, limit: int = SHOWN) -> str:
     """Return the start of a value's ``repr``, whatever it is and however large."""
     try:
-        return shortened(_REPR.repr(value), limit)
+        return shortened(brief(value), limit)
     except (ValueError, RecursionError):
         # Python refuses to write whole numbers of more than 4300 digits.
         return f"{type(value).__name__} too long to be shown"
@@ -54,6 +54,11 @@ def shown(value: object, limit: int = SHOWN) -> str:
 def listed(names: Iterable[object], limit: int = 10 * SHOWN) -> str:
     """Return names separated by commas, cut where they would fill a screen."""
     return shortened(", ".join(str(name) for name in names), limit)
+
+
+def brief(value: object) -> str:
+    """Return a value's ``repr`` with few of its items; raise what the value's own raises."""
+    return _REPR.repr(value)
 
 
 _REPR = reprlib.Repr()

@@ -42,14 +42,17 @@ class _Folders:
         return load(file, self.maps)
 
 
-@click.group()
-@click.option(
+FOLDER = click.option(
     "--folder",
     type=click.Path(path_type=Path, file_okay=False),
     default=DEFAULT,
     show_default=True,
     help="Where the cases are (the ini key garl_cases).",
 )
+
+
+@click.group()
+@FOLDER
 @click.pass_context
 def cases(context: click.Context, folder: Path) -> None:
     """Look after saved violations: list, show, replay, accept, promote, shrink, prune, check.

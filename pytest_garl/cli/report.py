@@ -8,7 +8,7 @@ from typing import Any
 
 import click
 
-from pytest_garl.cli.cases import DEFAULT
+from pytest_garl.cli.cases import FOLDER
 from pytest_garl.reports.record import report_of
 from pytest_garl.saving import save_text
 
@@ -25,13 +25,7 @@ from pytest_garl.saving import save_text
     type=click.Path(path_type=Path, dir_okay=False),
     help="Write to this file instead of to standard output.",
 )
-@click.option(
-    "--folder",
-    type=click.Path(path_type=Path, file_okay=False),
-    default=DEFAULT,
-    show_default=True,
-    help="Where the cases are (the ini key garl_cases).",
-)
+@FOLDER
 def report(ledger: Path, as_json: bool, out: Path | None, folder: Path) -> None:
     """Tell what the run in LEDGER (default .garl/ledger.sqlite) found.
 

@@ -3,17 +3,15 @@
 from __future__ import annotations
 
 import re
-import reprlib
 from collections.abc import Callable
 
-from pytest_garl.messages import printable
+from pytest_garl.messages import SHOWN, brief, printable
 
 MESSAGE_CHARS = 1_000
 """How much of an exception's message is kept."""
 TRACEBACK_CHARS = 20_000
 NAME_CHARS = 80
 """How much of a name is kept: it becomes part of signatures and of the names of files."""
-VALUE_CHARS = 80
 
 _ADDRESS = re.compile(r"\bat 0x[0-9A-Fa-f]{6,}")
 
@@ -59,14 +57,8 @@ def told(tell: Callable[[], str], limit: int, otherwise: str) -> str:
         return f"{otherwise} raised {name_of(type(error))}"
 
 
-class _Short(reprlib.Repr):
-    def __init__(self) -> None:
-        super().__init__()
-        self.maxstring = self.maxother = self.maxlong = VALUE_CHARS
-
-
 def shown(value: object) -> str:
-    """Return the start of a value's repr, whatever the value is."""
+    """Return the start of a value's repr, whatever the value is and whatever its repr raises."""
     name = name_of(type(value))
-    text = told(lambda: _Short().repr(value), 10 * VALUE_CHARS, f"<{name}>, whose repr()")
-    return text if len(text) <= VALUE_CHARS else text[: VALUE_CHARS - 3] + "..."
+    text = told(lambda: brief(value), 10 * SHOWN, f"<{name}>, whose repr()")
+    return text if len(text) <= SHOWN else text[: SHOWN - 3] + "..."
