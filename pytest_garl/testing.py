@@ -176,7 +176,7 @@ class _Checker:
         text = f"{self._system.__name__}: {problem}, first at {parted_s(fresh, again):.2f} s"
         if self._deterministic:
             raise LandingSystemError(
-                f"{text}; where that is meant, say deterministic=False here and in the marker"
+                f"{text}; if that is meant, say deterministic=False here and in the marker"
             )
         if text not in self._warnings:
             self._warnings.append(text)
@@ -279,7 +279,7 @@ def _told_of_leftovers(warn: Callable[[str], None]) -> Iterator[None]:
         warn(f"leaves {len(left)} threads running ({left[0].name})")
     started = _children() - processes
     if started:
-        warn(f"leaves {len(started)} processes running; a search ends them after each run")
+        warn(f"leaves {len(started)} processes running; a search ends them after each flight")
 
 
 def _children() -> set[str]:

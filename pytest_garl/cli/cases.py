@@ -169,7 +169,7 @@ def replay_(context: click.Context, file: Path, live: bool, video: Path | None) 
     _answer(result)
     if video is not None:
         if result.flight is None:
-            raise GarlError(f"{file}: its process did not live to record the flight: no video")
+            raise GarlError(f"{file}: its process ended before the flight was recorded: no video")
         from pytest_garl.landing_system import airframe_of
         from pytest_garl.reports.video import save_video
 

@@ -98,7 +98,7 @@ def _lost(path: Path, map_folders: tuple[Path, ...], reason: str) -> Entry:
     """Return an entry that tells of a symbolic link without a file: a case may be lost."""
     fault = (
         f"{path}: cannot be read: found a symbolic link that leads nowhere ({reason}), expected "
-        "a file; remove it, or bring back what it meant"
+        "a file; remove it, or restore what it points to"
     )
     return Entry(path=path, changed=0, map_folders=map_folders, head=None, fault=printable(fault))
 

@@ -64,7 +64,8 @@ def _result(claim: Claim, death: Death, again: bool, undecided: bool) -> dict[st
     diagonal = load_map(job.map, tuple(Path(folder) for folder in job.map_folders)).diagonal_m
     kind, error, message, text = _described(death)
     if undecided:
-        message = f"each of {ATTEMPTS} flights ended its process in another way, at last: {message}"
+        how = f"each of {ATTEMPTS} flights ended its process in a different way"
+        message = f"{how}, at last: {message}"
     elif again:
         message += ", twice"
     return broken_result(kind, error, message, text, diagonal, inconclusive=undecided)

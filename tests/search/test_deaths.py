@@ -104,7 +104,7 @@ def test_three_flights_that_end_each_in_another_way_leave_it_undecided(ledger: L
     result = ledger.result("s", 0, 0)
     assert result is not None
     assert (result["outcome"], result["verdict"]["signature"]) == ("inconclusive", "")
-    assert result["undecided"].startswith("each of 3 flights ended its process in another way")
+    assert result["undecided"].startswith("each of 3 flights ended its process in a different way")
 
 
 def test_a_finding_after_another_death_is_one(ledger: Ledger) -> None:
