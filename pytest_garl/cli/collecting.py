@@ -17,6 +17,9 @@ from pytest_garl.search.reference import BUILT_IN, Reference, reference_to
 from pytest_garl.search.sources import data_files
 from pytest_garl.switches import target_of
 
+IMPORTED = "ignore::pytest.PytestAssertRewriteWarning"
+"""pytest warns that this package is imported already; a project may make errors of warnings."""
+
 
 class _Collected:
     """A plugin that keeps what pytest collects."""
@@ -40,7 +43,7 @@ def means_of(case: Case, root: Path) -> Means:
     with alone_in_a_folder(case, live=False) as folder, contextlib.chdir(root):
         told = io.StringIO()
         with contextlib.redirect_stdout(told), contextlib.redirect_stderr(told):
-            options = ["--collect-only", "-q", "--capture=no"]
+            options = ["--collect-only", "-q", "--capture=no", f"-W{IMPORTED}"]
             status = pytest.main([*arguments(case, folder, live=False), *options], [collected])
     tests = [
         (item, target)

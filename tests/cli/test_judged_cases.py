@@ -205,6 +205,11 @@ def test_a_case_of_a_property_of_ones_own_is_shrunk_by_its_test(project: Path) -
     assert garl("replay", saved(project, "own")).output.startswith("FAILED")
 
 
+def test_a_case_is_shrunk_where_warnings_are_errors(project: Path) -> None:
+    (project / "pytest.ini").write_text("[pytest]\nfilterwarnings = error\n")
+    assert "flights)" in shrunk(saved(project, "IV-dog"), 9)
+
+
 def test_a_case_as_simple_as_can_be_stays_as_it_is(project: Path) -> None:
     dog = saved(project, "IV-dog")
     shrunk(dog, 60)
