@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import shlex
 import sys
 from pathlib import Path
 
@@ -14,6 +15,7 @@ from rich.text import Text
 from pytest_garl.errors import GarlError
 from pytest_garl.messages import printable
 from pytest_garl.regressions import corpus
+from pytest_garl.regressions.acceptance import acceptance_of
 from pytest_garl.regressions.case import Case
 from pytest_garl.regressions.files import load
 from pytest_garl.regressions.replay import Replay, replay, system_of
@@ -87,7 +89,9 @@ def list_(folders: _Folders) -> None:
             table.add_row(where, Text("broken", style="red"))
             continue
         case, evidence = entry.case, entry.case.evidence
-        robust = f"{evidence.neighbours_failed}/{evidence.neighbours}"
+        robust = (
+            f"{evidence.neighbours_failed}/{evidence.neighbours}" if evidence.neighbours else ""
+        )
         objects = str(len(case.moves))
         # As texts: in a string rich would make an animal of ":dog:", and colours of "[red]".
         signature = Text(printable(case.violation.signature, keep=""))
@@ -97,6 +101,18 @@ def list_(folders: _Folders) -> None:
     for entry in found:
         if entry.case is None:
             _say(entry.problem)
+    known = acceptance_of(folders.cases)
+    new = [
+        str(entry.path)
+        for entry in found
+        if entry.case is not None
+        and entry.case.status != "fixed"
+        and not entry.case.edge
+        and not known.covers(entry.path, entry.case)
+    ]
+    if new:
+        _say("\nNew, so that pytest fails on them until they are fixed, committed or accepted:")
+        _say("    garl cases accept " + " \\\n        ".join(shlex.quote(each) for each in new))
 
 
 def _console() -> Console:
@@ -127,9 +143,10 @@ def show(folders: _Folders, file: Path) -> None:
         _say(f"while it is flown {key} changes by {by:+.2f}")
     if case.edge:
         _say("\nIt sits on an edge: not all of its neighbours fail, so it gates nothing.")
+    tried = f"{evidence.neighbours_failed} of {evidence.neighbours} neighbours fail too; "
     _say(
-        f"\n{evidence.neighbours_failed} of {evidence.neighbours} neighbours fail too; shrinking "
-        f"removed {evidence.removed}; objects were moved by {case.policy}"
+        f"\n{tried if evidence.neighbours else ''}shrinking removed {evidence.removed}; objects "
+        f"were moved by {case.policy}"
     )
     _say(f"Fly it: garl cases replay {file}")
 

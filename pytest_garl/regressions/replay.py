@@ -113,7 +113,7 @@ def _by_tests(
         outcome=outcome,
         signature=facts.get("garl.signature", ""),
         story=facts.get("garl.story", ""),
-        judge=case.test,
+        judge=f"{case.test} and the tests beside it",
         reasons=reasons,
         flight=flight,
         map=map,

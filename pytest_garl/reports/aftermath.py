@@ -104,6 +104,12 @@ def told(pursued: tuple[Pursued, ...], config: pytest.Config) -> list[str]:
     if patches:
         lines.append("Nothing in the tree was changed (CI is set). To keep the cases:")
         lines.append(" \\\n        ".join(["    git apply", *patches]))
+    if any(each.file for each in pursued) and not patches:
+        text = (
+            "New cases fail until they are fixed, committed, or accepted with `garl cases accept "
+            "FILE`. `garl cases show FILE` tells more of one."
+        )
+        lines.append(wrapped(text, width))
     return [*lines, *_unreached(pursued, width)]
 
 
@@ -111,7 +117,7 @@ def _facts(each: Pursued, case: Case) -> list[str]:
     """Return in words why a case may be believed, and what it cost."""
     evidence = case.evidence
     if not each.finding.flights:
-        return ["as the search found it: neither confirmed nor shrunk"]
+        return ["as the search found it, not shrunk"]
     asked = [
         f"{evidence.neighbours_failed} of {evidence.neighbours} neighbours fail too",
         *(["EDGE, gates nothing"] if case.edge else []),

@@ -63,7 +63,8 @@ def explain_failing(
     lines = [f"The case {file} {state}.", *paragraphs(told, item), again]
     if expected:
         lines.append(f"If that is known: commit it, or: garl cases accept {file}")
-    return tell(report, lines, f"{state}: {headline(verdict['story'])}", again)
+    # What happened comes first, as pytest cuts the line at the end.
+    return tell(report, lines, f"{headline(verdict['story'])}; this case {state}", again)
 
 
 def explain_passing(

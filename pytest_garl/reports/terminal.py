@@ -126,7 +126,7 @@ def _maybe_fixed(reporter: Any) -> list[str]:
     stale = _told(reporter, ("passed",), STALE)
     return [
         *(
-            f"maybe fixed: {file} passes; if so: garl cases promote {file}"
+            f"maybe fixed: {file} passes; if it is fixed:\n    garl cases promote {file}"
             for file in sorted(fixed)
         ),
         *(f"stale: {told}" for told in sorted(stale)),

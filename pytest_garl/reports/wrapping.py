@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import textwrap
 from typing import Any
 
@@ -11,6 +12,7 @@ WIDTH = "garl_width"
 """What xdist's controller tells its workers about the terminal."""
 _NARROW = 40
 _HARD_SPACE = "\N{NO-BREAK SPACE}"
+_BEFORE_UNIT = re.compile(r"(?<=\d) (?=(?:%|m/s|m|s)(?!\w))")
 
 
 def width_of(config: pytest.Config) -> int:
@@ -23,9 +25,9 @@ def width_of(config: pytest.Config) -> int:
 
 
 def wrapped(text: str, width: int, *, first: str = "", others: str = "") -> str:
-    """Return text in lines of at most ``width`` columns; no word is broken, no % left alone."""
+    """Return text in lines of at most ``width`` columns; no word is broken, no unit left alone."""
     return textwrap.fill(
-        text.replace(" %", f"{_HARD_SPACE}%"),
+        _BEFORE_UNIT.sub(_HARD_SPACE, text),
         width,
         initial_indent=first,
         subsequent_indent=others,

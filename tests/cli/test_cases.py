@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import dataclasses
 import importlib
 import sys
 from collections.abc import Iterator
@@ -11,7 +12,7 @@ from click.testing import CliRunner, Result
 
 from pytest_garl.cli import main
 from pytest_garl.regressions.case import Case, Evidence, Violation
-from pytest_garl.regressions.corpus import save
+from pytest_garl.regressions.corpus import replace, save
 from pytest_garl.regressions.files import load
 from pytest_garl.scenarios.chromosome import decode
 from pytest_garl.scenarios.genes import genome_for
@@ -100,6 +101,22 @@ def test_list_and_show_tell_what_it_is(file: Path) -> None:
     assert "raised: ZeroDivisionError: no plan." in shown
     assert "fog, visibility 100 m" in shown
     assert "a person of up to 0.00 m/s" in shown
+
+
+def test_list_tells_what_is_new_until_it_is_accepted(file: Path) -> None:
+    new = garl("list").output
+    assert "pytest fails on them until they are fixed, committed or accepted" in new
+    assert new.endswith(f"garl cases accept {file}\n")
+    assert garl("accept", file).exit_code == 0
+    assert "garl cases accept" not in garl("list").output
+
+
+def test_nothing_is_said_of_neighbours_where_none_was_tried(file: Path) -> None:
+    case = load(file)
+    evidence = dataclasses.replace(case.evidence, neighbours=0, neighbours_failed=0)
+    file = replace(file, dataclasses.replace(case, evidence=evidence))
+    assert "neighbours" not in garl("show", file).output
+    assert "0/0" not in garl("list").output
 
 
 def test_replay_answers_failed_then_fixed_and_promote_believes_only_the_latter(file: Path) -> None:

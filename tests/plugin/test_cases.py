@@ -48,6 +48,7 @@ def template(tmp_path_factory: pytest.TempPathFactory) -> Path:
     assert done.returncode == pytest.ExitCode.TESTS_FAILED, done.stdout
     assert "confirming and shrinking 2 new kinds of violation" in done.stdout
     assert "saved scenarios/regressions/systems/lawn-IV-dog-" in done.stdout
+    assert "New cases fail until they are fixed, committed, or accepted" in done.stdout
     commit(folder)
     return folder
 
@@ -140,7 +141,7 @@ def test_what_the_cap_does_not_reach_is_saved_unshrunk_and_told(
     result.stdout.fnmatch_lines(
         [
             "*confirming and shrinking 2 new kinds of violation, at most * flights, about * s",
-            "*(as the search found it:*",
+            "*(as the search found it,*",
             "1 kind of violation not shrunk: *",
         ]
     )
@@ -197,7 +198,12 @@ def test_an_open_case_that_passes_may_be_fixed(searched: pytest.Pytester) -> Non
     dodge(searched.path)
     result = run(searched)
     result.assert_outcomes(passed=5, xfailed=1)
-    result.stdout.fnmatch_lines(["maybe fixed: scenarios/*IV-dog*.toml passes; if so: garl cases*"])
+    result.stdout.fnmatch_lines(
+        [
+            "maybe fixed: scenarios/*IV-dog*.toml passes; if it is fixed:",
+            "    garl cases promote scenarios/*IV-dog*.toml",
+        ]
+    )
     assert result.ret == 0
     strict = run(searched, *CASES, "-o", "garl_xfail_strict=true")
     assert strict.ret == pytest.ExitCode.TESTS_FAILED
@@ -297,8 +303,11 @@ def test_what_cannot_be_avoided_excuses_no_other_violation_of_its_kind(
     assert again.ret == pytest.ExitCode.TESTS_FAILED
 
 
-def test_a_case_is_known_when_it_is_committed_or_accepted(searched: pytest.Pytester) -> None:
+def test_a_case_is_known_when_it_is_committed_or_accepted(
+    searched: pytest.Pytester, monkeypatch: pytest.MonkeyPatch
+) -> None:
     shutil.rmtree(searched.path / ".git")
+    monkeypatch.setenv("COLUMNS", "200")
     files = [str(path) for path in cases(searched)]
     for _ in range(2):
         result = run(searched, *CASES)
@@ -308,6 +317,9 @@ def test_a_case_is_known_when_it_is_committed_or_accepted(searched: pytest.Pytes
                 "garl: nobody can tell which cases are committed (*not a git repository*",
                 "If that is known: commit it, or: garl cases accept *IV-dog*.toml",
             ]
+        )
+        result.stdout.fnmatch_lines(
+            ["FAILED *IV-dog* - collided with dog-1 at *; this case is new and not accepted yet"]
         )
         # A search says the same, however often.
         assert run(searched, *SEARCH).parseoutcomes()["failed"] == 4
@@ -355,7 +367,9 @@ def test_with_ci_set_the_tree_is_left_alone_and_a_patch_brings_the_case(
     project(pytester)
     result = run(pytester, *SEARCH)
     assert not cases(pytester)
-    result.stdout.fnmatch_lines(["patch .garl/patches/*.patch", "*git apply .garl/patches/*.patch"])
+    result.stdout.fnmatch_lines(
+        ["patch .garl/patches/*.patch", "    git apply *\\", "        .garl/patches/*.patch"]
+    )
     patches = sorted((pytester.path / ".garl" / "patches").glob("*.patch"))
     assert len(patches) == 2
     subprocess.run(["git", "init", "-q"], check=True, cwd=pytester.path)
