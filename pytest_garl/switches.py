@@ -131,8 +131,8 @@ OPTIONS = (
         name="shrink",
         metavar="N",
         help="Flights to confirm, shrink and save each new kind of violation that a search found: "
-        "8 or more; a Python exception takes 2. With 0 nothing is confirmed, shrunk or saved "
-        "(default: 12, but for all kinds together no more than the search itself).",
+        "8 or more; a Python exception or a hang takes 2. With 0 nothing is confirmed, shrunk or "
+        "saved (default: 12, but for all kinds together no more than the search itself).",
     ),
     Option(
         name="baseline",

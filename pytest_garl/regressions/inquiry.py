@@ -57,11 +57,15 @@ class Inquiry:
 
     @property
     def exception(self) -> bool:
-        """Whether the landing system raised or returned nonsense."""
+        """Whether the landing system raised, returned nonsense or hung.
+
+        No scenario explains more than the traceback does, and each flight that hangs costs four
+        times the limit of a call.
+        """
         if self.asks is not None or not self.violations:
             return False
         crash = self.violations[0][1].result["crash"]
-        return crash is not None and crash["kind"] in ("raised", "nonsense")
+        return crash is not None and crash["kind"] in ("raised", "nonsense", "hung")
 
     def failed(self, scenario: Scenario, done: Done) -> bool:
         """Whether a flight failed in the way that is asked about."""

@@ -33,7 +33,8 @@ LEAST = 2 + COUNT + PILOTS
 """Flights without which nothing can be said: one without what the failure should not need, one as
 found, three neighbours, the reference pilot."""
 EXCEPTION = 2
-"""Flights for a Python exception, which hardly depends on the scenario: bare, and as found."""
+"""Flights for a Python exception or a hang, which hardly depends on the scenario: bare, and as
+found."""
 UNLIKE = "its flights with the recorded moves do not fail in the same way"
 CANDIDATES = 3
 """So many violations of a signature are tried for one whose neighbours fail as well."""
@@ -68,7 +69,7 @@ class Pursuit:
         return self._finding(case_of(inquiry, failure, avoidable))
 
     def _exception(self, first: Scenario) -> Finding:
-        """Return a Python exception in the barest scenario, or as it was found."""
+        """Return a Python exception or a hang in the barest scenario, or as it was found."""
         found = deeds_of(self._flown[first], first, self._map)
         for scenario, deeds in ((nobody(first, self._map), Deeds(moves=())), (first, found)):
             done = self._again(scenario, deeds)

@@ -99,7 +99,7 @@ class Stand:
         """What is to be said, what matters most first."""
         words = [f"{self.flown:.0f}/{self.all:.0f} flights"]
         left_s = self.left_s
-        if left_s is None and 0 < self.flown < self.all:
+        if left_s is None and self.seconds > 0 and 0 < self.flown < self.all:
             left_s = (self.all - self.flown) * self.seconds / self.flown
         if left_s is not None:
             words.append(f"{duration(left_s)} left")
@@ -158,8 +158,8 @@ class Reader:
         self._rest: Rest | None = None
 
     def wait(self) -> None:
-        """Say nothing at first."""
-        self._read = time.monotonic()
+        """Say nothing at first; what is flown meanwhile counts for the forecast."""
+        self._began = self._read = time.monotonic()
 
     def read(self, ledger: Ledger) -> Stand | None:
         """Return how far the run is if it is time to say so, and if there is anything to say."""

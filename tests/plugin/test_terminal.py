@@ -11,10 +11,15 @@ import sys
 import termios
 import xml.etree.ElementTree as ElementTree
 from pathlib import Path
+from types import SimpleNamespace
+from typing import cast
 
 import pytest
 
+from pytest_garl.regressions.forecast import Rest
+from pytest_garl.reports import progress
 from pytest_garl.reports.progress import Stand, text
+from pytest_garl.run import Run
 from pytest_garl.search.ledger import Ledger, Progress
 from tests.plugin.test_plugin import project, run
 
@@ -164,7 +169,27 @@ def test_the_line_has_one_total_and_names_what_matters_first() -> None:
     more = dataclasses.replace(STAND, selected=40)
     assert "4/48 flights" in text(more, 160)
     new = Stand(searches=TWO[1:], kinds={}, nearest={}, seconds=0.0)
-    assert text(new, 160) == "garl [#####---------------]  1/4 flights  0 s left  A on lawn g00 1/4"
+    assert text(new, 160) == "garl [#####---------------]  1/4 flights  A on lawn g00 1/4"
+
+
+def test_the_first_line_now_and_then_counts_the_time_before_it(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    clock = [100.0]
+    monkeypatch.setattr(progress, "time", SimpleNamespace(monotonic=lambda: clock[0]))
+    reader = progress.Reader(cast(Run, SimpleNamespace(rest=Rest(flights=0.0, seconds=0.0))), 30.0)
+    reader.wait()
+    clock[0] += 30.0
+    ledger = SimpleNamespace(
+        progress=lambda: [TWO[1]],
+        meters=dict,
+        violations=dict,
+        nearest=dict,
+        fact=lambda key: None,
+    )
+    stand = reader.read(cast(Ledger, ledger))
+    assert stand is not None
+    assert stand.seconds == 30.0
 
 
 @pytest.mark.parametrize("width", range(20, 160, 7))
