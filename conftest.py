@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import signal
 
 from pytest_garl import dispatch
 
@@ -15,3 +16,7 @@ pytest_plugins = ["pytester"]
 # otherwise; the sessions that the tests start are a developer's, but for those that set it.
 for name in ("CI", "BUILD_NUMBER"):
     os.environ.pop(name, None)
+
+# A session in the background of a shell ignores Ctrl-C, and so would those that tests interrupt.
+if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
+    signal.signal(signal.SIGINT, signal.default_int_handler)

@@ -30,6 +30,9 @@ class Tally:
     @pytest.hookimpl(tryfirst=True)
     def pytest_runtest_logreport(self, report: pytest.TestReport) -> None:
         """Remember what counts for the session's colour."""
+        if report.when == "setup":
+            # A test that is run again tells anew; one with subtests tells more than once.
+            self._failures.pop(report.nodeid, None)
         told = dict(report.user_properties)
         if SLOT not in told or report.when == "teardown":
             return
@@ -42,8 +45,6 @@ class Tally:
             self._violating[flight] = str(told[SIGNATURE])
         if report.failed or hasattr(report, "wasxfail"):
             self._answered.add(flight)
-        # A test that is run again tells anew.
-        self._failures.pop(report.nodeid, None)
         if FAILURE in told and report.failed:
             self._failures[report.nodeid] = str(told[FAILURE])
         if EXCUSED in told and report.skipped:

@@ -124,10 +124,11 @@ def test_each_parameter_of_a_test_fails_once(
     given = "\n@pytest.mark.parametrize('limit_m', [1.5, 2.0])"
     write_tests(pytester, "Good", given + parametrised)
     result = run(pytester, *SEARCH[:1], "--garl-workers=1", "-rf", *parallel)
-    assert outcomes_of(result, "FAILED") == {
-        "test_it.py::test_distance[lawn-g00-s00-1.5]",
-        "test_it.py::test_distance[lawn-g00-s00-2.0]",
-    }
+    failed = outcomes_of(result, "FAILED")
+    assert sorted(name.rpartition("-")[2] for name in failed) == ["1.5]", "2.0]"]
+    if not parallel:
+        # Workers share the failure of a test with other fixtures: which slot it is, is theirs.
+        assert all("lawn-g00-s00" in name for name in failed)
     assert result.parseoutcomes()["xfailed"] > 1
 
 
