@@ -34,7 +34,7 @@ layers: $(READY)
 tests: $(READY)
 	$(BIN)/pytest -n 2 --dist=worksteal -m "not ray and not long" --durations=15 tests landing_systems
 
-test-long: $(READY)  ## the tutorial typed, and more moments to be killed in: minutes
+test-long: $(READY)  ## the tutorial, 50 kills, 154 misbehaving systems, more fuzz: an hour
 	$(BIN)/pytest -n 2 --dist=worksteal -m long tests
 
 test-ray: $(READY)  ## the tests that start Ray clusters: minutes, so not part of `test`

@@ -214,6 +214,7 @@ def flown(ledger: Path) -> int:
     return query(ledger, f"SELECT count(*) {FLOWN}")[0][0]
 
 
+@pytest.mark.long
 def test_a_run_that_was_stopped_and_killed_goes_on(slow: Path) -> None:
     assert garl("--workers=2", "--out=undisturbed", "--folder=undisturbed").exit_code == 0
     stopped = start()

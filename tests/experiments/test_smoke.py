@@ -18,6 +18,7 @@ def test_make_runs_what_is_tested_here() -> None:
 
 
 @pytest.mark.sim
+@pytest.mark.long
 def test_a_toy_experiment_is_flown_measured_and_reported(tmp_path: Path) -> None:
     def garl(*words: str) -> None:
         code = "from pytest_garl.cli import main; main()"

@@ -467,7 +467,10 @@ def test_own(landing, scenario):
 """
 
 
-@pytest.mark.parametrize("how", [("--garl-workers=0",), ("--garl-workers=1", "-n2")])
+@pytest.mark.parametrize(
+    "how",
+    [("--garl-workers=0",), pytest.param(("--garl-workers=1", "-n2"), marks=pytest.mark.long)],
+)
 def test_a_property_of_ones_own_is_shrunk_and_saved_for_its_test(
     pytester: pytest.Pytester, how: tuple[str, ...]
 ) -> None:

@@ -56,7 +56,7 @@ def test_a_finished_run_that_is_resumed_repeats_its_outcome(searched: pytest.Pyt
     again.stdout.fnmatch_lines(["*the same case is saved already*"])
 
 
-@pytest.mark.parametrize("shrink", ["10", "30"])
+@pytest.mark.parametrize("shrink", ["10", pytest.param("30", marks=pytest.mark.long)])
 def test_a_finished_run_may_be_resumed_with_more_or_less_shrinking(
     searched: pytest.Pytester, shrink: str
 ) -> None:

@@ -122,6 +122,7 @@ def test_the_same_seed_gives_the_same_results_for_any_workers(pytester: pytest.P
     assert result_hash(pytester) not in hashes
 
 
+@pytest.mark.long
 def test_a_network_that_learns_in_pytest_finds_the_same_for_any_workers(
     pytester: pytest.Pytester,
 ) -> None:

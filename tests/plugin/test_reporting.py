@@ -8,7 +8,7 @@ import pytest
 
 from tests.plugin.test_plugin import project, run
 
-PARALLEL = pytest.mark.parametrize("parallel", [(), ("-n2",)])
+PARALLEL = pytest.mark.parametrize("parallel", [(), pytest.param(("-n2",), marks=pytest.mark.long)])
 SEARCH = ("--garl-budget=8", "--garl-workers=1", "-o", "garl_dir=elsewhere")
 HIT = "collided with dog-1 at 1.0 m/s, 0.0 m up, over the marker"
 AGAIN = (
@@ -46,7 +46,14 @@ def test_a_printed_command_flies_the_failure_again(pytester: pytest.Pytester) ->
     assert f"{HIT}" in again.stdout.str()
 
 
-@pytest.mark.parametrize("columns", ["60", "80", "120"])
+@pytest.mark.parametrize(
+    "columns",
+    [
+        pytest.param("60", marks=pytest.mark.long),
+        "80",
+        pytest.param("120", marks=pytest.mark.long),
+    ],
+)
 def test_lines_of_our_own_fit_the_terminal(
     pytester: pytest.Pytester, columns: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -105,7 +105,7 @@ def undisturbed() -> dict[str, str]:
 
 
 MOMENTS = [
-    pytest.param(moment, marks=[] if moment % 4 == 0 else [pytest.mark.long])
+    pytest.param(moment, marks=[] if moment % 8 == 0 else [pytest.mark.long])
     for moment in range(20)
 ]
 

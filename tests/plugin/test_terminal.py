@@ -33,7 +33,7 @@ class Slow(Good):
         return super().step(observation)
 """
 LINE = re.compile(r"garl \[[#-]+\]  \d+/\d+ flights")
-PARALLEL = pytest.mark.parametrize("parallel", [(), ("-n2",)])
+PARALLEL = pytest.mark.parametrize("parallel", [(), pytest.param(("-n2",), marks=pytest.mark.long)])
 WIDTH = 60
 
 
