@@ -5,10 +5,10 @@ from __future__ import annotations
 import os
 import signal
 
-from pytest_garl import dispatch
+from pytest_garl import cpu_dispatch
 
 # Before a test module loads NumPy: what is flown inside pytest is flown as in a child.
-dispatch.pin()
+cpu_dispatch.pin()
 
 pytest_plugins = ["pytester"]
 

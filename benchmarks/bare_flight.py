@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 from landing_systems.modules.control_ardupilot import ArduPilotControl, ArduPilotParameters
 from pytest_garl import Airframe, VehicleState
 from pytest_garl.scenarios.bodies import rotate
-from pytest_garl.simulation.vehicle import Thrusts, drag, lag, vehicle_model, wrench
-from pytest_garl.simulation.world import PHYSICS_RATE_HZ, World
+from pytest_garl.simulation.physics.vehicle import Thrusts, drag, lag, vehicle_model, wrench
+from pytest_garl.simulation.physics.world import PHYSICS_RATE_HZ, World
 
 Orders = Callable[[float, ArduPilotControl], None]
 

@@ -15,10 +15,10 @@ from pathlib import Path
 import numpy as np
 
 from pytest_garl.regressions.case import Case, Evidence, Violation
-from pytest_garl.regressions.files import dumps
+from pytest_garl.regressions.case_file import dumps
 from pytest_garl.scenarios.chromosome import decode
 from pytest_garl.scenarios.genes import genome_for
-from pytest_garl.scenarios.maps import load_map
+from pytest_garl.scenarios.maps.map import load_map
 from pytest_garl.verdicts.verdict import Limits
 
 SYSTEM = """

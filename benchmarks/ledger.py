@@ -6,7 +6,7 @@ import tempfile
 import time
 from pathlib import Path
 
-from pytest_garl.search.ledger import Ledger
+from pytest_garl.execution.ledger import Ledger
 
 
 def main(flights: int = 2000) -> None:

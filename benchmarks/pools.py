@@ -15,18 +15,18 @@ from contextlib import ExitStack, contextmanager
 from pathlib import Path
 
 from landing_systems.opencv_mls import OpenCvLandingSystem
-from pytest_garl.adversary.policies import policy_spec
-from pytest_garl.regressions.survey import Survey
-from pytest_garl.scenarios.maps import load_map
+from pytest_garl.adversary.scripted import policy_spec
+from pytest_garl.baselines.record import Survey
+from pytest_garl.execution.batch import fly_all
+from pytest_garl.execution.job import Job
+from pytest_garl.execution.ledger import Ledger
+from pytest_garl.execution.local_pool import local_pool
+from pytest_garl.execution.pool import Pool
+from pytest_garl.execution.ray.pool import check_ray, ray_pool
+from pytest_garl.execution.reference import BUILT_IN, reference_to
+from pytest_garl.scenarios.maps.map import load_map
 from pytest_garl.scenarios.scenario import Scenario
-from pytest_garl.search.batch import fly_all
-from pytest_garl.search.job import Job
-from pytest_garl.search.ledger import Ledger
-from pytest_garl.search.local_pool import local_pool
-from pytest_garl.search.pool import Pool
-from pytest_garl.search.ray_pool import check_ray, ray_pool
-from pytest_garl.search.reference import BUILT_IN, reference_to
-from tests.search.flying import Good, job_of
+from tests.execution.flying import Good, job_of
 
 ROOT = Path(__file__).parents[1]
 

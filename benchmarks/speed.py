@@ -25,16 +25,16 @@ from landing_systems.modules.movement_watch import MovementWatch
 from landing_systems.modules.planning_ego import EgoPlanner
 from landing_systems.opencv_mls import OpenCvLandingSystem
 from landing_systems.tphyolo_mls import TphYoloLandingSystem
-from pytest_garl.adversary.policies import policy_spec
+from pytest_garl.adversary.scripted import policy_spec
 from pytest_garl.landing_system import Camera
 from pytest_garl.scenarios.genes import genome_for
-from pytest_garl.scenarios.maps import load_map
-from pytest_garl.search.random_search import propose
-from pytest_garl.simulation.camera import Renderer
+from pytest_garl.scenarios.maps.map import load_map
+from pytest_garl.search.methods.random_search import propose
+from pytest_garl.simulation.camera.renderer import Renderer
 from pytest_garl.simulation.fly import fly
-from pytest_garl.simulation.objects import MovingObject
+from pytest_garl.simulation.physics.npc import MovingObject
+from pytest_garl.simulation.physics.world import World
 from pytest_garl.simulation.randomness import generator
-from pytest_garl.simulation.world import World
 
 PARTS: tuple[tuple[str, Any, tuple[str, ...]], ...] = (
     ("detection, OpenCV", OpenCvDetector, ("detect",)),

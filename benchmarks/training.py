@@ -9,9 +9,9 @@ import argparse
 import dataclasses
 import time
 
-from pytest_garl.adversary.dqn import train
-from pytest_garl.adversary.training import PRESETS
-from pytest_garl.scenarios.maps import load_map
+from pytest_garl.adversary.training.dqn import train
+from pytest_garl.adversary.training.train import PRESETS
+from pytest_garl.scenarios.maps.map import load_map
 
 
 def main() -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from landing_systems.tphyolo_mls import TphYoloLandingSystem
-from pytest_garl.fixtures import Landing
+from pytest_garl import Landing
 
 pytestmark = pytest.mark.garl(
     system=TphYoloLandingSystem,

@@ -11,25 +11,25 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from pytest_garl import dispatch
-from pytest_garl.adversary.policies import policy_spec
+from pytest_garl import cpu_dispatch
+from pytest_garl.adversary.scripted import policy_spec
 from pytest_garl.errors import LandingSystemError
+from pytest_garl.execution.job import PAPER_LIMIT_S
+from pytest_garl.execution.metering import Meter, OutOfTimeError
+from pytest_garl.execution.reference import check_system
+from pytest_garl.execution.separate_process import ask_apart
 from pytest_garl.landing_system import Mission, Observation, airframe_of
-from pytest_garl.metering import Meter, OutOfTimeError
 from pytest_garl.scenarios.chromosome import decode
 from pytest_garl.scenarios.genes import genome_for
-from pytest_garl.scenarios.maps import Map, load_map
+from pytest_garl.scenarios.maps.map import Map, load_map
 from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.scenarios.validity import repair
-from pytest_garl.search.apart import ask_apart
-from pytest_garl.search.job import PAPER_LIMIT_S
-from pytest_garl.search.random_search import propose
-from pytest_garl.search.reference import check_system
+from pytest_garl.search.methods.random_search import propose
 from pytest_garl.simulation.flight import Flight
+from pytest_garl.simulation.flight_file import parted_s
 from pytest_garl.simulation.fly import fly
-from pytest_garl.simulation.record import parted_s
 from pytest_garl.verdicts.judge import judge
-from pytest_garl.verdicts.moments import reports_detections, reports_targets
+from pytest_garl.verdicts.phases import reports_detections, reports_targets
 from pytest_garl.verdicts.verdict import Limits
 
 FLIGHTS = 40
@@ -90,7 +90,7 @@ def check_landing_system(
     _check_airframe(system)
     _check_signature(system, "reset", 1)
     _check_signature(system, "step", 1)
-    if not dispatch.pin():
+    if not cpu_dispatch.pin():
         # NumPy was loaded earlier, and computes by other instructions than a search flies by.
         asked = {"seconds": seconds, "map": map, "deterministic": deterministic, "limit_s": limit_s}
         told = ask_apart("pytest_garl.testing:_check_as_values", system, asked)

@@ -26,8 +26,8 @@ def test_every_command_of_the_cases_page_exists() -> None:
 
 
 def test_the_page_of_experiments_tells_every_column_and_every_key() -> None:
-    from pytest_garl.experiments.plan import TOP_KEYS
-    from pytest_garl.experiments.rows import Row
+    from pytest_garl.experiments.results import Row
+    from pytest_garl.experiments.spec import TOP_KEYS
 
     text = (DOCS / "experiments" / "README.md").read_text()
     types = {f"type_{kind}" for kind in ("ii", "iii", "iv")}
@@ -38,7 +38,7 @@ def test_the_page_of_experiments_tells_every_column_and_every_key() -> None:
 
 
 def test_what_remarks_count_agrees_with_the_rows() -> None:
-    from pytest_garl.experiments.rows import read
+    from pytest_garl.experiments.results import read
 
     rows = {row.result_hash: row for row in read(DOCS / "experiments" / "rq.csv")}
     with (DOCS / "experiments" / "counts.csv").open(newline="") as file:

@@ -19,12 +19,12 @@ from pytest_garl import (
     Mission,
     Observation,
     PositionSetpoint,
-    metering,
     testing,
 )
 from pytest_garl.errors import LandingSystemError
-from pytest_garl.simulation.reference_pilot import ReferencePilot
-from pytest_garl.simulation.truth import Truth
+from pytest_garl.execution import metering
+from pytest_garl.simulation.system_under_test.ground_truth import Truth
+from pytest_garl.simulation.system_under_test.reference_pilot import ReferencePilot
 from pytest_garl.testing import check_landing_system
 
 COUNTER = itertools.count()

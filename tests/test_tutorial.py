@@ -9,8 +9,8 @@ from pathlib import Path
 
 import pytest
 
-from pytest_garl.dispatch import of_children
-from pytest_garl.regressions.files import load
+from pytest_garl.cpu_dispatch import of_children
+from pytest_garl.regressions.case_file import load
 
 DOCS = Path(__file__).parents[1] / "docs"
 SEARCH = "--garl-budget"

@@ -1,1 +1,1 @@
-"""Who interferes: the policies that steer dynamic objects."""
+"""Who interferes: the policies that steer the NPCs."""

@@ -10,7 +10,7 @@ from types import MappingProxyType
 import numpy as np
 
 from pytest_garl.errors import PolicyError
-from pytest_garl.simulation.policy import DECISION_STEP_S, STAY, Move, PolicySpec, Situation
+from pytest_garl.simulation.npc_policy import DECISION_STEP_S, STAY, Move, PolicySpec, Situation
 
 Moves = Mapping[str, Sequence[tuple[float, float]]]
 """The wanted velocities (x, y) of each object, one for every half second, as shares of its

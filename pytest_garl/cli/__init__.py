@@ -12,7 +12,7 @@ from typing import Any, NoReturn
 
 import click
 
-from pytest_garl import dispatch
+from pytest_garl import cpu_dispatch
 from pytest_garl.errors import GarlError
 
 COMMANDS = {
@@ -36,7 +36,7 @@ class _Group(click.Group):
     """
 
     def main(self, args: Any = None, *rest: Any, **more: Any) -> Any:
-        if args is None and not dispatch.pin() and _AGAIN not in os.environ:
+        if args is None and not cpu_dispatch.pin() and _AGAIN not in os.environ:
             # Something loaded NumPy as the interpreter started; the environment is right now.
             os.environ[_AGAIN] = "1"
             os.execv(sys.executable, [sys.executable, *sys.orig_argv[1:]])
@@ -48,7 +48,7 @@ class _Group(click.Group):
     def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
         if cmd_name not in COMMANDS:
             return None
-        dispatch.pin()
+        cpu_dispatch.pin()
         module = importlib.import_module(f"pytest_garl.cli.{COMMANDS[cmd_name]}")
         found: click.Command = getattr(module, cmd_name)
         return found

@@ -16,10 +16,10 @@ from rich.text import Text
 from pytest_garl.errors import OptionError
 
 if TYPE_CHECKING:
-    from pytest_garl.regressions.survey import Survey
-    from pytest_garl.search.errands import Done
-    from pytest_garl.search.reference import Reference
-    from pytest_garl.verdicts.gate import Comparison
+    from pytest_garl.baselines.comparison import Comparison
+    from pytest_garl.baselines.record import Survey
+    from pytest_garl.execution.on_demand import Done
+    from pytest_garl.execution.reference import Reference
 
 FAILED = 1
 """Exit status of a comparison that fails; a usage error is 2."""
@@ -121,9 +121,9 @@ def save(
 
     Run it where you run pytest. The same options choose the same scenarios, whatever the system.
     """
-    from pytest_garl.regressions import baseline as files
-    from pytest_garl.regressions.survey import from_ledger, survey_checkout
-    from pytest_garl.search.checkout import Checkout
+    from pytest_garl.baselines import file as files
+    from pytest_garl.baselines.record import from_ledger, survey_checkout
+    from pytest_garl.execution.checkout import Checkout
 
     if ledger is not None:
         made = from_ledger(ledger)
@@ -153,7 +153,7 @@ def save(
 @click.argument("name")
 def scenario(file: Path, name: str) -> None:
     """Print one scenario of a baseline, such as court-17, as a file for pytest --garl-repeat."""
-    from pytest_garl.regressions import baseline as files
+    from pytest_garl.baselines import file as files
     from pytest_garl.scenarios.files import dumps
 
     for each in files.load(file, (_maps_folder(),)).sets:
@@ -190,9 +190,9 @@ def diff(
     new type of violation, significantly more violations or aborts, or an inconclusive flight. Both
     fly with the simulator and the policies of this installation, and with the maps of this folder.
     """
-    from pytest_garl.regressions.survey import compare_sets, fly_beside, survey_checkout
-    from pytest_garl.scenarios.maps import load_map
-    from pytest_garl.search.checkout import Checkout
+    from pytest_garl.baselines.record import compare_sets, fly_beside, survey_checkout
+    from pytest_garl.execution.checkout import Checkout
+    from pytest_garl.scenarios.maps.map import load_map
 
     if not systems:
         raise OptionError("garl diff: --system is missing; give MODULE:CLASS of the landing system")
@@ -223,7 +223,7 @@ def _survey(
     simulator: str,
     **rest: Any,
 ) -> Survey:
-    from pytest_garl.regressions.survey import Survey
+    from pytest_garl.baselines.record import Survey
     from pytest_garl.verdicts.verdict import Limits
 
     names = tuple(dict.fromkeys(part.strip() for part in maps.split(",") if part.strip()))
@@ -239,7 +239,7 @@ def _survey(
 
 
 def _simulator(text: str) -> Reference:
-    from pytest_garl.search.reference import BUILT_IN, Reference
+    from pytest_garl.execution.reference import BUILT_IN, Reference
 
     if not text:
         return BUILT_IN
@@ -261,7 +261,7 @@ def _progress(flights: Iterator[Done], title: str, total: int) -> Iterable[Done]
 
 
 def _show(title: str, found: Comparison) -> None:
-    from pytest_garl.verdicts.pairs import DIFFERENT
+    from pytest_garl.baselines.pairs import DIFFERENT
 
     table = Table(box=None, header_style="bold")
     for name in ("scenario", "", "base", "head"):

@@ -17,9 +17,9 @@ from pytest_garl.messages import printable
 from pytest_garl.regressions import corpus
 from pytest_garl.regressions.acceptance import acceptance_of
 from pytest_garl.regressions.case import Case
-from pytest_garl.regressions.files import load
+from pytest_garl.regressions.case_file import load
+from pytest_garl.regressions.description import meanings
 from pytest_garl.regressions.replay import Replay, replay, system_of
-from pytest_garl.regressions.story import meanings
 
 DEFAULT = Path("scenarios/regressions")
 NO_PROOF = 3
@@ -178,7 +178,7 @@ def replay_(context: click.Context, file: Path, live: bool, video: Path | None) 
     folders: _Folders = context.obj
     case = folders.case(file)
     if video is not None:
-        from pytest_garl.reports.video.encoder import program
+        from pytest_garl.video.encoder import program
 
         # Before the flight: it is for nothing if it cannot be drawn.
         program()
@@ -188,7 +188,7 @@ def replay_(context: click.Context, file: Path, live: bool, video: Path | None) 
         if result.flight is None:
             raise GarlError(f"{file}: its process ended before the flight was recorded: no video")
         from pytest_garl.landing_system import airframe_of
-        from pytest_garl.reports.video import save_video
+        from pytest_garl.video import save_video
 
         camera = airframe_of(system_of(case, folders.root)).camera
         save_video(video, result.flight, case.scenario, result.map, camera, result.signature)
@@ -276,8 +276,8 @@ def shrink(folders: _Folders, file: Path, flights: int, workers: int) -> None:
     The file is replaced only by a case that is no worse in any respect (objects, genes, moves,
     size, neighbours that fail) and better in at least one.
     """
-    from pytest_garl.cli.collecting import means_of
-    from pytest_garl.regressions.resumed import KEPT, shrink_case
+    from pytest_garl.plugin.case_tests import means_of
+    from pytest_garl.regressions.reshrink import KEPT, shrink_case
 
     case = folders.case(file)
     means = means_of(case, folders.root)

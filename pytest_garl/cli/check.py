@@ -61,7 +61,7 @@ def check(
 def _imported(name: str) -> type:
     if str(Path.cwd()) not in sys.path:
         sys.path.insert(0, str(Path.cwd()))
-    from pytest_garl.search.reference import system_named
+    from pytest_garl.execution.reference import system_named
 
     try:
         system: type = system_named(name)

@@ -13,9 +13,9 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 from rich.text import Text
 
 if TYPE_CHECKING:
-    from pytest_garl.experiments.plan import Run
-    from pytest_garl.experiments.rows import Row
-    from pytest_garl.search.ledger import Progress as Flown
+    from pytest_garl.execution.ledger import Progress as Flown
+    from pytest_garl.experiments.results import Row
+    from pytest_garl.experiments.spec import Run
 
 INTERRUPTED = 130
 """Exit status after Ctrl-C, as shells have it: 128 and the signal's number."""
@@ -53,10 +53,10 @@ def experiment(file: Path, report: bool, out: Path | None, folder: Path, workers
     FILE is a TOML file; the rows are a CSV file of its name beside it. Run it where you run pytest.
     Each finished run is added at once; interrupted, the same command goes on.
     """
-    from pytest_garl.experiments import rows
+    from pytest_garl.experiments import results as rows
     from pytest_garl.experiments.campaign import Place, fly
-    from pytest_garl.experiments.plan import read
     from pytest_garl.experiments.report import write
+    from pytest_garl.experiments.spec import read
 
     asked = read(file)
     found = out / asked.rows.name if out else asked.rows

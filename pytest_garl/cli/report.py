@@ -9,8 +9,8 @@ from typing import Any
 import click
 
 from pytest_garl.cli.cases import FOLDER
-from pytest_garl.reports.record import report_of
-from pytest_garl.saving import save_text
+from pytest_garl.files.atomic import save_text
+from pytest_garl.reports.run_report import report_of
 
 
 @click.command()

@@ -12,13 +12,13 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from pytest_garl import dispatch
+from pytest_garl import cpu_dispatch
 from pytest_garl.errors import GarlError
 from pytest_garl.landing_system import Airframe, airframe_of
 from pytest_garl.scenarios.object_types import OBJECT_TYPES
 
 if TYPE_CHECKING:
-    from pytest_garl.adversary.training import Plan
+    from pytest_garl.adversary.training.train import Plan
 
 RECENT = 50
 
@@ -108,12 +108,12 @@ def train(**asked: Any) -> None:
     if asked["out"].suffix != ".npz":
         raise GarlError(f"--out: found {str(asked['out'])!r}, expected a name that ends in .npz")
     try:
-        from pytest_garl.adversary.training import train_best
+        from pytest_garl.adversary.training.train import train_best
     except ImportError as error:
         raise GarlError(
             f"training needs more than flying does ({error}): pip install 'pytest-garl[train]'"
         ) from error
-    dispatch.check()
+    cpu_dispatch.check()
     plan = _plan(asked)
     with _Progress(plan) as progress:
         outcome = train_best(plan, progress.episode, progress.validated)
@@ -126,8 +126,8 @@ def train(**asked: Any) -> None:
 
 
 def _plan(asked: dict[str, Any]) -> Plan:
-    from pytest_garl.adversary.training import PRESETS, Plan
-    from pytest_garl.scenarios.maps import load_map
+    from pytest_garl.adversary.training.train import PRESETS, Plan
+    from pytest_garl.scenarios.maps.map import load_map
 
     kinds = _words(asked["kinds"])
     for kind in kinds:

@@ -11,18 +11,18 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Protocol
 
-from pytest_garl.adversary.policies import policy_spec
+from pytest_garl.adversary.scripted import policy_spec
 from pytest_garl.errors import GarlError
-from pytest_garl.experiments import rows as files
-from pytest_garl.experiments.avoiding import pilot
+from pytest_garl.execution.ledger import Ledger, Progress
+from pytest_garl.experiments import results as files
+from pytest_garl.experiments.avoidability import pilot
 from pytest_garl.experiments.measure import Piloted, row_of, searches_of
-from pytest_garl.experiments.plan import Experiment, Run
-from pytest_garl.experiments.rows import ExperimentError, Row
-from pytest_garl.experiments.session import search
-from pytest_garl.saving import alone
-from pytest_garl.scenarios.maps import load_map
-from pytest_garl.search.ledger import Ledger, Progress
-from pytest_garl.search.methods import find_method
+from pytest_garl.experiments.pytest_run import search
+from pytest_garl.experiments.results import ExperimentError, Row
+from pytest_garl.experiments.spec import Experiment, Run
+from pytest_garl.files.atomic import alone
+from pytest_garl.scenarios.maps.map import load_map
+from pytest_garl.search.catalogue import find_method
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

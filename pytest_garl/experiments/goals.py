@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal
 
-from pytest_garl.experiments.figures import (
+from pytest_garl.experiments.metrics import (
     COVERAGE,
     DISTANCE,
     SIGNATURES,
@@ -16,8 +16,8 @@ from pytest_garl.experiments.figures import (
     Sample,
     sample,
 )
-from pytest_garl.experiments.plan import Experiment, Goals
-from pytest_garl.experiments.rows import Row
+from pytest_garl.experiments.results import Row
+from pytest_garl.experiments.spec import Experiment, Goals
 from pytest_garl.experiments.tables import NOT_RUN, markdown
 
 Verdict = Literal["met", "missed", "not run"]

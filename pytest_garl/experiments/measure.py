@@ -10,19 +10,18 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from pytest_garl.dispatch import of_children
-from pytest_garl.experiments.plan import KINDS, Run
-from pytest_garl.experiments.rows import ExperimentError, Row
+from pytest_garl.cpu_dispatch import of_children
+from pytest_garl.execution import ledger as ledgers
+from pytest_garl.execution.job import Job, load_scenario, loads
+from pytest_garl.execution.ledger import Ledger
+from pytest_garl.experiments.results import ExperimentError, Row
+from pytest_garl.experiments.spec import KINDS, Run
 from pytest_garl.regressions.follow_up import done_of
 from pytest_garl.scenarios.genes import WEATHER, genome_for
-from pytest_garl.scenarios.maps import Map, load_map
+from pytest_garl.scenarios.maps.map import Map, load_map
 from pytest_garl.scenarios.scenario import Scenario
-from pytest_garl.search import ledger as ledgers
-from pytest_garl.search.job import Job, load_scenario, loads
-from pytest_garl.search.ledger import Ledger
-from pytest_garl.simulation.record import load
+from pytest_garl.simulation.flight_file import load
 from pytest_garl.verdicts.metrics import mean_distance, no_cells, top_k, visit
-from pytest_garl.verdicts.serialise import from_dict
 from pytest_garl.verdicts.verdict import Verdict
 
 HASH = 12
@@ -46,7 +45,7 @@ class Search:
     @property
     def verdicts(self) -> tuple[Verdict, ...]:
         """What the flights came to."""
-        return tuple(from_dict(flight.result["verdict"]) for flight in self.flights)
+        return tuple(Verdict.from_json(flight.result["verdict"]) for flight in self.flights)
 
     @property
     def violating(self) -> tuple[ledgers.Row, ...]:

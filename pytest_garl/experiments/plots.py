@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from pytest_garl.experiments.figures import (
+from pytest_garl.experiments.metrics import (
     COVERAGE,
     DISTANCE,
     FIGURES,
@@ -18,8 +18,8 @@ from pytest_garl.experiments.figures import (
     published,
     samples,
 )
-from pytest_garl.experiments.plan import Experiment, Grid
-from pytest_garl.experiments.rows import Row
+from pytest_garl.experiments.results import Row
+from pytest_garl.experiments.spec import Experiment, Grid
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -10,11 +10,11 @@ from pathlib import Path
 
 from pytest_garl.experiments import goals, tables
 from pytest_garl.experiments.campaign import missing
-from pytest_garl.experiments.figures import samples
-from pytest_garl.experiments.plan import Experiment, Grid, Run
+from pytest_garl.experiments.metrics import samples
 from pytest_garl.experiments.plots import draw
-from pytest_garl.experiments.rows import Row
-from pytest_garl.saving import save_text
+from pytest_garl.experiments.results import Row
+from pytest_garl.experiments.spec import Experiment, Grid, Run
+from pytest_garl.files.atomic import save_text
 from pytest_garl.verdicts.metrics import CELL_M, HEIGHT_M
 
 HOW_TO_READ = f"""\

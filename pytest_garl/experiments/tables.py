@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 
-from pytest_garl.experiments.figures import (
+from pytest_garl.experiments.metrics import (
     COVERAGE,
     DISTANCE,
     FIGURES,
@@ -14,8 +14,8 @@ from pytest_garl.experiments.figures import (
     published,
     samples,
 )
-from pytest_garl.experiments.plan import KINDS, Experiment, Grid
-from pytest_garl.experiments.rows import Row
+from pytest_garl.experiments.results import Row
+from pytest_garl.experiments.spec import KINDS, Experiment, Grid
 from pytest_garl.verdicts.metrics import share_interval
 from pytest_garl.verdicts.statistics import mann_whitney, vargha_delaney
 

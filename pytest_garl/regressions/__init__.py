@@ -1,1 +1,1 @@
-"""Never again: violations that are confirmed, shrunk, saved and flown before every merge."""
+"""Saved cases: violations that are confirmed, shrunk, saved and flown before every merge."""

@@ -10,10 +10,10 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from pytest_garl.errors import GarlError, ScenarioError
+from pytest_garl.files.atomic import alone, save_text
 from pytest_garl.messages import printable
 from pytest_garl.regressions.case import Case
-from pytest_garl.regressions.files import Head, dumps, load, load_head
-from pytest_garl.saving import alone, save_text
+from pytest_garl.regressions.case_file import Head, dumps, load, load_head
 
 
 class CorpusError(GarlError):

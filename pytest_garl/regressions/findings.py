@@ -2,17 +2,22 @@
 
 from __future__ import annotations
 
+from pytest_garl.execution.on_demand import Done
+from pytest_garl.execution.reference import simulator_sha256
 from pytest_garl.regressions.case import Avoidable, Case, Deeds, Evidence, Violation
-from pytest_garl.regressions.inquiry import Failure, Finding, Inquiry, OwnFailure, simplest_first
+from pytest_garl.regressions.case_request import (
+    Failure,
+    Finding,
+    Inquiry,
+    OwnFailure,
+    simplest_first,
+)
+from pytest_garl.regressions.description import tell
 from pytest_garl.regressions.shrink import complexity, genome_of
-from pytest_garl.regressions.story import tell
-from pytest_garl.scenarios.maps import Map
+from pytest_garl.scenarios.maps.map import Map
 from pytest_garl.scenarios.scenario import Scenario
-from pytest_garl.search.errands import Done
-from pytest_garl.search.reference import simulator_sha256
 from pytest_garl.simulation.flight import Flight
-from pytest_garl.simulation.record import load
-from pytest_garl.verdicts.serialise import from_dict
+from pytest_garl.simulation.flight_file import load
 from pytest_garl.verdicts.verdict import Verdict
 
 
@@ -45,7 +50,7 @@ def case_of(inquiry: Inquiry, failure: Failure, avoidable: Avoidable) -> Case:
         status="unavoidable" if avoidable == "no" else "open",
         avoidable=avoidable,
         scenario=failure.scenario,
-        violation=_violation(from_dict(done.result["verdict"]), flight, own),
+        violation=_violation(Verdict.from_json(done.result["verdict"]), flight, own),
         policy=job.npcs.name,
         policy_sha256=job.npcs.sha256,
         moves=failure.deeds.moves,

@@ -9,23 +9,23 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+from pytest_garl.execution.job import Job, load_scenario, loads
+from pytest_garl.execution.ledger import Ledger, Row
+from pytest_garl.execution.on_demand import Done, Errands, Fly
+from pytest_garl.execution.pool import Pool
+from pytest_garl.execution.slot import flight_name
 from pytest_garl.regressions.case import Case
+from pytest_garl.regressions.case_request import Asks, Finding, Inquiry
 from pytest_garl.regressions.corpus import entries, save, save_patch
 from pytest_garl.regressions.findings import as_found
-from pytest_garl.regressions.inquiry import Asks, Finding, Inquiry
-from pytest_garl.regressions.pursuit import (
+from pytest_garl.regressions.investigation import (
     EXCEPTION,
     LEAST,
     PILOTS,
     Pursuit,
 )
-from pytest_garl.scenarios.maps import load_map
+from pytest_garl.scenarios.maps.map import load_map
 from pytest_garl.scenarios.scenario import Scenario
-from pytest_garl.search.errands import Done, Errands, Fly
-from pytest_garl.search.job import Job, load_scenario, loads
-from pytest_garl.search.ledger import Ledger, Row
-from pytest_garl.search.pool import Pool
-from pytest_garl.search.slots import flight_name
 
 NOTED = "signatures to pursue"
 """In the ledger: by search, the signatures that no saved case had when the search was done."""

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
+from pytest_garl.regressions.case_request import Inquiry
 from pytest_garl.regressions.follow_up import shares
-from pytest_garl.regressions.inquiry import Inquiry
-from pytest_garl.regressions.pursuit import LEAST, PILOTS
+from pytest_garl.regressions.investigation import LEAST, PILOTS
 
 SPENT = 0.85
 """Share of its flights that a kind of violation spends: many stop before the last is needed.  With

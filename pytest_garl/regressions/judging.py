@@ -14,10 +14,10 @@ from pathlib import Path
 from typing import Literal
 
 from pytest_garl.errors import GarlError
+from pytest_garl.files.atomic import save_text
 from pytest_garl.regressions.case import Case
+from pytest_garl.regressions.case_file import dumps
 from pytest_garl.regressions.corpus import folder_of
-from pytest_garl.regressions.files import dumps
-from pytest_garl.saving import save_text
 
 NAME = "judged"
 """Name of the file that pytest flies, and so part of its items' ids."""

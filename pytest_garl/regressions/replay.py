@@ -7,24 +7,24 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
 
-from pytest_garl import dispatch
-from pytest_garl.adversary.policies import policy_spec
+from pytest_garl import cpu_dispatch
 from pytest_garl.adversary.recorded import recorded_spec
+from pytest_garl.adversary.scripted import policy_spec
 from pytest_garl.errors import GarlError, LandingSystemError
-from pytest_garl.regressions.case import Case
-from pytest_garl.regressions.judging import Judged, is_test, judged
-from pytest_garl.regressions.staleness import Sources, unproven
-from pytest_garl.scenarios.maps import Map, load_map
-from pytest_garl.search.job import PAPER_LIMIT_S
-from pytest_garl.search.reference import (
+from pytest_garl.execution.job import PAPER_LIMIT_S
+from pytest_garl.execution.reference import (
     BUILT_IN,
     simulator_sha256,
     system_named,
 )
-from pytest_garl.search.sources import sources_sha256
+from pytest_garl.execution.sources import sources_sha256
+from pytest_garl.regressions.case import Case
+from pytest_garl.regressions.judging import Judged, is_test, judged
+from pytest_garl.regressions.staleness import Sources, unproven
+from pytest_garl.scenarios.maps.map import Map, load_map
 from pytest_garl.simulation.flight import Flight
+from pytest_garl.simulation.flight_file import load
 from pytest_garl.simulation.fly import fly
-from pytest_garl.simulation.record import load
 from pytest_garl.verdicts.judge import judge
 
 Answer = Literal["FIXED", "FAILED", "STALE", "UNDECIDED"]
@@ -128,7 +128,7 @@ def _records(folder: Path) -> list[Flight]:
 
 def _by_verdict(case: Case, folder: Path, map: Map, judged_by: str, live: bool) -> Replay:
     system = system_of(case, folder)
-    dispatch.check()
+    cpu_dispatch.check()
     npcs = policy_spec(case.policy) if live else recorded_spec(dict(case.moves), dict(case.changes))
     limit = max(PAPER_LIMIT_S, case.limits.time_s)
     flight = fly(case.scenario, system, npcs, map=map, time_limit_s=limit)

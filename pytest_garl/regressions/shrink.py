@@ -18,7 +18,7 @@ from hypothesis import strategies as st
 from hypothesis.database import ExampleDatabase, choices_to_bytes
 
 from pytest_garl.scenarios.genes import Genome, NuclearGene, Property, genome_like
-from pytest_garl.scenarios.maps import Map
+from pytest_garl.scenarios.maps.map import Map
 from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.scenarios.validity import repair
 

@@ -7,10 +7,10 @@ import itertools
 from dataclasses import dataclass
 
 from pytest_garl.regressions.case import Avoidable, Case
-from pytest_garl.regressions.files import record_lines
-from pytest_garl.regressions.neighbours import COUNT
+from pytest_garl.regressions.case_file import record_lines
+from pytest_garl.regressions.robustness import COUNT
 from pytest_garl.regressions.shrink import complexity, genome_of
-from pytest_garl.scenarios.maps import Map
+from pytest_garl.scenarios.maps.map import Map
 
 _DEMANDED: dict[Avoidable, int] = {"live": 0, "recorded": 1, "no": 2}
 

@@ -1,1 +1,1 @@
-"""Show: the terminal."""
+"""What a run found, as data: for the terminal, for ``garl report`` and other programs."""

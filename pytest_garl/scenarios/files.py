@@ -5,13 +5,12 @@ from __future__ import annotations
 from pathlib import Path
 
 from pytest_garl.errors import ScenarioError
+from pytest_garl.files.reading import read_text
+from pytest_garl.files.toml import Table, parse, quoted
 from pytest_garl.messages import shown
-from pytest_garl.reading import read_text
 from pytest_garl.scenarios.genes import genome_like
-from pytest_garl.scenarios.maps import Map
+from pytest_garl.scenarios.maps.map import Map
 from pytest_garl.scenarios.scenario import Scenario
-from pytest_garl.scenarios.toml_reader import Table, parse
-from pytest_garl.scenarios.toml_writer import quoted
 
 SCHEMA = 1
 
@@ -91,7 +90,7 @@ def map_name_in(text: str, *, source: str = "scenario") -> str:
 
 def load(path: Path, search_path: tuple[Path, ...] = ()) -> Scenario:
     """Return the scenario in a file."""
-    from pytest_garl.scenarios.maps import load_map
+    from pytest_garl.scenarios.maps.map import load_map
 
     text = read_text(path)
     map = load_map(map_name_in(text, source=str(path)), search_path)

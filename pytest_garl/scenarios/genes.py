@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from pytest_garl.errors import ScenarioError
 
 if TYPE_CHECKING:
-    from pytest_garl.scenarios.maps import Map
+    from pytest_garl.scenarios.maps.map import Map
 
 WeatherRange = Literal["confined", "full"]
 CONFINED_WEATHER = 0.15

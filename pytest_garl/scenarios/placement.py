@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from pytest_garl.scenarios.maps import Map
+from pytest_garl.scenarios.maps.map import Map
 from pytest_garl.scenarios.object_types import OBJECT_TYPES
 from pytest_garl.scenarios.scenario import Scenario
 

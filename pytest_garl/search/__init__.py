@@ -1,1 +1,1 @@
-"""Which scenario next: the search methods, the ledger and the flight pool."""
+"""Which scenario is flown next: the search methods and what they share."""

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
-from pytest_garl.search.job import dump_scenario, load_scenario
-from pytest_garl.search.ledger import Ledger
+from pytest_garl.execution.job import dump_scenario, load_scenario
+from pytest_garl.execution.ledger import Ledger
 from pytest_garl.search.method import Flown, Method
 
 

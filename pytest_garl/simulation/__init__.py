@@ -1,1 +1,1 @@
-"""Where it flies: the world, the vehicle, the camera, the flight."""
+"""Where a landing is flown: the flight loop, its recorder and its record."""

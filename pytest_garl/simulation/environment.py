@@ -6,7 +6,7 @@ from collections.abc import Iterable
 
 from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.simulation.flight import Flight
-from pytest_garl.simulation.policy import DECISION_STEP_S, Change
+from pytest_garl.simulation.npc_policy import DECISION_STEP_S, Change
 
 
 def changed(scenario: Scenario, changes: Iterable[Change]) -> Scenario:

@@ -8,14 +8,14 @@ from collections.abc import Callable
 from importlib.metadata import version
 from typing import Any
 
-from pytest_garl.dispatch import dispatched
-from pytest_garl.scenarios.maps import Map, load_map
+from pytest_garl.cpu_dispatch import dispatched
+from pytest_garl.scenarios.maps.map import Map, load_map
 from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.simulation.flight import PACKAGES, Flight
+from pytest_garl.simulation.flight_file import hash_of
 from pytest_garl.simulation.loop import Loop
-from pytest_garl.simulation.policy import PolicySpec
-from pytest_garl.simulation.record import hash_of
-from pytest_garl.simulation.system_calls import StepGuard
+from pytest_garl.simulation.npc_policy import PolicySpec
+from pytest_garl.simulation.system_under_test.calls import StepGuard
 
 
 def fly(

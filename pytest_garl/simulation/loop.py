@@ -17,29 +17,17 @@ from pytest_garl.landing_system import (
     VehicleState,
 )
 from pytest_garl.scenarios.bodies import rotate
-from pytest_garl.scenarios.maps import Map
+from pytest_garl.scenarios.maps.map import Map
 from pytest_garl.scenarios.placement import marker_position_m, wind_mps
 from pytest_garl.scenarios.scenario import Scenario
-from pytest_garl.simulation.camera import Frame, Renderer
-from pytest_garl.simulation.commands import read_command, read_thrusts
-from pytest_garl.simulation.diagnostics import Room
+from pytest_garl.simulation.camera.projection import eye_under
+from pytest_garl.simulation.camera.renderer import Frame, Renderer
 from pytest_garl.simulation.environment import changed
 from pytest_garl.simulation.flight import Flight, Outcome
-from pytest_garl.simulation.flight_control import FlightControl
-from pytest_garl.simulation.mission import mission_for
-from pytest_garl.simulation.objects import MovingObject
-from pytest_garl.simulation.observing import observe
-from pytest_garl.simulation.policy import DECISION_STEP_S, Change, ObjectPolicy, Situation
-from pytest_garl.simulation.randomness import generator
-from pytest_garl.simulation.recorder import Recorder
-from pytest_garl.simulation.system_calls import (
-    BrokenError,
-    StepGuard,
-    SystemCalls,
-    read_airframe,
-)
-from pytest_garl.simulation.truth import Truth, TruthObject
-from pytest_garl.simulation.vehicle import (
+from pytest_garl.simulation.npc_policy import DECISION_STEP_S, Change, ObjectPolicy, Situation
+from pytest_garl.simulation.physics.flight_control import FlightControl
+from pytest_garl.simulation.physics.npc import MovingObject
+from pytest_garl.simulation.physics.vehicle import (
     Motion,
     Quaternion,
     Thrusts,
@@ -49,8 +37,20 @@ from pytest_garl.simulation.vehicle import (
     vehicle_model,
     wrench,
 )
-from pytest_garl.simulation.view import eye_under
-from pytest_garl.simulation.world import PHYSICS_RATE_HZ, World
+from pytest_garl.simulation.physics.world import PHYSICS_RATE_HZ, World
+from pytest_garl.simulation.randomness import generator
+from pytest_garl.simulation.recorder import Recorder
+from pytest_garl.simulation.system_under_test.calls import (
+    BrokenError,
+    StepGuard,
+    SystemCalls,
+    read_airframe,
+)
+from pytest_garl.simulation.system_under_test.diagnostics import Room
+from pytest_garl.simulation.system_under_test.ground_truth import Truth, TruthObject
+from pytest_garl.simulation.system_under_test.mission import mission_for
+from pytest_garl.simulation.system_under_test.observation import observe
+from pytest_garl.simulation.system_under_test.validation import read_command, read_thrusts
 
 TRACK_EVERY = 10
 OBJECTS_EVERY = 4

@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 
 from pytest_garl.landing_system import Command
-from pytest_garl.scenarios.maps import Map
-from pytest_garl.simulation.camera import Frame, Renderer
+from pytest_garl.scenarios.maps.map import Map
+from pytest_garl.simulation.camera.renderer import Frame, Renderer
 from pytest_garl.simulation.flight import (
     BodyClass,
     Contact,
@@ -23,7 +23,7 @@ from pytest_garl.simulation.flight import (
     Step,
     Track,
 )
-from pytest_garl.simulation.objects import MovingObject
+from pytest_garl.simulation.physics.npc import MovingObject
 
 Vector = tuple[float, float, float]
 Quaternion = tuple[float, float, float, float]

@@ -7,10 +7,9 @@ import math
 import numpy as np
 
 from pytest_garl.simulation.flight import Contact, Flight, Separation
-from pytest_garl.simulation.texts import cut
-from pytest_garl.simulation.vehicle import up_m
-from pytest_garl.verdicts.compass import compass_point
-from pytest_garl.verdicts.moments import (
+from pytest_garl.simulation.physics.vehicle import up_m
+from pytest_garl.simulation.system_under_test.texts import cut
+from pytest_garl.verdicts.phases import (
     last_sighting_s,
     moment,
     reports_detections,
@@ -24,6 +23,7 @@ from pytest_garl.verdicts.verdict import (
     Verdict,
     ViolationType,
 )
+from pytest_garl.verdicts.wording import compass_point
 
 PAPER_DISTANCE_M = 1.5
 """Farther off than this is a violation by the paper's definition, whatever the limits are."""

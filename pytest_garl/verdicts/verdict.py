@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import dataclasses
+from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Literal
+from typing import Any, Literal, Self
 
 from pytest_garl.errors import OptionError
 from pytest_garl.messages import shown
@@ -83,3 +85,13 @@ class Verdict:
     def violation(self) -> bool:
         """Whether the flight violated a safety property."""
         return self.primary is not None
+
+    def to_json(self) -> dict[str, Any]:
+        """Return plain values, as files hold them."""
+        return dataclasses.asdict(self)
+
+    @classmethod
+    def from_json(cls, values: Mapping[str, Any]) -> Self:
+        """Return the verdict whose :meth:`to_json` gave ``values``."""
+        margins = tuple(Margin(**item) for item in values["margins"])
+        return cls(**{**values, "margins": margins})

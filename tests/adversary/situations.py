@@ -2,10 +2,10 @@ from __future__ import annotations
 
 from pytest_garl.scenarios.chromosome import decode
 from pytest_garl.scenarios.genes import genome_for
-from pytest_garl.scenarios.maps import load_map
+from pytest_garl.scenarios.maps.map import load_map
 from pytest_garl.scenarios.object_types import OBJECT_TYPES
 from pytest_garl.scenarios.scenario import Scenario
-from pytest_garl.simulation.policy import ObjectState, Situation
+from pytest_garl.simulation.npc_policy import ObjectState, Situation
 
 MAP = load_map("court")
 GENOME = genome_for(MAP)

@@ -9,10 +9,10 @@ import pytest
 from pytest_garl.adversary.recorded import LANDING_ZONE_M, recorded_spec
 from pytest_garl.scenarios.chromosome import decode
 from pytest_garl.scenarios.genes import genome_for
-from pytest_garl.scenarios.maps import load_map
+from pytest_garl.scenarios.maps.map import load_map
 from pytest_garl.scenarios.placement import start_genes
-from pytest_garl.simulation.objects import MovingObject
-from pytest_garl.simulation.policy import DECISION_STEP_S, Situation
+from pytest_garl.simulation.npc_policy import DECISION_STEP_S, Situation
+from pytest_garl.simulation.physics.npc import MovingObject
 
 LAWN = load_map("lawn")
 GENOME = genome_for(LAWN)

@@ -12,14 +12,14 @@ from click.testing import CliRunner, Result
 
 from pytest_garl.cli import main
 from pytest_garl.regressions.case import Case, Evidence, Violation
+from pytest_garl.regressions.case_file import load
 from pytest_garl.regressions.corpus import replace, save
-from pytest_garl.regressions.files import load
 from pytest_garl.scenarios.chromosome import decode
 from pytest_garl.scenarios.genes import genome_for
-from pytest_garl.scenarios.maps import load_map
+from pytest_garl.scenarios.maps.map import load_map
 from pytest_garl.scenarios.validity import repair
 from pytest_garl.verdicts.verdict import Limits
-from tests.regressions.test_files import case as dog_case
+from tests.regressions.test_case_file import case as dog_case
 
 SYSTEM = """
 from pathlib import Path

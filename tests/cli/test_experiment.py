@@ -13,14 +13,14 @@ from click.testing import CliRunner, Result
 
 import pytest_garl
 from pytest_garl.cli import main
-from pytest_garl.experiments.plan import read as plan
-from pytest_garl.experiments.rows import Row, read
+from pytest_garl.execution.job import load_scenario
+from pytest_garl.execution.ledger import Ledger
+from pytest_garl.experiments.results import Row, read
+from pytest_garl.experiments.spec import read as plan
 from pytest_garl.scenarios.chromosome import encode
 from pytest_garl.scenarios.genes import genome_for
-from pytest_garl.scenarios.maps import load_map
+from pytest_garl.scenarios.maps.map import load_map
 from pytest_garl.scenarios.placement import marker_position_m
-from pytest_garl.search.job import load_scenario
-from pytest_garl.search.ledger import Ledger
 from tests.plugin.test_plugin import write_project
 from tests.plugin.test_resume import FLOWN, SLOW, query
 

@@ -12,8 +12,8 @@ import pytest
 from click.testing import CliRunner, Result
 
 from pytest_garl.cli import main
+from pytest_garl.regressions.case_file import load
 from pytest_garl.regressions.corpus import replace
-from pytest_garl.regressions.files import load
 from tests.plugin.test_cases import OWN, change, dodge
 from tests.plugin.test_plugin import write_project
 

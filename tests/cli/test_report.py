@@ -11,7 +11,7 @@ from typing import Any
 import pytest
 from jsonschema import Draft202012Validator
 
-from pytest_garl.reports.record import SCHEMA
+from pytest_garl.reports.run_report import SCHEMA
 from tests.plugin.test_plugin import result_hash, write_project
 
 VALIDATOR = Draft202012Validator(json.loads(SCHEMA.read_text()))

@@ -11,8 +11,8 @@ from pathlib import Path
 
 import pytest
 
+from pytest_garl.execution.processes import named
 from pytest_garl.regressions.corpus import save
-from pytest_garl.search.processes import named
 from tests.cli.test_cases import broken_lander
 
 SLOW = """

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from pytest_garl.experiments.rows import Row
+from pytest_garl.experiments.results import Row
 
 PLAIN: dict[str, Any] = {
     "system": "Lander",

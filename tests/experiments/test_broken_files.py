@@ -9,9 +9,9 @@ from pathlib import Path
 import pytest
 
 from pytest_garl.errors import ScenarioError
-from pytest_garl.experiments.rows import ExperimentError, append, read
+from pytest_garl.experiments.results import ExperimentError, append, read
 from tests.experiments.samples import row
-from tests.experiments.test_plan import TEXT, plan
+from tests.experiments.test_spec import TEXT, plan
 
 
 @pytest.mark.parametrize(
@@ -42,7 +42,7 @@ def test_a_strange_experiment_is_one_short_error(
 
 
 def test_an_experiment_in_a_pipe_is_refused(tmp_path: Path) -> None:
-    from pytest_garl.experiments.plan import read as read_plan
+    from pytest_garl.experiments.spec import read as read_plan
 
     os.mkfifo(tmp_path / "mine.toml")
     with pytest.raises(ScenarioError, match="found a pipe, expected a regular file"):

@@ -5,8 +5,8 @@ import pytest
 
 from pytest_garl.experiments.measure import chromosomes
 from pytest_garl.scenarios.genes import genome_for, with_destinations
-from pytest_garl.scenarios.maps import load_map
-from pytest_garl.search.random_search import propose
+from pytest_garl.scenarios.maps.map import load_map
+from pytest_garl.search.methods.random_search import propose
 
 MAP = load_map("lawn")
 

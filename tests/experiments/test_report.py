@@ -5,9 +5,9 @@ from pathlib import Path
 import pytest
 
 from pytest_garl.experiments import goals
-from pytest_garl.experiments.plan import Experiment, read
 from pytest_garl.experiments.report import write
-from pytest_garl.experiments.rows import Row
+from pytest_garl.experiments.results import Row
+from pytest_garl.experiments.spec import Experiment, read
 from tests.experiments.samples import row
 
 TEXT = """

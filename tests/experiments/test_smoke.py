@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from pytest_garl.experiments.rows import read
+from pytest_garl.experiments.results import read
 
 ROOT = Path(__file__).parents[2]
 PLAN = "docs/experiments/smoke.toml"

@@ -14,27 +14,32 @@ from typing import Any
 
 import numpy as np
 
-from pytest_garl.adversary import network
+from pytest_garl.adversary import learned as network
+from pytest_garl.baselines import file as baseline
+from pytest_garl.baselines import record as survey
 from pytest_garl.errors import GarlError
-from pytest_garl.experiments import plan, rows
-from pytest_garl.regressions import baseline, corpus, files, survey
-from pytest_garl.regressions.story import meanings
+from pytest_garl.execution.job import fly_job, load_scenario, loads
+from pytest_garl.execution.ledger import Ledger
+from pytest_garl.execution.stored_ledger import check_stored
+from pytest_garl.experiments import results as rows
+from pytest_garl.experiments import spec as plan
+from pytest_garl.regressions import case_file as files
+from pytest_garl.regressions import corpus
+from pytest_garl.regressions.description import meanings
 from pytest_garl.scenarios import files as scenarios
-from pytest_garl.scenarios import maps
 from pytest_garl.scenarios.chromosome import decode
 from pytest_garl.scenarios.genes import genome_for
+from pytest_garl.scenarios.maps import map as maps
 from pytest_garl.scenarios.validity import problems
-from pytest_garl.search.job import fly_job, load_scenario, loads
-from pytest_garl.search.ledger import Ledger
 from pytest_garl.search.objectives import threat
-from pytest_garl.search.stored import check_stored
-from pytest_garl.simulation import record
-from pytest_garl.verdicts.serialise import from_dict
+from pytest_garl.simulation import flight_file
+from pytest_garl.verdicts.verdict import Verdict
+from tests.baselines import test_file as test_baseline
+from tests.execution.flying import Good, job_of, scenario
 from tests.experiments.samples import row
-from tests.experiments.test_plan import TEXT as PLAN
+from tests.experiments.test_spec import TEXT as PLAN
 from tests.fuzz import mutations
-from tests.regressions import test_baseline, test_files
-from tests.search.flying import Good, job_of, scenario
+from tests.regressions import test_case_file as test_files
 
 Change = Callable[[random.Random], None]
 _COURT = maps.load_map("court")
@@ -163,7 +168,7 @@ def _prepare_record(folder: Path, rng: random.Random) -> Path:
 
 
 def _load_record(path: Path, rng: random.Random) -> None:
-    record.hash_of(record.load(path))
+    flight_file.hash_of(flight_file.load(path))
 
 
 def _prepare_ledger(folder: Path, rng: random.Random) -> Path:
@@ -181,7 +186,7 @@ def _prepare_ledger(folder: Path, rng: random.Random) -> Path:
 def _write_ledger(path: Path) -> None:
     job = job_of(Good, path.parent)
     ledger = Ledger.create(path, _RUN)
-    ledger.add_search("s", "tests.search.flying:Good", "lawn", 8, test_baseline.job().dumps())
+    ledger.add_search("s", "tests.execution.flying:Good", "lawn", 8, test_baseline.job().dumps())
     ledger.add_slots("s", 0, {slot: _dumped(slot) for slot in range(8)})
     for _ in range(6):
         claim = ledger.claim()
@@ -193,7 +198,7 @@ def _write_ledger(path: Path) -> None:
 
 
 def _dumped(slot: int) -> str:
-    from pytest_garl.search.job import dump_scenario
+    from pytest_garl.execution.job import dump_scenario
 
     return dump_scenario(scenario(0.02 * slot))
 
@@ -222,7 +227,7 @@ def _use(ledger: Ledger) -> None:
                 assert result["verdict"]["signature"] is not None
         ledger.flown(search)
     for *_, result in ledger.results():
-        from_dict(result["verdict"])
+        Verdict.from_json(result["verdict"])
     ledger.progress()
     ledger.violations()
     ledger.nearest()

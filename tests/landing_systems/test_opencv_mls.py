@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from landing_systems.opencv_mls import OpenCvLandingSystem
-from pytest_garl.adversary.policies import policy_spec
+from pytest_garl.adversary.scripted import policy_spec
 from pytest_garl.scenarios.chromosome import decode
 from pytest_garl.scenarios.genes import genome_for
-from pytest_garl.scenarios.maps import load_map
+from pytest_garl.scenarios.maps.map import load_map
 from pytest_garl.scenarios.validity import repair
 from pytest_garl.simulation.fly import fly
 

@@ -16,19 +16,19 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from pytest_garl.adversary.policies import policy_spec
+from pytest_garl.adversary.scripted import policy_spec
 from pytest_garl.errors import GarlError
+from pytest_garl.execution.batch import fly_all, own_pool
+from pytest_garl.execution.ledger import Ledger
+from pytest_garl.execution.on_demand import Done
+from pytest_garl.execution.pool import Pool
+from pytest_garl.execution.processes import named
+from pytest_garl.execution.reference import BUILT_IN
 from pytest_garl.scenarios.scenario import Scenario
-from pytest_garl.search.batch import fly_all, own_pool
-from pytest_garl.search.errands import Done
-from pytest_garl.search.ledger import Ledger
-from pytest_garl.search.pool import Pool
-from pytest_garl.search.processes import named
-from pytest_garl.search.reference import BUILT_IN
 from pytest_garl.verdicts.verdict import Limits
+from tests.execution.flying import LAWN, job_of, scenario
 from tests.misbehaving import crashes, hangs, patches, processes, values
 from tests.misbehaving.base import Misbehaves, NeighbourLander
-from tests.search.flying import LAWN, job_of, scenario
 
 PATIENCE_S = 900.0
 """A run that waits longer for one flight hangs: two attempts of a process that stands still take

@@ -8,9 +8,9 @@ from pathlib import Path
 
 import pytest
 
-from pytest_garl.regressions.files import dumps
+from pytest_garl.regressions.case_file import dumps
 from tests.plugin.test_plugin import project, run
-from tests.regressions.test_files import case
+from tests.regressions.test_case_file import case
 
 BROKEN = {
     "nested": "nested too deeply",

@@ -9,8 +9,8 @@ import pytest
 from click.testing import CliRunner
 
 from pytest_garl.cli import main
-from pytest_garl.regressions.files import dumps, load
-from pytest_garl.search.ledger import Ledger
+from pytest_garl.execution.ledger import Ledger
+from pytest_garl.regressions.case_file import dumps, load
 from tests.plugin.test_plugin import project, result_hash, write_project
 
 SEARCH = ("--garl-budget=24", "--garl-workers=0", "--garl-shrink=60")

@@ -11,7 +11,7 @@ import dataclasses
 
 import tiny_simulator
 from pytest_garl.simulation.flight import Contact
-from pytest_garl.simulation.record import hash_of
+from pytest_garl.simulation.flight_file import hash_of
 
 
 def fly(*args, **options):

@@ -15,8 +15,8 @@ from pathlib import Path
 
 import pytest
 
-from pytest_garl.search.ledger import Ledger
-from pytest_garl.search.processes import children_of, named
+from pytest_garl.execution.ledger import Ledger
+from pytest_garl.execution.processes import children_of, named
 from tests.plugin.test_plugin import CONFTEST, write_project
 from tests.plugin.test_resume import SLOW, query
 
@@ -30,10 +30,10 @@ ARGS = (
 )
 SAVES_SLOWLY = """
 import time
-from pytest_garl import saving
+from pytest_garl.files import atomic
 from pytest_garl.regressions import corpus
 
-write = saving.save_text
+write = atomic.save_text
 
 def slowly(path, text):
     # A kill shall find it between two files, and between a file and its name.

@@ -8,18 +8,19 @@ from pathlib import Path
 
 import pytest
 
-from pytest_garl import dispatch
+from pytest_garl import cpu_dispatch
 from tests.plugin.test_plugin import TESTS, result_hash, run, write_project
 
 SYSTEM = """
 import os
 from pathlib import Path
-from pytest_garl import Land, dispatch
+from pytest_garl import cpu_dispatch
+from pytest_garl import Land
 
 class Tells:
     def reset(self, mission): pass
     def step(self, observation):
-        Path("told.txt").write_text(f"{os.getpid()} {dispatch.dispatched()}")
+        Path("told.txt").write_text(f"{os.getpid()} {cpu_dispatch.dispatched()}")
         return Land()
 """
 CONFTEST = """
@@ -27,12 +28,12 @@ import os
 from pathlib import Path
 import numpy
 import tiny_simulator
-from pytest_garl import dispatch
-Path("here.txt").write_text(f"{os.getpid()} {dispatch.dispatched()}")
+from pytest_garl import cpu_dispatch
+Path("here.txt").write_text(f"{os.getpid()} {cpu_dispatch.dispatched()}")
 def pytest_garl_fly(config):
     return tiny_simulator.fly
 """
-pytestmark = pytest.mark.skipif(not dispatch.has_baseline(), reason="this CPU has no AVX2")
+pytestmark = pytest.mark.skipif(not cpu_dispatch.has_baseline(), reason="this CPU has no AVX2")
 
 
 @pytest.fixture
@@ -42,7 +43,7 @@ def unpinned(pytester: pytest.Pytester, monkeypatch: pytest.MonkeyPatch) -> pyte
     (pytester.path / "systems.py").write_text(SYSTEM)
     (pytester.path / "test_it.py").write_text(TESTS.format(system="Tells", maps="['lawn']"))
     (pytester.path / "conftest.py").write_text(CONFTEST)
-    for name in dispatch.environment():
+    for name in cpu_dispatch.environment():
         monkeypatch.delenv(name, raising=False)
     monkeypatch.setenv("OPENBLAS_CORETYPE", "Nehalem")
     return pytester
@@ -61,13 +62,13 @@ def flown(pytester: pytest.Pytester, *args: str) -> tuple[pytest.RunResult, list
 def test_before_conftest_is_early_enough(unpinned: pytest.Pytester, args: tuple[str, ...]) -> None:
     result, here, told = flown(unpinned, *args)
     assert told == here
-    assert told[1] == dispatch.BASELINE
+    assert told[1] == cpu_dispatch.BASELINE
     result.stdout.no_fnmatch_line("*loaded before*")
 
 
 def test_a_search_is_bred_by_the_baseline(unpinned: pytest.Pytester) -> None:
     _, here, told = flown(unpinned, "--garl-workers=1", "--garl-budget=1")
-    assert here[1] == told[1] == dispatch.BASELINE
+    assert here[1] == told[1] == cpu_dispatch.BASELINE
     assert here[0] != told[0]
 
 
@@ -79,7 +80,7 @@ def test_a_search_breeds_the_same_whatever_the_environment_says(
     found = set()
     for setting in ({}, {"NPY_DISABLE_CPU_FEATURES": "X86_V3", "OPENBLAS_CORETYPE": "Nehalem"}):
         with monkeypatch.context() as outside:
-            for name in dispatch.environment():
+            for name in cpu_dispatch.environment():
                 outside.delenv(name, raising=False)
             for name, value in setting.items():
                 outside.setenv(name, value)
@@ -98,7 +99,7 @@ def test_what_is_loaded_before_that_sends_the_flight_to_a_child(unpinned: pytest
     unpinned.syspathinsert()
     result, here, told = flown(unpinned, "-p", "early", "--garl-workers=0", "--garl-budget=1")
     assert here[1].endswith("-nehalem")
-    assert told[1] == dispatch.BASELINE
+    assert told[1] == cpu_dispatch.BASELINE
     assert here[0] != told[0]
     result.stdout.fnmatch_lines(
         ["garl: loaded before*kernels for nehalem*flown in a child process, not inside pytest;*"]
@@ -120,30 +121,31 @@ def test_the_command_starts_again_where_numpy_was_loaded_first(
         "sys.argv = ['garl', '--version']\n"
         "print('began')\n"
         "try:\n    main()\n"
-        "finally:\n    print(dispatch.dispatched())\n"
+        "finally:\n    print(cpu_dispatch.dispatched())\n"
     )
     result = unpinned.run(sys.executable, "-u", "-c", code)
     assert result.outlines.count("began") == 2
-    assert result.outlines[-1] == dispatch.BASELINE
+    assert result.outlines[-1] == cpu_dispatch.BASELINE
 
 
 CHECKED = """
 import numpy, os
 from pathlib import Path
-from pytest_garl import Land, VelocitySetpoint, dispatch
+from pytest_garl import cpu_dispatch
+from pytest_garl import Land, VelocitySetpoint
 from pytest_garl.testing import check_landing_system
 
 class Good:
     def reset(self, mission): pass
     def step(self, observation):
-        Path("told.txt").write_text(dispatch.dispatched())
+        Path("told.txt").write_text(cpu_dispatch.dispatched())
         return Land()
 
 class Wrong(Good):
     def step(self, observation): return "down"
 
 if __name__ == "__main__":
-    print(dispatch.dispatched())
+    print(cpu_dispatch.dispatched())
     print(check_landing_system(Good, seconds=2.0).flights)
     try:
         check_landing_system(Wrong, seconds=2.0)
@@ -159,5 +161,5 @@ def test_the_checker_flies_in_a_child_where_numpy_was_loaded_first(
     script = unpinned.makepyfile(checked=CHECKED)
     result = unpinned.run(sys.executable, script)
     result.stdout.fnmatch_lines(["*-nehalem", "*lawn*", "LandingSystemError *down*"])
-    assert (unpinned.path / "told.txt").read_text() == dispatch.BASELINE
+    assert (unpinned.path / "told.txt").read_text() == cpu_dispatch.BASELINE
     assert result.ret == 0

@@ -7,11 +7,11 @@ from pathlib import Path
 
 import pytest
 
-from pytest_garl.search.job import loads
-from pytest_garl.search.ledger import Ledger
-from pytest_garl.search.methods import METHODS
-from pytest_garl.search.slots import population, slots
-from pytest_garl.switches import METHODS as OFFERED
+from pytest_garl.execution.job import loads
+from pytest_garl.execution.ledger import Ledger
+from pytest_garl.execution.slot import population, slots
+from pytest_garl.plugin.arguments import METHODS as OFFERED
+from pytest_garl.search.catalogue import METHODS
 
 SAVED = Path(__file__).parents[2] / "docs" / "tutorial" / "scenarios"
 
@@ -321,7 +321,7 @@ def test_who_moves_objects_depends_on_the_method_unless_one_says(
 
 
 POLICY = """
-from pytest_garl.simulation.policy import PolicySpec
+from pytest_garl.simulation.npc_policy import PolicySpec
 
 class Wild:
     def reset(self, situation, rng): pass

@@ -99,7 +99,7 @@ def test_own_assertions_that_fail_are_violations_in_the_summary(
     )
     (pytester.path / "conftest.py").write_text(
         "import dataclasses, tiny_simulator\n"
-        "from pytest_garl.simulation.record import hash_of\n"
+        "from pytest_garl.simulation.flight_file import hash_of\n"
         "def calm(scenario, *args, **kwargs):\n"
         "    nominal = {'environment.fog': 0.0, 'dog-1.velocity': 0.1}\n"
         "    return tiny_simulator.fly(scenario.replace(nominal), *args, **kwargs)\n"
@@ -200,7 +200,7 @@ def test_a_folder_of_cases_that_cannot_be_written_is_told_in_the_summary(
 
 def test_landing_is_exported_for_annotations() -> None:
     import pytest_garl
-    from pytest_garl.fixtures import Landing
+    from pytest_garl.plugin.fixtures import Landing
 
     assert pytest_garl.Landing is Landing
     assert "Landing" in pytest_garl.__all__

@@ -16,11 +16,11 @@ from typing import cast
 
 import pytest
 
+from pytest_garl.execution.ledger import Ledger, Progress
+from pytest_garl.plugin import progress
+from pytest_garl.plugin.progress import Stand, text
+from pytest_garl.plugin.run import Run
 from pytest_garl.regressions.forecast import Rest
-from pytest_garl.reports import progress
-from pytest_garl.reports.progress import Stand, text
-from pytest_garl.run import Run
-from pytest_garl.search.ledger import Ledger, Progress
 from tests.plugin.test_plugin import project, run
 
 SLOW = """
@@ -280,7 +280,7 @@ def test_a_log_shows_that_the_run_lives(
     slow_project(pytester)
     pytester.makeconftest(
         "from tiny_simulator import fly\n"
-        "import pytest_garl.reports.progress as progress\n"
+        "import pytest_garl.plugin.progress as progress\n"
         "progress.BEAT_S = 0.1\n"
         "def pytest_garl_fly(config): return fly\n"
     )

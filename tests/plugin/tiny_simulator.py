@@ -10,8 +10,8 @@ from pytest_garl.landing_system import Camera, Mission, Observation
 from pytest_garl.scenarios.placement import marker_position_m
 from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.simulation.flight import Contact, Flight, Track
-from pytest_garl.simulation.record import hash_of
-from pytest_garl.simulation.system_calls import crash_of
+from pytest_garl.simulation.flight_file import hash_of
+from pytest_garl.simulation.system_under_test.calls import crash_of
 
 
 def fly(

@@ -9,15 +9,15 @@ from pathlib import Path
 
 import pytest
 
+from pytest_garl.baselines import file as baselines
 from pytest_garl.errors import OptionError, ScenarioError
-from pytest_garl.regressions import baseline as baselines
+from pytest_garl.regressions.case_file import dumps, load, load_head, loads
 from pytest_garl.regressions.corpus import CorpusError, entries, every_entry, save, save_patch
-from pytest_garl.regressions.files import dumps, load, load_head, loads
-from pytest_garl.scenarios import maps as package
-from pytest_garl.scenarios.maps import load_map
+from pytest_garl.scenarios.maps import map as package
+from pytest_garl.scenarios.maps.map import load_map
 from pytest_garl.verdicts.verdict import Limits
-from tests.regressions.test_baseline import baseline
-from tests.regressions.test_files import NAMES, SYSTEM, case, changing
+from tests.baselines.test_file import baseline
+from tests.regressions.test_case_file import NAMES, SYSTEM, case, changing
 
 TEXT = dumps(case())
 MOVES = "[[2, 0.0, 0.0], [1, 0.6, -0.8]]"

@@ -10,16 +10,16 @@ from typing import Any
 
 import pytest
 
-from pytest_garl.adversary.policies import policy_spec
+from pytest_garl.adversary.scripted import policy_spec
+from pytest_garl.execution.on_demand import Done
+from pytest_garl.plugin.run import _steered
 from pytest_garl.regressions.case import Case
 from pytest_garl.regressions.findings import deeds_of
 from pytest_garl.regressions.replay import replay
-from pytest_garl.run import _steered
-from pytest_garl.search.errands import Done
+from pytest_garl.simulation.flight_file import save
 from pytest_garl.simulation.fly import fly
-from pytest_garl.simulation.record import save
-from pytest_garl.simulation.reference_pilot import ReferencePilot
-from tests.regressions.test_files import NAMES, case, changing
+from pytest_garl.simulation.system_under_test.reference_pilot import ReferencePilot
+from tests.regressions.test_case_file import NAMES, case, changing
 from tests.simulation.test_environment import LAWN, SCENARIO, WEATHERMAKER
 
 

@@ -5,14 +5,14 @@ from typing import Any
 
 import pytest
 
+from pytest_garl.execution.on_demand import Done
+from pytest_garl.regressions.case_request import Finding, Inquiry
 from pytest_garl.regressions.follow_up import shares
 from pytest_garl.regressions.forecast import of_search, rest_of
-from pytest_garl.regressions.inquiry import Finding, Inquiry
-from pytest_garl.regressions.pursuit import EXCEPTION, LEAST, PILOTS
+from pytest_garl.regressions.investigation import EXCEPTION, LEAST, PILOTS
 from pytest_garl.scenarios.chromosome import decode
 from pytest_garl.scenarios.genes import genome_for
-from pytest_garl.scenarios.maps import load_map
-from pytest_garl.search.errands import Done
+from pytest_garl.scenarios.maps.map import load_map
 
 LAWN = load_map("lawn")
 GENOME = genome_for(LAWN)

@@ -7,13 +7,13 @@ from pathlib import Path
 
 import pytest
 
-import pytest_garl.scenarios.maps as maps
+import pytest_garl.scenarios.maps.map as maps
 from pytest_garl.errors import ScenarioError
+from pytest_garl.files.toml import parse
 from pytest_garl.scenarios.chromosome import decode
 from pytest_garl.scenarios.files import dumps, load
 from pytest_garl.scenarios.genes import genome_for
-from pytest_garl.scenarios.maps import load_map
-from pytest_garl.scenarios.toml_reader import parse
+from pytest_garl.scenarios.maps.map import load_map
 
 COURT = load_map("court")
 LAWN = (Path(maps.__file__).parent / "lawn.toml").read_text()

@@ -11,7 +11,7 @@ from pytest_garl.errors import ScenarioError
 from pytest_garl.scenarios.chromosome import decode, encode
 from pytest_garl.scenarios.files import dumps, loads
 from pytest_garl.scenarios.genes import EXTRAS, genome_for, genome_like, with_destinations
-from pytest_garl.scenarios.maps import load_map, map_names
+from pytest_garl.scenarios.maps.map import load_map, map_names
 from pytest_garl.scenarios.placement import disc_to_square, square_to_disc
 from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.scenarios.strategies import scenarios
@@ -144,7 +144,7 @@ def test_a_broken_scenario_file_names_file_and_key(old: str, new: str, expected:
     ],
 )
 def test_a_broken_map_names_file_and_key(tmp_path: Path, old: str, new: str, expected: str) -> None:
-    import pytest_garl.scenarios.maps as maps
+    import pytest_garl.scenarios.maps.map as maps
 
     text = (Path(maps.__file__).parent / "lawn.toml").read_text()
     (tmp_path / "mine.toml").write_text(text.replace(old, new, 1))
@@ -155,7 +155,7 @@ def test_a_broken_map_names_file_and_key(tmp_path: Path, old: str, new: str, exp
 
 
 def test_a_users_map_is_found_by_name(tmp_path: Path) -> None:
-    import pytest_garl.scenarios.maps as maps
+    import pytest_garl.scenarios.maps.map as maps
 
     text = (Path(maps.__file__).parent / "lawn.toml").read_text()
     (tmp_path / "garden.toml").write_text(text)

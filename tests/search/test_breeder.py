@@ -4,15 +4,15 @@ from pathlib import Path
 
 import pytest
 
+from pytest_garl.execution.job import load_scenario
+from pytest_garl.execution.ledger import Ledger
+from pytest_garl.execution.slot import Slot, population, slots
 from pytest_garl.scenarios.genes import genome_for
-from pytest_garl.scenarios.maps import load_map
+from pytest_garl.scenarios.maps.map import load_map
 from pytest_garl.search.breeder import Breeder
-from pytest_garl.search.job import load_scenario
-from pytest_garl.search.ledger import Ledger
+from pytest_garl.search.catalogue import METHODS, make_method
 from pytest_garl.search.method import Plan
-from pytest_garl.search.methods import METHODS, make_method
-from pytest_garl.search.slots import Slot, population, slots
-from tests.search.test_nsga2 import result
+from tests.search.methods.test_nsga2 import result
 
 MAP = load_map("court")
 GENOME = genome_for(MAP)

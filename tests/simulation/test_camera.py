@@ -13,13 +13,13 @@ import pytest
 from pytest_garl.landing_system import Camera
 from pytest_garl.scenarios.chromosome import decode
 from pytest_garl.scenarios.genes import genome_for
-from pytest_garl.scenarios.maps import load_map
+from pytest_garl.scenarios.maps.map import load_map
 from pytest_garl.scenarios.object_types import OBJECT_TYPES
 from pytest_garl.scenarios.placement import marker_position_m
 from pytest_garl.scenarios.validity import discs_of, repair
-from pytest_garl.simulation.camera import Frame, Renderer
-from pytest_garl.simulation.meshes import mesh_of, placed
-from pytest_garl.simulation.view import FAR_M
+from pytest_garl.simulation.camera.meshes import mesh_of, placed
+from pytest_garl.simulation.camera.projection import FAR_M
+from pytest_garl.simulation.camera.renderer import Frame, Renderer
 
 CAMERA = Camera()
 FINE = Camera(width_px=1280, height_px=960)

@@ -30,12 +30,12 @@ from pytest_garl import (
 )
 from pytest_garl.errors import LandingSystemError
 from pytest_garl.landing_system import airframe_of
-from pytest_garl.simulation import diagnostics
-from pytest_garl.simulation.commands import read_command, read_thrusts
-from pytest_garl.simulation.diagnostics import Room
+from pytest_garl.simulation.flight_file import load, save
 from pytest_garl.simulation.fly import fly
-from pytest_garl.simulation.reading import NonsenseError
-from pytest_garl.simulation.record import load, save
+from pytest_garl.simulation.system_under_test import diagnostics
+from pytest_garl.simulation.system_under_test.diagnostics import Room
+from pytest_garl.simulation.system_under_test.reading import NonsenseError
+from pytest_garl.simulation.system_under_test.validation import read_command, read_thrusts
 from pytest_garl.verdicts.judge import judge
 from pytest_garl.verdicts.verdict import Limits
 from tests.simulation.test_flight import EMPTY, STAND, Scripted, nominal
@@ -501,8 +501,8 @@ def test_landing_and_aborting_keep_the_yaw(last: Command) -> None:
 
 
 def test_abort_keeps_the_yaw_that_a_system_with_its_own_control_was_flying() -> None:
-    from pytest_garl.simulation.flight_control import FlightControl
-    from pytest_garl.simulation.vehicle import Motion, vehicle_model
+    from pytest_garl.simulation.physics.flight_control import FlightControl
+    from pytest_garl.simulation.physics.vehicle import Motion, vehicle_model
 
     control = FlightControl(vehicle_model(Airframe()))
     half = math.sin(0.5), math.cos(0.5)
@@ -546,7 +546,7 @@ def test_observation_cannot_be_made_writeable_again() -> None:
 def test_physics_without_finite_numbers_end_the_flight_as_a_finding(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
-    from pytest_garl.simulation.world import World
+    from pytest_garl.simulation.physics.world import World
 
     where, step = World.uav, World.step
     steps = itertools.count()

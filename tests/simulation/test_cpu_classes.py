@@ -12,14 +12,14 @@ from typing import Any
 
 import pytest
 
-from pytest_garl import dispatch
+from pytest_garl import cpu_dispatch
 from pytest_garl.adversary.recorded import recorded_spec
+from pytest_garl.execution.batch import fly_all, own_pool
+from pytest_garl.execution.job import Job
+from pytest_garl.execution.reference import BUILT_IN, Reference
 from pytest_garl.regressions.case import Case
 from pytest_garl.regressions.corpus import every_entry
-from pytest_garl.scenarios.maps import load_map
-from pytest_garl.search.batch import fly_all, own_pool
-from pytest_garl.search.job import Job
-from pytest_garl.search.reference import BUILT_IN, Reference
+from pytest_garl.scenarios.maps.map import load_map
 
 Found = tuple[Path, Case]
 ROOT = Path(__file__).parents[2]
@@ -46,17 +46,17 @@ FLY = """
 import json, sys
 import numpy as np
 from pathlib import Path
-from pytest_garl import dispatch
+from pytest_garl import cpu_dispatch
 from pytest_garl.adversary.recorded import recorded_spec
-from pytest_garl.regressions.files import load
-from pytest_garl.search.reference import system_named
+from pytest_garl.regressions.case_file import load
+from pytest_garl.execution.reference import system_named
 from pytest_garl.simulation.fly import fly
 from pytest_garl.verdicts.judge import judge
 rng = np.random.default_rng(0)
 product = rng.random((31, 57)) @ rng.random((57, 23))
 refused = ""
 try:
-    dispatch.check()
+    cpu_dispatch.check()
 except Exception as error:
     refused = str(error)
 cases = [load(Path(file), ()) for file in sys.argv[1:]]
@@ -74,7 +74,7 @@ print(json.dumps({
 }))
 """
 GARL = "from pytest_garl.cli import main; main()"
-needs_avx2 = pytest.mark.skipif(not dispatch.has_baseline(), reason="this CPU has no AVX2")
+needs_avx2 = pytest.mark.skipif(not cpu_dispatch.has_baseline(), reason="this CPU has no AVX2")
 
 
 def case_of_each(wanted: Callable[[Case], bool], best: Callable[..., Any]) -> list[Found]:
@@ -124,12 +124,12 @@ def flown_by_a_child() -> list[tuple[str, str]]:
 
 def flown_unpinned(setting: dict[str, str]) -> dict[str, Any]:
     """Fly in a process that chooses its instructions by itself, as this setting lets it."""
-    pinned = dispatch.environment()
+    pinned = cpu_dispatch.environment()
     outside = {name: value for name, value in os.environ.items() if name not in pinned}
     # That NumPy does not know a group, or the CPU does not have it, is only a warning.
     done = subprocess.run(
         [sys.executable, "-W", "ignore", "-c", FLY, *(str(path) for path, _ in ROBUST)],
-        env={**outside, **dispatch.THREADS, **setting},
+        env={**outside, **cpu_dispatch.THREADS, **setting},
         cwd=ROOT,
         capture_output=True,
         text=True,
@@ -173,11 +173,11 @@ def test_the_command_flies_as_children_do() -> None:
 @needs_avx2
 @pytest.mark.sim
 def test_without_the_pin_bytes_differ_and_are_refused() -> None:
-    avx2, old = flown_unpinned(dispatch.environment()), flown_unpinned(WITHOUT_AVX2)
+    avx2, old = flown_unpinned(cpu_dispatch.environment()), flown_unpinned(WITHOUT_AVX2)
     assert not avx2["refused"]
     assert "expected x86_64-avx2-haswell" in old["refused"]
-    assert avx2["cpus"] == [dispatch.BASELINE] * 3
-    assert dispatch.BASELINE not in old["cpus"]
+    assert avx2["cpus"] == [cpu_dispatch.BASELINE] * 3
+    assert cpu_dispatch.BASELINE not in old["cpus"]
     assert avx2["product"] != old["product"]
     assert avx2["hashes"] != old["hashes"]
     # Where there is no AVX2 not the bytes are promised but the verdict, of robust cases.

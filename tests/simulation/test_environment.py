@@ -8,23 +8,23 @@ import numpy as np
 import pytest
 
 from pytest_garl import Command, Mission, Observation, PositionSetpoint
-from pytest_garl.adversary.policies import policy_spec
 from pytest_garl.adversary.recorded import recorded_spec
+from pytest_garl.adversary.scripted import policy_spec
+from pytest_garl.execution.on_demand import Done
 from pytest_garl.landing_system import Airframe, Camera
 from pytest_garl.regressions.case import Deeds
 from pytest_garl.regressions.findings import deeds_of
 from pytest_garl.scenarios.genes import ENVIRONMENT, genome_for
-from pytest_garl.scenarios.maps import load_map
+from pytest_garl.scenarios.maps.map import load_map
 from pytest_garl.scenarios.scenario import Scenario
-from pytest_garl.search.errands import Done
-from pytest_garl.search.random_search import propose
-from pytest_garl.simulation.camera import Renderer
+from pytest_garl.search.methods.random_search import propose
+from pytest_garl.simulation.camera.renderer import Renderer
 from pytest_garl.simulation.environment import changed, environment_at
 from pytest_garl.simulation.flight import Flight
+from pytest_garl.simulation.flight_file import load, save
 from pytest_garl.simulation.fly import fly
-from pytest_garl.simulation.policy import Move, PolicySpec, Situation
+from pytest_garl.simulation.npc_policy import Move, PolicySpec, Situation
 from pytest_garl.simulation.randomness import generator
-from pytest_garl.simulation.record import load, save
 
 LAWN = load_map("lawn")
 SCENARIO = propose(LAWN, genome_for(LAWN), 3, 0, 1)[0]

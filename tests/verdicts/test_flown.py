@@ -6,10 +6,10 @@ import math
 
 import pytest
 
-from pytest_garl.adversary.policies import policy_spec
+from pytest_garl.adversary.scripted import policy_spec
+from pytest_garl.baselines.record import Survey
 from pytest_garl.landing_system import Abort, Command, Land, Mission, Observation, PositionSetpoint
-from pytest_garl.regressions.survey import Survey
-from pytest_garl.scenarios.maps import load_map
+from pytest_garl.scenarios.maps.map import load_map
 from pytest_garl.simulation.fly import fly
 from pytest_garl.verdicts.judge import judge, off_marker_m
 from pytest_garl.verdicts.verdict import Limits

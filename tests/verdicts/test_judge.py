@@ -11,8 +11,7 @@ from pytest_garl.landing_system import Detection, Diagnostics
 from pytest_garl.simulation.flight import Contact, Crash, Flight, Separation, Step, Track
 from pytest_garl.verdicts.judge import closest_call, judge, off_marker_m, undecided
 from pytest_garl.verdicts.metrics import share_interval, top_k
-from pytest_garl.verdicts.serialise import from_dict, to_dict
-from pytest_garl.verdicts.verdict import Limits
+from pytest_garl.verdicts.verdict import Limits, Verdict
 
 
 def step(
@@ -157,7 +156,7 @@ def test_the_first_event_decides(subject: Flight, primary: Any, signature: str) 
     assert verdict.primary == primary
     assert verdict.signature == signature
     assert verdict.story
-    assert from_dict(to_dict(verdict)) == verdict
+    assert Verdict.from_json(verdict.to_json()) == verdict
 
 
 def test_late_and_aborted_are_no_violation_in_the_papers_sense() -> None:

@@ -9,13 +9,13 @@ from pathlib import Path
 from typing import cast, get_args
 
 from pytest_garl.errors import ScenarioError
+from pytest_garl.files.reading import read_bytes
+from pytest_garl.files.toml import Table, parse
 from pytest_garl.messages import printable, shown
-from pytest_garl.reading import read_bytes
 from pytest_garl.scenarios.bodies import Body
-from pytest_garl.scenarios.furniture import FURNITURE
-from pytest_garl.scenarios.maps import Ground, Layer, LayerKind, Map, Texture
+from pytest_garl.scenarios.maps.map import Ground, Layer, LayerKind, Map, Texture
 from pytest_garl.scenarios.object_types import OBJECT_TYPES
-from pytest_garl.scenarios.toml_reader import Table, parse
+from pytest_garl.scenarios.static_bodies import FURNITURE
 
 _GPS_DISC_M = 7.5
 LARGEST_AREA_M2 = 10_000.0

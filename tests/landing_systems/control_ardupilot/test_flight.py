@@ -20,14 +20,14 @@ from pytest_garl import (
     PositionSetpoint,
     VehicleState,
 )
-from pytest_garl.adversary.policies import policy_spec
+from pytest_garl.adversary.scripted import policy_spec
 from pytest_garl.scenarios.chromosome import decode
 from pytest_garl.scenarios.genes import WIND, genome_for
-from pytest_garl.scenarios.maps import load_map
+from pytest_garl.scenarios.maps.map import load_map
 from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.scenarios.validity import repair
 from pytest_garl.simulation.fly import fly
-from pytest_garl.simulation.truth import Truth
+from pytest_garl.simulation.system_under_test.ground_truth import Truth
 
 pytestmark = pytest.mark.sim
 

@@ -18,20 +18,20 @@ from landing_systems.modules.detection_tphyolo.detector import (
     ground_place,
 )
 from landing_systems.modules.detection_tphyolo.patches import PATCH_PX, REACH, normalised, patch
-from landing_systems.modules.detection_tphyolo.scenes import (
+from landing_systems.training.tphyolo.scenes import (
     CAMERA,
     Print,
     pictures,
     random_pose,
     truth,
 )
-from landing_systems.modules.detection_tphyolo.scoring import mission, observation_of, score
+from landing_systems.training.tphyolo.scoring import mission, observation_of, score
 from pytest_garl import Observation
 from pytest_garl.scenarios.chromosome import decode
 from pytest_garl.scenarios.genes import genome_for
-from pytest_garl.scenarios.maps import load_map
-from pytest_garl.simulation.camera import Renderer
-from pytest_garl.simulation.view import View
+from pytest_garl.scenarios.maps.map import load_map
+from pytest_garl.simulation.camera.projection import View
+from pytest_garl.simulation.camera.renderer import Renderer
 
 NONE: Mapping[str, float] = MappingProxyType({})
 LEVEL = (0.0, 0.0, 0.0, 1.0)

@@ -1,0 +1,1 @@
+"""How TPHYolo-MLS's networks were trained: data, losses, export and scores."""

@@ -1,0 +1,52 @@
+from pytest_garl.landing_system import (
+    Abort,
+    Airframe,
+    AttitudeSetpoint,
+    Camera,
+    Command,
+    Detection,
+    Diagnostics,
+    Land,
+    LandingSystem,
+    Mission,
+    MotorThrusts,
+    Observation,
+    PositionSetpoint,
+    VehicleState,
+    VelocitySetpoint,
+)
+from pytest_garl.plugin.fixtures import Landing
+from pytest_garl.simulation.flight import Flight
+from pytest_garl.simulation.npc_policy import Move, PolicySpec, Situation
+from pytest_garl.verdicts.verdict import Limits
+from pytest_garl.video import save_video
+
+__version__: str
+
+__all__ = [
+    "Abort",
+    "Airframe",
+    "AttitudeSetpoint",
+    "Camera",
+    "Command",
+    "Detection",
+    "Diagnostics",
+    "Flight",
+    "Land",
+    "Landing",
+    "LandingSystem",
+    "Limits",
+    "Mission",
+    "MotorThrusts",
+    "Move",
+    "Observation",
+    "PolicySpec",
+    "PositionSetpoint",
+    "Situation",
+    "VehicleState",
+    "VelocitySetpoint",
+    "limits",
+    "save_video",
+]
+
+limits = Limits

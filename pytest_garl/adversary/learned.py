@@ -1,0 +1,171 @@
+"""Trained policies as data: a small network in NumPy, its file and its manifest."""
+
+from __future__ import annotations
+
+import functools
+import hashlib
+import io
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pytest_garl.adversary.observations import VIEWS, on_turn
+from pytest_garl.errors import PolicyError
+from pytest_garl.files.arrays import unpack
+from pytest_garl.files.json_values import parsed
+from pytest_garl.files.reading import MEGABYTE, read_bytes
+from pytest_garl.messages import listed, shown
+from pytest_garl.simulation.npc_policy import STAY, Move, PolicySpec, Situation
+
+Array = NDArray[np.float64]
+WEIGHTS = Path(__file__).with_name("weights")
+FORMAT = 1
+_LARGEST = MEGABYTE
+"""Bytes of weights, packed or not: two hundred times those that are shipped."""
+_REMEDY = "; train it again with `garl train`, or restore the file"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Network:
+    """Linear layers with ReLU between them; double precision, so that CPUs agree.
+
+    ``layers`` are (weight (out, in), bias (out,)); ``state`` names what goes in.
+    """
+
+    state: str
+    layers: tuple[tuple[Array, Array], ...]
+
+    def values(self, state: NDArray[Any]) -> Array:
+        """Return the value of each action, shape (actions,)."""
+        signal: Array = state.astype(np.float64)
+        for weight, bias in self.layers[:-1]:
+            signal = np.maximum(weight @ signal + bias, 0.0)
+        weight, bias = self.layers[-1]
+        return np.asarray(weight @ signal + bias, dtype=np.float64)
+
+
+class LearnedPolicy:
+    """Takes the action that the network values most; one instance steers one object."""
+
+    def __init__(self, weights: str, sha256: str) -> None:
+        self._network = _load(weights, sha256)
+        self._view = VIEWS[self._network.state]
+
+    def reset(self, situation: Situation, rng: np.random.Generator) -> None:
+        """Nothing to prepare: the state says everything."""
+
+    def decide(self, situation: Situation) -> Move:
+        """Return the best action, or stay where it is another's turn."""
+        if self._view.in_turn and not on_turn(situation):
+            return STAY
+        values = self._network.values(self._view.state(situation))
+        return self._view.moves(situation)[int(np.argmax(values))]
+
+
+def learned_spec(name: str) -> PolicySpec:
+    """Return the specification of a shipped policy, or of one in a file.
+
+    ``name`` is "dqn", "dqn-paper", "online-rl", or the path of weights (``.npz``) that
+    ``garl train`` wrote, with their manifest (``.json``) beside them.  Raises PolicyError for a
+    file that is missing, damaged, or not what its manifest says.
+    """
+    path = _path(name)
+    sha256 = str(read_manifest(path)["sha256"])
+    weights = name if path.parent == WEIGHTS else str(path.resolve())
+    _load(weights, sha256)
+    return PolicySpec(
+        name=name,
+        factory=f"{__name__}:{LearnedPolicy.__name__}",
+        arguments=(("weights", weights), ("sha256", sha256)),
+    )
+
+
+def save(path: Path, network: Network, about: Mapping[str, Any]) -> None:
+    """Write weights to ``path`` (.npz, no pickles) and their manifest (.json) beside it."""
+    arrays: dict[str, Any] = {}
+    for index, (weight, bias) in enumerate(network.layers):
+        arrays[f"weight_{index}"] = weight.astype(np.float32)
+        arrays[f"bias_{index}"] = bias.astype(np.float32)
+    buffer = io.BytesIO()
+    np.savez(buffer, **arrays)
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.write_bytes(buffer.getvalue())
+    manifest = {
+        "format": FORMAT,
+        "state": network.state,
+        "sha256": hashlib.sha256(buffer.getvalue()).hexdigest(),
+        **about,
+    }
+    path.with_suffix(".json").write_text(json.dumps(manifest, indent=2) + "\n", encoding="utf-8")
+
+
+def read_manifest(path: Path) -> dict[str, Any]:
+    """Return the manifest of weights at ``path``; raise PolicyError where it is no manifest."""
+    if not path.is_file():
+        raise PolicyError(
+            f"object policy: there are no weights at {path}; expected a file of `garl train`"
+        )
+    file = path.with_suffix(".json")
+    try:
+        manifest = parsed(read_bytes(file, error=PolicyError))
+    except (PolicyError, ValueError) as error:
+        raise _wrong(file, f"is no readable manifest ({error})") from error
+    if not isinstance(manifest, dict):
+        raise _wrong(file, f"is no readable manifest (found {shown(manifest)}, expected a table)")
+    known = {"format", "state", "sha256"} <= manifest.keys()
+    if not known or manifest["format"] != FORMAT:
+        raise _wrong(file, f"is not a manifest of format {FORMAT}")
+    if str(manifest["state"]) not in VIEWS:
+        state = shown(manifest["state"])
+        raise _wrong(file, f"names the state {state}; known: {', '.join(VIEWS)}")
+    return manifest
+
+
+@functools.lru_cache(maxsize=8)
+def _load(weights: str, sha256: str) -> Network:
+    path = _path(weights)
+    manifest = read_manifest(path)
+    data = read_bytes(path, _LARGEST, PolicyError, _REMEDY)
+    found = hashlib.sha256(data).hexdigest()
+    if not found == sha256 == manifest["sha256"]:
+        raise _wrong(path, f"has the hash {found[:16]}…, its manifest says {sha256[:16]}…")
+    try:
+        arrays = unpack(data, _LARGEST)
+    except ValueError as error:
+        raise _wrong(path, f"is no file of weights ({error})") from error
+    count = len(arrays) // 2
+    expected = {f"{kind}_{index}" for index in range(count) for kind in ("weight", "bias")}
+    if arrays.keys() != expected:
+        found = listed(sorted(arrays))
+        raise _wrong(path, f"is no file of weights (found {found}; expected weight_0, bias_0, …)")
+    layers = [
+        (arrays[f"weight_{index}"].astype(np.float64), arrays[f"bias_{index}"].astype(np.float64))
+        for index in range(count)
+    ]
+    _check(path, layers, manifest["state"])
+    return Network(state=manifest["state"], layers=tuple(layers))
+
+
+def _check(path: Path, layers: Sequence[tuple[Array, Array]], state: str) -> None:
+    size, actions = VIEWS[state].size, VIEWS[state].actions
+    for weight, bias in layers:
+        if weight.ndim != 2 or bias.shape != weight.shape[:1] or weight.shape[1] != size:
+            raise _wrong(path, f"has a layer of shape {weight.shape} where {size} numbers go in")
+        if not (np.isfinite(weight).all() and np.isfinite(bias).all()):
+            raise _wrong(path, "has weights that are not finite")
+        size = weight.shape[0]
+    if size != actions:
+        raise _wrong(path, f"knows {size} actions; expected {actions} with the state {state!r}")
+
+
+def _path(name: str) -> Path:
+    return WEIGHTS / f"{name}.npz" if "/" not in name and "." not in name else Path(name)
+
+
+def _wrong(path: Path, problem: str) -> PolicyError:
+    return PolicyError(f"object policy: {path} {problem}{_REMEDY}")

@@ -1,0 +1,228 @@
+"""What a learned policy sees and what it may do: situations as numbers, actions as moves."""
+
+from __future__ import annotations
+
+import hashlib
+import math
+import struct
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from types import MappingProxyType
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pytest_garl.scenarios.genes import CONFINED_WEATHER, ENVIRONMENT, SUN
+from pytest_garl.simulation.npc_policy import DECISION_STEP_S, STAY, Move, Situation
+
+State = NDArray[np.float32]
+
+ACTIONS: tuple[Move, ...] = (
+    Move(x=0.0, y=1.0),
+    Move(x=0.0, y=-1.0),
+    Move(x=-1.0, y=0.0),
+    Move(x=1.0, y=0.0),
+    Move(x=0.0, y=0.0),
+)
+"""The paper's actions: up, down, left, right, stationary (up is north)."""
+
+PLACE_SCALE_M = 10.0
+SPEED_SCALE_MPS = 3.0
+STEP_SCALE_M = 4.0
+BODY_SCALE_M = 3.0
+"""What each kind of number is divided by, so that all are of the order of one."""
+LIMIT = 10.0
+"""No number is beyond this, however large the map."""
+CONDITION_STEP = 0.01
+"""What the paper's online rival alters a condition by at a time."""
+
+
+def paper(situation: Situation) -> State:
+    """Return object - marker and UAV - marker in the plane (4,), in metres / 10.
+
+    Paper, section 3.4: the state S.
+    """
+    return _vector(_places(situation))
+
+
+def extended(situation: Situation) -> State:
+    """Return nine numbers: the paper's four, and what timing needs.
+
+    The UAV's height and vertical speed, how far the object can go in one decision, and the
+    heights of its top and bottom.
+    """
+    return _vector(
+        (
+            *_places(situation),
+            situation.uav_position_m[2] / PLACE_SCALE_M,
+            situation.uav_velocity_mps[2] / SPEED_SCALE_MPS,
+            *_being(situation),
+        )
+    )
+
+
+def relative(situation: Situation) -> State:
+    """Return ten numbers in the frame of the object, whose x axis points to the UAV's column.
+
+    Distance to the column; UAV - marker; the UAV's height and vertical speed; the object's
+    step, top and bottom; its velocity.  A landing looks the same from all sides, so what
+    is learned on one side need not be learned again on the others.
+    """
+    ox, oy, _ = situation.self.position_m
+    ux, uy, height = situation.uav_position_m
+    mx, my = situation.marker_position_m
+    ahead, aside = _turn(situation, ux - mx, uy - my)
+    forward, sideways = _turn(situation, *situation.self.velocity_mps)
+    return _vector(
+        (
+            math.dist((ox, oy), (ux, uy)) / PLACE_SCALE_M,
+            ahead / PLACE_SCALE_M,
+            aside / PLACE_SCALE_M,
+            height / PLACE_SCALE_M,
+            situation.uav_velocity_mps[2] / SPEED_SCALE_MPS,
+            *_being(situation),
+            forward / SPEED_SCALE_MPS,
+            sideways / SPEED_SCALE_MPS,
+        )
+    )
+
+
+def fellow(situation: Situation) -> State:
+    """Return the relative state and where the nearest fellow is, (12,).
+
+    Fellow - object in the object's frame; one 20 m behind where there is none.
+    """
+    x, y, _ = situation.self.position_m
+    near = min(
+        (other.position_m for other in situation.others),
+        key=lambda place: math.dist(place[:2], (x, y)),
+        default=None,
+    )
+    ahead, aside = _turn(situation, near[0] - x, near[1] - y) if near else (-20.0, 0.0)
+    offset = _vector((ahead / PLACE_SCALE_M, aside / PLACE_SCALE_M))
+    return np.concatenate([relative(situation), offset])
+
+
+def online(situation: Situation) -> State:
+    """Return the paper's four, the environment's nine properties and the marker's genes, (15,).
+
+    The state of the paper's Online RL "encodes the environment, marker position, and dynamic
+    objects' start points".  As in its code the places are those of the moment, the object's and
+    the UAV's; unlike there they are relative to the marker in flight as they were in training.
+    Weather is a share of the confined range, which the policy never leaves.
+    """
+    scenario = situation.scenario
+    conditions = [scenario[key] / _range(key) for key in ENVIRONMENT]
+    return _vector((*_places(situation), *conditions, scenario["marker.x"], scenario["marker.y"]))
+
+
+def online_moves(situation: Situation) -> tuple[Move, ...]:
+    """Return the paper's five moves, then each of nine conditions up and down, (23,).
+
+    As many as in the paper's code: eight weathers by ±0.01, and time of day.  No weather is
+    raised beyond the confined range: the policy knows no other.
+    """
+    changes = []
+    for key in ENVIRONMENT:
+        value = situation.scenario[key]
+        up = max(0.0, min(CONDITION_STEP, _range(key) - value))
+        changes += [(key, up), (key, -min(CONDITION_STEP, value))]
+    return *ACTIONS, *(Move(x=0.0, y=0.0, changes=(each,)) if each[1] else STAY for each in changes)
+
+
+def on_turn(situation: Situation) -> bool:
+    """Whether a decision is this object's, where one of all is drawn for each.
+
+    Objects have a generator each and none in common; what they draw together comes from what
+    all of them see.
+    """
+    names = sorted(each.name for each in (situation.self, *situation.others))
+    seen = struct.pack("<3d", situation.time_s, *situation.marker_position_m)
+    draw = int.from_bytes(hashlib.blake2b(seen, digest_size=8).digest(), "little")
+    return names[draw % len(names)] == situation.self.name
+
+
+def compass_moves(situation: Situation) -> tuple[Move, ...]:
+    """Return what the paper's actions mean: north, south, west, east, stay."""
+    return ACTIONS
+
+
+def relative_moves(situation: Situation) -> tuple[Move, ...]:
+    """Return what actions mean in the object's frame: left, right, back, ahead, stay."""
+    cos, sin = _heading(situation)
+    return tuple(Move(x=cos * m.x - sin * m.y, y=sin * m.x + cos * m.y) for m in ACTIONS)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class View:
+    """How a policy sees: the state's size, the state, what the actions mean and how many there are.
+
+    ``in_turn`` is whether at each decision one object acts, drawn at random, and all others stay.
+    """
+
+    size: int
+    state: Callable[[Situation], State]
+    moves: Callable[[Situation], tuple[Move, ...]]
+    actions: int = len(ACTIONS)
+    in_turn: bool = False
+
+
+VIEWS: Mapping[str, View] = MappingProxyType(
+    {
+        "paper": View(size=4, state=paper, moves=compass_moves),
+        "extended": View(size=9, state=extended, moves=compass_moves),
+        "relative": View(size=10, state=relative, moves=relative_moves),
+        "fellow": View(size=12, state=fellow, moves=relative_moves),
+        "online": View(
+            size=4 + len(ENVIRONMENT) + 2,
+            state=online,
+            moves=online_moves,
+            actions=len(ACTIONS) + 2 * len(ENVIRONMENT),
+            in_turn=True,
+        ),
+    }
+)
+"""Each view by the name that a policy's manifest gives."""
+
+
+def _heading(situation: Situation) -> tuple[float, float]:
+    """Cosine and sine of the direction from the object to the UAV's column."""
+    ox, oy, _ = situation.self.position_m
+    ux, uy, _ = situation.uav_position_m
+    length = math.dist((ox, oy), (ux, uy))
+    return ((ux - ox) / length, (uy - oy) / length) if length > 0 else (1.0, 0.0)
+
+
+def _turn(situation: Situation, x: float, y: float) -> tuple[float, float]:
+    cos, sin = _heading(situation)
+    return cos * x + sin * y, cos * y - sin * x
+
+
+def _being(situation: Situation) -> tuple[float, float, float]:
+    """How far the object can go in one decision, and the heights of its top and bottom."""
+    kind = situation.self.type
+    return (
+        situation.self.speed_mps * DECISION_STEP_S / STEP_SCALE_M,
+        kind.top_m / BODY_SCALE_M,
+        kind.bottom_m / BODY_SCALE_M,
+    )
+
+
+def _range(key: str) -> float:
+    return 1.0 if key == SUN else CONFINED_WEATHER
+
+
+def _vector(numbers: Sequence[float]) -> State:
+    return np.clip(np.array(numbers, dtype=np.float32), -LIMIT, LIMIT)
+
+
+def _places(situation: Situation) -> tuple[float, float, float, float]:
+    mx, my = situation.marker_position_m
+    ox, oy, _ = situation.self.position_m
+    ux, uy, _ = situation.uav_position_m
+    return (
+        (ox - mx) / PLACE_SCALE_M,
+        (oy - my) / PLACE_SCALE_M,
+        (ux - mx) / PLACE_SCALE_M,
+        (uy - my) / PLACE_SCALE_M,
+    )

@@ -1,0 +1,1 @@
+"""How the learned NPC policies are trained; needs the extra ``train``."""

@@ -1,0 +1,128 @@
+"""The surrogate: a Gymnasium environment on the project's own simulator and camera."""
+
+from __future__ import annotations
+
+import functools
+from dataclasses import dataclass, field
+from typing import Any, Literal
+
+import gymnasium
+import numpy as np
+from numpy.typing import NDArray
+
+from pytest_garl.adversary.observations import LIMIT, VIEWS
+from pytest_garl.adversary.training import rewards
+from pytest_garl.adversary.training.episode import Episode, draw_episode, in_any_environment
+from pytest_garl.adversary.training.uav_models import AvoidingPilot, Caution, Habits, StraightPilot
+from pytest_garl.landing_system import Airframe
+from pytest_garl.scenarios.maps.map import Map
+
+Observation = NDArray[np.float32]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Surrogate:
+    """What is trained against: maps, types, UAV, state, reward.
+
+    ``uav`` is "straight", the paper's, "avoiding", or "both", half of the episodes each.
+    ``discount`` is part of the potential-based reward.  With ``environment`` "drawn" an episode
+    begins in any weather and light of a search, with the marker anywhere, instead of clear
+    weather and a marker at a fixed place.
+    """
+
+    maps: tuple[Map, ...]
+    kinds: tuple[str, ...] = ("person", "dog", "bird")
+    uav: Literal["straight", "avoiding", "both"] = "avoiding"
+    state: str = "relative"
+    reward: Literal["collision-first", "paper"] = "collision-first"
+    discount: float = 0.99
+    environment: Literal["clear", "drawn"] = "clear"
+    airframe: Airframe = field(default_factory=Airframe)
+
+
+class SurrogateEnv(gymnasium.Env[Observation, np.int64]):
+    """One object, a marker at a fixed place, a UAV from take-off to landing or collision.
+
+    Actions are those of the state's view, one every 0.5 s; the observation is its vector.
+    ``info`` tells ``collided``, ``outcome`` and, with the paper's reward, ``hidden``, the
+    share of the marker in the frame that is covered.  A step after the end changes nothing.
+    """
+
+    metadata = {"render_modes": []}  # noqa: RUF012
+
+    def __init__(self, surrogate: Surrogate) -> None:
+        self.surrogate = surrogate
+        self._view = VIEWS[surrogate.state]
+        self.observation_space = gymnasium.spaces.Box(-LIMIT, LIMIT, (self._view.size,), np.float32)
+        self.action_space = gymnasium.spaces.Discrete(self._view.actions)
+        self._episode: Episode | None = None
+
+    def reset(
+        self, *, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[Observation, dict[str, Any]]:
+        """Draw an episode; the same seed draws the same."""
+        super().reset(seed=seed)
+        self.close()
+        rng, surrogate = self.np_random, self.surrogate
+        map = surrogate.maps[int(rng.integers(len(surrogate.maps)))]
+        kind = surrogate.kinds[int(rng.integers(len(surrogate.kinds)))]
+        scenario, place = draw_episode(map, [kind], rng)
+        if surrogate.environment == "drawn":
+            scenario = in_any_environment(scenario, place, rng)
+        avoiding = rng.random() < {"straight": 0.0, "both": 0.5, "avoiding": 1.0}[surrogate.uav]
+        # The paper's UAV always flies alike; ours as differently as landing systems do.
+        habits = Habits() if surrogate.uav == "straight" else Habits.drawn(rng)
+        pilot: Any = functools.partial(StraightPilot, habits)
+        if avoiding:
+            pilot = functools.partial(AvoidingPilot, habits, Caution.drawn(rng))
+        pilot.airframe = surrogate.airframe
+        camera = surrogate.airframe.camera if surrogate.reward == "paper" else None
+        self._episode = Episode(scenario, place, pilot, camera=camera)
+        return self._observe()
+
+    def step(self, action: np.int64) -> tuple[Observation, float, bool, bool, dict[str, Any]]:
+        """Move the object for 0.5 s."""
+        episode = self._current()
+        if episode.outcome is not None:
+            observation, info = self._observe()
+            return observation, 0.0, True, False, info
+        before = self._distance_m()
+        moves = self._view.moves(episode.situations[0])
+        episode.step([moves[int(action)]])
+        observation, info = self._observe()
+        collided = bool(info["collided"])
+        late = info["outcome"] == "not_landed"
+        ended = bool(info["outcome"]) and not late
+        if self.surrogate.reward == "paper":
+            expected, seen = episode.marker_pixels()
+            reward = rewards.paper(expected, seen, collided=collided)
+            info["hidden"] = 1 - seen / expected if expected else 0.0
+        else:
+            reward = rewards.collision_first(
+                before,
+                self._distance_m(),
+                collided=collided,
+                ended=ended,
+                discount=self.surrogate.discount,
+            )
+        return observation, reward, ended, late, info
+
+    def close(self) -> None:
+        """Free the physics of the last episode."""
+        if self._episode is not None:
+            self._episode.close()
+            self._episode = None
+
+    def _current(self) -> Episode:
+        if self._episode is None:
+            raise gymnasium.error.ResetNeeded("reset() comes before the first step()")
+        return self._episode
+
+    def _observe(self) -> tuple[Observation, dict[str, Any]]:
+        episode = self._current()
+        observation = self._view.state(episode.situations[0])
+        return observation, {"outcome": episode.outcome or "", "collided": episode.hit is not None}
+
+    def _distance_m(self) -> float:
+        situation = self._current().situations[0]
+        return rewards.column_distance_m(situation.self.position_m, situation.uav_position_m)

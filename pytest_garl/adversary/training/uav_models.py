@@ -1,0 +1,165 @@
+"""The UAVs of the surrogate: they know the marker's place, and land on it."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from pytest_garl.landing_system import (
+    Airframe,
+    Command,
+    Land,
+    Mission,
+    Observation,
+    PositionSetpoint,
+    VelocitySetpoint,
+)
+from pytest_garl.simulation.system_under_test.ground_truth import Truth, TruthObject
+
+CENTRED_M = 0.3
+LAND_BELOW_M = 0.35
+SLOW_BELOW_M = 1.5
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Habits:
+    """How a UAV flies: cruise height, speeds over ground and downwards."""
+
+    cruise_m: float = 10.0
+    speed_mps: float = 3.0
+    descent_mps: float = 1.0
+
+    @classmethod
+    def drawn(cls, rng: np.random.Generator) -> Habits:
+        """Draw habits as different as those of landing systems."""
+        return cls(
+            cruise_m=float(rng.uniform(8.0, 12.0)),
+            speed_mps=float(rng.uniform(2.0, 4.0)),
+            descent_mps=float(rng.uniform(0.5, 1.2)),
+        )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Caution:
+    """When a UAV climbs away from what its depth camera shows.
+
+    From an object within ``radius_m`` of its column and ``below_m`` under it, seen for
+    ``delay_s``, at ``climb_mps`` until none was there for ``clear_s``.
+    """
+
+    radius_m: float = 2.0
+    below_m: float = 4.5
+    delay_s: float = 0.5
+    clear_s: float = 1.0
+    climb_mps: float = 1.0
+
+    @classmethod
+    def drawn(cls, rng: np.random.Generator) -> Caution:
+        """Draw a caution; which one a landing system has nobody knows."""
+        return cls(
+            radius_m=float(rng.uniform(1.5, 3.0)),
+            below_m=float(rng.uniform(2.5, 6.0)),
+            delay_s=float(rng.uniform(0.1, 0.8)),
+            clear_s=float(rng.uniform(0.5, 2.0)),
+            climb_mps=float(rng.uniform(0.8, 2.0)),
+        )
+
+
+class StraightPilot:
+    """The paper's: "flies directly to the marker without any additional trajectory planning"."""
+
+    airframe = Airframe()
+    needs_camera = False
+
+    def __init__(self, habits: Habits | None = None) -> None:
+        self._habits = habits or Habits()
+
+    def reset(self, mission: Mission) -> None:
+        """Start on the ground."""
+        self._home = mission.home_m
+        self._truth: Truth | None = None
+        self._up = self._there = False
+
+    def observe_truth(self, truth: Truth) -> None:
+        """Be told where everything is."""
+        self._truth = truth
+
+    def step(self, observation: Observation) -> Command:
+        """Climb, cross, descend, land."""
+        x, y, z = (float(value) for value in observation.position_m)
+        habits = self._habits
+        if self._truth is None:
+            return PositionSetpoint(position_m=(x, y, habits.cruise_m))
+        goal = self._truth.marker_m
+        offset = math.dist((x, y), goal)
+        self._up |= z > habits.cruise_m - 1.0
+        if not self._up:
+            return PositionSetpoint(position_m=(*self._home[:2], habits.cruise_m))
+        self._there |= offset < CENTRED_M
+        if not self._there:
+            return PositionSetpoint(position_m=(*goal, habits.cruise_m), speed_mps=habits.speed_mps)
+        if z < LAND_BELOW_M:
+            return Land(speed_mps=0.4)
+        descent = habits.descent_mps if z > SLOW_BELOW_M else 0.5 * habits.descent_mps
+        climb = -descent if offset < CENTRED_M else 0.0
+        return VelocitySetpoint(velocity_mps=(*_towards(goal, (x, y)), climb))
+
+
+class AvoidingPilot(StraightPilot):
+    """Climbs away from objects that a depth camera under its belly could see."""
+
+    def __init__(self, habits: Habits | None = None, caution: Caution | None = None) -> None:
+        super().__init__(habits)
+        self._caution = caution or Caution()
+
+    def reset(self, mission: Mission) -> None:
+        """Start on the ground, with nothing in sight."""
+        super().reset(mission)
+        self._camera = mission.camera
+        self._seen_since: float | None = None
+        self._clear_since = -math.inf
+        self._climbing = False
+
+    def step(self, observation: Observation) -> Command:
+        """Climb where something is below, land where nothing is."""
+        now, caution, truth = observation.time_s, self._caution, self._truth
+        if truth is None:
+            return super().step(observation)
+        place = tuple(float(value) for value in observation.position_m)
+        if any(self._threatens(item, place) for item in truth.objects):
+            self._clear_since = now
+            if self._seen_since is None:
+                self._seen_since = now
+            self._climbing |= now - self._seen_since >= caution.delay_s
+        else:
+            self._seen_since = None
+            self._climbing &= now - self._clear_since < caution.clear_s
+        if self._climbing:
+            x, y, z = place
+            climb = caution.climb_mps if z < self._habits.cruise_m else 0.0
+            goal = truth.marker_m if self._there else (x, y)
+            return VelocitySetpoint(velocity_mps=(*_towards(goal, (x, y)), climb))
+        return super().step(observation)
+
+    def _threatens(self, item: TruthObject, place: tuple[float, ...]) -> bool:
+        """Whether an object is near the column below, and inside the camera's view."""
+        below = place[2] - item.type.top_m
+        dx, dy = abs(item.position_m[0] - place[0]), abs(item.position_m[1] - place[1])
+        reach = item.type.radius_m
+        if not 0 < below < self._caution.below_m:
+            return False
+        if math.hypot(dx, dy) - reach > self._caution.radius_m:
+            return False
+        # The camera covers as much to each side along x as the frame is high, along y as it
+        # is wide, seen from a level UAV with its nose east.
+        camera = self._camera
+        wide = math.tan(camera.field_of_view_rad / 2)
+        high = wide * camera.height_px / camera.width_px
+        return dx - reach < below * high and dy - reach < below * wide
+
+
+def _towards(goal: tuple[float, float], at: tuple[float, float]) -> tuple[float, float]:
+    vx, vy = (max(-1.0, min(1.0, 1.2 * (aim - own))) for aim, own in zip(goal, at, strict=True))
+    return vx, vy

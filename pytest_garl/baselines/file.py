@@ -1,0 +1,296 @@
+"""Baselines: scenarios with what a landing system made of them, as one TOML file without code."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from pytest_garl.baselines.pairs import Answer
+from pytest_garl.errors import GarlError, ScenarioError
+from pytest_garl.files.atomic import save_text
+from pytest_garl.files.reading import MEGABYTE, read_text
+from pytest_garl.files.toml import LARGEST, Table, finite, parse, quoted
+from pytest_garl.messages import listed, printable, shown
+from pytest_garl.regressions.case_file import read_limits
+from pytest_garl.scenarios.genes import Property, genome_like
+from pytest_garl.scenarios.maps.map import Map
+from pytest_garl.scenarios.scenario import Scenario
+from pytest_garl.verdicts.verdict import Limits
+
+SCHEMA = 1
+LARGEST_BYTES = 4 * MEGABYTE
+"""Some six thousand flights, each a line of 600 bytes.  Reading TOML takes up to a hundred times as
+much memory."""
+_KEYS = {
+    "system",
+    "map",
+    "map_sha256",
+    "simulator",
+    "npcs",
+    "npcs_sha256",
+    "method",
+    "limits",
+    "genes",
+    "flights",
+}
+_OUTCOMES = ("landed", "collision", "not_landed", "aborted", "crashed", "inconclusive")
+
+
+class BaselineError(GarlError):
+    """A baseline that cannot be made, written or compared with."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Sample:
+    """One scenario and what its flight came to."""
+
+    scenario: Scenario
+    answer: Answer
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SampleSet:
+    """What one landing system made of scenarios on one map, and all that they were flown with.
+
+    ``system`` and ``simulator`` are "module:name"; ``npcs`` names who moved the objects, and
+    ``npcs_sha256`` is that of a learned policy's weights, else empty.  ``method`` is the search
+    method that chose the scenarios, empty where that is not known.
+    """
+
+    system: str
+    map: str
+    map_sha256: str
+    simulator: str
+    npcs: str
+    npcs_sha256: str
+    limits: Limits
+    samples: tuple[Sample, ...]
+    method: str = ""
+
+    @property
+    def title(self) -> str:
+        """Name for people and item ids, such as ``Lander-court``."""
+        return f"{self.system.rpartition(':')[2]}-{self.map}"
+
+    @property
+    def caution(self) -> str:
+        """What somebody must know who compares a landing system with this set, or nothing."""
+        if self.method in ("", "random"):
+            return ""
+        return (
+            f"the search method {self.method!r} chose these scenarios where the landing system "
+            "failed; some failed by chance, so this baseline is kinder to a change than random "
+            "scenarios are"
+        )
+
+    def name(self, index: int) -> str:
+        """Return a sample's name, such as ``court-17``."""
+        return f"{self.map}-{index}"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Baseline:
+    """Sets of one or more systems and maps; the hashes hold on CPUs of the class ``cpu``."""
+
+    cpu: str
+    versions: tuple[tuple[str, str], ...]
+    sets: tuple[SampleSet, ...]
+
+    def of(self, system: str, map: str) -> SampleSet | None:
+        """Return the set of a system on a map, if there is one."""
+        found = (each for each in self.sets if (each.system, each.map) == (system, map))
+        return next(found, None)
+
+
+def dumps(baseline: Baseline) -> str:
+    """Return the baseline as TOML: the same bytes for equal baselines."""
+    lines = [
+        "# A baseline of pytest-garl: scenarios, and what a landing system made of them.",
+        "# Fly them again on a changed system: pytest --garl-baseline=THIS_FILE",
+        f"schema = {SCHEMA}",
+        f"cpu = {quoted(baseline.cpu)}  # class of CPUs on which the hashes hold",
+        "",
+        "[versions]",
+        *(f"{quoted(name)} = {quoted(version)}" for name, version in baseline.versions),
+    ]
+    for each in baseline.sets:
+        lines += ["", *_set_lines(each)]
+    return "\n".join(lines) + "\n"
+
+
+def _set_lines(each: SampleSet) -> list[str]:
+    limits = each.limits
+    keys = [key for key, _ in each.samples[0].scenario.genes]
+    return [
+        "[[set]]",
+        f"system = {quoted(each.system)}",
+        f"map = {quoted(each.map)}",
+        f"map_sha256 = {quoted(each.map_sha256)}",
+        f"simulator = {quoted(each.simulator)}",
+        f"npcs = {quoted(each.npcs)}",
+        f"npcs_sha256 = {quoted(each.npcs_sha256)}",
+        f"method = {quoted(each.method)}  # which chose the scenarios",
+        f"limits = {{ distance_m = {limits.distance_m!r}, time_s = {limits.time_s!r}, "
+        f'abort = "{limits.abort}" }}',
+        f"genes = [{', '.join(quoted(key) for key in keys)}]",
+        "# Each: seed, outcome, signature, violation as the paper defines it, SHA-256 of the",
+        "# trajectory, values of the genes.",
+        "flights = [",
+        *(f"  {_row(sample)}," for sample in each.samples),
+        "]",
+    ]
+
+
+def _row(sample: Sample) -> str:
+    scenario, answer = sample.scenario, sample.answer
+    values = ", ".join(repr(value) for _, value in scenario.genes)
+    return (
+        f"[{scenario.seed}, {quoted(answer.outcome)}, {quoted(answer.signature)}, "
+        f"{str(answer.paper_violation).lower()}, {quoted(answer.sha256)}, [{values}]]"
+    )
+
+
+def loads(text: str, load_map: Callable[[str], Map], *, source: str = "baseline") -> Baseline:
+    """Return the baseline in ``text``; raise ScenarioError that names source and key."""
+    top = Table(parse(text, source), source)
+    top.only({"schema", "cpu", "versions", "set"})
+    if top.integer("schema") != SCHEMA:
+        raise top.error("schema", f"found {shown(top.get('schema'))}, expected {SCHEMA}")
+    versions = top.table("versions")
+    baseline = Baseline(
+        cpu=top.text("cpu"),
+        versions=tuple((name, versions.text(name)) for name in versions.values),
+        sets=tuple(_read_set(table, load_map) for table in top.tables("set")),
+    )
+    _checked(baseline, lambda problem: top.error("set", problem))
+    return baseline
+
+
+def load(path: Path, search_path: tuple[Path, ...] = ()) -> Baseline:
+    """Return the baseline in a file."""
+    from pytest_garl.scenarios.maps.map import load_map
+
+    hint = "; expected a file that `garl baseline save` wrote"
+    text = read_text(path, LARGEST_BYTES, hint=hint)
+    return loads(text, lambda name: load_map(name, search_path), source=str(path))
+
+
+def save(path: Path, baseline: Baseline) -> None:
+    """Write the file; what stood there before is replaced as a whole."""
+    _checked(baseline, lambda problem: BaselineError(f"{path}: {problem}"))
+    text = dumps(baseline)
+    if len(text.encode()) > LARGEST_BYTES:
+        flights = sum(len(each.samples) for each in baseline.sets)
+        raise BaselineError(
+            f"{path}: found {flights} flights in {len(text.encode())} bytes, expected at most "
+            f"{LARGEST_BYTES}; save fewer flights"
+        )
+    save_text(path, text)
+
+
+def _checked(baseline: Baseline, wrong: Callable[[str], GarlError]) -> None:
+    """Raise what ``wrong`` makes of a problem between sets or samples."""
+    if not baseline.sets:
+        raise wrong("found none, expected at least one [[set]]")
+    places = [(each.system, each.map) for each in baseline.sets]
+    twice = next((place for place in places if places.count(place) > 1), None)
+    if twice:
+        raise wrong(f"found {twice[0]} on {twice[1]} twice, expected one set of each")
+    for each in baseline.sets:
+        if not each.samples:
+            raise wrong(f"{each.system} on {each.map}: found no flights, expected at least one")
+        shapes = {
+            (tuple(key for key, _ in sample.scenario.genes), sample.scenario.absent)
+            for sample in each.samples
+        }
+        if len(shapes) > 1 or any(absent for _, absent in shapes):
+            raise wrong(
+                f"{each.system} on {each.map}: found scenarios of different genes or without some "
+                "of the map's objects, expected those of a search, with all of them"
+            )
+
+
+def _read_set(table: Table, load_map: Callable[[str], Map]) -> SampleSet:
+    table.only(_KEYS)
+    for key in ("system", "simulator"):
+        if not all(table.text(key).partition(":")):
+            raise table.error(key, f"found {shown(table.text(key))}, expected 'module:name'")
+    try:
+        map = load_map(table.text("map"))
+    except ScenarioError as error:
+        raise table.error("map", str(error)) from error
+    properties = _read_genes(table, map)
+    rows = table.get("flights")
+    if not isinstance(rows, list):
+        raise table.error("flights", f"found {shown(rows)}, expected a list of flights")
+    return SampleSet(
+        system=table.text("system"),
+        map=map.name,
+        map_sha256=table.text("map_sha256"),
+        simulator=table.text("simulator"),
+        npcs=table.text("npcs"),
+        npcs_sha256=table.text("npcs_sha256"),
+        method=table.text("method", ""),
+        limits=read_limits(table.table("limits")),
+        samples=tuple(
+            _read_row(table, index, row, map.name, properties) for index, row in enumerate(rows)
+        ),
+    )
+
+
+def _read_genes(table: Table, map: Map) -> tuple[Property, ...]:
+    """Return the properties that the columns of values stand for."""
+    keys = table.texts("genes")
+    genome = genome_like(keys, map)
+    if keys != genome.keys:
+        wrong = sorted({*keys} ^ {*genome.keys})
+        raise table.error(
+            "genes",
+            f"found others than those of the map {map.name!r}, or in another order "
+            f"({listed(wrong) or 'order'}); if the map has changed, save a baseline anew",
+        )
+    return genome.properties
+
+
+def _read_row(
+    table: Table, index: int, row: Any, map: str, properties: tuple[Property, ...]
+) -> Sample:
+    key = f"flights[{index}]"
+    kinds = (int, str, str, bool, str, list)
+    if (
+        not isinstance(row, list)
+        or len(row) != len(kinds)
+        or any(type(item) is not kind for item, kind in zip(row, kinds, strict=True))
+    ):
+        raise table.error(
+            key,
+            f"found {shown(row)}, expected "
+            "[seed, outcome, signature, true or false, hash, [genes]]",
+        )
+    seed, outcome, signature, paper_violation, sha256, values = row
+    if not 0 <= seed <= LARGEST:
+        raise table.error(
+            key, f"found the seed {shown(seed)}, expected a whole number from 0 to {LARGEST}"
+        )
+    if outcome not in _OUTCOMES:
+        raise table.error(key, f"found {shown(outcome)}, expected one of {', '.join(_OUTCOMES)}")
+    if len(values) != len(properties):
+        raise table.error(key, f"found {len(values)} values of genes, expected {len(properties)}")
+    for item, value in zip(properties, values, strict=True):
+        number = finite(value)
+        if number is None or not item.low <= number <= item.high:
+            raise table.error(
+                key, f"{item.key}: found {shown(value)}, expected {item.low:g} to {item.high:g}"
+            )
+    genes = tuple((item.key, float(value)) for item, value in zip(properties, values, strict=True))
+    return Sample(
+        scenario=Scenario(map=map, seed=seed, genes=genes),
+        answer=Answer(
+            outcome=outcome,
+            signature=printable(signature),
+            paper_violation=paper_violation,
+            sha256=printable(sha256),
+        ),
+    )

@@ -1,0 +1,66 @@
+"""Many flights of given scenarios at once, beside any search."""
+
+from __future__ import annotations
+
+import dataclasses
+import hashlib
+import json
+import tempfile
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+
+from pytest_garl.errors import LedgerError
+from pytest_garl.execution.checkout import Checkout
+from pytest_garl.execution.job import Job, dump_scenario, loads
+from pytest_garl.execution.ledger import Ledger
+from pytest_garl.execution.local_pool import local_pool
+from pytest_garl.execution.on_demand import Done
+from pytest_garl.execution.pool import Pool, wait_for
+from pytest_garl.execution.slot import Slot, flight_name
+from pytest_garl.scenarios.scenario import Scenario
+
+
+def fly_all(
+    ledger: Ledger,
+    pool: Pool,
+    job: Job,
+    scenarios: Sequence[Scenario],
+    tick: Callable[[], None] = lambda: None,
+) -> Iterator[Done]:
+    """Yield what each scenario came to, in order; all are handed out before the first is awaited.
+
+    Raises LedgerError if a resumed run flew them in another way.
+    """
+    system = job.system.name
+    texts = {index: dump_scenario(scenario) for index, scenario in enumerate(scenarios)}
+    facts = [system, job.map, job.npcs.name, dataclasses.asdict(job.limits), *texts.values()]
+    search = hashlib.sha256(json.dumps(facts).encode()).hexdigest()[:16]
+    ledger.add_search(search, system, job.map, len(texts), job.dumps(), "case")
+    known = ledger.job(search)
+    differing = job.differences(loads(known)) if known else ()
+    if differing:
+        raise LedgerError(
+            f"{ledger.path}: {system} on {job.map} flew the same scenarios before, but "
+            f"{', '.join(differing)} changed; run without --garl-resume to begin anew"
+        )
+    ledger.add_slots(search, 0, texts)
+    for index in texts:
+        yield Done(
+            result=wait_for(ledger, pool, search, Slot(generation=0, index=index), tick),
+            sha256=ledger.sha256(search, 0, index),
+            record=Path(job.flights) / f"{flight_name(search, 0, index, job.map)}.npz",
+        )
+
+
+@contextmanager
+def own_pool(workers: int, checkout: Checkout | None = None) -> Iterator[tuple[Ledger, Pool]]:
+    """Give a ledger and children for as long as the block lasts; they may see one checkout only."""
+    with tempfile.TemporaryDirectory(prefix="garl-") as scratch:
+        ledger = Ledger.create(Path(scratch) / "ledger.sqlite", {})
+        pool = local_pool(ledger, workers, checkout)
+        try:
+            yield ledger, pool
+        finally:
+            pool.close()
+            ledger.close()

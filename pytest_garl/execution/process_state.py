@@ -1,0 +1,176 @@
+"""What a flight may have changed in its process, so that the next one would fly otherwise."""
+
+from __future__ import annotations
+
+import builtins
+import importlib
+import locale
+import os
+import resource
+import signal
+import sys
+import threading
+import warnings
+from collections.abc import Iterator
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+OURS = "pytest_garl"
+FLYING = (
+    "adversary.learned",
+    "adversary.recorded",
+    "adversary.scripted",
+    "execution.job",
+    "simulation.flight_file",
+    "simulation.fly",
+    "simulation.system_under_test.reference_pilot",
+    "verdicts.judge",
+)
+"""What a flight imports, with all that these import."""
+SHARED = {"cv2", "json", "math", "numpy", "os", "pathlib", "pybullet", "random", "struct", "time"}
+"""Packages of others with which the simulator computes."""
+MOST_THREADS = 8
+MOST_FILES = 64
+MOST_BYTES = 2**30
+"""What flights may leave of threads, open files and memory before their process is replaced."""
+_LIMITED = (
+    resource.RLIMIT_NOFILE,
+    resource.RLIMIT_FSIZE,
+    resource.RLIMIT_AS,
+    resource.RLIMIT_DATA,
+)
+_GONE = object()
+
+
+class ProcessState:
+    """The process before its first flight: all functions and settings that flights share.
+
+    A module that sets attributes of its own when it is first used, as NumPy does, has changed
+    nothing; one of whose functions is another than before has.
+    """
+
+    def __init__(self) -> None:
+        for name in FLYING:
+            importlib.import_module(f"{OURS}.{name}")
+        self._spaces = [(space, dict(values)) for space, values in _namespaces()]
+        self._facts = _facts()
+        self._files, self._bytes = _open_files(), 0
+
+    def limited(self) -> bool:
+        """Whether a landing system has changed or used up what this process may use."""
+        return self._facts["limits"] != _limits() or not _can_open()
+
+    def changed(self) -> bool:
+        """Whether the next flight had better be another process's."""
+        try:
+            return self._differs()
+        except Exception:  # noqa: BLE001 (what is asked here may be what was replaced)
+            return True
+
+    def _differs(self) -> bool:
+        peak = 1024 * resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+        self._bytes = self._bytes or peak
+        return (
+            _left_processes()
+            or self._facts != _facts()
+            or threading.active_count() > MOST_THREADS
+            or _open_files() > self._files + MOST_FILES
+            or peak > self._bytes + MOST_BYTES
+            or any(
+                space.get(name, _GONE) is not value
+                for space, values in self._spaces
+                for name, value in values.items()
+            )
+        )
+
+
+def _namespaces() -> Iterator[tuple[Any, dict[str, Any]]]:
+    """Yield namespaces, with those of their names that must stay what they are."""
+    modules = {name: module for name, module in sys.modules.items() if _watched(name)}
+    yield sys.modules, dict(modules)
+    yield vars(builtins), _functions(builtins)
+    for name, module in modules.items():
+        if not name.startswith(OURS):
+            yield vars(module), _functions(module)
+            continue
+        yield vars(module), vars(module)
+        for value in list(vars(module).values()):
+            if isinstance(value, type) and value.__module__ == name:
+                yield vars(value), dict(vars(value))
+
+
+def _watched(name: str) -> bool:
+    return name.partition(".")[0] in SHARED | {OURS} and isinstance(sys.modules[name], ModuleType)
+
+
+def _functions(module: ModuleType) -> dict[str, Any]:
+    return {name: value for name, value in vars(module).items() if callable(value)}
+
+
+def _facts() -> dict[str, Any]:
+    """Return the settings that all flights of a process share."""
+    import cv2
+    import numpy as np
+
+    return {
+        "folder": _folder(),
+        "limits": _limits(),
+        "standard files": [_identity(number) for number in range(3)],
+        "NumPy": (np.geterr(), np.geterrcall()),
+        "OpenCV": (cv2.getNumThreads(), cv2.useOptimized()),
+        # Imports add filters that hide warnings, and change nothing.
+        "warnings": [each for each in warnings.filters if each[0] == "error"],
+        "locale": locale.setlocale(locale.LC_ALL),
+        "tracing": (sys.gettrace(), sys.getprofile()),
+        "recursion": sys.getrecursionlimit(),
+        "alarm": signal.getitimer(signal.ITIMER_REAL) != (0.0, 0.0),
+        # Libraries that were compiled for speed switch these off when they are loaded.
+        "subnormal numbers": float(np.float64(sys.float_info.min) * 0.5) > 0,
+    }
+
+
+def _folder() -> str:
+    try:
+        return str(Path.cwd())
+    except OSError:
+        return ""
+
+
+def _limits() -> list[tuple[int, int]]:
+    """Return what this process may use of the machine."""
+    return [resource.getrlimit(name) for name in _LIMITED]
+
+
+def _identity(number: int) -> tuple[int, int]:
+    """Return which file a descriptor stands for."""
+    try:
+        status = os.fstat(number)
+    except OSError:
+        return -1, -1
+    return status.st_dev, status.st_ino
+
+
+def _open_files() -> int:
+    try:
+        return len(list(Path("/proc/self/fd").iterdir()))
+    except OSError:
+        return sys.maxsize
+
+
+def _can_open() -> bool:
+    try:
+        os.close(os.open(os.devnull, os.O_RDONLY))
+    except OSError:
+        return False
+    return True
+
+
+def _left_processes() -> bool:
+    """Whether a process that flights have started lives on; those that have ended are let go."""
+    try:
+        while os.waitpid(-1, os.WNOHANG)[0]:
+            pass
+    except ChildProcessError:
+        return False
+    return True

@@ -1,0 +1,132 @@
+"""A pilot: flies single slots on whatever machine it is put, in a child process of its own."""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+import os
+import platform
+import shutil
+import tempfile
+from dataclasses import dataclass
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+from typing import Any
+
+from pytest_garl import cpu_dispatch
+from pytest_garl.execution.job import Job, loads
+from pytest_garl.execution.ledger import Claim, Ledger
+from pytest_garl.execution.local_pool import Flyers
+from pytest_garl.execution.pool import wait_for
+from pytest_garl.execution.process_pool import ChildPool
+from pytest_garl.execution.ray.path_mapping import Relocation
+from pytest_garl.execution.reference import package_sha256
+from pytest_garl.execution.slot import Slot, flight_name
+from pytest_garl.execution.worker_failure import Death
+from pytest_garl.simulation.flight import PACKAGES
+
+_FIRST = Slot(generation=0, index=0)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Landed:
+    """A flight that was flown: what the ledger records of it, and the bytes of its record."""
+
+    result: dict[str, Any]
+    sha256: str
+    wall_s: float
+    record: bytes
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Base:
+    """Where pilots work, each in a folder of its own below ``scratch``.
+
+    Where ``home`` is set, Ray has put a copy of it into the working directory, in which pilots
+    leave nothing that Ray does not remove with it; ``inside`` is the folder in which pytest runs.
+    """
+
+    scratch: str = "."
+    home: str = ""
+    inside: str = "."
+
+
+class Pilot:
+    """Flies what it is told, one slot after the other.
+
+    The flying is done by a local pool of one child with a ledger of its own, so that a landing
+    system that dies or hangs takes nothing else with it, and its death reads as it does locally.
+    What it means is decided by who asked.
+    """
+
+    def __init__(self, base: Base) -> None:
+        here = Path.cwd()
+        self._relocation = Relocation(home=base.home, here=str(here)) if base.home else None
+        self._folder = Path(tempfile.mkdtemp(prefix=".garl-pilot-", dir=here / base.scratch))
+        os.chdir(here / base.inside)
+        self._ledger = Ledger.create(self._folder / "ledger.sqlite", {})
+        self._pool = ChildPool(self._ledger, Flyers(seats=1, settle=self._note))
+        self._flown = 0
+        self._death: Death | None = None
+
+    def about(self) -> tuple[str, dict[str, str]]:
+        """Return the machine's name, and the versions of what decides on a flight's bytes."""
+        return platform.node(), versions()
+
+    def fly(self, claim: Claim) -> Landed | Death:
+        """Fly a slot once; return what it came to, or how its process ended."""
+        self._flown += 1
+        search, flights = str(self._flown), self._folder / "flights"
+        job = dataclasses.replace(self._job(claim.job), flights=str(flights))
+        self._ledger.add_search(search, job.system.name, job.map, 1, job.dumps(), "errand")
+        self._ledger.add_slots(search, 0, {0: claim.scenario}, claim.after)
+        result = wait_for(self._ledger, self._pool, search, _FIRST, lambda: None)
+        if self._death is not None:
+            death, self._death = self._death, None
+            error, message, text = death.failure or ("", "", "")
+            return dataclasses.replace(
+                death,
+                words=self._at_home(death.words),
+                complaint=self._at_home(death.complaint),
+                failure=(error, self._at_home(message), self._at_home(text)) if error else None,
+            )
+        file = flights / f"{flight_name(search, 0, 0, job.map)}.npz"
+        record = file.read_bytes()
+        file.unlink()
+        return Landed(
+            result=json.loads(self._at_home(json.dumps(result))),
+            sha256=self._ledger.sha256(search, 0, 0),
+            wall_s=self._ledger.wall_s(search, 0, 0),
+            record=record,
+        )
+
+    def close(self) -> None:
+        """End the child and leave nothing behind."""
+        self._pool.close()
+        self._ledger.close()
+        shutil.rmtree(self._folder, ignore_errors=True)
+
+    def _job(self, text: str) -> Job:
+        return self._relocation.job(text) if self._relocation else loads(text)
+
+    def _at_home(self, text: str) -> str:
+        return self._relocation.home_again(text) if self._relocation else text
+
+    def _note(self, ledger: Ledger, claim: Claim, death: Death) -> None:
+        """Remember a death and take the slot out of the queue: it is flown once."""
+        self._death = death
+        ledger.record(claim, {}, "", 0.0)
+
+
+def versions() -> dict[str, str]:
+    """Return the installed versions of what decides on a flight's bytes, and our sources' hash."""
+    found = {
+        "sources of pytest-garl": package_sha256()[:12],
+        "CPU dispatch": cpu_dispatch.expected(),
+    }
+    for name in PACKAGES:
+        try:
+            found[name] = version(name)
+        except PackageNotFoundError:
+            found[name] = "missing"
+    return found

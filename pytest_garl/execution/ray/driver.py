@@ -1,0 +1,146 @@
+"""Ray's driver, a child process of pytest: connects to a cluster and has it fly the ledger's slots.
+
+The only module that imports Ray, and not before it runs.
+"""
+
+from __future__ import annotations
+
+import logging
+import os
+import secrets
+import shutil
+import signal
+import sys
+import tempfile
+import threading
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any
+
+from pytest_garl.errors import PoolError
+from pytest_garl.execution.ledger import Ledger
+from pytest_garl.execution.processes import Parent, named, run_child
+from pytest_garl.execution.ray.actor import Base
+from pytest_garl.execution.ray.scheduler import Fleet
+
+PATIENCE_S = 180.0
+"""How long Ray may take to connect, with the upload of the project; alone it goes on for ever."""
+PARTING_S = 10.0
+"""How long the processes of a cluster started here may take to end."""
+STORE_BYTES = 128 * 2**20
+"""Object store of a cluster started here: records of flights, some 100 kB each, pass through it."""
+
+
+def main(parent: Parent, ledger: str, root: str, workers: str) -> None:
+    """Fly until the parent process is gone; ``workers`` is 0 for all CPUs of the cluster."""
+    # Until Ray sets a handler of its own, which does the same.
+    signal.signal(signal.SIGTERM, lambda number, _: sys.exit(number))
+    path = Path(ledger)
+    address = os.environ.get("RAY_ADDRESS") or "local"
+    there = own(int(workers)) if address == "local" else joined(address, Path(root), path.parent)
+    with there as (ray, base, cpus):
+        fleet = Fleet(ray, Ledger(path), base, int(workers) or cpus)
+        try:
+            while parent.lives():
+                fleet.turn()
+        finally:
+            fleet.close()
+
+
+@contextmanager
+def own(workers: int) -> Iterator[tuple[Any, Base, int]]:
+    """Start a cluster on this machine that ends with the block.
+
+    Gives Ray, where pilots work and for how many there are CPUs; raises PoolError.
+    """
+    # A cluster listens on the network; with a token it obeys nobody else.
+    os.environ.setdefault("RAY_AUTH_MODE", "token")
+    os.environ.setdefault("RAY_AUTH_TOKEN", secrets.token_hex(32))
+    cpus = workers or os.cpu_count() or 1
+    # Not in TMPDIR: a socket's path has 107 characters at most, and Ray's take 60.
+    folder = tempfile.mkdtemp(prefix="garl-ray-", dir=os.environ.get("RAY_TMPDIR", "/tmp"))
+    try:
+        with _connected(
+            "local",
+            num_cpus=cpus,
+            include_dashboard=False,
+            object_store_memory=STORE_BYTES,
+            _temp_dir=folder,
+            # Short of memory the kernel ends what needs most, the flight, as it does without Ray.
+            _system_config={"memory_monitor_refresh_ms": 0},
+        ) as ray:
+            yield ray, Base(scratch=folder), cpus
+    finally:
+        _remove(folder)
+
+
+def _remove(folder: str) -> None:
+    """Remove a cluster's folder when nobody writes there any more.
+
+    Its processes have it in their command lines, as has a child that was flying: that one ends when
+    it notices that its pilot is gone, and would make the folder again to put its record there.
+    """
+    until = time.monotonic() + PARTING_S
+    while named(folder) and time.monotonic() < until:
+        time.sleep(0.05)
+    shutil.rmtree(folder, ignore_errors=True)
+
+
+@contextmanager
+def joined(address: str, root: Path, folder: Path) -> Iterator[tuple[Any, Base, int]]:
+    """Join a cluster for as long as the block lasts, and give it a copy of the project at ``root``.
+
+    What git ignores is not copied, nor is ``folder``, where the flights are.
+    """
+    root, folder, here = root.resolve(), folder.resolve(), Path.cwd()
+    excludes = [f"/{folder.relative_to(root)}"] if folder.is_relative_to(root) else []
+    inside = str(here.relative_to(root)) if here.is_relative_to(root) else "."
+    copied = {"working_dir": str(root), "excludes": excludes}
+    with _connected(address, runtime_env=copied) as ray:
+        cpus = int(ray.cluster_resources().get("CPU", 1))
+        yield ray, Base(home=str(root), inside=inside), cpus
+
+
+@contextmanager
+def _connected(address: str, **options: Any) -> Iterator[Any]:
+    late = threading.Timer(PATIENCE_S, _give_up, (address,))
+    late.daemon = True
+    late.start()
+    import ray
+
+    try:
+        ray.init(address, log_to_driver=False, logging_level=logging.ERROR, **options)
+    except (OSError, RuntimeError, ValueError, ray.exceptions.RayError) as error:
+        raise PoolError(unreachable(address, str(error))) from error
+    finally:
+        late.cancel()
+    try:
+        yield ray
+    finally:
+        ray.shutdown()
+
+
+def unreachable(address: str, reason: str) -> str:
+    """Return why there is no cluster, and what one can do."""
+    if address == "local":
+        return f"Ray cannot start a cluster on this machine: {reason.strip()}"
+    return (
+        f"RAY_ADDRESS={address}: {reason.strip()}\nExpected the head of a cluster, such as "
+        f"10.0.0.1:6379, of which this machine is a node, with Ray {version('ray')}, Python "
+        f"{sys.version_info.major}.{sys.version_info.minor}, and the same RAY_AUTH_MODE and token "
+        "as here"
+    )
+
+
+def _give_up(address: str) -> None:
+    """End the process from a thread: the call of Ray does not come back."""
+    reason = unreachable(address, f"no cluster after {PATIENCE_S:g} s")
+    Parent.of_this_process().tell(cannot_go_on=reason)
+    os._exit(1)
+
+
+if __name__ == "__main__":
+    run_child(main, "the driver of Ray")

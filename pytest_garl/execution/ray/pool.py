@@ -1,0 +1,78 @@
+"""The Ray pool: flies on a Ray cluster, by way of one child process that speaks with it."""
+
+from __future__ import annotations
+
+import importlib.util
+import re
+import socket
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from pytest_garl.errors import PoolError
+from pytest_garl.execution.ledger import Ledger
+from pytest_garl.execution.pool import Pool
+from pytest_garl.execution.process_pool import ChildPool
+from pytest_garl.execution.worker_failure import Death
+
+INSTALL = "pip install 'pytest-garl[ray]'"
+REACH_S = 5.0
+
+
+def ray_pool(ledger: Ledger, workers: int | None, root: Path) -> Pool:
+    """Return a pool of ``workers`` flights at a time; None: as many as the cluster has CPUs.
+
+    The cluster is that of RAY_ADDRESS, which gets a copy of the project at ``root``, or else one on
+    this machine that begins and ends with the pool.
+    """
+    return ChildPool(ledger, Driver(workers=workers, root=root))
+
+
+def check_ray(address: str) -> None:
+    """Raise PoolError where Ray is not installed, or where nobody answers at ``address``."""
+    if importlib.util.find_spec("ray") is None:
+        raise PoolError(f"Ray is not installed; {INSTALL}, or fly with --garl-pool=local")
+    place = re.fullmatch(r"(?P<host>[^/]+):(?P<port>\d+)", address)
+    if place is None:
+        # "auto" and ray://… are for Ray to find.
+        return
+    try:
+        socket.create_connection((place["host"], int(place["port"])), REACH_S).close()
+    except (OSError, OverflowError) as error:
+        raise PoolError(
+            f"RAY_ADDRESS={address}: nobody answers there ({error}). Is the cluster up (`ray "
+            "status`)? Expected the host and port of its head, such as 10.0.0.1:6379; without "
+            "RAY_ADDRESS a cluster on this machine is started"
+        ) from error
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Driver:
+    """One child for all pytest processes of a run: it claims slots and has the cluster fly them.
+
+    So Ray's threads, signal handlers and warnings stay out of the pytest process.
+    """
+
+    workers: int | None
+    root: Path
+    patience_s: float = 30.0
+    """To end a cluster takes a second or two, and more on a busy machine."""
+
+    @property
+    def seats(self) -> int:
+        """One, however many fly: the limit of flights is the driver's."""
+        return 1
+
+    def command(self, ledger: Path) -> Sequence[str]:
+        """Return the module that the child runs, and its arguments."""
+        return [
+            "pytest_garl.execution.ray.driver",
+            str(ledger),
+            str(self.root),
+            str(self.workers or 0),
+        ]
+
+    def bury(self, ledger: Ledger, pid: int, death: Death) -> bool:
+        """Give back all slots: nothing flies in the driver, so its death says nothing of them."""
+        ledger.release(pid)
+        return False

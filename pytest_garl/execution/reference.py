@@ -1,0 +1,122 @@
+"""Classes and functions by name, so that a child process can load them."""
+
+from __future__ import annotations
+
+import functools
+import hashlib
+import importlib
+import importlib.util
+import inspect
+import re
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from pytest_garl.errors import LandingSystemError
+from pytest_garl.messages import shown
+
+SYSTEM_NAME = re.compile(r"\w[\w-]*(\.\w[\w-]*)*:[^\W\d]\w*(\.[^\W\d]\w*)*")
+"""Of a class, "module:class", names with dots between: what is imported is no path to elsewhere."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Reference:
+    """Where a class or function is defined."""
+
+    module: str
+    file: str
+    qualname: str
+
+    @property
+    def name(self) -> str:
+        """The name in ledgers, cases and baselines: "module:qualname"."""
+        return f"{self.module}:{self.qualname}"
+
+    def load(self) -> Any:
+        """Return the object, imported by name, or from its file where the name fails."""
+        try:
+            module = importlib.import_module(self.module)
+            if self.file and Path(module.__file__ or "").resolve() != Path(self.file):
+                raise ImportError(f"{self.module} is another file: {module.__file__}")
+        except ImportError:
+            spec = importlib.util.spec_from_file_location(self.module, self.file)
+            if spec is None or spec.loader is None:
+                raise
+            module = importlib.util.module_from_spec(spec)
+            sys.modules[self.module] = module
+            spec.loader.exec_module(module)
+        found: Any = module
+        for name in self.qualname.split("."):
+            found = getattr(found, name)
+        return found
+
+
+BUILT_IN = Reference(module="pytest_garl.simulation.fly", file="", qualname="fly")
+"""The project's own simulator."""
+
+
+def reference_to(thing: Any) -> Reference:
+    """Return where ``thing`` is defined; raise LandingSystemError if no child can find it."""
+    qualname = getattr(thing, "__qualname__", "")
+    if not qualname or "<locals>" in qualname or "<lambda>" in qualname:
+        raise LandingSystemError(
+            f"{thing!r} is defined inside a function; child processes cannot import it. "
+            "Move it to the top level of a module."
+        )
+    try:
+        file = str(Path(inspect.getfile(thing)).resolve())
+    except (TypeError, OSError):
+        file = ""
+    return Reference(module=thing.__module__, file=file, qualname=qualname)
+
+
+@functools.cache
+def package_sha256() -> str:
+    """Hash what of this package shapes a search: its sources, maps and shipped weights."""
+    home = Path(__file__).parents[1]
+    rooms = ("files", "scenarios", "simulation", "adversary", "verdicts", "execution", "search")
+    digest = hashlib.sha256((home / "landing_system.py").read_bytes())
+    for file in sorted(file for room in rooms for file in (home / room).rglob("*")):
+        if file.suffix in (".py", ".toml", ".npz"):
+            digest.update(file.relative_to(home).as_posix().encode() + file.read_bytes())
+    return digest.hexdigest()
+
+
+def simulator_sha256(simulator: Reference) -> str:
+    """Hash what of a flight is not the landing system's: this package, another simulator's file."""
+    own = Path(simulator.file).read_bytes() if simulator.file else b""
+    return hashlib.sha256(package_sha256().encode() + own).hexdigest()
+
+
+def system_named(name: str) -> Any:
+    """Import a landing system by "module:class"; raise LandingSystemError for what is none."""
+    if not SYSTEM_NAME.fullmatch(name):
+        raise LandingSystemError(
+            f"found {shown(name)}, expected 'module:class', names with dots between"
+        )
+    module, _, qualname = name.partition(":")
+    try:
+        found: Any = importlib.import_module(module)
+        for part in qualname.split("."):
+            found = getattr(found, part)
+    except (Exception, SystemExit) as error:
+        # A module may raise what it likes while it is imported.
+        raise LandingSystemError(f"{type(error).__name__}: {error}") from error
+    check_system(found)
+    return found
+
+
+def check_system(system: Any) -> None:
+    """Raise LandingSystemError for what can be no landing system."""
+    if not inspect.isclass(system):
+        raise LandingSystemError(
+            f"system={system!r}: expected a class, found {type(system).__name__}"
+        )
+    for method in ("reset", "step"):
+        if not callable(getattr(system, method, None)):
+            raise LandingSystemError(
+                f"system={system.__name__} has no method {method!r}; a landing system has "
+                "reset(mission) and step(observation)"
+            )
+    reference_to(system)

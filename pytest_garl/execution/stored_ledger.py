@@ -1,0 +1,137 @@
+"""What a ledger holds from an earlier process, checked before anybody relies on it."""
+
+from __future__ import annotations
+
+import dataclasses
+import sqlite3
+from typing import Any, get_args
+
+from pytest_garl.errors import GarlError, LedgerError
+from pytest_garl.execution.job import load_scenario, loads
+from pytest_garl.execution.ledger import VERSION, Kind, Ledger, result_in
+from pytest_garl.files.json_values import made
+from pytest_garl.messages import shortened, shown
+from pytest_garl.simulation.flight import Crash
+from pytest_garl.verdicts.verdict import Verdict
+
+_TYPES = {
+    "run": {"key": "text", "value": "text"},
+    "search": {
+        "id": "text",
+        "system": "text",
+        "map": "text",
+        "wanted": "integer",
+        "job": "text",
+        "kind": "text",
+    },
+    "slot": {
+        "search": "text",
+        "generation": "integer",
+        "slot": "integer",
+        "scenario": "text",
+        "state": "text",
+        "attempts": "integer",
+        "after": "text",
+        "result": "text null",
+        "objectives": "text null",
+        "sha256": "text null",
+        "wall_s": "real integer null",
+    },
+    "meter": {"name": "text", "value": "real integer"},
+}
+"""SQLite keeps in any column whatever a damaged page says."""
+_STATES = ("waiting", "claimed", "flown")
+
+
+def check_stored(ledger: Ledger) -> None:
+    """Raise LedgerError that says what is wrong with a ledger's file; nothing for a sound one."""
+    problem = _problem(ledger)
+    if problem:
+        raise LedgerError(
+            f"{ledger.path}: is damaged or no ledger of this version: {problem}; search anew, "
+            "without --garl-resume"
+        )
+
+
+def _problem(ledger: Ledger) -> str:
+    try:
+        (answer,) = ledger.select("PRAGMA quick_check(1)")[0]
+        if answer != "ok":
+            return str(answer)
+        return (
+            next((found for table in _TYPES if (found := _wrong_type(ledger, table))), "")
+            or _wrong_version(ledger)
+            or _wrong_search(ledger)
+            or _wrong_slot(ledger)
+        )
+    except LedgerError as error:
+        return str(error.__cause__ if isinstance(error.__cause__, sqlite3.Error) else error)
+
+
+def _wrong_type(ledger: Ledger, table: str) -> str:
+    names = ", ".join(f"typeof({column})" for column in _TYPES[table])
+    for found in ledger.select(f"SELECT DISTINCT {names} FROM {table}"):
+        for (column, expected), kind in zip(_TYPES[table].items(), found, strict=True):
+            if kind not in expected.split():
+                return f"{table}.{column}: found {kind}, expected {' or '.join(expected.split())}"
+    return ""
+
+
+def _wrong_version(ledger: Ledger) -> str:
+    found = ledger.fact("ledger")
+    wrong = f"found a ledger of version {shown(found)}, expected {VERSION}"
+    return "" if found == VERSION else wrong
+
+
+def _wrong_search(ledger: Ledger) -> str:
+    for search, job, kind, wanted in ledger.select("SELECT id, job, kind, wanted FROM search"):
+        if kind not in get_args(Kind) or wanted < 0:
+            return f"search {shown(search)}: found {shown((kind, wanted))}"
+        try:
+            loads(job)
+        except GarlError as error:
+            return f"search {shown(search)}: {error.__cause__ or error}"
+    return ""
+
+
+def _wrong_slot(ledger: Ledger) -> str:
+    searches = {search for (search,) in ledger.select("SELECT id FROM search")}
+    rows = ledger.select("SELECT search, generation, slot, state, scenario, result FROM slot")
+    for search, generation, slot, state, scenario, result in rows:
+        where = f"slot {generation}/{slot} of {shortened(search)}"
+        if search not in searches or min(generation, slot) < 0 or state not in _STATES:
+            return f"{where}: found no such search or the state {shown(state)}"
+        if (state == "flown") != (result is not None):
+            return (
+                f"{where}: found the state {state} with{'out' if result is None else ''} a result"
+            )
+        try:
+            load_scenario(scenario)
+            if result is not None:
+                made(_Result, _plain(result_in(result)))
+        except (GarlError, ValueError) as error:
+            return f"{where}: {error.__cause__ or error}"
+    return ""
+
+
+@dataclasses.dataclass(frozen=True, slots=True, kw_only=True)
+class _Result:
+    """What everybody may rely on in the result of a flight."""
+
+    outcome: str
+    final_distance_m: float
+    elapsed_s: float
+    collisions: tuple[str, ...]
+    undecided: str
+    closest_call: str
+    closest_body: str
+    verdict: Verdict
+    crash: Crash | None
+
+
+_FIELDS = [field.name for field in dataclasses.fields(_Result)]
+
+
+def _plain(result: dict[str, Any]) -> dict[str, Any]:
+    """Return what of a result is checked; there may be more."""
+    return {key: value for key, value in result.items() if key in _FIELDS}

@@ -1,0 +1,82 @@
+"""Which violations nobody could have avoided: the reference pilot flies them too."""
+
+from __future__ import annotations
+
+import contextlib
+import dataclasses
+import functools
+from collections.abc import Callable, Sequence
+from contextlib import closing
+from pathlib import Path
+
+import numpy as np
+
+from pytest_garl.adversary.recorded import recorded_spec
+from pytest_garl.errors import LedgerError
+from pytest_garl.execution.job import load_scenario
+from pytest_garl.execution.ledger import Ledger, Row
+from pytest_garl.execution.local_pool import local_pool
+from pytest_garl.execution.on_demand import Errands, Fly
+from pytest_garl.execution.reference import reference_to
+from pytest_garl.experiments.measure import Piloted, Search
+from pytest_garl.regressions.findings import deeds_of
+from pytest_garl.regressions.follow_up import done_of
+from pytest_garl.simulation.system_under_test.reference_pilot import ReferencePilot
+
+
+def pilot(
+    searches: Sequence[Search],
+    path: Path,
+    *,
+    limit: int,
+    seed: int,
+    workers: int,
+    tick: Callable[[], None],
+) -> tuple[Piloted, ...]:
+    """Let the reference pilot fly at most ``limit`` violating scenarios of each search.
+
+    It knows where everything is, and the objects repeat what they did, to the environment as
+    well.  What it flies is drawn by ``seed``, so that its share stands for all violations.  The
+    flights stand in a ledger of their own at ``path``, so that they count nowhere else;
+    interrupted, it goes on from there.
+    """
+    drawn = {search.key: _drawn(search.violating, limit, seed) for search in searches}
+    flights = {
+        f"pilot {search.key} {flight.generation} {flight.slot}": functools.partial(
+            _avoided, search, flight
+        )
+        for search in searches
+        for flight in drawn[search.key]
+    }
+    with closing(_opened(path)) as ledger, closing(local_pool(ledger, workers)) as pool:
+        avoided = Errands(ledger, pool, tick).run(flights)
+    return tuple(
+        Piloted(
+            tried=len(drawn[search.key]),
+            unavoidable=sum(
+                not lands for name, lands in avoided.items() if f" {search.key} " in name
+            ),
+        )
+        for search in searches
+    )
+
+
+def _drawn(violating: Sequence[Row], limit: int, seed: int) -> list[Row]:
+    count = min(limit, len(violating))
+    chosen = np.random.default_rng(seed).choice(len(violating), count, replace=False)
+    return [violating[index] for index in sorted(int(each) for each in chosen)]
+
+
+def _opened(path: Path) -> Ledger:
+    with contextlib.suppress(LedgerError):
+        return Ledger.resume(path, {})
+    return Ledger.create(path, {})
+
+
+def _avoided(search: Search, flight: Row, fly: Fly) -> bool:
+    """Whether the reference pilot comes through without a violation."""
+    scenario, done = load_scenario(flight.scenario), done_of(flight, search.job)
+    deeds = deeds_of(done, scenario, search.map)
+    npcs = recorded_spec(dict(deeds.moves), dict(deeds.changes))
+    job = dataclasses.replace(search.job, system=reference_to(ReferencePilot), npcs=npcs)
+    return not fly(job, scenario).signature

@@ -1,0 +1,191 @@
+"""Finished searches as rows of a CSV file that grows over days and is committed."""
+
+from __future__ import annotations
+
+import csv
+import dataclasses
+import io
+import math
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from types import MappingProxyType
+from typing import Any
+
+from pytest_garl.errors import GarlError
+from pytest_garl.files.atomic import alone, save_text
+from pytest_garl.files.reading import MEGABYTE, read_text
+from pytest_garl.messages import listed, printable, shown
+
+LARGEST_BYTES = 16 * MEGABYTE
+"""Some ten thousand searches, each a row of a kilobyte."""
+SEPARATOR = "|"
+"""Between signatures in a cell."""
+
+
+class ExperimentError(GarlError):
+    """An experiment that cannot be flown, or whose rows cannot be read."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Row:
+    """What one search came to: a system on a map, a method, a seed, a budget.
+
+    ``docs/experiments/README.md`` tells what each column means; None stands for what does not
+    exist, such as a tenth violation where nine were found.
+    """
+
+    system: str
+    map: str
+    method: str
+    seed: int
+    budget: int
+    violations: int
+    type_i: int
+    type_ii: int
+    type_iii: int
+    type_iv: int
+    type_v: int
+    late: int
+    off: int
+    hard: int
+    aborted: int
+    inconclusive: int
+    unavoidable: int | None
+    piloted: int | None
+    top10: int | None
+    signatures: tuple[str, ...]
+    parameter_distance: float
+    weather_distance: float
+    violating_distance: float | None
+    covered: int
+    cells: int
+    flying_s: float
+    idle_s: float
+    workers: int
+    landing_system: str
+    landing_system_sha256: str
+    map_sha256: str
+    policy: str
+    policy_sha256: str
+    version: str
+    package_sha256: str
+    machine: str
+    result_hash: str
+
+    @property
+    def key(self) -> tuple[str, str, str, int, int]:
+        """What is flown once: system, map, method, seed, budget."""
+        return self.system, self.map, self.method, self.seed, self.budget
+
+    @property
+    def kinds(self) -> tuple[int, ...]:
+        """Violations of the types I to V."""
+        return self.type_i, self.type_ii, self.type_iii, self.type_iv, self.type_v
+
+
+def _number(cell: str) -> float:
+    value = float(cell)
+    if not math.isfinite(value):
+        raise ValueError(cell)
+    return value
+
+
+def _whole(cell: str) -> int:
+    value = int(cell)
+    if not 0 <= value <= _LARGEST:
+        raise ValueError(cell)
+    return value
+
+
+_LARGEST = 2**63 - 1
+
+
+def _optional(kind: Callable[[str], Any]) -> Callable[[str], Any]:
+    return lambda cell: kind(cell) if cell else None
+
+
+_READERS: Mapping[str, Callable[[str], Any]] = MappingProxyType(
+    {
+        "str": printable,
+        "int": _whole,
+        "float": _number,
+        "int | None": _optional(_whole),
+        "float | None": _optional(_number),
+        "tuple[str, ...]": lambda cell: tuple(printable(cell).split(SEPARATOR)) if cell else (),
+    }
+)
+_EXPECTED = {"int": "a whole number from 0", "float": "a number"}
+_FIELDS = {field.name: str(field.type) for field in dataclasses.fields(Row)}
+
+
+def read(path: Path) -> tuple[Row, ...]:
+    """Return the rows in a file, none where there is no file.
+
+    Raises ExperimentError that names file, line and column.
+    """
+    there = path.exists() or path.is_symlink()
+    text = read_text(path, LARGEST_BYTES, ExperimentError) if there else ""
+    if not text:
+        return ()
+    lines = csv.DictReader(io.StringIO(text, newline=""), strict=True)
+    try:
+        _check_columns(path, lines.fieldnames or ())
+        return tuple(_row(path, lines.line_num, cells) for cells in lines)
+    except csv.Error as error:
+        raise ExperimentError(
+            f"{path}, line {lines.line_num + 1}: not valid CSV: {error}"
+        ) from error
+
+
+def _check_columns(path: Path, found: Sequence[str]) -> None:
+    if [*found] != [*_FIELDS]:
+        wrong = {*found} ^ {*_FIELDS}
+        raise ExperimentError(
+            f"{path}: found other columns than expected"
+            f"{': ' + listed(sorted(wrong)) if wrong else ', in another order'}. Were its rows "
+            "written by another version of pytest-garl? Keep them under another name"
+        )
+
+
+def _row(path: Path, line: int, cells: Mapping[str, str | None]) -> Row:
+    values = {}
+    for name, kind in _FIELDS.items():
+        cell = cells[name]
+        if cell is None or len(cells) > len(_FIELDS):
+            raise ExperimentError(
+                f"{path}, line {line}: found too {'few' if cell is None else 'many'} cells, "
+                f"expected {len(_FIELDS)}"
+            )
+        try:
+            values[name] = _READERS[kind](cell)
+        except ValueError as error:
+            expected = _EXPECTED[kind.partition(" ")[0]]
+            raise ExperimentError(
+                f"{path}, line {line}: column {name!r}: found {shown(cell)}, expected {expected}"
+            ) from error
+    return Row(**values)
+
+
+def append(path: Path, rows: Iterable[Row]) -> None:
+    """Add rows all at once; a search that another process has added meanwhile keeps its row."""
+    with alone(path.parent):
+        known = read(path)
+        keys = {row.key for row in known}
+        save_text(path, _dumps([*known, *(row for row in rows if row.key not in keys)]))
+
+
+def _dumps(rows: Iterable[Row]) -> str:
+    file = io.StringIO(newline="")
+    writer = csv.writer(file, lineterminator="\n")
+    writer.writerow(_FIELDS)
+    writer.writerows([_cell(getattr(row, name)) for name in _FIELDS] for row in rows)
+    return file.getvalue()
+
+
+def _cell(value: object) -> str:
+    if isinstance(value, tuple):
+        return SEPARATOR.join(value)
+    if isinstance(value, float):
+        return f"{value:.4f}"
+    return "" if value is None else str(value)

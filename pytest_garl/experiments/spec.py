@@ -1,0 +1,284 @@
+"""What an experiment flies and reports: one TOML file, read strictly."""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import re
+from collections.abc import Collection, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+from pytest_garl.files.reading import read_text
+from pytest_garl.files.toml import LARGEST, Table, parse
+from pytest_garl.messages import listed, shown
+
+NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9 ._-]*")
+_MOST_GRIDS = 100
+_MOST_SEARCHES = 10_000
+_MOST_FLIGHTS = 1_000_000
+"""Of a search: more than a year of flying."""
+WITH = " with "
+"""Between a search and who steers its objects."""
+KINDS = ("I", "II", "III", "IV", "V")
+TOP_KEYS = frozenset(
+    {
+        "title",
+        "text",
+        "report",
+        "budget",
+        "seeds",
+        "maps",
+        "unavoidable",
+        "systems",
+        "grids",
+        "goals",
+        "training_hours",
+        "published",
+    }
+)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Run:
+    """One pytest session: a method's searches on all maps, from one seed.
+
+    ``system`` is the name in tables and rows, ``tests`` what pytest is given.  ``method`` is a
+    search, or "search with policy" where its objects are steered by another than its own.
+    """
+
+    system: str
+    tests: str
+    maps: tuple[str, ...]
+    method: str
+    seed: int
+    budget: int
+
+    @property
+    def search(self) -> str:
+        """The search method alone."""
+        return self.method.partition(WITH)[0]
+
+    @property
+    def npcs(self) -> str:
+        """Who steers the objects; empty: as the search has it."""
+        return self.method.partition(WITH)[2]
+
+    @property
+    def title(self) -> str:
+        """The run in words."""
+        where = " and ".join(self.maps)
+        return f"{self.system}, {self.method}, seed {self.seed}, {self.budget} flights on {where}"
+
+    @property
+    def folder(self) -> str:
+        """Name of the folder of its ledger; runs that differ have different ones."""
+        words = (self.system, self.method, f"seed{self.seed}", str(self.budget), *self.maps)
+        digest = hashlib.sha256(repr((self.tests, *words)).encode()).hexdigest()[:6]
+        return re.sub(r"[^A-Za-z0-9]+", "-", "-".join((*words, digest)))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Grid:
+    """A part of the report with a table of its own: systems × maps × methods × seeds.
+
+    ``text`` and ``remarks`` are Markdown: what is asked, and what came of it.
+    """
+
+    name: str
+    title: str
+    text: str
+    remarks: str
+    systems: tuple[str, ...]
+    maps: tuple[str, ...]
+    methods: tuple[str, ...]
+    seeds: tuple[int, ...]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Published:
+    """Figures that others published for a system on a map, shown beside those of ``methods``.
+
+    Shares are in percent; ``kinds`` are the types I to V as shares of the violations;
+    ``top10`` is 0 where fewer than ten were found.  None: not published.
+    """
+
+    system: str
+    map: str
+    methods: tuple[str, ...]
+    violations: float | None
+    top10: int | None
+    distance: float | None
+    coverage: float | None
+    hours: float | None
+    kinds: tuple[float, ...] | None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Goals:
+    """Whose figures are held against whose: a method, chance, and all baselines."""
+
+    system: str
+    method: str
+    random: str
+    baselines: tuple[str, ...]
+    maps: tuple[str, ...]
+    seeds: tuple[int, ...]
+    remarks: str
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Experiment:
+    """An experiment as its file says.
+
+    ``unavoidable`` bounds the reference pilot's flights per run and map.  ``training_h`` is what
+    the training of a method's policy took, in hours, before any search.
+    """
+
+    file: Path
+    rows: Path
+    report: Path
+    title: str
+    text: str
+    budget: int
+    unavoidable: int
+    systems: Mapping[str, str]
+    grids: tuple[Grid, ...]
+    goals: Goals | None
+    training_h: Mapping[str, float]
+    published: tuple[Published, ...]
+
+    @property
+    def runs(self) -> tuple[Run, ...]:
+        """All runs, each once: every grid's first seeds first, else in the file's order."""
+        found: dict[tuple[str, str, int], tuple[str, ...]] = {}
+        for turn in range(max(len(grid.seeds) for grid in self.grids)):
+            for grid in self.grids:
+                for seed in grid.seeds[turn : turn + 1]:
+                    for system in grid.systems:
+                        for method in grid.methods:
+                            key = (system, method, seed)
+                            found[key] = tuple(dict.fromkeys((*found.get(key, ()), *grid.maps)))
+        return tuple(
+            Run(
+                system=system,
+                tests=self.systems[system],
+                maps=maps,
+                method=method,
+                seed=seed,
+                budget=self.budget,
+            )
+            for (system, method, seed), maps in found.items()
+        )
+
+
+def read(file: Path) -> Experiment:
+    """Return the experiment in ``file``; raise ScenarioError that names file and key."""
+    top = Table(parse(read_text(file), str(file)), str(file))
+    top.only(TOP_KEYS)
+    systems = top.table("systems")
+    names = {_named(systems, name): systems.text(name) for name in systems.values}
+    grids = tuple(_grid(top, each, names) for each in top.tables("grids", most=_MOST_GRIDS))
+    if not grids:
+        raise top.error("grids", "missing; expected at least one [[grids]] with methods to fly")
+    twice = {grid.name for grid in grids if sum(grid.name == each.name for each in grids) > 1}
+    if twice:
+        raise top.error("grids", f"found {listed(sorted(twice))} twice, expected other names")
+    searches = sum(
+        len(each.systems) * len(each.maps) * len(each.methods) * len(each.seeds) for each in grids
+    )
+    if searches > _MOST_SEARCHES:
+        raise top.error("grids", f"found {searches} searches, expected at most {_MOST_SEARCHES}")
+    training = top.table("training_hours") if "training_hours" in top.values else None
+    return Experiment(
+        file=file,
+        rows=file.with_suffix(".csv"),
+        report=Path(os.path.normpath(file.parent / top.text("report", f"{file.stem}.md"))),
+        title=top.text("title"),
+        text=top.text("text", "").strip(),
+        budget=top.integer("budget", low=1, high=_MOST_FLIGHTS),
+        unavoidable=top.integer("unavoidable", 0),
+        systems=names,
+        grids=grids,
+        goals=_goals(top.table("goals"), grids) if "goals" in top.values else None,
+        training_h={key: training.number(key, low=0.0) for key in training.values}
+        if training
+        else {},
+        published=tuple(_published(each, names) for each in top.tables("published")),
+    )
+
+
+def _named(table: Table, name: str) -> str:
+    if not NAME.fullmatch(name):
+        raise table.error(name, "expected a name of letters, digits, spaces and . _ -")
+    return name
+
+
+def _grid(top: Table, table: Table, systems: Collection[str]) -> Grid:
+    table.only({"name", "title", "text", "remarks", "systems", "maps", "methods", "seeds"})
+    name = _named(table, table.text("name"))
+    return Grid(
+        name=name,
+        title=table.text("title", name),
+        text=table.text("text", "").strip(),
+        remarks=table.text("remarks", "").strip(),
+        systems=_some(table, "systems", among=systems)
+        if "systems" in table.values
+        else (*systems,),
+        maps=_some(table if "maps" in table.values else top, "maps"),
+        methods=_some(table, "methods"),
+        seeds=_seeds(table if "seeds" in table.values else top),
+    )
+
+
+def _some(table: Table, key: str, among: Collection[str] = ()) -> tuple[str, ...]:
+    """Return a list of strings that is not empty and says nothing twice."""
+    found = table.texts(key)
+    if not found or len(set(found)) < len(found):
+        raise table.error(key, f"found {shown(list(found))}, expected names, each once")
+    for name in found:
+        if among and name not in among:
+            raise table.error(key, f"found {shown(name)}, expected some of {listed(among)}")
+    return found
+
+
+def _seeds(table: Table) -> tuple[int, ...]:
+    found = table.get("seeds")
+    good = isinstance(found, list) and all(
+        type(seed) is int and 0 <= seed <= LARGEST for seed in found
+    )
+    if not good or not found or len(set(found)) < len(found):
+        raise table.error(
+            "seeds", f"found {shown(found)}, expected whole numbers from 0, each once"
+        )
+    return tuple(found)
+
+
+def _goals(table: Table, grids: Collection[Grid]) -> Goals:
+    table.only({"grid", "system", "method", "random", "baselines", "remarks"})
+    name = table.text("grid", among=[grid.name for grid in grids])
+    grid = next(grid for grid in grids if grid.name == name)
+    methods = grid.methods
+    return Goals(
+        system=table.text("system", among=grid.systems),
+        method=table.text("method", among=methods),
+        random=table.text("random", among=methods),
+        baselines=_some(table, "baselines", among=methods),
+        maps=grid.maps,
+        seeds=grid.seeds,
+        remarks=table.text("remarks", "").strip(),
+    )
+
+
+def _published(table: Table, systems: Collection[str]) -> Published:
+    figures = ("violations", "distance", "coverage", "hours")
+    table.only({"system", "map", "methods", "top10", "kinds", *figures})
+    values = {key: table.number(key, low=0.0) if key in table.values else None for key in figures}
+    return Published(
+        system=table.text("system", among=systems),
+        map=table.text("map"),
+        methods=_some(table, "methods"),
+        top10=table.integer("top10") if "top10" in table.values else None,
+        kinds=table.numbers("kinds", len(KINDS)) if "kinds" in table.values else None,
+        **values,
+    )

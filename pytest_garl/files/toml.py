@@ -1,0 +1,201 @@
+"""Strict reading of TOML, and quoting for its writers.
+
+Every error names the file, the key and what was expected.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+import tomllib
+from collections.abc import Collection, Mapping
+from typing import Any
+
+from pytest_garl.errors import ScenarioError
+from pytest_garl.messages import listed, printable, shortened, shown
+
+LARGEST = 2**63 - 1
+"""The largest whole number that TOML promises to keep."""
+_DEEP = 32
+_PART = r"""(?:[\w-]++|"(?:[^"\\\n]|\\.)*+"|'[^'\n]*+')"""
+_DEEP_KEY = re.compile(rf"(?<![\w.-])(?:{_PART}[ \t]*+\.[ \t]*+){{{_DEEP}}}")
+"""A key of so many parts: the parser's time grows with the square of their number."""
+
+
+def parse(text: str, source: str) -> dict[str, Any]:
+    """Return the document; raise ScenarioError with the line for bad TOML."""
+    if _DEEP_KEY.search(text):
+        raise ScenarioError(
+            f"{source}: not valid TOML: found a name of more than {_DEEP} parts with dots "
+            "between, expected fewer"
+        )
+    try:
+        return tomllib.loads(text)
+    except RecursionError as error:
+        raise ScenarioError(
+            f"{source}: not valid TOML: found lists or tables nested too deeply, expected a few "
+            "levels"
+        ) from error
+    except ValueError as error:
+        # Beside the parser's own errors these are numbers of more digits than Python takes.
+        raise ScenarioError(f"{source}: not valid TOML: {shortened(str(error), 200)}") from error
+
+
+def finite(value: object) -> float | None:
+    """Return a finite number as float, or None for everything else."""
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        return None
+    try:
+        number = float(value)
+    except OverflowError:
+        return None
+    return number if math.isfinite(number) else None
+
+
+class Table:
+    """One table of a document that remembers where it stands, so that errors can say it."""
+
+    def __init__(self, values: Any, source: str, path: str = "") -> None:
+        self.source = printable(source, keep="")
+        self.path = path
+        if not isinstance(values, Mapping):
+            raise self.error("", f"found {shown(values)}, expected a table")
+        self.values: Mapping[str, Any] = values
+
+    def error(self, key: str, problem: str) -> ScenarioError:
+        """Return an error about a key of this table."""
+        where = ".".join(part for part in (self.path, key) if part)
+        return ScenarioError(f"{self.source}: key {shown(where)}: {problem}")
+
+    def only(self, known: Collection[str]) -> None:
+        """Refuse keys that nobody reads."""
+        for key in self.values:
+            if key not in known:
+                raise self.error(key, f"unknown key; expected one of {listed(sorted(known))}")
+
+    def get(self, key: str, default: Any = None) -> Any:
+        """Return a value; without default a missing key is an error."""
+        if key in self.values:
+            return self.values[key]
+        if default is None:
+            raise self.error(key, "missing")
+        return default
+
+    def text(self, key: str, default: str | None = None, among: Collection[str] = ()) -> str:
+        """Return a string, control characters written out, one of ``among`` if given."""
+        value = self.get(key, default)
+        if not isinstance(value, str):
+            raise self.error(key, f"found {shown(value)}, expected a string")
+        if among and value not in among:
+            raise self.error(key, f"found {shown(value)}, expected one of {listed(sorted(among))}")
+        return printable(value)
+
+    def texts(self, key: str) -> tuple[str, ...]:
+        """Return a list of strings, empty if absent."""
+        value = self.values.get(key, [])
+        if not isinstance(value, list) or not all(isinstance(item, str) for item in value):
+            raise self.error(key, f"found {shown(value)}, expected a list of strings")
+        return tuple(printable(item) for item in value)
+
+    def truth(self, key: str, *, default: bool) -> bool:
+        """Return true or false."""
+        value = self.get(key, default=default)
+        if not isinstance(value, bool):
+            raise self.error(key, f"found {shown(value)}, expected true or false")
+        return value
+
+    def integer(
+        self, key: str, default: int | None = None, low: int = 0, high: int = LARGEST
+    ) -> int:
+        """Return a whole number within [low, high]."""
+        value = self.get(key, default)
+        if not isinstance(value, int) or isinstance(value, bool) or not low <= value <= high:
+            bounds = f"of at least {low}" if high == LARGEST else f"from {low} to {high}"
+            raise self.error(key, f"found {shown(value)}, expected a whole number {bounds}")
+        return value
+
+    def number(
+        self,
+        key: str,
+        default: float | None = None,
+        low: float = -math.inf,
+        high: float = math.inf,
+    ) -> float:
+        """Return a finite number within [low, high]."""
+        return self._number(key, self.get(key, default), low, high)
+
+    def numbers(
+        self,
+        key: str,
+        count: int,
+        default: tuple[float, ...] | None = None,
+        high: float = math.inf,
+    ) -> tuple[float, ...]:
+        """Return exactly ``count`` finite numbers within [-high, high]."""
+        return self._numbers(key, self.get(key, default), count, high)
+
+    def points(self, key: str, low: int, most: int, high: float) -> tuple[tuple[float, float], ...]:
+        """Return ``low`` to ``most`` pairs (x, y) of numbers within [-high, high]."""
+        value = self.get(key)
+        if not isinstance(value, list):
+            raise self.error(key, f"found {shown(value)}, expected a list of [x, y] pairs")
+        if not low <= len(value) <= most:
+            count = f"{low} to {most}" if most > low else f"exactly {low}"
+            raise self.error(key, f"found {len(value)} points, expected {count}, each [x, y]")
+        pairs = [self._numbers(key, pair, 2, high) for pair in value]
+        return tuple((x, y) for x, y in pairs)
+
+    def colour(self, key: str, default: tuple[int, int, int] | None = None) -> tuple[int, int, int]:
+        """Return an RGB colour of three whole numbers from 0 to 255."""
+        value = self.get(key, default)
+        good = (
+            isinstance(value, list | tuple)
+            and len(value) == 3
+            and all(type(item) is int and 0 <= item <= 255 for item in value)
+        )
+        if not good:
+            raise self.error(
+                key, f"found {shown(value)}, expected three whole numbers from 0 to 255"
+            )
+        red, green, blue = value
+        return red, green, blue
+
+    def table(self, key: str) -> Table:
+        """Return a sub-table."""
+        return Table(self.get(key), self.source, ".".join(p for p in (self.path, key) if p))
+
+    def tables(self, key: str, most: int = 10_000) -> tuple[Table, ...]:
+        """Return an array of at most ``most`` tables, empty if absent."""
+        value = self.values.get(key, [])
+        if not isinstance(value, list):
+            raise self.error(key, f"found {shown(value)}, expected an array of tables")
+        if len(value) > most:
+            raise self.error(key, f"found {len(value)} tables, expected at most {most}")
+        prefix = f"{self.path}." if self.path else ""
+        return tuple(
+            Table(item, self.source, f"{prefix}{key}[{index}]") for index, item in enumerate(value)
+        )
+
+    def _numbers(self, key: str, value: Any, count: int, high: float) -> tuple[float, ...]:
+        if not isinstance(value, list | tuple) or len(value) != count:
+            raise self.error(key, f"found {shown(value)}, expected {count} numbers")
+        return tuple(self._number(key, item, -high, high) for item in value)
+
+    def _number(self, key: str, value: Any, low: float, high: float) -> float:
+        if isinstance(value, bool) or not isinstance(value, int | float):
+            raise self.error(key, f"found {shown(value)}, expected a number")
+        number = finite(value)
+        if number is None or not low <= number <= high:
+            raise self.error(
+                key, f"found {shown(value)}, expected a number from {low:g} to {high:g}"
+            )
+        return number
+
+
+def quoted(value: str) -> str:
+    """Return a TOML basic string."""
+    escaped = value.replace("\\", "\\\\").replace('"', '\\"')
+    plain = "".join(
+        char if char >= " " and char != "\x7f" else f"\\u{ord(char):04x}" for char in escaped
+    )
+    return f'"{plain}"'

@@ -1,0 +1,1 @@
+"""All that knows pytest: hooks, options, items, fixtures, outcomes and the summary."""

@@ -1,0 +1,187 @@
+"""The gate against a baseline: one item per landing system and map that flies all its scenarios."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Generator, Iterable, Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from pytest_garl.adversary.scripted import policy_spec
+from pytest_garl.baselines.comparison import Comparison
+from pytest_garl.baselines.file import Baseline, SampleSet, load
+from pytest_garl.baselines.pairs import Fate
+from pytest_garl.baselines.record import compare_flights, moved_on, unlike
+from pytest_garl.errors import GarlError
+from pytest_garl.plugin.arguments import RUN
+from pytest_garl.plugin.collection import FIRST, Target, name_of, read_marker
+from pytest_garl.plugin.fixtures import stop
+from pytest_garl.plugin.options import Options
+from pytest_garl.plugin.run import Run
+
+TOLD = "garl.gate"
+"""The user property under which a gate's sentences reach the summary, also from xdist's workers."""
+
+
+def register(config: pytest.Config, options: Options) -> None:
+    """Add the gate to a session; raise UsageError for a file that is no baseline."""
+    assert options.baseline is not None
+    try:
+        baseline = load(options.baseline, options.map_folders)
+    except GarlError as error:
+        raise pytest.UsageError(f"--garl-baseline: {error}") from error
+    config.pluginmanager.register(Gating(options, options.baseline, baseline), "garl_gating")
+
+
+class Gate(pytest.Item):
+    """Flies one set of the baseline and fails if the landing system is worse."""
+
+    def __init__(self, *, target: Target, base: SampleSet, **rest: Any) -> None:
+        super().__init__(**rest)
+        self.garl_gate = base
+        self._target = target
+
+    def runtest(self) -> None:
+        """Fly and compare."""
+        from pytest_garl.scenarios.maps.map import load_map
+
+        run: Run = self.config.stash[RUN]
+        base = self.garl_gate
+        try:
+            npcs = policy_spec(base.npcs)
+            differing = unlike(base, run.job(self._target, npcs))
+            if differing:
+                refused = f"gate FAILED: no fair comparison, {'; '.join(differing)}"
+                lines = [refused, "If that is wanted, save the baseline anew."]
+                self._tell(lines)
+                pytest.fail("\n".join(lines), pytrace=False)
+            found = compare_flights(
+                base,
+                run.fly_all(self._target, npcs, [each.scenario for each in base.samples]),
+                load_map(base.map, run.options.map_folders),
+                lambda scenarios: run.fly_all(self._target, npcs, scenarios),
+                level=run.options.level,
+                known=run.known(self._target),
+            )
+        except GarlError as error:
+            stop(self, error)
+        caution = [f"note: {base.caution}"] if base.caution else []
+        self._tell([*found.sentences(), *self._hint(found, run.options.baseline), *caution])
+        if not found.passed:
+            # The pairs are listed once, in the summary.
+            pytest.fail("\n".join(found.summary()), pytrace=False)
+
+    def _tell(self, lines: Iterable[str]) -> None:
+        """Leave lines for the summary."""
+        self.user_properties += [(TOLD, line) for line in (self.garl_gate.title, *lines)]
+
+    def _hint(self, found: Comparison, file: Path | None) -> Iterator[str]:
+        """Say how to look at a pair that is worse."""
+        worse: tuple[Fate, ...] = ("broke", "changed")
+        first = next((pair for fate in worse for pair in found.of(fate)), None)
+        if first is not None:
+            yield (
+                f"fly it: garl baseline scenario {file} {first.name} > one.toml; "
+                f"pytest --garl-repeat=one.toml --garl-npcs={self.garl_gate.npcs}"
+            )
+
+    def reportinfo(self) -> tuple[os.PathLike[str] | str, int | None, str]:
+        """Return where the item comes from and what it is called."""
+        return self.path, None, self.name
+
+
+class Gating:
+    """The hooks of a session with a baseline."""
+
+    def __init__(self, options: Options, file: Path, baseline: Baseline) -> None:
+        self._options, self._file, self._baseline = options, file, baseline
+        self._placed: set[tuple[str, str, str]] = set()
+        self._told: dict[str, list[str]] = {}
+        self._problem = ""
+
+    @pytest.hookimpl(wrapper=True)
+    def pytest_pycollect_makeitem(
+        self, collector: pytest.Module | pytest.Class
+    ) -> Generator[None, Any, Any]:
+        """Put a gate before the first marked test of each module, for each of its maps."""
+        made = yield
+        if not isinstance(made, list):
+            return made
+        marker = next((mark for item in made if (mark := item.get_closest_marker("garl"))), None)
+        return made if marker is None else [*self._gates(collector, marker), *made]
+
+    def _gates(
+        self, collector: pytest.Module | pytest.Class, marker: pytest.Mark
+    ) -> Iterator[Gate]:
+        try:
+            subject = read_marker(marker, self._options)
+        except GarlError as error:
+            raise pytest.Collector.CollectError(f"{collector.nodeid}: {error}") from error
+        for map in subject.maps:
+            base = self._baseline.of(name_of(subject.system), map)
+            place = (str(collector.path), name_of(subject.system), map)
+            if base is not None and place not in self._placed:
+                self._placed.add(place)
+                yield Gate.from_parent(
+                    collector,
+                    name=f"baseline[{base.title}]",
+                    target=subject.target(map, FIRST),
+                    base=base,
+                )
+
+    def pytest_collection_finish(self, session: pytest.Session) -> None:
+        """Refuse to begin where the command line asks for a gate and no selected test has one."""
+        worker = hasattr(session.config, "workerinput")
+        if not worker and not any(isinstance(item, Gate) for item in session.items):
+            problem = self._nothing(session.config)
+            if problem:
+                raise pytest.UsageError(problem)
+
+    def pytest_runtest_logreport(self, report: pytest.TestReport) -> None:
+        """Remember what a gate says."""
+        lines = [str(text) for key, text in report.user_properties if key == TOLD]
+        if lines and report.when == "call":
+            self._told[report.nodeid] = lines
+
+    def pytest_sessionfinish(self, session: pytest.Session) -> None:
+        """Refuse to pass without a gate under xdist, whose workers alone know the items."""
+        if not session.config.pluginmanager.hasplugin("dsession") or self._told:
+            return
+        if session.exitstatus in (pytest.ExitCode.OK, pytest.ExitCode.NO_TESTS_COLLECTED):
+            self._problem = self._nothing(session.config)
+            if self._problem:
+                session.exitstatus = pytest.ExitCode.USAGE_ERROR
+
+    def _nothing(self, config: pytest.Config) -> str:
+        """Return what is wrong with a session without gate; an ini key asks for none."""
+        asked = config.getoption("--garl-baseline")
+        wanted = ", ".join(f"{each.system} on {each.map}" for each in self._baseline.sets)
+        return asked and (
+            f"--garl-baseline={asked}: nothing to compare: it holds {wanted}, and no selected test "
+            "is marked with one of these"
+        )
+
+    def pytest_report_header(self) -> str:
+        """Say what the gate will fly, at most."""
+        sets = ", ".join(f"{len(each.samples)} of {each.title}" for each in self._baseline.sets)
+        return f"garl: gate against {self._file}: {sets}, level {self._options.level:g}"
+
+    def pytest_terminal_summary(self, terminalreporter: Any) -> None:
+        """Show what each gate says."""
+        if not self._told and not self._problem:
+            return
+        terminalreporter.section("garl: baseline", sep="=")
+        if self._problem:
+            terminalreporter.write_line(self._problem, red=True)
+        for note in moved_on(self._baseline):
+            terminalreporter.write_line(f"note: {note}; differences may be its doing")
+        titles = {title for title, *_ in self._told.values()}
+        for each in self._baseline.sets:
+            if each.title not in titles:
+                terminalreporter.write_line(f"note: {each.title} was not flown")
+        for _, (title, answer, *lines) in sorted(self._told.items()):
+            terminalreporter.write_line(f"{title}: {answer}")
+            for line in lines:
+                terminalreporter.write_line(f"    {line}")

@@ -1,0 +1,68 @@
+"""Find the tests that found a saved case: the simulator, files and assertions they fly it with."""
+
+from __future__ import annotations
+
+import contextlib
+import io
+from pathlib import Path
+
+import pytest
+
+from pytest_garl.errors import GarlError
+from pytest_garl.execution.reference import BUILT_IN, Reference, reference_to
+from pytest_garl.execution.sources import data_files
+from pytest_garl.plugin.arguments import target_of
+from pytest_garl.plugin.user_assertions import Asks
+from pytest_garl.regressions.case import Case
+from pytest_garl.regressions.judging import alone_in_a_folder, arguments
+from pytest_garl.regressions.reshrink import Means
+
+IMPORTED = "ignore::pytest.PytestAssertRewriteWarning"
+"""pytest warns that this package is imported already; a project may make errors of warnings."""
+
+
+class _Collected:
+    """A plugin that keeps what pytest collects."""
+
+    def __init__(self) -> None:
+        self.items: list[pytest.Item] = []
+        self.simulator: Reference = BUILT_IN
+
+    def pytest_collection_finish(self, session: pytest.Session) -> None:
+        """Keep the items, and the simulator of the project."""
+        self.items = list(session.items)
+        own = session.config.hook.pytest_garl_fly(config=session.config)
+        self.simulator = reference_to(own) if own else BUILT_IN
+
+
+def means_of(case: Case, root: Path) -> Means:
+    """Return with what the tests that found a case fly and judge it."""
+    if not case.test:
+        return Means()
+    collected = _Collected()
+    with alone_in_a_folder(case, live=False) as folder, contextlib.chdir(root):
+        told = io.StringIO()
+        with contextlib.redirect_stdout(told), contextlib.redirect_stderr(told):
+            options = ["--collect-only", "-q", "--capture=no", f"-W{IMPORTED}"]
+            status = pytest.main([*arguments(case, folder, live=False), *options], [collected])
+    tests = [
+        (item, target)
+        for item in collected.items
+        if isinstance(item, pytest.Function) and (target := target_of(item)) is not None
+    ]
+    if status not in (pytest.ExitCode.OK, pytest.ExitCode.NO_TESTS_COLLECTED):
+        raise GarlError(f"pytest could not collect {case.test}:\n{told.getvalue()}")
+    for item, target in tests:
+        if case.own_test and item.originalname != case.own_test:
+            continue
+        return Means(
+            asks=Asks(item, target) if case.assertion else None,
+            simulator=collected.simulator,
+            files=tuple(data_files(target.files, root).items()),
+        )
+    if not case.assertion:
+        return Means(simulator=collected.simulator)
+    raise GarlError(
+        f"the case {case.id} is of a property of your own, and its test {case.test!r} is not found "
+        f"in {root}; run this where you run pytest, or correct the case's key 'test'"
+    )

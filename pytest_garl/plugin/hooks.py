@@ -1,0 +1,302 @@
+"""The pytest hooks of pytest-garl, and nothing else."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Generator
+from typing import Any
+
+import pytest
+
+from pytest_garl.errors import GarlError
+from pytest_garl.plugin import hookspecs
+from pytest_garl.plugin.arguments import (
+    BEGUN,
+    FATAL,
+    FOUND,
+    OWN,
+    RUN,
+    TALLY,
+    add_options,
+    asked,
+    computes,
+    flies,
+    name_slots,
+    target_of,
+)
+from pytest_garl.plugin.fixtures import end_unjudged, garl_slot, landing, npcs, scenario
+from pytest_garl.plugin.tally import Tally
+
+__all__ = ["garl_slot", "landing", "npcs", "scenario"]
+
+NOTHING_TO_FLY = "no --garl-budget given and no saved cases; to search: pytest --garl-budget=40"
+
+
+def pytest_addoption(parser: pytest.Parser) -> None:
+    """Register options and ini keys."""
+    add_options(parser)
+
+
+def pytest_addhooks(pluginmanager: pytest.PytestPluginManager) -> None:
+    """Register the hooks that users may implement."""
+    pluginmanager.add_hookspecs(hookspecs)
+
+
+def pytest_load_initial_conftests(early_config: pytest.Config) -> None:
+    """Choose the CPU's instructions before a conftest.py loads NumPy, if anything is asked for."""
+    if computes(early_config):
+        from pytest_garl import cpu_dispatch
+
+        cpu_dispatch.pin()
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    """Register the marker, and join or begin a run if anything is to be flown."""
+    config.addinivalue_line(
+        "markers",
+        "garl(system, maps, limits, deterministic, files): search for violations of a landing "
+        "system: its class; names of maps (default: court and lawn); limits(distance_m=1.5, "
+        "time_s=120, abort='ok'); whether it does the same in the same flight (default: True); "
+        "data files that it reads, so that --garl-resume knows when they change.",
+    )
+    if not hasattr(config, "workerinput"):
+        config.stash[TALLY] = Tally()
+        config.pluginmanager.register(config.stash[TALLY], "garl_tally")
+    if not asked(config):
+        return
+    from pytest_garl.plugin.option_checks import check_usage
+    from pytest_garl.plugin.options import read_options
+
+    options = read_options(config)
+    check_usage(config, options)
+    if options.baseline is not None:
+        from pytest_garl.plugin.baseline_gate import register
+
+        register(config, options)
+    if options.searches and not config.option.collectonly:
+        _begin(config)
+
+
+def _begin(config: pytest.Config) -> None:
+    from pytest_garl.plugin.options import read_options
+    from pytest_garl.plugin.startup import begin_run
+
+    try:
+        config.stash[RUN] = begin_run(config, read_options(config))
+    except GarlError as error:
+        raise pytest.UsageError(str(error)) from error
+
+
+def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
+    """Turn a marked test into its slots."""
+    if "garl_slot" not in metafunc.fixturenames:
+        return
+    marker = metafunc.definition.get_closest_marker("garl")
+    if marker is None:
+        raise pytest.Collector.CollectError(
+            f"{metafunc.definition.nodeid} uses a landing fixture without "
+            "@pytest.mark.garl(system=..., maps=[...])"
+        )
+    from pytest_garl.plugin.collection import targets_for
+    from pytest_garl.plugin.options import read_options
+
+    options = read_options(metafunc.config)
+    try:
+        targets: list[Any] = list(targets_for(marker, options, metafunc.definition.originalname))
+    except GarlError as error:
+        raise pytest.Collector.CollectError(f"{metafunc.definition.nodeid}: {error}") from error
+    ids = [target.name for target in targets]
+    if not targets:
+        reason = f"--garl-repeat={options.repeat}: not of this test" if options.repeat else ""
+        reason = reason or (NOTHING_TO_FLY if not options.budget else "no map selected")
+        targets, ids = [reason], ["nothing"]
+    metafunc.parametrize("garl_slot", targets, ids=ids, indirect=True)
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_collection_finish(session: pytest.Session) -> None:
+    """Tell the run which slots are wanted; where there is none yet, saved cases begin one."""
+    config = session.config
+    if config.option.collectonly:
+        return
+    name_slots(session.items)
+    if asked(config) and not hasattr(config, "workerinput"):
+        from pytest_garl.plugin.option_checks import check_selection
+
+        check_selection(config, session.items)
+    if RUN not in config.stash and any(flies(item) for item in session.items):
+        _begin(config)
+    run = config.stash.get(RUN, None)
+    if run is not None:
+        run.select(session.items)
+        if run.options.resume:
+            try:
+                run.check_resumed()
+            except GarlError as error:
+                raise pytest.UsageError(str(error)) from error
+
+
+@pytest.hookimpl(wrapper=True, trylast=True)
+def pytest_runtestloop(session: pytest.Session) -> Generator[None, object, object]:
+    """Show the progress line while the tests run."""
+    run = session.config.stash.get(RUN, None)
+    if run is None:
+        return (yield)
+    from pytest_garl.plugin.progress import live
+
+    with live(run, session.config):
+        result = yield
+    run.ran = True
+    return result
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_pyfunc_call(pyfuncitem: pytest.Function) -> Generator[None, Any, Any]:
+    """End a test before its body runs if the landing system crashed."""
+    pyfuncitem.stash[BEGUN] = True
+    try:
+        end_unjudged(pyfuncitem)
+        return (yield)
+    finally:
+        pyfuncitem.stash[BEGUN] = False
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_runtest_makereport(
+    item: pytest.Item, call: pytest.CallInfo[None]
+) -> Generator[None, pytest.TestReport, pytest.TestReport]:
+    """Explain a violation, report a known one as xfailed, and judge saved cases."""
+    report = yield
+    target = target_of(item)
+    run = item.config.stash.get(RUN, None)
+    if target is not None and run is not None and (report.when == "call" or report.skipped):
+        from pytest_garl.plugin.outcomes import explain
+
+        try:
+            if report.when == "call":
+                explain(report, item, run, target, call.excinfo.value if call.excinfo else None)
+            run.note_ran(item.nodeid)
+        except GarlError as error:
+            # Without a ledger no other item would fare better.
+            report.outcome, report.longrepr = "failed", f"garl: {error}"
+            report.user_properties.append((FATAL, str(error)))
+    return report
+
+
+def pytest_runtest_logreport(report: pytest.TestReport) -> None:
+    """End a session that has lost its ledger; remember what xdist's workers tell of assertions."""
+    for key, value in report.user_properties:
+        if key == FATAL:
+            raise pytest.exit.Exception(f"garl: {value}", pytest.ExitCode.INTERNAL_ERROR)
+        worker = getattr(report, "node", None)
+        if key == OWN and worker is not None:
+            worker.config.stash[RUN].told[report.nodeid] = str(value)
+        if key == FOUND and worker is not None:
+            search, _, signature = str(value).partition(" ")
+            worker.config.stash[RUN].note_test(search, signature, report.nodeid)
+
+
+def pytest_report_header(config: pytest.Config) -> str | None:
+    """Say what will be searched, and how long it will probably take."""
+    run = config.stash.get(RUN, None)
+    if run is None:
+        return None
+    from pytest_garl.plugin.summary import header
+
+    return header(run)
+
+
+def pytest_report_collectionfinish(config: pytest.Config) -> list[str]:
+    """Say how long all searches take, and where only accepted cases are known."""
+    run = config.stash.get(RUN, None)
+    if run is None:
+        return []
+    from pytest_garl.plugin.summary import forecast
+
+    lines = forecast(run)
+    if run.acceptance.problem:
+        lines.append(_known_by_mark(run.acceptance.problem))
+    return lines
+
+
+def _known_by_mark(problem: str) -> str:
+    return (
+        f"garl: nobody can tell which cases are committed ({problem}); known are "
+        "only those that `garl cases accept` has marked"
+    )
+
+
+def pytest_terminal_summary(terminalreporter: Any, config: pytest.Config) -> None:
+    """Show what was found, per system and map."""
+    if RUN not in config.stash and config.pluginmanager.hasplugin("dsession"):
+        # xdist's controller collects nothing: its workers' cases show by their ledger.
+        folder = config.rootpath / str(config.getini("garl_dir"))
+        if (folder / f"cases-{os.getpid()}.sqlite").is_file():
+            _begin(config)
+    run = config.stash.get(RUN, None)
+    if run is not None:
+        from pytest_garl.plugin.summary import summary
+
+        try:
+            summary(terminalreporter, run)
+        except GarlError as error:
+            terminalreporter.write_line(f"garl: {error}", red=True)
+    tally = config.stash.get(TALLY, None)
+    if tally is not None and tally.items:
+        from pytest_garl.plugin.summary import colour
+
+        colour(terminalreporter, tally)
+
+
+def pytest_sessionfinish(session: pytest.Session) -> None:
+    """Pursue and save what a search found; say whether the session may be green."""
+    run = session.config.stash.get(RUN, None)
+    if run is not None:
+        try:
+            if run.searched(session):
+                from pytest_garl.plugin.save_cases import pursue
+
+                pursue(run, session)
+                if run.trouble:
+                    session.exitstatus = pytest.ExitCode.INTERNAL_ERROR
+        except GarlError as error:
+            _lost_ledger(session, run, error)
+        finally:
+            run.pool.close()
+    tally = session.config.stash.get(TALLY, None)
+    if tally is not None and tally.items:
+        from pytest_garl.plugin.session_status import problems
+
+        maps = session.config.getoption("--garl-map")
+        try:
+            tally.problems = list(problems(tally, run, maps=maps))
+        except GarlError as error:
+            _lost_ledger(session, run, error)
+        if tally.problems and session.exitstatus == pytest.ExitCode.OK:
+            session.exitstatus = pytest.ExitCode.TESTS_FAILED
+
+
+def _lost_ledger(session: pytest.Session, run: Any, error: GarlError) -> None:
+    """End a session without its ledger: nothing can be saved, and the summary says why."""
+    session.exitstatus = pytest.ExitCode.INTERNAL_ERROR
+    if run is not None:
+        run.trouble = run.trouble or str(error)
+
+
+def pytest_unconfigure(config: pytest.Config) -> None:
+    """Leave the ledger to others."""
+    run = config.stash.get(RUN, None)
+    if run is not None:
+        run.close()
+
+
+@pytest.hookimpl(optionalhook=True)
+def pytest_configure_node(node: Any) -> None:
+    """Give an xdist worker the run's name, and its seed, so that a random one is drawn once."""
+    from pytest_garl.plugin.wrapping import WIDTH, width_of
+
+    node.workerinput["garl_controller"] = str(os.getpid())
+    node.workerinput[WIDTH] = width_of(node.config)
+    run = node.config.stash.get(RUN, None)
+    if run is not None:
+        node.workerinput["garl_seed"] = str(run.options.seed)

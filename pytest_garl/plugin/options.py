@@ -1,0 +1,253 @@
+"""Every command-line option and ini key, validated once into one frozen object."""
+
+from __future__ import annotations
+
+import os
+import re
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Literal, cast
+
+import pytest
+
+from pytest_garl.errors import GarlError
+from pytest_garl.plugin.arguments import METHODS, OPTIONS, POLICIES, Option
+
+if TYPE_CHECKING:
+    from pytest_garl.scenarios.genes import WeatherRange
+
+SLOT_ID = re.compile(r"(?P<map>.+)-g(?P<generation>\d{2,})-s(?P<slot>\d{2,})")
+
+SHRINK = 12
+"""Flights for each new kind of violation: enough for the barest scenario, its neighbours, the
+reference pilot and a shorter record of moves."""
+LEAST_SHRINK = 8
+"""Fewer say nothing: ``pursuit.LEAST``, which to import takes long."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Options:
+    """What the user wants, checked."""
+
+    budget: int
+    seed: int
+    method: str
+    population: int
+    resume: bool
+    maps: tuple[str, ...]
+    pool: Literal["local", "ray"]
+    workers: int | None
+    """None: as many as the Ray cluster has CPUs."""
+    ray_address: str
+    """Of a cluster that is there already, or empty: one on this machine."""
+    weather: WeatherRange
+    timeout_s: float
+    repeat: str
+    duplicates: Literal["xfail", "fail"]
+    npcs: str
+    baseline: Path | None
+    level: float
+    shrink: int
+    """Flights for each new kind of violation."""
+    shrink_capped: bool
+    """Whether all kinds of a search together have no more flights than the search."""
+    xfail_strict: bool
+    cases: Path
+    folder: Path
+    root: Path
+    controller: str
+
+    @property
+    def searches(self) -> bool:
+        """Whether more than saved cases is flown."""
+        return self.budget > 0 or bool(self.repeat)
+
+    @property
+    def map_folders(self) -> tuple[Path, ...]:
+        """Where a user's own maps lie."""
+        return (self.root / "scenarios" / "maps",)
+
+    @property
+    def ledger(self) -> Path:
+        """The ledger of this run; repeating writes one of its own and keeps the search's.
+
+        Runs of saved cases alone may be several at a time; each has one until it ends.
+        """
+        if not self.searches:
+            return self.folder / f"cases-{self.controller}.sqlite"
+        return self.folder / ("repeat.sqlite" if self.repeat else "ledger.sqlite")
+
+
+def read_options(config: pytest.Config) -> Options:
+    """Return the options; raise UsageError that says what was found and what is expected."""
+    text = {option.name: _value(config, option) for option in OPTIONS}
+    budget = _integer("budget", text["budget"], 1) if text["budget"] else 0
+    address = os.environ.get("RAY_ADDRESS", "")
+    address = "" if address == "local" else address
+    size = _integer("population", text["population"], 1) if text["population"] else 0
+    return Options(
+        budget=budget,
+        population=min(size, budget) if size else _population(budget),
+        resume=bool(config.getoption("--garl-resume")),
+        seed=_seed(config, text["seed"]),
+        method=_method(text["method"]),
+        maps=tuple(part.strip() for part in text["map"].split(",") if part.strip()),
+        pool=cast(Literal["local", "ray"], _among("pool", text["pool"], ("local", "ray"))),
+        workers=_workers(text["workers"], text["pool"], address),
+        ray_address=address,
+        weather=cast("WeatherRange", _among("weather", text["weather"], ("confined", "full"))),
+        timeout_s=_number("timeout", text["timeout"], 1e6, "a positive number of seconds"),
+        repeat=_repeat(text["repeat"]),
+        duplicates=cast(
+            Literal["xfail", "fail"], _among("duplicates", text["duplicates"], ("xfail", "fail"))
+        ),
+        npcs=_npcs(text["npcs"] or _npcs_then(config, text["repeat"]), text["method"]),
+        baseline=_baseline(config),
+        level=_number("level", text["level"], 1, "a number between 0 and 1"),
+        shrink=_shrink(text["shrink"]),
+        shrink_capped=not text["shrink"],
+        xfail_strict=bool(config.getini("garl_xfail_strict")),
+        cases=config.rootpath / str(config.getini("garl_cases")),
+        folder=config.rootpath / str(config.getini("garl_dir")),
+        root=config.rootpath,
+        controller=controller_of(config),
+    )
+
+
+def controller_of(config: pytest.Config) -> str:
+    """Return the process whose run this is: xdist's controller, or this one."""
+    given: dict[str, Any] = getattr(config, "workerinput", {})
+    return str(given.get("garl_controller", os.getpid()))
+
+
+def _value(config: pytest.Config, option: Option) -> str:
+    given = config.getoption(f"--garl-{option.name}")
+    return str(config.getini(f"garl_{option.name}") if given is None else given)
+
+
+def _wrong(name: str, found: str, expected: str) -> pytest.UsageError:
+    return pytest.UsageError(f"--garl-{name}: found {found!r}, expected {expected}")
+
+
+def _integer(name: str, text: str, low: int) -> int:
+    if not re.fullmatch(r"\d+", text) or int(text) < low:
+        raise _wrong(name, text, f"a whole number of at least {low}")
+    return int(text)
+
+
+def _workers(text: str, pool: str, ray_address: str) -> int | None:
+    if text:
+        # None of Ray's workers is the pytest process.
+        return _integer("workers", text, 1 if pool == "ray" else 0)
+    return None if pool == "ray" and ray_address else os.cpu_count() or 1
+
+
+def _population(budget: int) -> int:
+    if not budget:
+        return 0
+    from pytest_garl.execution.slot import population
+
+    return population(budget)
+
+
+def _shrink(text: str) -> int:
+    if not text:
+        return SHRINK
+    number = _integer("shrink", text, 0)
+    if 0 < number < LEAST_SHRINK:
+        raise _wrong("shrink", text, f"0, or at least {LEAST_SHRINK} flights per new kind")
+    return number
+
+
+def _number(name: str, text: str, below: float, expected: str) -> float:
+    """Return a number between 0 and ``below``, both excluded."""
+    try:
+        value = float(text)
+    except ValueError:
+        value = -1.0
+    if not 0 < value < below:
+        raise _wrong(name, text, expected)
+    return value
+
+
+def _baseline(config: pytest.Config) -> Path | None:
+    """Return the file: the command line's as seen from here, the ini key's from the root."""
+    given = config.getoption("--garl-baseline")
+    text, folder = (given, Path()) if given else (config.getini("garl_baseline"), config.rootpath)
+    if text and not (folder / text).is_file():
+        raise _wrong("baseline", text, "a file that `garl baseline save` wrote")
+    return folder / text if text else None
+
+
+def _among(name: str, text: str, known: tuple[str, ...]) -> str:
+    if text not in known:
+        raise _wrong(name, text, f"one of {', '.join(known)}")
+    return text
+
+
+def _method(text: str) -> str:
+    if ":" not in text:
+        return _among("method", text, METHODS)
+    from pytest_garl.search.catalogue import find_method
+
+    try:
+        find_method(text)
+    except GarlError as error:
+        raise pytest.UsageError(f"--garl-method: {error}") from error
+    return text
+
+
+POLICY_OF = {
+    "garl-paper": "dqn-paper",
+    "ga": "destination",
+    "offline-rl": "destination",
+    "online-rl": "online-rl",
+    "random": "waypoint",
+    "surrogate-random": "dqn-paper",
+}
+"""Who moves objects where nobody says: what is part of each of the paper's methods."""
+
+
+def _npcs(text: str, method: str) -> str:
+    if not text:
+        return POLICY_OF.get(method, "dqn")
+    if text in POLICIES:
+        return text
+    if not text.endswith(".npz"):
+        expected = f"one of {', '.join(POLICIES)}, or weights (.npz) that `garl train` wrote"
+        raise _wrong("npcs", text, expected)
+    return text
+
+
+def _npcs_then(config: pytest.Config, repeat: str) -> str:
+    """Return who moved objects in the search whose slot is repeated, or nothing."""
+    path = config.rootpath / str(config.getini("garl_dir")) / "ledger.sqlite"
+    if not SLOT_ID.fullmatch(repeat) or not path.is_file():
+        return ""
+    from pytest_garl.execution.ledger import Ledger
+
+    try:
+        ledger = Ledger(path)
+        try:
+            return str(ledger.fact("npcs") or "")
+        finally:
+            ledger.close()
+    except GarlError as error:
+        raise pytest.UsageError(f"--garl-repeat={repeat}: {error}") from error
+
+
+def _seed(config: pytest.Config, text: str) -> int:
+    given: dict[str, Any] = getattr(config, "workerinput", {})
+    if "garl_seed" in given:
+        return int(given["garl_seed"])
+    if text == "random":
+        import secrets
+
+        return secrets.randbelow(2**32)
+    return _integer("seed", text, 0)
+
+
+def _repeat(text: str) -> str:
+    if text and not SLOT_ID.fullmatch(text) and not Path(text).is_file():
+        raise _wrong("repeat", text, "a slot such as court-g03-s17, or an existing scenario file")
+    return text

@@ -1,0 +1,447 @@
+"""One pytest session's part in a run: its items' searches, the ledger, the pool."""
+
+from __future__ import annotations
+
+import functools
+import hashlib
+import os
+import sys
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, TextIO
+
+import pytest
+
+from pytest_garl.errors import LedgerError
+from pytest_garl.execution.ledger import Kind, Ledger
+from pytest_garl.execution.pool import Pool, wait_for
+from pytest_garl.execution.reference import BUILT_IN, Reference, reference_to, simulator_sha256
+from pytest_garl.execution.slot import Slot, flight_name
+from pytest_garl.execution.sources import combined_sha256, data_files, sources_of
+from pytest_garl.plugin.arguments import POLICIES, target_of
+from pytest_garl.plugin.collection import FIRST, Target, name_of, repeated
+from pytest_garl.plugin.options import Options
+
+if TYPE_CHECKING:
+    from pytest_garl.execution.job import Job
+    from pytest_garl.execution.on_demand import Done
+    from pytest_garl.plugin.user_assertions import Asks
+    from pytest_garl.regressions.acceptance import Acceptance
+    from pytest_garl.regressions.follow_up import Pursued
+    from pytest_garl.regressions.forecast import Rest
+    from pytest_garl.scenarios.scenario import Scenario
+    from pytest_garl.search.breeder import Breeder
+    from pytest_garl.search.method import Flown, Method
+    from pytest_garl.simulation.npc_policy import PolicySpec
+
+SELECTED = "selected flights"
+"""The ledger's fact: how many flights of searches the selected tests want."""
+FLIGHT_S = 2.2
+"""Wall time of one flight on one core where no earlier run tells: OpenCV-MLS, measured by
+``python -m benchmarks``."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Selected:
+    """A selected test item of a slot.
+
+    ``test`` is the same for all slots of one test; ``shows`` says whether its failure shows: it is
+    marked neither to be skipped nor to fail, and takes the slot's landing.
+    """
+
+    nodeid: str
+    test: str
+    shows: bool
+
+
+def selected(item: pytest.Item) -> Selected:
+    """Return what a run must know of an item."""
+    marked = any(item.get_closest_marker(name) for name in ("skip", "skipif", "xfail"))
+    return Selected(
+        nodeid=item.nodeid,
+        test=test_of(item),
+        shows=not marked and "landing" in getattr(item, "fixturenames", ()),
+    )
+
+
+def test_of(item: pytest.Item) -> str:
+    """Return an item's test with its parameters but the slot."""
+    callspec, target = getattr(item, "callspec", None), target_of(item)
+    # Not pytest's indices of the parameters, which count all items of the test.
+    others = callspec.id.replace(target.name, "", 1).strip("-") if callspec and target else ""
+    name = f"{item.nodeid.removesuffix(item.name)}{getattr(item, 'originalname', item.name)}"
+    return f"{name}[{others}]" if others else name
+
+
+@dataclass(kw_only=True)
+class Run:
+    """State of one pytest process; xdist workers each have one and share the ledger."""
+
+    options: Options
+    ledger: Ledger
+    pool: Pool
+    simulator: Reference
+    flight_s: float = FLIGHT_S
+    tick: Callable[[], None] = field(default=lambda: None)
+    """Called while a flight is waited for."""
+    waited: Callable[[], None] = field(default=lambda: None)
+    """Called when the waiting is over."""
+    items: dict[str, dict[Slot, list[Selected]]] = field(default_factory=dict)
+    targets: dict[str, dict[Slot, Target]] = field(default_factory=dict)
+    breeders: dict[str, Breeder] = field(default_factory=dict)
+    results: dict[tuple[str, Slot], dict[str, Any]] = field(default_factory=dict)
+    pursued: tuple[Pursued, ...] = ()
+    """What became of new signatures after the search."""
+    rest: Rest | None = None
+    """What is to come after the search, when it is known."""
+    trouble: str = ""
+    """Why that could not be finished, if it could not."""
+    own: dict[tuple[str, str], Asks] = field(default_factory=dict)
+    """Assertions of tests that failed where the built-in verdict is content, by search and
+    signature."""
+    found_by: dict[tuple[str, str], str] = field(default_factory=dict)
+    """The test that failed for a violation, by search and signature: its node id, without
+    parameters."""
+    told: dict[str, str] = field(default_factory=dict)
+    """Tests of which xdist's workers say that they failed so, with the signature."""
+    lock: TextIO | None = None
+    ran: bool = False
+    """Whether all tests ran to the end of the list, and nobody interrupted them."""
+
+    def select(self, items: list[pytest.Item]) -> None:
+        """Remember which slots the selected items want."""
+        for item in items:
+            target = target_of(item)
+            if target is not None:
+                wanted = self.items.setdefault(target.search, {})
+                wanted.setdefault(target.slot, []).append(selected(item))
+                self.targets.setdefault(target.search, {})[target.slot] = target
+        searched = sum(
+            target.entry is None for slots in self.targets.values() for target in slots.values()
+        )
+        if searched:
+            # For the bar, which xdist's controller draws without having had the items.
+            self.ledger.note_fact(SELECTED, searched)
+
+    def check_resumed(self) -> None:
+        """Raise LedgerError if a search to resume flew something else."""
+        from pytest_garl.execution.job import loads
+
+        for search, wanted in self.targets.items():
+            target = next(iter(wanted.values()))
+            text = self.ledger.job(search)
+            if text is not None:
+                then = loads(text)
+                differing = self.job(target, _of_today(then.npcs)).differences(then)
+                if differing:
+                    raise LedgerError(
+                        f"--garl-resume: {target.system.__qualname__} on {target.map} is not what "
+                        f"it was: {', '.join(differing)} changed; run without --garl-resume to "
+                        "begin anew"
+                    )
+
+    def note_test(self, search: str, signature: str, nodeid: str) -> None:
+        """Remember which test failed for a violation: of several the first by name."""
+        test = nodeid.partition("[")[0]
+        known = self.found_by.setdefault((search, signature), test)
+        self.found_by[search, signature] = min(known, test)
+
+    def close(self) -> None:
+        """End the flying children and let others have the ledger."""
+        self.pool.close()
+        self.ledger.close()
+        if self.lock is not None:
+            self.lock.close()
+        if not self.options.searches and self.options.controller == str(os.getpid()):
+            self.ledger.remove()
+
+    def tells(self, target: Target, nodeid: str) -> bool:
+        """Whether a test is the first that tells of a slot, in whichever process it runs."""
+        key = f"told slot {target.search} {target.slot.id(target.map)}"
+        return bool(self.ledger.first_fact(key, nodeid) == nodeid)
+
+    def note_ran(self, nodeid: str) -> None:
+        """Write down that a test has run; what it told of is in the ledger by then."""
+        self.ledger.note_fact(f"told ran {nodeid}", value=True)
+
+    def has_run(self, nodeid: str) -> bool:
+        """Whether a test has run, in whichever process."""
+        return bool(self.ledger.fact(f"told ran {nodeid}"))
+
+    def fly(self, target: Target, npcs: PolicySpec) -> dict[str, Any]:
+        """Return the slot's result after it and all lower selected slots are flown."""
+        self._register(target, npcs)
+        search = target.search
+        try:
+            for slot in self._lower(search, target.slot):
+                self._wait(search, slot)
+            return self._wait(search, target.slot)
+        finally:
+            self.waited()
+
+    def record(self, target: Target) -> Path:
+        """Return where the record of a slot's flight lies."""
+        slot = target.slot
+        name = flight_name(target.search, slot.generation, slot.index, target.map)
+        return self.options.folder / "flights" / f"{name}.npz"
+
+    def trajectory_sha256(self, target: Target) -> str:
+        """Return the hash of a slot's flight."""
+        return self.ledger.sha256(target.search, target.slot.generation, target.slot.index)
+
+    def unproven(self, target: Target) -> tuple[str, ...]:
+        """Return why it proves nothing that a case passes; nothing if the system was repaired."""
+        from pytest_garl.regressions.staleness import Sources, unproven
+        from pytest_garl.scenarios.maps.map import load_map
+
+        case = target.entry.case if target.entry else None
+        if case is None:
+            return ()
+        sources = Sources(
+            system_sha256=combined_sha256(self._sources_of(target)),
+            simulator_sha256=simulator_sha256(self.simulator),
+            map_sha256=load_map(target.map, self.options.map_folders).sha256,
+        )
+        return unproven(case, sources, self.trajectory_sha256(target))
+
+    def scenario(self, target: Target) -> Scenario:
+        """Return what a slot flies."""
+        from pytest_garl.execution.job import load_scenario
+
+        slot = target.slot
+        text = self.ledger.scenario(target.search, slot.generation, slot.index)
+        assert text is not None
+        return load_scenario(text)
+
+    def known(self, target: Target) -> dict[str, str]:
+        """Return the signatures that known cases expect of a system on a map, with their files.
+
+        What is repeated is to be seen, known or not.
+        """
+        from pytest_garl.regressions.corpus import entries
+        from pytest_garl.regressions.follow_up import is_known
+
+        options = self.options
+        if options.repeat:
+            return {}
+        return {
+            entry.case.violation.signature: entry.path.name
+            for entry in entries(options.cases, name_of(target.system), options.map_folders)
+            if entry.case is not None
+            and is_known(entry.case, target.map)
+            and self.acceptance.covers(entry.path, entry.case)
+        }
+
+    @functools.cached_property
+    def acceptance(self) -> Acceptance:
+        """Which saved cases are known: what git said when it was first asked."""
+        from pytest_garl.regressions.acceptance import acceptance_of
+
+        return acceptance_of(self.options.cases)
+
+    def searched(self, session: pytest.Session) -> bool:
+        """Whether this process has seen a search to its end and may save what it found."""
+        options, worker = self.options, hasattr(session.config, "workerinput")
+        ended = session.exitstatus in (pytest.ExitCode.OK, pytest.ExitCode.TESTS_FAILED)
+        stopped = bool(session.shouldfail or session.shouldstop)
+        if not (ended and self.ran) or stopped or worker or options.repeat or not options.shrink:
+            return False
+        # Interrupted twice, pytest tells of the status that it began with.
+        return all(each.flown >= each.all for each in self.ledger.progress())
+
+    def lower(self, target: Target) -> list[Target]:
+        """Return what the selected tests of lower slots of a search test."""
+        search = target.search
+        return [self.targets[search][slot] for slot in self._lower(search, target.slot)]
+
+    def result(self, target: Target) -> dict[str, Any]:
+        """Return what a slot came to that is flown, or will be."""
+        return self._wait(target.search, target.slot)
+
+    def again(self, target: Target, count: int) -> list[Done]:
+        """Fly a flown slot ``count`` times more."""
+        from pytest_garl.execution.on_demand import Done
+
+        job = self.ledger.job(target.search)
+        assert job is not None
+        name = name_of(target.system)
+        text = self.ledger.scenario(target.search, target.slot.generation, target.slot.index)
+        assert text is not None
+        flown = []
+        for index in range(count):
+            errand = again_key(target, index)
+            self.ledger.add_search(errand, name, target.map, 1, job, "errand")
+            self.ledger.add_slots(errand, 0, {0: text})
+            result = self._wait(errand, FIRST)
+            record = (
+                self.options.folder / "flights" / f"{flight_name(errand, 0, 0, target.map)}.npz"
+            )
+            sha256 = self.ledger.sha256(errand, 0, 0)
+            flown.append(Done(result=result, sha256=sha256, record=record))
+        return flown
+
+    def fly_all(
+        self, target: Target, npcs: PolicySpec, scenarios: Sequence[Scenario]
+    ) -> Sequence[Done]:
+        """Return what scenarios come to that are flown beside the searches."""
+        from pytest_garl.execution.batch import fly_all
+
+        try:
+            job = self.job(target, npcs)
+            return list(fly_all(self.ledger, self.pool, job, scenarios, self._advance))
+        finally:
+            self.waited()
+
+    def _lower(self, search: str, below: Slot) -> list[Slot]:
+        return [slot for slot in sorted(self.items[search]) if slot < below]
+
+    def _wait(self, search: str, slot: Slot) -> dict[str, Any]:
+        """Return a slot's result; what is flown never changes and is asked for once."""
+        known = self.results.get((search, slot))
+        if known is None:
+            known = wait_for(self.ledger, self.pool, search, slot, self._advance)
+            self.results[search, slot] = known
+        return known
+
+    def _advance(self) -> None:
+        """Breed what can be bred, so that the pool has work ahead of the items."""
+        for breeder in self.breeders.values():
+            breeder.advance()
+        self.tick()
+
+    def _register(self, target: Target, npcs: PolicySpec) -> None:
+        """Put this search, and the others of the same system, into the ledger."""
+        for search, wanted in self.targets.items():
+            sample = next(iter(wanted.values()))
+            if search in self.breeders or sample.system is not target.system:
+                continue
+            if not sample.broken:
+                self._add(search, wanted, npcs)
+
+    def _add(self, search: str, wanted: Mapping[Slot, Target], npcs: PolicySpec) -> None:
+        from pytest_garl.adversary.scripted import check_policy
+        from pytest_garl.execution.job import loads
+        from pytest_garl.scenarios.maps.map import load_map
+        from pytest_garl.search.breeder import Breeder
+
+        target = next(iter(wanted.values()))
+        npcs = _steered(target, npcs)
+        job = self.job(target, npcs)
+        case = target.entry.case if target.entry else None
+        absent = case.scenario.absent if case else ()
+        check_policy(npcs, load_map(job.map, self.options.map_folders).without(absent))
+        name = name_of(target.system)
+        slots: dict[int, list[int]] = {}
+        for slot in sorted(wanted):
+            slots.setdefault(slot.generation, []).append(slot.index)
+        method = self._method(wanted)
+        flights = len(wanted)
+        if method.learns:
+            flights = max(slots) * self.options.population + len(slots[max(slots)])
+        kind: Kind = "case" if case else "search"
+        self.ledger.add_search(search, name, target.map, flights, job.dumps(), kind)
+        nodes = [item.nodeid for each in self.items[search].values() for item in each]
+        files = sorted({node.partition("::")[0] for node in nodes})
+        # For the summary, which xdist's controller writes without having had the items.
+        self.ledger.note_fact(f"files of {name} on {target.map}", " ".join(files))
+        known = self.ledger.job(search)
+        if known is not None and job.differences(loads(known)):
+            raise LedgerError(
+                f"{name} on {target.map}: two sets of tests fly the same search with different "
+                f"{', '.join(job.differences(loads(known)))}"
+            )
+        self.breeders[search] = Breeder(self.ledger, search, method, slots)
+
+    def job(self, target: Target, npcs: PolicySpec) -> Job:
+        """Return what a child must know to fly a target."""
+        from pytest_garl.execution.job import Job
+        from pytest_garl.scenarios.maps.map import load_map
+
+        map = load_map(target.map, self.options.map_folders)
+        sources = self._sources_of(target)
+        own = sources_of(self.simulator.load()) if self.simulator != BUILT_IN else ()
+        return Job(
+            system=reference_to(target.system),
+            system_sha256=combined_sha256(sources),
+            simulator=self.simulator,
+            map=map.name,
+            map_sha256=map.sha256,
+            map_folders=tuple(str(folder) for folder in self.options.map_folders),
+            npcs=npcs,
+            limits=target.limits,
+            timeout_s=self.options.timeout_s,
+            path=tuple(_path()),
+            flights=str(self.options.folder / "flights"),
+            sources=tuple(sorted({*sources, *own})),
+        )
+
+    def _sources_of(self, target: Target) -> tuple[tuple[str, str], ...]:
+        return sources_of(target.system, data_files(target.files, self.options.root))
+
+    def _method(self, wanted: Mapping[Slot, Target]) -> Method:
+        from pytest_garl.scenarios.genes import genome_for
+        from pytest_garl.scenarios.maps.map import load_map
+        from pytest_garl.search.catalogue import make_method
+        from pytest_garl.search.method import Plan
+
+        if any(each.entry for each in wanted.values()) or self.options.repeat:
+            return _Repeat({slot: repeated(self.options, each) for slot, each in wanted.items()})
+        map = load_map(next(iter(wanted.values())).map, self.options.map_folders)
+        plan = Plan(
+            map=map,
+            genome=genome_for(map, weather=self.options.weather),
+            seed=self.options.seed,
+            population=self.options.population,
+        )
+        return make_method(self.options.method, plan)
+
+
+def again_key(target: Target, index: int) -> str:
+    """Return the ledger's key of a slot's flight once more."""
+    text = f"again {target.search} {target.slot.id(target.map)} {index}"
+    return hashlib.sha256(text.encode()).hexdigest()[:16]
+
+
+def _steered(target: Target, npcs: PolicySpec) -> PolicySpec:
+    """Return who moves the objects: a case's are those of its record, or of its policy."""
+    from pytest_garl.adversary.recorded import recorded_spec
+    from pytest_garl.adversary.scripted import policy_spec
+
+    case = target.entry.case if target.entry else None
+    if case is None:
+        return npcs
+    if not target.live:
+        return recorded_spec(dict(case.moves), dict(case.changes))
+    return policy_spec(case.policy) if case.policy in POLICIES else npcs
+
+
+def _of_today(npcs: PolicySpec) -> PolicySpec:
+    """Return a policy with the weights that its file holds today."""
+    from pytest_garl.adversary.scripted import policy_spec
+
+    weights = str(dict(npcs.arguments).get("weights", ""))
+    return replace(npcs, arguments=policy_spec(weights).arguments) if weights else npcs
+
+
+class _Repeat:
+    """Proposes the one scenario that is repeated, or that a case holds, in its slot."""
+
+    learns = False
+
+    def __init__(self, scenarios: Mapping[Slot, Scenario]) -> None:
+        self._scenarios, self._generation = scenarios, -1
+
+    def ask(self) -> Sequence[Scenario]:
+        self._generation += 1
+        first = next(iter(self._scenarios.values()))
+        size = 1 + max(slot.index for slot in self._scenarios)
+        slots = [Slot(generation=self._generation, index=index) for index in range(size)]
+        return [self._scenarios.get(slot, first) for slot in slots]
+
+    def tell(self, flown: Sequence[Flown]) -> Sequence[tuple[float, ...]]:
+        return ()
+
+
+def _path() -> list[str]:
+    return [entry for entry in sys.path if entry]

@@ -1,0 +1,143 @@
+"""After the items: confirm, shrink and save what the search found, and say so."""
+
+from __future__ import annotations
+
+import os
+import shlex
+from collections.abc import Sequence
+from typing import Any
+
+import pytest
+
+from pytest_garl.errors import GarlError
+from pytest_garl.plugin.options import SHRINK
+from pytest_garl.plugin.progress import duration, live
+from pytest_garl.plugin.run import Run
+from pytest_garl.plugin.suggested_commands import shown
+from pytest_garl.plugin.user_assertions import asks_of
+from pytest_garl.plugin.wrapping import begin_line, counted, width_of, wrapped
+from pytest_garl.regressions.case import Case
+from pytest_garl.regressions.case_request import Inquiry
+from pytest_garl.regressions.follow_up import (
+    Place,
+    Pursued,
+    Shrinking,
+    follow_up,
+    inquiries,
+    shares,
+)
+from pytest_garl.regressions.forecast import rest_of
+
+PILOT = {
+    "live": "the reference pilot violates nothing",
+    "recorded": "the reference pilot violates nothing unless it is pursued as well",
+    "no": "UNAVOIDABLE, gates nothing",
+}
+
+
+def pursue(run: Run, session: pytest.Session) -> None:
+    """Pursue new signatures; what comes of it is told in the summary."""
+    options, config = run.options, session.config
+    place = Place(
+        root=options.root,
+        cases=options.cases,
+        # A build server's tree is thrown away: what is to stay goes out as a patch.
+        patches=options.folder / "patches" if os.environ.get("CI") else None,
+        map_folders=options.map_folders,
+    )
+    reporter: Any = config.pluginmanager.get_plugin("terminalreporter")
+    try:
+        for nodeid, signature in sorted(run.told.items()):
+            target, asks = asks_of(session, nodeid)
+            run.own[target.search, signature] = asks
+        shrinking = Shrinking(each=options.shrink, capped=options.shrink_capped)
+        wanted = inquiries(run.ledger, place, shrinking, run.own, run.found_by)
+        if wanted:
+            most = sum(each.budget for each in shares(wanted))
+            run.rest = rest_of(wanted, _flight_s(run, wanted), options.workers or 1)
+            begin_line(reporter)
+            reporter.write_line(
+                f"garl: confirming and shrinking {counted(len(wanted), 'new kind')} of violation, "
+                f"at most {counted(most, 'flight')}, about {duration(run.rest.seconds)}"
+            )
+        with live(run, config):
+            run.pursued = follow_up(run.ledger, run.pool, place, wanted, run.tick)
+    except KeyboardInterrupt:
+        begin_line(reporter)
+        reporter.write_line(
+            "garl: interrupted before everything was saved; the same command with --garl-resume "
+            "goes on"
+        )
+    except GarlError as error:
+        begin_line(reporter)
+        reporter.write_line(f"garl: {error}", red=True)
+        run.trouble = str(error)
+
+
+def _flight_s(run: Run, wanted: Sequence[Inquiry]) -> dict[str, float]:
+    """Return how long a flight of each signature took in the search."""
+    known = run.ledger.kinds()
+    any_s = run.ledger.seconds_per_flight() or run.flight_s
+    return {each.name: known.get((each.search, each.signature)) or any_s for each in wanted}
+
+
+def told(pursued: tuple[Pursued, ...], config: pytest.Config) -> list[str]:
+    """Return the summary's lines about saved cases."""
+    lines: list[str] = []
+    patches = []
+    width = width_of(config)
+    for each in pursued:
+        case = each.finding.case
+        name = f"{each.system.split(':')[-1]} on {each.map}: {each.finding.signature}"
+        if case is None:
+            lines.append(f"not saved: {name}: {each.finding.reason}")
+            continue
+        if each.file is None:
+            lines.append(f"not saved: {name}: the same case is saved already")
+            continue
+        file = shown(each.file, config)
+        if each.file.suffix == ".patch":
+            patches.append(shlex.quote(file))
+        lines.append(f"{'patch' if each.file.suffix == '.patch' else 'saved'} {file}")
+        text = f"{case.violation.story} ({'; '.join(_facts(each, case))})"
+        lines.append(wrapped(text, width, first="    ", others="    "))
+    if patches:
+        lines.append("Nothing in the tree was changed (CI is set). To keep the cases:")
+        lines.append(" \\\n        ".join(["    git apply", *patches]))
+    if any(each.file for each in pursued) and not patches:
+        text = (
+            "New cases fail until they are fixed, committed, or accepted with `garl cases accept "
+            "FILE`. `garl cases show FILE` tells more of one."
+        )
+        lines.append(wrapped(text, width))
+    return [*lines, *_unreached(pursued, width)]
+
+
+def _facts(each: Pursued, case: Case) -> list[str]:
+    """Return in words why a case may be believed, and what it cost."""
+    evidence = case.evidence
+    if not each.finding.flights:
+        return ["as the search found it, not shrunk"]
+    asked = [
+        f"{evidence.neighbours_failed} of {evidence.neighbours} neighbours fail too",
+        *(["EDGE, gates nothing"] if case.edge else []),
+        PILOT[case.avoidable],
+    ]
+    return [
+        *(asked if evidence.neighbours else []),
+        f"shrinking removed {evidence.removed}",
+        counted(each.finding.flights, "flight"),
+    ]
+
+
+def _unreached(pursued: tuple[Pursued, ...], width: int) -> list[str]:
+    """Say which kinds are not shrunk, and how many flights would reach them."""
+    left = sum(not each.finding.flights for each in pursued)
+    if not left:
+        return []
+    text = (
+        f"{counted(left, 'kind')} of violation not shrunk: shrinking has no more flights than the "
+        f"search. --garl-shrink={SHRINK} has no such limit and reaches all of them (at most "
+        f"{SHRINK * len(pursued)} flights); `garl cases shrink FILE` shrinks a saved one."
+    )
+    return [wrapped(text, width)]

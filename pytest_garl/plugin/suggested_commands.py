@@ -1,0 +1,47 @@
+"""Commands that a report prints: they work where pytest was called, with its settings."""
+
+from __future__ import annotations
+
+import shlex
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import pytest
+
+from pytest_garl.messages import printable
+
+if TYPE_CHECKING:
+    from pytest_garl.plugin.collection import Target
+
+_FOLDERS = ("garl_dir", "garl_cases")
+
+
+def repeat_command(config: pytest.Config, test: str, scenario: str) -> str:
+    """Return the command that flies a scenario again in ``test``, a node id or several files."""
+    return " ".join(filter(None, ["pytest", test, f"--garl-repeat={scenario}", *settings(config)]))
+
+
+def repeat_line(item: pytest.Item, target: Target) -> str:
+    """Return the line of a failure that tells how to fly its scenario again."""
+    nodeid: Any = item.nodeid
+    test = f'"{item.config.cwd_relative_nodeid(nodeid)}"'
+    return f"Repeat: {repeat_command(item.config, test, target.file or target.name)}"
+
+
+def settings(config: pytest.Config) -> list[str]:
+    """Return what the command line says about where things lie."""
+    found = []
+    for option, value in (("-c", config.option.inifilename), ("--rootdir", config.option.rootdir)):
+        if value:
+            found += [option, shlex.quote(str(value))]
+    for given in config.option.override_ini or ():
+        if given.partition("=")[0].strip() in _FOLDERS:
+            found += ["-o", shlex.quote(given)]
+    return found
+
+
+def shown(path: Path, config: pytest.Config) -> str:
+    """Return a path as seen from where pytest was called."""
+    here = config.invocation_params.dir
+    found = path.relative_to(here) if path.is_relative_to(here) else path
+    return printable(str(found), keep="")

@@ -1,0 +1,116 @@
+"""One sentence about a violation, for somebody who has seen no flight."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import numpy as np
+
+from pytest_garl.regressions.shrink import genome_of
+from pytest_garl.scenarios.maps.map import load_map
+from pytest_garl.scenarios.placement import (
+    marker_position_m,
+    object_destination_m,
+    object_speed_mps,
+    object_start_m,
+)
+from pytest_garl.scenarios.scenario import Scenario
+from pytest_garl.simulation.camera.weather import (
+    DUST_VISIBILITY_M,
+    FOG_VISIBILITY_M,
+    LEAVES_PER_M3,
+    RAIN_MMPH,
+    SNOW_MMPH,
+    sun_elevation_deg,
+)
+from pytest_garl.simulation.flight import Contact, Flight, ObjectRecord
+from pytest_garl.simulation.physics.vehicle import up_m
+from pytest_garl.verdicts.verdict import Verdict
+from pytest_garl.verdicts.wording import compass_point
+
+NEAR_M = 3.0
+"""Horizontal distance at which an object enters the scene: two of the UAV's lengths and its
+own stride."""
+
+
+def tell(flight: Flight, verdict: Verdict) -> str:
+    """Return the story: for a moving object how it came, then what happened where."""
+    contact = flight.contacts[-1] if flight.contacts else None
+    if verdict.violation_type != "IV" or contact is None:
+        return verdict.story
+    culprit = next((item for item in flight.objects if item.name == contact.body), None)
+    return f"{_entrance(flight, culprit, contact)} {verdict.story}" if culprit else verdict.story
+
+
+def _entrance(flight: Flight, culprit: ObjectRecord, contact: Contact) -> str:
+    """Return how the object came near: ``A dog at 2.1 m/s enters from the south-east ...``."""
+    there, own = flight.uav.position_m, culprit.track.position_m
+    away = np.hypot(own[:, 0] - there[:, 0], own[:, 1] - there[:, 1])
+    outside = np.flatnonzero(away > NEAR_M)
+    entered = int(outside[-1]) + 1 if len(outside) else 0
+    entered = min(entered, len(away) - 1)
+    up = up_m(float(there[entered, 2]))
+    speeds = np.hypot(culprit.track.velocity_mps[:, 0], culprit.track.velocity_mps[:, 1])
+    speed = float(speeds[entered:].max())
+    kind = f"{_article(culprit.type)} {culprit.type}"
+    place = _over(flight, there[entered])
+    if speed < 0.1:
+        return f"{kind} stands still in the UAV's way, {up:.1f} m below it."
+    side = own[entered] - there[entered]
+    point = compass_point(float(side[0]), float(side[1]))
+    return (
+        f"{kind} at {speed:.1f} m/s enters from the {point} while the UAV is {up:.1f} m above "
+        f"{place}."
+    )
+
+
+def _over(flight: Flight, position: np.ndarray) -> str:
+    mx, my = flight.marker_position_m
+    distance = math.hypot(float(position[0]) - mx, float(position[1]) - my)
+    return "the marker" if distance < 1.0 else f"the ground, {distance:.1f} m from the marker"
+
+
+def _article(word: str) -> str:
+    return "An" if word[0] in "aeiou" else "A"
+
+
+def _in_units(key: str, value: float) -> str:
+    """Return what an environment gene means, in physical units."""
+    name = key.partition(".")[2]
+    if name == "sun_position":
+        return f"sun at an elevation of {sun_elevation_deg(value):.0f} degrees"
+    if name in ("fog", "dust"):
+        nearest_m = FOG_VISIBILITY_M if name == "fog" else DUST_VISIBILITY_M
+        return f"{name}, visibility {nearest_m / value:.0f} m"
+    if name in ("rain", "snow"):
+        most = RAIN_MMPH if name == "rain" else SNOW_MMPH
+        return f"falling {name}, {most * value:.1f} mm/h"
+    if name == "maple_leaf":
+        return f"falling leaves, {LEAVES_PER_M3 * value:.2f} per cubic metre"
+    what = {
+        "road_wetness": "as wet as it gets",
+        "road_leaf": "of the ground under leaves",
+        "road_snow": "of the ground under snow",
+    }
+    return f"{100 * value:.0f} % {what[name]}"
+
+
+def meanings(scenario: Scenario, map_folders: tuple[Path, ...]) -> list[tuple[str, str, str]]:
+    """Return what is off nominal as (gene, value, meaning in physical units)."""
+    map = load_map(scenario.map, map_folders)
+    rows = [
+        (item.key, f"{scenario[item.key]:.3g}", _in_units(item.key, scenario[item.key]))
+        for item in genome_of(scenario, map).properties
+        if item.key.startswith("environment.") and scenario[item.key] != item.nominal
+    ]
+    x, y = marker_position_m(scenario, map)
+    rows.append(("marker", "", f"at ({x:.1f}, {y:.1f}) m, east and north"))
+    for name, kind in map.without(scenario.absent).object_names:
+        x, y = object_start_m(scenario, map, name)
+        speed = object_speed_mps(scenario, map, name)
+        way = f"from ({x:.1f}, {y:.1f}) m"
+        goal = object_destination_m(scenario, map, name)
+        way += f" to ({goal[0]:.1f}, {goal[1]:.1f}) m and back" if goal else ""
+        rows.append((name, "", f"a {kind} of up to {speed:.2f} m/s, {way}"))
+    return rows

@@ -1,0 +1,69 @@
+"""Shorter records of moves: whole hundredths, and an object that waits where it strikes from."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+
+from pytest_garl.regressions.case import MoveList, Moves
+from pytest_garl.scenarios.maps.map import Map
+from pytest_garl.scenarios.placement import start_genes
+from pytest_garl.scenarios.scenario import Scenario
+from pytest_garl.scenarios.validity import problems
+from pytest_garl.simulation.flight import Flight
+from pytest_garl.simulation.npc_policy import DECISION_STEP_S
+
+LEADS_S = (2.0, 4.0, 8.0)
+"""How long before the end an object may still move, tried from short to long."""
+
+
+def simpler(
+    scenario: Scenario, moves: Moves, flight: Flight, name: str, map: Map
+) -> Iterator[tuple[Scenario, Moves]]:
+    """Yield scenarios with shorter records, the shortest first.
+
+    In the first ones the object ``name`` stands until shortly before the end of the flight,
+    where it was at that time; what makes no sense, such as standing on the marker, is left out.
+    In all of them moves are whole hundredths, so that equal ones are one run.
+    """
+    yield from _postponed(scenario, moves, flight, name, map)
+    yield scenario, tuple((each, _rounded(own)) for each, own in moves)
+
+
+def _rounded(moves: MoveList) -> MoveList:
+    return tuple(_round(x, y) for x, y in moves)
+
+
+def _round(x: float, y: float) -> tuple[float, float]:
+    """Return a move in whole hundredths that is no longer than 1, without negative zeros."""
+    x, y = round(x, 2) + 0.0, round(y, 2) + 0.0
+    while math.hypot(x, y) > 1:
+        x, y = (round(v - math.copysign(0.01, v), 2) + 0.0 if v else v for v in (x, y))
+    return x, y
+
+
+def _postponed(
+    scenario: Scenario, moves: Moves, flight: Flight, name: str, map: Map
+) -> Iterator[tuple[Scenario, Moves]]:
+    # A team's own simulator may not record what its objects do.
+    track = next((item.track for item in flight.objects if item.name == name), None)
+    own = dict(moves).get(name, ())
+    if track is None:
+        return
+    for lead in LEADS_S:
+        wait = len(own) - round(lead / DECISION_STEP_S)
+        # The first moves of one that stands already need no replacing.
+        if wait <= 0 or all(move == (0.0, 0.0) for move in own[:wait]):
+            continue
+        index = min(len(track.time_s) - 1, int(track.time_s.searchsorted(wait * DECISION_STEP_S)))
+        x, y = (float(value) for value in track.position_m[index, :2])
+        there = scenario.replace(start_genes(name, (x, y), map))
+        if problems(there, map):
+            continue
+        still: MoveList = ((0.0, 0.0),) * wait + own[wait:]
+        rounded = {key: round(value, 3) for key, value in start_genes(name, (x, y), map).items()}
+        there = there.replace(rounded)
+        yield (
+            there,
+            tuple((each, _rounded(still if each == name else its)) for each, its in moves),
+        )

@@ -1,0 +1,248 @@
+"""Go on shrinking a saved case from its own record, with a ledger and a pool of its own."""
+
+from __future__ import annotations
+
+import dataclasses
+import re
+import sys
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+from pytest_garl.adversary.scripted import policy_spec
+from pytest_garl.execution.batch import own_pool
+from pytest_garl.execution.job import Job
+from pytest_garl.execution.on_demand import Errands, Fly
+from pytest_garl.execution.reference import (
+    BUILT_IN,
+    Reference,
+    reference_to,
+    simulator_sha256,
+)
+from pytest_garl.execution.sources import sources_sha256
+from pytest_garl.regressions.case import Avoidable, Case, Deeds
+from pytest_garl.regressions.case_file import size_of
+from pytest_garl.regressions.case_request import Asks, Failure, Finding, Inquiry
+from pytest_garl.regressions.findings import case_of, culprit_of
+from pytest_garl.regressions.investigation import PILOTS, Pursuit
+from pytest_garl.regressions.replay import system_of
+from pytest_garl.regressions.robustness import COUNT
+from pytest_garl.regressions.shrink import shrink
+from pytest_garl.regressions.simplicity import no_worse, simplicity
+from pytest_garl.regressions.staleness import Sources
+from pytest_garl.scenarios.maps.map import load_map
+from pytest_garl.scenarios.scenario import Scenario
+
+TIMEOUT_S = 10.0
+LEAST = 1 + 1 + 1 + COUNT + PILOTS
+"""Flights without which nothing can be found: the case as it is, a simpler one, that one as it is
+recorded, its neighbours, the reference pilot."""
+GONE = "it does not fail in the same way any more with its recorded moves"
+KEPT = "nothing simpler was found"
+_REMOVED = re.compile(r"(\d+) of (\d+) objects, (\d+) of (\d+) genes off nominal")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Means:
+    """With what the tests of a case fly and judge: their simulator, data files, own assertion.
+
+    ``files`` are what the landing system reads, by the names that their hashes have.
+    """
+
+    asks: Asks | None = None
+    simulator: Reference = BUILT_IN
+    files: tuple[tuple[str, Path], ...] = ()
+
+
+def shrink_case(
+    case: Case,
+    folder: Path,
+    map_folders: tuple[Path, ...],
+    flights: int,
+    workers: int,
+    means: Means | None = None,
+) -> Finding:
+    """Return a case that is no worse in any respect and better in one, or the reason for none.
+
+    At most ``flights`` are flown.
+    """
+    means = means or Means()
+    map = load_map(case.scenario.map, map_folders)
+    system = system_of(case, folder)
+    with own_pool(workers) as (ledger, pool):
+        job = Job(
+            system=reference_to(system),
+            system_sha256=sources_sha256(system, dict(means.files)),
+            simulator=means.simulator,
+            map=map.name,
+            map_sha256=map.sha256,
+            map_folders=tuple(str(each) for each in map_folders),
+            npcs=policy_spec(case.policy),
+            limits=case.limits,
+            timeout_s=TIMEOUT_S,
+            path=tuple(entry for entry in sys.path if entry),
+            flights=str(ledger.path.parent / "flights"),
+        )
+        inquiry = Inquiry(
+            name=case.id,
+            signature=case.violation.signature,
+            violations=(),
+            job=job,
+            map=map,
+            budget=flights,
+            asks=means.asks,
+            test=case.test,
+        )
+
+        def think(fly: Fly) -> Finding:
+            return Continued(inquiry, fly, case).run()
+
+        return Errands(ledger, pool, lambda: None).run({case.id: think})[case.id]
+
+
+class Continued(Pursuit):
+    """The train of thought about a saved case: it begins with what its file says."""
+
+    def __init__(self, inquiry: Inquiry, fly: Fly, case: Case) -> None:
+        super().__init__(inquiry, fly)
+        self._case = case
+
+    def run(self) -> Finding:
+        """Return what was found."""
+        case = self._case
+        first = self._as_saved()
+        if first is None:
+            return self._finding(None, GONE)
+        better = self._better(first, self._by_record(first))
+        if better is None:
+            better = self._better(first, self._by_policy(first))
+        if better is None and self._outdated():
+            better = self._saved_as(first, case.avoidable)
+        return self._finding(better, "" if better else KEPT)
+
+    def _as_saved(self) -> Failure | None:
+        """Return the case's own failure, flown once more with its record."""
+        case = self._case
+        deeds = Deeds(moves=case.moves, changes=case.changes)
+        done = self._again(case.scenario, deeds)
+        if not self._inquiry.failed(case.scenario, done):
+            return None
+        robust, asked = case.evidence.neighbours_failed, case.evidence.neighbours
+        if self._outdated() and asked and self._left >= COUNT:
+            # Counted in another world.
+            robust, asked = self._robust(case.scenario, deeds), COUNT
+        return Failure(
+            first=case.scenario,
+            scenario=case.scenario,
+            deeds=deeds,
+            done=done,
+            robust=robust,
+            asked=asked,
+        )
+
+    def _outdated(self) -> bool:
+        """Whether the sources are not those that the case's evidence is of."""
+        evidence, job = self._case.evidence, self._inquiry.job
+        today = Sources(
+            system_sha256=job.system_sha256,
+            simulator_sha256=simulator_sha256(job.simulator),
+            map_sha256=job.map_sha256,
+        )
+        return today != Sources(
+            system_sha256=evidence.system_sha256,
+            simulator_sha256=evidence.simulator_sha256,
+            map_sha256=evidence.map_sha256,
+        )
+
+    def _by_record(self, first: Failure) -> Failure:
+        """Return the simplest failure in which the objects that are left repeat their record."""
+
+        def deeds_of(scenario: Scenario) -> Deeds:
+            return _without(first.deeds, scenario.absent)
+
+        def fails(scenario: Scenario) -> bool:
+            return self._inquiry.failed(scenario, self._again(scenario, deeds_of(scenario)))
+
+        # What the record does not give may need a policy.
+        share = 2 if first.deeds.moves else 1
+        return self._shrunk_by(first, fails, deeds_of, share)
+
+    def _by_policy(self, first: Failure) -> Failure:
+        """Return the simplest failure in which a live policy steers: for what no record does."""
+
+        def fails(scenario: Scenario) -> bool:
+            done = self._flown[scenario] = self._go(self._inquiry.job, scenario)
+            return self._inquiry.failed(scenario, done)
+
+        if not first.deeds.moves:
+            return first
+        return self._shrunk_by(first, fails, self._deeds_of, 1)
+
+    def _shrunk_by(
+        self,
+        first: Failure,
+        fails: Callable[[Scenario], bool],
+        deeds_of: Callable[[Scenario], Deeds],
+        share: int,
+    ) -> Failure:
+        """Shrink with a share of the flights that are left; the last go to neighbours."""
+        # The last are for a result's neighbours and, if there are many, for a shorter record.
+        reserve = 1 + COUNT if self._left < 4 * (1 + COUNT) else 2 * (1 + COUNT)
+        budget = (self._left - reserve) // share
+        if budget < 1:
+            return first
+        culprit = culprit_of(first.done)
+        found = shrink(first.scenario, fails, self._map, budget, culprit=culprit)
+        return self._off_the_edge(first, found.history[1:], deeds_of)
+
+    def _better(self, first: Failure, simpler: Failure) -> Case | None:
+        """Return a failure as a case if it is no worse than the saved one, and better in one."""
+        candidates = [each for each in reversed(self._with_record(simpler)) if each is not first]
+        for failure in candidates:
+            case = self._saved_as(failure, self._case.avoidable)
+            # Only for what is better otherwise is the reference pilot asked.
+            if self._improves(case) and self._piloted + 2 <= PILOTS:
+                case = self._saved_as(failure, self._avoidable(failure))
+                if self._improves(case):
+                    return case
+        return None
+
+    def _improves(self, case: Case) -> bool:
+        one = simplicity(case, self._map)
+        other = simplicity(self._case, self._map, outdated=self._outdated())
+        if one == other:
+            return size_of(case) < size_of(self._case)
+        return no_worse(one, other)
+
+    def _saved_as(self, failure: Failure, avoidable: Avoidable) -> Case:
+        """Return a failure as the case that takes the saved one's place."""
+        case, found = self._case, case_of(self._inquiry, failure, avoidable)
+        removed = _all_removed(case.evidence.removed, found.evidence.removed)
+        return dataclasses.replace(
+            found,
+            status=case.status,
+            accepted=case.accepted,
+            policy=case.policy,
+            policy_sha256=case.policy_sha256,
+            evidence=dataclasses.replace(found.evidence, removed=removed),
+        )
+
+
+def _without(deeds: Deeds, absent: tuple[str, ...]) -> Deeds:
+    """Return what those did who are not absent."""
+    return Deeds(
+        moves=tuple(each for each in deeds.moves if each[0] not in absent),
+        changes=tuple(each for each in deeds.changes if each[0] not in absent),
+    )
+
+
+def _all_removed(before: str, after: str) -> str:
+    """Say what shrinking took away, this time and the times before."""
+    first, second = _REMOVED.fullmatch(before), _REMOVED.fullmatch(after)
+    if first is None or second is None:
+        return before if second is None else after
+    objects, all_objects, genes, all_genes = (int(text) for text in first.groups())
+    return (
+        f"{objects + int(second[1])} of {all_objects} objects, "
+        f"{genes + int(second[3])} of {all_genes} genes off nominal"
+    )

@@ -1,0 +1,39 @@
+"""Neighbours of a scenario: so near that a violation which they do not share sits on an edge."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from pytest_garl.regressions.shrink import genome_of
+from pytest_garl.scenarios.maps.map import Map
+from pytest_garl.scenarios.scenario import Scenario
+from pytest_garl.scenarios.validity import repair
+
+COUNT = 3
+REACH = 0.002
+"""Share of a gene's range: 1.5 cm of the marker's disc, 2 to 8 cm of an object's start, a hundredth
+of a metre per second: more than differs between two CPUs, less than a person would call another
+scenario."""
+
+
+def neighbours(scenario: Scenario, map: Map) -> tuple[Scenario, ...]:
+    """Return three scenarios next to this one, always the same; nominal weather stays nominal."""
+    rng = np.random.default_rng([scenario.seed, 0])
+    present = dict(scenario.genes)
+    items = [
+        item
+        for item in genome_of(scenario, map).properties
+        if item.key in present
+        and (present[item.key] != item.nominal or not item.key.startswith("environment."))
+    ]
+    found = []
+    for _ in range(COUNT):
+        steps = rng.uniform(-REACH, REACH, len(items))
+        moved = {
+            item.key: float(
+                np.clip(present[item.key] + step * (item.high - item.low), item.low, item.high)
+            )
+            for item, step in zip(items, steps, strict=True)
+        }
+        found.append(repair(scenario.replace(moved), map))
+    return tuple(found)

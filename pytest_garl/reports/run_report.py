@@ -1,0 +1,162 @@
+"""A run as data for other programs: what ``garl report --json`` writes.
+
+``report.schema.json`` beside this file says what is in it.  A key is never taken away or given
+another meaning without a new ``version``; new keys may come.
+"""
+
+from __future__ import annotations
+
+import json
+from collections import Counter
+from datetime import UTC, datetime
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any
+
+from pytest_garl.errors import LedgerError
+from pytest_garl.execution.ledger import Ledger
+from pytest_garl.regressions.acceptance import acceptance_of
+from pytest_garl.regressions.corpus import every_entry
+from pytest_garl.reports.violation_kinds import Found, Own, found_by
+from pytest_garl.verdicts.metrics import decided, share_interval, top_k
+
+VERSION = 1
+SCHEMA = Path(__file__).with_name("report.schema.json")
+OWN_FACT = "own failures"
+"""The ledger's fact about tests' own assertions that failed, which no flight's result knows."""
+BEGAN, ENDED = "began", "ended"
+"""Facts: when the run began, and when it came to its end, in UTC."""
+_RUN = ("seed", "budget", "method", "population", "weather", "npcs", "python")
+
+
+def utc() -> str:
+    """Return the time, as the facts say it."""
+    return datetime.now(UTC).isoformat(timespec="seconds")
+
+
+def report_of(path: Path, cases: Path, map_folders: tuple[Path, ...]) -> dict[str, Any]:
+    """Return the run in a ledger, however far it came, with the saved cases of its systems."""
+    if not path.is_file():
+        raise LedgerError(f"there is no ledger at {path}; run a search first")
+    ledger = Ledger(path)
+    try:
+        found = found_by(ledger, [Own(**each) for each in ledger.fact(OWN_FACT) or ()])
+        progress = ledger.progress()
+        wanted: Counter[tuple[str, str]] = Counter()
+        for each in progress:
+            wanted[each.system, each.map] += each.all
+        saved = _cases(cases, map_folders, {search.system for search in found})
+        searches = [
+            _search(ledger, each, wanted[each.system, each.map], saved, path) for each in found
+        ]
+        meters = ledger.meters()
+        return {
+            "schema": "pytest-garl-report",
+            "version": VERSION,
+            "pytest_garl": ledger.fact("version") or version("pytest-garl"),
+            "ledger": str(path),
+            "complete": ledger.fact(ENDED) is not None
+            and all(each.flown == each.all for each in progress),
+            "run": {key: ledger.fact(key) for key in _RUN},
+            "results_sha256": ledger.result_hash(),
+            "time": {
+                "began": ledger.fact(BEGAN),
+                "ended": ledger.fact(ENDED),
+                "flying_s": meters.get("flying_s", 0.0),
+                "idle_s": meters.get("idle_s", 0.0),
+            },
+            "flights": {
+                "wanted": sum(each.all for each in progress),
+                "flown": sum(each.flown for each in progress),
+                "flown_again": int(meters.get("retried", 0)),
+                "beside": int(meters.get("errands", 0)),
+            },
+            "searches": searches,
+            "cases": saved,
+        }
+    finally:
+        ledger.close()
+
+
+def _search(
+    ledger: Ledger, found: Found, wanted: int, cases: list[dict[str, Any]], path: Path
+) -> dict[str, Any]:
+    total, verdicts = len(found.verdicts), found.verdicts
+    low, high = share_interval(found.violating, total)
+    return {
+        "system": found.system,
+        "map": found.map,
+        "wanted": wanted,
+        "flown": total,
+        "violating": found.violating,
+        "violating_interval_95": [low, high],
+        "violating_by_the_paper": sum(verdict.paper_violation for verdict in verdicts),
+        "tenth_violation": top_k(verdicts),
+        "outcomes": dict(sorted(Counter(str(each["outcome"]) for each in found.results).items())),
+        "types": dict(
+            sorted(Counter(str(v.violation_type) for v in verdicts if v.violation_type).items())
+        ),
+        "decided": {
+            "distance": decided(verdicts, "distance"),
+            "time": decided(verdicts, "time"),
+        },
+        "signatures": [
+            {
+                "signature": kind.signature,
+                "type": kind.signature.partition(":")[0],
+                "count": kind.count,
+                "first": _flight(ledger, found, kind.first),
+                "story": kind.story,
+                "headline": kind.headline,
+                "repeat": _again(found, kind.first, path),
+                "cases": [
+                    case["file"]
+                    for case in cases
+                    if (case["system"], case["map"], case["signature"])
+                    == (found.system, found.map, kind.signature)
+                ],
+            }
+            for kind in found.kinds
+        ],
+    }
+
+
+def _flight(ledger: Ledger, found: Found, name: str) -> dict[str, Any]:
+    slot = found.slots[name]
+    result, trajectory, scenario = ledger.flight(found.system, found.map, slot)
+    return {
+        "slot": name,
+        "seed": json.loads(scenario)["seed"],
+        "outcome": result["outcome"],
+        "final_distance_m": result["final_distance_m"],
+        "elapsed_s": result["elapsed_s"],
+        "trajectory_sha256": trajectory,
+    }
+
+
+def _again(found: Found, slot: str, path: Path) -> str:
+    folder = path.parent.name
+    words = ["pytest", *found.files, f"--garl-repeat={slot}"]
+    return " ".join(words if folder == ".garl" else [*words, "-o", f"garl_dir={folder}"])
+
+
+def _cases(folder: Path, map_folders: tuple[Path, ...], systems: set[str]) -> list[dict[str, Any]]:
+    """Return the saved cases of systems; a file that cannot be read is `garl cases check`'s."""
+    acceptance = acceptance_of(folder)
+    found = []
+    for entry in every_entry(folder, map_folders):
+        case = entry.case
+        if case is None or case.system not in systems:
+            continue
+        found.append(
+            {
+                "file": str(entry.path),
+                "system": case.system,
+                "map": case.scenario.map,
+                "signature": case.violation.signature,
+                "status": case.status,
+                "known": acceptance.covers(entry.path, case),
+                "story": case.violation.story,
+            }
+        )
+    return found

@@ -1,0 +1,143 @@
+"""What a search found, kind by kind: for the terminal, for GitHub, for ``garl report``."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from pytest_garl.execution.ledger import Ledger
+from pytest_garl.execution.slot import Slot
+from pytest_garl.verdicts.verdict import Verdict
+from pytest_garl.verdicts.wording import headline
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Own:
+    """A test's own assertion that failed on a slot, where the built-in verdict is content."""
+
+    system: str
+    map: str
+    slot: str
+    signature: str
+    message: str
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Kind:
+    """One signature: how many flights have it, the first of them, and what happened there."""
+
+    signature: str
+    count: int
+    first: str
+    story: str
+    headline: str
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Found:
+    """All flights of a system on a map, and their kinds, the most frequent first."""
+
+    system: str
+    map: str
+    files: tuple[str, ...]
+    slots: Mapping[str, Slot]
+    results: tuple[dict[str, Any], ...]
+    verdicts: tuple[Verdict, ...]
+    kinds: tuple[Kind, ...]
+    violating: int
+    """Flights that violate a property, built in or a test's own."""
+
+    @property
+    def name(self) -> str:
+        """The class."""
+        return self.system.split(":")[-1]
+
+    def count(self, outcome: str) -> int:
+        """Return how many flights ended so."""
+        return sum(result["outcome"] == outcome for result in self.results)
+
+    @property
+    def crashes(self) -> Mapping[str, int]:
+        """How often the landing system broke down, by how; nothing for what is inconclusive."""
+        counts: dict[str, int] = {}
+        for result, verdict in zip(self.results, self.verdicts, strict=True):
+            if verdict.violation_type == "V":
+                kind = result["crash"]["kind"] if result["crash"] else "raised"
+                word = kind if kind in ("died", "hung", "broke") else "Python error"
+                counts[word] = counts.get(word, 0) + 1
+        return counts
+
+
+def found_by(ledger: Ledger, own: Iterable[Own] = ()) -> list[Found]:
+    """Return what each search of a ledger found."""
+    flown: dict[tuple[str, str], list[tuple[Slot, dict[str, Any]]]] = {}
+    for system, map, generation, index, result in ledger.results():
+        slot = Slot(generation=generation, index=index)
+        flown.setdefault((system, map), []).append((slot, result))
+    mine: dict[tuple[str, str], list[Own]] = {}
+    for each in own:
+        mine.setdefault((each.system, each.map), []).append(each)
+    return [
+        _found(ledger, system, map, rows, mine.get((system, map), []))
+        for (system, map), rows in flown.items()
+    ]
+
+
+def _found(
+    ledger: Ledger,
+    system: str,
+    map: str,
+    rows: list[tuple[Slot, dict[str, Any]]],
+    own: list[Own],
+) -> Found:
+    verdicts = [Verdict.from_json(result["verdict"]) for _, result in rows]
+    slots: dict[str, list[tuple[str, str]]] = {}
+    for (slot, _), verdict in zip(rows, verdicts, strict=True):
+        if verdict.violation:
+            slots.setdefault(verdict.signature, []).append((slot.id(map), verdict.story))
+    for each in sorted(own, key=lambda each: each.slot):
+        slots.setdefault(each.signature, []).append((each.slot, each.message))
+    kinds = [
+        Kind(
+            signature=signature,
+            count=len({slot for slot, _ in those}),
+            first=those[0][0],
+            story=those[0][1],
+            headline=headline(those[0][1]),
+        )
+        for signature, those in slots.items()
+    ]
+    files = str(ledger.fact(f"files of {system} on {map}") or "")
+    return Found(
+        system=system,
+        map=map,
+        files=tuple(files.split()),
+        slots={slot.id(map): slot for slot, _ in rows},
+        results=tuple(result for _, result in rows),
+        verdicts=tuple(verdicts),
+        kinds=tuple(sorted(kinds, key=lambda each: (-each.count, each.signature))),
+        violating=len({slot for those in slots.values() for slot, _ in those}),
+    )
+
+
+_CRASHES = {"died": "died", "hung": "hung", "broke": "broke the simulator"}
+LEGEND = {
+    "I": "landed on something else",
+    "I?": "landed elsewhere, unknown on what",
+    "II": "not landed, marker not seen",
+    "III": "hit a fixed body",
+    "IV": "hit a moving body",
+    "V": "Python error, death or hang of the landing system",
+    "late": "not landed in time",
+    "off": "landed off its own right target",
+    "hard": "touched down too fast or tilted",
+    "abort": "gave up",
+    "own": "an assertion of a test",
+}
+
+
+def legend(kinds: Iterable[Kind]) -> str:
+    """Return what the types of these kinds mean, in one line."""
+    types = {kind.signature.partition(":")[0] for kind in kinds}
+    return "; ".join(f"{name}: {words}" for name, words in LEGEND.items() if name in types)

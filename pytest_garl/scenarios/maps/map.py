@@ -1,0 +1,150 @@
+"""Maps: where a scenario takes place, as data (TOML files)."""
+
+from __future__ import annotations
+
+import dataclasses
+import functools
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Literal
+
+from pytest_garl.errors import ScenarioError
+from pytest_garl.messages import listed, shown
+from pytest_garl.scenarios.bodies import Body
+
+LayerKind = Literal["rectangle", "line", "circle", "arc", "polygon", "roots", "patches", "marker"]
+Texture = Literal["concrete", "grass", "asphalt", "sand", "soil"]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Layer:
+    """One thing painted on the ground, in the order of the file.
+
+    ``points_m`` are world (x, y) pairs: opposite corners of a rectangle, the ends (or
+    corners) of a line, the centre of a circle, arc or decoy marker, the corners of a
+    polygon, the middle of roots or patches.  ``size_m`` is the line's width, the circle's
+    or arc's radius, the marker's side, the spread of roots or patches; ``width_m`` the
+    stroke of circles and arcs (0: filled); ``angles_rad`` an arc's start and end;
+    ``marker_id`` the decoy's id; ``colour`` RGB 0-255.
+    """
+
+    kind: LayerKind
+    points_m: tuple[tuple[float, float], ...]
+    colour: tuple[int, int, int] = (255, 255, 255)
+    size_m: float = 0.0
+    width_m: float = 0.0
+    angles_rad: tuple[float, float] = (0.0, 0.0)
+    yaw_rad: float = 0.0
+    marker_id: int = -1
+    name: str = ""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Ground:
+    """The planar ground: a procedural base texture of its own seed, and layers over it."""
+
+    texture: Texture
+    texture_seed: int
+    colour: tuple[int, int, int]
+    layers: tuple[Layer, ...] = ()
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Map:
+    """One place: ground, static bodies, the objects that live there, bounds and mission.
+
+    ``bounds_m`` is (x_min, x_max, y_min, y_max); ``objects`` are (type, count) pairs;
+    ``sha256`` is that of the file, part of a run's identity.  ``absent`` are objects that stay
+    at home in one scenario; the file knows none.
+    """
+
+    name: str
+    title: str
+    bounds_m: tuple[float, float, float, float]
+    gps_position_m: tuple[float, float]
+    uav_start_m: tuple[float, float, float]
+    ground: Ground
+    bodies: tuple[Body, ...]
+    objects: tuple[tuple[str, int], ...]
+    sha256: str
+    absent: tuple[str, ...] = ()
+
+    @property
+    def residents(self) -> tuple[tuple[str, str], ...]:
+        """(name, type) of each dynamic object, absent or not, in order."""
+        return tuple(
+            (f"{kind}-{index}", kind)
+            for kind, count in self.objects
+            for index in range(1, count + 1)
+        )
+
+    @property
+    def object_names(self) -> tuple[tuple[str, str], ...]:
+        """(name, type) of each dynamic object there is: ``("person-1", "person")``, in order."""
+        return tuple(pair for pair in self.residents if pair[0] not in self.absent)
+
+    def without(self, absent: Iterable[str]) -> Map:
+        """Return the map with these objects at home; raise ScenarioError for unknown ones."""
+        names = tuple(sorted(absent))
+        known = [name for name, _ in self.residents]
+        unknown = [name for name in names if name not in known]
+        if unknown:
+            raise ScenarioError(
+                f"map {self.name!r} has no object {listed(unknown)}; it has {listed(known)}"
+            )
+        return dataclasses.replace(self, absent=names)
+
+    @property
+    def diagonal_m(self) -> float:
+        """Length of the map's diagonal."""
+        x_min, x_max, y_min, y_max = self.bounds_m
+        return float(((x_max - x_min) ** 2 + (y_max - y_min) ** 2) ** 0.5)
+
+
+def map_names(search_path: Sequence[Path] = ()) -> tuple[str, ...]:
+    """Names of all maps that can be found: the package's and the user's."""
+    return tuple(
+        sorted({file.stem for folder in _folders(search_path) for file in _maps_in(folder)})
+    )
+
+
+def load_map(name: str, search_path: Sequence[Path] = ()) -> Map:
+    """Return the map ``<name>.toml`` from the search path, or else from the package.
+
+    Raises ScenarioError for an unknown name or a broken file; the message names file and
+    key.
+    """
+    for folder in _folders(search_path):
+        file = folder / f"{name}.toml"
+        if file in _maps_in(folder):
+            return _read(file, _changed(file))
+    raise ScenarioError(
+        f"unknown map {shown(name)}; expected one of {listed(map_names(search_path))}. "
+        "A map of your own is a file scenarios/maps/<name>.toml"
+    )
+
+
+def _changed(file: Path) -> int:
+    try:
+        return file.stat().st_mtime_ns
+    except OSError as error:
+        # A link to nothing, or to itself.
+        raise ScenarioError(f"{file}: cannot be read: {error.strerror}") from error
+
+
+@functools.lru_cache(maxsize=64)
+def _read(file: Path, changed: int) -> Map:
+    """Read a file once, until it changes."""
+    from pytest_garl.scenarios.maps.reader import read_map
+
+    del changed
+    return read_map(file)
+
+
+def _folders(search_path: Sequence[Path]) -> tuple[Path, ...]:
+    return (*search_path, Path(__file__).parent)
+
+
+def _maps_in(folder: Path) -> tuple[Path, ...]:
+    return tuple(sorted(folder.glob("*.toml"))) if folder.is_dir() else ()

@@ -1,0 +1,1 @@
+"""What the camera sees: renderer, projection, ground, bodies, weather."""

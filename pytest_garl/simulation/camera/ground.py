@@ -1,0 +1,187 @@
+"""The planar ground, painted once per flight: texture, lines, marker, cover, light, shadows."""
+
+from __future__ import annotations
+
+import functools
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from pytest_garl.scenarios.maps.map import Map
+from pytest_garl.scenarios.placement import MARKER_SIDE_M, TARGET_MARKER_ID, marker_position_m
+from pytest_garl.scenarios.scenario import Scenario
+from pytest_garl.simulation.camera import map_texture
+from pytest_garl.simulation.camera.canvas import Box, Canvas, Image
+from pytest_garl.simulation.camera.ground_cover import TILE_M, cover
+from pytest_garl.simulation.camera.map_texture import RESOLUTION_M
+from pytest_garl.simulation.camera.meshes import mesh_of, placed_hulls
+from pytest_garl.simulation.camera.weather import WET_ALBEDO_LOSS, Conditions
+
+_INSET_M = 0.01
+_INSET_HALF_M = 2.0
+_LEVELS = 6
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Raster:
+    """A picture of a piece of ground as a mip pyramid: ``levels[k]`` has 2^k m_per_px.
+
+    Levels have four channels, of which the last is unused: they are warped faster so.
+
+    Row 0 lies at ``y_max``, column 0 at ``x_min`` (pixel edges).
+    """
+
+    levels: tuple[Image, ...]
+    m_per_px: float
+    x_min: float
+    y_max: float
+
+    @functools.cached_property
+    def outline(self) -> NDArray[np.float64]:
+        """Corners (4, 2) in the world."""
+        rows, columns = self.levels[0].shape[:2]
+        x, y = self.x_min + columns * self.m_per_px, self.y_max - rows * self.m_per_px
+        return np.array([[self.x_min, self.y_max], [x, self.y_max], [x, y], [self.x_min, y]])
+
+    def holds(self, points: NDArray[np.float64]) -> bool:
+        """Whether homogeneous world points (3, n) of equal sign all lie well inside."""
+        places = points[:2] / points[2]
+        slack = 4 * self.m_per_px * 2 ** len(self.levels)
+        low, high = self.outline.min(axis=0) + slack, self.outline.max(axis=0) - slack
+        inside = (places >= low[:, None]) & (places <= high[:, None])
+        return bool(inside.all())
+
+    def pixel_of_world(self, level: int) -> NDArray[np.float64]:
+        """Matrix (3, 3) from homogeneous world (x, y) to pixel centres of a level."""
+        scale = 1 / (self.m_per_px * 2**level)
+        return np.array(
+            [
+                [scale, 0.0, -self.x_min * scale - 0.5],
+                [0.0, -scale, self.y_max * scale - 0.5],
+                [0.0, 0.0, 1.0],
+            ]
+        )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Ground:
+    """The whole ground coarsely, and a piece about the marker finely.
+
+    ``cover_shift_m`` (2,) says where the pattern of fallen leaves and snow begins; ``unlit``
+    are both pieces without the shadows of static bodies.
+    """
+
+    wide: Raster
+    inset: Raster
+    cover_shift_m: NDArray[np.float64]
+    unlit: tuple[Canvas, Canvas]
+
+
+def paint_ground(
+    scenario: Scenario,
+    map: Map,
+    conditions: Conditions,
+    rng: np.random.Generator,
+    marker_id: int = TARGET_MARKER_ID,
+) -> Ground:
+    """Paint the ground of one flight in full light; exposure comes later."""
+    shift = rng.uniform(0, TILE_M, 2)
+    marker = marker_position_m(scenario, map)
+    return _lit(_painted(marker, map, conditions, shift, marker_id), map, conditions, shift)
+
+
+def repaint(
+    ground: Ground,
+    marker_m: tuple[float, float],
+    map: Map,
+    before: Conditions,
+    conditions: Conditions,
+    marker_id: int,
+) -> Ground:
+    """Return the ground under other conditions than ``before``, as if painted under them.
+
+    What lies on it costs five times as much as its shadows, so that it is painted anew only
+    where it has changed.
+    """
+    if _light_of(conditions) == _light_of(before) and _cover_of(conditions) == _cover_of(before):
+        return ground
+    unlit, shift = ground.unlit, ground.cover_shift_m
+    if _cover_of(conditions) != _cover_of(before):
+        unlit = _painted(marker_m, map, conditions, shift, marker_id)
+    return _lit(unlit, map, conditions, shift)
+
+
+def _cover_of(conditions: Conditions) -> tuple[float, ...]:
+    return conditions.wetness, conditions.leaf_cover, conditions.snow_cover
+
+
+def _light_of(conditions: Conditions) -> tuple[float, ...]:
+    return *conditions.sun, conditions.direct_share
+
+
+def _painted(
+    marker: tuple[float, float],
+    map: Map,
+    conditions: Conditions,
+    shift: NDArray[np.float64],
+    marker_id: int,
+) -> tuple[Canvas, Canvas]:
+    """Paint both pieces, with the marker and what lies about."""
+    half = _INSET_HALF_M
+    inset_box = (marker[0] - half, marker[0] + half, marker[1] - half, marker[1] + half)
+    wide = Canvas(map_texture.picture(map).copy(), map_texture.box_of(map), RESOLUTION_M)
+    inset = Canvas(map_texture.detail(map, inset_box, _INSET_M), inset_box, _INSET_M)
+    for canvas in (wide, inset):
+        canvas.marker(marker, MARKER_SIDE_M, 0.0, marker_id)
+        if conditions.wetness > 0:
+            alpha = 1 - WET_ALBEDO_LOSS * conditions.wetness
+            cv2.convertScaleAbs(canvas.image, canvas.image, alpha)
+        cover(canvas.image, canvas.box, canvas.resolution, shift, conditions)
+    return wide, inset
+
+
+def _lit(
+    unlit: tuple[Canvas, Canvas],
+    map: Map,
+    conditions: Conditions,
+    shift: NDArray[np.float64],
+) -> Ground:
+    wide, inset = (
+        _raster(_light(canvas, map, conditions), canvas.box, canvas.resolution) for canvas in unlit
+    )
+    return Ground(wide=wide, inset=inset, cover_shift_m=shift, unlit=unlit)
+
+
+def _raster(image: Image, box: Box, resolution: float) -> Raster:
+    levels = [np.asarray(cv2.cvtColor(image, cv2.COLOR_RGB2RGBA), dtype=np.uint8)]
+    for _ in range(_LEVELS - 1):
+        rows, columns = levels[-1].shape[:2]
+        size = (max(1, columns // 2), max(1, rows // 2))
+        levels.append(cv2.resize(levels[-1], size, interpolation=cv2.INTER_AREA).astype(np.uint8))
+    return Raster(levels=tuple(levels), m_per_px=resolution, x_min=box[0], y_max=box[3])
+
+
+def _light(canvas: Canvas, map: Map, conditions: Conditions) -> Image:
+    """Return the piece, darker where the static bodies keep the sun from it."""
+    if conditions.direct_share <= 0.01 or conditions.sun[2] <= 0.02:
+        return canvas.image
+    image = canvas.image.copy()
+    mask = np.zeros(image.shape[:2], np.uint8)
+    shade = Canvas(mask, canvas.box, canvas.resolution)
+    for body in map.bodies:
+        for hull in placed_hulls(mesh_of(body.parts), body.position_m, body.yaw_rad):
+            outline = cv2.convexHull(shadow_of(hull, conditions.sun).astype(np.float32))
+            shade.polygon(outline.reshape(-1, 2).astype(np.float64), (255.0,))
+    if mask.any():
+        dark = cv2.convertScaleAbs(image, alpha=1 - conditions.direct_share)
+        cv2.copyTo(dark, mask, image)
+    return image
+
+
+def shadow_of(points: NDArray[np.float32], sun: tuple[float, float, float]) -> NDArray[np.float32]:
+    """Project points (n, 3) along the sun's rays onto the ground; returns (n, 2)."""
+    slope = np.array([sun[0], sun[1]], np.float32) / np.float32(sun[2])
+    shadow: NDArray[np.float32] = points[:, :2] - points[:, 2:3] * slope
+    return shadow

@@ -1,0 +1,344 @@
+"""The downward camera: a compositor that gives colour, depth and segmentation."""
+
+from __future__ import annotations
+
+import copy
+import functools
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from pytest_garl.errors import GarlError
+from pytest_garl.landing_system import Camera
+from pytest_garl.scenarios.maps.map import Map
+from pytest_garl.scenarios.placement import MARKER_SIDE_M, TARGET_MARKER_ID, marker_position_m
+from pytest_garl.scenarios.scenario import Scenario
+from pytest_garl.simulation.camera.ground import Ground, Raster, paint_ground, repaint
+from pytest_garl.simulation.camera.ground_cover import covered
+from pytest_garl.simulation.camera.particles import Particles
+from pytest_garl.simulation.camera.projection import FAR_M, View
+from pytest_garl.simulation.camera.sensor import Sensor
+from pytest_garl.simulation.camera.solids import Layer, Place, Shadow, Solids, draw_shadows
+from pytest_garl.simulation.camera.weather import Conditions, conditions_of
+
+Vector = tuple[float, float, float]
+Quaternion = tuple[float, float, float, float]
+Array = NDArray[np.float32]
+_SHIFT = 4
+_SPECULAR_RADIUS = 0.10
+"""Half-width, as a tangent, of the sun's smeared reflection on a wet rough ground:
+engineering estimate."""
+
+
+class Frame:
+    """One picture: RGB uint8 (H, W, 3), planar depth float32 (H, W), segmentation int32 (H, W).
+
+    A ray that meets nothing has depth 100 and segment -1.  ``pixels`` counts those of each
+    segment from the marker's (1) on.  ``image`` is painted when it is first asked for, and is
+    the same whenever that is.
+    """
+
+    __slots__ = ("_image", "_paint", "depth_m", "pixels", "segmentation")
+
+    def __init__(
+        self,
+        *,
+        paint: Callable[[], NDArray[np.uint8]],
+        depth_m: NDArray[np.float32],
+        segmentation: NDArray[np.int32],
+        pixels: NDArray[np.intp],
+    ) -> None:
+        self._paint = paint
+        self._image: NDArray[np.uint8] | None = None
+        self.depth_m = depth_m
+        self.segmentation = segmentation
+        self.pixels = pixels
+
+    @property
+    def image(self) -> NDArray[np.uint8]:
+        """What the camera's sensor delivers."""
+        if self._image is None:
+            self._image = self._paint()
+        return self._image
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class _Look:
+    """What the environment makes of a picture; another environment has another."""
+
+    conditions: Conditions
+    sensor: Sensor
+    particles: Particles
+    decay: Array
+    air: NDArray[np.uint8]
+    veil: NDArray[np.uint8]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class _Scene:
+    """What there is to paint in one frame."""
+
+    view: View
+    time_s: float
+    depth_m: Array
+    footprint_m: float
+    sky: NDArray[np.bool_] | None
+    shadows: Sequence[Shadow]
+    layers: Sequence[Layer]
+    ground: Ground | None
+    look: _Look
+
+
+class Renderer:
+    """Draws what the camera sees in one scenario; a frame is a pure function of its arguments.
+
+    ``segment_ids`` numbers ground (0), marker (1), static bodies and dynamic objects.
+    With ``colour=False`` no ground is painted: such a renderer gives frames without images.
+    Flights have the marker that missions look for; another ``marker_id`` is for training
+    detectors.
+    """
+
+    def __init__(
+        self,
+        scenario: Scenario,
+        map: Map,
+        camera: Camera,
+        rng: np.random.Generator,
+        *,
+        colour: bool = True,
+        marker_id: int = TARGET_MARKER_ID,
+    ) -> None:
+        self.camera = camera
+        conditions = conditions_of(scenario)
+        self.marker_m = marker_position_m(scenario, map)
+        self._map, self._marker_id = map, marker_id
+        names = ["ground", "marker", *(body.name for body in map.bodies)]
+        names += [name for name, _ in map.object_names]
+        self.segment_ids: Mapping[str, int] = {name: index for index, name in enumerate(names)}
+        self._ground = paint_ground(scenario, map, conditions, rng, marker_id) if colour else None
+        width, height = camera.width_px, camera.height_px
+        (cx, cy), focal = camera.centre_px, camera.focal_px
+        self._columns = np.arange(width, dtype=np.float32)
+        self._rows = np.arange(height, dtype=np.float32)[:, None]
+        across, down = (self._columns - cx) / focal, (self._rows - cy) / focal
+        self._stretch = np.sqrt(1 + across**2 + down**2)
+        right, bottom = width - 1.0, height - 1.0
+        self._corners = np.array([[0, 0, 1], [right, 0, 1], [right, bottom, 1], [0, bottom, 1]]).T
+        self._before_draws = copy.deepcopy(rng)
+        self._prepare(conditions, rng)
+
+    @property
+    def conditions(self) -> Conditions:
+        """The environment that frames show now."""
+        return self._look.conditions
+
+    def change(self, scenario: Scenario) -> None:
+        """Show the environment of ``scenario`` from the next frame on.
+
+        Its other genes must be those of the renderer's own; frames are then what they would be
+        had the renderer been made with it.
+        """
+        before, conditions = self.conditions, conditions_of(scenario)
+        if self._ground is not None:
+            self._ground = repaint(
+                self._ground, self.marker_m, self._map, before, conditions, self._marker_id
+            )
+        self._prepare(conditions, copy.deepcopy(self._before_draws))
+
+    def _prepare(self, conditions: Conditions, rng: np.random.Generator) -> None:
+        """Make all that draws frames under these conditions, but the ground."""
+        self._solids = Solids(self._map, conditions, self.segment_ids)
+        airlight = np.array(conditions.airlight)
+        veil = (1 - np.arange(256) / 255)[:, None] * airlight
+        self._look = _Look(
+            conditions=conditions,
+            sensor=Sensor(self.camera, conditions, rng),
+            particles=Particles(self.camera, conditions, rng),
+            decay=(-conditions.extinction_per_m * self._stretch).astype(np.float32),
+            air=airlight.astype(np.uint8),
+            veil=np.round(veil).astype(np.uint8).reshape(1, 256, 3),
+        )
+
+    def render(
+        self, position_m: Vector, attitude: Quaternion, time_s: float, objects: Sequence[Place]
+    ) -> Frame:
+        """Return the frame from a camera at ``position_m`` with the UAV's ``attitude``.
+
+        ``objects`` are the (position, yaw) of the dynamic objects in the map's order.
+        """
+        view = View.of(self.camera, position_m, attitude)
+        depth, horizon = self._ground_depth(view)
+        segmentation = np.zeros(depth.shape, np.int32)
+        if horizon:
+            segmentation[depth >= FAR_M] = -1
+        marker = self._marker_segment(segmentation, view)
+        sky = segmentation < 0 if horizon else None
+        footprint = float(depth[depth.shape[0] // 2, depth.shape[1] // 2]) / self.camera.focal_px
+        self._solids.place(objects)
+        shadows = self._solids.shadows()
+        pixels, layers = self._solids.draw(depth, segmentation, view)
+        pixels[1] = np.count_nonzero(segmentation[marker] == 1)
+        scene = _Scene(
+            view=view,
+            time_s=time_s,
+            depth_m=depth,
+            footprint_m=footprint,
+            sky=sky,
+            shadows=shadows,
+            layers=layers,
+            ground=self._ground,
+            look=self._look,
+        )
+        paint = functools.partial(self._paint, scene)
+        return Frame(paint=paint, depth_m=depth, segmentation=segmentation, pixels=pixels)
+
+    def _paint(self, scene: _Scene) -> NDArray[np.uint8]:
+        """Paint from the ground up, whatever the renderer has drawn since."""
+        view, look = scene.view, scene.look
+        image = self._ground_image(scene)
+        draw_shadows(image, view, scene.shadows, look.conditions)
+        self._gloss(image, view, look.conditions)
+        if scene.sky is not None:
+            image[scene.sky] = look.air
+        for layer in scene.layers:
+            layer.put_on(image)
+        look.particles.draw(image, scene.depth_m, view, scene.time_s)
+        _fog(image, scene.depth_m, look)
+        return look.sensor.expose(image, scene.time_s)
+
+    def marker_pixels(self, position_m: Vector, attitude: Quaternion) -> int:
+        """Count the marker's pixels in a frame with nothing in front of it."""
+        shape = self.camera.height_px, self.camera.width_px
+        segmentation = np.zeros(shape, np.int32)
+        self._marker_segment(segmentation, View.of(self.camera, position_m, attitude))
+        return int(np.count_nonzero(segmentation))
+
+    def covered(self, places_m: NDArray[np.float64]) -> NDArray[np.bool_]:
+        """Whether places (n, 2) on the ground lie under leaves or snow, shape (n,)."""
+        return covered(places_m, _painted(self._ground).cover_shift_m, self.conditions)
+
+    def marker_area_px(self, position_m: Vector, attitude: Quaternion) -> float:
+        """Projected area of the marker, clipped to the frame, with nothing in front."""
+        polygon = self._marker_polygon(View.of(self.camera, position_m, attitude))
+        if len(polygon) < 3:
+            return 0.0
+        width, height = self.camera.width_px, self.camera.height_px
+        frame = np.array(
+            [[-0.5, -0.5], [width - 0.5, -0.5], [width - 0.5, height - 0.5], [-0.5, height - 0.5]],
+            np.float32,
+        )
+        area, _ = cv2.intersectConvexConvex(polygon, frame)
+        return float(area)
+
+    def marker_side_px(self, height_m: float) -> float:
+        """Side in pixels of the marker seen from straight above."""
+        return self.camera.focal_px * MARKER_SIDE_M / height_m
+
+    def _ground_depth(self, view: View) -> tuple[Array, bool]:
+        """Return the ground's planar depth, and whether some ray misses the ground."""
+        across, down, level = view.ground_of_pixel[2].astype(np.float32)
+        slope = np.add(across * self._columns, down * self._rows + level)
+        up = float(view.eye[2])
+        highest = float(max(slope[0, 0], slope[0, -1], slope[-1, 0], slope[-1, -1]))
+        horizon = highest > -up / FAR_M
+        if not horizon:
+            return np.divide(np.float32(-up), slope, out=slope), False
+        # Exactly the far plane: beyond it by a rounding the rasteriser writes no depth, and short
+        # of it the sky would be ground.
+        sky = slope >= np.float32(-up / FAR_M)
+        slope[sky] = -up / FAR_M
+        depth: Array = np.divide(np.float32(-up), slope, out=slope)
+        np.minimum(depth, np.float32(FAR_M), out=depth)
+        depth[sky] = FAR_M
+        return depth, True
+
+    def _ground_image(self, scene: _Scene) -> NDArray[np.uint8]:
+        view, ground, footprint = scene.view, _painted(scene.ground), scene.footprint_m
+        world = view.ground_of_pixel
+        height, width = self.camera.height_px, self.camera.width_px
+        # Four channels: warpPerspective is 2.5 times as fast as with three.
+        image = np.empty((height, width, 4), np.uint8)
+        inset = ground.inset
+        rows, columns = slice(0, height), slice(0, width)
+        if scene.sky is not None or not inset.holds(world @ self._corners):
+            _warp(ground.wide, image, world, footprint, cv2.BORDER_REFLECT_101)
+            rows, columns = view.box(view.ground_polygon(inset.outline))
+        part = image[rows, columns]
+        if part.size:
+            shift = np.array([[1.0, 0.0, columns.start], [0.0, 1.0, rows.start], [0.0, 0.0, 1.0]])
+            _warp(inset, part, world @ shift, footprint, cv2.BORDER_TRANSPARENT)
+        return np.asarray(cv2.cvtColor(image, cv2.COLOR_RGBA2RGB), dtype=np.uint8)
+
+    def _marker_polygon(self, view: View) -> Array:
+        half = MARKER_SIDE_M / 2
+        x, y = self.marker_m
+        corners = [(x - half, y + half), (x + half, y + half), (x + half, y - half)]
+        return view.ground_polygon(np.array([*corners, (x - half, y - half)]))
+
+    def _marker_segment(self, segmentation: NDArray[np.int32], view: View) -> tuple[slice, slice]:
+        """Draw the marker's segment; return the rows and columns that hold it."""
+        polygon = self._marker_polygon(view)
+        if len(polygon) < 3:
+            return slice(0, 0), slice(0, 0)
+        points = np.round(polygon * 2**_SHIFT).astype(np.int32)
+        cv2.fillConvexPoly(segmentation, points, (1.0,), cv2.LINE_8, _SHIFT)
+        return view.box(polygon)
+
+    def _gloss(self, image: NDArray[np.uint8], view: View, conditions: Conditions) -> None:
+        """Add the sun's reflection on wet ground, where the mirrored ray meets the sun."""
+        strength = 230.0 * conditions.wetness * conditions.direct_share
+        x, y, z = conditions.sun
+        mirrored = view.axes @ np.array([x, y, -z])
+        if strength < 1 or mirrored[2] < 0.3:
+            return
+        centre = view.pixels(mirrored[None])
+        sigma = _SPECULAR_RADIUS * self.camera.focal_px / float(mirrored[2])
+        # Beyond 3.3 sigma 230 levels are less than one.
+        rows, columns = view.box(np.concatenate([centre - 3.3 * sigma, centre + 3.3 * sigma]))
+        part = image[rows, columns]
+        if part.size == 0:
+            return
+        u, v = centre[0]
+        across = np.exp(-(((np.arange(columns.start, columns.stop) - u) / sigma) ** 2) / 2)
+        down = np.exp(-(((np.arange(rows.start, rows.stop) - v) / sigma) ** 2) / 2)
+        glow = (strength * np.outer(down, across)).astype(np.uint8)
+        cv2.add(part, cv2.cvtColor(glow, cv2.COLOR_GRAY2RGB), part)
+
+
+def _painted(ground: Ground | None) -> Ground:
+    if ground is None:
+        raise GarlError("this renderer was made with colour=False; it has no ground to show")
+    return ground
+
+
+def _fog(image: NDArray[np.uint8], depth: Array, look: _Look) -> None:
+    """Let the air hide what is far: I = J t + A (1 - t) with t = exp(-extinction x path)."""
+    if look.conditions.extinction_per_m > 0:
+        # In bytes: a level of transmission is a level of grey at most.
+        through = cv2.convertScaleAbs(cv2.exp(cv2.multiply(depth, look.decay)), alpha=255)
+        through = cv2.cvtColor(through, cv2.COLOR_GRAY2RGB)
+        cv2.multiply(image, through, image, 1 / 255)
+        cv2.add(image, cv2.LUT(through, look.veil), image)
+
+
+def _warp(
+    raster: Raster,
+    image: NDArray[np.uint8],
+    world: NDArray[np.float64],
+    footprint_m: float,
+    border: int,
+) -> None:
+    wanted = math.log2(max(footprint_m / raster.m_per_px, 1e-6))
+    level = min(len(raster.levels) - 1, max(0, round(wanted)))
+    cv2.warpPerspective(
+        raster.levels[level],
+        raster.pixel_of_world(level) @ world,
+        (image.shape[1], image.shape[0]),
+        image,
+        flags=cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP,
+        borderMode=border,
+    )

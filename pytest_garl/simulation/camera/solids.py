@@ -1,0 +1,268 @@
+"""Bodies and objects in a frame: their triangles, and their shadows on the ground."""
+
+from __future__ import annotations
+
+import functools
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from pytest_garl.scenarios.bodies import Part
+from pytest_garl.scenarios.maps.map import Map
+from pytest_garl.scenarios.object_types import OBJECT_TYPES
+from pytest_garl.simulation.camera.ground import shadow_of
+from pytest_garl.simulation.camera.meshes import (
+    Mesh,
+    clip_near,
+    mesh_of,
+    placed_hulls,
+    yaw_matrix,
+)
+from pytest_garl.simulation.camera.projection import FAR_M, NEAR_M, View
+from pytest_garl.simulation.camera.weather import Conditions
+
+Array = NDArray[np.float32]
+Place = tuple[tuple[float, float, float], float]
+"""Position and yaw."""
+_SHIFT = 4
+_TO_GL = np.diag([1.0, -1.0, -1.0, 1.0]).astype(np.float32)
+"""From camera axes (right, down, forward) to those of the rasteriser."""
+_COARSE_PX = 4.0
+"""A part of this radius in pixels is off by half a pixel if drawn with 6 sides for 10."""
+_COARSE_M = (0.0, 0.12, 0.3, 1.0)
+"""Parts up to these radii are coarse in the levels of detail."""
+
+
+@dataclass(slots=True, kw_only=True, eq=False)
+class _Solid:
+    """One body as triangles, with what stays the same while it does not turn."""
+
+    segment: int
+    meshes: tuple[Mesh, ...]
+    at: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    yaw_rad: float = math.nan
+    turn: Array = field(default_factory=lambda: np.eye(3, dtype=np.float32))
+    shades: dict[int, Array] = field(default_factory=dict)
+    shadows: NDArray[np.float64] = field(default_factory=lambda: np.zeros((0, 2)))
+    """The outlines of the parts' shadows about the body's own, one after the other."""
+    lengths: list[int] = field(default_factory=list)
+    """Corners of each outline."""
+
+    def put(self, place: Place, conditions: Conditions) -> None:
+        at, yaw = place
+        self.at = at
+        if yaw == self.yaw_rad:
+            return
+        self.yaw_rad, self.turn = yaw, yaw_matrix(yaw)
+        self.shades = {}
+        if _sun_shines(conditions):
+            hulls = placed_hulls(self.meshes[0], (0.0, 0.0, 0.0), yaw)
+            flat = (shadow_of(hull, conditions.sun) for hull in hulls)
+            outlines = [cv2.convexHull(s).reshape(-1, 2) for s in flat]
+            self.shadows = np.concatenate(outlines).astype(np.float64)
+            self.lengths = [len(outline) for outline in outlines]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Layer:
+    """The pixels of one solid, float32 (h, w, 3) in a window of the image, where ``covered``."""
+
+    rows: slice
+    columns: slice
+    covered: NDArray[np.bool_]
+    drawn: Array
+
+    def put_on(self, image: NDArray[np.uint8]) -> None:
+        """Put them over what the image shows."""
+        window = image[self.rows, self.columns]
+        cv2.copyTo(cv2.convertScaleAbs(self.drawn), self.covered.view(np.uint8), window)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Shadow:
+    """A dynamic object's shadow: outlines (n, 2) on the ground about ``at``, one after another."""
+
+    at: tuple[float, float, float]
+    outlines: NDArray[np.float64]
+    lengths: tuple[int, ...]
+    radius_m: float
+
+
+class Solids:
+    """Draws static bodies and dynamic objects into frames."""
+
+    def __init__(self, map: Map, conditions: Conditions, segment_ids: Mapping[str, int]) -> None:
+        self._conditions = conditions
+        self._static = [
+            _Solid(segment=segment_ids[body.name], meshes=_levels(body.parts))
+            for body in map.bodies
+        ]
+        for solid, body in zip(self._static, map.bodies, strict=True):
+            solid.put((body.position_m, body.yaw_rad), conditions)
+        self._moving = [
+            _Solid(segment=segment_ids[name], meshes=_levels(OBJECT_TYPES[kind].parts))
+            for name, kind in map.object_names
+        ]
+        self._segments = len(segment_ids)
+        self._settings = cv2.TriangleRasterizeSettings()
+        self._settings.setShadingType(cv2.RASTERIZE_SHADING_FLAT)
+        self._settings.setCullingMode(cv2.RASTERIZE_CULLING_NONE)
+
+    def place(self, objects: Sequence[Place]) -> None:
+        """Put the dynamic objects, in the map's order, where they are now."""
+        for solid, place in zip(self._moving, objects, strict=True):
+            solid.put(place, self._conditions)
+
+    def shadows(self) -> tuple[Shadow, ...]:
+        """Return the shadows of the dynamic objects as they stand."""
+        return tuple(
+            Shadow(
+                at=solid.at,
+                outlines=solid.shadows,
+                lengths=tuple(solid.lengths),
+                radius_m=solid.meshes[0].radius_m,
+            )
+            for solid in self._moving
+        )
+
+    def draw(
+        self, depth: Array, segmentation: NDArray[np.int32], view: View
+    ) -> tuple[NDArray[np.intp], list[Layer]]:
+        """Draw all solids into depth and segmentation.
+
+        Returns how many pixels each segment got, and what to put on the image, in order.
+        """
+        axes = view.axes.astype(np.float32)
+        pixels = np.zeros(self._segments, np.intp)
+        layers = []
+        for solid in (*self._static, *self._moving):
+            at = np.array(solid.at)
+            x, y, z = (float(value) for value in view.axes @ (at - view.eye))
+            radius = solid.meshes[0].radius_m
+            if not view.shows(x, y, z, radius):
+                continue
+            level = _level_at(max(NEAR_M, z - radius) / view.camera.focal_px * _COARSE_PX)
+            mesh = solid.meshes[level]
+            # In the solid's own frame, so that only what faces the camera is turned.
+            eye = solid.turn.T @ (view.eye - at).astype(np.float32)
+            facing = np.flatnonzero(mesh.normals @ eye > mesh.offsets)
+            corners = mesh.corners[facing].reshape(-1, 3)
+            seen = corners @ (axes @ solid.turn).T + np.array([x, y, z], np.float32)
+            if z - radius <= NEAR_M:
+                triangles, origin = clip_near(seen.reshape(-1, 3, 3), NEAR_M)
+                seen, facing = triangles.reshape(-1, 3), facing[origin]
+            if len(seen):
+                paint = self._shade(solid, level)[facing]
+                layer = self._rasterise(seen, paint, depth, view)
+                if layer is not None:
+                    segmentation[layer.rows, layer.columns][layer.covered] = solid.segment
+                    pixels[solid.segment] = np.count_nonzero(layer.covered)
+                    layers.append(layer)
+        return pixels, layers
+
+    def _rasterise(self, corners: Array, paint: Array, depth: Array, view: View) -> Layer | None:
+        """Draw camera-frame triangles (corners (3 n, 3), paint (n, 3)) where they are nearest.
+
+        OpenCV's rasteriser costs by the area of its target, so it gets only the window
+        that holds the triangles; a shear along the depth moves the optical axis there.
+        """
+        rows, columns = view.box(view.pixels(corners))
+        height, width = rows.stop - rows.start, columns.stop - columns.start
+        if height <= 0 or width <= 0:
+            return None
+        (cx, cy), focal = view.camera.centre_px, view.camera.focal_px
+        across = (columns.start + (width - 1) / 2 - cx) / focal
+        down = (rows.start + (height - 1) / 2 - cy) / focal
+        sheared = corners - corners[:, 2:] * np.array([across, down, 0.0], np.float32)
+        drawn = np.zeros((height, width, 3), np.float32)
+        cv2.triangleRasterize(
+            sheared,
+            _order(len(paint)),
+            np.repeat(paint, 3, axis=0),
+            drawn,
+            depth[rows, columns],
+            _TO_GL,
+            2 * math.atan(height / 2 / focal),
+            NEAR_M,
+            FAR_M,
+            self._settings,
+        )
+        covered = cv2.extractChannel(drawn, 0) > 0
+        return Layer(rows=rows, columns=columns, covered=covered, drawn=drawn)
+
+    def _shade(self, solid: _Solid, level: int) -> Array:
+        """Return the mesh's colours in this light, kept until the solid turns.
+
+        None is black: what is black was not drawn.
+        """
+        kept = solid.shades.get(level)
+        if kept is None:
+            mesh, conditions = solid.meshes[level], self._conditions
+            normals = mesh.normals @ solid.turn.T
+            share = conditions.direct_share
+            facing = np.clip(normals @ np.array(conditions.sun, np.float32), 0, 1)
+            sky = 0.75 + 0.25 * normals[:, 2]
+            light = (1 - share) * sky + share * facing / max(0.35, conditions.sun[2])
+            lit = mesh.colours * np.clip(light, 0, 1.15)[:, None]
+            kept = solid.shades[level] = np.clip(np.round(lit), 1, 255).astype(np.float32)
+        return kept
+
+
+def draw_shadows(
+    image: NDArray[np.uint8], view: View, shadows: Sequence[Shadow], conditions: Conditions
+) -> None:
+    """Darken the ground where dynamic objects keep the sun from it."""
+    if not _sun_shines(conditions):
+        return
+    sun = conditions.sun
+    reach = 3 * max(2.0, float(view.eye[2]))
+    outlines: list[NDArray[np.float64]] = []
+    lengths: list[int] = []
+    for shadow in shadows:
+        x = shadow.at[0] - sun[0] / sun[2] * shadow.at[2]
+        y = shadow.at[1] - sun[1] / sun[2] * shadow.at[2]
+        if math.hypot(x - view.eye[0], y - view.eye[1]) < reach + shadow.radius_m:
+            outlines.append(shadow.outlines + np.array([x, y]))
+            lengths += shadow.lengths
+    if not outlines:
+        return
+    points, lengths = view.ground_polygons(np.concatenate(outlines), lengths)
+    rows, columns = view.box(points)
+    part = image[rows, columns]
+    if part.size == 0:
+        return
+    mask = np.zeros(part.shape[:2], np.uint8)
+    fixed = np.round((points - (columns.start, rows.start)) * 2**_SHIFT).astype(np.int32)
+    start = 0
+    for length in lengths:
+        cv2.fillConvexPoly(mask, fixed[start : start + length], (255.0,), cv2.LINE_8, _SHIFT)
+        start += length
+    share = conditions.direct_share
+    cv2.copyTo(cv2.convertScaleAbs(part, alpha=1 - share), mask, part)
+
+
+def _sun_shines(conditions: Conditions) -> bool:
+    return conditions.direct_share > 0.01 and conditions.sun[2] > 0.02
+
+
+def _levels(parts: tuple[Part, ...]) -> tuple[Mesh, ...]:
+    return tuple(mesh_of(parts, coarse_below_m=radius) for radius in _COARSE_M)
+
+
+def _level_at(radius_m: float) -> int:
+    """Return the level of detail in which parts up to ``radius_m`` may be coarse."""
+    return max(level for level, limit in enumerate(_COARSE_M) if limit <= radius_m)
+
+
+@functools.lru_cache(maxsize=4)
+def _corner_numbers(most: int) -> NDArray[np.int32]:
+    return np.arange(3 * most, dtype=np.int32).reshape(-1, 3)
+
+
+def _order(count: int) -> NDArray[np.int32]:
+    """Return the numbers of the corners of ``count`` triangles, one after the other."""
+    return _corner_numbers(max(4096, 1 << count.bit_length()))[:count]

@@ -1,0 +1,158 @@
+"""Who moves the dynamic objects: the protocol, and the specification that names a policy."""
+
+from __future__ import annotations
+
+import importlib
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Protocol
+
+from pytest_garl.errors import PolicyError
+from pytest_garl.scenarios.genes import ENVIRONMENT
+
+if TYPE_CHECKING:
+    import numpy as np
+
+    from pytest_garl.scenarios.maps.map import Map
+    from pytest_garl.scenarios.object_types import ObjectType
+    from pytest_garl.scenarios.scenario import Scenario
+
+DECISION_STEP_S = 0.5
+"""Time between two decisions of a policy (paper, section 3.4: "0.5 seconds")."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ObjectState:
+    """Ground truth about one dynamic object at a decision; positions (x, y, z) in metres.
+
+    ``speed_mps`` is how fast this object may move: its velocity gene times its type's
+    top speed.  ``position_m`` is that of the body's frame.
+    """
+
+    name: str
+    type: ObjectType
+    position_m: tuple[float, float, float]
+    velocity_mps: tuple[float, float]
+    speed_mps: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Situation:
+    """What a policy may see when it decides for one object: everything, exactly.
+
+    ``scenario`` is what is flown, with all its genes, the environment as it is at the moment.
+    """
+
+    time_s: float
+    self: ObjectState
+    others: tuple[ObjectState, ...]
+    uav_position_m: tuple[float, float, float]
+    uav_velocity_mps: tuple[float, float, float]
+    marker_position_m: tuple[float, float]
+    map: Map
+    scenario: Scenario
+
+
+Change = tuple[str, float]
+"""A gene of the environment, and what is added to it: ``("environment.fog", 0.01)``."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Move:
+    """The wanted velocity until the next decision, as a share (x, y) of the object's speed.
+
+    Its length is at most 1; the paper's five actions are (0, 1), (0, -1), (-1, 0), (1, 0)
+    and (0, 0).  A policy may change the environment as well: ``changes`` take effect at once,
+    each clipped to the gene's range, and are part of the flight's record.
+    """
+
+    x: float
+    y: float
+    changes: tuple[Change, ...] = ()
+
+
+STAY = Move(x=0.0, y=0.0)
+
+
+class ObjectPolicy(Protocol):
+    """Decides every 0.5 s where one object goes; one instance serves one object.
+
+    ``rng`` is the object's own generator, derived from the scenario's seed.
+    """
+
+    def reset(self, situation: Situation, rng: np.random.Generator) -> None:
+        """Prepare for one flight."""
+
+    def decide(self, situation: Situation) -> Move:
+        """Return the wanted velocity until the next decision."""
+
+
+def decision(policy: ObjectPolicy, situation: Situation) -> Move:
+    """Return the policy's move; raise PolicyError if it raises or answers what is no move."""
+    name = f"object policy {type(policy).__name__}, deciding for {situation.self.name}"
+    try:
+        move = policy.decide(situation)
+    except Exception as error:
+        raise PolicyError(f"{name}: raised {type(error).__name__}: {error}") from error
+    try:
+        length = math.hypot(move.x, move.y)
+        wrong = [each for each in move.changes if not _is_change(each)]
+    except (AttributeError, TypeError):
+        length, wrong = math.nan, []
+    if not length <= 1 + 1e-9:
+        raise PolicyError(
+            f"{name}: found {move!r}; expected Move(x=…, y=…), a share of the object's speed "
+            "no longer than 1"
+        )
+    if wrong:
+        raise PolicyError(
+            f"{name}: found the change {wrong[0]!r}; expected (gene, number) with one of "
+            f"{', '.join(ENVIRONMENT)}"
+        )
+    return move
+
+
+def _is_change(each: object) -> bool:
+    match each:
+        case (str(gene), int() | float() as amount) if isinstance(each, tuple):
+            return gene in ENVIRONMENT and math.isfinite(amount)
+    return False
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PolicySpec:
+    """Names a policy so that a child process can make it and a ledger can compare it.
+
+    ``factory`` is "module:attribute", called with ``arguments`` as keyword arguments for
+    each object.
+    """
+
+    name: str
+    factory: str
+    arguments: tuple[tuple[str, str | int | float], ...] = ()
+
+    @property
+    def sha256(self) -> str:
+        """The hash of a learned policy's weights; empty for the others."""
+        return str(dict(self.arguments).get("sha256", ""))
+
+    def make(self) -> ObjectPolicy:
+        """Return a fresh policy for one object; raise PolicyError where there is none."""
+        module, _, attribute = self.factory.partition(":")
+        try:
+            factory = getattr(importlib.import_module(module), attribute)
+        except (ImportError, AttributeError) as error:
+            raise PolicyError(
+                f"object policy {self.name!r}: {self.factory!r} cannot be loaded ({error}); "
+                "expected 'module:attribute' of an importable module"
+            ) from error
+        try:
+            policy: ObjectPolicy = factory(**dict(self.arguments))
+        except PolicyError:
+            raise
+        except Exception as error:
+            raise PolicyError(
+                f"object policy {self.name!r}: {self.factory} with {dict(self.arguments)} raised "
+                f"{type(error).__name__}: {error}"
+            ) from error
+        return policy

@@ -1,0 +1,1 @@
+"""How bodies move: the pybullet world, the vehicle and its control, the NPCs' bodies."""

@@ -1,0 +1,174 @@
+"""The simple flight control: a cascade from setpoints to motor thrusts.
+
+A cascade like AirSim's simple_flight: position P, velocity PI, attitude P, rate P; but with an
+integral on all axes of velocity, which AirSim has on the vertical one alone.
+"""
+
+from __future__ import annotations
+
+import math
+
+from pytest_garl.landing_system import (
+    Abort,
+    AttitudeSetpoint,
+    Command,
+    Land,
+    PositionSetpoint,
+    VelocitySetpoint,
+)
+from pytest_garl.simulation.physics.vehicle import (
+    GRAVITY_MPS2,
+    Motion,
+    Quaternion,
+    Thrusts,
+    Vector,
+    VehicleModel,
+    mix,
+)
+
+POSITION_P = 1.0
+VELOCITY_P = 2.2
+VELOCITY_I = 0.6
+ATTITUDE_P = 8.0
+RATE_P = 22.0
+YAW_RATE_P = 6.0
+"""Bandwidths in 1/s, each loop a half to a quarter of the next inner one, the innermost close to
+the motors' 20 1/s."""
+MAX_TILT_RAD = math.radians(25)
+_MAX_SLOPE = math.tan(MAX_TILT_RAD)
+MAX_ACCELERATION_MPS2 = 4.0
+MAX_RATE_RADPS = 3.5
+MAX_CLIMB_MPS = 5.0
+MAX_DESCENT_MPS = 4.0
+"""Climb and descent are the Matrice 100's ratings; it may tilt 35 degrees, a landing
+controller keeps below it."""
+MAX_INTEGRAL_MPS2 = 4.0
+ABORT_CLIMB_MPS = 3.0
+
+
+class FlightControl:
+    """Turns the latest command into motor thrusts; one instance per flight."""
+
+    def __init__(self, model: VehicleModel) -> None:
+        self._model = model
+        self._integral = [0.0, 0.0, 0.0]
+        self._hold: Vector | None = None
+        self._command: Command | None = None
+        self._yaw_rad = 0.0
+
+    def take(self, command: Command) -> None:
+        """Note a command's yaw: what lands or aborts keeps the one that was commanded last.
+
+        It is told of every command, also while a landing system flies the motors itself.
+        """
+        if isinstance(command, PositionSetpoint | VelocitySetpoint):
+            self._yaw_rad = command.yaw_rad
+        elif isinstance(command, AttitudeSetpoint):
+            self._yaw_rad = _yaw(command.attitude)
+
+    def thrusts(self, motion: Motion, command: Command | None, dt_s: float) -> Thrusts:
+        """Return wanted motor thrusts (front left, front right, rear right, rear left)."""
+        if command is None:
+            return 0.0, 0.0, 0.0, 0.0
+        if isinstance(command, AttitudeSetpoint):
+            thrust = command.thrust * 4 * self._model.max_thrust_n
+            return self._attitude(motion, _z_axis(command.attitude), _yaw(command.attitude), thrust)
+        if type(command) is not type(self._command):
+            self._hold = motion.position_m
+        self._command = command
+        wanted, yaw = self._velocity(motion, command)
+        ax, ay, az = self._acceleration(motion, wanted, dt_s)
+        vertical = az + GRAVITY_MPS2
+        if vertical < 2.0:
+            vertical = 2.0
+        tilt = math.hypot(ax, ay) / vertical
+        scale = _MAX_SLOPE / tilt if tilt > _MAX_SLOPE else 1.0
+        direction = _unit((ax * scale, ay * scale, vertical))
+        x, y, _, _ = motion.attitude
+        upright = 1 - 2 * (x * x + y * y)
+        thrust = self._model.mass_kg * vertical / (0.5 if upright < 0.5 else upright)
+        return self._attitude(motion, direction, yaw, thrust)
+
+    def _velocity(self, motion: Motion, command: Command) -> tuple[Vector, float]:
+        position = motion.position_m
+        hold = self._hold or position
+        if isinstance(command, VelocitySetpoint):
+            return command.velocity_mps, command.yaw_rad
+        if isinstance(command, PositionSetpoint):
+            (ax, ay, az), (x, y, z) = command.position_m, position
+            vx, vy, vz = POSITION_P * (ax - x), POSITION_P * (ay - y), POSITION_P * (az - z)
+            length = math.sqrt(vx * vx + vy * vy + vz * vz)
+            factor = command.speed_mps / length if length > command.speed_mps else 1.0
+            return (vx * factor, vy * factor, vz * factor), command.yaw_rad
+        climb = ABORT_CLIMB_MPS if isinstance(command, Abort) else 0.0
+        if isinstance(command, Land):
+            climb = -command.speed_mps
+        vx, vy = POSITION_P * (hold[0] - position[0]), POSITION_P * (hold[1] - position[1])
+        return (vx, vy, climb), self._yaw_rad
+
+    def _acceleration(self, motion: Motion, wanted: Vector, dt_s: float) -> Vector:
+        (wx, wy, wz), (vx, vy, vz) = wanted, motion.velocity_mps
+        climb = _bounded(wz, -MAX_DESCENT_MPS, MAX_CLIMB_MPS)
+        return (
+            self._axis(0, wx - vx, dt_s),
+            self._axis(1, wy - vy, dt_s),
+            self._axis(2, climb - vz, dt_s),
+        )
+
+    def _axis(self, axis: int, error: float, dt_s: float) -> float:
+        proportional = VELOCITY_P * error
+        integral = self._integral[axis]
+        # Integrating while the output is saturated would wind up and overshoot.
+        if -MAX_ACCELERATION_MPS2 < proportional < MAX_ACCELERATION_MPS2:
+            total = integral + VELOCITY_I * error * dt_s
+            integral = _bounded(total, -MAX_INTEGRAL_MPS2, MAX_INTEGRAL_MPS2)
+            self._integral[axis] = integral
+            return proportional + integral
+        return _bounded(proportional, -MAX_ACCELERATION_MPS2, MAX_ACCELERATION_MPS2) + integral
+
+    def _attitude(
+        self, motion: Motion, direction: Vector, yaw_rad: float, thrust_n: float
+    ) -> Thrusts:
+        # The tilt error as a rotation vector in the body frame: z x wanted direction.
+        wx, wy, _ = _to_body(motion.attitude, direction)
+        yaw_error = math.remainder(yaw_rad - _yaw(motion.attitude), math.tau)
+        roll = _bounded(-wy * ATTITUDE_P, -MAX_RATE_RADPS, MAX_RATE_RADPS)
+        pitch = _bounded(wx * ATTITUDE_P, -MAX_RATE_RADPS, MAX_RATE_RADPS)
+        yaw = _bounded(yaw_error * ATTITUDE_P / 4, -MAX_RATE_RADPS, MAX_RATE_RADPS)
+        (p, q, r), (ix, iy, iz) = motion.spin_radps, self._model.inertia
+        torque = (
+            ix * RATE_P * (roll - p),
+            iy * RATE_P * (pitch - q),
+            iz * YAW_RATE_P * (yaw - r),
+        )
+        return mix(thrust_n, torque, self._model)
+
+
+def _bounded(value: float, low: float, high: float) -> float:
+    # Half the time of min(high, max(low, value)), in the innermost loop.
+    return low if value < low else high if value > high else value
+
+
+def _z_axis(q: Quaternion) -> Vector:
+    x, y, z, w = q
+    return 2 * (x * z + w * y), 2 * (y * z - w * x), 1 - 2 * (x * x + y * y)
+
+
+def _yaw(q: Quaternion) -> float:
+    x, y, z, w = q
+    return math.atan2(2 * (w * z + x * y), 1 - 2 * (y * y + z * z))
+
+
+def _unit(v: Vector) -> Vector:
+    length = math.sqrt(v[0] * v[0] + v[1] * v[1] + v[2] * v[2])
+    return v[0] / length, v[1] / length, v[2] / length
+
+
+def _to_body(q: Quaternion, v: Vector) -> Vector:
+    x, y, z, w = -q[0], -q[1], -q[2], q[3]
+    tx, ty, tz = 2 * (y * v[2] - z * v[1]), 2 * (z * v[0] - x * v[2]), 2 * (x * v[1] - y * v[0])
+    return (
+        v[0] + w * tx + y * tz - z * ty,
+        v[1] + w * ty + z * tx - x * tz,
+        v[2] + w * tz + x * ty - y * tx,
+    )

@@ -1,0 +1,1 @@
+"""What the landing system is shown and asked, and what is accepted of its answers."""

@@ -1,0 +1,148 @@
+"""Diagnostics as a flight records them: plain bounded values, or an error that names the field."""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+import math
+from typing import Any
+
+from pytest_garl.landing_system import Detection, Diagnostics
+from pytest_garl.simulation.system_under_test.reading import (
+    NonsenseError,
+    Vector,
+    are_floats,
+    finite,
+    items,
+    number,
+    numbers,
+    vector,
+)
+from pytest_garl.simulation.system_under_test.texts import cut, shown
+
+PHASE_CHARS = 100
+NOTE_CHARS = 1_000
+MOST_DETECTIONS = 100
+MOST_CORNERS = 32
+MOST_POINTS = 1_000
+POINTS_KEPT = 100
+"""A flight has 1,200 frames at the default rate, and its record keeps the path of each."""
+MOST_BYTES = 24_000_000
+"""Of all diagnostics of a flight: a record of 32 MB is not loaded again (``record.py``)."""
+FULL_SHARE = 0.25
+"""Of these bytes, for paths, corners and notes too; the rest is for what verdicts need."""
+_NUMBER_BYTES, _KEYS_BYTES = 26, 80
+"""What they take at most in a record, which is JSON in ASCII."""
+MOST_MARKER_ID = 2**31
+
+
+class Room:
+    """How much of a landing system's diagnostics the record of one flight still takes."""
+
+    def __init__(self) -> None:
+        self._left = MOST_BYTES
+
+    def take(self, thoughts: Diagnostics, field: str) -> Diagnostics:
+        """Return what is recorded: only what verdicts need, once a quarter of the room is used."""
+        if self._left < (1 - FULL_SHARE) * MOST_BYTES:
+            thoughts = dataclasses.replace(
+                thoughts,
+                detections=tuple(
+                    dataclasses.replace(seen, corners_px=()) for seen in thoughts.detections
+                ),
+                planned_path_m=(),
+                note="",
+            )
+        self._left -= _bytes_of(thoughts)
+        if self._left < 0:
+            raise NonsenseError(
+                f"{field}: those of this flight fill more than {MOST_BYTES} bytes; expected fewer "
+                "detections in each frame",
+                "BadDiagnostics",
+            )
+        return thoughts
+
+
+def _bytes_of(thoughts: Diagnostics) -> int:
+    corners = sum(2 * len(seen.corners_px) for seen in thoughts.detections)
+    numbers = 3 * len(thoughts.planned_path_m) + 5 * len(thoughts.detections) + corners + 3
+    texts = len(json.dumps(thoughts.phase)) + len(json.dumps(thoughts.note))
+    return _NUMBER_BYTES * numbers + texts + _KEYS_BYTES * (1 + len(thoughts.detections))
+
+
+def read_diagnostics(value: Any, field: str) -> Diagnostics | None:
+    """Return diagnostics rebuilt from plain values; raise NonsenseError for what is wrong.
+
+    Texts are cut: a phase after 100 characters, a note after 1,000.  Of a path every k-th point is
+    kept, and its last, so that there are at most 100.
+    """
+    if value is None:
+        return None
+    try:
+        if not isinstance(value, Diagnostics):
+            raise NonsenseError(f"{field} = {shown(value)}; expected Diagnostics")
+        target = value.target_m
+        return Diagnostics(
+            phase=cut(str(value.phase), PHASE_CHARS),
+            detections=tuple(
+                _detection(seen, f"{field}.detections[{index}]")
+                for index, seen in enumerate(
+                    _items(value.detections, f"{field}.detections", MOST_DETECTIONS)
+                )
+            ),
+            target_m=None if target is None else vector(target, f"{field}.target_m"),
+            planned_path_m=_thinned(
+                [
+                    point if are_floats(point, 3) else vector(point, f"{field}.planned_path_m[{i}]")
+                    for i, point in enumerate(
+                        _items(value.planned_path_m, f"{field}.planned_path_m", MOST_POINTS)
+                    )
+                ]
+            ),
+            note=cut(str(value.note), NOTE_CHARS),
+        )
+    except NonsenseError as error:
+        raise NonsenseError(str(error), "BadDiagnostics") from None
+
+
+def _detection(value: Any, field: str) -> Detection:
+    if not isinstance(value, Detection):
+        raise NonsenseError(f"{field} = {shown(value)}; expected Detection")
+    return Detection(
+        marker_id=_whole(value.marker_id, f"{field}.marker_id"),
+        confidence=number(value.confidence, f"{field}.confidence"),
+        position_m=vector(value.position_m, f"{field}.position_m"),
+        corners_px=tuple(
+            corner if are_floats(corner, 2) else _pair(corner, f"{field}.corners_px[{i}]")
+            for i, corner in enumerate(
+                _items(value.corners_px, f"{field}.corners_px", MOST_CORNERS)
+            )
+        ),
+    )
+
+
+def _thinned(path: list[Vector]) -> tuple[Vector, ...]:
+    every = math.ceil((len(path) - 1) / (POINTS_KEPT - 1)) if len(path) > POINTS_KEPT else 1
+    kept = path[::every]
+    return (*kept, path[-1]) if kept and kept[-1] is not path[-1] else tuple(kept)
+
+
+def _items(value: object, field: str, most: int) -> list[Any]:
+    found = items(value, most)
+    if found is None:
+        raise NonsenseError(f"{field} = {shown(value)}; expected a sequence")
+    if len(found) > most:
+        raise NonsenseError(f"{field} has more than {most} items; expected at most {most}")
+    return found
+
+
+def _whole(value: object, field: str) -> int:
+    found = finite(value)
+    if found is None or found != int(found) or abs(found) >= MOST_MARKER_ID:
+        raise NonsenseError(f"{field} = {shown(value)}; expected a whole number")
+    return int(found)
+
+
+def _pair(value: object, field: str) -> tuple[float, float]:
+    u, v = numbers(value, field, 2)
+    return u, v

@@ -1,0 +1,26 @@
+"""What a reference pilot is told: where everything is."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from pytest_garl.scenarios.maps.map import Map
+from pytest_garl.scenarios.object_types import ObjectType
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class TruthObject:
+    """One dynamic object, exactly."""
+
+    position_m: tuple[float, float, float]
+    velocity_mps: tuple[float, float]
+    type: ObjectType
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Truth:
+    """The world at one camera frame; told to systems that have ``observe_truth(truth)``."""
+
+    marker_m: tuple[float, float]
+    objects: tuple[TruthObject, ...]
+    map: Map

@@ -1,0 +1,32 @@
+"""The mission of the paper: fly to the told coordinate, find the marker, land on it."""
+
+from __future__ import annotations
+
+from pytest_garl.landing_system import Airframe, Mission
+from pytest_garl.scenarios.maps.map import Map
+from pytest_garl.scenarios.placement import (
+    MARKER_DICTIONARY,
+    MARKER_SIDE_M,
+    TARGET_MARKER_ID,
+    gps_error_m,
+)
+from pytest_garl.scenarios.scenario import Scenario
+
+SEARCH_ALTITUDE_M = 10.0
+"""Search height of the paper's published landing systems."""
+
+
+def mission_for(scenario: Scenario, map: Map, airframe: Airframe, time_limit_s: float) -> Mission:
+    """Return what the landing system is told before take-off."""
+    error_x, error_y = gps_error_m(scenario)
+    gps_x, gps_y = map.gps_position_m
+    return Mission(
+        gps_position_m=(gps_x + error_x, gps_y + error_y),
+        home_m=map.uav_start_m,
+        search_altitude_m=SEARCH_ALTITUDE_M,
+        marker_id=TARGET_MARKER_ID,
+        marker_side_m=MARKER_SIDE_M,
+        marker_dictionary=MARKER_DICTIONARY,
+        camera=airframe.camera,
+        time_limit_s=time_limit_s,
+    )

@@ -1,0 +1,96 @@
+"""Reads values that a landing system made: plain and finite, or an error that names the field."""
+
+from __future__ import annotations
+
+import itertools
+import math
+from typing import Any
+
+import numpy as np
+
+from pytest_garl.simulation.system_under_test.texts import shown
+
+Vector = tuple[float, float, float]
+
+
+class NonsenseError(Exception):
+    """A value that breaks the contract; ``error`` is the kind of it in a signature."""
+
+    def __init__(self, message: str, error: str = "BadCommand") -> None:
+        super().__init__(message)
+        self.error = error
+
+
+def number(
+    value: object, field: str, low: float = -math.inf, high: float = math.inf, unit: str = ""
+) -> float:
+    """Return a finite Python float from ``low`` to ``high``, or raise NonsenseError."""
+    found = finite(value)
+    if found is None:
+        raise NonsenseError(f"{field} = {shown(value)}; expected a finite number")
+    if not low <= found <= high:
+        raise NonsenseError(
+            f"{field} = {shown(value)}; expected {low:g} to {high:g} {unit}".rstrip()
+        )
+    return found
+
+
+def numbers(
+    value: object, field: str, count: int, most: float = math.inf, unit: str = ""
+) -> tuple[float, ...]:
+    """Return so many finite Python floats of any sequence, none beyond ``most`` or ``-most``."""
+    found = [finite(item) for item in items(value, count) or ()]
+    if len(found) != count or None in found:
+        raise NonsenseError(f"{field} = {shown(value)}; expected {count} finite numbers")
+    plain = tuple(item for item in found if item is not None)
+    if any(abs(item) > most for item in plain):
+        raise NonsenseError(
+            f"{field} = {shown(plain)}; expected each from {-most:g} to {most:g} {unit}".rstrip()
+        )
+    return plain
+
+
+def are_floats(value: object, count: int) -> bool:
+    """Whether a value is a tuple of so many finite floats: the usual case, told in no time."""
+    return (
+        type(value) is tuple
+        and len(value) == count
+        and all(type(item) is float for item in value)
+        and math.isfinite(sum(value))
+    )
+
+
+def vector(value: object, field: str, most: float = math.inf, unit: str = "") -> Vector:
+    """Return three finite Python floats, none beyond ``most``."""
+    x, y, z = numbers(value, field, 3, most, unit)
+    return x, y, z
+
+
+def items(value: object, most: int) -> list[Any] | None:
+    """Return the items of a sequence, ``most`` and one at the most; None for what is none.
+
+    It is read once, so that a generator may be passed, even one without end.
+    """
+    if isinstance(value, str | bytes | dict | set | frozenset):
+        return None
+    try:
+        each = iter(value)  # type: ignore[call-overload]  # that is the question
+    except TypeError:
+        return None
+    return list(itertools.islice(each, most + 1))
+
+
+def finite(value: object) -> float | None:
+    """Return a value as a finite Python float, or None."""
+    if type(value) is float:
+        return value if math.isfinite(value) else None
+    if isinstance(value, str | bytes | bytearray | complex | np.complexfloating):
+        return None
+    if isinstance(value, np.ndarray) and value.ndim:
+        return None
+    try:
+        # A subclass of float may come back; its plain value is what counts.
+        found = float.__float__(float(value))  # type: ignore[arg-type]  # that is the question
+    except (TypeError, ValueError, OverflowError):
+        return None
+    return found if math.isfinite(found) else None

@@ -1,0 +1,42 @@
+"""Words for reports: a flight in half a line, directions."""
+
+from __future__ import annotations
+
+import math
+import re
+
+_WHERE = re.compile(
+    r"(?P<what>.*?)\.?\s+At [\d.]+ s the UAV was (?P<where>.+?)\.(?: In the last .*)?", re.DOTALL
+)
+_POINTS = (
+    "east",
+    "north-east",
+    "north",
+    "north-west",
+    "west",
+    "south-west",
+    "south",
+    "south-east",
+)
+_CRASH = "The landing system "
+_RAISED = f"{_CRASH}raised: "
+
+
+def headline(story: str) -> str:
+    """Return ``collided with person-2 at 2.6 m/s, 1.4 m up, over the marker``."""
+    found = _WHERE.fullmatch(story.strip())
+    what, where = (found["what"], f", {found['where']}") if found else (story.strip(), "")
+    if what.startswith(_RAISED):
+        what = f"Python error {what.removeprefix(_RAISED)}"
+    elif not what.startswith(_CRASH):
+        # What a landing system says may hold anything; our own sentences end with a full stop.
+        what = re.split(r"(?<=[a-z\d%])[.;] (?=[A-Z]|it does)", what)[0]
+    what = what.partition("\n")[0].removesuffix(".")
+    if not what.startswith("Python"):
+        what = what[:1].lower() + what[1:]
+    return f"{what}{where}"
+
+
+def compass_point(east_m: float, north_m: float) -> str:
+    """Return the nearest of the eight points in the direction of an offset."""
+    return _POINTS[round(math.atan2(north_m, east_m) / (math.pi / 4)) % 8]

@@ -1,0 +1,102 @@
+"""Writes pictures as an H.264 .mp4 that every browser plays."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import subprocess
+import tempfile
+from collections.abc import Iterable, Sequence
+from itertools import chain
+from pathlib import Path
+
+from pytest_garl.errors import GarlError
+from pytest_garl.video.drawing import Image
+
+_QUALITY = 27
+"""x264's constant rate factor: letters and one-pixel lines stay clear, sensor noise goes."""
+_TOP_KBPS = 350
+"""Bounds a film of 60 s to 2.6 MB in whatever weather."""
+_BUFFER_KBIT = 1400
+
+
+def write(frames: Iterable[Image], path: Path, rate_hz: float) -> None:
+    """Encode pictures, RGB uint8 (H, W, 3) of one even size, into the .mp4 file ``path``.
+
+    The file appears once it is complete.  Raises GarlError where imageio-ffmpeg is missing,
+    where the pictures do not fit together, or with the encoder's own words where it fails.
+    """
+    ffmpeg = program()
+    pictures = iter(frames)
+    first = next(pictures, None)
+    if first is None:
+        raise GarlError(f"{path}: a film needs at least one picture; the flight gave none")
+    height, width = first.shape[:2]
+    if height % 2 or width % 2:
+        raise GarlError(
+            f"{path}: pictures of {width}x{height} pixels; browsers play even widths and heights"
+        )
+    path.parent.mkdir(parents=True, exist_ok=True)
+    scratch = path.with_name(f".{path.name}.{os.getpid()}")
+    try:
+        _encode(_command(ffmpeg, width, height, rate_hz, scratch), chain([first], pictures), path)
+        scratch.replace(path)
+    finally:
+        scratch.unlink(missing_ok=True)
+
+
+def _encode(command: Sequence[str], pictures: Iterable[Image], path: Path) -> None:
+    shape = None
+    with tempfile.TemporaryFile() as said:
+        with subprocess.Popen(
+            command, stdin=subprocess.PIPE, stdout=subprocess.DEVNULL, stderr=said
+        ) as encoder:
+            try:
+                assert encoder.stdin is not None
+                # An encoder that has given up closes the pipe; its words say why.
+                with contextlib.suppress(BrokenPipeError), encoder.stdin as pipe:
+                    for picture in pictures:
+                        shape = shape or picture.shape
+                        if picture.shape != shape:
+                            raise GarlError(
+                                f"{path}: a picture of shape {picture.shape} among pictures of "
+                                f"{shape}; a film has one size"
+                            )
+                        pipe.write(picture.tobytes())
+            except BaseException:
+                encoder.kill()
+                raise
+        if encoder.returncode:
+            said.seek(0)
+            words = said.read().decode(errors="replace").strip()
+            raise GarlError(
+                f"{path}: the encoder {command[0]} gave up (exit status {encoder.returncode}): "
+                f"{words}. Is there space, may the folder be written, and does this ffmpeg have "
+                "libx264?"
+            )
+
+
+def _command(program: str, width: int, height: int, rate_hz: float, path: Path) -> list[str]:
+    source = f"-f rawvideo -pix_fmt rgb24 -s {width}x{height} -r {rate_hz:g} -i -"
+    coding = f"-c:v libx264 -preset veryfast -crf {_QUALITY} -pix_fmt yuv420p"
+    bound = f"-maxrate {_TOP_KBPS}k -bufsize {_BUFFER_KBIT}k"
+    # Untagged, players guess the colours' matrix from the picture's size.
+    colours = "-vf scale=out_color_matrix=bt709,"
+    colours += "setparams=color_primaries=bt709:color_trc=bt709:colorspace=bt709"
+    words = f"-nostdin -y -v error {source} -an {coding} {bound} {colours} -movflags +faststart"
+    return [program, *words.split(), "-f", "mp4", str(path)]
+
+
+def program() -> str:
+    """Return where ffmpeg is; raise GarlError where there is none."""
+    try:
+        import imageio_ffmpeg
+    except ImportError as error:
+        raise GarlError(
+            "a video needs the package imageio-ffmpeg, which is not installed; "
+            "install it with: pip install 'pytest-garl[video]'"
+        ) from error
+    try:
+        return str(imageio_ffmpeg.get_ffmpeg_exe())
+    except RuntimeError as error:
+        raise GarlError(f"imageio-ffmpeg has no ffmpeg for this machine: {error}") from error

@@ -1,0 +1,94 @@
+"""From a recorded flight to the film's pictures."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+
+from pytest_garl.errors import GarlError
+from pytest_garl.landing_system import Camera
+from pytest_garl.scenarios.maps.map import Map
+from pytest_garl.scenarios.placement import marker_position_m
+from pytest_garl.scenarios.scenario import Scenario
+from pytest_garl.simulation.camera.renderer import Renderer
+from pytest_garl.simulation.environment import environment_at
+from pytest_garl.simulation.flight import Flight
+from pytest_garl.simulation.randomness import generator
+from pytest_garl.video.camera_pane import CameraPane
+from pytest_garl.video.drawing import Image
+from pytest_garl.video.encoder import write
+from pytest_garl.video.map_pane import MapPane
+from pytest_garl.video.pose import moment_at
+from pytest_garl.video.timeline import Strip
+
+CLOSING_S = 2.0
+"""How long the last moment, with the outcome, stands still."""
+
+
+def save_video(
+    path: Path, flight: Flight, scenario: Scenario, map: Map, camera: Camera, signature: str = ""
+) -> None:
+    """Write the film of a flight to ``path`` (.mp4); it plays at the flight's own speed.
+
+    Raises GarlError where the flight is not one of this scenario, or imageio-ffmpeg is missing.
+    """
+    write(frames(flight, scenario, map, camera, signature), path, rate_hz(flight, camera))
+
+
+def frames(
+    flight: Flight, scenario: Scenario, map: Map, camera: Camera, signature: str = ""
+) -> Iterator[Image]:
+    """Yield the film's pictures, RGB uint8 (656, 1024, 3): one per camera frame, then the end.
+
+    ``map`` is the scenario's, with or without its absent objects; ``camera`` the one that
+    flew; ``signature`` the verdict's, empty for a flight without violation.  The end is the
+    last moment with the outcome, for ``CLOSING_S``.  Raises GarlError where the flight is not
+    one of this scenario.
+    """
+    place = map.without(scenario.absent)
+    _check(flight, scenario, place)
+    renderer = Renderer(scenario, place, camera, generator(scenario.seed, "sensor"))
+    left, right = CameraPane(renderer), MapPane(flight, scenario, place, camera)
+    below = Strip(flight, signature)
+    shown = scenario
+    for step in flight.steps:
+        if (now := environment_at(scenario, flight, step.time_s)) != shown:
+            renderer.change(now)
+            shown = now
+        moment = moment_at(flight, step.time_s)
+        side = np.vstack([left.draw(moment, step), below.draw(moment, step)])
+        yield np.hstack([side, right.draw(moment, step)])
+    last, moment = flight.steps[-1] if flight.steps else None, moment_at(flight, flight.elapsed_s)
+    side = np.vstack([left.draw(moment, None), below.draw(moment, last, ended=True)])
+    picture = np.hstack([side, right.draw(moment, last, ended=True)])
+    for _ in range(math.ceil(CLOSING_S * rate_hz(flight, camera))):
+        yield picture
+
+
+def rate_hz(flight: Flight, camera: Camera) -> float:
+    """Return the rate of the recorded steps, which the physics rounds from the camera's."""
+    if len(flight.steps) < 2:
+        return camera.rate_hz
+    span = flight.steps[-1].time_s - flight.steps[0].time_s
+    return round((len(flight.steps) - 1) / span, 3)
+
+
+def _check(flight: Flight, scenario: Scenario, map: Map) -> None:
+    marker = marker_position_m(scenario, map)
+    if math.dist(marker, flight.marker_position_m) > 1e-6:
+        x, y = flight.marker_position_m
+        raise GarlError(
+            f"this flight is not of this scenario: its marker lay at ({x:.2f}, {y:.2f}), the "
+            f"scenario's lies at ({marker[0]:.2f}, {marker[1]:.2f}) on map {map.name!r}; "
+            "take the scenario and the map that were flown"
+        )
+    flown, listed = [item.name for item in flight.objects], [name for name, _ in map.object_names]
+    if flown != listed:
+        raise GarlError(
+            f"this flight is not of this scenario: it has the objects {', '.join(flown) or 'none'}"
+            f", map {map.name!r} has {', '.join(listed) or 'none'}; take the scenario and the map "
+            "that were flown"
+        )

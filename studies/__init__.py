@@ -1,0 +1,1 @@
+"""Studies: they write the tables of the docs."""

@@ -1,0 +1,97 @@
+"""What the remarks on an experiment count and its rows do not tell, from the ledgers that it keeps.
+
+``python -m studies.counts`` reads those below ``.garl/experiments`` and writes
+``docs/experiments/counts.csv``: how often each kind of violation occurred, how many flights were in
+the dark, and what became of those in which all objects but one, or all, are slow.  Searches whose
+ledger is gone keep their line.
+"""
+
+from __future__ import annotations
+
+import argparse
+import csv
+from collections import Counter
+from collections.abc import Iterable
+from contextlib import closing
+from pathlib import Path
+
+from pytest_garl.execution.job import load_scenario, loads
+from pytest_garl.execution.ledger import Ledger
+from pytest_garl.experiments.measure import HASH
+from pytest_garl.experiments.results import SEPARATOR
+from pytest_garl.experiments.results import read as rows_of
+from pytest_garl.scenarios.genes import genome_for
+from pytest_garl.scenarios.maps.map import load_map
+from pytest_garl.scenarios.scenario import Scenario
+from pytest_garl.simulation.camera.weather import conditions_of
+from studies.rows import read
+
+ROWS, FILE = Path("docs/experiments/rq.csv"), Path("docs/experiments/counts.csv")
+SLOW = 0.25
+"""An object is slow whose speed lies in this lowest share of its range."""
+
+
+def count(ledger: Ledger, search: str, map: str) -> dict[str, int | str]:
+    """Return a search's counts; ``kinds`` is ``signature=flights``, separated as in rows."""
+    counts, kinds = Counter[str](), Counter[str]()
+    genome = genome_for(load_map(map))
+    speeds = [
+        (key, float(low), float(high))
+        for key, low, high in zip(genome.keys, genome.lower, genome.upper, strict=True)
+        if key.endswith(".velocity")
+    ]
+    for flight in ledger.flown(search):
+        scenario, outcome = load_scenario(flight.scenario), flight.result["outcome"]
+        if flight.signature:
+            kinds[flight.signature] += 1
+        counts[outcome] += 1
+        if conditions_of(scenario).sun[2] < 0:
+            counts["dark"] += 1
+            counts[f"dark_{outcome}"] += 1
+        if _slow(scenario, speeds):
+            counts[f"slow_{outcome}"] += 1
+    names = ("landed", "aborted", "dark", "dark_aborted", "slow_landed", "slow_collision")
+    return {
+        **{name: counts[name] for name in names},
+        "kinds": SEPARATOR.join(f"{name}={times}" for name, times in sorted(kinds.items())),
+    }
+
+
+def _slow(scenario: Scenario, speeds: Iterable[tuple[str, float, float]]) -> bool:
+    fast = [key for key, low, high in speeds if scenario[key] >= low + SLOW * (high - low)]
+    return len(fast) <= 1
+
+
+def main() -> None:
+    """Count what there are ledgers of."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--folder", type=Path, default=Path(".garl/experiments"))
+    folder = parser.parse_args().folder
+    rows = {row.result_hash: row for row in rows_of(ROWS)}
+    lines: dict[str, dict[str, int | str]] = {
+        line["result_hash"]: dict(line) for line in read(FILE) if line["result_hash"] in rows
+    }
+    for path in sorted(folder.glob("*/ledger.sqlite")):
+        with closing(Ledger(path)) as ledger:
+            for search, text in ledger.searches():
+                row = rows.get(ledger.result_hash(search)[:HASH])
+                if row is None:
+                    continue
+                lines[row.result_hash] = {
+                    "system": row.system,
+                    "map": row.map,
+                    "method": row.method,
+                    "seed": row.seed,
+                    **count(ledger, search, loads(text).map),
+                    "result_hash": row.result_hash,
+                }
+    ordered = [lines[key] for key in rows if key in lines]
+    with FILE.open("w", newline="") as file:
+        writer = csv.DictWriter(file, list(ordered[0]))
+        writer.writeheader()
+        writer.writerows(ordered)
+    print(f"{len(ordered)} of {len(rows)} searches are counted in {FILE}")
+
+
+if __name__ == "__main__":
+    main()

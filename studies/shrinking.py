@@ -1,0 +1,204 @@
+"""What the shrinker's passes are worth, on violations of OpenCV-MLS that a search found.
+
+``python -m studies.shrinking`` searches with the defaults of pytest-garl, takes twenty of the
+violations, kind after kind, shrinks each by both passes and by each alone, and appends to
+``docs/shrinking.csv`` what that lacks; ``--report`` prints the table.
+"""
+
+from __future__ import annotations
+
+import argparse
+import functools
+import itertools
+import os
+from collections import defaultdict
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from pytest_garl.execution.job import Job, load_scenario, loads
+from pytest_garl.execution.ledger import Ledger, Row
+from pytest_garl.execution.local_pool import local_pool
+from pytest_garl.execution.on_demand import Done, Errands, Fly
+from pytest_garl.regressions.findings import culprit_of
+from pytest_garl.regressions.shrink import (
+    by_hypothesis,
+    complexity,
+    genome_of,
+    reset_and_bisect,
+    shrink,
+    tidy,
+)
+from pytest_garl.scenarios.maps.map import load_map
+from pytest_garl.scenarios.scenario import Scenario
+from studies.methods import run
+from studies.rows import append, read
+
+FILE = Path("docs/shrinking.csv")
+TESTS = "landing_systems/test_opencv_mls.py"
+COUNT = 20
+SEARCHED = 60
+"""Flights of the search on each map that the violations are taken from."""
+BUDGET = 40
+AT_A_TIME = 5
+PASSES: dict[str, tuple[Callable[..., None], ...]] = {
+    "both": (reset_and_bisect, by_hypothesis, tidy),
+    "reset and bisect": (reset_and_bisect,),
+    "Hypothesis": (by_hypothesis,),
+}
+FIELDS = (
+    "passes",
+    "map",
+    "slot",
+    "signature",
+    "flights",
+    "objects_before",
+    "objects",
+    "genes_before",
+    "genes",
+    "distance_before",
+    "distance",
+)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Violation:
+    """One violation to shrink."""
+
+    job: Job
+    slot: str
+    signature: str
+    scenario: Scenario
+    culprit: str
+
+
+def violations(ledger: Ledger, count: int) -> list[Violation]:
+    """Return violations, one of each kind, then a second of each, until there are enough."""
+    kinds: defaultdict[tuple[str, str], list[Row]] = defaultdict(list)
+    for row in ledger.violating():
+        kinds[row.search, row.signature].append(row)
+    turns = itertools.zip_longest(*kinds.values())
+    rows = [row for turn in turns for row in turn if row is not None]
+    return [_violation(ledger, row) for row in rows[:count]]
+
+
+def _violation(ledger: Ledger, row: Row) -> Violation:
+    text = ledger.job(row.search)
+    assert text is not None
+    done = Done(result=row.result, sha256=row.sha256, record=Path())
+    return Violation(
+        job=loads(text),
+        slot=f"g{row.generation:02d}-s{row.slot:02d}",
+        signature=row.signature,
+        scenario=load_scenario(row.scenario),
+        culprit=culprit_of(done),
+    )
+
+
+def shrink_one(violation: Violation, fly: Fly) -> list[dict[str, Any]]:
+    """Shrink a violation by all passes and by each alone; return a row for each."""
+    known: dict[Scenario, bool] = {}
+
+    def fails(scenario: Scenario) -> bool:
+        # What one pass has flown the next need not fly again; it counts for both.
+        if scenario not in known:
+            known[scenario] = fly(violation.job, scenario).signature == violation.signature
+        return known[scenario]
+
+    return [_row(violation, passes, fails) for passes in PASSES]
+
+
+def _row(violation: Violation, passes: str, fails: Callable[[Scenario], bool]) -> dict[str, Any]:
+    map = load_map(violation.job.map)
+    found = shrink(
+        violation.scenario,
+        fails,
+        map,
+        BUDGET,
+        culprit=violation.culprit,
+        passes=PASSES[passes],
+    )
+    genome = genome_of(violation.scenario, map)
+    before, after = (complexity(each, genome) for each in (violation.scenario, found.simplest))
+    return {
+        "passes": passes,
+        "map": map.name,
+        "slot": violation.slot,
+        "signature": violation.signature,
+        "flights": found.flights,
+        "objects_before": before[0],
+        "objects": after[0],
+        "genes_before": before[1],
+        "genes": after[1],
+        "distance_before": before[2],
+        "distance": after[2],
+    }
+
+
+def report(rows: list[dict[str, str]]) -> str:
+    """Return a Markdown table of medians."""
+    lines = [
+        "| passes | violations | flights | most | objects left | genes left | distance left |",
+        "| --- | --- | --- | --- | --- | --- | --- |",
+    ]
+    if rows:
+        first = [row for row in rows if row["passes"] == rows[0]["passes"]]
+        lines.append(
+            f"| (as found) | {len(first)} | 0 | 0 | {' | '.join(_medians(first, '_before'))} |"
+        )
+    for passes in PASSES:
+        own = [row for row in rows if row["passes"] == passes]
+        if own:
+            flights = [int(row["flights"]) for row in own]
+            lines.append(
+                f"| {passes} | {len(own)} | {np.median(flights):.0f} | {max(flights)} "
+                f"| {' | '.join(_medians(own, ''))} |"
+            )
+    return "\n".join(lines)
+
+
+def _medians(rows: list[dict[str, str]], suffix: str) -> Iterator[str]:
+    for name in ("objects", "genes", "distance"):
+        yield f"{np.median([float(row[name + suffix]) for row in rows]):.3g}"
+
+
+def main() -> None:
+    """Shrink what is missing, or print the table."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--report", action="store_true")
+    parser.add_argument("--count", type=int, default=COUNT)
+    parser.add_argument("--workers", type=int, default=os.cpu_count() or 1)
+    arguments = parser.parse_args()
+    known = read(FILE)
+    if arguments.report:
+        print(report(known))
+        return
+    done = {(row["map"], row["slot"]) for row in known}
+    folder = Path(".garl/shrinking/search")
+    source = Ledger(run(folder, TESTS, [f"--garl-budget={SEARCHED}"]))
+    wanted = [
+        each
+        for each in violations(source, arguments.count)
+        if (each.job.map, each.slot) not in done
+    ]
+    path = Path(".garl/shrinking/ledger.sqlite")
+    ledger = Ledger(path) if path.is_file() else Ledger.create(path, {})
+    pool = local_pool(ledger, arguments.workers)
+    try:
+        # As many at a time as keep the workers busy; what is done is written down.
+        for start in range(0, len(wanted), AT_A_TIME):
+            functions = {
+                f"{each.job.map} {each.slot}": functools.partial(shrink_one, each)
+                for each in wanted[start : start + AT_A_TIME]
+            }
+            found = Errands(ledger, pool, lambda: None).run(functions)
+            append(FILE, FIELDS, itertools.chain.from_iterable(found.values()))
+    finally:
+        pool.close()
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,205 @@
+"""Several objects: copies of one policy against objects that were trained together.
+
+``python -m studies.team --train`` trains two objects together: shared weights, each also
+seeing its nearest fellow, warm-started from the shipped policy, all rewarded for a
+collision of any.  Without ``--train`` both are flown, one, two and three objects at a time, as
+fifty full flights per cell and call, appended to ``docs/team.csv``; ``--report`` prints the table.
+"""
+
+from __future__ import annotations
+
+import argparse
+import dataclasses
+import functools
+import os
+from concurrent.futures import ProcessPoolExecutor
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import torch
+from rich.progress import Progress
+
+from pytest_garl import cpu_dispatch
+from pytest_garl.adversary.learned import WEIGHTS, save
+from pytest_garl.adversary.observations import VIEWS
+from pytest_garl.adversary.scripted import policy_spec
+from pytest_garl.adversary.training import rewards
+from pytest_garl.adversary.training.dqn import Experience, Learner, Training
+from pytest_garl.adversary.training.episode import Episode, draw_episode
+from pytest_garl.adversary.training.uav_models import AvoidingPilot, Caution, Habits
+from pytest_garl.scenarios.genes import WEATHER, genome_for
+from pytest_garl.scenarios.maps.map import Map, load_map
+from pytest_garl.scenarios.scenario import Scenario
+from pytest_garl.search.methods.random_search import propose
+from studies.adversary import CHUNK, MAPS, SYSTEMS
+from studies.rows import append, read, share
+
+FILE = Path("docs/team.csv")
+TOGETHER = Path(".garl/team/together.npz")
+KINDS = ("person", "dog", "bird")
+SEED = 5151
+COUNTS = (1, 2, 3)
+FIELDS = ("mover", "objects", "system", "map", "chunk", "flights", "collided", "blocked")
+
+
+def warm_learner(training: Training) -> Learner:
+    """Return a learner that begins as the shipped policy and is blind to fellows."""
+    view = VIEWS["fellow"]
+    learner = Learner(view.size, 5, training)
+    with np.load(WEIGHTS / "dqn.npz") as arrays, torch.no_grad():
+        linear = [layer for layer in learner.network if isinstance(layer, torch.nn.Linear)]
+        for index, layer in enumerate(linear):
+            weight = arrays[f"weight_{index}"]
+            layer.weight.zero_()
+            layer.weight[:, : weight.shape[1]] = torch.from_numpy(weight)
+            layer.bias.copy_(torch.from_numpy(arrays[f"bias_{index}"]))
+    learner.target.load_state_dict(learner.network.state_dict())
+    return learner
+
+
+def train_together(training: Training, count: int) -> Learner:
+    """Train objects that share weights, one episode after the other."""
+    torch.set_num_threads(1)
+    learner, view = warm_learner(training), VIEWS["fellow"]
+    maps = [load_map(name) for name in MAPS]
+    with Progress() as bar:
+        task = bar.add_task("together", total=training.episodes)
+        for number in range(training.episodes):
+            rng = np.random.default_rng([training.seed, number])
+            kinds = [KINDS[int(index)] for index in rng.integers(3, size=count)]
+            scenario, place = draw_episode(maps[int(rng.integers(2))], kinds, rng)
+            pilot = functools.partial(AvoidingPilot, Habits.drawn(rng), Caution.drawn(rng))
+            episode = Episode(scenario, place, pilot)
+            experiences = [Experience(learner) for _ in kinds]
+            epsilon = max(training.epsilon_least, training.epsilon * training.epsilon_decay**number)
+            while episode.outcome is None:
+                _decide(episode, learner, experiences, view, epsilon)
+            episode.close()
+            bar.update(task, completed=number + 1)
+    return learner
+
+
+def _decide(
+    episode: Episode, learner: Learner, experiences: list[Experience], view: Any, epsilon: float
+) -> None:
+    before = episode.situations
+    states = np.stack([view.state(situation) for situation in before])
+    actions = learner.act(states, epsilon)
+    episode.step(
+        [view.moves(seen)[int(action)] for seen, action in zip(before, actions, strict=True)]
+    )
+    after = episode.situations
+    collided, cut = episode.hit is not None, episode.outcome == "not_landed"
+    ended = episode.outcome is not None and not cut
+    for index, experience in enumerate(experiences):
+        distances = [
+            rewards.column_distance_m(each[index].self.position_m, each[index].uav_position_m)
+            for each in (before, after)
+        ]
+        reward = rewards.collision_first(
+            *distances, collided=collided, ended=ended, discount=learner.training.discount
+        )
+        experience.add(
+            states[index],
+            int(actions[index]),
+            reward,
+            view.state(after[index]),
+            ended=ended,
+            cut=cut,
+        )
+        learner.update()
+
+
+def scenarios(name: str, count: int, chunk: int) -> list[tuple[Scenario, Map]]:
+    """Return fresh scenarios with so many objects of random types, in clear weather."""
+    rng = np.random.default_rng([SEED, count, chunk])
+    clear = {f"environment.{each}": 0.0 for each, _ in WEATHER}
+    found = []
+    for index in range(CHUNK):
+        kinds = [KINDS[int(kind)] for kind in rng.integers(3, size=count)]
+        counts = tuple((kind, kinds.count(kind)) for kind in dict.fromkeys(kinds))
+        map = dataclasses.replace(load_map(name), objects=counts)
+        scenario = propose(map, genome_for(map), SEED + chunk, index, 1)[0]
+        found.append((scenario.replace(clear), map))
+    return found
+
+
+def fly_one(job: tuple[Scenario, Map, str, str]) -> tuple[bool, bool]:
+    """Return whether the UAV hit an object, and whether it was kept from landing."""
+    import cv2
+
+    from landing_systems.opencv_mls import OpenCvLandingSystem
+    from pytest_garl.simulation.fly import fly
+    from studies.avoiding import AvoidingLandingSystem
+
+    cv2.setNumThreads(1)
+    scenario, map, mover, system = job
+    made: Any = {"opencv": OpenCvLandingSystem, "avoiding": AvoidingLandingSystem}[system]
+    spec = policy_spec("dqn" if mover == "copies" else str(TOGETHER))
+    flight = fly(scenario, made, spec, map=map)
+    hit = flight.outcome == "collision" and flight.contacts[-1].body_class == "dynamic"
+    return hit, flight.outcome in ("aborted", "not_landed")
+
+
+def report(rows: list[dict[str, str]]) -> str:
+    """Return a Markdown table over both maps."""
+    lines = [
+        "| system | objects | mover | flights | collided | blocked |",
+        "| --- | --- | --- | --- | --- | --- |",
+    ]
+    for system in SYSTEMS:
+        for count in COUNTS:
+            for mover in ("copies", "together"):
+                key = (system, str(count), mover)
+                own = [r for r in rows if (r["system"], r["objects"], r["mover"]) == key]
+                if not own:
+                    continue
+                flights = sum(int(row["flights"]) for row in own)
+                cells = [
+                    share(sum(int(row[name]) for row in own), flights)
+                    for name in ("collided", "blocked")
+                ]
+                lines.append(f"| {system} | {count} | {mover} | {flights} | {' | '.join(cells)} |")
+    return "\n".join(lines)
+
+
+def main() -> None:
+    """Train, fly or report."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--train", action="store_true")
+    parser.add_argument("--report", action="store_true")
+    parser.add_argument("--episodes", type=int, default=800)
+    parser.add_argument("--flights", type=int, default=300, help="per cell, both maps together")
+    arguments = parser.parse_args()
+    known = read(FILE)
+    if arguments.report:
+        print(report(known))
+        return
+    if arguments.train:
+        training = Training(episodes=arguments.episodes, epsilon=0.3)
+        save(TOGETHER, train_together(training, 2).policy("fellow"), {"policy": "together"})
+        return
+    done = {tuple(row[name] for name in FIELDS[:5]) for row in known}
+    cpu_dispatch.pin()
+    with ProcessPoolExecutor(os.cpu_count()) as pool:
+        for chunk in range(-(-arguments.flights // CHUNK // len(MAPS))):
+            for system in SYSTEMS:
+                for map in MAPS:
+                    for count in COUNTS:
+                        for mover in ("copies", "together"):
+                            key = (mover, str(count), system, map, str(chunk))
+                            if key not in done:
+                                append(FILE, FIELDS, [_row(key, pool)])
+
+
+def _row(key: tuple[str, str, str, str, str], pool: ProcessPoolExecutor) -> dict[str, Any]:
+    mover, count, system, map, chunk = key
+    jobs = [(each, at, mover, system) for each, at in scenarios(map, int(count), int(chunk))]
+    ends = list(pool.map(fly_one, jobs))
+    figures = (len(ends), sum(hit for hit, _ in ends), sum(blocked for _, blocked in ends))
+    return dict(zip(FIELDS, (*key, *figures), strict=True))
+
+
+if __name__ == "__main__":
+    main()

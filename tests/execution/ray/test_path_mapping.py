@@ -1,0 +1,61 @@
+from __future__ import annotations
+
+import dataclasses
+from pathlib import Path
+
+import pytest
+
+from pytest_garl.execution.ray.path_mapping import Relocation
+from pytest_garl.execution.reference import Reference
+from pytest_garl.simulation.npc_policy import PolicySpec
+from tests.execution.flying import Good, job_of
+
+MOVED = Relocation(home="/home/ann/stack", here="/tmp/ray/_ray_pkg_1f")
+
+
+def test_a_job_reads_as_in_the_copy() -> None:
+    job = dataclasses.replace(
+        job_of(Good, Path("/home/ann/stack/.garl/flights")),
+        system=Reference(module="mine", file="/home/ann/stack/src/mine.py", qualname="Mine"),
+        map_folders=("/home/ann/stack/scenarios/maps",),
+        npcs=PolicySpec(
+            name="a.npz", factory="m:f", arguments=(("weights", "/home/ann/stack/a.npz"),)
+        ),
+        path=("/home/ann/stack", "/usr/lib/python3.11", "/srv/home/ann/stack", "/home/ann/stack2"),
+    )
+    found = MOVED.job(job.dumps())
+    assert found.system.file == "/tmp/ray/_ray_pkg_1f/src/mine.py"
+    assert found.map_folders == ("/tmp/ray/_ray_pkg_1f/scenarios/maps",)
+    assert dict(found.npcs.arguments) == {"weights": "/tmp/ray/_ray_pkg_1f/a.npz"}
+    # Only whole paths below the project are meant.
+    assert found.path == ("/tmp/ray/_ray_pkg_1f", *job.path[1:])
+
+
+def test_what_was_not_copied_is_imported_by_name() -> None:
+    job = job_of(Good, Path("flights"))
+    assert job.system.file
+    found = MOVED.job(job.dumps())
+    assert found.system == dataclasses.replace(job.system, file="")
+    assert found.simulator == dataclasses.replace(job.simulator, file="")
+
+
+def test_a_folder_with_any_name_is_found() -> None:
+    home = '/home/jörg/a "b" (c)+'
+    job = dataclasses.replace(job_of(Good, Path("flights")), path=(home, f"{home}/src"))
+    moved = Relocation(home=home, here="/a\\b")
+    assert moved.job(job.dumps()).path == ("/a\\b", "/a\\b/src")
+
+
+@pytest.mark.parametrize(
+    ("here", "home"),
+    [
+        (
+            '  File "/tmp/ray/_ray_pkg_1f/mine.py", line 3',
+            '  File "/home/ann/stack/mine.py", line 3',
+        ),
+        ("no /tmp/ray/_ray_pkg_1f there", "no /home/ann/stack there"),
+        ("/tmp/ray/_ray_pkg_1f2", "/tmp/ray/_ray_pkg_1f2"),
+    ],
+)
+def test_a_traceback_reads_as_at_home(here: str, home: str) -> None:
+    assert MOVED.home_again(here) == home

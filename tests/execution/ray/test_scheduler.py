@@ -1,0 +1,184 @@
+from __future__ import annotations
+
+import itertools
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from pytest_garl.errors import PoolError
+from pytest_garl.execution.job import dump_scenario
+from pytest_garl.execution.ledger import Claim, Ledger
+from pytest_garl.execution.ray.actor import Base, Landed, versions
+from pytest_garl.execution.ray.scheduler import Fleet, unlike
+from pytest_garl.execution.worker_failure import Death
+from tests.execution.flying import Good, job_of, scenario
+
+LANDED = Landed(result={"outcome": "landed"}, sha256="hash", wall_s=1.5, record=b"record")
+KILLED = Death(status=-9)
+
+
+class RayError(Exception):
+    """Ray's base; the others are below it, as Ray's are."""
+
+
+class RayTaskError(RayError):
+    def __init__(self, cause: Exception) -> None:
+        super().__init__(str(cause))
+        self.cause = cause
+
+
+class WorkerLostError(RayError):
+    pass
+
+
+class FakeRay:
+    """Ray as far as a fleet uses it: a call is answered at once, or when it is waited for.
+
+    ``fly`` and ``about`` say what pilots answer; an exception is raised where it is got.
+    """
+
+    exceptions = type("exceptions", (), {"RayError": RayError, "RayTaskError": RayTaskError})
+
+    def __init__(
+        self,
+        fly: Callable[[Claim], object] = lambda claim: LANDED,
+        about: Callable[[], object] = lambda: ("node", versions()),
+    ) -> None:
+        self._answers: dict[str, Callable[..., object]] = {
+            "fly": fly,
+            "about": about,
+            "close": lambda: None,
+        }
+        self._refs: dict[int, object] = {}
+        self.hired = self.closed = 0
+        self.most = 0
+
+    def remote(self, *, num_cpus: int) -> Callable[[type], Any]:
+        assert num_cpus == 1
+        return lambda pilot: type("Hire", (), {"remote": staticmethod(self._hire)})
+
+    def _hire(self, base: Base) -> Any:
+        self.hired += 1
+        return type("Actor", (), {name: self._method(name) for name in self._answers})
+
+    def _method(self, name: str) -> Any:
+        def call(*arguments: Any) -> int:
+            self.closed += name == "close"
+            ref = len(self._refs)
+            self._refs[ref] = self._answers[name](*arguments)
+            return ref
+
+        return type("Method", (), {"remote": staticmethod(call)})
+
+    def wait(self, refs: Sequence[int], *, timeout: float) -> tuple[list[int], list[int]]:
+        self.most = max(self.most, len(refs))
+        return list(refs[:1]), list(refs[1:])
+
+    def get(self, ref: int | list[int], timeout: float | None = None) -> object:
+        if isinstance(ref, list):
+            return [self.get(each) for each in ref]
+        answer = self._refs[ref]
+        if isinstance(answer, Exception):
+            raise answer
+        return answer
+
+
+@pytest.fixture
+def ledger(tmp_path: Path) -> Ledger:
+    ledger = Ledger.create(tmp_path / "ledger.sqlite", {})
+    job = job_of(Good, tmp_path / "flights")
+    ledger.add_search("search", "flying:Good", "lawn", 3, job.dumps())
+    ledger.add_slots("search", 0, {index: dump_scenario(scenario()) for index in range(3)})
+    return ledger
+
+
+def fly(ray: FakeRay, ledger: Ledger, size: int = 2) -> Fleet:
+    fleet = Fleet(ray, ledger, Base(), size)
+    for _ in range(100):
+        if not ledger.unflown("search", 0):
+            break
+        fleet.turn()
+    return fleet
+
+
+def test_all_is_flown_and_recorded_with_the_records_where_the_job_wants_them(
+    ledger: Ledger, tmp_path: Path
+) -> None:
+    ray = FakeRay()
+    fly(ray, ledger).close()
+    assert ledger.generation("search", 0) == [(dump_scenario(scenario()), LANDED.result)] * 3
+    assert ledger.sha256("search", 0, 2) == "hash"
+    assert ledger.meters()["flying_s"] == 4.5
+    files = {path.name: path.read_bytes() for path in (tmp_path / "flights").iterdir()}
+    assert files == {f"search-lawn-g00-s0{index}.npz": b"record" for index in range(3)}
+    assert (ray.hired, ray.most, ray.closed) == (2, 2, 2)
+
+
+def test_no_more_pilots_are_hired_than_there_is_to_fly(ledger: Ledger) -> None:
+    ray = FakeRay()
+    fly(ray, ledger, size=500)
+    assert ray.hired == 3
+
+
+def test_a_lost_worker_loses_nothing_and_says_nothing_of_the_system(ledger: Ledger) -> None:
+    losses = itertools.chain([WorkerLostError("killed")] * 2, itertools.repeat(LANDED))
+    ray = FakeRay(fly=lambda claim: next(losses))
+    fly(ray, ledger)
+    assert [result for _, result in ledger.generation("search", 0)] == [LANDED.result] * 3
+    assert "retried" not in ledger.meters()
+    assert ray.hired == 4
+
+
+def test_one_slot_that_costs_worker_after_worker_ends_the_run(ledger: Ledger) -> None:
+    ray = FakeRay(fly=lambda claim: WorkerLostError("out of memory") if claim.slot == 1 else LANDED)
+    with pytest.raises(PoolError, match="the same slot 4 times: out of memory"):
+        fly(ray, ledger)
+    assert ledger.unflown("search", 0) == 1
+
+
+def test_workers_that_cannot_begin_end_the_run(ledger: Ledger) -> None:
+    ray = FakeRay(about=lambda: WorkerLostError("No module named 'pytest_garl'"))
+    with pytest.raises(PoolError, match=r"die before they fly: No module named 'pytest_garl'\n"):
+        fly(ray, ledger, size=1)
+    assert ray.hired == 4
+
+
+def test_a_node_with_other_versions_ends_the_run_before_a_flight(ledger: Ledger) -> None:
+    ray = FakeRay(about=lambda: ("far-1", versions() | {"numpy": "1.0"}))
+    with pytest.raises(PoolError, match=r"node far-1 would not fly the same: it has numpy 1\.0 \("):
+        fly(ray, ledger)
+    assert ledger.unflown("search", 0) == 3
+
+
+def test_versions_differ_also_where_there_is_none() -> None:
+    assert unlike({"a": "1", "b": "2"}, {"a": "1"}) == "b missing (here 2)"
+    assert unlike({"a": "1"}, {"a": "1", "c": "3"}) == ""
+
+
+def test_a_death_is_settled_as_in_the_local_pool(ledger: Ledger) -> None:
+    claims: list[Claim] = []
+
+    def die(claim: Claim) -> object:
+        claims.append(claim)
+        return KILLED if claim.slot == 0 else LANDED
+
+    fly(FakeRay(fly=die), ledger)
+    result = ledger.result("search", 0, 0)
+    assert result is not None
+    assert result["verdict"]["signature"] == "V:died:signal-9"
+    assert [claim.after for claim in claims if claim.slot == 0] == ["", "killed"]
+    assert ledger.meters()["retried"] == 1
+
+
+def test_a_slot_to_fly_alone_is_flown_even_if_its_worker_is_lost(ledger: Ledger) -> None:
+    answers = iter([LANDED, LANDED, KILLED, WorkerLostError("killed"), LANDED])
+    fly(FakeRay(fly=lambda claim: next(answers)), ledger, size=1)
+    assert ledger.unflown("search", 0) == 0
+
+
+def test_what_fails_on_a_node_is_told_without_ray_around_it(ledger: Ledger) -> None:
+    ray = FakeRay(fly=lambda claim: RayTaskError(PoolError("the simulator failed")))
+    with pytest.raises(PoolError, match=r"^on a node of Ray: the simulator failed$"):
+        fly(ray, ledger)

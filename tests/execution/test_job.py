@@ -1,0 +1,63 @@
+"""A flight with a NaN in it is a finding, whoever made the NaN, and is written nowhere."""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+import math
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from pytest_garl.execution.job import fly_job
+from pytest_garl.execution.reference import reference_to
+from pytest_garl.landing_system import Diagnostics
+from pytest_garl.simulation.flight import Flight, Step
+from tests.execution.flying import Good, job_of, scenario
+from tests.plugin import tiny_simulator
+
+NAN = math.nan
+
+
+def with_nan_distance(*args: Any, **more: Any) -> Flight:
+    return dataclasses.replace(tiny_simulator.fly(*args, **more), final_distance_m=NAN)
+
+
+def with_nan_track(*args: Any, **more: Any) -> Flight:
+    flight = tiny_simulator.fly(*args, **more)
+    flight.uav.position_m[-1, 2] = math.inf
+    return flight
+
+
+def with_nan_target(*args: Any, **more: Any) -> Flight:
+    step = Step(
+        time_s=1.0,
+        command="Land",
+        marker_visible=1.0,
+        marker_px=1.0,
+        objects_visible=(),
+        diagnostics=Diagnostics(target_m=(NAN, 0.0, 0.0)),
+    )
+    return dataclasses.replace(tiny_simulator.fly(*args, **more), steps=(step,))
+
+
+@pytest.mark.parametrize(
+    ("simulator", "words"),
+    [
+        (with_nan_distance, "final_distance_m"),
+        (with_nan_track, "0.position_m"),
+        (with_nan_target, "steps"),
+    ],
+)
+def test_flight_that_is_not_finite_is_a_finding(
+    simulator: Callable[..., Flight], words: str, tmp_path: Path
+) -> None:
+    job = dataclasses.replace(job_of(Good, tmp_path), simulator=reference_to(simulator))
+    result, sha256, _ = fly_job(job, scenario(), "court-g00-s00", None)
+    assert result["outcome"] == "crashed"
+    assert result["verdict"]["signature"] == "V:nonsense:NotFinite"
+    assert f"holds a NaN or an infinity in {words}" in result["verdict"]["story"]
+    json.dumps(result, allow_nan=False)
+    assert (sha256, list(tmp_path.iterdir())) == ("", [])

@@ -1,0 +1,110 @@
+"""What belongs to a landing system, read from its imports, whoever has imported what."""
+
+from __future__ import annotations
+
+import importlib
+import itertools
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from pytest_garl.execution.sources import data_files, sources_of, sources_sha256
+
+_NUMBERS = itertools.count()
+STACK = {
+    "__init__.py": "",
+    "lander.py": "import json, numpy\nfrom {0}.planning import path\nclass Lander: pass\n",
+    "planning/__init__.py": "from . import path\n",
+    "planning/path.py": "from ..maths import turn as _turn\n",
+    "maths.py": "def turn():\n    from {0} import late\n",
+    "late.py": "import {0}.deep.deeper\n",
+    "deep/deeper.py": "import pytest, pytest_garl\n",
+    "other.py": "class Other: pass\n",
+    "test_lander.py": "from {0}.lander import Lander\n",
+}
+OWN = {
+    "__init__.py",
+    "lander.py",
+    "planning/__init__.py",
+    "planning/path.py",
+    "maths.py",
+    "late.py",
+    "deep/deeper.py",
+}
+Make = Callable[[], tuple[Path, str]]
+
+
+@pytest.fixture
+def make(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Make:
+    """Make a package of a name that was never used, and return its folder and name."""
+
+    def made() -> tuple[Path, str]:
+        name = f"stack_{next(_NUMBERS)}"
+        folder = tmp_path / name
+        for file, text in STACK.items():
+            path = folder / file
+            path.parent.mkdir(parents=True, exist_ok=True)
+            path.write_text(text.format(name))
+        monkeypatch.syspath_prepend(str(tmp_path))
+        return folder, name
+
+    return made
+
+
+def lander(name: str) -> Any:
+    return importlib.import_module(f"{name}.lander").Lander
+
+
+def test_imports_are_followed_wherever_they_stand(make: Make) -> None:
+    _, name = make()
+    assert {file for file, _ in sources_of(lander(name))} == {f"{name}/{file}" for file in OWN}
+    assert f"{name}.late" not in sys.modules
+
+
+@pytest.mark.parametrize("file", sorted(OWN))
+def test_each_of_them_changes_the_hash(make: Make, file: str) -> None:
+    folder, name = make()
+    system = lander(name)
+    before = sources_sha256(system)
+    assert sources_sha256(system) == before
+    (folder / file).write_text((folder / file).read_text() + "# changed\n")
+    assert sources_sha256(system) != before
+
+
+@pytest.mark.parametrize("file", ["other.py", "test_lander.py"])
+def test_what_it_does_not_import_does_not_count(make: Make, file: str) -> None:
+    folder, name = make()
+    system = lander(name)
+    before = sources_sha256(system)
+    importlib.import_module(f"{name}.{file.removesuffix('.py')}")
+    importlib.import_module(f"{name}.late")
+    (folder / file).write_text("changed = True\n")
+    assert sources_sha256(system) == before
+
+
+def test_modules_beside_each_other_belong_together(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Without a package, as in the README."""
+    monkeypatch.syspath_prepend(str(tmp_path))
+    (tmp_path / "alone_landing.py").write_text("import alone_helper\nclass Alone: pass\n")
+    helper = tmp_path / "alone_helper.py"
+    helper.write_text("speed = 1\n")
+    system = importlib.import_module("alone_landing").Alone
+    assert [file for file, _ in sources_of(system)] == ["alone_helper.py", "alone_landing.py"]
+    before = sources_sha256(system)
+    helper.write_text("speed = 2\n")
+    assert sources_sha256(system) != before
+
+
+def test_a_folder_of_data_means_all_in_it(tmp_path: Path) -> None:
+    for name in ("model/a.bin", "model/deep/b.bin", "one.txt", "another.txt"):
+        (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
+        (tmp_path / name).write_text(name)
+    found = data_files(["model", "one.txt"], tmp_path)
+    assert [*found] == ["model/a.bin", "model/deep/b.bin", "one.txt"]
+    with pytest.raises(FileNotFoundError, match=r"gone\.txt"):
+        data_files(["gone.txt"], tmp_path)

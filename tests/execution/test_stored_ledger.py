@@ -1,0 +1,198 @@
+"""Ledgers of earlier processes: sound ones are taken, damaged ones are one clear error."""
+
+from __future__ import annotations
+
+import json
+import sqlite3
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from pytest_garl.baselines.record import from_ledger
+from pytest_garl.errors import LedgerError
+from pytest_garl.execution.database import Database
+from pytest_garl.execution.job import dump_scenario, load_scenario, loads
+from pytest_garl.execution.ledger import VERSION, Ledger, result_in
+from pytest_garl.execution.stored_ledger import check_stored
+from tests.baselines.test_file import job, result, write_ledger
+from tests.execution.flying import scenario
+
+
+@pytest.fixture
+def path(tmp_path: Path) -> Path:
+    write_ledger(tmp_path / "ledger.sqlite", job())
+    return tmp_path / "ledger.sqlite"
+
+
+def _checked(path: Path) -> None:
+    ledger = Ledger(path)
+    try:
+        check_stored(ledger)
+    finally:
+        ledger.close()
+
+
+def _run(path: Path, sql: str, *values: Any) -> None:
+    database = sqlite3.connect(path)
+    database.execute(sql, values)
+    database.commit()
+    database.close()
+
+
+def test_a_sound_ledger_is_taken(path: Path) -> None:
+    _checked(path)
+
+
+def _changed(**values: Any) -> str:
+    return json.dumps({**result(), **values})
+
+
+def _verdict(**values: Any) -> str:
+    verdict: Any = result()["verdict"]
+    return _changed(verdict={**verdict, **values})
+
+
+def _job(change: Callable[[dict[str, Any]], object]) -> str:
+    values = json.loads(job().dumps())
+    change(values)
+    return json.dumps(values)
+
+
+MARGIN = {"property": "time", "value": 1.0, "unit": "s", "decided": True, "reason": ""}
+RESULT = "UPDATE slot SET result = ? WHERE slot = 0"
+JOB = "UPDATE search SET job = ?"
+SCENARIO = "UPDATE slot SET scenario = ? WHERE slot = 1"
+
+
+@pytest.mark.parametrize(
+    ("sql", "value", "words"),
+    [
+        (RESULT, "{", "slot 0/0 of a: not valid JSON"),
+        (RESULT, "[" * 100_000, "slot 0/0 of a: not valid JSON: nested too deeply"),
+        (RESULT, "[]", r"found \[\]"),
+        (RESULT, b"\xff", "slot.result: found blob, expected text or null"),
+        (RESULT, _changed(outcome=1), "slot 0/0 of a: outcome: found 1, expected a text"),
+        (RESULT, _changed(elapsed_s="x"), "elapsed_s: found 'x', expected a finite number"),
+        (RESULT, '{"outcome": "landed"}', "found other keys than expected: closest_body"),
+        (RESULT, _verdict(primary="bad"), "verdict.primary: found 'bad', expected one of 'dist"),
+        (RESULT, _verdict(margins=[{}]), r"verdict.margins\[0\]: found other keys"),
+        (RESULT, _verdict(margins=[MARGIN | {"value": None}]), r"margins\[0\].value: found None"),
+        (RESULT, _changed(crash={"kind": "raised"}), "crash: found other keys than expected"),
+        (RESULT, None, "slot 0/0 of a: found the state flown without a result"),
+        (JOB, "{}", "search 'a': the whole: found other keys than expected: flights, limits"),
+        (JOB, _job(lambda job: job.update(timeout_s="1")), "timeout_s: found '1', expected a fin"),
+        (JOB, _job(lambda job: job["limits"].update(time_s=1e9)), "limits: found time_s=1000000"),
+        (JOB, _job(lambda job: job["npcs"].update(arguments=[["a"]])), "npcs.arguments.0.: found"),
+        (SCENARIO, "5", "slot 0/1 of a: the whole: found 5, expected a table"),
+        (SCENARIO, '{"map": "lawn", "seed": 1, "genes": [["a", "b"]]}', r"genes\[0\]\[1\]: found"),
+        ("UPDATE slot SET state = ?", "lost", "or the state 'lost'"),
+        ("UPDATE slot SET search = ? WHERE slot = 1", "b", "slot 0/1 of b: found no such search"),
+        ("UPDATE slot SET generation = ?", "x", "slot.generation: found text, expected integer"),
+        ("UPDATE slot SET slot = -1 WHERE slot = ?", 1, "slot 0/-1 of a: found no such"),
+        ("UPDATE slot SET wall_s = ?", "x", "slot.wall_s: found text, expected real or integer"),
+        ("UPDATE search SET kind = ?", "x", r"search 'a': found \('x', 2\)"),
+        ("UPDATE search SET wanted = ?", b"x", "search.wanted: found blob, expected integer"),
+        ("UPDATE run SET value = ?", "3", f"found a ledger of version 3, expected {VERSION}"),
+        ("UPDATE run SET value = ?", "[[", "the fact 'ledger' is damaged: not valid JSON"),
+        ("UPDATE run SET key = ?", "x", f"found a ledger of version None, expected {VERSION}"),
+        ("UPDATE meter SET value = ?", "x", "meter.value: found text, expected real"),
+    ],
+)
+def test_a_damaged_row_is_one_short_error(path: Path, sql: str, value: Any, words: str) -> None:
+    _run(path, sql, value)
+    with pytest.raises(LedgerError, match=words) as caught:
+        _checked(path)
+    assert str(caught.value).startswith(f"{path}: is damaged or no ledger of this version: ")
+    assert len(str(caught.value)) < 800
+    with pytest.raises(LedgerError, match=words):
+        from_ledger(path)
+
+
+@pytest.mark.parametrize("table", ["run", "search", "slot", "meter"])
+def test_a_ledger_without_a_table_is_one_error(path: Path, table: str) -> None:
+    _run(path, f"DROP TABLE {table}")
+    with pytest.raises(LedgerError, match=f"no such table: {table}"):
+        _checked(path)
+
+
+def test_a_page_that_is_damaged_shows_as_an_error_of_the_ledger(path: Path) -> None:
+    ledger = Ledger(path)
+    ledger.add_slots("a", 1, {slot: dump_scenario(scenario(0.1)) for slot in range(200)})
+    ledger.select("PRAGMA wal_checkpoint(TRUNCATE)")
+    ledger.close()
+    content = bytearray(path.read_bytes())
+    for page in range(8, len(content) // 4096):
+        content[page * 4096 : page * 4096 + 12] = b"\xff" * 12
+    path.write_bytes(content)
+    with pytest.raises(LedgerError, match="is damaged or no ledger"):
+        _checked(path)
+    ledger = Ledger(path)
+    with pytest.raises(LedgerError, match="database disk image is malformed"):
+        ledger.scenarios(1, 150, "lawn")
+    with pytest.raises(LedgerError, match="database disk image is malformed"):
+        ledger.result_hash()
+    ledger.close()
+
+
+def test_an_error_that_shows_while_rows_are_fetched_is_the_ledgers(tmp_path: Path) -> None:
+    database = Database(tmp_path / "some.sqlite")
+    rows = "WITH RECURSIVE n(i) AS (SELECT 1 UNION ALL SELECT i + 1 FROM n WHERE i < 5000) "
+    with pytest.raises(LedgerError, match=r"some.sqlite: malformed JSON"):
+        database.execute(rows + "SELECT json_extract(iif(i < 4000, '{}', '{'), '$.a') FROM n")
+    database.close()
+
+
+def test_a_value_as_large_as_the_memory_is_refused(tmp_path: Path) -> None:
+    database = Database(tmp_path / "some.sqlite")
+    with pytest.raises(LedgerError, match="string or blob too big"):
+        database.execute("SELECT zeroblob(100000000)")
+    database.close()
+
+
+def test_escape_sequences_in_a_result_are_written_out() -> None:
+    text = json.dumps({"verdict": {"story": "\x1b[2J one\ntwo"}, "collisions": ["\u202e"], "n": 1})
+    found = result_in(text)
+    assert found["verdict"]["story"] == "\\x1b[2J one\ntwo"
+    assert found["collisions"] == ["\\u202e"]
+    assert result_in(json.dumps(found)) == found
+
+
+def test_jobs_and_scenarios_survive_their_text() -> None:
+    assert loads(job().dumps()) == job()
+    for each in (scenario(0.25), scenario(0.25).without("dog-1")):
+        assert load_scenario(dump_scenario(each)) == each
+    with pytest.raises(LedgerError, match="a job in the ledger is damaged: not valid JSON"):
+        loads("")
+    with pytest.raises(LedgerError, match="a scenario in the ledger is damaged: map: found 1"):
+        load_scenario('{"map": 1, "seed": 1, "genes": []}')
+
+
+def test_a_page_that_no_query_reads_is_found_too(path: Path) -> None:
+    database = sqlite3.connect(path)
+    sql = "SELECT rootpage FROM sqlite_master WHERE name = 'slot_state'"
+    (page,) = database.execute(sql).fetchone()
+    database.execute("PRAGMA wal_checkpoint(TRUNCATE)")
+    database.close()
+    content = bytearray(path.read_bytes())
+    content[(page - 1) * 4096] = 0xFF
+    path.write_bytes(content)
+    with pytest.raises(LedgerError, match="is damaged or no ledger"):
+        _checked(path)
+
+
+def test_an_error_that_quotes_damaged_bytes_is_the_ledgers(path: Path) -> None:
+    content = path.read_bytes()
+    start = content.index(b"tablemetermeter")
+    damaged = content[:start] + b"tablem\x8aterm\x8ater" + content[start + 15 :]
+    path.write_bytes(damaged)
+    with pytest.raises(LedgerError, match=r"ledger\.sqlite"):
+        _checked(path)
+
+
+def test_the_name_of_a_search_is_shortened(path: Path) -> None:
+    _run(path, "UPDATE slot SET search = ? WHERE slot = 1", "9" * 5000)
+    with pytest.raises(LedgerError, match=r"slot 0/1 of 999.*…9+: found no such search") as caught:
+        _checked(path)
+    assert len(str(caught.value)) < 500

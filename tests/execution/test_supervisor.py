@@ -1,0 +1,303 @@
+from __future__ import annotations
+
+import dataclasses
+import json
+import os
+import signal
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from pytest_garl.errors import PoolError
+from pytest_garl.execution.job import dump_scenario, fly_job
+from pytest_garl.execution.ledger import Ledger
+from pytest_garl.execution.local_pool import Flyers
+from pytest_garl.execution.pool import wait_for
+from pytest_garl.execution.process_pool import MOST_LOSSES, ChildPool
+from pytest_garl.execution.reference import reference_to
+from pytest_garl.execution.slot import Slot, flight_name
+from pytest_garl.execution.supervisor import LEAST_STANDSTILL_S, Watch
+from tests.execution.flying import Exits, Good, Slow, job_of, scenario
+from tests.execution.misbehaving import (
+    ClosesFiles,
+    DiesOnce,
+    Floods,
+    Forks,
+    HoldsTheLock,
+    KilledOnce,
+    LeavesLock,
+    LeavesProcesses,
+    OpensNothing,
+    Pretends,
+    PretendsToZeros,
+    ReplacesZeros,
+    StopsClocks,
+    WillNotEnd,
+    left,
+)
+from tests.plugin import tiny_simulator
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class Flown:
+    """What a system's flight came to, and one of a good system after it."""
+
+    result: dict[str, Any]
+    sha256: str
+    neighbour: str
+    meters: dict[str, float]
+
+    @property
+    def signature(self) -> str:
+        return str(self.result["verdict"]["signature"])
+
+
+class Field:
+    """A ledger and a pool of one child: what one flight leaves, the next one meets."""
+
+    def __init__(self, folder: Path) -> None:
+        self.folder = folder
+        self.ledger = Ledger.create(folder / "ledger.sqlite", {})
+        self.pool = ChildPool(self.ledger, Flyers(seats=1, patience_s=60.0))
+
+    def fly(self, system: type, timeout_s: float = 20.0, simulator: Any = None) -> Flown:
+        """Fly a system and then a good one."""
+        flights = self.folder / "flights"
+        job = job_of(system, flights, timeout_s)
+        if simulator:
+            job = dataclasses.replace(job, simulator=reference_to(simulator))
+        for search, each in (("bad", job), ("good", job_of(Good, flights, 20.0))):
+            self.ledger.add_search(search, each.system.name, "lawn", 1, each.dumps())
+        self.ledger.add_slots("bad", 0, {0: dump_scenario(scenario())})
+        self.ledger.add_slots("good", 1, {0: dump_scenario(scenario(0.2))})
+        for search, slot in (("bad", Slot(generation=0, index=0)), ("good", NEXT)):
+            wait_for(self.ledger, self.pool, search, slot, lambda: None)
+        result = self.ledger.result("bad", 0, 0)
+        assert result is not None
+        return Flown(
+            result=result,
+            sha256=self.ledger.sha256("bad", 0, 0),
+            neighbour=self.ledger.sha256("good", 1, 0),
+            meters=self.ledger.meters(),
+        )
+
+
+NEXT = Slot(generation=1, index=0)
+
+
+@pytest.fixture
+def field(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Field]:
+    monkeypatch.chdir(tmp_path)
+    field = Field(tmp_path)
+    yield field
+    field.pool.close()
+    field.ledger.close()
+
+
+@pytest.fixture(scope="module")
+def undisturbed(tmp_path_factory: pytest.TempPathFactory) -> str:
+    """Return the hash of the good system's flight."""
+    flights = tmp_path_factory.mktemp("undisturbed")
+    return fly_job(job_of(Good, flights), scenario(0.2), "flight", None)[1]
+
+
+@pytest.mark.parametrize("system", [HoldsTheLock, StopsClocks])
+def test_a_call_that_hangs_is_a_finding_whatever_it_does_to_the_process(
+    field: Field, undisturbed: str, system: type
+) -> None:
+    flown = field.fly(system, timeout_s=0.5)
+    assert flown.signature == "V:hung:Timeout"
+    assert flown.result["crash"]["message"] == (
+        "one call took longer than 1.5 s of wall time, twice"
+    )
+    assert flown.neighbour == undisturbed
+
+
+def test_a_hang_is_told_with_the_line_where_it_was(field: Field) -> None:
+    flown = field.fly(HoldsTheLock, timeout_s=0.5)
+    assert "misbehaving.py" in flown.result["crash"]["traceback"]
+    assert "in step" in flown.result["crash"]["traceback"]
+
+
+def works_between_calls(*args: Any, guard: Any, **more: Any) -> Any:
+    """Take long where no landing system is called, as the painting of the ground does."""
+    guard.step_begins()
+    guard.step_ends()
+    time.sleep(2.5)
+    return tiny_simulator.fly(*args, guard=guard, **more)
+
+
+def test_the_time_of_the_simulator_is_not_charged_to_the_system(field: Field) -> None:
+    flown = field.fly(Good, timeout_s=2.0, simulator=works_between_calls)
+    assert flown.result["outcome"] == "landed"
+    assert "retried" not in flown.meters
+
+
+def test_a_slow_flight_counts_as_if_it_had_had_more_time_at_once(
+    field: Field, tmp_path: Path
+) -> None:
+    flown = field.fly(Slow, timeout_s=1.0)
+    calm, sha256, _ = fly_job(job_of(Slow, tmp_path / "calm"), scenario(), "flight", None)
+    assert (flown.result, flown.sha256) == (json.loads(json.dumps(calm)), sha256)
+    assert flown.meters["retried"] == 1
+
+
+def test_a_process_that_dies_once_is_a_finding(field: Field, undisturbed: str) -> None:
+    flown = field.fly(DiesOnce)
+    assert flown.signature == "V:died:signal-11"
+    assert "in step" in flown.result["crash"]["traceback"]
+    assert "retried" not in flown.meters
+    assert flown.neighbour == undisturbed
+
+
+def test_a_process_that_dies_leaves_no_record_of_an_earlier_run(field: Field) -> None:
+    flights = field.folder / "flights"
+    flights.mkdir()
+    stale = flights / f"{flight_name('bad', 0, 0, 'lawn')}.npz"
+    stale.write_bytes(b"of an earlier run")
+    assert field.fly(Exits).signature == "V:died:exit-status-3"
+    assert not stale.exists()
+    assert (flights / f"{flight_name('good', 1, 0, 'lawn')}.npz").is_file()
+
+
+def test_a_process_that_is_killed_once_is_flown_again(field: Field) -> None:
+    flown = field.fly(KilledOnce)
+    assert flown.signature == ""
+    assert flown.meters["retried"] == 1
+
+
+def test_nobody_can_say_that_the_run_cannot_go_on(field: Field, undisturbed: str) -> None:
+    flown = field.fly(Pretends)
+    assert flown.signature == "V:died:exit-status-86"
+    assert flown.neighbour == undisturbed
+
+
+def test_what_a_flight_starts_ends_with_it(field: Field, undisturbed: str) -> None:
+    flown = field.fly(LeavesProcesses)
+    assert flown.signature == ""
+    assert flown.neighbour == undisturbed
+    # The neighbour flew in the next process, which was started when all of these had ended.
+    assert left("misbehaving.py") == set()
+
+
+def test_a_system_that_forks_is_flown_once(field: Field, undisturbed: str) -> None:
+    flown = field.fly(Forks)
+    assert flown.signature == ""
+    assert flown.meters["flights"] == 2
+    assert flown.neighbour == undisturbed
+
+
+@pytest.mark.parametrize(
+    ("system", "signature"),
+    [
+        (ClosesFiles, ""),
+        (OpensNothing, "V:broke:LedgerError"),
+        (ReplacesZeros, "V:broke:TypeError"),
+        (PretendsToZeros, ""),
+        (Floods, ""),
+        (WillNotEnd, ""),
+    ],
+)
+def test_what_harms_the_process_harms_nobody_else(
+    field: Field, undisturbed: str, system: type, signature: str
+) -> None:
+    flown = field.fly(system)
+    assert flown.signature == signature
+    assert flown.neighbour == undisturbed
+
+
+def test_a_simulator_that_fails_in_one_flight_alone_is_proved_by_the_reference_pilot(
+    field: Field,
+) -> None:
+    message = field.fly(ReplacesZeros).result["crash"]["message"]
+    assert message.startswith("the simulator, which flies the reference pilot, failed with TypeE")
+
+
+def test_children_end_when_asked_whatever_flew_in_them(tmp_path: Path) -> None:
+    field = Field(tmp_path)
+    field.fly(WillNotEnd)
+    children = [child.process for child in field.pool._children.values()]
+    field.pool.close()
+    # Nobody had to kill it.
+    assert [child.returncode for child in children] == [0]
+    field.ledger.close()
+
+
+def test_children_that_end_between_flights_end_no_run(field: Field) -> None:
+    job = job_of(Good, field.folder / "flights")
+    field.ledger.add_search("one", job.system.name, "lawn", 9, job.dumps())
+    for index in range(MOST_LOSSES + 2):
+        field.ledger.add_slots("one", index, {0: dump_scenario(scenario())})
+        slot = Slot(generation=index, index=0)
+        wait_for(field.ledger, field.pool, "one", slot, lambda: None)
+        (child,) = field.pool._children
+        os.kill(child, signal.SIGKILL)
+        while child in field.pool._children:
+            field.pool.turn()
+    assert field.ledger.meters()["flights"] == MOST_LOSSES + 2
+
+
+def test_children_that_end_before_they_fly_end_the_run(field: Field) -> None:
+    def kill_all() -> None:
+        for child in field.pool._children:
+            os.kill(child, signal.SIGKILL)
+
+    field.ledger.add_search("one", "s", "lawn", 1, "{}")
+    with pytest.raises(PoolError, match="flying children die before they fly"):
+        wait_for(field.ledger, field.pool, "one", NEXT, kill_all)
+
+
+def test_nothing_is_left_beside_the_ledger(tmp_path: Path) -> None:
+    field = Field(tmp_path)
+    field.fly(Good)
+    field.pool.close()
+    field.ledger.close()
+    assert {path.name for path in tmp_path.iterdir()} == {"ledger.sqlite", "flights"}
+
+
+def test_a_process_that_nothing_changed_flies_on(field: Field) -> None:
+    field.fly(Good)
+    (first,) = field.pool._children
+    job = job_of(Good, field.folder)
+    field.ledger.add_search("more", job.system.name, "lawn", 4, job.dumps())
+    field.ledger.add_slots("more", 2, {index: dump_scenario(scenario()) for index in range(4)})
+    for index in range(4):
+        wait_for(field.ledger, field.pool, "more", Slot(generation=2, index=index), lambda: None)
+    assert list(field.pool._children) == [first]
+
+
+def test_only_a_call_is_charged_until_nothing_goes_on_at_all(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    now = 1000.0
+    monkeypatch.setattr("pytest_garl.execution.supervisor.monotonic", lambda: now)
+    monkeypatch.setattr("pytest_garl.execution.supervisor.os.write", lambda *_: 0)
+    watch = Watch()
+    assert watch.overdue() == ""
+    watch.flight_begins(2.0)
+    now += 60.0
+    assert watch.overdue() == ""
+    watch.step_begins()
+    now += 1.9
+    assert watch.overdue() == ""
+    now += 0.2
+    assert watch.overdue() == "one call took longer than 2 s of wall time"
+    watch.step_ends()
+    now += LEAST_STANDSTILL_S - 1
+    assert watch.overdue() == ""
+    now += 2
+    assert watch.overdue() == "neither it nor the simulator went on for 120 s"
+    watch.flight_ends()
+    assert watch.overdue() == ""
+
+
+@pytest.mark.long
+def test_a_thread_that_holds_the_interpreter_between_calls_is_a_finding(
+    field: Field, undisturbed: str
+) -> None:
+    flown = field.fly(LeavesLock)
+    assert flown.signature == "V:hung:Timeout"
+    assert flown.neighbour == undisturbed

@@ -1,0 +1,129 @@
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from pytest_garl.execution.job import dump_scenario
+from pytest_garl.execution.ledger import Claim, Ledger
+from pytest_garl.execution.worker_failure import Death, settle
+from tests.execution.flying import Good, job_of, scenario
+
+DIED = Death(status=-11, complaint="no fuel")
+KILLED = Death(status=-9)
+BROKE = Death(status=0, failure=("TypeError", "no array", "Traceback"))
+HUNG = Death(status=-9, words="in step", hung="one call took longer than 30 s of wall time")
+
+
+@pytest.fixture
+def ledger(tmp_path: Path) -> Ledger:
+    ledger = Ledger.create(tmp_path / "ledger.sqlite", {})
+    job = job_of(Good, tmp_path / "flights")
+    ledger.add_search("s", "flying:Good", "lawn", 2, job.dumps())
+    ledger.add_slots("s", 0, {0: dump_scenario(scenario()), 1: dump_scenario(scenario(0.1))})
+    return ledger
+
+
+def claimed(ledger: Ledger) -> Claim:
+    claim = ledger.claim()
+    assert claim is not None
+    return claim
+
+
+def crash(ledger: Ledger) -> dict[str, Any]:
+    result = ledger.result("s", 0, 0)
+    assert result is not None
+    found: dict[str, Any] = result["crash"]
+    return found
+
+
+@pytest.mark.parametrize(
+    ("death", "after"), [(KILLED, "killed"), (HUNG, "hung"), (BROKE, "failed")]
+)
+def test_what_the_machine_may_have_done_is_flown_again_when_nobody_else_flies(
+    ledger: Ledger, death: Death, after: str
+) -> None:
+    first, other = claimed(ledger), claimed(ledger)
+    settle(ledger, first, death)
+    assert ledger.result("s", 0, 0) is None
+    assert ledger.claim() is None
+    ledger.record(other, {}, "", 0.0)
+    assert ledger.claim(flown="m:Class") is None
+    assert ledger.alone_waits()
+    again = claimed(ledger)
+    assert (again.slot, again.after, again.attempt) == (0, after, 2)
+    assert not ledger.alone_waits()
+    assert ledger.meters()["retried"] == 1
+
+
+def test_a_process_that_ends_itself_is_a_finding_at_once(ledger: Ledger) -> None:
+    settle(ledger, claimed(ledger), DIED)
+    result = ledger.result("s", 0, 0)
+    assert result is not None
+    assert result["verdict"]["signature"] == "V:died:signal-11"
+    assert result["crash"]["message"] == "its process ended with signal 11"
+    assert result["crash"]["traceback"] == "no fuel"
+    assert "retried" not in ledger.meters()
+
+
+@pytest.mark.parametrize(
+    ("death", "signature", "message"),
+    [
+        (KILLED, "V:died:signal-9", "its process ended with signal 9, twice"),
+        (HUNG, "V:hung:Timeout", "one call took longer than 30 s of wall time, twice"),
+        (
+            BROKE,
+            "V:broke:TypeError",
+            "the simulator, which flies the reference pilot, failed with TypeError: no array, "
+            "twice",
+        ),
+    ],
+)
+def test_what_happens_again_alone_is_a_finding(
+    ledger: Ledger, death: Death, signature: str, message: str
+) -> None:
+    first = claimed(ledger)
+    ledger.record(claimed(ledger), {}, "", 0.0)
+    settle(ledger, first, death)
+    settle(ledger, claimed(ledger), death)
+    result = ledger.result("s", 0, 0)
+    assert result is not None
+    assert result["verdict"]["signature"] == signature
+    assert crash(ledger)["message"] == message
+
+
+def test_three_flights_that_end_each_in_another_way_leave_it_undecided(ledger: Ledger) -> None:
+    first = claimed(ledger)
+    ledger.record(claimed(ledger), {}, "", 0.0)
+    settle(ledger, first, HUNG)
+    settle(ledger, claimed(ledger), KILLED)
+    third = claimed(ledger)
+    assert (third.after, third.attempt) == ("hung killed", 3)
+    settle(ledger, third, BROKE)
+    result = ledger.result("s", 0, 0)
+    assert result is not None
+    assert (result["outcome"], result["verdict"]["signature"]) == ("inconclusive", "")
+    assert result["undecided"].startswith("each of 3 flights ended its process in a different way")
+
+
+def test_a_finding_after_another_death_is_one(ledger: Ledger) -> None:
+    first = claimed(ledger)
+    ledger.record(claimed(ledger), {}, "", 0.0)
+    settle(ledger, first, KILLED)
+    settle(ledger, claimed(ledger), DIED)
+    assert crash(ledger)["message"] == "its process ended with signal 11"
+
+
+def test_what_is_given_back_is_flown_as_if_it_had_not_been_claimed(ledger: Ledger) -> None:
+    first = claimed(ledger)
+    ledger.give_back(first)
+    assert claimed(ledger) == first
+    ledger.record(claimed(ledger), {}, "", 0.0)
+    settle(ledger, first, HUNG)
+    alone = claimed(ledger)
+    assert (alone.after, alone.attempt) == ("hung", 2)
+    ledger.give_back(alone)
+    assert claimed(ledger) == alone
+    ledger.release(alone.pid)
+    assert claimed(ledger) == alone

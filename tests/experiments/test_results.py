@@ -1,0 +1,88 @@
+from __future__ import annotations
+
+import multiprocessing
+from pathlib import Path
+
+import pytest
+
+from pytest_garl.experiments.results import ExperimentError, append, read
+from tests.experiments.samples import PLAIN, row
+
+BARE = row(
+    seed=1, top10=None, unavoidable=None, piloted=None, signatures=(), violating_distance=None
+)
+
+
+def add(path: Path, seeds: range) -> None:
+    for seed in seeds:
+        append(path, [row(seed=seed, map=map) for map in ("court", "lawn")])
+
+
+def test_what_is_appended_is_read_again(tmp_path: Path) -> None:
+    path = tmp_path / "new" / "rows.csv"
+    assert read(path) == ()
+    append(path, [row()])
+    append(path, [BARE])
+    assert read(path) == (row(), BARE)
+    head, first, second = path.read_text().splitlines()
+    assert head.split(",") == list(PLAIN)
+    assert first.startswith("Lander,court,garl,0,40,10,1,2,0,6,1,3,1,0,4,0,1,4,30,II:lost:descent|")
+    assert ",,,,,1.5000,0.1250,," in second
+
+
+def test_a_search_has_one_row(tmp_path: Path) -> None:
+    path = tmp_path / "rows.csv"
+    append(path, [row()])
+    append(path, [row(violations=11), BARE])
+    assert read(path) == (row(), BARE)
+
+
+def test_processes_that_append_at_once_lose_nothing(tmp_path: Path) -> None:
+    path = tmp_path / "rows.csv"
+    context = multiprocessing.get_context("spawn")
+    processes = [
+        context.Process(target=add, args=(path, range(start, start + 8))) for start in (0, 4)
+    ]
+    for process in processes:
+        process.start()
+    for process in processes:
+        process.join()
+    found = read(path)
+    assert {each.key for each in found} == {
+        ("Lander", map, "garl", seed, 40) for map in ("court", "lawn") for seed in range(12)
+    }
+    assert len(found) == 24
+
+
+@pytest.mark.parametrize(
+    ("before", "after", "words"),
+    [
+        (
+            ",40,10,",
+            ",40,ten,",
+            "line 2: column 'violations': found 'ten', expected a whole number",
+        ),
+        (",1.5000,", ",nan,", "column 'parameter_distance': found 'nan', expected a number"),
+        (",eeeeeeeeeeee", "", "line 2: found too few cells, expected 37"),
+        (",eeeeeeeeeeee", ",e,e", "line 2: found too many cells, expected 37"),
+        (",seed,", ",seeds,", "found other columns than expected: seed, seeds"),
+        ("map,method", "method,map", "found other columns than expected, in another order"),
+        (",40,10,", ',40,"10"0,', "line 2: not valid CSV"),
+    ],
+)
+def test_a_broken_file_names_line_and_column(
+    tmp_path: Path, before: str, after: str, words: str
+) -> None:
+    path = tmp_path / "rows.csv"
+    append(path, [row()])
+    path.write_text(path.read_text().replace(before, after, 1))
+    with pytest.raises(ExperimentError) as caught:
+        read(path)
+    assert words in str(caught.value)
+    assert str(path) in str(caught.value)
+
+
+def test_bytes_that_are_no_text_are_told(tmp_path: Path) -> None:
+    (tmp_path / "rows.csv").write_bytes(b"\xff\xfe")
+    with pytest.raises(ExperimentError, match="cannot be read"):
+        read(tmp_path / "rows.csv")

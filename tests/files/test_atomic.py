@@ -1,0 +1,44 @@
+from __future__ import annotations
+
+import multiprocessing
+import time
+from pathlib import Path
+
+import pytest
+
+from pytest_garl.files.atomic import SavingError, alone, save_text
+
+
+def add_one(path: Path) -> None:
+    for _ in range(20):
+        with alone(path.parent):
+            count = int(path.read_text())
+            time.sleep(0.001)
+            save_text(path, str(count + 1))
+
+
+def test_who_is_alone_loses_nothing(tmp_path: Path) -> None:
+    path = save_text(tmp_path / "deep" / "count", "0")
+    context = multiprocessing.get_context("spawn")
+    processes = [context.Process(target=add_one, args=(path,)) for _ in range(2)]
+    for process in processes:
+        process.start()
+    for process in processes:
+        process.join()
+    assert path.read_text() == "40"
+    assert [each.name for each in path.parent.iterdir()] == ["count"]
+
+
+def test_line_ends_stay_as_they_are(tmp_path: Path) -> None:
+    assert save_text(tmp_path / "a", "ü\r\nb\n").read_bytes() == "ü\r\nb\n".encode()
+
+
+def test_where_nothing_can_be_written_is_told(tmp_path: Path) -> None:
+    (tmp_path / "file").touch()
+    with pytest.raises(SavingError, match=r"file/a.csv: cannot be saved \(.*file"):
+        save_text(tmp_path / "file" / "a.csv", "")
+    with (
+        pytest.raises(SavingError, match="file: nothing can be saved here"),
+        alone(tmp_path / "file"),
+    ):
+        pass

@@ -1,0 +1,227 @@
+from __future__ import annotations
+
+import dataclasses
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from pytest_garl.errors import ScenarioError
+from pytest_garl.messages import printable
+from pytest_garl.regressions.case import Case, Evidence, Violation
+from pytest_garl.regressions.case_file import dumps, loads
+from pytest_garl.regressions.corpus import entries, every_entry, patch_of, replace, save
+from pytest_garl.scenarios.chromosome import decode
+from pytest_garl.scenarios.genes import genome_for, with_destinations
+from pytest_garl.scenarios.maps.map import load_map
+from pytest_garl.scenarios.validity import repair
+from pytest_garl.verdicts.verdict import Limits
+
+LAWN = load_map("lawn")
+NAMES = [name for name, _ in LAWN.object_names]
+SYSTEM = "stack.landing:Lander"
+
+
+def case(signature: str = "IV:dog:last-metre:unseen", story: str = "A dog. It bites.") -> Case:
+    genome = genome_for(LAWN)
+    row = genome.random(np.random.default_rng(1))
+    scenario = repair(decode(row, genome, map="lawn", seed=9), LAWN).without(*NAMES[:-1])
+    return Case(
+        system=SYSTEM,
+        status="open",
+        avoidable="live",
+        scenario=scenario,
+        violation=Violation(
+            signature=signature,
+            type="IV",
+            property="collision",
+            margin=0.0,
+            unit="m",
+            story=story,
+        ),
+        policy="dqn",
+        policy_sha256="ab" * 32,
+        moves=((NAMES[-1], ((0.0, 0.0), (0.0, 0.0), (0.6, -0.8))),),
+        evidence=Evidence(
+            trajectory_sha256="cd" * 32,
+            cpu="x86_64-avx2",
+            map_sha256=LAWN.sha256,
+            neighbours=3,
+            neighbours_failed=3,
+            removed="3 of 4 objects",
+            versions=(("pytest-garl", "0.1.0"), ("numpy", "2.4.0")),
+        ),
+        limits=Limits(),
+    )
+
+
+def test_a_case_survives_its_file_and_has_the_same_bytes_again() -> None:
+    text = dumps(case())
+    assert loads(text, load_map) == case()
+    assert dumps(loads(text, load_map)) == text
+
+
+@settings(deadline=None)
+@given(st.text())
+def test_no_story_breaks_the_file(story: str) -> None:
+    strange = case(story=story)
+    assert loads(dumps(strange), load_map) == case(story=printable(story))
+
+
+def test_a_case_with_destinations_survives_its_file() -> None:
+    genome = with_destinations(genome_for(LAWN))
+    row = genome.random(np.random.default_rng(1))
+    scenario = repair(decode(row, genome, map="lawn", seed=9), LAWN).without(*NAMES[:-1])
+    bound = dataclasses.replace(case(), scenario=scenario, policy="destination")
+    assert loads(dumps(bound), load_map) == bound
+
+
+def changing() -> Case:
+    changes = ((0, "environment.fog", 0.01), (2, "environment.sun_position", -0.01))
+    return dataclasses.replace(case(), policy="online-rl", changes=((NAMES[-1], changes),))
+
+
+def test_what_a_policy_changed_of_the_environment_survives_the_file() -> None:
+    text = dumps(changing())
+    assert f'{NAMES[-1]} = [[0, "environment.fog", 0.01], [2, "environment.sun_position"' in text
+    assert loads(text, load_map) == changing()
+    assert dumps(loads(text, load_map)) == text
+    assert changing().id != case().id
+    assert "[changes]" not in dumps(case())
+
+
+def test_names_with_quotes_and_backslashes_survive_the_file() -> None:
+    strange = dataclasses.replace(case(), system="stack:Länder", test='te"st.py::test\\it')
+    odd = dataclasses.replace(LAWN, name='la"wn\\')
+    strange = dataclasses.replace(
+        strange, scenario=dataclasses.replace(strange.scenario, map=odd.name)
+    )
+    assert loads(dumps(strange), lambda _: odd) == strange
+
+
+def test_a_case_keeps_the_test_that_found_it_and_the_hashes_of_the_sources() -> None:
+    plain = case()
+    evidence = dataclasses.replace(
+        plain.evidence, system_sha256="ef" * 32, simulator_sha256="12" * 32
+    )
+    told = dataclasses.replace(plain, test="tests/test_it.py::TestIt::test_a", evidence=evidence)
+    assert loads(dumps(told), load_map) == told
+    assert told.id == plain.id
+    assert told.own_test == ""
+
+
+def test_a_case_of_a_tests_own_assertion_belongs_to_that_test_wherever_its_file_is() -> None:
+    old = dataclasses.replace(case(), test="test_own", assertion="12345678")
+    told = dataclasses.replace(old, test="tests/test_it.py::test_own")
+    assert loads(dumps(old), load_map) == old
+    assert (told.own_test, told.id) == ("test_own", old.id)
+    assert told.id != case().id
+
+
+@pytest.mark.parametrize(
+    ("old", "new"),
+    [
+        ("[0, ", "[-1, "),
+        ("[0, ", "[0.5, "),
+        ('"environment.fog"', '"wind.x"'),
+        ("0.01]", "nan]"),
+        ("0.01]", '"a little"]'),
+        ("0.01]", "0.01, 3]"),
+    ],
+)
+def test_changes_that_make_no_sense_name_source_and_key(old: str, new: str) -> None:
+    text = dumps(changing())
+    start = text.index("[changes]")
+    broken = text[:start] + text[start:].replace(old, new, 1)
+    words = rf"lawn-x.toml: key 'changes.{NAMES[-1]}': found .* expected a list of \[decision, gene"
+    with pytest.raises(ScenarioError, match=words):
+        loads(broken, load_map, source="lawn-x.toml")
+
+
+def test_an_unknown_object_changes_nothing() -> None:
+    text = dumps(changing()).replace(f'{NAMES[-1]} = [[0, "env', 'cat-1 = [[0, "env')
+    with pytest.raises(ScenarioError, match=r"'changes.cat-1': unknown key"):
+        loads(text, load_map)
+
+
+def test_a_negative_zero_survives_the_file_with_the_name() -> None:
+    plain = dataclasses.replace(
+        case(), moves=((NAMES[-1], ((0.0, 0.0), (0.0, -0.0), (-0.0, 0.0))),)
+    )
+    again = loads(dumps(plain), load_map)
+    assert repr(again.moves) == repr(plain.moves)
+    assert again.id == plain.id
+
+
+def test_moves_are_written_as_runs() -> None:
+    assert f"{NAMES[-1]} = [[2, 0.0, 0.0], [1, 0.6, -0.8]]" in dumps(case())
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "words"),
+    [
+        ("[[2, 0.0, 0.0]", "[[2.5, 0.0, 0.0]", "expected a list of \\[times, x, y\\]"),
+        ("[[2, 0.0, 0.0]", "[[0, 0.0, 0.0]", "times of at least 1"),
+        ("0.6, -0.8", "0.9, -0.8", "at most 1"),
+        ("0.6, -0.8", "nan, -0.8", "at most 1"),
+        ('status = "open"', 'status = "known"', "'status': found 'known'"),
+        ("[policy]", "[polices]", "'polices': unknown key"),
+        ("neighbours = 3", "neighbours = -3", "'evidence.neighbours'"),
+        ("time_s = 120.0", "time_s = -1.0", "'limits.time_s'"),
+        ('"stack.landing:Lander"', '"Lander"', "expected 'module:class'"),
+    ],
+)
+def test_a_broken_file_names_source_and_key(old: str, new: str, words: str) -> None:
+    text = dumps(case())
+    assert old in text
+    with pytest.raises(ScenarioError, match=words) as caught:
+        loads(text.replace(old, new), load_map, source="lawn-x.toml")
+    assert "lawn-x.toml" in str(caught.value)
+
+
+def test_the_name_tells_map_type_and_subject_and_differs_between_scenarios() -> None:
+    first, other = case(), case(signature="IV:dog:descent:seen")
+    assert first.id.startswith("lawn-IV-dog-")
+    assert len(first.id) == len("lawn-IV-dog-") + 6
+    assert first.id != other.id
+    fixed = dataclasses.replace(first, status="fixed")
+    assert fixed.id == first.id
+    assert case(signature="V:PlannerError@planning_ego").id.startswith("lawn-V-PlannerError-")
+    assert case(signature="I?:unknown").id.startswith("lawn-I-unknown-")
+
+
+def test_one_file_per_way_to_fail(tmp_path: Path) -> None:
+    path = save(tmp_path, case())
+    assert path == tmp_path / "landing" / f"{case().id}.toml"
+    assert save(tmp_path, case(story="Another flight, the same signature.")) is None
+    assert save(tmp_path, case(signature="IV:dog:descent:seen")) is not None
+    assert len(every_entry(tmp_path, ())) == 2
+
+
+def test_what_was_fixed_and_comes_back_is_saved_anew(tmp_path: Path) -> None:
+    path = save(tmp_path, case())
+    assert path is not None
+    replace(path, dataclasses.replace(case(), status="fixed"))
+    again = dataclasses.replace(case(), policy="greedy", moves=((NAMES[-1], ()),))
+    assert save(tmp_path, again) is not None
+    found = entries(tmp_path, SYSTEM, ())
+    assert sorted(each.case.status for each in found if each.case) == ["fixed", "open"]
+
+
+def test_a_file_that_changes_is_read_again(tmp_path: Path) -> None:
+    path = save(tmp_path, case())
+    assert path is not None
+    assert entries(tmp_path, SYSTEM, ())[0].case == case()
+    path.write_text("schema = ")
+    assert "not valid TOML" in entries(tmp_path, SYSTEM, ())[0].problem
+
+
+def test_a_patch_says_how_to_make_the_file(tmp_path: Path) -> None:
+    patch = patch_of(tmp_path / "scenarios" / "a.toml", tmp_path, "one\ntwo\n")
+    assert patch.splitlines()[:2] == [
+        "diff --git a/scenarios/a.toml b/scenarios/a.toml",
+        "new file mode 100644",
+    ]
+    assert patch.endswith("@@ -0,0 +1,2 @@\n+one\n+two\n")

@@ -1,0 +1,207 @@
+from __future__ import annotations
+
+import dataclasses
+import random
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from pytest_garl.adversary.scripted import policy_spec
+from pytest_garl.execution.job import Job
+from pytest_garl.execution.on_demand import Done
+from pytest_garl.execution.reference import BUILT_IN, Reference, simulator_sha256
+from pytest_garl.regressions.case import Case
+from pytest_garl.regressions.case_file import size_of
+from pytest_garl.regressions.case_request import Inquiry
+from pytest_garl.regressions.investigation import LEAST, Pursuit
+from pytest_garl.regressions.reshrink import LEAST as LEAST_AGAIN
+from pytest_garl.regressions.reshrink import Continued, _all_removed
+from pytest_garl.regressions.robustness import neighbours
+from pytest_garl.regressions.simplicity import no_worse, simplicity
+from pytest_garl.scenarios.scenario import Scenario
+from pytest_garl.verdicts.verdict import Limits
+from tests.regressions.test_case_file import LAWN, NAMES
+from tests.regressions.test_case_file import case as dog_case
+from tests.regressions.test_shrink import CULPRIT, violation
+
+SIGNATURE = "IV:dog:last-metre:unseen"
+Fails = Callable[[Scenario, str], bool]
+JOB = Job(
+    system=Reference(module="stack.landing", file="", qualname="Lander"),
+    system_sha256="ab" * 32,
+    simulator=BUILT_IN,
+    map="lawn",
+    map_sha256=LAWN.sha256,
+    map_folders=(),
+    npcs=policy_spec("stationary"),
+    limits=Limits(),
+    timeout_s=10.0,
+    path=(),
+    flights="/nowhere",
+)
+
+
+def result(signature: str) -> dict[str, Any]:
+    verdict: dict[str, Any] = {
+        "outcome": "collision" if signature else "landed",
+        "primary": "collision" if signature else None,
+        "violation_type": "IV" if signature else None,
+        "signature": signature,
+        "paper_violation": bool(signature),
+        "margins": [],
+        "story": "A story.",
+    }
+    return {"verdict": verdict, "collisions": [CULPRIT] if signature else [], "crash": None}
+
+
+class Flights:
+    """Stands for the simulator: which scenarios fail, steered by whom; counts what is flown."""
+
+    def __init__(self, fails: Fails) -> None:
+        self.fails, self.count = fails, 0
+
+    def __call__(self, job: Job, scenario: Scenario) -> Done:
+        self.count += 1
+        pilot = job.system.qualname == "ReferencePilot"
+        failed = not pilot and self.fails(scenario, job.npcs.name)
+        return Done(
+            result=result(SIGNATURE if failed else ""), sha256="cd" * 32, record=Path("/nowhere/x")
+        )
+
+
+def inquiry(budget: int, *scenarios: Scenario) -> Inquiry:
+    found = Done(result=result(SIGNATURE), sha256="", record=Path("/nowhere/x"))
+    return Inquiry(
+        name=f"search {SIGNATURE}",
+        signature=SIGNATURE,
+        violations=tuple((each, found) for each in scenarios),
+        job=JOB,
+        map=LAWN,
+        budget=budget,
+    )
+
+
+def saved(scenario: Scenario, *, neighbours_failed: int = 3) -> Case:
+    evidence = dataclasses.replace(
+        dog_case().evidence,
+        system_sha256=JOB.system_sha256,
+        simulator_sha256=simulator_sha256(BUILT_IN),
+        neighbours_failed=neighbours_failed,
+        removed="0 of 4 objects, 1 of 15 genes off nominal",
+    )
+    names = [name for name in NAMES if name not in scenario.absent]
+    moves = tuple((name, ((0.0, 0.0), (0.5, -0.25))) for name in names)
+    return dataclasses.replace(
+        dog_case(), scenario=scenario, moves=moves, evidence=evidence, policy="stationary"
+    )
+
+
+def shrunk(case: Case, fails: Fails, flights: int = 60) -> tuple[Case | None, int]:
+    fly = Flights(fails)
+    finding = Continued(inquiry(flights), fly, case).run()
+    assert finding.flights == fly.count <= flights
+    return finding.case, fly.count
+
+
+FIRST = violation().replace({f"{CULPRIT}.velocity": 0.9, "environment.fog": 0.12})
+
+
+def by_record(scenario: Scenario, npcs: str) -> bool:
+    return npcs == "recorded" and CULPRIT not in scenario.absent
+
+
+def test_a_case_is_shrunk_from_its_own_record() -> None:
+    case = saved(FIRST)
+    better, _ = shrunk(case, by_record)
+    assert better is not None
+    assert set(better.scenario.absent) == {*NAMES} - {CULPRIT}
+    assert better.moves == ((CULPRIT, dict(case.moves)[CULPRIT]),)
+    assert better.scenario["environment.fog"] == 0.0
+    assert better.evidence.removed.startswith("3 of 4 objects, ")
+    assert no_worse(simplicity(better, LAWN), simplicity(case, LAWN))
+
+
+def test_what_only_a_policy_makes_simpler_is_found_as_well() -> None:
+    records = {FIRST}
+
+    def fails(scenario: Scenario, npcs: str) -> bool:
+        # A record strikes only where it was made; a policy strikes wherever the culprit is.
+        if npcs == "recorded":
+            near = [neighbour for each in records for neighbour in neighbours(each, LAWN)]
+            return scenario in records or scenario in near
+        records.add(scenario)
+        return CULPRIT not in scenario.absent
+
+    better, _ = shrunk(saved(FIRST), fails)
+    assert better is not None
+    assert set(better.scenario.absent) == {*NAMES} - {CULPRIT}
+
+
+@pytest.mark.parametrize("seed", range(30))
+def test_a_case_never_becomes_worse_in_any_respect(seed: int) -> None:
+    chance = random.Random(seed)
+    answers: dict[tuple[Scenario, str], bool] = {}
+
+    def fails(scenario: Scenario, npcs: str) -> bool:
+        likely = chance.random() < 0.6
+        return scenario == FIRST or answers.setdefault((scenario, npcs), likely)
+
+    case = saved(FIRST, neighbours_failed=chance.randrange(4))
+    better, flights = shrunk(case, fails, chance.randrange(LEAST_AGAIN, 50))
+    assert flights >= 1
+    if better is not None:
+        one, other = simplicity(better, LAWN), simplicity(case, LAWN)
+        assert no_worse(one, other)
+        assert one != other or size_of(better) < size_of(case)
+
+
+def test_what_fails_only_as_it_is_stays_as_it_is() -> None:
+    better, _ = shrunk(saved(FIRST), lambda scenario, _: scenario == FIRST)
+    assert better is None
+
+
+def test_evidence_of_other_sources_is_renewed() -> None:
+    case = saved(FIRST)
+    old = dataclasses.replace(case.evidence, simulator_sha256="00" * 32)
+    around = (FIRST, *neighbours(FIRST, LAWN))
+    better, _ = shrunk(
+        dataclasses.replace(case, evidence=old), lambda scenario, _: scenario in around
+    )
+    assert better is not None
+    assert (better.id, better.scenario) == (case.id, case.scenario)
+    assert better.evidence.simulator_sha256 == simulator_sha256(BUILT_IN)
+    assert better.evidence.neighbours_failed == 3
+
+
+@pytest.mark.parametrize("seed", range(40))
+def test_a_pursuit_never_flies_more_than_its_budget(seed: int) -> None:
+    chance = random.Random(seed)
+    share, budget = chance.random(), chance.randrange(LEAST, 40)
+    fly = Flights(lambda *_: chance.random() < share)
+    scenarios = [violation(seed=100 * seed + number) for number in range(4)]
+    finding = Pursuit(inquiry(budget, *scenarios), fly).run()
+    assert finding.flights == fly.count <= budget
+
+
+def test_a_pursuit_steps_back_until_all_neighbours_fail() -> None:
+    def fails(scenario: Scenario, npcs: str) -> bool:
+        # On the edge: near nominal fog it fails at round values alone.
+        fog = scenario["environment.fog"]
+        return fog >= 0.04 or (0 < fog < 0.04 and round(fog, 2) == fog)
+
+    finding = Pursuit(inquiry(60, FIRST), Flights(fails)).run()
+    assert finding.case is not None
+    assert finding.case.evidence.neighbours_failed == 3
+    assert finding.case.scenario["environment.fog"] >= 0.04
+
+
+def test_what_was_removed_adds_up() -> None:
+    one, two = (
+        "1 of 4 objects, 2 of 14 genes off nominal",
+        "2 of 3 objects, 5 of 12 genes off nominal",
+    )
+    assert _all_removed(one, two) == "3 of 4 objects, 7 of 14 genes off nominal"
+    assert _all_removed(one, "nothing") == one
+    assert _all_removed("nothing", two) == two

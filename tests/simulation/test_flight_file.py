@@ -1,0 +1,196 @@
+from __future__ import annotations
+
+import io
+import json
+import os
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from pytest_garl.errors import GarlError
+from pytest_garl.landing_system import Detection, Diagnostics
+from pytest_garl.simulation import flight_file
+from pytest_garl.simulation.flight import (
+    Contact,
+    Crash,
+    Event,
+    Flight,
+    ObjectRecord,
+    Separation,
+    Step,
+    Track,
+)
+
+Header = dict[str, Any]
+
+
+def _track(length: int = 3) -> Track:
+    return Track(
+        time_s=np.arange(length) / 24,
+        position_m=np.ones((length, 3)),
+        attitude=np.tile([0.0, 0.0, 0.0, 1.0], (length, 1)),
+        velocity_mps=np.zeros((length, 3)),
+    )
+
+
+def flight() -> Flight:
+    seen = Detection(marker_id=3, confidence=0.5, position_m=(1.0, 2.0, 0.0))
+    thoughts = Diagnostics(phase="descend", detections=(seen,), planned_path_m=((0.0, 1.0, 2.0),))
+    return Flight(
+        outcome="collision",
+        final_distance_m=2.5,
+        elapsed_s=14.0,
+        marker_position_m=(1.0, -2.0),
+        uav=_track(),
+        objects=(
+            ObjectRecord(
+                name="dog-1",
+                type="dog",
+                track=_track(),
+                moves=np.zeros((2, 2)),
+                changes=((0, "environment.fog", 0.01),),
+            ),
+        ),
+        contacts=(
+            Contact(
+                time_s=14.0,
+                body="dog-1",
+                kind="dog",
+                body_class="dynamic",
+                position_m=(0.0, 0.0, 1.0),
+                speed_mps=1.0,
+                tilt_rad=0.0,
+            ),
+        ),
+        separations=(
+            Separation(body="tree-1", kind="tree", body_class="static", distance_m=1.0, time_s=2.0),
+        ),
+        events=(Event(time_s=1.0, name="took_off", text="left the ground"),),
+        steps=(
+            Step(
+                time_s=0.1,
+                command="Land",
+                marker_visible=0.5,
+                marker_px=20.0,
+                objects_visible=("dog-1",),
+                diagnostics=thoughts,
+            ),
+        ),
+        decoys=(("marker-3", 1.0, 2.0),),
+        crash=Crash(kind="raised", error="E", message="m", where="w", traceback="t"),
+        sha256="ab",
+        cpu="x",
+        versions=(("numpy", "2"),),
+        wall_s=1.0,
+    )
+
+
+@pytest.fixture
+def file(tmp_path: Path) -> Path:
+    flight_file.save(flight(), tmp_path / "one.npz")
+    return tmp_path / "one.npz"
+
+
+def _rewritten(file: Path, change: Callable[[dict[str, Any], Header], None]) -> None:
+    with np.load(file) as saved:
+        arrays = dict(saved)
+    header = json.loads(arrays.pop("header").tobytes())
+    change(arrays, header)
+    text = header if isinstance(header, str) else json.dumps(header)
+    arrays.setdefault("header", np.frombuffer(text.encode(), dtype=np.uint8))
+    buffer = io.BytesIO()
+    np.savez_compressed(buffer, **arrays)
+    file.write_bytes(buffer.getvalue())
+
+
+def test_a_flight_survives_its_file_to_the_byte(file: Path, tmp_path: Path) -> None:
+    found = flight_file.load(file)
+    assert flight_file.hash_of(found) == flight_file.hash_of(flight())
+    for name in ("contacts", "separations", "events", "steps", "decoys", "crash", "versions"):
+        assert getattr(found, name) == getattr(flight(), name)
+    assert found.objects[0].changes == flight().objects[0].changes
+    flight_file.save(found, tmp_path / "two.npz")
+    assert (tmp_path / "two.npz").read_bytes() == file.read_bytes()
+
+
+def test_a_file_in_which_nothing_changed_the_environment_is_read(file: Path) -> None:
+    _rewritten(file, lambda _, header: header.pop("changes"))
+    assert flight_file.load(file).objects[0].changes == ()
+
+
+def _set(key: str, value: Any) -> Callable[[Any, Header], None]:
+    return lambda _, header: header.update({key: value})
+
+
+def _array(key: str, value: Any) -> Callable[[dict[str, Any], Any], None]:
+    return lambda arrays, _: arrays.update({key: value})
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        (lambda _, header: header.pop("steps"), "the whole: found other keys .*: steps"),
+        (_set("outcome", "gone"), "outcome: found 'gone', expected one of 'landed'"),
+        (_set("elapsed_s", "x" * 9000), "elapsed_s: found 'xxx.* expected a finite number"),
+        (_set("marker_position_m", [1]), "marker_position_m: found .1., expected a list of 2"),
+        (_set("objects", [["dog-1"]]), r"objects\[0\]: found \['dog-1'\], expected a list of 2"),
+        (_set("objects", []), "found more arrays than 0 objects have: 1.attitude"),
+        (_set("objects", [["dog-1", "dog"], ["a", "b"]]), "2.time_s: missing"),
+        (_set("changes", []), "changes: found those of 0 objects, expected 1"),
+        (_set("crash", {"kind": "raised"}), "crash: found other keys than expected"),
+        (_set("steps", [[]]), r"steps\[0\]: found \[\], expected a table"),
+        (_array("header", np.frombuffer(b"[" * 99_999, np.uint8)), "nested too deeply"),
+        (_array("header", np.frombuffer(b"[]", np.uint8)), r"found \[\], expected a table"),
+        (_array("0.time_s", np.empty(0)), "0.time_s: found no times"),
+        (_array("0.time_s", np.zeros((3, 1))), r"0.time_s: found .* \(3, 1\), expected .* \(any\)"),
+        (_array("1.attitude", np.zeros((2, 4))), r"1.attitude: found .* expected float64 of \(3,"),
+        (_array("1.moves", np.zeros((2, 3))), r"1.moves: found .* of \(any, 2\)"),
+        (_array("0.position_m", np.zeros((3, 3), np.float32)), "0.position_m: found float32"),
+        (_array("0.position_m", np.full((3, 3), np.nan)), "0.position_m: found a number that is"),
+        (_array("2.moves", np.zeros((2, 2))), "found more arrays than 1 objects have: 2.moves"),
+    ],
+)
+def test_a_damaged_flight_is_one_short_error(
+    file: Path, change: Callable[[Any, Any], None], words: str
+) -> None:
+    _rewritten(file, change)
+    with pytest.raises(GarlError, match=words) as caught:
+        flight_file.load(file)
+    assert str(caught.value).startswith(f"{file}: not a saved flight: ")
+    assert len(str(caught.value)) < 500
+
+
+@pytest.mark.parametrize("damage", ["cut", "foreign", "missing", "pipe", "flipped"])
+def test_a_file_that_is_no_flight_is_one_short_error(file: Path, damage: str) -> None:
+    content = bytearray(file.read_bytes())
+    file.unlink()
+    content[len(content) // 2] ^= 0x55
+    if damage == "pipe":
+        os.mkfifo(file)
+    elif damage != "missing":
+        file.write_bytes(
+            {"cut": bytes(content[:-50]), "foreign": b"x", "flipped": bytes(content)}[damage]
+        )
+    with pytest.raises(GarlError, match=r"one\.npz: "):
+        flight_file.load(file)
+
+
+def test_a_flight_larger_than_the_memory_is_refused(
+    file: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    size = file.stat().st_size
+    monkeypatch.setattr(flight_file, "LARGEST_BYTES", size)
+    assert flight_file.load(file).outcome == "collision"
+    monkeypatch.setattr(flight_file, "LARGEST_BYTES", size - 1)
+    with pytest.raises(GarlError, match=f"found {size} bytes, expected at most {size - 1}"):
+        flight_file.load(file)
+    monkeypatch.setattr(flight_file, "LARGEST_BYTES", size)
+    monkeypatch.setattr(flight_file, "LARGEST_HEADER_BYTES", 100)
+    with pytest.raises(GarlError, match=r"header: found .* bytes, expected at most 100"):
+        flight_file.load(file)
+    monkeypatch.setattr(flight_file, "LARGEST_UNPACKED_BYTES", 500)
+    with pytest.raises(GarlError, match="bytes when unpacked, expected at most 500"):
+        flight_file.load(file)

@@ -1,0 +1,42 @@
+from __future__ import annotations
+
+import pytest
+
+from pytest_garl.verdicts.wording import headline
+
+PLACE = "At 32.7 s the UAV was 1.4 m up, over the marker."
+
+
+@pytest.mark.parametrize(
+    ("story", "expected"),
+    [
+        (
+            "Collided with person-2 at 2.6 m/s. The camera had it in view within the last 2 s. "
+            f"{PLACE} In the last 2 s 7 % of the marker was hidden or out of the frame.",
+            "collided with person-2 at 2.6 m/s, 1.4 m up, over the marker",
+        ),
+        (
+            f"The landing system raised: IndexError: list index. Out of range. {PLACE}",
+            "Python error IndexError: list index. Out of range, 1.4 m up, over the marker",
+        ),
+        (
+            f"The landing system returned nonsense: BadCommand: step returned 3. {PLACE}",
+            "the landing system returned nonsense: BadCommand: step returned 3, 1.4 m up, over the "
+            "marker",
+        ),
+        (
+            f"Landed 3.0 m off the marker; it does not say on what. {PLACE}",
+            "landed 3.0 m off the marker, 1.4 m up, over the marker",
+        ),
+        (
+            "Not landed; the marker was never detected. "
+            "At 120.0 s the UAV was 9.1 m up, 4.0 m east of the marker.",
+            "not landed; the marker was never detected, 9.1 m up, 4.0 m east of the marker",
+        ),
+        ("The landing system hung: step took 10 s.", "the landing system hung: step took 10 s"),
+        (f"Landed after 21.3 s. {PLACE}", "landed after 21.3 s, 1.4 m up, over the marker"),
+        ("", ""),
+    ],
+)
+def test_a_story_becomes_half_a_line(story: str, expected: str) -> None:
+    assert headline(story) == expected

@@ -1,0 +1,76 @@
+"""Look at what a policy does with a person, a dog and a bird: one flight each that it hit.
+
+``python -m tools.look_movers`` flies OpenCV-MLS through random scenarios with one object in
+clear weather until that object is hit, writes its last seconds to ``.garl/mover-<kind>.png`` and
+prints where UAV and object were.
+"""
+
+from __future__ import annotations
+
+import argparse
+import dataclasses
+from pathlib import Path
+
+import cv2
+import numpy as np
+
+from landing_systems.opencv_mls import OpenCvLandingSystem
+from pytest_garl.adversary.scripted import policy_spec
+from pytest_garl.landing_system import Camera
+from pytest_garl.scenarios.genes import WEATHER, genome_for
+from pytest_garl.scenarios.maps.map import Map, load_map
+from pytest_garl.scenarios.scenario import Scenario
+from pytest_garl.search.methods.random_search import propose
+from pytest_garl.simulation.camera.renderer import Renderer
+from pytest_garl.simulation.flight import Flight
+from pytest_garl.simulation.fly import fly
+from pytest_garl.simulation.randomness import generator
+from pytest_garl.verdicts.judge import judge
+from pytest_garl.verdicts.verdict import Limits
+from tools.look import sheet
+
+PLACES = {"person": "court", "dog": "lawn", "bird": "court"}
+TRIES = 40
+SEED = 99
+
+
+def first_hit(map: Map, mover: str) -> tuple[Scenario, Flight] | None:
+    """Return the first of the scenarios in which the object is hit, and its flight."""
+    clear = {f"environment.{name}": 0.0 for name, _ in WEATHER}
+    for drawn in propose(map, genome_for(map), SEED, 0, TRIES):
+        scenario = drawn.replace(clear)
+        flight = fly(scenario, OpenCvLandingSystem, policy_spec(mover), map=map)
+        if flight.outcome == "collision" and flight.contacts[-1].body_class == "dynamic":
+            return scenario, flight
+    return None
+
+
+def main() -> None:
+    """Write a picture and a table per kind of object."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--mover", default="dqn")
+    parser.add_argument("--out", type=Path, default=Path(".garl"))
+    arguments = parser.parse_args()
+    cv2.setNumThreads(1)
+    for kind, name in PLACES.items():
+        map = dataclasses.replace(load_map(name), objects=((kind, 1),))
+        found = first_hit(map, arguments.mover)
+        if found is None:
+            print(f"{kind}: none of {TRIES} flights hit it")
+            continue
+        scenario, flight = found
+        renderer = Renderer(scenario, map, Camera(), generator(scenario.seed, "sensor"))
+        target = arguments.out / f"mover-{kind}.png"
+        target.parent.mkdir(parents=True, exist_ok=True)
+        picture = sheet(flight, renderer, 0.6)
+        cv2.imwrite(str(target), cv2.cvtColor(picture, cv2.COLOR_RGB2BGR))
+        print(f"{target}: {judge(flight, Limits()).story}")
+        uav, own = flight.uav, flight.objects[0].track
+        for row in np.flatnonzero(uav.time_s > flight.elapsed_s - 5)[::12]:
+            speed = np.hypot(*own.velocity_mps[row, :2])
+            where = np.round(own.position_m[row], 1), np.round(uav.position_m[row], 1)
+            print(f"  {uav.time_s[row]:5.1f} s  {kind} {where[0]} {speed:.1f} m/s  UAV {where[1]}")
+
+
+if __name__ == "__main__":
+    main()
