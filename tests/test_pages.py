@@ -1,0 +1,160 @@
+"""README and docs: links and pages are found, tables and commands agree with the code."""
+
+from __future__ import annotations
+
+import dataclasses
+import re
+import typing
+from pathlib import Path
+
+import pytest
+
+from pytest_garl import landing_system
+from pytest_garl.verdicts.verdict import ViolationType
+
+ROOT = Path(__file__).parents[1]
+README, DOCS = ROOT / "README.md", ROOT / "docs"
+PAGES = [*sorted(ROOT.glob("*.md")), *sorted(DOCS.rglob("*.md"))]
+LINK = re.compile(r"\]\(([^)\s]+)\)")
+MOST_LINES = 15
+
+TRY = "cp -r docs/tutorial /tmp/my-stack && cd /tmp/my-stack && rm -r scenarios"
+RUN_BY = {
+    "python3.11 -m venv .venv && . .venv/bin/activate": ("Makefile", "$(FLIES)"),
+    "pip install .": ("Makefile", "$(FLIES)"),
+    "garl check my_landing:MyLandingSystem": ("tests/cli/test_check.py", "check"),
+    "pytest --garl-budget=40 test_my_landing.py": ("tests/test_pages.py", "--garl-budget"),
+    TRY: ("tests/test_tutorial.py", "copytree"),
+    "pytest --garl-budget=16 --garl-shrink=16 test_my_landing.py": (
+        "tests/test_tutorial.py",
+        "transcript",
+    ),
+    "make search": ("Makefile", "search:"),
+    "make test": (".ci/run", "make test"),
+}
+"""Each command of the README, with the file that runs it and a word of that file."""
+
+
+def prose(page: Path) -> str:
+    """Return a page without its blocks of code."""
+    return re.sub(r"^```.*?^```$", "", page.read_text(), flags=re.DOTALL | re.MULTILINE)
+
+
+def links(page: Path) -> list[str]:
+    return [link for link in LINK.findall(prose(page)) if "://" not in link]
+
+
+def anchors(page: Path) -> set[str]:
+    """Return the anchors that GitHub gives a page's headings."""
+    headings = re.findall(r"^#+ (.*)$", prose(page), re.MULTILINE)
+    return {re.sub(r"[^\w\- ]", "", each.lower()).replace(" ", "-") for each in headings}
+
+
+def blocks(page: Path) -> dict[str, str]:
+    """Return the files of a page's Python blocks, by the name in their first line."""
+    found = re.findall(r"^```python\n# (\w+\.py)\n(.*?)^```$", page.read_text(), re.DOTALL | re.M)
+    return dict(found)
+
+
+def indented(page: Path) -> list[list[str]]:
+    """Return the blocks of commands and output."""
+    found = re.findall(r"(?:^    .*\n(?:^\n(?=^    ))?)+", prose(page), re.MULTILINE)
+    return [[line[4:] for line in block.splitlines()] for block in found]
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: str(page.relative_to(ROOT)))
+def test_page_has_no_dead_link(page: Path) -> None:
+    for link in links(page):
+        file, _, anchor = link.partition("#")
+        target = (page.parent / file).resolve() if file else page
+        assert target.exists(), link
+        assert not anchor or anchor in anchors(target), link
+
+
+def test_index_leads_to_every_page() -> None:
+    reached, waiting = set(), [DOCS / "index.md"]
+    while waiting:
+        page = waiting.pop()
+        reached.add(page)
+        targets = {(page.parent / link.partition("#")[0]).resolve() for link in links(page)}
+        waiting += [each for each in targets - reached if each.suffix == ".md"]
+    assert set(PAGES) - reached == set()
+
+
+@pytest.mark.parametrize(
+    "name",
+    [
+        "Mission",
+        "Observation",
+        "Camera",
+        "PositionSetpoint",
+        "VelocitySetpoint",
+        "AttitudeSetpoint",
+        "Land",
+        "Abort",
+    ],
+)
+def test_readme_names_every_field(name: str) -> None:
+    text = README.read_text()
+    assert f"`{name}`" in text
+    for field in dataclasses.fields(getattr(landing_system, name)):
+        assert f"`{field.name}" in text or field.name == "diagnostics", field.name
+
+
+def test_readme_explains_every_type_of_violation() -> None:
+    rows = re.findall(r"^\| ([\w?]+) \| ", README.read_text(), re.MULTILINE)
+    assert {*typing.get_args(ViolationType), "I?"} <= set(rows)
+
+
+def test_readme_shows_output_of_the_tutorial() -> None:
+    (output,) = (block for block in indented(README) if block[0].startswith("IV:"))
+    assert len(output) <= MOST_LINES
+    tutorial = [line.split() for line in (DOCS / "tutorial.md").read_text().splitlines()]
+    assert [line for line in output if line.split() not in [*tutorial, ["..."]]] == []
+
+
+def test_every_command_of_the_readme_is_run() -> None:
+    shown = {
+        line.partition("#")[0].strip()
+        for block in indented(README)
+        if not block[0].startswith("IV:")
+        for line in block
+    }
+    assert shown == set(RUN_BY)
+    for file, word in RUN_BY.values():
+        assert word in (ROOT / file).read_text(), file
+
+
+def test_code_of_the_readme_flies(pytester: pytest.Pytester) -> None:
+    code = blocks(README)
+    assert set(code) == {"my_landing.py", "test_my_landing.py"}
+    other = blocks(DOCS / "extending.md")
+    system = re.sub(
+        r"^ +\.\.\.  # your code.*$", "        return Land()", code["my_landing.py"], flags=re.M
+    )
+    assert system != code["my_landing.py"]
+    (pytester.path / "my_landing.py").write_text(system)
+    (pytester.path / "test_my_landing.py").write_text(code["test_my_landing.py"])
+    (pytester.path / "my_simulator.py").write_text(other["my_simulator.py"])
+    pytester.makeconftest(
+        "import my_simulator\ndef pytest_garl_fly(config):\n    return my_simulator.fly"
+    )
+    result = pytester.runpytest_subprocess(
+        "-p", "no:cacheprovider", "--garl-budget=3", "--garl-workers=1", "--garl-shrink=0"
+    )
+    result.assert_outcomes(passed=9 * 2)
+
+
+def test_options_page_lists_every_option_with_its_default(pytester: pytest.Pytester) -> None:
+    from pytest_garl.switches import OPTIONS
+
+    text = (DOCS / "options.md").read_text()
+    rows = [re.split(r"(?<!\\)\|", line) for line in text.splitlines() if line.startswith("| `--")]
+    defaults = {re.findall(r"--garl-(\w+)", row[1])[0]: row[3].strip(" `") for row in rows}
+    assert set(defaults) == {option.name for option in OPTIONS} | {"resume"}
+    for option in OPTIONS:
+        if option.default:
+            assert defaults[option.name] == option.default
+    shown = pytester.runpytest("--help").stdout.str()
+    for key in re.findall(r"^\| ini `(\w+)`", text, re.MULTILINE):
+        assert f"{key} (" in shown
