@@ -1,6 +1,6 @@
 """The learned detector beside ArUco on the same pictures, by size, hiding and weather.
 
-``python -m studies.detection`` renders the maps that are flown, from seeds that training never
+``python -m benchmarks.detection`` renders the maps that are flown, from seeds that training never
 saw, and writes ``docs/detection.md`` and ``docs/pictures/reliability.png``.  ``--without-court``
 names weights that were trained without any court, to report the gap.
 """
@@ -26,21 +26,21 @@ from landing_systems.modules.detection_tphyolo.calibration import (
 )
 from landing_systems.modules.detection_tphyolo.decoding import CLASS_IDS, NETWORK_SIZE
 from landing_systems.modules.detection_tphyolo.detector import TphYoloDetector, load_network
-from landing_systems.modules.detection_tphyolo.weights import SHIPPED, read_weights
-from landing_systems.training.tphyolo.scenes import (
+from landing_systems.modules.detection_tphyolo.scenes import (
     Marker,
     Picture,
     Weather,
     pictures,
 )
-from landing_systems.training.tphyolo.scoring import (
+from landing_systems.modules.detection_tphyolo.scoring import (
     Scored,
     mission,
     observation_of,
     score,
 )
+from landing_systems.modules.detection_tphyolo.weights import SHIPPED, read_weights
 from pytest_garl import Detection, Observation
-from pytest_garl.scenarios.maps.map import load_map
+from pytest_garl.scenarios.maps import load_map
 
 CONFIRM = 0.8
 """The decision's threshold."""
@@ -252,7 +252,7 @@ def engines_ms(weights: Path, runs: int) -> tuple[float, float]:
     """
     import torch
 
-    from landing_systems.training.tphyolo.model import TphYolo, fused
+    from landing_systems.modules.detection_tphyolo.model import TphYolo, fused
 
     torch.set_num_threads(1)
     eager = fused(TphYolo())
@@ -344,37 +344,38 @@ def main() -> None:
 
 _REPORT = """# The learned marker detector beside ArUco
 
-Written by `python -m studies.detection`: {frames} frames of {scenarios} random scenarios on the
-maps that are flown, from seeds and with ground textures that training never saw.
-{weights}. Heights 0.5 to
-15 m, tilts up to 20°, all headings, people, dogs and birds on and about the marker; half of the
-scenarios in the confined weather of searches, half with each weather gene drawn from its full range
-with a probability of a quarter. A marker counts as found when a detection with its id and a
-confidence of at least 0.8 lies on it. Below 2 m the detector leaves out what touches the frame's
-edge (its middle is a guess), which costs recall here and nothing in flight: the UAV has come down
-over the marker. Its hidden share is what objects, leaves and snow on it cover; flakes and leaves in
-the air do not count, fog and darkness show in its contrast. "ArUco" is the detector of OpenCV-MLS
-on a single frame; "four looks" what it would find if the UAV hung still
-and it tried all its ways to look.
+Written by `python -m benchmarks.detection`: {frames} frames of {scenarios} random scenarios on the
+maps of searches, from seeds and with ground textures that training never saw.
+{weights}. Heights are 0.5 to
+15 m, tilts up to 20°, with all headings, and people, dogs and birds on and around the marker. Half of
+the scenarios are in the confined weather of searches. In the other half each weather gene is drawn
+from its full range with a probability of a quarter. A marker counts as found if a detection with its
+id and a confidence of at least 0.8 lies on it. Below 2 m the detector ignores markers that touch the
+frame's edge, because it can only guess their middle. This costs recall here and nothing in flight,
+because the UAV has come down over the marker. The hidden share of a marker is the share that objects,
+leaves and snow on it cover. Flakes and leaves in the air do not count; fog and darkness show in its
+contrast. "ArUco" is the detector of OpenCV-MLS on a single frame. "Four looks" is what it would find
+if the UAV hung still and it tried all its ways to look.
 
 {summary}
 
 ## Confidence
 
-A confidence shall be the share of detections that are right. Calibrated on invented places, it is
-off by {error} on average here (expected calibration error over ten bins).
+A confidence should be the share of correct detections. It was calibrated on invented places. Here it
+is off by {error} on average (expected calibration error over ten bins).
 
 ![Reliability](pictures/reliability.png)
 
 ## Time
 
-A frame of 320x240 takes {least} ms of CPU time at best and {usual} ms in the median, all included
-(one thread; OpenCV's DNN, classic engine). The first network alone takes {opencv} ms, in PyTorch's
-eager mode {eager} ms.
+A frame of 320x240 takes {least} ms of CPU time at best and {usual} ms in the median, in total
+(one thread; OpenCV's DNN, classic engine). The first network alone takes {opencv} ms, and {eager} ms in
+PyTorch's eager mode.
 
 ## By weather, hidden share and size
 
-Markers wholly in the frame whose white and black differ by at least 8 grey levels.
+The table counts markers that are wholly in the frame and whose white and black differ by at least 8
+grey levels.
 
 {table}
 """
