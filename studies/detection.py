@@ -1,6 +1,6 @@
 """The learned detector beside ArUco on the same pictures, by size, hiding and weather.
 
-``python -m benchmarks.detection`` renders the maps that are flown, from seeds that training never
+``python -m studies.detection`` renders the maps that are flown, from seeds that training never
 saw, and writes ``docs/detection.md`` and ``docs/pictures/reliability.png``.  ``--without-court``
 names weights that were trained without any court, to report the gap.
 """
@@ -26,21 +26,21 @@ from landing_systems.modules.detection_tphyolo.calibration import (
 )
 from landing_systems.modules.detection_tphyolo.decoding import CLASS_IDS, NETWORK_SIZE
 from landing_systems.modules.detection_tphyolo.detector import TphYoloDetector, load_network
-from landing_systems.modules.detection_tphyolo.scenes import (
+from landing_systems.modules.detection_tphyolo.weights import SHIPPED, read_weights
+from landing_systems.training.tphyolo.scenes import (
     Marker,
     Picture,
     Weather,
     pictures,
 )
-from landing_systems.modules.detection_tphyolo.scoring import (
+from landing_systems.training.tphyolo.scoring import (
     Scored,
     mission,
     observation_of,
     score,
 )
-from landing_systems.modules.detection_tphyolo.weights import SHIPPED, read_weights
 from pytest_garl import Detection, Observation
-from pytest_garl.scenarios.maps import load_map
+from pytest_garl.scenarios.maps.map import load_map
 
 CONFIRM = 0.8
 """The decision's threshold."""
@@ -252,7 +252,7 @@ def engines_ms(weights: Path, runs: int) -> tuple[float, float]:
     """
     import torch
 
-    from landing_systems.modules.detection_tphyolo.model import TphYolo, fused
+    from landing_systems.training.tphyolo.model import TphYolo, fused
 
     torch.set_num_threads(1)
     eager = fused(TphYolo())
@@ -344,7 +344,7 @@ def main() -> None:
 
 _REPORT = """# The learned marker detector beside ArUco
 
-Written by `python -m benchmarks.detection`: {frames} frames of {scenarios} random scenarios on the
+Written by `python -m studies.detection`: {frames} frames of {scenarios} random scenarios on the
 maps of searches, from seeds and with ground textures that training never saw.
 {weights}. Heights are 0.5 to
 15 m, tilts up to 20°, with all headings, and people, dogs and birds on and around the marker. Half of
