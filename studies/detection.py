@@ -345,31 +345,30 @@ def main() -> None:
 _REPORT = """# The learned marker detector beside ArUco
 
 Written by `python -m studies.detection`: {frames} frames of {scenarios} random scenarios on the
-maps of searches, from seeds and with ground textures that training never saw.
-{weights}. Heights are 0.5 to
-15 m, tilts up to 20°, with all headings, and people, dogs and birds on and around the marker. Half of
-the scenarios are in the confined weather of searches. In the other half each weather gene is drawn
-from its full range with a probability of a quarter. A marker counts as found if a detection with its
-id and a confidence of at least 0.8 lies on it. Below 2 m the detector ignores markers that touch the
-frame's edge, because it can only guess their middle. This costs recall here and nothing in flight,
-because the UAV has come down over the marker. The hidden share of a marker is the share that objects,
-leaves and snow on it cover. Flakes and leaves in the air do not count; fog and darkness show in its
-contrast. "ArUco" is the detector of OpenCV-MLS on a single frame. "Four looks" is what it would find
-if the UAV hung still and it tried all its ways to look.
+maps of searches, from seeds and with ground textures that training never saw. {weights}. Heights
+are 0.5 to 15 m, tilts up to 20°, with all headings, and people, dogs and birds on and around the
+marker. Half of the scenarios are in the confined weather of searches. In the other half each
+weather gene is drawn from its full range with a probability of a quarter. A marker counts as found
+if a detection with its id and a confidence of at least 0.8 lies on it. Below 2 m the detector
+ignores markers that touch the frame's edge, because it can only guess their middle. This costs
+recall here and nothing in flight, because the UAV has come down over the marker. The hidden share
+of a marker is the share that objects, leaves and snow on it cover. Flakes and leaves in the air do
+not count; fog and darkness show in its contrast. "ArUco" is the detector of OpenCV-MLS on a single
+frame. "Four looks" is what it would find if the UAV hung still and it tried all its ways to look.
 
 {summary}
 
 ## Confidence
 
-A confidence should be the share of correct detections. It was calibrated on invented places. Here it
-is off by {error} on average (expected calibration error over ten bins).
+A confidence should be the share of correct detections. It was calibrated on invented places. Here
+it is off by {error} on average (expected calibration error over ten bins).
 
 ![Reliability](pictures/reliability.png)
 
 ## Time
 
-A frame of 320x240 takes {least} ms of CPU time at best and {usual} ms in the median, in total
-(one thread; OpenCV's DNN, classic engine). The first network alone takes {opencv} ms, and {eager} ms in
+A frame of 320x240 takes {least} ms of CPU time at best and {usual} ms in the median, in total (one
+thread; OpenCV's DNN, classic engine). The first network alone takes {opencv} ms, and {eager} ms in
 PyTorch's eager mode.
 
 ## By weather, hidden share and size
