@@ -12,7 +12,7 @@ from pytest_garl.errors import GarlError
 from pytest_garl.execution.reference import BUILT_IN, Reference, reference_to
 from pytest_garl.execution.sources import data_files
 from pytest_garl.plugin.arguments import target_of
-from pytest_garl.plugin.user_assertions import Asks
+from pytest_garl.plugin.user_assertions import ItemAssertion
 from pytest_garl.regressions.case import Case
 from pytest_garl.regressions.judging import alone_in_a_folder, arguments
 from pytest_garl.regressions.reshrink import Means
@@ -56,7 +56,7 @@ def means_of(case: Case, root: Path) -> Means:
         if case.own_test and item.originalname != case.own_test:
             continue
         return Means(
-            asks=Asks(item, target) if case.assertion else None,
+            user_assertion=ItemAssertion(item, target) if case.assertion else None,
             simulator=collected.simulator,
             files=tuple(data_files(target.files, root).items()),
         )

@@ -9,10 +9,11 @@ import pytest
 
 from pytest_garl.execution.on_demand import Done
 from pytest_garl.plugin.arguments import LANDING
-from pytest_garl.plugin.assertions import Failure, failure_of
 from pytest_garl.plugin.collection import Target
+from pytest_garl.plugin.failed_statement import failure_of
 from pytest_garl.plugin.run import Run, test_of
-from pytest_garl.plugin.user_assertions import Asks
+from pytest_garl.plugin.user_assertions import ItemAssertion
+from pytest_garl.regressions.user_failure import UserFailure
 from pytest_garl.verdicts.metrics import share_interval
 
 AGAIN = 4
@@ -30,15 +31,15 @@ class Fault:
 
     signature: str
     test: str
-    failure: Failure | None
+    failure: UserFailure | None
     own: bool
-    asks: Asks
+    user_assertion: ItemAssertion
 
     def key(self, search: str) -> str:
         """Return what is the same for all items that tell of the same."""
         if self.failure is None:
             return f"{search} {self.signature}"
-        return f"{search} {self.signature} {self.test} {self.failure.digest}"
+        return f"{search} {self.signature} {self.test} {self.failure.assertion}"
 
     def shows_in(self, run: Run, target: Target, done: Done) -> bool:
         """Whether the same assertion of the test fails for the same reason in another flight."""
@@ -47,10 +48,10 @@ class Fault:
             return False
         if self.failure is None:
             return True
-        if not self.asks.possible:
+        if not self.user_assertion.runs_on_any_flight:
             return False
-        found = self.asks.failure(done.result, done.record, run.scenario(target))
-        if found is None or found.digest != self.failure.digest:
+        found = self.user_assertion.failure(done.result, done.record, run.scenario(target))
+        if found is None or found.assertion != self.failure.assertion:
             return False
         return found.is_about(verdict["primary"]) is not self.own
 
@@ -65,18 +66,20 @@ def fault_of(
     item: pytest.Function, target: Target, result: dict[str, Any], error: BaseException
 ) -> Fault | None:
     """Return what a failing item tells of, or None where the test itself is at fault."""
-    asks, test = Asks(item, target), test_of(item)
+    assertion, test = ItemAssertion(item, target), test_of(item)
     signature = str(result["verdict"]["signature"])
     landing = item.stash.get(LANDING, None)
     if landing is not None and landing.unjudged:
-        return Fault(signature=signature, test=test, failure=None, own=False, asks=asks)
+        return Fault(
+            signature=signature, test=test, failure=None, own=False, user_assertion=assertion
+        )
     reads = landing.reads if landing is not None else ()
     failure = failure_of(item.originalname, item.obj, error, reads)
     if failure is None:
         return None
     own = not failure.is_about(result["verdict"]["primary"])
     signature = failure.signature if own else signature
-    return Fault(signature=signature, test=test, failure=failure, own=own, asks=asks)
+    return Fault(signature=signature, test=test, failure=failure, own=own, user_assertion=assertion)
 
 
 def told_by(run: Run, target: Target, fault: Fault, nodeid: str) -> str:
@@ -143,7 +146,7 @@ def repeats(run: Run, target: Target, fault: Fault) -> Repeats:
         (once,) = run.again(target, 1)
         if once.sha256 == run.trajectory_sha256(target):
             return Repeats(failed=2, flown=2, same=True)
-    if fault.own and not fault.asks.possible:
+    if fault.own and not fault.user_assertion.runs_on_any_flight:
         # Its test takes what no other flight can be given.
         return Repeats(failed=1, flown=1)
     flown = run.again(target, AGAIN)

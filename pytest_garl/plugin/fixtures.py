@@ -14,7 +14,7 @@ import pytest
 
 from pytest_garl.errors import GarlError
 from pytest_garl.plugin.arguments import BEGUN, FATAL, LANDING, RUN, target_of
-from pytest_garl.plugin.assertions import Read, code_of
+from pytest_garl.plugin.failed_statement import AttributeRead, code_of
 
 if TYPE_CHECKING:
     from pytest_garl.plugin.collection import Target
@@ -42,7 +42,7 @@ class Landing:
         self._target, self._result, self._record = target, result, record
         self._code = code_of(test) if test else None
         self.slot: str = target.name
-        self.reads: list[Read] = []
+        self.reads: list[AttributeRead] = []
 
     @property
     def result(self) -> dict[str, Any]:
@@ -166,7 +166,7 @@ class Landing:
             return
         while frame is not None and frame.f_code is not self._code:
             frame = frame.f_back
-        self.reads.append(Read(name=name, line=frame.f_lineno if frame else 0))
+        self.reads.append(AttributeRead(name=name, line=frame.f_lineno if frame else 0))
 
 
 @pytest.fixture

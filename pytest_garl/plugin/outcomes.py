@@ -77,7 +77,7 @@ def _explain_fault(
     report.user_properties.append((FAILURE, fault.key(target.search)))
     _note_test(report, item, run, target, fault)
     lines = [f"{fault.signature}: a property of your own" if fault.own else fault.signature]
-    if fault.own and not fault.asks.possible:
+    if fault.own and not fault.user_assertion.runs_on_any_flight:
         lines.append("It is not saved: its test takes more than landing and scenario.")
     elif fault.own and result["verdict"]["primary"] is not None:
         lines.append("It is saved only if it fails in a flight that violates nothing else, too.")
@@ -101,11 +101,11 @@ def _note_test(
     report: pytest.TestReport, item: pytest.Item, run: Run, target: Target, fault: Fault
 ) -> None:
     """Remember which test found a violation: it judges the case that is saved."""
-    if fault.own and not fault.asks.possible:
+    if fault.own and not fault.user_assertion.runs_on_any_flight:
         return
     worker = hasattr(item.config, "workerinput")
     if fault.own:
-        run.own[target.search, fault.signature] = fault.asks
+        run.own[target.search, fault.signature] = fault.user_assertion
         if worker:
             report.user_properties.append((OWN, fault.signature))
     run.note_test(target.search, fault.signature, item.nodeid)

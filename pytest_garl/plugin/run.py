@@ -26,7 +26,7 @@ from pytest_garl.plugin.options import Options
 if TYPE_CHECKING:
     from pytest_garl.execution.job import Job
     from pytest_garl.execution.on_demand import Done
-    from pytest_garl.plugin.user_assertions import Asks
+    from pytest_garl.plugin.user_assertions import ItemAssertion
     from pytest_garl.regressions.acceptance import Acceptance
     from pytest_garl.regressions.follow_up import Pursued
     from pytest_garl.regressions.forecast import Rest
@@ -97,7 +97,7 @@ class Run:
     """What is to come after the search, when it is known."""
     trouble: str = ""
     """Why that could not be finished, if it could not."""
-    own: dict[tuple[str, str], Asks] = field(default_factory=dict)
+    own: dict[tuple[str, str], ItemAssertion] = field(default_factory=dict)
     """Assertions of tests that failed where the built-in verdict is content, by search and
     signature."""
     found_by: dict[tuple[str, str], str] = field(default_factory=dict)

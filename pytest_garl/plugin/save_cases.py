@@ -14,7 +14,7 @@ from pytest_garl.plugin.options import SHRINK
 from pytest_garl.plugin.progress import duration, live
 from pytest_garl.plugin.run import Run
 from pytest_garl.plugin.suggested_commands import shown
-from pytest_garl.plugin.user_assertions import asks_of
+from pytest_garl.plugin.user_assertions import collect_assertion
 from pytest_garl.plugin.wrapping import begin_line, counted, width_of, wrapped
 from pytest_garl.regressions.case import Case
 from pytest_garl.regressions.case_request import Inquiry
@@ -48,8 +48,8 @@ def pursue(run: Run, session: pytest.Session) -> None:
     reporter: Any = config.pluginmanager.get_plugin("terminalreporter")
     try:
         for nodeid, signature in sorted(run.told.items()):
-            target, asks = asks_of(session, nodeid)
-            run.own[target.search, signature] = asks
+            target, user_assertion = collect_assertion(session, nodeid)
+            run.own[target.search, signature] = user_assertion
         shrinking = Shrinking(each=options.shrink, capped=options.shrink_capped)
         wanted = inquiries(run.ledger, place, shrinking, run.own, run.found_by)
         if wanted:

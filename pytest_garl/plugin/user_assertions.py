@@ -1,4 +1,4 @@
-"""A test's own assertion, asked of any flight: what a user demands beyond the built-in verdict."""
+"""Ask the assertions of users' tests about any flight."""
 
 from __future__ import annotations
 
@@ -12,71 +12,68 @@ import pytest
 
 from pytest_garl.errors import GarlError
 from pytest_garl.plugin.arguments import target_of
-from pytest_garl.plugin.assertions import FAILS, Failure, failure_of
 from pytest_garl.plugin.collection import Target
+from pytest_garl.plugin.failed_statement import FAILS, failure_of
 from pytest_garl.plugin.fixtures import Landing
-from pytest_garl.regressions.case_request import OwnFailure
+from pytest_garl.regressions.user_failure import UserFailure
 from pytest_garl.scenarios.scenario import Scenario
 
-_GIVEN = {"landing", "scenario"}
+_AVAILABLE = {"landing", "scenario"}
 
 
-def asks_of(session: pytest.Session, nodeid: str) -> tuple[Target, Asks]:
-    """Return what a test asks that another process has run; this one has collected nothing."""
+def collect_assertion(session: pytest.Session, nodeid: str) -> tuple[Target, ItemAssertion]:
+    """Return target and assertion of a test that an xdist worker ran.
+
+    The controller has collected nothing, so the test's file is collected here.
+    """
     path = session.config.rootpath / nodeid.partition("::")[0]
     nodes: list[Any] = [pytest.Module.from_parent(session, path=path)]
     for node in nodes:
         if isinstance(node, pytest.Function) and node.nodeid == nodeid:
             target = target_of(node)
             assert target is not None
-            return target, Asks(node, target)
+            return target, ItemAssertion(node, target)
         if isinstance(node, pytest.Collector) and nodeid.startswith(node.nodeid):
             nodes.extend(node.collect())
     raise GarlError(f"{nodeid}: a worker ran it, but it is not found in {path}")
 
 
-class Asks:
-    """Runs an item's test on other flights; only for tests that take nothing but a flight."""
+class ItemAssertion:
+    """The assertions of an item's test, for tests that take nothing but a flight."""
 
     def __init__(self, item: pytest.Function, target: Target) -> None:
         self._function: Callable[..., Any] = item.obj
-        self._wanted = set(inspect.signature(item.obj).parameters)
+        self._parameters = set(inspect.signature(item.obj).parameters)
         self._target = target
         self.test = item.originalname
 
     @property
-    def possible(self) -> bool:
-        """Whether the test takes nothing that this module cannot give."""
-        return self._wanted <= _GIVEN
+    def runs_on_any_flight(self) -> bool:
+        """Whether the test can run on any flight: it takes no fixture but landing and scenario."""
+        return self._parameters <= _AVAILABLE
 
     def __call__(
         self, result: dict[str, Any], record: Path, scenario: Scenario
-    ) -> OwnFailure | None:
-        """Return how the test fails on a flight that violates nothing else, or None.
+    ) -> UserFailure | None:
+        """Return how the test fails on a flight without built-in violation, or None.
 
-        A case of a property of the user's own is to show that property alone.
+        A saved case of a user's property shows that property alone.
         """
         violates = result["verdict"]["primary"] is not None
-        found = None if violates else self.failure(result, record, scenario)
-        if found is None:
-            return None
-        return OwnFailure(
-            test=found.test,
-            assertion=found.digest,
-            signature=found.signature,
-            message=found.message,
-        )
+        return None if violates else self.failure(result, record, scenario)
 
-    def failure(self, result: dict[str, Any], record: Path, scenario: Scenario) -> Failure | None:
-        """Return which assertion of the test fails on a flight, or None."""
+    def failure(
+        self, result: dict[str, Any], record: Path, scenario: Scenario
+    ) -> UserFailure | None:
+        """Return how the test fails on a flight, or None."""
         landing = Landing(self._target, result, record, self._function)
         if landing.unjudged:
             return None
-        given = {"landing": landing, "scenario": scenario}
-        # What else a test raises, or that it skips, is no failure of an assertion.
+        arguments = {"landing": landing, "scenario": scenario}
+        # Another exception, or a skip, is no failed assertion.
         with contextlib.suppress(Exception, pytest.skip.Exception):
             try:
-                self._function(**{name: given[name] for name in self._wanted})
+                self._function(**{name: arguments[name] for name in self._parameters})
             except FAILS as error:
                 return failure_of(self.test, self._function, error, landing.reads)
         return None

@@ -2,32 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
-from pathlib import Path
-from typing import Any
 
 from pytest_garl.execution.job import Job
 from pytest_garl.execution.on_demand import Done
 from pytest_garl.regressions.case import Case, Deeds
 from pytest_garl.regressions.robustness import COUNT
 from pytest_garl.regressions.shrink import complexity, genome_of
+from pytest_garl.regressions.user_failure import UserAssertion
 from pytest_garl.scenarios.maps.map import Map
 from pytest_garl.scenarios.scenario import Scenario
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class OwnFailure:
-    """How a test's own assertion failed on a flight."""
-
-    test: str
-    assertion: str
-    signature: str
-    message: str
-
-
-Asks = Callable[[dict[str, Any], Path, Scenario], OwnFailure | None]
-"""A test's own assertion, asked of a flight: result, record, scenario."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -36,7 +20,7 @@ class Inquiry:
 
     ``violations`` are scenarios with the flights that violated.  ``name`` begins with the search.
     ``budget`` bounds the flights, ``cap`` those of the landing system for all signatures of the
-    search together unless it is None.  ``asks`` is the test's own assertion that failed, None for
+    search together unless it is None.  ``user_assertion`` is the assertion that failed, None for
     the built-in verdict; ``test`` is the node id of the test that found it.
     """
 
@@ -46,7 +30,7 @@ class Inquiry:
     job: Job
     map: Map
     budget: int
-    asks: Asks | None = None
+    user_assertion: UserAssertion | None = None
     test: str = ""
     cap: int | None = None
 
@@ -62,16 +46,16 @@ class Inquiry:
         No scenario explains more than the traceback does, and each flight that hangs costs four
         times the limit of a call.
         """
-        if self.asks is not None or not self.violations:
+        if self.user_assertion is not None or not self.violations:
             return False
         crash = self.violations[0][1].result["crash"]
         return crash is not None and crash["kind"] in ("raised", "nonsense", "hung")
 
     def failed(self, scenario: Scenario, done: Done) -> bool:
         """Whether a flight failed in the way that is asked about."""
-        if self.asks is None:
+        if self.user_assertion is None:
             return done.signature == self.signature
-        own = self.asks(done.result, done.record, scenario)
+        own = self.user_assertion(done.result, done.record, scenario)
         return own is not None and own.signature == self.signature
 
 

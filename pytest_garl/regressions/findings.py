@@ -9,11 +9,11 @@ from pytest_garl.regressions.case_request import (
     Failure,
     Finding,
     Inquiry,
-    OwnFailure,
     simplest_first,
 )
 from pytest_garl.regressions.description import tell
 from pytest_garl.regressions.shrink import complexity, genome_of
+from pytest_garl.regressions.user_failure import UserFailure
 from pytest_garl.scenarios.maps.map import Map
 from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.simulation.flight import Flight
@@ -44,7 +44,8 @@ def case_of(inquiry: Inquiry, failure: Failure, avoidable: Avoidable) -> Case:
     """Return a failure as what is saved."""
     done, job = failure.done, inquiry.job
     flight = load(done.record) if done.record.exists() else None
-    own = inquiry.asks(done.result, done.record, failure.scenario) if inquiry.asks else None
+    ask = inquiry.user_assertion
+    own = ask(done.result, done.record, failure.scenario) if ask else None
     return Case(
         system=job.system.name,
         status="unavoidable" if avoidable == "no" else "open",
@@ -72,7 +73,7 @@ def case_of(inquiry: Inquiry, failure: Failure, avoidable: Avoidable) -> Case:
     )
 
 
-def _violation(verdict: Verdict, flight: Flight | None, own: OwnFailure | None) -> Violation:
+def _violation(verdict: Verdict, flight: Flight | None, own: UserFailure | None) -> Violation:
     """Return what failed, from the verdict or from the test's own assertion."""
     if own is not None:
         return Violation(

@@ -15,7 +15,7 @@ from pytest_garl.execution.on_demand import Done, Errands, Fly
 from pytest_garl.execution.pool import Pool
 from pytest_garl.execution.slot import flight_name
 from pytest_garl.regressions.case import Case
-from pytest_garl.regressions.case_request import Asks, Finding, Inquiry
+from pytest_garl.regressions.case_request import Finding, Inquiry
 from pytest_garl.regressions.corpus import entries, save, save_patch
 from pytest_garl.regressions.findings import as_found
 from pytest_garl.regressions.investigation import (
@@ -24,6 +24,7 @@ from pytest_garl.regressions.investigation import (
     PILOTS,
     Pursuit,
 )
+from pytest_garl.regressions.user_failure import UserAssertion
 from pytest_garl.scenarios.maps.map import load_map
 from pytest_garl.scenarios.scenario import Scenario
 
@@ -67,7 +68,7 @@ def inquiries(
     ledger: Ledger,
     place: Place,
     shrinking: Shrinking,
-    own: Mapping[tuple[str, str], Asks] | None = None,
+    own: Mapping[tuple[str, str], UserAssertion] | None = None,
     found_by: Mapping[tuple[str, str], str] | None = None,
 ) -> tuple[Inquiry, ...]:
     """Return what is to be found out about signatures that no saved case has.
@@ -79,9 +80,9 @@ def inquiries(
     ``found_by`` are the node ids of the tests that failed.
     """
     found: list[Inquiry] = []
-    asks, tests = own or {}, found_by or {}
+    assertions, tests = own or {}, found_by or {}
     groups = _by_search(ledger)
-    for search, signature in asks:
+    for search, signature in assertions:
         groups.setdefault(search, {})[signature] = []
     noted: dict[str, list[str]] | None = ledger.fact(NOTED)
     wanted: dict[str, list[str]] = {}
@@ -101,7 +102,7 @@ def inquiries(
             wanted[search] = noted.get(search, [])
         new = {
             signature: _failures(
-                ledger, search, rows[signature], asks.get((search, signature)), job
+                ledger, search, rows[signature], assertions.get((search, signature)), job
             )
             for signature in wanted[search]
             if signature in rows
@@ -116,7 +117,7 @@ def inquiries(
                 job=job,
                 map=map,
                 budget=shrinking.each,
-                asks=asks.get((search, signature)),
+                user_assertion=assertions.get((search, signature)),
                 test=tests.get((search, signature), ""),
                 cap=cap,
             )
@@ -198,15 +199,21 @@ def _by_search(ledger: Ledger) -> dict[str, dict[str, list[Row]]]:
 
 
 def _failures(
-    ledger: Ledger, search: str, violating: Sequence[Row], asks: Asks | None, job: Job
+    ledger: Ledger,
+    search: str,
+    violating: Sequence[Row],
+    user_assertion: UserAssertion | None,
+    job: Job,
 ) -> tuple[tuple[Scenario, Done], ...]:
     """Return scenarios with their flights: those that violated, or those that a test refuses."""
-    rows = ledger.flown(search) if asks else violating
+    rows = ledger.flown(search) if user_assertion else violating
     flights = [(load_scenario(row.scenario), done_of(row, job)) for row in rows]
-    if asks is None:
+    if user_assertion is None:
         return tuple(flights)
     return tuple(
-        (scenario, done) for scenario, done in flights if asks(done.result, done.record, scenario)
+        (scenario, done)
+        for scenario, done in flights
+        if user_assertion(done.result, done.record, scenario)
     )
 
 

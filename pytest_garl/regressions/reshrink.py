@@ -22,7 +22,7 @@ from pytest_garl.execution.reference import (
 from pytest_garl.execution.sources import sources_sha256
 from pytest_garl.regressions.case import Avoidable, Case, Deeds
 from pytest_garl.regressions.case_file import size_of
-from pytest_garl.regressions.case_request import Asks, Failure, Finding, Inquiry
+from pytest_garl.regressions.case_request import Failure, Finding, Inquiry
 from pytest_garl.regressions.findings import case_of, culprit_of
 from pytest_garl.regressions.investigation import PILOTS, Pursuit
 from pytest_garl.regressions.replay import system_of
@@ -30,6 +30,7 @@ from pytest_garl.regressions.robustness import COUNT
 from pytest_garl.regressions.shrink import shrink
 from pytest_garl.regressions.simplicity import no_worse, simplicity
 from pytest_garl.regressions.staleness import Sources
+from pytest_garl.regressions.user_failure import UserAssertion
 from pytest_garl.scenarios.maps.map import load_map
 from pytest_garl.scenarios.scenario import Scenario
 
@@ -49,7 +50,7 @@ class Means:
     ``files`` are what the landing system reads, by the names that their hashes have.
     """
 
-    asks: Asks | None = None
+    user_assertion: UserAssertion | None = None
     simulator: Reference = BUILT_IN
     files: tuple[tuple[str, Path], ...] = ()
 
@@ -90,7 +91,7 @@ def shrink_case(
             job=job,
             map=map,
             budget=flights,
-            asks=means.asks,
+            user_assertion=means.user_assertion,
             test=case.test,
         )
 

@@ -1,4 +1,4 @@
-"""Where a test's assertion failed, and what of the landing it had read: what it is about."""
+"""Find the statement of a test that failed, and the attributes of the landing that it read."""
 
 from __future__ import annotations
 
@@ -16,85 +16,54 @@ from typing import Any
 import pytest
 
 from pytest_garl.messages import printable
+from pytest_garl.regressions.user_failure import UserFailure
 
 FAILS: tuple[type[BaseException], ...] = (AssertionError, pytest.fail.Exception)
-"""How a test says that a property does not hold; any other exception is a fault of the test."""
-
-ABOUT: dict[str, frozenset[str]] = {
-    "distance": frozenset({"distance_to_landing_m", "final_distance_m"}),
-    "time": frozenset({"time_to_landing_s", "elapsed_s"}),
-    "collision": frozenset({"collisions"}),
-}
-"""What a test reads of a landing that asserts one of the built-in properties."""
-ALL = frozenset({"outcome", "verdict", "result"})
-"""What speaks of every built-in property."""
+"""A test raises these to say that a property does not hold; any other exception is an error."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Read:
-    """One attribute of a landing that was read; ``line`` is the test's, 0 outside of its body."""
+class AttributeRead:
+    """One attribute of a landing that a test read; ``line`` is 0 outside of the test's body."""
 
     name: str
     line: int
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Failure:
-    """A failed assertion of a test.
-
-    ``digest`` is the hash of the statement in the test's own body, whoever raised below it;
-    ``read`` is what of the landing that statement reads.
-    """
-
-    test: str
-    digest: str
-    message: str
-    read: frozenset[str]
-
-    @property
-    def signature(self) -> str:
-        """Signature of a property of the user's own."""
-        return f"own:{self.test}:{self.digest}"
-
-    def is_about(self, name: str | None) -> bool:
-        """Whether the assertion is about a built-in property."""
-        return name is not None and bool(self.read & (ALL | ABOUT.get(name, frozenset({name}))))
-
-
 def code_of(function: Callable[..., Any]) -> CodeType | None:
-    """Return the code of a test's own body, or None for what is no plain function."""
+    """Return the code of a test's own body, or None if it is no plain function."""
     plain = inspect.unwrap(function)
     code: CodeType | None = getattr(getattr(plain, "__func__", plain), "__code__", None)
     return code
 
 
 def failure_of(
-    test: str, function: Callable[..., Any], error: BaseException, reads: Sequence[Read]
-) -> Failure | None:
-    """Return which assertion of a test failed, or None for what is no assertion."""
+    test: str, function: Callable[..., Any], error: BaseException, reads: Sequence[AttributeRead]
+) -> UserFailure | None:
+    """Return which assertion of a test failed, or None if the error is no failed assertion."""
     if not isinstance(error, FAILS) or isinstance(error, pytest.xfail.Exception):
         return None
-    path, line = _place(error, code_of(function))
+    path, line = _location(error, code_of(function))
     statement = _statement(path, line)
-    return Failure(
+    return UserFailure(
         test=test,
-        digest=hashlib.sha256(statement.source.encode()).hexdigest()[:8],
+        assertion=hashlib.sha256(statement.source.encode()).hexdigest()[:8],
         message=printable(str(error).partition("\n")[0] or statement.source.partition("\n")[0]),
-        read=_read_by(statement, reads),
+        attributes=_attributes_of(statement, reads),
     )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _Statement:
-    """A statement: its source, free of layout and message, its lines, what its message reads."""
+    """A statement: its source without layout and message, its lines, what its message reads."""
 
     source: str
     lines: range
     message: frozenset[str] = frozenset()
 
 
-def _place(error: BaseException, code: CodeType | None) -> tuple[str, int]:
-    """Return file and line of the test's own body, or the nearest to it that the error passed."""
+def _location(error: BaseException, code: CodeType | None) -> tuple[str, int]:
+    """Return file and line in the test's own body, or the nearest place that the error passed."""
     places = []
     trace = error.__traceback__
     while trace is not None:
@@ -102,14 +71,14 @@ def _place(error: BaseException, code: CodeType | None) -> tuple[str, int]:
             return code.co_filename, trace.tb_lineno
         places.append((trace.tb_frame.f_code.co_filename, trace.tb_lineno))
         trace = trace.tb_next
-    home = code.co_filename if code else ""
+    own_file = code.co_filename if code else ""
     nearest: tuple[str, int] = ("", 0)
-    return next((place for place in places if place[0] == home), (*places, nearest)[0])
+    return next((place for place in places if place[0] == own_file), (*places, nearest)[0])
 
 
 @functools.lru_cache(maxsize=1000)
 def _statement(path: str, line: int) -> _Statement:
-    """Return the innermost statement at a line; of one that holds others, its head alone."""
+    """Return the innermost statement at a line; of a compound statement only its header."""
     try:
         tree = ast.parse("".join(linecache.getlines(path)))
     except SyntaxError:
@@ -127,7 +96,7 @@ def _statement(path: str, line: int) -> _Statement:
     lines = range(node.lineno, max(end, node.lineno) + 1)
     if isinstance(node, ast.Assert):
         message = _attributes(node.msg) - _attributes(node.test)
-        # What it says of the failure is no part of the property.
+        # The message is no part of the property.
         node.msg = None
         return _Statement(source=ast.unparse(node), lines=lines, message=message)
     for name in ("body", "orelse", "finalbody", "handlers", "cases"):
@@ -141,8 +110,8 @@ def _attributes(node: ast.expr | None) -> frozenset[str]:
     return frozenset(each.attr for each in inside if isinstance(each, ast.Attribute))
 
 
-def _read_by(statement: _Statement, reads: Sequence[Read]) -> frozenset[str]:
-    """Return what a statement has read, or the last before it that read anything."""
+def _attributes_of(statement: _Statement, reads: Sequence[AttributeRead]) -> frozenset[str]:
+    """Return the attributes that a statement read, or those that the last line before it read."""
 
     def names(lines: Collection[int]) -> frozenset[str]:
         return frozenset(each.name for each in reads if each.line in lines)

@@ -10,8 +10,9 @@ from typing import Any
 
 import pytest
 
-from pytest_garl.plugin.assertions import Failure, failure_of
+from pytest_garl.plugin.failed_statement import failure_of
 from pytest_garl.plugin.fixtures import Landing
+from pytest_garl.regressions.user_failure import UserFailure
 
 RESULT = {
     "outcome": "collision",
@@ -31,7 +32,7 @@ RESULT = {
 }
 
 
-def failing(tmp_path: Path, body: str, helpers: str = "") -> Failure | None:
+def failing(tmp_path: Path, body: str, helpers: str = "") -> UserFailure | None:
     """Return which assertion of a test with that body fails."""
     file = tmp_path / "test_it.py"
     lines = "".join(f"    {line}\n" for line in body.splitlines())
@@ -54,7 +55,7 @@ def digest(tmp_path: Path, body: str, helpers: str = "") -> str:
     (tmp_path / name).mkdir()
     found = failing(tmp_path / name, body, helpers)
     assert found is not None
-    return found.digest
+    return found.assertion
 
 
 @pytest.mark.parametrize(

@@ -1,0 +1,52 @@
+"""A failed assertion of a user's test, and how to ask the assertion about any other flight."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Protocol
+
+from pytest_garl.scenarios.scenario import Scenario
+
+ABOUT: dict[str, frozenset[str]] = {
+    "distance": frozenset({"distance_to_landing_m", "final_distance_m"}),
+    "time": frozenset({"time_to_landing_s", "elapsed_s"}),
+    "collision": frozenset({"collisions"}),
+}
+"""The attributes of a landing that an assertion about a built-in property reads."""
+ALL = frozenset({"outcome", "verdict", "result"})
+"""The attributes that are about every built-in property."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class UserFailure:
+    """A failed assertion of a user's test.
+
+    ``assertion`` is the hash of the statement in the test's own body, even if a function below it
+    raised; ``attributes`` are the landing's attributes that the statement reads.
+    """
+
+    test: str
+    assertion: str
+    message: str
+    attributes: frozenset[str]
+
+    @property
+    def signature(self) -> str:
+        """The signature of a violation of the user's own property."""
+        return f"own:{self.test}:{self.assertion}"
+
+    def is_about(self, name: str | None) -> bool:
+        """Return whether the assertion is about the built-in property ``name``."""
+        if name is None:
+            return False
+        return bool(self.attributes & (ALL | ABOUT.get(name, frozenset({name}))))
+
+
+class UserAssertion(Protocol):
+    """UserAssertion a user's assertion about a flight."""
+
+    def __call__(
+        self, result: dict[str, Any], record: Path, scenario: Scenario
+    ) -> UserFailure | None:
+        """Return how the test fails on a flight without built-in violation, or None."""
