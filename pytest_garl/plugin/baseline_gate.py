@@ -21,7 +21,7 @@ from pytest_garl.plugin.fixtures import stop
 from pytest_garl.plugin.options import Options
 from pytest_garl.plugin.run import Run
 
-TOLD = "garl.gate"
+GATE_REPORT = "garl.gate"
 """The user property under which a gate's sentences reach the summary, also from xdist's workers."""
 
 
@@ -32,10 +32,12 @@ def register(config: pytest.Config, options: Options) -> None:
         baseline = load(options.baseline, options.map_folders)
     except GarlError as error:
         raise pytest.UsageError(f"--garl-baseline: {error}") from error
-    config.pluginmanager.register(Gating(options, options.baseline, baseline), "garl_gating")
+    config.pluginmanager.register(
+        BaselineGatePlugin(options, options.baseline, baseline), "garl_baseline_gate"
+    )
 
 
-class Gate(pytest.Item):
+class BaselineGateItem(pytest.Item):
     """Flies one set of the baseline and fails if the landing system is worse."""
 
     def __init__(self, *, target: Target, base: SampleSet, **rest: Any) -> None:
@@ -63,7 +65,7 @@ class Gate(pytest.Item):
                 load_map(base.map, run.options.map_folders),
                 lambda scenarios: run.fly_all(self._target, npcs, scenarios),
                 level=run.options.level,
-                known=run.known(self._target),
+                known=run.expected_signatures(self._target),
             )
         except GarlError as error:
             stop(self, error)
@@ -75,7 +77,7 @@ class Gate(pytest.Item):
 
     def _tell(self, lines: Iterable[str]) -> None:
         """Leave lines for the summary."""
-        self.user_properties += [(TOLD, line) for line in (self.garl_gate.title, *lines)]
+        self.user_properties += [(GATE_REPORT, line) for line in (self.garl_gate.title, *lines)]
 
     def _hint(self, found: Comparison, file: Path | None) -> Iterator[str]:
         """Say how to look at a pair that is worse."""
@@ -92,7 +94,7 @@ class Gate(pytest.Item):
         return self.path, None, self.name
 
 
-class Gating:
+class BaselineGatePlugin:
     """The hooks of a session with a baseline."""
 
     def __init__(self, options: Options, file: Path, baseline: Baseline) -> None:
@@ -114,7 +116,7 @@ class Gating:
 
     def _gates(
         self, collector: pytest.Module | pytest.Class, marker: pytest.Mark
-    ) -> Iterator[Gate]:
+    ) -> Iterator[BaselineGateItem]:
         try:
             subject = read_marker(marker, self._options)
         except GarlError as error:
@@ -124,7 +126,7 @@ class Gating:
             place = (str(collector.path), name_of(subject.system), map)
             if base is not None and place not in self._placed:
                 self._placed.add(place)
-                yield Gate.from_parent(
+                yield BaselineGateItem.from_parent(
                     collector,
                     name=f"baseline[{base.title}]",
                     target=subject.target(map, FIRST),
@@ -134,14 +136,14 @@ class Gating:
     def pytest_collection_finish(self, session: pytest.Session) -> None:
         """Refuse to begin where the command line asks for a gate and no selected test has one."""
         worker = hasattr(session.config, "workerinput")
-        if not worker and not any(isinstance(item, Gate) for item in session.items):
+        if not worker and not any(isinstance(item, BaselineGateItem) for item in session.items):
             problem = self._nothing(session.config)
             if problem:
                 raise pytest.UsageError(problem)
 
     def pytest_runtest_logreport(self, report: pytest.TestReport) -> None:
         """Remember what a gate says."""
-        lines = [str(text) for key, text in report.user_properties if key == TOLD]
+        lines = [str(text) for key, text in report.user_properties if key == GATE_REPORT]
         if lines and report.when == "call":
             self._told[report.nodeid] = lines
 

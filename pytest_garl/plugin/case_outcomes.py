@@ -45,7 +45,7 @@ def explain_failing(
     if expected and run.acceptance.covers(target.entry.path, case):
         word = "known" if case.status == "open" else "unavoidable"
         return expect(report, f"{word}: {signature} ({file})")
-    other = run.known(target).get(fault.signature) if fault.own and not same else None
+    other = run.expected_signatures(target).get(fault.signature) if fault.own and not same else None
     if other is not None:
         return expect(report, f"known: {fault.signature} ({other})")
     if expected:
@@ -85,7 +85,7 @@ def explain_passing(
     stale = "; ".join(run.unproven(target))
     said = (STALE, f"{file} passes, but {stale}") if stale else (MAYBE_FIXED, file)
     report.user_properties.append(said)
-    if run.options.xfail_strict and run.tells(target, item.nodeid):
+    if run.options.xfail_strict and run.reports_first(target, item.nodeid):
         maybe = f"stale, {stale}" if stale else "maybe fixed"
         report.outcome = "failed"
         report.longrepr = (

@@ -16,7 +16,7 @@ from pytest_garl.plugin.user_assertions import ItemAssertion
 from pytest_garl.regressions.user_failure import UserFailure
 from pytest_garl.verdicts.metrics import share_interval
 
-AGAIN = 4
+REFLIGHTS = 4
 """How often a violation of a system that need not be deterministic is flown once more."""
 REPEATED = 2
 """In so many of all flights a violation must show to be one."""
@@ -91,7 +91,7 @@ def told_by(run: Run, target: Target, fault: Fault, nodeid: str) -> str:
     there = run.ledger.fact(_told(fault, target))
     if there is not None and there[1] != nodeid:
         return str(there[0])
-    for other in run.lower(target):
+    for other in run.lower_targets(target):
         waiting = [
             item
             for item in run.items[other.search][other.slot]
@@ -143,12 +143,12 @@ class Repeats:
 def repeats(run: Run, target: Target, fault: Fault) -> Repeats:
     """Fly a slot once more; where that is another flight, or is said to be, some times more."""
     if target.deterministic:
-        (once,) = run.again(target, 1)
+        (once,) = run.refly(target, 1)
         if once.sha256 == run.trajectory_sha256(target):
             return Repeats(failed=2, flown=2, same=True)
     if fault.own and not fault.user_assertion.runs_on_any_flight:
         # Its test takes what no other flight can be given.
         return Repeats(failed=1, flown=1)
-    flown = run.again(target, AGAIN)
+    flown = run.refly(target, REFLIGHTS)
     failed = 1 + sum(fault.shows_again_in(run, target, done) for done in flown)
-    return Repeats(failed=failed, flown=1 + AGAIN)
+    return Repeats(failed=failed, flown=1 + REFLIGHTS)

@@ -256,7 +256,7 @@ def end_unjudged(item: pytest.Item) -> None:
     one = target.entry is not None or bool(run.options.repeat)
     if landing.inconclusive and not one:
         pytest.skip(landing.unjudged)
-    if item.get_closest_marker("xfail") is None and not run.tells(target, item.nodeid):
+    if item.get_closest_marker("xfail") is None and not run.reports_first(target, item.nodeid):
         pytest.skip(landing.unjudged)
     pytest.fail(landing.complaint, pytrace=False)
 

@@ -146,7 +146,7 @@ def pytest_runtestloop(session: pytest.Session) -> Generator[None, object, objec
 
     with live(run, session.config):
         result = yield
-    run.ran = True
+    run.loop_finished = True
     return result
 
 
@@ -190,10 +190,10 @@ def pytest_runtest_logreport(report: pytest.TestReport) -> None:
             raise pytest.exit.Exception(f"garl: {value}", pytest.ExitCode.INTERNAL_ERROR)
         worker = getattr(report, "node", None)
         if key == OWN and worker is not None:
-            worker.config.stash[RUN].told[report.nodeid] = str(value)
+            worker.config.stash[RUN].reported_failures[report.nodeid] = str(value)
         if key == FOUND and worker is not None:
             search, _, signature = str(value).partition(" ")
-            worker.config.stash[RUN].note_test(search, signature, report.nodeid)
+            worker.config.stash[RUN].note_finding_test(search, signature, report.nodeid)
 
 
 def pytest_report_header(config: pytest.Config) -> str | None:
@@ -253,11 +253,11 @@ def pytest_sessionfinish(session: pytest.Session) -> None:
     run = session.config.stash.get(RUN, None)
     if run is not None:
         try:
-            if run.searched(session):
+            if run.may_save(session):
                 from pytest_garl.plugin.save_cases import pursue
 
                 pursue(run, session)
-                if run.trouble:
+                if run.save_problem:
                     session.exitstatus = pytest.ExitCode.INTERNAL_ERROR
         except GarlError as error:
             _lost_ledger(session, run, error)
@@ -280,7 +280,7 @@ def _lost_ledger(session: pytest.Session, run: Any, error: GarlError) -> None:
     """End a session without its ledger: nothing can be saved, and the summary says why."""
     session.exitstatus = pytest.ExitCode.INTERNAL_ERROR
     if run is not None:
-        run.trouble = run.trouble or str(error)
+        run.save_problem = run.save_problem or str(error)
 
 
 def pytest_unconfigure(config: pytest.Config) -> None:

@@ -12,7 +12,7 @@ from pytest_garl.plugin.case_outcomes import explain_failing, explain_passing
 from pytest_garl.plugin.collection import FIRST, Target, name_of
 from pytest_garl.plugin.faults import Fault, Repeats, fault_of, repeats, told_by, write_down
 from pytest_garl.plugin.report_edits import expect, paragraphs, tell
-from pytest_garl.plugin.run import Run, again_key
+from pytest_garl.plugin.run import Run, reflight_key
 from pytest_garl.plugin.suggested_commands import repeat_line
 from pytest_garl.verdicts.wording import headline
 
@@ -58,22 +58,22 @@ def _explain_fault(
 ) -> None:
     """Report what a search found, unless it is known, was told already, or does not repeat."""
     _note_own(report, target, fault)
-    known = run.known(target).get(fault.signature)
+    known = run.expected_signatures(target).get(fault.signature)
     if known is not None:
         return expect(report, f"known: {fault.signature} ({known})")
-    twin = told_by(run, target, fault, item.nodeid)
+    first_with_same_signature = told_by(run, target, fault, item.nodeid)
     doubts: list[str] = []
-    if not twin and not run.options.repeat:
+    if not first_with_same_signature and not run.options.repeat:
         found = repeats(run, target, fault)
         if not found.holds:
             unrepeated = [name_of(target.system), target.map, target.name, fault.signature]
             report.user_properties.append((UNREPEATED, json.dumps(unrepeated)))
             return expect(report, f"did not repeat: {found.share} ({fault.signature})")
         doubts = _doubts(run, target, found)
-        twin = write_down(run, target, fault, item.nodeid)
-    if twin and run.options.duplicates == "xfail":
+        first_with_same_signature = write_down(run, target, fault, item.nodeid)
+    if first_with_same_signature and run.options.duplicates == "xfail":
         report.user_properties.append((EXCUSED, fault.key(target.search)))
-        return expect(report, f"same violation as {twin} ({fault.signature})")
+        return expect(report, f"same violation as {first_with_same_signature} ({fault.signature})")
     report.user_properties.append((FAILURE, fault.key(target.search)))
     _note_test(report, item, run, target, fault)
     lines = [f"{fault.signature}: a property of your own" if fault.own else fault.signature]
@@ -105,10 +105,10 @@ def _note_test(
         return
     worker = hasattr(item.config, "workerinput")
     if fault.own:
-        run.own[target.search, fault.signature] = fault.user_assertion
+        run.user_assertions[target.search, fault.signature] = fault.user_assertion
         if worker:
             report.user_properties.append((OWN, fault.signature))
-    run.note_test(target.search, fault.signature, item.nodeid)
+    run.note_finding_test(target.search, fault.signature, item.nodeid)
     if worker:
         report.user_properties.append((FOUND, f"{target.search} {fault.signature}"))
 
@@ -135,7 +135,7 @@ def _parting(run: Run, target: Target) -> str:
     slot = target.slot
     names = (
         flight_name(target.search, slot.generation, slot.index, target.map),
-        flight_name(again_key(target, 0), FIRST.generation, FIRST.index, target.map),
+        flight_name(reflight_key(target, 0), FIRST.generation, FIRST.index, target.map),
     )
     files = [run.options.folder / "flights" / f"{name}.npz" for name in names]
     if not all(file.exists() for file in files):

@@ -57,12 +57,12 @@ def _ticking(
     run: Run, refresh: Callable[[Ledger], None], clear: Callable[[], None]
 ) -> Iterator[None]:
     """Have something done while a flight is waited for, and when it has come."""
-    before = run.tick, run.waited
-    run.tick, run.waited = partial(refresh, run.ledger), clear
+    before = run.on_wait, run.on_wait_end
+    run.on_wait, run.on_wait_end = partial(refresh, run.ledger), clear
     try:
         yield
     finally:
-        run.tick, run.waited = before
+        run.on_wait, run.on_wait_end = before
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -221,7 +221,7 @@ def _reporting(run: Run, config: pytest.Config) -> Iterator[None]:
     class Hears:
         @pytest.hookimpl(trylast=True)
         def pytest_runtest_logreport(self) -> None:
-            run.tick()
+            run.on_wait()
 
     if not config.pluginmanager.hasplugin("dsession"):
         yield

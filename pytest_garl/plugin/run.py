@@ -83,9 +83,9 @@ class Run:
     pool: Pool
     simulator: Reference
     flight_s: float = FLIGHT_S
-    tick: Callable[[], None] = field(default=lambda: None)
+    on_wait: Callable[[], None] = field(default=lambda: None)
     """Called while a flight is waited for."""
-    waited: Callable[[], None] = field(default=lambda: None)
+    on_wait_end: Callable[[], None] = field(default=lambda: None)
     """Called when the waiting is over."""
     items: dict[str, dict[Slot, list[Selected]]] = field(default_factory=dict)
     targets: dict[str, dict[Slot, Target]] = field(default_factory=dict)
@@ -95,18 +95,18 @@ class Run:
     """What became of new signatures after the search."""
     rest: Rest | None = None
     """What is to come after the search, when it is known."""
-    trouble: str = ""
+    save_problem: str = ""
     """Why that could not be finished, if it could not."""
-    own: dict[tuple[str, str], ItemAssertion] = field(default_factory=dict)
+    user_assertions: dict[tuple[str, str], ItemAssertion] = field(default_factory=dict)
     """Assertions of tests that failed where the built-in verdict is content, by search and
     signature."""
-    found_by: dict[tuple[str, str], str] = field(default_factory=dict)
+    finding_tests: dict[tuple[str, str], str] = field(default_factory=dict)
     """The test that failed for a violation, by search and signature: its node id, without
     parameters."""
-    told: dict[str, str] = field(default_factory=dict)
+    reported_failures: dict[str, str] = field(default_factory=dict)
     """Tests of which xdist's workers say that they failed so, with the signature."""
     lock: TextIO | None = None
-    ran: bool = False
+    loop_finished: bool = False
     """Whether all tests ran to the end of the list, and nobody interrupted them."""
 
     def select(self, items: list[pytest.Item]) -> None:
@@ -141,11 +141,11 @@ class Run:
                         "begin anew"
                     )
 
-    def note_test(self, search: str, signature: str, nodeid: str) -> None:
+    def note_finding_test(self, search: str, signature: str, nodeid: str) -> None:
         """Remember which test failed for a violation: of several the first by name."""
         test = nodeid.partition("[")[0]
-        known = self.found_by.setdefault((search, signature), test)
-        self.found_by[search, signature] = min(known, test)
+        known = self.finding_tests.setdefault((search, signature), test)
+        self.finding_tests[search, signature] = min(known, test)
 
     def close(self) -> None:
         """End the flying children and let others have the ledger."""
@@ -156,7 +156,7 @@ class Run:
         if not self.options.searches and self.options.controller == str(os.getpid()):
             self.ledger.remove()
 
-    def tells(self, target: Target, nodeid: str) -> bool:
+    def reports_first(self, target: Target, nodeid: str) -> bool:
         """Whether a test is the first that tells of a slot, in whichever process it runs."""
         key = f"told slot {target.search} {target.slot.id(target.map)}"
         return bool(self.ledger.first_fact(key, nodeid) == nodeid)
@@ -178,7 +178,7 @@ class Run:
                 self._wait(search, slot)
             return self._wait(search, target.slot)
         finally:
-            self.waited()
+            self.on_wait_end()
 
     def record(self, target: Target) -> Path:
         """Return where the record of a slot's flight lies."""
@@ -214,7 +214,7 @@ class Run:
         assert text is not None
         return load_scenario(text)
 
-    def known(self, target: Target) -> dict[str, str]:
+    def expected_signatures(self, target: Target) -> dict[str, str]:
         """Return the signatures that known cases expect of a system on a map, with their files.
 
         What is repeated is to be seen, known or not.
@@ -240,17 +240,19 @@ class Run:
 
         return acceptance_of(self.options.cases)
 
-    def searched(self, session: pytest.Session) -> bool:
+    def may_save(self, session: pytest.Session) -> bool:
         """Whether this process has seen a search to its end and may save what it found."""
         options, worker = self.options, hasattr(session.config, "workerinput")
         ended = session.exitstatus in (pytest.ExitCode.OK, pytest.ExitCode.TESTS_FAILED)
         stopped = bool(session.shouldfail or session.shouldstop)
-        if not (ended and self.ran) or stopped or worker or options.repeat or not options.shrink:
+        if not (ended and self.loop_finished) or stopped or worker:
+            return False
+        if options.repeat or not options.shrink:
             return False
         # Interrupted twice, pytest tells of the status that it began with.
         return all(each.flown >= each.all for each in self.ledger.progress())
 
-    def lower(self, target: Target) -> list[Target]:
+    def lower_targets(self, target: Target) -> list[Target]:
         """Return what the selected tests of lower slots of a search test."""
         search = target.search
         return [self.targets[search][slot] for slot in self._lower(search, target.slot)]
@@ -259,7 +261,7 @@ class Run:
         """Return what a slot came to that is flown, or will be."""
         return self._wait(target.search, target.slot)
 
-    def again(self, target: Target, count: int) -> list[Done]:
+    def refly(self, target: Target, count: int) -> list[Done]:
         """Fly a flown slot ``count`` times more."""
         from pytest_garl.execution.on_demand import Done
 
@@ -270,7 +272,7 @@ class Run:
         assert text is not None
         flown = []
         for index in range(count):
-            errand = again_key(target, index)
+            errand = reflight_key(target, index)
             self.ledger.add_search(errand, name, target.map, 1, job, "errand")
             self.ledger.add_slots(errand, 0, {0: text})
             result = self._wait(errand, FIRST)
@@ -291,7 +293,7 @@ class Run:
             job = self.job(target, npcs)
             return list(fly_all(self.ledger, self.pool, job, scenarios, self._advance))
         finally:
-            self.waited()
+            self.on_wait_end()
 
     def _lower(self, search: str, below: Slot) -> list[Slot]:
         return [slot for slot in sorted(self.items[search]) if slot < below]
@@ -308,7 +310,7 @@ class Run:
         """Breed what can be bred, so that the pool has work ahead of the items."""
         for breeder in self.breeders.values():
             breeder.advance()
-        self.tick()
+        self.on_wait()
 
     def _register(self, target: Target, npcs: PolicySpec) -> None:
         """Put this search, and the others of the same system, into the ledger."""
@@ -397,7 +399,7 @@ class Run:
         return make_method(self.options.method, plan)
 
 
-def again_key(target: Target, index: int) -> str:
+def reflight_key(target: Target, index: int) -> str:
     """Return the ledger's key of a slot's flight once more."""
     text = f"again {target.search} {target.slot.id(target.map)} {index}"
     return hashlib.sha256(text.encode()).hexdigest()[:16]

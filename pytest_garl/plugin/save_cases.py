@@ -47,11 +47,11 @@ def pursue(run: Run, session: pytest.Session) -> None:
     )
     reporter: Any = config.pluginmanager.get_plugin("terminalreporter")
     try:
-        for nodeid, signature in sorted(run.told.items()):
+        for nodeid, signature in sorted(run.reported_failures.items()):
             target, user_assertion = collect_assertion(session, nodeid)
-            run.own[target.search, signature] = user_assertion
+            run.user_assertions[target.search, signature] = user_assertion
         shrinking = Shrinking(each=options.shrink, capped=options.shrink_capped)
-        wanted = inquiries(run.ledger, place, shrinking, run.own, run.found_by)
+        wanted = inquiries(run.ledger, place, shrinking, run.user_assertions, run.finding_tests)
         if wanted:
             most = sum(each.budget for each in shares(wanted))
             run.rest = rest_of(wanted, _flight_s(run, wanted), options.workers or 1)
@@ -61,7 +61,7 @@ def pursue(run: Run, session: pytest.Session) -> None:
                 f"at most {counted(most, 'flight')}, about {duration(run.rest.seconds)}"
             )
         with live(run, config):
-            run.pursued = follow_up(run.ledger, run.pool, place, wanted, run.tick)
+            run.pursued = follow_up(run.ledger, run.pool, place, wanted, run.on_wait)
     except KeyboardInterrupt:
         begin_line(reporter)
         reporter.write_line(
@@ -71,7 +71,7 @@ def pursue(run: Run, session: pytest.Session) -> None:
     except GarlError as error:
         begin_line(reporter)
         reporter.write_line(f"garl: {error}", red=True)
-        run.trouble = str(error)
+        run.save_problem = str(error)
 
 
 def _flight_s(run: Run, wanted: Sequence[Inquiry]) -> dict[str, float]:

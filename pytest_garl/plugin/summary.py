@@ -98,7 +98,7 @@ def summary(reporter: Any, run: Run) -> None:
     _searches(reporter, run)
     lines = [
         *told(run.pursued, reporter.config),
-        *([f"nothing more was saved: {run.trouble}"] if run.trouble else []),
+        *([f"nothing more was saved: {run.save_problem}"] if run.save_problem else []),
         *_maybe_fixed(reporter),
         *(wrapped(line, width_of(reporter.config)) for line in _computed_otherwise(run)),
     ]
