@@ -23,7 +23,7 @@ from pytest_garl.execution.job import Job, load_scenario, loads
 from pytest_garl.execution.ledger import Ledger, Row
 from pytest_garl.execution.local_pool import local_pool
 from pytest_garl.execution.on_demand import Done, Errands, Fly
-from pytest_garl.regressions.findings import culprit_of
+from pytest_garl.regressions.new_case import find_colliding_object
 from pytest_garl.regressions.shrink import (
     by_hypothesis,
     complexity,
@@ -72,7 +72,7 @@ class Violation:
     slot: str
     signature: str
     scenario: Scenario
-    culprit: str
+    colliding_object: str
 
 
 def violations(ledger: Ledger, count: int) -> list[Violation]:
@@ -94,7 +94,7 @@ def _violation(ledger: Ledger, row: Row) -> Violation:
         slot=f"g{row.generation:02d}-s{row.slot:02d}",
         signature=row.signature,
         scenario=load_scenario(row.scenario),
-        culprit=culprit_of(done),
+        colliding_object=find_colliding_object(done),
     )
 
 
@@ -118,7 +118,7 @@ def _row(violation: Violation, passes: str, fails: Callable[[Scenario], bool]) -
         fails,
         map,
         BUDGET,
-        culprit=violation.culprit,
+        colliding_object=violation.colliding_object,
         passes=PASSES[passes],
     )
     genome = genome_of(violation.scenario, map)

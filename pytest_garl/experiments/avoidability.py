@@ -19,8 +19,8 @@ from pytest_garl.execution.local_pool import local_pool
 from pytest_garl.execution.on_demand import Errands, Fly
 from pytest_garl.execution.reference import reference_to
 from pytest_garl.experiments.measure import Piloted, Search
-from pytest_garl.regressions.findings import deeds_of
 from pytest_garl.regressions.follow_up import done_of
+from pytest_garl.regressions.new_case import recorded_behaviour
 from pytest_garl.simulation.system_under_test.reference_pilot import ReferencePilot
 
 
@@ -76,7 +76,7 @@ def _opened(path: Path) -> Ledger:
 def _avoided(search: Search, flight: Row, fly: Fly) -> bool:
     """Whether the reference pilot comes through without a violation."""
     scenario, done = load_scenario(flight.scenario), done_of(flight, search.job)
-    deeds = deeds_of(done, scenario, search.map)
-    npcs = recorded_spec(dict(deeds.moves), dict(deeds.changes))
+    behaviour = recorded_behaviour(done, scenario, search.map)
+    npcs = recorded_spec(dict(behaviour.moves), dict(behaviour.changes))
     job = dataclasses.replace(search.job, system=reference_to(ReferencePilot), npcs=npcs)
     return not fly(job, scenario).signature

@@ -21,7 +21,7 @@ from pytest_garl.execution.sources import data_files
 from pytest_garl.plugin.options import SLOT_ID, Options
 
 if TYPE_CHECKING:
-    from pytest_garl.regressions.corpus import Entry
+    from pytest_garl.regressions.corpus import CorpusEntry
     from pytest_garl.scenarios.scenario import Scenario
     from pytest_garl.verdicts.verdict import Limits
 
@@ -44,7 +44,7 @@ class Target:
     """Data files of the system, below the project's root."""
     file: str = ""
     """A scenario file to repeat; empty for a slot of a search."""
-    entry: Entry | None = None
+    entry: CorpusEntry | None = None
     """A saved case."""
     live: bool = False
     """Whether the case's objects are steered as in a search, and do not repeat their moves."""

@@ -21,7 +21,7 @@ from pytest_garl.errors import LedgerError
 from pytest_garl.execution.ledger import Ledger, Progress
 from pytest_garl.plugin.run import SELECTED, Run
 from pytest_garl.plugin.wrapping import begin_line, width_of
-from pytest_garl.regressions.forecast import Rest, of_search
+from pytest_garl.regressions.forecast import RemainingWork, flights_after_search
 
 REFRESH_S = 0.5
 BEAT_S = 30.0
@@ -155,7 +155,7 @@ class Reader:
         self._run, self._every_s = run, every_s
         self._read = self._began = self._rest_began = 0.0
         self._expected = 0.0
-        self._rest: Rest | None = None
+        self._rest: RemainingWork | None = None
 
     def wait(self) -> None:
         """Say nothing at first; what is flown meanwhile counts for the forecast."""
@@ -177,7 +177,9 @@ class Reader:
             options = self._run.options
             cap = options.budget if options.shrink_capped else None
             new = Counter(search for search, _ in ledger.kinds())
-            self._expected = sum(of_search(each, options.shrink, cap) for each in new.values())
+            self._expected = sum(
+                flights_after_search(each, options.shrink, cap) for each in new.values()
+            )
         else:
             if self._rest is None:
                 self._rest, self._rest_began = self._run.rest, now

@@ -28,8 +28,8 @@ if TYPE_CHECKING:
     from pytest_garl.execution.on_demand import Done
     from pytest_garl.plugin.user_assertions import ItemAssertion
     from pytest_garl.regressions.acceptance import Acceptance
-    from pytest_garl.regressions.follow_up import Pursued
-    from pytest_garl.regressions.forecast import Rest
+    from pytest_garl.regressions.follow_up import InvestigatedSignature
+    from pytest_garl.regressions.forecast import RemainingWork
     from pytest_garl.scenarios.scenario import Scenario
     from pytest_garl.search.breeder import Breeder
     from pytest_garl.search.method import Flown, Method
@@ -91,9 +91,9 @@ class Run:
     targets: dict[str, dict[Slot, Target]] = field(default_factory=dict)
     breeders: dict[str, Breeder] = field(default_factory=dict)
     results: dict[tuple[str, Slot], dict[str, Any]] = field(default_factory=dict)
-    pursued: tuple[Pursued, ...] = ()
+    pursued: tuple[InvestigatedSignature, ...] = ()
     """What became of new signatures after the search."""
-    rest: Rest | None = None
+    rest: RemainingWork | None = None
     """What is to come after the search, when it is known."""
     save_problem: str = ""
     """Why that could not be finished, if it could not."""

@@ -17,16 +17,16 @@ from pytest_garl.plugin.suggested_commands import shown
 from pytest_garl.plugin.user_assertions import collect_assertion
 from pytest_garl.plugin.wrapping import begin_line, counted, width_of, wrapped
 from pytest_garl.regressions.case import Case
-from pytest_garl.regressions.case_request import Inquiry
+from pytest_garl.regressions.case_request import CaseRequest
 from pytest_garl.regressions.follow_up import (
+    InvestigatedSignature,
     Place,
-    Pursued,
-    Shrinking,
+    ShrinkBudget,
+    case_requests,
     follow_up,
-    inquiries,
     shares,
 )
-from pytest_garl.regressions.forecast import rest_of
+from pytest_garl.regressions.forecast import remaining_work
 
 PILOT = {
     "live": "the reference pilot violates nothing",
@@ -50,11 +50,11 @@ def pursue(run: Run, session: pytest.Session) -> None:
         for nodeid, signature in sorted(run.reported_failures.items()):
             target, user_assertion = collect_assertion(session, nodeid)
             run.user_assertions[target.search, signature] = user_assertion
-        shrinking = Shrinking(each=options.shrink, capped=options.shrink_capped)
-        wanted = inquiries(run.ledger, place, shrinking, run.user_assertions, run.finding_tests)
+        shrinking = ShrinkBudget(each=options.shrink, capped=options.shrink_capped)
+        wanted = case_requests(run.ledger, place, shrinking, run.user_assertions, run.finding_tests)
         if wanted:
             most = sum(each.budget for each in shares(wanted))
-            run.rest = rest_of(wanted, _flight_s(run, wanted), options.workers or 1)
+            run.rest = remaining_work(wanted, _flight_s(run, wanted), options.workers or 1)
             begin_line(reporter)
             reporter.write_line(
                 f"garl: confirming and shrinking {counted(len(wanted), 'new kind')} of violation, "
@@ -74,14 +74,14 @@ def pursue(run: Run, session: pytest.Session) -> None:
         run.save_problem = str(error)
 
 
-def _flight_s(run: Run, wanted: Sequence[Inquiry]) -> dict[str, float]:
+def _flight_s(run: Run, wanted: Sequence[CaseRequest]) -> dict[str, float]:
     """Return how long a flight of each signature took in the search."""
     known = run.ledger.kinds()
     any_s = run.ledger.seconds_per_flight() or run.flight_s
     return {each.name: known.get((each.search, each.signature)) or any_s for each in wanted}
 
 
-def told(pursued: tuple[Pursued, ...], config: pytest.Config) -> list[str]:
+def told(pursued: tuple[InvestigatedSignature, ...], config: pytest.Config) -> list[str]:
     """Return the summary's lines about saved cases."""
     lines: list[str] = []
     patches = []
@@ -113,7 +113,7 @@ def told(pursued: tuple[Pursued, ...], config: pytest.Config) -> list[str]:
     return [*lines, *_unreached(pursued, width)]
 
 
-def _facts(each: Pursued, case: Case) -> list[str]:
+def _facts(each: InvestigatedSignature, case: Case) -> list[str]:
     """Return in words why a case may be believed, and what it cost."""
     evidence = case.evidence
     if not each.finding.flights:
@@ -130,7 +130,7 @@ def _facts(each: Pursued, case: Case) -> list[str]:
     ]
 
 
-def _unreached(pursued: tuple[Pursued, ...], width: int) -> list[str]:
+def _unreached(pursued: tuple[InvestigatedSignature, ...], width: int) -> list[str]:
     """Say which kinds are not shrunk, and how many flights would reach them."""
     left = sum(not each.finding.flights for each in pursued)
     if not left:

@@ -56,7 +56,7 @@ class Evidence:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Deeds:
+class RecordedBehaviour:
     """What objects did in a flight, and what their policies changed of the environment.
 
     ``changes`` names the objects whose policy changed anything: the number of the decision,

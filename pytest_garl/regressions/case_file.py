@@ -48,7 +48,7 @@ _MOST_MOVES = round(LONGEST_S / DECISION_STEP_S)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Head:
+class CaseHeader:
     """What of a case decides which items it becomes."""
 
     system: str
@@ -214,13 +214,13 @@ def loads(text: str, load_map: Callable[[str], Map], *, source: str = "case") ->
     )
 
 
-def load_head(path: Path) -> Head:
+def load_header(path: Path) -> CaseHeader:
     """Return the keys above a file's first table, in a fraction of the time of all of it."""
     head, _, _ = read_text(path).partition("\n[")
     return _read_head(Table(parse(head, str(path)), str(path)))
 
 
-def _read_head(top: Table) -> Head:
+def _read_head(top: Table) -> CaseHeader:
     if top.integer("schema") != SCHEMA:
         raise top.error("schema", f"found {shown(top.get('schema'))}, expected {SCHEMA}")
     system = top.text("system")
@@ -228,7 +228,7 @@ def _read_head(top: Table) -> Head:
         raise top.error(
             "system", f"found {shown(system)}, expected 'module:class', names with dots between"
         )
-    return Head(
+    return CaseHeader(
         system=system,
         status=cast(Status, top.text("status", among=_STATUSES)),
         avoidable=cast(Avoidable, top.text("avoidable", among=_AVOIDABLE)),

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 from pytest_garl.execution.job import Job
 from pytest_garl.execution.on_demand import Done
-from pytest_garl.regressions.case import Case, Deeds
+from pytest_garl.regressions.case import Case, RecordedBehaviour
 from pytest_garl.regressions.robustness import COUNT
 from pytest_garl.regressions.shrink import complexity, genome_of
 from pytest_garl.regressions.user_failure import UserAssertion
@@ -15,7 +15,7 @@ from pytest_garl.scenarios.scenario import Scenario
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Inquiry:
+class CaseRequest:
     """What is to be found out about one signature of one search.
 
     ``violations`` are scenarios with the flights that violated.  ``name`` begins with the search.
@@ -60,7 +60,7 @@ class Inquiry:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Finding:
+class CaseResult:
     """What came of it: a case, or the reason why there is none."""
 
     signature: str
@@ -82,15 +82,15 @@ class Failure:
 
     first: Scenario
     scenario: Scenario
-    deeds: Deeds
+    behaviour: RecordedBehaviour
     done: Done
     robust: int
     asked: int = COUNT
 
 
-def simplest_first(inquiry: Inquiry) -> list[Scenario]:
+def simplest_first(request: CaseRequest) -> list[Scenario]:
     """Return the violations' scenarios, the simplest first."""
     return sorted(
-        (scenario for scenario, _ in inquiry.violations),
-        key=lambda each: complexity(each, genome_of(each, inquiry.map)),
+        (scenario for scenario, _ in request.violations),
+        key=lambda each: complexity(each, genome_of(each, request.map)),
     )

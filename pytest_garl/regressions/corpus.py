@@ -13,7 +13,7 @@ from pytest_garl.errors import GarlError, ScenarioError
 from pytest_garl.files.atomic import alone, save_text
 from pytest_garl.messages import printable
 from pytest_garl.regressions.case import Case
-from pytest_garl.regressions.case_file import Head, dumps, load, load_head
+from pytest_garl.regressions.case_file import CaseHeader, dumps, load, load_header
 
 
 class CorpusError(GarlError):
@@ -21,7 +21,7 @@ class CorpusError(GarlError):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Entry:
+class CorpusEntry:
     """One file of the corpus.
 
     ``head`` is what collecting needs; the rest of the file is read when somebody asks for it.
@@ -30,7 +30,7 @@ class Entry:
     path: Path
     changed: int
     map_folders: tuple[Path, ...]
-    head: Head | None
+    head: CaseHeader | None
     fault: str = ""
 
     @property
@@ -54,7 +54,7 @@ def folder_of(cases: Path, system: str) -> Path:
     return cases / system.partition(":")[0].rpartition(".")[2]
 
 
-def entries(cases: Path, system: str, map_folders: tuple[Path, ...]) -> tuple[Entry, ...]:
+def entries(cases: Path, system: str, map_folders: tuple[Path, ...]) -> tuple[CorpusEntry, ...]:
     """Return the files of a system in the order of their names, broken ones among them."""
     _check_link(cases)
     return tuple(
@@ -62,7 +62,7 @@ def entries(cases: Path, system: str, map_folders: tuple[Path, ...]) -> tuple[En
     )
 
 
-def every_entry(cases: Path, map_folders: tuple[Path, ...]) -> tuple[Entry, ...]:
+def every_entry(cases: Path, map_folders: tuple[Path, ...]) -> tuple[CorpusEntry, ...]:
     """Return all files of the corpus, system by system."""
     _check_link(cases)
     try:
@@ -80,7 +80,7 @@ def _check_link(cases: Path) -> None:
         )
 
 
-def _in_folder(folder: Path, map_folders: tuple[Path, ...]) -> Iterator[Entry]:
+def _in_folder(folder: Path, map_folders: tuple[Path, ...]) -> Iterator[CorpusEntry]:
     for path in sorted(folder.glob("*.toml")):
         try:
             changed = path.stat().st_mtime_ns
@@ -94,23 +94,25 @@ def _in_folder(folder: Path, map_folders: tuple[Path, ...]) -> Iterator[Entry]:
         yield _lost(folder, map_folders, "there is no such folder")
 
 
-def _lost(path: Path, map_folders: tuple[Path, ...], reason: str) -> Entry:
+def _lost(path: Path, map_folders: tuple[Path, ...], reason: str) -> CorpusEntry:
     """Return an entry that tells of a symbolic link without a file: a case may be lost."""
     fault = (
         f"{path}: cannot be read: found a symbolic link that leads nowhere ({reason}), expected "
         "a file; remove it, or restore what it points to"
     )
-    return Entry(path=path, changed=0, map_folders=map_folders, head=None, fault=printable(fault))
+    return CorpusEntry(
+        path=path, changed=0, map_folders=map_folders, head=None, fault=printable(fault)
+    )
 
 
 @functools.lru_cache(maxsize=10_000)
-def _read(path: Path, changed: int, map_folders: tuple[Path, ...]) -> Entry:
+def _read(path: Path, changed: int, map_folders: tuple[Path, ...]) -> CorpusEntry:
     """Read a file's head once, however many tests fly it."""
     try:
-        head, fault = load_head(path), ""
+        head, fault = load_header(path), ""
     except ScenarioError as error:
         head, fault = None, str(error)
-    return Entry(path=path, changed=changed, map_folders=map_folders, head=head, fault=fault)
+    return CorpusEntry(path=path, changed=changed, map_folders=map_folders, head=head, fault=fault)
 
 
 @functools.lru_cache(maxsize=10_000)
@@ -122,7 +124,7 @@ def _load(path: Path, changed: int, map_folders: tuple[Path, ...]) -> tuple[Case
         return None, str(error)
 
 
-def _of_system(entry: Entry, system: str) -> Entry:
+def _of_system(entry: CorpusEntry, system: str) -> CorpusEntry:
     if entry.head is None or entry.head.system == system:
         return entry
     fault = (

@@ -39,21 +39,27 @@ def tell(flight: Flight, verdict: Verdict) -> str:
     contact = flight.contacts[-1] if flight.contacts else None
     if verdict.violation_type != "IV" or contact is None:
         return verdict.story
-    culprit = next((item for item in flight.objects if item.name == contact.body), None)
-    return f"{_entrance(flight, culprit, contact)} {verdict.story}" if culprit else verdict.story
+    colliding_object = next((item for item in flight.objects if item.name == contact.body), None)
+    return (
+        f"{_entrance(flight, colliding_object, contact)} {verdict.story}"
+        if colliding_object
+        else verdict.story
+    )
 
 
-def _entrance(flight: Flight, culprit: ObjectRecord, contact: Contact) -> str:
+def _entrance(flight: Flight, colliding_object: ObjectRecord, contact: Contact) -> str:
     """Return how the object came near: ``A dog at 2.1 m/s enters from the south-east ...``."""
-    there, own = flight.uav.position_m, culprit.track.position_m
+    there, own = flight.uav.position_m, colliding_object.track.position_m
     away = np.hypot(own[:, 0] - there[:, 0], own[:, 1] - there[:, 1])
     outside = np.flatnonzero(away > NEAR_M)
     entered = int(outside[-1]) + 1 if len(outside) else 0
     entered = min(entered, len(away) - 1)
     up = up_m(float(there[entered, 2]))
-    speeds = np.hypot(culprit.track.velocity_mps[:, 0], culprit.track.velocity_mps[:, 1])
+    speeds = np.hypot(
+        colliding_object.track.velocity_mps[:, 0], colliding_object.track.velocity_mps[:, 1]
+    )
     speed = float(speeds[entered:].max())
-    kind = f"{_article(culprit.type)} {culprit.type}"
+    kind = f"{_article(colliding_object.type)} {colliding_object.type}"
     place = _over(flight, there[entered])
     if speed < 0.1:
         return f"{kind} stands still in the UAV's way, {up:.1f} m below it."

@@ -15,15 +15,15 @@ from pytest_garl.execution.on_demand import Done, Errands, Fly
 from pytest_garl.execution.pool import Pool
 from pytest_garl.execution.slot import flight_name
 from pytest_garl.regressions.case import Case
-from pytest_garl.regressions.case_request import Finding, Inquiry
+from pytest_garl.regressions.case_request import CaseRequest, CaseResult
 from pytest_garl.regressions.corpus import entries, save, save_patch
-from pytest_garl.regressions.findings import as_found
 from pytest_garl.regressions.investigation import (
     EXCEPTION,
     LEAST,
     PILOTS,
-    Pursuit,
+    CaseBuilder,
 )
+from pytest_garl.regressions.new_case import as_found
 from pytest_garl.regressions.user_failure import UserAssertion
 from pytest_garl.scenarios.maps.map import load_map
 from pytest_garl.scenarios.scenario import Scenario
@@ -33,7 +33,7 @@ NOTED = "signatures to pursue"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Shrinking:
+class ShrinkBudget:
     """How many flights each new signature has, and whether a search's signatures have a cap.
 
     The cap is as many flights of the landing system as the search itself; one signature is always
@@ -55,22 +55,22 @@ class Place:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Pursued:
+class InvestigatedSignature:
     """What became of one new signature: its case and the file, or the reason for none."""
 
     system: str
     map: str
-    finding: Finding
+    finding: CaseResult
     file: Path | None
 
 
-def inquiries(
+def case_requests(
     ledger: Ledger,
     place: Place,
-    shrinking: Shrinking,
+    shrinking: ShrinkBudget,
     own: Mapping[tuple[str, str], UserAssertion] | None = None,
     found_by: Mapping[tuple[str, str], str] | None = None,
-) -> tuple[Inquiry, ...]:
+) -> tuple[CaseRequest, ...]:
     """Return what is to be found out about signatures that no saved case has.
 
     Which these are is written down when it is asked first: a run that is resumed after some of its
@@ -79,7 +79,7 @@ def inquiries(
     assertions of tests that failed where the verdict is content, by search and signature;
     ``found_by`` are the node ids of the tests that failed.
     """
-    found: list[Inquiry] = []
+    found: list[CaseRequest] = []
     assertions, tests = own or {}, found_by or {}
     groups = _by_search(ledger)
     for search, signature in assertions:
@@ -110,7 +110,7 @@ def inquiries(
         cap = len(ledger.flown(search)) if shrinking.capped else None
         map = load_map(job.map, place.map_folders)
         found += [
-            Inquiry(
+            CaseRequest(
                 name=f"{search} {signature}",
                 signature=signature,
                 violations=new[signature],
@@ -131,8 +131,8 @@ def inquiries(
 
 
 def shares(
-    wanted: Sequence[Inquiry], findings: Mapping[str, Finding] | None = None
-) -> tuple[Inquiry, ...]:
+    wanted: Sequence[CaseRequest], findings: Mapping[str, CaseResult] | None = None
+) -> tuple[CaseRequest, ...]:
     """Return signatures with the flights that each may have.
 
     Where a search's cap is too low for all of its signatures, as many are reached as can be, and
@@ -155,7 +155,7 @@ def shares(
     return tuple(found)
 
 
-def _with_pilots(kind: Inquiry, flights: int) -> int:
+def _with_pilots(kind: CaseRequest, flights: int) -> int:
     return flights if kind.exception or not flights else flights + PILOTS
 
 
@@ -227,16 +227,16 @@ def follow_up(
     ledger: Ledger,
     pool: Pool,
     place: Place,
-    wanted: Sequence[Inquiry],
+    wanted: Sequence[CaseRequest],
     tick: Callable[[], None],
-) -> tuple[Pursued, ...]:
+) -> tuple[InvestigatedSignature, ...]:
     """Pursue all signatures at once and save their cases; the order is always the same.
 
     What some leave of a search's cap goes to those that had no share.
     """
-    findings: dict[str, Finding] = {}
+    findings: dict[str, CaseResult] = {}
     while reached := _reached(wanted, findings):
-        functions: dict[str, Callable[[Fly], Finding]] = {
+        functions: dict[str, Callable[[Fly], CaseResult]] = {
             each.name: functools.partial(_pursue, each) for each in reached
         }
         findings |= Errands(ledger, pool, tick).run(functions)
@@ -246,19 +246,21 @@ def follow_up(
     return tuple(_saved(each, findings[each.name], place) for each in wanted)
 
 
-def _reached(wanted: Sequence[Inquiry], findings: Mapping[str, Finding]) -> list[Inquiry]:
+def _reached(
+    wanted: Sequence[CaseRequest], findings: Mapping[str, CaseResult]
+) -> list[CaseRequest]:
     """Return the signatures that are next to be pursued, each with its flights."""
     waiting = [each for each in wanted if each.name not in findings]
     return [each for each in shares(waiting, findings) if each.budget]
 
 
-def _pursue(inquiry: Inquiry, fly: Fly) -> Finding:
-    return Pursuit(inquiry, fly).run()
+def _pursue(request: CaseRequest, fly: Fly) -> CaseResult:
+    return CaseBuilder(request, fly).run()
 
 
-def _saved(inquiry: Inquiry, finding: Finding, place: Place) -> Pursued:
-    job = inquiry.job
-    return Pursued(
+def _saved(request: CaseRequest, finding: CaseResult, place: Place) -> InvestigatedSignature:
+    job = request.job
+    return InvestigatedSignature(
         system=job.system.name,
         map=job.map,
         finding=finding,

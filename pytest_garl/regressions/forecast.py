@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
-from pytest_garl.regressions.case_request import Inquiry
+from pytest_garl.regressions.case_request import CaseRequest
 from pytest_garl.regressions.follow_up import shares
 from pytest_garl.regressions.investigation import LEAST, PILOTS
 
@@ -19,14 +19,14 @@ PILOTED_S = 0.2
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Rest:
+class RemainingWork:
     """What is to come after a search: flights, and the time that they take."""
 
     flights: float
     seconds: float
 
 
-def of_search(kinds: int, each: int, cap: int | None) -> float:
+def flights_after_search(kinds: int, each: int, cap: int | None) -> float:
     """Return the flights that the new kinds of a search take, those that repeat them included."""
     if not kinds or not each:
         return 0.0
@@ -44,22 +44,24 @@ def seconds_of_kind(each: int, flight_s: float, workers: int) -> float:
     return flights * flight_s / max(1, workers)
 
 
-def rest_of(wanted: Sequence[Inquiry], flight_s: Mapping[str, float], workers: int) -> Rest:
+def remaining_work(
+    wanted: Sequence[CaseRequest], flight_s: Mapping[str, float], workers: int
+) -> RemainingWork:
     """Return what signatures still take; ``flight_s`` is how long a flight of each takes."""
     flights, each_s = 0.0, []
     left: dict[str, float] = {each.search: float(each.cap or 0) for each in wanted}
-    for inquiry in sorted(shares(wanted), key=lambda each: not each.budget):
-        budget = inquiry.budget
-        if not budget and left[inquiry.search] >= LEAST - PILOTS:
+    for request in sorted(shares(wanted), key=lambda each: not each.budget):
+        budget = request.budget
+        if not budget and left[request.search] >= LEAST - PILOTS:
             # Others leave something for it.
             budget = LEAST
         if not budget:
             continue
-        own = 1.0 if inquiry.exception else SPENT * (budget - PILOTS)
-        piloted = 0 if inquiry.exception else PILOTED
-        left[inquiry.search] -= own
+        own = 1.0 if request.exception else SPENT * (budget - PILOTS)
+        piloted = 0 if request.exception else PILOTED
+        left[request.search] -= own
         flights += own + piloted
-        each_s.append((own + piloted * PILOTED_S) * flight_s[inquiry.name])
+        each_s.append((own + piloted * PILOTED_S) * flight_s[request.name])
     # Flights of one kind follow each other; those of several are flown side by side.
     seconds = max([sum(each_s) / max(1, workers), *each_s], default=0.0)
-    return Rest(flights=flights, seconds=seconds)
+    return RemainingWork(flights=flights, seconds=seconds)

@@ -9,16 +9,16 @@ from pytest_garl.adversary.recorded import recorded_spec
 from pytest_garl.execution.job import Job
 from pytest_garl.execution.on_demand import Done, Fly
 from pytest_garl.execution.reference import reference_to
-from pytest_garl.regressions.case import Avoidable, Case, Deeds
-from pytest_garl.regressions.case_request import Failure, Finding, Inquiry, simplest_first
-from pytest_garl.regressions.findings import (
+from pytest_garl.regressions.case import Avoidable, Case, RecordedBehaviour
+from pytest_garl.regressions.case_request import CaseRequest, CaseResult, Failure, simplest_first
+from pytest_garl.regressions.move_reduction import shorter_records
+from pytest_garl.regressions.new_case import (
     case_of,
-    culprit_of,
-    deeds_of,
+    find_colliding_object,
     nobody_asked,
+    recorded_behaviour,
     unasked,
 )
-from pytest_garl.regressions.move_reduction import simpler
 from pytest_garl.regressions.robustness import COUNT, neighbours
 from pytest_garl.regressions.shrink import alone, bare, clear, nobody, shrink
 from pytest_garl.scenarios.maps.map import Map
@@ -40,20 +40,20 @@ CANDIDATES = 3
 """So many violations of a signature are tried for one whose neighbours fail as well."""
 
 
-class Pursuit:
+class CaseBuilder:
     """The train of thought about one signature; every flight goes through ``fly``."""
 
-    def __init__(self, inquiry: Inquiry, fly: Fly) -> None:
-        self._inquiry, self._fly, self._flights, self._piloted = inquiry, fly, 0, 0
-        self._flown: dict[Scenario, Done] = dict(inquiry.violations)
+    def __init__(self, request: CaseRequest, fly: Fly) -> None:
+        self._request, self._fly, self._flights, self._piloted = request, fly, 0, 0
+        self._flown: dict[Scenario, Done] = dict(request.violations)
 
-    def run(self) -> Finding:
+    def run(self) -> CaseResult:
         """Return what was found out."""
-        inquiry = self._inquiry
-        simple = simplest_first(inquiry)
+        request = self._request
+        simple = simplest_first(request)
         if not simple:
             return self._finding(None, UNLIKE)
-        if inquiry.exception:
+        if request.exception:
             return self._exception(simple[0])
         best = self._barest(simple[0])
         if best is None or (best.robust < COUNT and self._left > COUNT):
@@ -66,30 +66,33 @@ class Pursuit:
         for longer in others:
             if avoidable == "no" and (found := self._avoidable(longer)) != "no":
                 failure, avoidable = longer, found
-        return self._finding(case_of(inquiry, failure, avoidable))
+        return self._finding(case_of(request, failure, avoidable))
 
-    def _exception(self, first: Scenario) -> Finding:
+    def _exception(self, first: Scenario) -> CaseResult:
         """Return a Python exception or a hang in the barest scenario, or as it was found."""
-        found = deeds_of(self._flown[first], first, self._map)
-        for scenario, deeds in ((nobody(first, self._map), Deeds(moves=())), (first, found)):
-            done = self._again(scenario, deeds)
-            if self._inquiry.failed(scenario, done):
-                failure = unasked(first, scenario, deeds, done)
-                return self._finding(case_of(self._inquiry, failure, nobody_asked(failure)))
+        found = recorded_behaviour(self._flown[first], first, self._map)
+        for scenario, behaviour in (
+            (nobody(first, self._map), RecordedBehaviour(moves=())),
+            (first, found),
+        ):
+            done = self._again(scenario, behaviour)
+            if self._request.failed(scenario, done):
+                failure = unasked(first, scenario, behaviour, done)
+                return self._finding(case_of(self._request, failure, nobody_asked(failure)))
         return self._finding(None, UNLIKE)
 
     @property
     def _map(self) -> Map:
-        return self._inquiry.map
+        return self._request.map
 
     @property
     def _left(self) -> int:
         """Flights that may be spent before the reference pilot's."""
-        return self._inquiry.budget - PILOTS - (self._flights - self._piloted)
+        return self._request.budget - PILOTS - (self._flights - self._piloted)
 
-    def _finding(self, case: Case | None, reason: str = "") -> Finding:
-        return Finding(
-            signature=self._inquiry.signature,
+    def _finding(self, case: Case | None, reason: str = "") -> CaseResult:
+        return CaseResult(
+            signature=self._request.signature,
             case=case,
             flights=self._flights,
             piloted=self._piloted,
@@ -100,10 +103,10 @@ class Pursuit:
         self._flights += 1
         return self._fly(job, scenario)
 
-    def _again(self, scenario: Scenario, deeds: Deeds) -> Done:
+    def _again(self, scenario: Scenario, behaviour: RecordedBehaviour) -> Done:
         """Fly with recorded moves."""
-        spec = recorded_spec(dict(deeds.moves), dict(deeds.changes))
-        return self._go(dataclasses.replace(self._inquiry.job, npcs=spec), scenario)
+        spec = recorded_spec(dict(behaviour.moves), dict(behaviour.changes))
+        return self._go(dataclasses.replace(self._request.job, npcs=spec), scenario)
 
     def _barest(self, first: Scenario) -> Failure | None:
         """Return the failure with all that it should not need taken away, if it still fails.
@@ -112,31 +115,38 @@ class Pursuit:
         clear weather, and lastly in the weather that there was.
         """
         found = self._flown[first]
-        culprit = culprit_of(found)
-        scenario = bare(first, self._map, culprit)
+        colliding_object = find_colliding_object(found)
+        scenario = bare(first, self._map, colliding_object)
         # What is left must do for the scenario as it was found.
-        if scenario != first and self._left >= (3 if culprit else 2) + COUNT:
-            done = self._flown[scenario] = self._go(self._inquiry.job, scenario)
-            if self._inquiry.failed(scenario, done):
-                deeds = deeds_of(done, scenario, self._map)
+        if scenario != first and self._left >= (3 if colliding_object else 2) + COUNT:
+            done = self._flown[scenario] = self._go(self._request.job, scenario)
+            if self._request.failed(scenario, done):
+                behaviour = recorded_behaviour(done, scenario, self._map)
                 # Where nothing moves, the record is the flight itself.
-                done = self._again(scenario, deeds) if deeds.moves else done
-                if self._inquiry.failed(scenario, done):
-                    return self._asked(first, scenario, deeds, done)
-        if not culprit:
+                done = self._again(scenario, behaviour) if behaviour.moves else done
+                if self._request.failed(scenario, done):
+                    return self._asked(first, scenario, behaviour, done)
+        if not colliding_object:
             return None
-        deeds = _only(deeds_of(found, first, self._map), culprit)
-        for scenario in (clear(first, self._map, culprit), alone(first, self._map, culprit)):
+        behaviour = _only(recorded_behaviour(found, first, self._map), colliding_object)
+        for scenario in (
+            clear(first, self._map, colliding_object),
+            alone(first, self._map, colliding_object),
+        ):
             if scenario == first or self._left < 2 + COUNT:
                 continue
-            done = self._again(scenario, deeds)
-            if self._inquiry.failed(scenario, done):
-                return self._asked(first, scenario, deeds, done)
+            done = self._again(scenario, behaviour)
+            if self._request.failed(scenario, done):
+                return self._asked(first, scenario, behaviour, done)
         return None
 
-    def _asked(self, first: Scenario, scenario: Scenario, deeds: Deeds, done: Done) -> Failure:
-        robust = self._robust(scenario, deeds)
-        return Failure(first=first, scenario=scenario, deeds=deeds, done=done, robust=robust)
+    def _asked(
+        self, first: Scenario, scenario: Scenario, behaviour: RecordedBehaviour, done: Done
+    ) -> Failure:
+        robust = self._robust(scenario, behaviour)
+        return Failure(
+            first=first, scenario=scenario, behaviour=behaviour, done=done, robust=robust
+        )
 
     def _most_robust(self, scenarios: Sequence[Scenario], best: Failure | None) -> Failure | None:
         """Return the first violation all of whose neighbours fail, or the best of those tried."""
@@ -144,65 +154,76 @@ class Pursuit:
             needed = 1 + COUNT + (LEAST if number and best is not None else 0)
             if self._left < needed:
                 break
-            deeds = deeds_of(self._flown[scenario], scenario, self._inquiry.map)
-            done = self._again(scenario, deeds)
-            if not self._inquiry.failed(scenario, done):
+            behaviour = recorded_behaviour(self._flown[scenario], scenario, self._request.map)
+            done = self._again(scenario, behaviour)
+            if not self._request.failed(scenario, done):
                 continue
-            robust = self._robust(scenario, deeds)
+            robust = self._robust(scenario, behaviour)
             if best is None or robust > best.robust:
                 best = Failure(
-                    first=scenario, scenario=scenario, deeds=deeds, done=done, robust=robust
+                    first=scenario, scenario=scenario, behaviour=behaviour, done=done, robust=robust
                 )
             if robust == COUNT:
                 break
         return best
 
-    def _robust(self, scenario: Scenario, deeds: Deeds, least: int = 0) -> int:
+    def _robust(self, scenario: Scenario, behaviour: RecordedBehaviour, least: int = 0) -> int:
         """Return how many neighbours fail too; fewer than ``least`` are not counted to the end."""
         robust = COUNT
-        for each in neighbours(scenario, self._inquiry.map):
-            robust -= not self._inquiry.failed(each, self._again(each, deeds))
+        for each in neighbours(scenario, self._request.map):
+            robust -= not self._request.failed(each, self._again(each, behaviour))
             if robust < least:
                 break
         return robust
 
     def _avoidable(self, failure: Failure) -> Avoidable:
         """Whether a pilot that knows where everything is comes through, landed or aborted."""
-        scenario, job = failure.scenario, self._inquiry.job
+        scenario, job = failure.scenario, self._request.job
         pilot = dataclasses.replace(job, system=reference_to(ReferencePilot))
-        recorded = recorded_spec(dict(failure.deeds.moves), dict(failure.deeds.changes))
+        recorded = recorded_spec(dict(failure.behaviour.moves), dict(failure.behaviour.changes))
         if not self._comes_through(dataclasses.replace(pilot, npcs=recorded), scenario):
             return "no"
         # Where nothing moves, nothing pursues.
-        alone = not failure.deeds.moves
+        alone = not failure.behaviour.moves
         return "live" if alone or self._comes_through(pilot, scenario) else "recorded"
 
     def _comes_through(self, pilot: Job, scenario: Scenario) -> bool:
         self._piloted += 1
         done = self._go(pilot, scenario)
-        return not done.signature and not self._inquiry.failed(scenario, done)
+        return not done.signature and not self._request.failed(scenario, done)
 
     def _shrunk(self, best: Failure) -> tuple[Failure, ...]:
         """Return the simplest failure whose neighbours fail as well: with all moves, with few."""
-        inquiry = self._inquiry
+        request = self._request
 
         def fails(scenario: Scenario) -> bool:
-            done = self._flown[scenario] = self._go(inquiry.job, scenario)
-            return inquiry.failed(scenario, done)
+            done = self._flown[scenario] = self._go(request.job, scenario)
+            return request.failed(scenario, done)
 
         # Steps back from an edge want a share as well, and a shorter record of moves.
-        reserve = self._left // 3 if any(own for _, own in best.deeds.moves) else 0
+        reserve = self._left // 3 if any(own for _, own in best.behaviour.moves) else 0
         budget = self._left - 1 - COUNT - reserve
         if budget < 2:
             return self._with_record(best)
-        found = shrink(best.scenario, fails, inquiry.map, budget, culprit=culprit_of(best.done))
-        return self._with_record(self._off_the_edge(best, found.history[1:], self._deeds_of))
+        found = shrink(
+            best.scenario,
+            fails,
+            request.map,
+            budget,
+            colliding_object=find_colliding_object(best.done),
+        )
+        return self._with_record(
+            self._off_the_edge(best, found.history[1:], self._recorded_behaviour)
+        )
 
-    def _deeds_of(self, scenario: Scenario) -> Deeds:
-        return deeds_of(self._flown[scenario], scenario, self._map)
+    def _recorded_behaviour(self, scenario: Scenario) -> RecordedBehaviour:
+        return recorded_behaviour(self._flown[scenario], scenario, self._map)
 
     def _off_the_edge(
-        self, best: Failure, history: Sequence[Scenario], deeds_of: Callable[[Scenario], Deeds]
+        self,
+        best: Failure,
+        history: Sequence[Scenario],
+        recorded_behaviour: Callable[[Scenario], RecordedBehaviour],
     ) -> Failure:
         """Return the simplest of the failures all of whose neighbours fail, or the most robust.
 
@@ -212,15 +233,20 @@ class Pursuit:
         for scenario in _ever_further_back(history):
             if self._left < 1 + COUNT or (kept is not None and kept.robust == COUNT):
                 break
-            deeds = deeds_of(scenario)
-            done = self._again(scenario, deeds)
-            if not self._inquiry.failed(scenario, done):
+            behaviour = recorded_behaviour(scenario)
+            done = self._again(scenario, behaviour)
+            if not self._request.failed(scenario, done):
                 continue
             least = best.robust if kept is None else kept.robust + 1
-            robust = self._robust(scenario, deeds, least)
+            robust = self._robust(scenario, behaviour, least)
             if robust >= least:
                 kept = dataclasses.replace(
-                    best, scenario=scenario, deeds=deeds, done=done, robust=robust, asked=COUNT
+                    best,
+                    scenario=scenario,
+                    behaviour=behaviour,
+                    done=done,
+                    robust=robust,
+                    asked=COUNT,
                 )
         return best if kept is None else kept
 
@@ -231,26 +257,31 @@ class Pursuit:
 
     def _recorded(self, failure: Failure) -> Failure:
         """Return the failure with the shortest record of moves that it survives."""
-        culprit = culprit_of(failure.done)
-        moves = failure.deeds.moves
+        colliding_object = find_colliding_object(failure.done)
+        moves = failure.behaviour.moves
         if not any(own for _, own in moves) or not failure.done.record.exists():
             return failure
         flight = load(failure.done.record)
-        for scenario, shorter in simpler(
-            failure.scenario, moves, flight, culprit, self._inquiry.map
+        for scenario, shorter in shorter_records(
+            failure.scenario, moves, flight, colliding_object, self._request.map
         ):
             if self._left < 1 + COUNT:
                 break
             if (scenario, shorter) == (failure.scenario, moves):
                 continue
-            deeds = dataclasses.replace(failure.deeds, moves=shorter)
-            done = self._again(scenario, deeds)
-            if not self._inquiry.failed(scenario, done):
+            behaviour = dataclasses.replace(failure.behaviour, moves=shorter)
+            done = self._again(scenario, behaviour)
+            if not self._request.failed(scenario, done):
                 continue
-            robust = self._robust(scenario, deeds, failure.robust)
+            robust = self._robust(scenario, behaviour, failure.robust)
             if robust >= failure.robust:
                 return dataclasses.replace(
-                    failure, scenario=scenario, deeds=deeds, done=done, robust=robust, asked=COUNT
+                    failure,
+                    scenario=scenario,
+                    behaviour=behaviour,
+                    done=done,
+                    robust=robust,
+                    asked=COUNT,
                 )
         return failure
 
@@ -267,8 +298,8 @@ def _ever_further_back(history: Sequence[Scenario]) -> Iterator[Scenario]:
     yield from history[:1]
 
 
-def _only(deeds: Deeds, name: str) -> Deeds:
-    return Deeds(
-        moves=tuple(each for each in deeds.moves if each[0] == name),
-        changes=tuple(each for each in deeds.changes if each[0] == name),
+def _only(behaviour: RecordedBehaviour, name: str) -> RecordedBehaviour:
+    return RecordedBehaviour(
+        moves=tuple(each for each in behaviour.moves if each[0] == name),
+        changes=tuple(each for each in behaviour.changes if each[0] == name),
     )

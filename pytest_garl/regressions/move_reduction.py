@@ -17,7 +17,7 @@ LEADS_S = (2.0, 4.0, 8.0)
 """How long before the end an object may still move, tried from short to long."""
 
 
-def simpler(
+def shorter_records(
     scenario: Scenario, moves: Moves, flight: Flight, name: str, map: Map
 ) -> Iterator[tuple[Scenario, Moves]]:
     """Yield scenarios with shorter records, the shortest first.

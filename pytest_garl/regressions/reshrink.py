@@ -20,11 +20,11 @@ from pytest_garl.execution.reference import (
     simulator_sha256,
 )
 from pytest_garl.execution.sources import sources_sha256
-from pytest_garl.regressions.case import Avoidable, Case, Deeds
+from pytest_garl.regressions.case import Avoidable, Case, RecordedBehaviour
 from pytest_garl.regressions.case_file import size_of
-from pytest_garl.regressions.case_request import Failure, Finding, Inquiry
-from pytest_garl.regressions.findings import case_of, culprit_of
-from pytest_garl.regressions.investigation import PILOTS, Pursuit
+from pytest_garl.regressions.case_request import CaseRequest, CaseResult, Failure
+from pytest_garl.regressions.investigation import PILOTS, CaseBuilder
+from pytest_garl.regressions.new_case import case_of, find_colliding_object
 from pytest_garl.regressions.replay import system_of
 from pytest_garl.regressions.robustness import COUNT
 from pytest_garl.regressions.shrink import shrink
@@ -62,7 +62,7 @@ def shrink_case(
     flights: int,
     workers: int,
     means: Means | None = None,
-) -> Finding:
+) -> CaseResult:
     """Return a case that is no worse in any respect and better in one, or the reason for none.
 
     At most ``flights`` are flown.
@@ -84,7 +84,7 @@ def shrink_case(
             path=tuple(entry for entry in sys.path if entry),
             flights=str(ledger.path.parent / "flights"),
         )
-        inquiry = Inquiry(
+        request = CaseRequest(
             name=case.id,
             signature=case.violation.signature,
             violations=(),
@@ -95,20 +95,20 @@ def shrink_case(
             test=case.test,
         )
 
-        def think(fly: Fly) -> Finding:
-            return Continued(inquiry, fly, case).run()
+        def think(fly: Fly) -> CaseResult:
+            return CaseReshrinker(request, fly, case).run()
 
         return Errands(ledger, pool, lambda: None).run({case.id: think})[case.id]
 
 
-class Continued(Pursuit):
+class CaseReshrinker(CaseBuilder):
     """The train of thought about a saved case: it begins with what its file says."""
 
-    def __init__(self, inquiry: Inquiry, fly: Fly, case: Case) -> None:
-        super().__init__(inquiry, fly)
+    def __init__(self, request: CaseRequest, fly: Fly, case: Case) -> None:
+        super().__init__(request, fly)
         self._case = case
 
-    def run(self) -> Finding:
+    def run(self) -> CaseResult:
         """Return what was found."""
         case = self._case
         first = self._as_saved()
@@ -124,18 +124,18 @@ class Continued(Pursuit):
     def _as_saved(self) -> Failure | None:
         """Return the case's own failure, flown once more with its record."""
         case = self._case
-        deeds = Deeds(moves=case.moves, changes=case.changes)
-        done = self._again(case.scenario, deeds)
-        if not self._inquiry.failed(case.scenario, done):
+        behaviour = RecordedBehaviour(moves=case.moves, changes=case.changes)
+        done = self._again(case.scenario, behaviour)
+        if not self._request.failed(case.scenario, done):
             return None
         robust, asked = case.evidence.neighbours_failed, case.evidence.neighbours
         if self._outdated() and asked and self._left >= COUNT:
             # Counted in another world.
-            robust, asked = self._robust(case.scenario, deeds), COUNT
+            robust, asked = self._robust(case.scenario, behaviour), COUNT
         return Failure(
             first=case.scenario,
             scenario=case.scenario,
-            deeds=deeds,
+            behaviour=behaviour,
             done=done,
             robust=robust,
             asked=asked,
@@ -143,7 +143,7 @@ class Continued(Pursuit):
 
     def _outdated(self) -> bool:
         """Whether the sources are not those that the case's evidence is of."""
-        evidence, job = self._case.evidence, self._inquiry.job
+        evidence, job = self._case.evidence, self._request.job
         today = Sources(
             system_sha256=job.system_sha256,
             simulator_sha256=simulator_sha256(job.simulator),
@@ -158,32 +158,34 @@ class Continued(Pursuit):
     def _by_record(self, first: Failure) -> Failure:
         """Return the simplest failure in which the objects that are left repeat their record."""
 
-        def deeds_of(scenario: Scenario) -> Deeds:
-            return _without(first.deeds, scenario.absent)
+        def recorded_behaviour(scenario: Scenario) -> RecordedBehaviour:
+            return _without(first.behaviour, scenario.absent)
 
         def fails(scenario: Scenario) -> bool:
-            return self._inquiry.failed(scenario, self._again(scenario, deeds_of(scenario)))
+            return self._request.failed(
+                scenario, self._again(scenario, recorded_behaviour(scenario))
+            )
 
         # What the record does not give may need a policy.
-        share = 2 if first.deeds.moves else 1
-        return self._shrunk_by(first, fails, deeds_of, share)
+        share = 2 if first.behaviour.moves else 1
+        return self._shrunk_by(first, fails, recorded_behaviour, share)
 
     def _by_policy(self, first: Failure) -> Failure:
         """Return the simplest failure in which a live policy steers: for what no record does."""
 
         def fails(scenario: Scenario) -> bool:
-            done = self._flown[scenario] = self._go(self._inquiry.job, scenario)
-            return self._inquiry.failed(scenario, done)
+            done = self._flown[scenario] = self._go(self._request.job, scenario)
+            return self._request.failed(scenario, done)
 
-        if not first.deeds.moves:
+        if not first.behaviour.moves:
             return first
-        return self._shrunk_by(first, fails, self._deeds_of, 1)
+        return self._shrunk_by(first, fails, self._recorded_behaviour, 1)
 
     def _shrunk_by(
         self,
         first: Failure,
         fails: Callable[[Scenario], bool],
-        deeds_of: Callable[[Scenario], Deeds],
+        recorded_behaviour: Callable[[Scenario], RecordedBehaviour],
         share: int,
     ) -> Failure:
         """Shrink with a share of the flights that are left; the last go to neighbours."""
@@ -192,9 +194,9 @@ class Continued(Pursuit):
         budget = (self._left - reserve) // share
         if budget < 1:
             return first
-        culprit = culprit_of(first.done)
-        found = shrink(first.scenario, fails, self._map, budget, culprit=culprit)
-        return self._off_the_edge(first, found.history[1:], deeds_of)
+        colliding_object = find_colliding_object(first.done)
+        found = shrink(first.scenario, fails, self._map, budget, colliding_object=colliding_object)
+        return self._off_the_edge(first, found.history[1:], recorded_behaviour)
 
     def _better(self, first: Failure, simpler: Failure) -> Case | None:
         """Return a failure as a case if it is no worse than the saved one, and better in one."""
@@ -217,7 +219,7 @@ class Continued(Pursuit):
 
     def _saved_as(self, failure: Failure, avoidable: Avoidable) -> Case:
         """Return a failure as the case that takes the saved one's place."""
-        case, found = self._case, case_of(self._inquiry, failure, avoidable)
+        case, found = self._case, case_of(self._request, failure, avoidable)
         removed = _all_removed(case.evidence.removed, found.evidence.removed)
         return dataclasses.replace(
             found,
@@ -229,11 +231,11 @@ class Continued(Pursuit):
         )
 
 
-def _without(deeds: Deeds, absent: tuple[str, ...]) -> Deeds:
+def _without(behaviour: RecordedBehaviour, absent: tuple[str, ...]) -> RecordedBehaviour:
     """Return what those did who are not absent."""
-    return Deeds(
-        moves=tuple(each for each in deeds.moves if each[0] not in absent),
-        changes=tuple(each for each in deeds.changes if each[0] not in absent),
+    return RecordedBehaviour(
+        moves=tuple(each for each in behaviour.moves if each[0] not in absent),
+        changes=tuple(each for each in behaviour.changes if each[0] not in absent),
     )
 
 

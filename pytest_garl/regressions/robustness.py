@@ -10,7 +10,7 @@ from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.scenarios.validity import repair
 
 COUNT = 3
-REACH = 0.002
+JITTER = 0.002
 """Share of a gene's range: 1.5 cm of the marker's disc, 2 to 8 cm of an object's start, a hundredth
 of a metre per second: more than differs between two CPUs, less than a person would call another
 scenario."""
@@ -28,7 +28,7 @@ def neighbours(scenario: Scenario, map: Map) -> tuple[Scenario, ...]:
     ]
     found = []
     for _ in range(COUNT):
-        steps = rng.uniform(-REACH, REACH, len(items))
+        steps = rng.uniform(-JITTER, JITTER, len(items))
         moved = {
             item.key: float(
                 np.clip(present[item.key] + step * (item.high - item.low), item.low, item.high)

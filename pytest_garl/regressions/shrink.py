@@ -88,17 +88,17 @@ def shrink(
     map: Map,
     budget: int,
     *,
-    culprit: str = "",
+    colliding_object: str = "",
     passes: Sequence[Callable[[Trials, str], None]] | None = None,
 ) -> Shrunk:
     """Return the simplest scenario found with at most ``budget`` flights.
 
-    ``first`` is known to fail; ``culprit`` is the object that the failure cannot do without.
+    ``first`` is known to fail; ``colliding_object`` is the one that the failure cannot do without.
     """
     trials = Trials(first, fails, map, budget)
     try:
         for each in (reset_and_bisect, by_hypothesis, tidy) if passes is None else passes:
-            each(trials, culprit)
+            each(trials, colliding_object)
     except SpentError:
         pass
     return Shrunk(history=tuple(trials.history), flights=trials.flights)
@@ -126,9 +126,9 @@ def complexity(scenario: Scenario, genome: Genome) -> tuple[int, int, float, int
     return objects, off, round(distance, 2), digits
 
 
-def reset_and_bisect(trials: Trials, culprit: str) -> None:
+def reset_and_bisect(trials: Trials, colliding_object: str) -> None:
     """Reset all that can be reset, in the largest pieces; then go nearer to nominal."""
-    groups = _simplifications(trials, culprit)
+    groups = _simplifications(trials, colliding_object)
     everything = [change for group in groups for change in group]
     if len(groups) > 1 and trials(_applied(trials.best, everything)):
         return _bisect(trials)
@@ -137,25 +137,25 @@ def reset_and_bisect(trials: Trials, culprit: str) -> None:
     return _bisect(trials)
 
 
-def bare(first: Scenario, map: Map, culprit: str) -> Scenario:
+def bare(first: Scenario, map: Map, colliding_object: str) -> Scenario:
     """Return a scenario without all that its failure should not need.
 
     A collision needs the object that was hit, everything else is nominal; any other failure has
     its cause in weather, light or place, and needs no object.
     """
-    return _nominal(first, map, culprit) if culprit else alone(first, map, "")
+    return _nominal(first, map, colliding_object) if colliding_object else alone(first, map, "")
 
 
-def clear(first: Scenario, map: Map, culprit: str) -> Scenario:
-    """Return a scenario like ``bare``, but the marker stays where the culprit went around it."""
+def clear(first: Scenario, map: Map, colliding_object: str) -> Scenario:
+    """Return a scenario like ``bare``, but the marker stays where the object went around it."""
     places = {key: value for key, value in first.genes if key in PLACES}
-    return repair(_nominal(first, map, culprit).replace(places), map)
+    return repair(_nominal(first, map, colliding_object).replace(places), map)
 
 
-def alone(first: Scenario, map: Map, culprit: str) -> Scenario:
-    """Return a scenario with no object but the culprit, everything else as it was."""
+def alone(first: Scenario, map: Map, colliding_object: str) -> Scenario:
+    """Return a scenario with no object but the colliding object, everything else as it was."""
     names = [key.partition(".")[0] for key, _ in first.genes if key.endswith(".velocity")]
-    return repair(first.without(*(name for name in names if name != culprit)), map)
+    return repair(first.without(*(name for name in names if name != colliding_object)), map)
 
 
 def nobody(first: Scenario, map: Map) -> Scenario:
@@ -163,18 +163,18 @@ def nobody(first: Scenario, map: Map) -> Scenario:
     return _nominal(first, map, "")
 
 
-def _nominal(first: Scenario, map: Map, culprit: str) -> Scenario:
-    groups = _simplifications(Trials(first, lambda _: False, map, 0), culprit)
+def _nominal(first: Scenario, map: Map, colliding_object: str) -> Scenario:
+    groups = _simplifications(Trials(first, lambda _: False, map, 0), colliding_object)
     return repair(_applied(first, [change for group in groups for change in group]), map)
 
 
-def _simplifications(trials: Trials, culprit: str) -> list[list[Change]]:
+def _simplifications(trials: Trials, colliding_object: str) -> list[list[Change]]:
     """Return ways to make a scenario simpler: by objects, by weather, by light and place."""
     first = trials.best
-    homebodies = [
+    removable = [
         _sends_home(key.partition(".")[0])
         for key, _ in first.genes
-        if key.endswith(".velocity") and key.partition(".")[0] != culprit
+        if key.endswith(".velocity") and key.partition(".")[0] != colliding_object
     ]
     weather: list[Change] = []
     rest: list[Change] = []
@@ -187,7 +187,7 @@ def _simplifications(trials: Trials, culprit: str) -> list[list[Change]]:
             continue
         is_weather = head == "environment" and "environment.sun_position" not in nominal
         (weather if is_weather else rest).append(_resets(nominal))
-    return [group for group in (homebodies, weather, rest) if group]
+    return [group for group in (removable, weather, rest) if group]
 
 
 def _sends_home(name: str) -> Change:
@@ -237,7 +237,7 @@ def _bisect(trials: Trials) -> None:
                 least = share
 
 
-def tidy(trials: Trials, culprit: str) -> None:
+def tidy(trials: Trials, colliding_object: str) -> None:
     """Write values with as few digits as the failure survives."""
     for digits in (2, 3, 4):
         rounded = {key: round(value, digits) for key, value in trials.best.genes}
@@ -262,13 +262,13 @@ class _HandedOver(ExampleDatabase):
         """Keep what was handed over."""
 
 
-def by_hypothesis(trials: Trials, culprit: str) -> None:
+def by_hypothesis(trials: Trials, colliding_object: str) -> None:
     """Let Hypothesis shrink the failing scenario as whole steps from nominal.
 
     The failing input is handed over through the example database.
     """
     first = trials.best
-    lines = list(_lines(trials, culprit))
+    lines = list(_lines(trials, colliding_object))
     start = [steps for _, _, steps in lines]
 
     def build(drawn: Sequence[int]) -> Scenario:
@@ -302,13 +302,13 @@ def by_hypothesis(trials: Trials, culprit: str) -> None:
 _Line = tuple[Callable[[Scenario, int], Scenario], st.SearchStrategy[int], int]
 
 
-def _lines(trials: Trials, culprit: str) -> Iterator[_Line]:
+def _lines(trials: Trials, colliding_object: str) -> Iterator[_Line]:
     """Yield for each thing that may vary: how to apply a step, its strategy, the present step."""
     first = trials.best
     present = {key for key, _ in first.genes}
     for key in sorted(key for key in present if key.endswith(".velocity")):
         name = key.partition(".")[0]
-        if name != culprit:
+        if name != colliding_object:
             yield _presence(name), st.integers(0, 1), 1
     for gene in trials.genome.genes:
         yield from _steps(gene, first, present)

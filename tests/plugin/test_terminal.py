@@ -20,7 +20,7 @@ from pytest_garl.execution.ledger import Ledger, Progress
 from pytest_garl.plugin import progress
 from pytest_garl.plugin.progress import Stand, text
 from pytest_garl.plugin.run import Run
-from pytest_garl.regressions.forecast import Rest
+from pytest_garl.regressions.forecast import RemainingWork
 from tests.plugin.test_plugin import project, run
 
 SLOW = """
@@ -177,7 +177,9 @@ def test_the_first_line_now_and_then_counts_the_time_before_it(
 ) -> None:
     clock = [100.0]
     monkeypatch.setattr(progress, "time", SimpleNamespace(monotonic=lambda: clock[0]))
-    reader = progress.Reader(cast(Run, SimpleNamespace(rest=Rest(flights=0.0, seconds=0.0))), 30.0)
+    reader = progress.Reader(
+        cast(Run, SimpleNamespace(rest=RemainingWork(flights=0.0, seconds=0.0))), 30.0
+    )
     reader.wait()
     clock[0] += 30.0
     ledger = SimpleNamespace(

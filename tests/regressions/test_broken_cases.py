@@ -11,7 +11,7 @@ import pytest
 
 from pytest_garl.baselines import file as baselines
 from pytest_garl.errors import OptionError, ScenarioError
-from pytest_garl.regressions.case_file import dumps, load, load_head, loads
+from pytest_garl.regressions.case_file import dumps, load, load_header, loads
 from pytest_garl.regressions.corpus import CorpusError, entries, every_entry, save, save_patch
 from pytest_garl.scenarios.maps import map as package
 from pytest_garl.scenarios.maps.map import load_map
@@ -159,7 +159,7 @@ def test_a_folder_of_cases_that_cannot_be_read_is_one_error(
 
 def test_the_head_of_a_case_is_read_within_the_limit(tmp_path: Path) -> None:
     (tmp_path / "a.toml").write_text(TEXT + "#" * 1_000_000)
-    for read in (load, load_head):
+    for read in (load, load_header):
         with pytest.raises(ScenarioError, match="bytes, expected at most 1000000"):
             read(tmp_path / "a.toml")
 

@@ -14,7 +14,7 @@ from pytest_garl.adversary.scripted import policy_spec
 from pytest_garl.execution.on_demand import Done
 from pytest_garl.plugin.run import _steered
 from pytest_garl.regressions.case import Case
-from pytest_garl.regressions.findings import deeds_of
+from pytest_garl.regressions.new_case import recorded_behaviour
 from pytest_garl.regressions.replay import replay
 from pytest_garl.simulation.flight_file import save
 from pytest_garl.simulation.fly import fly
@@ -29,15 +29,15 @@ def recorded(tmp_path: Path) -> Case:
     flight = fly(SCENARIO, ReferencePilot, WEATHERMAKER, map=LAWN)
     save(flight, tmp_path / "flight.npz")
     done = Done(result={}, sha256=flight.sha256, record=tmp_path / "flight.npz")
-    deeds = deeds_of(done, SCENARIO, LAWN)
-    assert deeds.changes
+    behaviour = recorded_behaviour(done, SCENARIO, LAWN)
+    assert behaviour.changes
     plain = case()
     return dataclasses.replace(
         plain,
         system=f"{ReferencePilot.__module__}:{ReferencePilot.__qualname__}",
         scenario=SCENARIO,
-        moves=deeds.moves,
-        changes=deeds.changes,
+        moves=behaviour.moves,
+        changes=behaviour.changes,
         evidence=dataclasses.replace(
             plain.evidence, trajectory_sha256=flight.sha256, cpu=flight.cpu
         ),

@@ -6,9 +6,9 @@ from typing import Any
 import pytest
 
 from pytest_garl.execution.on_demand import Done
-from pytest_garl.regressions.case_request import Finding, Inquiry
+from pytest_garl.regressions.case_request import CaseRequest, CaseResult
 from pytest_garl.regressions.follow_up import shares
-from pytest_garl.regressions.forecast import of_search, rest_of
+from pytest_garl.regressions.forecast import flights_after_search, remaining_work
 from pytest_garl.regressions.investigation import EXCEPTION, LEAST, PILOTS
 from pytest_garl.scenarios.chromosome import decode
 from pytest_garl.scenarios.genes import genome_for
@@ -18,12 +18,12 @@ LAWN = load_map("lawn")
 GENOME = genome_for(LAWN)
 
 
-def kind(number: int, *, cap: int | None, budget: int = 12, crash: str = "") -> Inquiry:
+def kind(number: int, *, cap: int | None, budget: int = 12, crash: str = "") -> CaseRequest:
     scenario = decode(GENOME.nominal, GENOME, map="lawn", seed=number)
     result: dict[str, Any] = {"crash": {"kind": crash} if crash else None}
     done = Done(result=result, sha256="", record=Path("none"))
     job: Any = None
-    return Inquiry(
+    return CaseRequest(
         name=f"search {number}",
         signature=str(number),
         violations=((scenario, done),),
@@ -34,7 +34,7 @@ def kind(number: int, *, cap: int | None, budget: int = 12, crash: str = "") -> 
     )
 
 
-def budgets(*kinds: Inquiry) -> list[int]:
+def budgets(*kinds: CaseRequest) -> list[int]:
     return [each.budget for each in shares(kinds)]
 
 
@@ -71,7 +71,7 @@ def test_what_some_leave_reaches_others_and_the_reference_pilot_is_not_counted()
     own = LEAST - PILOTS
     wanted = [kind(number, cap=2 * own) for number in range(3)]
     assert budgets(*wanted) == [LEAST, LEAST, 0]
-    spent = Finding(signature="0", case=None, flights=4 + PILOTS, piloted=PILOTS)
+    spent = CaseResult(signature="0", case=None, flights=4 + PILOTS, piloted=PILOTS)
     done = {"search 0": spent, "search 1": spent}
     left = 2 * own - 8
     (last,) = shares(wanted[2:], done)
@@ -81,15 +81,19 @@ def test_what_some_leave_reaches_others_and_the_reference_pilot_is_not_counted()
 def test_the_forecast_is_that_of_the_longest_kind_or_of_all_side_by_side() -> None:
     kinds = [kind(number, cap=None) for number in range(4)]
     times = {each.name: 2.0 for each in kinds}
-    alone = rest_of(kinds, times, 1)
-    assert rest_of(kinds, times, 2).seconds == pytest.approx(alone.seconds / 2)
-    assert rest_of(kinds, times, 100).seconds == pytest.approx(alone.seconds / 4)
-    assert rest_of((), {}, 2).seconds == 0
-    assert rest_of(kinds, times, 1).flights == rest_of(kinds, times, 2).flights
+    alone = remaining_work(kinds, times, 1)
+    assert remaining_work(kinds, times, 2).seconds == pytest.approx(alone.seconds / 2)
+    assert remaining_work(kinds, times, 100).seconds == pytest.approx(alone.seconds / 4)
+    assert remaining_work((), {}, 2).seconds == 0
+    assert remaining_work(kinds, times, 1).flights == remaining_work(kinds, times, 2).flights
 
 
 def test_the_bar_expects_no_more_than_the_cap_allows() -> None:
-    assert of_search(0, 12, 40) == of_search(3, 0, 40) == 0
-    assert of_search(2, 12, None) == 2 * of_search(1, 12, None)
-    assert of_search(20, 12, 8) < 20 + 12 + 4
-    assert of_search(20, 12, 8) <= of_search(20, 12, 80) <= of_search(20, 12, None)
+    assert flights_after_search(0, 12, 40) == flights_after_search(3, 0, 40) == 0
+    assert flights_after_search(2, 12, None) == 2 * flights_after_search(1, 12, None)
+    assert flights_after_search(20, 12, 8) < 20 + 12 + 4
+    assert (
+        flights_after_search(20, 12, 8)
+        <= flights_after_search(20, 12, 80)
+        <= flights_after_search(20, 12, None)
+    )

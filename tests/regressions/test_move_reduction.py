@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from pytest_garl.adversary.recorded import LANDING_ZONE_M, recorded_spec
 from pytest_garl.adversary.scripted import policy_spec
 from pytest_garl.errors import PolicyError
-from pytest_garl.regressions.move_reduction import _round, simpler
+from pytest_garl.regressions.move_reduction import _round, shorter_records
 from pytest_garl.regressions.robustness import neighbours
 from pytest_garl.scenarios.chromosome import decode
 from pytest_garl.scenarios.genes import genome_for
@@ -50,7 +50,7 @@ def test_a_shorter_record_ends_where_the_longer_one_does() -> None:
         (item.name, tuple((float(x), float(y)) for x, y in item.moves)) for item in flight.objects
     )
     name = flight.objects[1].name
-    found = list(simpler(SCENARIO, moves, flight, name, LAWN))
+    found = list(shorter_records(SCENARIO, moves, flight, name, LAWN))
     assert len(found) >= 2
     waiting, shorter = found[0]
     assert problems(waiting, LAWN) == ()

@@ -14,17 +14,17 @@ from pytest_garl.execution.on_demand import Done
 from pytest_garl.execution.reference import BUILT_IN, Reference, simulator_sha256
 from pytest_garl.regressions.case import Case
 from pytest_garl.regressions.case_file import size_of
-from pytest_garl.regressions.case_request import Inquiry
-from pytest_garl.regressions.investigation import LEAST, Pursuit
+from pytest_garl.regressions.case_request import CaseRequest
+from pytest_garl.regressions.investigation import LEAST, CaseBuilder
 from pytest_garl.regressions.reshrink import LEAST as LEAST_AGAIN
-from pytest_garl.regressions.reshrink import Continued, _all_removed
+from pytest_garl.regressions.reshrink import CaseReshrinker, _all_removed
 from pytest_garl.regressions.robustness import neighbours
 from pytest_garl.regressions.simplicity import no_worse, simplicity
 from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.verdicts.verdict import Limits
 from tests.regressions.test_case_file import LAWN, NAMES
 from tests.regressions.test_case_file import case as dog_case
-from tests.regressions.test_shrink import CULPRIT, violation
+from tests.regressions.test_shrink import COLLIDING_OBJECT, violation
 
 SIGNATURE = "IV:dog:last-metre:unseen"
 Fails = Callable[[Scenario, str], bool]
@@ -53,7 +53,11 @@ def result(signature: str) -> dict[str, Any]:
         "margins": [],
         "story": "A story.",
     }
-    return {"verdict": verdict, "collisions": [CULPRIT] if signature else [], "crash": None}
+    return {
+        "verdict": verdict,
+        "collisions": [COLLIDING_OBJECT] if signature else [],
+        "crash": None,
+    }
 
 
 class Flights:
@@ -71,9 +75,9 @@ class Flights:
         )
 
 
-def inquiry(budget: int, *scenarios: Scenario) -> Inquiry:
+def request(budget: int, *scenarios: Scenario) -> CaseRequest:
     found = Done(result=result(SIGNATURE), sha256="", record=Path("/nowhere/x"))
-    return Inquiry(
+    return CaseRequest(
         name=f"search {SIGNATURE}",
         signature=SIGNATURE,
         violations=tuple((each, found) for each in scenarios),
@@ -100,24 +104,24 @@ def saved(scenario: Scenario, *, neighbours_failed: int = 3) -> Case:
 
 def shrunk(case: Case, fails: Fails, flights: int = 60) -> tuple[Case | None, int]:
     fly = Flights(fails)
-    finding = Continued(inquiry(flights), fly, case).run()
+    finding = CaseReshrinker(request(flights), fly, case).run()
     assert finding.flights == fly.count <= flights
     return finding.case, fly.count
 
 
-FIRST = violation().replace({f"{CULPRIT}.velocity": 0.9, "environment.fog": 0.12})
+FIRST = violation().replace({f"{COLLIDING_OBJECT}.velocity": 0.9, "environment.fog": 0.12})
 
 
 def by_record(scenario: Scenario, npcs: str) -> bool:
-    return npcs == "recorded" and CULPRIT not in scenario.absent
+    return npcs == "recorded" and COLLIDING_OBJECT not in scenario.absent
 
 
 def test_a_case_is_shrunk_from_its_own_record() -> None:
     case = saved(FIRST)
     better, _ = shrunk(case, by_record)
     assert better is not None
-    assert set(better.scenario.absent) == {*NAMES} - {CULPRIT}
-    assert better.moves == ((CULPRIT, dict(case.moves)[CULPRIT]),)
+    assert set(better.scenario.absent) == {*NAMES} - {COLLIDING_OBJECT}
+    assert better.moves == ((COLLIDING_OBJECT, dict(case.moves)[COLLIDING_OBJECT]),)
     assert better.scenario["environment.fog"] == 0.0
     assert better.evidence.removed.startswith("3 of 4 objects, ")
     assert no_worse(simplicity(better, LAWN), simplicity(case, LAWN))
@@ -127,16 +131,16 @@ def test_what_only_a_policy_makes_simpler_is_found_as_well() -> None:
     records = {FIRST}
 
     def fails(scenario: Scenario, npcs: str) -> bool:
-        # A record strikes only where it was made; a policy strikes wherever the culprit is.
+        # A record strikes only where it was made; a policy strikes wherever that object is.
         if npcs == "recorded":
             near = [neighbour for each in records for neighbour in neighbours(each, LAWN)]
             return scenario in records or scenario in near
         records.add(scenario)
-        return CULPRIT not in scenario.absent
+        return COLLIDING_OBJECT not in scenario.absent
 
     better, _ = shrunk(saved(FIRST), fails)
     assert better is not None
-    assert set(better.scenario.absent) == {*NAMES} - {CULPRIT}
+    assert set(better.scenario.absent) == {*NAMES} - {COLLIDING_OBJECT}
 
 
 @pytest.mark.parametrize("seed", range(30))
@@ -181,7 +185,7 @@ def test_a_pursuit_never_flies_more_than_its_budget(seed: int) -> None:
     share, budget = chance.random(), chance.randrange(LEAST, 40)
     fly = Flights(lambda *_: chance.random() < share)
     scenarios = [violation(seed=100 * seed + number) for number in range(4)]
-    finding = Pursuit(inquiry(budget, *scenarios), fly).run()
+    finding = CaseBuilder(request(budget, *scenarios), fly).run()
     assert finding.flights == fly.count <= budget
 
 
@@ -191,7 +195,7 @@ def test_a_pursuit_steps_back_until_all_neighbours_fail() -> None:
         fog = scenario["environment.fog"]
         return fog >= 0.04 or (0 < fog < 0.04 and round(fog, 2) == fog)
 
-    finding = Pursuit(inquiry(60, FIRST), Flights(fails)).run()
+    finding = CaseBuilder(request(60, FIRST), Flights(fails)).run()
     assert finding.case is not None
     assert finding.case.evidence.neighbours_failed == 3
     assert finding.case.scenario["environment.fog"] >= 0.04

@@ -21,7 +21,7 @@ from pytest_garl.scenarios.validity import problems, repair
 
 LAWN = load_map("lawn")
 NAMES = [name for name, _ in LAWN.object_names]
-CULPRIT = NAMES[0]
+COLLIDING_OBJECT = NAMES[0]
 
 
 def violation(seed: int = 7) -> Scenario:
@@ -31,7 +31,7 @@ def violation(seed: int = 7) -> Scenario:
 
 
 def fast(scenario: Scenario) -> bool:
-    return scenario.get(f"{CULPRIT}.velocity", 0.0) >= 0.3
+    return scenario.get(f"{COLLIDING_OBJECT}.velocity", 0.0) >= 0.3
 
 
 def in_fog(scenario: Scenario) -> bool:
@@ -42,20 +42,22 @@ def two_of_them(scenario: Scenario) -> bool:
     return fast(scenario) and NAMES[-1] not in scenario.absent
 
 
-FIRST = violation().replace({f"{CULPRIT}.velocity": 0.9, "environment.fog": 0.12})
+FIRST = violation().replace({f"{COLLIDING_OBJECT}.velocity": 0.9, "environment.fog": 0.12})
 
 
 def test_all_that_a_failure_does_not_need_is_gone_after_few_flights() -> None:
-    found = shrink(FIRST, fast, LAWN, 100, culprit=CULPRIT, passes=(reset_and_bisect,))
-    assert set(found.simplest.absent) == {*NAMES} - {CULPRIT}
+    found = shrink(
+        FIRST, fast, LAWN, 100, colliding_object=COLLIDING_OBJECT, passes=(reset_and_bisect,)
+    )
+    assert set(found.simplest.absent) == {*NAMES} - {COLLIDING_OBJECT}
     assert complexity(found.simplest, genome_of(FIRST, LAWN))[1] == 1
-    assert 0.3 <= found.simplest[f"{CULPRIT}.velocity"] <= 0.3 + 0.9 / 8
+    assert 0.3 <= found.simplest[f"{COLLIDING_OBJECT}.velocity"] <= 0.3 + 0.9 / 8
     assert found.flights <= 6
 
 
 @pytest.mark.parametrize("fails", [in_fog, two_of_them])
 def test_what_a_failure_needs_stays(fails: Callable[[Scenario], bool]) -> None:
-    found = shrink(FIRST, fails, LAWN, 100, culprit=CULPRIT)
+    found = shrink(FIRST, fails, LAWN, 100, colliding_object=COLLIDING_OBJECT)
     assert fails(found.simplest)
     assert problems(found.simplest, LAWN) == ()
     assert complexity(found.simplest, genome_of(FIRST, LAWN))[1] == (2 if fails is in_fog else 1)
@@ -67,7 +69,9 @@ def test_hypothesis_finds_what_only_goes_together() -> None:
         return fast(scenario) and abs(fog - dust) < 0.01
 
     first = FIRST.replace({"environment.dust": 0.12})
-    plain = shrink(first, unequal, LAWN, 300, culprit=CULPRIT, passes=(by_hypothesis,))
+    plain = shrink(
+        first, unequal, LAWN, 300, colliding_object=COLLIDING_OBJECT, passes=(by_hypothesis,)
+    )
     assert plain.simplest["environment.fog"] == plain.simplest["environment.dust"] == 0
 
 
@@ -81,17 +85,19 @@ def test_the_budget_is_kept_and_nothing_is_flown_twice() -> None:
 
     for budget in (0, 1, 5, 40):
         seen.clear()
-        found = shrink(FIRST, fails, LAWN, budget, culprit=CULPRIT)
+        found = shrink(FIRST, fails, LAWN, budget, colliding_object=COLLIDING_OBJECT)
         assert found.flights == len(seen) <= budget
 
 
 def test_shrinking_is_deterministic() -> None:
-    one, other = (shrink(FIRST, in_fog, LAWN, 60, culprit=CULPRIT) for _ in range(2))
+    one, other = (
+        shrink(FIRST, in_fog, LAWN, 60, colliding_object=COLLIDING_OBJECT) for _ in range(2)
+    )
     assert one == other
 
 
 def test_every_scenario_on_the_way_failed_and_is_simpler_than_the_last() -> None:
-    history = shrink(FIRST, in_fog, LAWN, 60, culprit=CULPRIT).history
+    history = shrink(FIRST, in_fog, LAWN, 60, colliding_object=COLLIDING_OBJECT).history
     genome = genome_of(FIRST, LAWN)
     assert all(in_fog(each) for each in history)
     sizes = [complexity(each, genome) for each in history]
@@ -103,17 +109,19 @@ def test_destinations_survive_shrinking_with_fewer_digits() -> None:
     genome = with_destinations(genome_for(LAWN))
     row = genome.random(np.random.default_rng(4))
     first = repair(decode(row, genome, map="lawn", seed=1), LAWN)
-    first = first.replace({f"{CULPRIT}.velocity": 0.9, f"{CULPRIT}.destination_x": 0.5123})
+    first = first.replace(
+        {f"{COLLIDING_OBJECT}.velocity": 0.9, f"{COLLIDING_OBJECT}.destination_x": 0.5123}
+    )
 
     def fails(scenario: Scenario) -> bool:
-        return fast(scenario) and abs(scenario[f"{CULPRIT}.destination_x"] - 0.5123) < 0.1
+        return fast(scenario) and abs(scenario[f"{COLLIDING_OBJECT}.destination_x"] - 0.5123) < 0.1
 
-    found = shrink(first, fails, LAWN, 100, culprit=CULPRIT)
-    assert found.simplest[f"{CULPRIT}.destination_x"] == 0.51
-    assert found.simplest[f"{CULPRIT}.destination_y"] == pytest.approx(
-        first[f"{CULPRIT}.destination_y"], abs=0.005
+    found = shrink(first, fails, LAWN, 100, colliding_object=COLLIDING_OBJECT)
+    assert found.simplest[f"{COLLIDING_OBJECT}.destination_x"] == 0.51
+    assert found.simplest[f"{COLLIDING_OBJECT}.destination_y"] == pytest.approx(
+        first[f"{COLLIDING_OBJECT}.destination_y"], abs=0.005
     )
-    assert set(found.simplest.absent) == {*NAMES} - {CULPRIT}
+    assert set(found.simplest.absent) == {*NAMES} - {COLLIDING_OBJECT}
     assert not any(key.startswith(NAMES[-1]) for key, _ in found.simplest.genes)
 
 
@@ -125,5 +133,5 @@ def test_a_trial_is_of_a_scenario_that_makes_sense() -> None:
         return False
 
     trials = Trials(FIRST, fails, LAWN, 10)
-    trials(FIRST.replace({f"{CULPRIT}.start_x": FIRST[f"{NAMES[1]}.start_x"]}))
+    trials(FIRST.replace({f"{COLLIDING_OBJECT}.start_x": FIRST[f"{NAMES[1]}.start_x"]}))
     assert problems(flown[0], LAWN) == ()

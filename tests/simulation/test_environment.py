@@ -12,8 +12,8 @@ from pytest_garl.adversary.recorded import recorded_spec
 from pytest_garl.adversary.scripted import policy_spec
 from pytest_garl.execution.on_demand import Done
 from pytest_garl.landing_system import Airframe, Camera
-from pytest_garl.regressions.case import Deeds
-from pytest_garl.regressions.findings import deeds_of
+from pytest_garl.regressions.case import RecordedBehaviour
+from pytest_garl.regressions.new_case import recorded_behaviour
 from pytest_garl.scenarios.genes import ENVIRONMENT, genome_for
 from pytest_garl.scenarios.maps.map import load_map
 from pytest_garl.scenarios.scenario import Scenario
@@ -167,9 +167,9 @@ def test_recorded_changes_fly_the_same_flight_to_the_byte(tmp_path: Path) -> Non
     flight, seen = flown()
     save(flight, tmp_path / "flight.npz")
     done = Done(result={}, sha256=flight.sha256, record=tmp_path / "flight.npz")
-    deeds = deeds_of(done, SCENARIO, LAWN)
-    assert [name for name, _ in deeds.changes] == ["dog-1"]
-    again, seen_again = flown(recorded_spec(dict(deeds.moves), dict(deeds.changes)))
+    behaviour = recorded_behaviour(done, SCENARIO, LAWN)
+    assert [name for name, _ in behaviour.changes] == ["dog-1"]
+    again, seen_again = flown(recorded_spec(dict(behaviour.moves), dict(behaviour.changes)))
     assert again.sha256 == flight.sha256
     assert all((a == b).all() for a, b in zip(seen, seen_again, strict=True))
 
@@ -188,7 +188,9 @@ def test_a_file_of_a_flight_that_changed_nothing_says_nothing_of_it(tmp_path: Pa
         assert b'"changes"' not in file["header"].tobytes()
     assert all(item.changes == () for item in load(tmp_path / "flight.npz").objects)
     done = Done(result={}, sha256="", record=tmp_path / "flight.npz")
-    assert deeds_of(done, SCENARIO, LAWN) == Deeds(moves=deeds_of(done, SCENARIO, LAWN).moves)
+    assert recorded_behaviour(done, SCENARIO, LAWN) == RecordedBehaviour(
+        moves=recorded_behaviour(done, SCENARIO, LAWN).moves
+    )
 
 
 def test_the_environment_at_a_time_is_that_of_the_flight() -> None:

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from pytest_garl.execution.on_demand import Done
 from pytest_garl.execution.reference import simulator_sha256
-from pytest_garl.regressions.case import Avoidable, Case, Deeds, Evidence, Violation
+from pytest_garl.regressions.case import Avoidable, Case, Evidence, RecordedBehaviour, Violation
 from pytest_garl.regressions.case_request import (
+    CaseRequest,
+    CaseResult,
     Failure,
-    Finding,
-    Inquiry,
     simplest_first,
 )
 from pytest_garl.regressions.description import tell
@@ -21,30 +21,34 @@ from pytest_garl.simulation.flight_file import load
 from pytest_garl.verdicts.verdict import Verdict
 
 
-def as_found(inquiry: Inquiry) -> Finding:
+def as_found(request: CaseRequest) -> CaseResult:
     """Return the search's own flight as a case, without another flight."""
-    scenario = simplest_first(inquiry)[0]
-    done = dict(inquiry.violations)[scenario]
-    failure = unasked(scenario, scenario, deeds_of(done, scenario, inquiry.map), done)
-    case = case_of(inquiry, failure, nobody_asked(failure))
-    return Finding(signature=inquiry.signature, case=case, flights=0)
+    scenario = simplest_first(request)[0]
+    done = dict(request.violations)[scenario]
+    failure = unasked(scenario, scenario, recorded_behaviour(done, scenario, request.map), done)
+    case = case_of(request, failure, nobody_asked(failure))
+    return CaseResult(signature=request.signature, case=case, flights=0)
 
 
-def unasked(first: Scenario, scenario: Scenario, deeds: Deeds, done: Done) -> Failure:
+def unasked(
+    first: Scenario, scenario: Scenario, behaviour: RecordedBehaviour, done: Done
+) -> Failure:
     """Return a failure of which no neighbour was flown."""
-    return Failure(first=first, scenario=scenario, deeds=deeds, done=done, robust=0, asked=0)
+    return Failure(
+        first=first, scenario=scenario, behaviour=behaviour, done=done, robust=0, asked=0
+    )
 
 
 def nobody_asked(failure: Failure) -> Avoidable:
     """Return what may be demanded without asking the reference pilot: where nothing moves, all."""
-    return "recorded" if failure.deeds.moves else "live"
+    return "recorded" if failure.behaviour.moves else "live"
 
 
-def case_of(inquiry: Inquiry, failure: Failure, avoidable: Avoidable) -> Case:
+def case_of(request: CaseRequest, failure: Failure, avoidable: Avoidable) -> Case:
     """Return a failure as what is saved."""
-    done, job = failure.done, inquiry.job
+    done, job = failure.done, request.job
     flight = load(done.record) if done.record.exists() else None
-    ask = inquiry.user_assertion
+    ask = request.user_assertion
     own = ask(done.result, done.record, failure.scenario) if ask else None
     return Case(
         system=job.system.name,
@@ -54,21 +58,21 @@ def case_of(inquiry: Inquiry, failure: Failure, avoidable: Avoidable) -> Case:
         violation=_violation(Verdict.from_json(done.result["verdict"]), flight, own),
         policy=job.npcs.name,
         policy_sha256=job.npcs.sha256,
-        moves=failure.deeds.moves,
-        changes=failure.deeds.changes,
+        moves=failure.behaviour.moves,
+        changes=failure.behaviour.changes,
         evidence=Evidence(
             trajectory_sha256=done.sha256,
             cpu=flight.cpu if flight else "",
             map_sha256=job.map_sha256,
             neighbours=failure.asked,
             neighbours_failed=failure.robust,
-            removed=removed(failure.first, failure.scenario, inquiry.map),
+            removed=removed(failure.first, failure.scenario, request.map),
             versions=flight.versions if flight else (),
             system_sha256=job.system_sha256,
             simulator_sha256=simulator_sha256(job.simulator),
         ),
         limits=job.limits,
-        test=inquiry.test or (own.test if own else ""),
+        test=request.test or (own.test if own else ""),
         assertion=own.assertion if own else "",
     )
 
@@ -97,14 +101,14 @@ def _violation(verdict: Verdict, flight: Flight | None, own: UserFailure | None)
     )
 
 
-def deeds_of(done: Done, scenario: Scenario, map: Map) -> Deeds:
+def recorded_behaviour(done: Done, scenario: Scenario, map: Map) -> RecordedBehaviour:
     """Return what each object did in a flight; nothing where its process did not live."""
     names = [name for name, _ in map.without(scenario.absent).object_names]
     if not done.record.exists():
-        return Deeds(moves=tuple((name, ()) for name in names))
+        return RecordedBehaviour(moves=tuple((name, ()) for name in names))
     objects = load(done.record).objects
     made = {item.name: item.moves for item in objects}
-    return Deeds(
+    return RecordedBehaviour(
         moves=tuple(
             (name, tuple((float(x), float(y)) for x, y in made.get(name, ()))) for name in names
         ),
@@ -112,7 +116,7 @@ def deeds_of(done: Done, scenario: Scenario, map: Map) -> Deeds:
     )
 
 
-def culprit_of(done: Done) -> str:
+def find_colliding_object(done: Done) -> str:
     """Return the moving object that the UAV hit, if it did."""
     hit = done.result["collisions"]
     kind = done.result["verdict"]["violation_type"]
