@@ -33,7 +33,7 @@ from pytest_garl.search.method import Flown, Method, Plan
 from pytest_garl.search.methods.garl import Garl
 from pytest_garl.simulation.fly import fly
 from pytest_garl.verdicts.judge import closest_call, judge, undecided
-from pytest_garl.verdicts.metrics import mean_distance, top_k
+from pytest_garl.verdicts.paper_metrics import mean_distance, top_k
 from pytest_garl.verdicts.verdict import Limits, Verdict
 from studies.rows import append, read
 

@@ -20,7 +20,7 @@ from pytest_garl.execution.ledger import Ledger
 from pytest_garl.scenarios.genes import genome_for
 from pytest_garl.scenarios.maps.map import load_map
 from pytest_garl.search.objectives import diversity
-from pytest_garl.verdicts.metrics import top_k
+from pytest_garl.verdicts.paper_metrics import top_k
 from pytest_garl.verdicts.verdict import Verdict
 from studies.rows import append, read, share
 

@@ -7,7 +7,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from pytest_garl.verdicts.metrics import share_interval
+from pytest_garl.verdicts.statistics import share_interval
 
 
 def read(path: Path) -> list[dict[str, str]]:

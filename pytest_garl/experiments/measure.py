@@ -21,7 +21,7 @@ from pytest_garl.scenarios.genes import WEATHER, genome_for
 from pytest_garl.scenarios.maps.map import Map, load_map
 from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.simulation.flight_file import load
-from pytest_garl.verdicts.metrics import mean_distance, no_cells, top_k, visit
+from pytest_garl.verdicts.paper_metrics import empty_cells, mark_visited, mean_distance, top_k
 from pytest_garl.verdicts.verdict import Verdict
 
 HASH = 12
@@ -152,7 +152,7 @@ def chromosomes(
 def covered(search: Search) -> NDArray[np.bool_]:
     """Return which cells of the map's volume the violating flights passed through."""
     bounds_m = search.map.bounds_m
-    cells = no_cells(bounds_m)
+    cells = empty_cells(bounds_m)
     for flight in search.violating:
-        visit(cells, load(done_of(flight, search.job).record).uav.position_m, bounds_m)
+        mark_visited(cells, load(done_of(flight, search.job).record).uav.position_m, bounds_m)
     return cells

@@ -15,7 +15,7 @@ from pytest_garl.experiments.plots import draw
 from pytest_garl.experiments.results import Row
 from pytest_garl.experiments.spec import Experiment, Grid, Run
 from pytest_garl.files.atomic import save_text
-from pytest_garl.verdicts.metrics import CELL_M, HEIGHT_M
+from pytest_garl.verdicts.paper_metrics import CELL_M, HEIGHT_M
 
 HOW_TO_READ = f"""\
 - A violation is the paper's: a collision, a landing more than 1.5 m off the marker, or none in

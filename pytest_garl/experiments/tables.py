@@ -16,8 +16,7 @@ from pytest_garl.experiments.metrics import (
 )
 from pytest_garl.experiments.results import Row
 from pytest_garl.experiments.spec import KINDS, Experiment, Grid
-from pytest_garl.verdicts.metrics import share_interval
-from pytest_garl.verdicts.statistics import mann_whitney, vargha_delaney
+from pytest_garl.verdicts.statistics import mann_whitney, share_interval, vargha_delaney
 
 NONE = "–"
 NOT_RUN = "not run"

@@ -14,7 +14,7 @@ from pytest_garl.plugin.failed_statement import failure_of
 from pytest_garl.plugin.run import Run, test_of
 from pytest_garl.plugin.user_assertions import ItemAssertion
 from pytest_garl.regressions.user_failure import UserFailure
-from pytest_garl.verdicts.metrics import share_interval
+from pytest_garl.verdicts.statistics import share_interval
 
 REFLIGHTS = 4
 """How often a violation of a system that need not be deterministic is flown once more."""

@@ -22,7 +22,9 @@ from pytest_garl.plugin.wrapping import counted, width_of, wrapped
 from pytest_garl.regressions.forecast import seconds_of_kind
 from pytest_garl.reports.run_report import ENDED, OWN_FACT, utc
 from pytest_garl.reports.violation_kinds import Found, Kind, Own, found_by, legend
-from pytest_garl.verdicts.metrics import decided_words, share_interval, top_k
+from pytest_garl.verdicts.paper_metrics import top_k
+from pytest_garl.verdicts.statistics import share_interval
+from pytest_garl.verdicts.wording import decided_text
 
 
 def header(run: Run) -> str:
@@ -221,7 +223,7 @@ def _table(found: Found, config: pytest.Config, width: int) -> list[str]:
         shares.append(f"the tenth violation in flight {tenth}")
     lines = [
         wrapped(f"{found.name} on {found.map}: {', '.join(shares)}", width, others="  "),
-        wrapped(decided_words(verdicts), width, first="  ", others="  "),
+        wrapped(decided_text(verdicts), width, first="  ", others="  "),
     ]
     longest = max((len(kind.signature) for kind in found.kinds), default=0)
     for kind in found.kinds:

@@ -18,7 +18,9 @@ from pytest_garl.execution.ledger import Ledger
 from pytest_garl.regressions.acceptance import acceptance_of
 from pytest_garl.regressions.corpus import every_entry
 from pytest_garl.reports.violation_kinds import Found, Own, found_by
-from pytest_garl.verdicts.metrics import decided, share_interval, top_k
+from pytest_garl.verdicts.paper_metrics import top_k
+from pytest_garl.verdicts.statistics import share_interval
+from pytest_garl.verdicts.verdict import count_decided
 
 VERSION = 1
 SCHEMA = Path(__file__).with_name("report.schema.json")
@@ -97,8 +99,8 @@ def _search(
             sorted(Counter(str(v.violation_type) for v in verdicts if v.violation_type).items())
         ),
         "decided": {
-            "distance": decided(verdicts, "distance"),
-            "time": decided(verdicts, "time"),
+            "distance": count_decided(verdicts, "distance"),
+            "time": count_decided(verdicts, "time"),
         },
         "signatures": [
             {

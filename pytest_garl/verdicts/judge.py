@@ -1,4 +1,4 @@
-"""Judge a flight: a pure function from its record and the limits to a verdict."""
+"""Judge a flight: a pure function of the flight and the limits that returns a verdict."""
 
 from __future__ import annotations
 
@@ -10,13 +10,14 @@ from pytest_garl.simulation.flight import Contact, Flight, Separation
 from pytest_garl.simulation.physics.vehicle import up_m
 from pytest_garl.simulation.system_under_test.texts import cut
 from pytest_garl.verdicts.phases import (
+    landing_phase,
     last_sighting_s,
-    moment,
     reports_detections,
     reports_targets,
     was_in_view,
 )
 from pytest_garl.verdicts.verdict import (
+    PAPER_LIMITS,
     Limits,
     Margin,
     PropertyName,
@@ -25,28 +26,32 @@ from pytest_garl.verdicts.verdict import (
 )
 from pytest_garl.verdicts.wording import compass_point
 
-PAPER_DISTANCE_M = 1.5
-"""Farther off than this is a violation by the paper's definition, whatever the limits are."""
 ON_GROUND_M = 0.02
-"""After its first contact with the ground, the UAV is on it up to this much higher than it was
-then: the feet spring a little."""
-LOST_S = 3.0
-"""A target not seen for this long before the end counts as no longer detected."""
-STORY_CHARS = 300
-"""How much of an exception's message a story repeats; the flight's record has 1,000 characters."""
-DECOY_M = 1.5
+"""After its first contact with the ground, the UAV counts as on the ground up to this much above
+its height at the contact: the feet spring a little."""
+LOST_AFTER_S = 3.0
+"""A marker not seen for this long before the end is lost."""
+MESSAGE_CHARS = 300
+"""Length of an exception's message in a description; the flight's record has 1,000 characters."""
+SAME_PLACE_M = 1.5
+"""A target and a decoy, or a target and the marker, within this distance are the same place: the
+length of the marker's side."""
 CLOSE_CALL_M = 3.0
-"""Bodies farther away than this threaten nobody; exact separations end here as well."""
+"""A body farther away than this is no close call; exact separations end here too."""
+TILTED_RAD = math.radians(20)
+"""A touchdown beyond this angle is called tilted."""
+RECENT_S = 2.0
+"""Length of the last part of a flight in which a hidden marker is described."""
 
 
 def judge(flight: Flight, limits: Limits) -> Verdict:
-    """Return the verdict; the first event of the flight decides, and there is only one.
+    """Return the verdict: the first violation of the flight, or none.
 
-    A touch of the ground off the marker before an abort is a violation here and none by the paper's
-    definition, which asks of landings alone how far off they are.
+    A touchdown off the marker before an abort is a violation.  It is no violation by the paper's
+    definition, which measures the distance of landings alone.
     """
-    primary, kind, signature, what = _mechanism(flight, limits)
-    far = flight.final_distance_m > PAPER_DISTANCE_M
+    primary, violation_type, signature, what = _mechanism(flight, limits)
+    far = flight.final_distance_m > PAPER_LIMITS.distance_m
     paper = (
         flight.outcome == "collision"
         or flight.outcome == "not_landed"
@@ -55,7 +60,7 @@ def judge(flight: Flight, limits: Limits) -> Verdict:
     return Verdict(
         outcome=flight.outcome,
         primary=primary,
-        violation_type=kind,
+        violation_type=violation_type,
         signature=signature,
         paper_violation=paper,
         margins=_margins(flight, limits),
@@ -64,9 +69,9 @@ def judge(flight: Flight, limits: Limits) -> Verdict:
 
 
 def closest_call(flight: Flight) -> tuple[str, str]:
-    """Return the signature of the flight, had it hit what it came nearest to, and that body.
+    """Return the signature of a collision with the nearest body, and that body's name.
 
-    Both are empty where no body but the ground came within 3 m.
+    Both are empty if no body but the ground came within :data:`CLOSE_CALL_M`.
     """
     near = [
         gap
@@ -80,7 +85,7 @@ def closest_call(flight: Flight) -> tuple[str, str]:
 
 
 def undecided(flight: Flight) -> str:
-    """Say why distance and time were not decided, or nothing if they were."""
+    """Return the reason why distance and time were not decided; empty if they were."""
     if flight.outcome == "landed":
         return ""
     when = f"at {flight.elapsed_s:.1f} s"
@@ -94,10 +99,10 @@ def undecided(flight: Flight) -> str:
 
 
 def off_marker_m(flight: Flight, limits: Limits) -> float | None:
-    """Return how far off the marker the UAV came down; None where it did not.
+    """Return the distance from the marker at which the UAV came down; None if it did not.
 
-    A flight that ended in an abort came down if it had touched the ground farther off than the
-    limit: what touches down there has taken the wrong place, whatever it does next.
+    An aborted flight came down if it touched the ground beyond the limit: it took a wrong place
+    for the marker, whatever it did next.
     """
     if flight.outcome == "landed":
         return flight.final_distance_m
@@ -106,10 +111,9 @@ def off_marker_m(flight: Flight, limits: Limits) -> float | None:
 
 
 def _touch_off_marker(flight: Flight, limits: Limits) -> tuple[float, float] | None:
-    """Return how far off the marker an aborted flight first touched the ground, and when.
+    """Return distance and time of an aborted flight's first touchdown beyond the limit, or None.
 
-    None where it touched nothing beyond the limit.  The record holds the first contact with the
-    ground alone; after it the height tells.
+    The record holds only the first contact with the ground; later ones follow from the height.
     """
     first = next((each for each in flight.contacts if each.body_class == "ground"), None)
     if flight.outcome != "aborted" or first is None:
@@ -162,7 +166,7 @@ def _mechanism(
 ) -> tuple[PropertyName | None, ViolationType | None, str, str]:
     if flight.outcome == "crashed" and flight.crash:
         crash = flight.crash
-        message = cut(crash.message, STORY_CHARS)
+        message = cut(crash.message, MESSAGE_CHARS)
         text = f"The landing system {_VERBS[crash.kind]}: {crash.error}: {message}".rstrip(": ")
         return "crash", "V", f"V:{crash.error}@{crash.where}", text + "."
     if flight.outcome == "collision":
@@ -172,9 +176,9 @@ def _mechanism(
         if touch:
             off = f"Touched the ground {touch[0]:.1f} m off the marker before it gave up"
             return _missed(flight, touch[1], off)
-        when = moment(flight, _abort_time(flight))
+        phase = landing_phase(flight, _abort_time(flight))
         if limits.abort == "violation":
-            return "abort", "abort", f"abort:{when}", "The landing was aborted."
+            return "abort", "abort", f"abort:{phase}", "The landing was aborted."
         return None, None, "", "The landing was aborted and the UAV climbed clear."
     if flight.outcome == "not_landed":
         return _not_landed(flight)
@@ -182,8 +186,8 @@ def _mechanism(
         off = f"Landed {flight.final_distance_m:.1f} m off the marker"
         return _missed(flight, flight.elapsed_s, off)
     if flight.elapsed_s > limits.time_s:
-        when = moment(flight, limits.time_s)
-        return "time", "late", f"late:{when}", f"Landed late, after {flight.elapsed_s:.1f} s."
+        phase = landing_phase(flight, limits.time_s)
+        return "time", "late", f"late:{phase}", f"Landed late, after {flight.elapsed_s:.1f} s."
     return None, None, "", f"Landed after {flight.elapsed_s:.1f} s."
 
 
@@ -193,7 +197,7 @@ _VERBS = {"raised": "raised", "nonsense": "returned nonsense", "died": "died", "
 def _collision(flight: Flight, contact: Contact) -> tuple[PropertyName, ViolationType, str, str]:
     speed = f"at {contact.speed_mps:.1f} m/s"
     if contact.body_class == "ground":
-        tilted = contact.tilt_rad > math.radians(20)
+        tilted = contact.tilt_rad > TILTED_RAD
         how = "tilted" if tilted else "fast"
         return "collision", "hard", f"hard:{how}", f"Touched down too {how}, {speed}."
     signature = _collision_signature(flight, contact)
@@ -210,34 +214,34 @@ def _collision(flight: Flight, contact: Contact) -> tuple[PropertyName, Violatio
 
 
 def _collision_signature(flight: Flight, met: Contact | Separation) -> str:
-    when = moment(flight, met.time_s)
+    phase = landing_phase(flight, met.time_s)
     if met.body_class == "static":
-        return f"III:{met.kind}:{when}"
+        return f"III:{met.kind}:{phase}"
     sight = "seen" if was_in_view(flight, met.body, met.time_s) else "unseen"
-    return f"IV:{met.kind}:{when}:{sight}"
+    return f"IV:{met.kind}:{phase}:{sight}"
 
 
 def _not_landed(flight: Flight) -> tuple[PropertyName, ViolationType, str, str]:
-    """Tell a target that was never or no longer seen (II) from one that was not landed on."""
-    when = moment(flight, flight.elapsed_s)
-    # Without a word of the system nobody knows what it made of the picture.
+    """Distinguish a marker never seen or lost (II) from one seen to the end (late)."""
+    phase = landing_phase(flight, flight.elapsed_s)
+    # Without diagnostics nobody knows whether the system detected the marker in the picture.
     seen = "detected" if reports_detections(flight) or reports_targets(flight) else "in view"
     last = last_sighting_s(flight)
     if last is None:
-        return "time", "II", f"II:never-seen:{when}", f"Not landed; the marker was never {seen}."
-    if flight.elapsed_s - last > LOST_S:
+        return "time", "II", f"II:never-seen:{phase}", f"Not landed; the marker was never {seen}."
+    if flight.elapsed_s - last > LOST_AFTER_S:
         text = f"Not landed; the marker was last {seen} at {last:.1f} s."
-        return "time", "II", f"II:lost:{when}", text
+        return "time", "II", f"II:lost:{phase}", text
     text = f"Not landed although the marker was {seen} to the end."
-    return "time", "late", f"late:not-landed:{when}", text
+    return "time", "late", f"late:not-landed:{phase}", text
 
 
 def _missed(
     flight: Flight, time_s: float, off: str
 ) -> tuple[PropertyName, ViolationType, str, str]:
-    """Tell what a system took for the marker that came down elsewhere at ``time_s``.
+    """Return the violation of a touchdown elsewhere at ``time_s``: what was taken for the marker.
 
-    ``off`` is the sentence's beginning: how far off it came down.
+    ``off`` is the beginning of the sentence, with the distance from the marker.
     """
     index = int(np.searchsorted(flight.uav.time_s, time_s, side="right")) - 1
     x, y = (float(value) for value in flight.uav.position_m[max(0, index), :2])
@@ -249,13 +253,13 @@ def _missed(
         ),
         None,
     )
-    if target is not None and math.dist(target[:2], flight.marker_position_m) <= DECOY_M:
+    if target is not None and math.dist(target[:2], flight.marker_position_m) <= SAME_PLACE_M:
         return "distance", "off", "off:knew-better", f"{off}, though its target was right."
     place = target[:2] if target is not None else (x, y)
     near = [
         (math.dist(place, (dx, dy)), name)
         for name, dx, dy in flight.decoys
-        if math.dist(place, (dx, dy)) <= DECOY_M
+        if math.dist(place, (dx, dy)) <= SAME_PLACE_M
     ]
     if near:
         name = min(near)[1]
@@ -270,9 +274,9 @@ def _missed(
 def _taken_at(flight: Flight, place: tuple[float, ...], end_s: float) -> str:
     for step in flight.steps:
         target = step.diagnostics.target_m if step.diagnostics else None
-        if target is not None and math.dist(target[:2], place) <= DECOY_M:
-            return moment(flight, step.time_s)
-    return moment(flight, end_s)
+        if target is not None and math.dist(target[:2], place) <= SAME_PLACE_M:
+            return landing_phase(flight, step.time_s)
+    return landing_phase(flight, end_s)
 
 
 def _abort_time(flight: Flight) -> float:
@@ -285,7 +289,7 @@ def _where(flight: Flight) -> str:
     distance = math.hypot(x - mx, y - my)
     point = compass_point(x - mx, y - my)
     place = f"{distance:.1f} m {point} of the marker" if distance > 0.3 else "over the marker"
-    recent = [s for s in flight.steps if s.time_s > flight.elapsed_s - 2.0]
+    recent = [s for s in flight.steps if s.time_s > flight.elapsed_s - RECENT_S]
     hidden = ""
     share = 1 - sum(s.marker_visible for s in recent) / len(recent) if recent else 0.0
     if share >= 0.01 and flight.outcome != "landed":

@@ -1,4 +1,4 @@
-"""In which part of the landing something happened, from ground truth alone."""
+"""The phase of the landing at a time, and sightings of the marker, from ground truth."""
 
 from __future__ import annotations
 
@@ -11,16 +11,20 @@ from pytest_garl.simulation.flight import Flight
 LAST_METRE_M = 1.2
 """Body height at which the feet are one metre above the ground."""
 NEAR_MARKER_M = 2.5
+"""Horizontal distance from the marker within which a high UAV is on approach."""
 LOW_M = 7.0
+"""Height at which the take-off ends and below which a flight is a descent."""
 UNSEEN_S = 2.0
+"""An object counts as seen if it was in the frame this long before."""
 AT_MARKER_M = 1.5
-"""What a system says is so near to the marker, is the marker: as far as its side is long."""
-IN_VIEW = 0.5
-"""More than this share of the marker in the frame counts as in view."""
+"""A detection or target within this distance of the marker is the marker: the length of its side.
+"""
+IN_VIEW_SHARE = 0.5
+"""The marker is in view if more than this share of it is in the frame."""
 
 
-def moment(flight: Flight, time_s: float) -> str:
-    """Name the moment: take-off, transit, search, approach, descent or last-metre."""
+def landing_phase(flight: Flight, time_s: float) -> str:
+    """Return the phase: take-off, transit, search, approach, descent or last-metre."""
     index = int(np.searchsorted(flight.uav.time_s, time_s, side="right")) - 1
     index = max(0, index)
     x, y, z = flight.uav.position_m[index]
@@ -39,7 +43,7 @@ def moment(flight: Flight, time_s: float) -> str:
 
 
 def was_in_view(flight: Flight, body: str, time_s: float) -> bool:
-    """Whether the camera showed a dynamic object within the last two seconds."""
+    """Whether the camera showed a dynamic object within two seconds before ``time_s``."""
     return any(
         body in step.objects_visible
         for step in flight.steps
@@ -48,11 +52,11 @@ def was_in_view(flight: Flight, body: str, time_s: float) -> bool:
 
 
 def last_sighting_s(flight: Flight) -> float | None:
-    """Return when the marker was seen last: by the system's own word, where it gives one.
+    """Return the time of the last sighting of the marker; None if it was never seen.
 
-    What a system detected at the marker's place counts.  If it reports targets alone, each of them
-    at that place counts.  If it reports neither, the marker counts where most of it was in the
-    frame.  None: it was never seen.
+    If the system reports detections, each detection at the marker's place is a sighting.  If it
+    reports targets alone, each target at that place is one.  If it reports neither, each frame
+    that shows most of the marker is one.
     """
     if reports_detections(flight):
         times = [
@@ -70,7 +74,7 @@ def last_sighting_s(flight: Flight) -> float | None:
             and _at_marker(flight, step.diagnostics.target_m)
         ]
     else:
-        times = [step.time_s for step in flight.steps if step.marker_visible > IN_VIEW]
+        times = [step.time_s for step in flight.steps if step.marker_visible > IN_VIEW_SHARE]
     return max(times, default=None)
 
 

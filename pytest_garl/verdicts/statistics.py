@@ -1,4 +1,4 @@
-"""Do two methods differ over repeats, and by how much."""
+"""Intervals of shares, and tests whether two methods differ over repeated searches."""
 
 from __future__ import annotations
 
@@ -8,24 +8,36 @@ from collections.abc import Sequence
 import numpy as np
 
 MOST_PARTITIONS = 100_000
-"""Up to so many ways to deal the values out again, each is tried: nine against nine values."""
+"""The Mann-Whitney test is exact up to this number of partitions: nine against nine values."""
+
+
+def share_interval(count: int, total: int, level: float = 0.95) -> tuple[float, float]:
+    """Return the exact (Clopper-Pearson) interval of ``count / total``, as fractions."""
+    if total == 0:
+        return 0.0, 1.0
+    from scipy.stats import beta
+
+    tail = (1 - level) / 2
+    low = float(beta.ppf(tail, count, total - count + 1)) if count else 0.0
+    high = float(beta.ppf(1 - tail, count + 1, total - count)) if count < total else 1.0
+    return low, high
 
 
 def vargha_delaney(first: Sequence[float], second: Sequence[float]) -> float:
-    """Return A12: how often a value of the first is the larger one, ties counting half.
+    """Return A12: the probability that a value of the first is larger; a tie counts half.
 
-    0.5 means no difference; Vargha and Delaney (2000) call 0.56 a small effect, 0.64 a medium and
-    0.71 a large one, and likewise below 0.5.
+    0.5 means no difference.  Vargha and Delaney (2000) call 0.56 a small effect, 0.64 a medium one
+    and 0.71 a large one, and likewise below 0.5.
     """
     a, b = np.asarray(first)[:, None], np.asarray(second)[None, :]
     return float((a > b).mean() + (a == b).mean() / 2)
 
 
 def mann_whitney(first: Sequence[float], second: Sequence[float]) -> tuple[float, float]:
-    """Return U of the first and the two-sided p-value of "both are drawn alike".
+    """Return U of the first sample and the two-sided p-value that both have one distribution.
 
-    Both need two values or more.  Exact, with ties as well, by dealing the values out in every
-    possible way; by the normal approximation where there are more than a hundred thousand.
+    Both samples need at least two values.  The test tries every partition of all values and is
+    exact, with ties too.  Above :data:`MOST_PARTITIONS` it is the normal approximation.
     """
     from scipy.stats import PermutationMethod, mannwhitneyu
 

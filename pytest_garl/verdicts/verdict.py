@@ -1,9 +1,9 @@
-"""What a flight means: limits, margins, the primary property, the type and the signature."""
+"""The verdict on one flight: limits, margins, primary property, violation type, signature."""
 
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Literal, Self
 
@@ -11,22 +11,22 @@ from pytest_garl.errors import OptionError
 from pytest_garl.messages import shown
 
 LONGEST_S = 300.0
-"""The longest flight that may be asked for, in seconds: more than twice the paper's two minutes,
-and short enough that one landing system that hovers does not hold up a search."""
+"""The largest limit of time, in seconds: more than twice the paper's two minutes, and short enough
+that a landing system that hovers does not hold up a search."""
 FARTHEST_M = 1000.0
-"""The largest limit of distance that may be asked for: no map is so wide."""
+"""The largest limit of distance: no map is that wide."""
 PropertyName = Literal["distance", "time", "collision", "crash", "abort", "own"]
 ViolationType = Literal["I", "II", "III", "IV", "V", "late", "off", "hard", "abort", "own"]
-"""The paper's five types and ours; "own" is what a test asserts beyond them."""
+"""The paper's five types and ours; "own" is the type of a property that a user's test asserts."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Limits:
-    """What counts as a violation; the paper's figures by default.
+    """Limits beyond which a flight violates a property; the defaults are the paper's.
 
-    ``distance_m`` 1.5: outside the 1.5 m marker for sure, and more than the GPS error
-    (paper, RQ1).  ``time_s`` 120: the Wingcopter's two minutes in multi-copter mode.
-    ``abort``: "ok" shows aborted landings as their own share, "violation" counts them.
+    ``distance_m`` 1.5: surely outside of the 1.5 m marker, and more than the GPS error (paper,
+    RQ1).  ``time_s`` 120: the Wingcopter's two minutes in multi-copter mode.  ``abort``: "ok"
+    reports aborted landings as a share of their own, "violation" counts them as violations.
     """
 
     distance_m: float = 1.5
@@ -49,10 +49,10 @@ class Limits:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Margin:
-    """How far a property is from being violated: signed, negative when violated.
+    """Distance of a property from its violation: signed, negative if the property is violated.
 
-    ``value`` is in ``unit``; ``decided`` is False where the flight ended before the
-    property could be told, and ``reason`` then says why.
+    ``value`` is in ``unit``.  ``decided`` is False if the flight ended before the property was
+    decided; ``reason`` then says why.
     """
 
     property: PropertyName
@@ -66,11 +66,11 @@ class Margin:
 class Verdict:
     """The judgement of one flight.
 
-    ``primary`` is the one property that a violating flight violates first, ``None`` for a
-    flight without violation.  ``signature`` names the mechanism and the moment, such as
+    ``primary`` is the property that the flight violates first, and ``None`` if it violates none.
+    ``signature`` names the mechanism and the phase of the landing, such as
     ``IV:dog:last-metre:unseen``.  ``paper_violation`` is the paper's narrower definition
-    (collision, or not landed within 1.5 m of the marker).  ``story`` says in sentences
-    what happened, where and when.
+    (collision, or not landed within 1.5 m of the marker).  ``story`` says in sentences what
+    happened, where and when.
     """
 
     outcome: str
@@ -95,3 +95,17 @@ class Verdict:
         """Return the verdict whose :meth:`to_json` gave ``values``."""
         margins = tuple(Margin(**item) for item in values["margins"])
         return cls(**{**values, "margins": margins})
+
+
+PAPER_LIMITS = Limits()
+"""The limits of the paper's definition of a violation."""
+
+
+def count_decided(verdicts: Sequence[Verdict], name: PropertyName) -> int:
+    """Return the number of flights that decided a property: it surely held, or was violated."""
+    return sum(
+        margin.decided
+        for verdict in verdicts
+        for margin in verdict.margins
+        if margin.property == name
+    )

@@ -1,9 +1,12 @@
-"""Words for reports: a flight in half a line, directions."""
+"""Text for reports: a flight in half a line, what flights decided, compass points."""
 
 from __future__ import annotations
 
 import math
 import re
+from collections.abc import Sequence
+
+from pytest_garl.verdicts.verdict import Verdict, count_decided
 
 _WHERE = re.compile(
     r"(?P<what>.*?)\.?\s+At [\d.]+ s the UAV was (?P<where>.+?)\.(?: In the last .*)?", re.DOTALL
@@ -22,14 +25,17 @@ _CRASH = "The landing system "
 _RAISED = f"{_CRASH}raised: "
 
 
-def headline(story: str) -> str:
-    """Return ``collided with person-2 at 2.6 m/s, 1.4 m up, over the marker``."""
-    found = _WHERE.fullmatch(story.strip())
-    what, where = (found["what"], f", {found['where']}") if found else (story.strip(), "")
+def headline(description: str) -> str:
+    """Shorten a verdict's description to half a line.
+
+    Example: ``collided with person-2 at 2.6 m/s, 1.4 m up, over the marker``.
+    """
+    found = _WHERE.fullmatch(description.strip())
+    what, where = (found["what"], f", {found['where']}") if found else (description.strip(), "")
     if what.startswith(_RAISED):
         what = f"Python error {what.removeprefix(_RAISED)}"
     elif not what.startswith(_CRASH):
-        # What a landing system says may hold anything; our own sentences end with a full stop.
+        # A landing system's message may hold anything; our own sentences end with a full stop.
         what = re.split(r"(?<=[a-z\d%])[.;] (?=[A-Z]|it does)", what)[0]
     what = what.partition("\n")[0].removesuffix(".")
     if not what.startswith("Python"):
@@ -37,6 +43,14 @@ def headline(story: str) -> str:
     return f"{what}{where}"
 
 
+def decided_text(verdicts: Sequence[Verdict]) -> str:
+    """Return such as ``distance decided in 4 of 60 flights, time in 12``."""
+    return (
+        f"distance decided in {count_decided(verdicts, 'distance')} of {len(verdicts)} flights, "
+        f"time in {count_decided(verdicts, 'time')}"
+    )
+
+
 def compass_point(east_m: float, north_m: float) -> str:
-    """Return the nearest of the eight points in the direction of an offset."""
+    """Return the compass point, of eight, that is nearest to the direction of an offset."""
     return _POINTS[round(math.atan2(north_m, east_m) / (math.pi / 4)) % 8]

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from pytest_garl.baselines.comparison import LEVEL
-from pytest_garl.verdicts.metrics import share_interval
+from pytest_garl.verdicts.statistics import share_interval
 from studies.gate_rates import KNOWN, NEW, detected, false_alarms, measured
 
 DRAWS = 300

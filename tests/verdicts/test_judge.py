@@ -10,7 +10,6 @@ import pytest
 from pytest_garl.landing_system import Detection, Diagnostics
 from pytest_garl.simulation.flight import Contact, Crash, Flight, Separation, Step, Track
 from pytest_garl.verdicts.judge import closest_call, judge, off_marker_m, undecided
-from pytest_garl.verdicts.metrics import share_interval, top_k
 from pytest_garl.verdicts.verdict import Limits, Verdict
 
 
@@ -151,7 +150,7 @@ CRASH = Crash(
         (flight("aborted", (0.0, 0.0, 8.0)), None, ""),
     ],
 )
-def test_the_first_event_decides(subject: Flight, primary: Any, signature: str) -> None:
+def test_the_first_event_decides_the_verdict(subject: Flight, primary: Any, signature: str) -> None:
     verdict = judge(subject, Limits())
     assert verdict.primary == primary
     assert verdict.signature == signature
@@ -159,19 +158,19 @@ def test_the_first_event_decides(subject: Flight, primary: Any, signature: str) 
     assert Verdict.from_json(verdict.to_json()) == verdict
 
 
-def test_late_and_aborted_are_no_violation_in_the_papers_sense() -> None:
+def test_late_and_aborted_flights_are_no_paper_violation() -> None:
     late = judge(flight("landed", (0.0, 0.0, 0.2)), Limits(time_s=20))
     assert (late.primary, late.violation_type, late.paper_violation) == ("time", "late", False)
     aborted = judge(flight("aborted", (0.0, 0.0, 8.0)), Limits(abort="violation"))
     assert (aborted.primary, aborted.paper_violation) == ("abort", False)
 
 
-def test_a_landing_off_and_late_is_one_violation_of_distance() -> None:
+def test_a_late_landing_off_the_marker_violates_the_distance_alone() -> None:
     verdict = judge(flight("landed", (5.0, 0.0, 0.2)), Limits(time_s=20))
     assert verdict.primary == "distance"
 
 
-def test_what_a_collision_leaves_undecided_says_why() -> None:
+def test_undecided_names_the_collision() -> None:
     subject = flight("collision", (0.0, 0.0, 1.0), contacts=hit("dog-1", "dog", "dynamic"))
     assert undecided(subject) == "collision with dog-1 at 30.0 s"
 
@@ -182,27 +181,13 @@ def test_margins_are_signed() -> None:
     assert margins["time"].value == pytest.approx(90.0)
 
 
-def test_exact_interval_of_a_share() -> None:
-    # Clopper-Pearson for 0 of 10 is [0, 1 - 0.025^(1/10)].
-    low, high = share_interval(0, 10)
-    assert low == 0
-    assert high == pytest.approx(1 - 0.025**0.1)
-
-
-def test_top_k_counts_flights_up_to_the_kth_violation() -> None:
-    good = judge(flight("landed", (0.0, 0.0, 0.2)), Limits())
-    bad = judge(flight("landed", (5.0, 0.0, 0.2)), Limits())
-    assert top_k([good, bad, good, bad], k=2) == 4
-    assert top_k([good, bad], k=2) is None
-
-
 def gap(body: str, kind: str, body_class: Any, distance_m: float, time_s: float) -> Separation:
     return Separation(
         body=body, kind=kind, body_class=body_class, distance_m=distance_m, time_s=time_s
     )
 
 
-def test_a_closest_call_is_named_as_the_collision_that_it_nearly_was() -> None:
+def test_closest_call_has_the_signature_of_the_near_collision() -> None:
     near = flight(
         "landed",
         (0.0, 0.0, 0.2),
@@ -220,7 +205,7 @@ def test_a_closest_call_is_named_as_the_collision_that_it_nearly_was() -> None:
     assert judge(collided, Limits()).signature == closest_call(near)[0]
 
 
-def test_what_stays_three_metres_away_is_no_close_call() -> None:
+def test_a_body_three_metres_away_is_no_close_call() -> None:
     far = flight(
         "landed", (0.0, 0.0, 0.2), separations=(gap("tree-1", "tree", "static", 3.0, 10.0),)
     )
@@ -244,7 +229,7 @@ DESCENT_AND_CLIMB = (
         ((4.0, 4.0, 0.0), "I:decoy-marker-3:last-metre", "on decoy-marker-3"),
     ],
 )
-def test_touching_the_ground_off_the_marker_before_an_abort_is_judged_as_a_landing_there(
+def test_a_touchdown_off_the_marker_before_an_abort_is_judged_as_a_landing(
     target: Any, signature: str, words: str
 ) -> None:
     subject = flight(
@@ -266,7 +251,7 @@ def test_touching_the_ground_off_the_marker_before_an_abort_is_judged_as_a_landi
     assert not verdict.paper_violation
 
 
-def test_touching_the_ground_within_the_limit_before_an_abort_is_none() -> None:
+def test_a_touchdown_within_the_limit_before_an_abort_is_no_violation() -> None:
     subject = flight(
         "aborted", (5.0, 0.0, 5.0), uav=flown(*DESCENT_AND_CLIMB), contacts=touch(10.0)
     )
@@ -275,7 +260,7 @@ def test_touching_the_ground_within_the_limit_before_an_abort_is_none() -> None:
     assert judge(subject, Limits(distance_m=4.99)).primary == "distance"
 
 
-def test_sliding_off_the_marker_before_an_abort_is_judged_and_flying_off_is_not() -> None:
+def test_sliding_off_the_marker_before_an_abort_violates_and_flying_off_does_not() -> None:
     touched = ((0.0, 0.0, 0.0, 8.0), (10.0, 0.0, 0.0, 0.22), (10.1, 0.5, 0.0, 0.2))
     slid = flown(*touched, (12.0, 3.0, 0.0, 0.21), (14.0, 3.0, 0.0, 5.0))
     flew = flown(*touched, (12.0, 3.0, 0.0, 0.3), (14.0, 3.0, 0.0, 5.0))
@@ -286,7 +271,7 @@ def test_sliding_off_the_marker_before_an_abort_is_judged_and_flying_off_is_not(
     assert judge(dataclasses.replace(subject, uav=flew), Limits()).primary is None
 
 
-def test_an_abort_without_touching_the_ground_leaves_the_distance_undecided() -> None:
+def test_an_abort_in_the_air_leaves_the_distance_undecided() -> None:
     subject = flight("aborted", (5.0, 0.0, 5.0))
     margins = {each.property: each for each in judge(subject, Limits()).margins}
     assert not margins["distance"].decided
@@ -298,40 +283,38 @@ def test_an_abort_without_touching_the_ground_leaves_the_distance_undecided() ->
 
 
 @pytest.mark.parametrize(("distance_m", "violated"), [(1.5, False), (1.501, True)])
-def test_the_papers_definition_allows_a_landing_1_5_m_off(
-    distance_m: float, violated: bool
-) -> None:
+def test_paper_violation_begins_beyond_1_5_m(distance_m: float, violated: bool) -> None:
     verdict = judge(flight("landed", (distance_m, 0.0, 0.2)), Limits(distance_m=4.0))
     assert verdict.paper_violation is violated
     assert verdict.primary is None
 
 
 @pytest.mark.parametrize(("limit_m", "primary"), [(3.0, None), (2.999, "distance")])
-def test_a_landing_at_the_limit_of_the_distance_is_none(limit_m: float, primary: Any) -> None:
+def test_a_landing_at_the_limit_of_distance_is_no_violation(limit_m: float, primary: Any) -> None:
     verdict = judge(flight("landed", (3.0, 0.0, 0.2)), Limits(distance_m=limit_m))
     assert verdict.primary == primary
 
 
 @pytest.mark.parametrize(("limit_s", "primary"), [(30.0, None), (29.999, "time")])
-def test_a_landing_at_the_limit_of_the_time_is_none(limit_s: float, primary: Any) -> None:
+def test_a_landing_at_the_limit_of_time_is_no_violation(limit_s: float, primary: Any) -> None:
     assert judge(flight("landed", (0.0, 0.0, 0.2)), Limits(time_s=limit_s)).primary == primary
 
 
 @pytest.mark.parametrize(("tilt_deg", "signature"), [(20.0, "hard:fast"), (20.1, "hard:tilted")])
-def test_a_touchdown_is_tilted_beyond_twenty_degrees(tilt_deg: float, signature: str) -> None:
+def test_a_touchdown_beyond_twenty_degrees_is_tilted(tilt_deg: float, signature: str) -> None:
     contacts = hit("ground", "ground", "ground", math.radians(tilt_deg))
     subject = flight("collision", (0.0, 0.0, 0.2), contacts=contacts)
     assert judge(subject, Limits()).signature == signature
 
 
-def test_the_nearest_of_two_decoys_is_what_it_landed_on() -> None:
+def test_signature_names_the_nearest_of_two_decoys() -> None:
     decoys = (("decoy-a", 4.0, 5.2), ("decoy-b", 4.0, 4.3))
     subject = flight("landed", (4.0, 4.0, 0.2), steps=(step(5.0, target=(4, 4, 0)),), decoys=decoys)
     assert judge(subject, Limits()).signature.startswith("I:decoy-b:")
 
 
 @pytest.mark.parametrize(("away_m", "what"), [(1.5, "decoy-a"), (1.501, "phantom")])
-def test_a_decoy_is_what_lies_within_1_5_m_of_the_target(away_m: float, what: str) -> None:
+def test_signature_names_a_decoy_within_1_5_m_of_the_target(away_m: float, what: str) -> None:
     subject = flight(
         "landed",
         (4.0, 4.0, 0.2),
@@ -342,7 +325,7 @@ def test_a_decoy_is_what_lies_within_1_5_m_of_the_target(away_m: float, what: st
 
 
 @pytest.mark.parametrize(("away_m", "kind"), [(1.5, "off"), (1.501, "I")])
-def test_a_target_is_right_within_1_5_m_of_the_marker(away_m: float, kind: str) -> None:
+def test_a_target_within_1_5_m_of_the_marker_is_right(away_m: float, kind: str) -> None:
     subject = flight("landed", (3.0, 0.0, 0.2), steps=(step(5.0, target=(away_m, 0.0, 0.0)),))
     assert judge(subject, Limits()).violation_type == kind
 
@@ -354,7 +337,7 @@ def test_a_target_is_right_within_1_5_m_of_the_marker(away_m: float, kind: str) 
         (26.9, "II:lost:approach", "the marker was last detected at 26.9 s"),
     ],
 )
-def test_a_marker_is_lost_that_was_not_detected_for_three_seconds(
+def test_a_marker_not_detected_for_three_seconds_is_lost(
     last_s: float, signature: str, words: str
 ) -> None:
     steps = (step(5.0, detected=(0.0, 0.0, 0.0)), step(last_s, detected=(0.0, 0.0, 0.0)))
@@ -364,7 +347,7 @@ def test_a_marker_is_lost_that_was_not_detected_for_three_seconds(
 
 
 @pytest.mark.parametrize(("away_m", "kind"), [(1.5, "late"), (1.501, "II")])
-def test_a_detection_within_1_5_m_of_the_marker_is_one_of_the_marker(
+def test_a_detection_within_1_5_m_of_the_marker_counts_as_a_sighting(
     away_m: float, kind: str
 ) -> None:
     steps = (step(29.9, detected=(away_m, 0.0, 0.0)),)
@@ -373,7 +356,7 @@ def test_a_detection_within_1_5_m_of_the_marker_is_one_of_the_marker(
 
 
 @pytest.mark.parametrize(("away_m", "kind"), [(1.5, "late"), (1.501, "II")])
-def test_a_system_that_reports_targets_alone_has_seen_the_marker_where_its_target_was(
+def test_targets_count_as_sightings_of_a_system_without_detections(
     away_m: float, kind: str
 ) -> None:
     steps = (step(29.9, target=(away_m, 0.0, 0.0)),)
@@ -382,7 +365,7 @@ def test_a_system_that_reports_targets_alone_has_seen_the_marker_where_its_targe
     assert "detected" in verdict.story
 
 
-def test_a_target_held_without_a_detection_is_no_sighting_of_a_system_that_detects() -> None:
+def test_a_target_is_no_sighting_of_a_system_with_detections() -> None:
     here = (0.0, 0.0, 0.0)
     steps = (step(5.0, detected=here, target=here), step(29.9, target=here))
     verdict = judge(flight("not_landed", (0.0, 0.0, 10.0), steps=steps), Limits())
@@ -397,7 +380,7 @@ def test_a_target_held_without_a_detection_is_no_sighting_of_a_system_that_detec
         (0.5, "II", "the marker was never in view"),
     ],
 )
-def test_a_system_that_reports_nothing_is_told_what_was_in_view_and_never_detected(
+def test_without_diagnostics_the_marker_in_view_counts_as_a_sighting(
     diagnostics: Any, visible: float, kind: str, words: str
 ) -> None:
     silent = dataclasses.replace(step(29.9, visible=visible), diagnostics=diagnostics)
@@ -412,7 +395,7 @@ def test_a_system_that_reports_nothing_is_told_what_was_in_view_and_never_detect
 
 
 @pytest.mark.parametrize(("time_s", "sight"), [(28.0, "seen"), (27.9, "unseen"), (30.1, "unseen")])
-def test_what_hits_was_seen_if_in_view_within_two_seconds_before(time_s: float, sight: str) -> None:
+def test_an_object_in_view_up_to_two_seconds_before_was_seen(time_s: float, sight: str) -> None:
     subject = flight(
         "collision",
         (0.0, 0.0, 1.0),

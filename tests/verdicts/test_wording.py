@@ -8,7 +8,7 @@ PLACE = "At 32.7 s the UAV was 1.4 m up, over the marker."
 
 
 @pytest.mark.parametrize(
-    ("story", "expected"),
+    ("description", "expected"),
     [
         (
             "Collided with person-2 at 2.6 m/s. The camera had it in view within the last 2 s. "
@@ -38,5 +38,5 @@ PLACE = "At 32.7 s the UAV was 1.4 m up, over the marker."
         ("", ""),
     ],
 )
-def test_a_story_becomes_half_a_line(story: str, expected: str) -> None:
-    assert headline(story) == expected
+def test_headline_shortens_a_description_to_half_a_line(description: str, expected: str) -> None:
+    assert headline(description) == expected
