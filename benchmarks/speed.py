@@ -32,7 +32,7 @@ from pytest_garl.scenarios.maps.map import load_map
 from pytest_garl.search.methods.random_search import propose
 from pytest_garl.simulation.camera.renderer import Renderer
 from pytest_garl.simulation.fly import fly
-from pytest_garl.simulation.physics.npc import MovingObject
+from pytest_garl.simulation.physics.npc import Npc
 from pytest_garl.simulation.physics.world import World
 from pytest_garl.simulation.randomness import generator
 
@@ -45,7 +45,7 @@ PARTS: tuple[tuple[str, Any, tuple[str, ...]], ...] = (
     ("camera: depth and segments", Renderer, ("render",)),
     ("camera: images looked at", Renderer, ("_paint",)),
     ("physics and contacts", World, ("step", "touches", "separations", "uav", "move")),
-    ("objects and their policy", MovingObject, ("decide", "advance")),
+    ("objects and their policy", Npc, ("decide", "advance")),
 )
 REST = "rest of the flight"
 

@@ -10,7 +10,8 @@ import numpy as np
 
 from pytest_garl.landing_system import Command
 from pytest_garl.scenarios.maps.map import Map
-from pytest_garl.simulation.camera.renderer import Frame, Renderer
+from pytest_garl.simulation.camera.frame import Frame
+from pytest_garl.simulation.camera.renderer import Renderer
 from pytest_garl.simulation.flight import (
     BodyClass,
     Contact,
@@ -23,7 +24,7 @@ from pytest_garl.simulation.flight import (
     Step,
     Track,
 )
-from pytest_garl.simulation.physics.npc import MovingObject
+from pytest_garl.simulation.physics.npc import Npc
 
 Vector = tuple[float, float, float]
 Quaternion = tuple[float, float, float, float]
@@ -33,9 +34,7 @@ Sight = tuple[float, float, tuple[str, ...]]
 class Recorder:
     """Collects poses, contacts, events and steps; ``time_s`` is the flight's present time."""
 
-    def __init__(
-        self, map: Map, objects: Sequence[MovingObject], marker: tuple[float, float]
-    ) -> None:
+    def __init__(self, map: Map, objects: Sequence[Npc], marker: tuple[float, float]) -> None:
         self.time_s = 0.0
         self.touched_ground = False
         self._map, self._objects, self._marker = map, objects, marker

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pytest_garl.simulation.camera.projection import Quaternion, Vector, eye_under
-from pytest_garl.simulation.camera.solids import Place
+from pytest_garl.simulation.camera.solids import BodyPose
 from pytest_garl.simulation.flight import Flight, Track
 
 
@@ -21,7 +21,7 @@ class Moment:
     position_m: Vector
     attitude: Quaternion
     eye_m: Vector
-    objects: tuple[Place, ...]
+    objects: tuple[BodyPose, ...]
 
 
 def moment_at(flight: Flight, time_s: float) -> Moment:

@@ -12,7 +12,7 @@ from pytest_garl.scenarios.genes import genome_for
 from pytest_garl.scenarios.maps.map import load_map
 from pytest_garl.scenarios.placement import start_genes
 from pytest_garl.simulation.npc_policy import DECISION_STEP_S, Situation
-from pytest_garl.simulation.physics.npc import MovingObject
+from pytest_garl.simulation.physics.npc import Npc
 
 LAWN = load_map("lawn")
 GENOME = genome_for(LAWN)
@@ -32,7 +32,7 @@ def walked(
     scenario = decode(GENOME.nominal, GENOME, map="lawn", seed=1)
     genes = {**start_genes(name, start, LAWN), f"{name}.velocity": 0.5}
     scenario = scenario.replace(genes)
-    thing = MovingObject(scenario, LAWN, name, recorded_spec({name: moves}).make())
+    thing = Npc(scenario, LAWN, name, recorded_spec({name: moves}).make())
     situation = Situation(
         time_s=0.0,
         self=thing.state,

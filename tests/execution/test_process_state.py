@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 from pytest_garl.execution.process_state import ProcessState
-from pytest_garl.simulation import loop
+from pytest_garl.simulation import contacts, loop
 from tests.execution.flying import Good, job_of, scenario
 
 
@@ -41,7 +41,7 @@ def test_what_flights_import_and_hide_changes_nothing(state: ProcessState, tmp_p
 
 
 def limits_nothing(patch: pytest.MonkeyPatch) -> None:
-    patch.setattr(loop, "HARD_TOUCHDOWN_MPS", 100.0)
+    patch.setattr(contacts, "HARD_TOUCHDOWN_MPS", 100.0)
 
 
 def never_ends(patch: pytest.MonkeyPatch) -> None:

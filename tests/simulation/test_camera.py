@@ -17,9 +17,10 @@ from pytest_garl.scenarios.maps.map import load_map
 from pytest_garl.scenarios.object_types import OBJECT_TYPES
 from pytest_garl.scenarios.placement import marker_position_m
 from pytest_garl.scenarios.validity import discs_of, repair
+from pytest_garl.simulation.camera.frame import Frame
 from pytest_garl.simulation.camera.meshes import mesh_of, placed
 from pytest_garl.simulation.camera.projection import FAR_M
-from pytest_garl.simulation.camera.renderer import Frame, Renderer
+from pytest_garl.simulation.camera.renderer import Renderer
 
 CAMERA = Camera()
 FINE = Camera(width_px=1280, height_px=960)

@@ -19,8 +19,9 @@ from pytest_garl.scenarios.placement import MARKER_SIDE_M, TARGET_MARKER_ID
 from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.scenarios.validity import repair
 from pytest_garl.simulation.camera.canvas import marker_bits
+from pytest_garl.simulation.camera.frame import Frame
 from pytest_garl.simulation.camera.projection import View
-from pytest_garl.simulation.camera.renderer import Frame, Renderer
+from pytest_garl.simulation.camera.renderer import Renderer
 
 Weather = Literal["confined", "full"]
 Pose = tuple[tuple[float, float, float], tuple[float, float, float, float]]

@@ -58,7 +58,7 @@ class Episode:
         self.outcome: Outcome | None = None
         self._loop = Loop(scenario, pilot, _Steered, map, time_limit_s, None)
         self._loop.begin()
-        self._names = [item.name for item in self._loop.objects]
+        self._names = [npc.name for npc in self._loop.npcs]
         self._renderer = (
             Renderer(scenario, map, camera, generator(scenario.seed, "sensor"), colour=False)
             if camera
@@ -67,21 +67,21 @@ class Episode:
 
     @property
     def situations(self) -> tuple[Situation, ...]:
-        """What each object may see."""
-        return tuple(self._loop.situation(item) for item in self._loop.objects)
+        """What each NPC may see."""
+        return tuple(self._loop.situation(npc) for npc in self._loop.npcs)
 
     @property
     def hit(self) -> str | None:
-        """Name of the object that the UAV collided with, if it did."""
+        """Name of the NPC that the UAV collided with, if it did."""
         if self.outcome != "collision":
             return None
         body = self._loop.recorder.last_contact
         return body if body in self._names else None
 
     def step(self, moves: Sequence[Move]) -> None:
-        """Let the objects go where ``moves`` say until the next decision, or the end."""
-        for item, move in zip(self._loop.objects, moves, strict=True):
-            item.policy.move = move  # type: ignore[attr-defined]
+        """Let the NPCs go where ``moves`` say until the next decision, or the end."""
+        for npc, move in zip(self._loop.npcs, moves, strict=True):
+            npc.policy.move = move  # type: ignore[attr-defined]
         for _ in range(_TICKS):
             self.outcome = self._loop.tick()
             if self.outcome is not None:
@@ -95,7 +95,7 @@ class Episode:
         if self._renderer is None:
             return 0, 0
         eye, attitude = self._loop.eye()
-        poses = [(item.position_m, item.yaw_rad) for item in self._loop.objects]
+        poses = [(npc.position_m, npc.yaw_rad) for npc in self._loop.npcs]
         frame = self._renderer.render(eye, attitude, 0.0, poses)
         marker = self._renderer.segment_ids["marker"]
         return self._renderer.marker_pixels(eye, attitude), int(frame.pixels[marker])

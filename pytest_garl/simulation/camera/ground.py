@@ -66,7 +66,7 @@ class Raster:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Ground:
+class PaintedGround:
     """The whole ground coarsely, and a piece about the marker finely.
 
     ``cover_shift_m`` (2,) says where the pattern of fallen leaves and snow begins; ``unlit``
@@ -85,7 +85,7 @@ def paint_ground(
     conditions: Conditions,
     rng: np.random.Generator,
     marker_id: int = TARGET_MARKER_ID,
-) -> Ground:
+) -> PaintedGround:
     """Paint the ground of one flight in full light; exposure comes later."""
     shift = rng.uniform(0, TILE_M, 2)
     marker = marker_position_m(scenario, map)
@@ -93,13 +93,13 @@ def paint_ground(
 
 
 def repaint(
-    ground: Ground,
+    ground: PaintedGround,
     marker_m: tuple[float, float],
     map: Map,
     before: Conditions,
     conditions: Conditions,
     marker_id: int,
-) -> Ground:
+) -> PaintedGround:
     """Return the ground under other conditions than ``before``, as if painted under them.
 
     What lies on it costs five times as much as its shadows, so that it is painted anew only
@@ -147,11 +147,11 @@ def _lit(
     map: Map,
     conditions: Conditions,
     shift: NDArray[np.float64],
-) -> Ground:
+) -> PaintedGround:
     wide, inset = (
         _raster(_light(canvas, map, conditions), canvas.box, canvas.resolution) for canvas in unlit
     )
-    return Ground(wide=wide, inset=inset, cover_shift_m=shift, unlit=unlit)
+    return PaintedGround(wide=wide, inset=inset, cover_shift_m=shift, unlit=unlit)
 
 
 def _raster(image: Image, box: Box, resolution: float) -> Raster:

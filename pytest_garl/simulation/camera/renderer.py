@@ -5,7 +5,7 @@ from __future__ import annotations
 import copy
 import functools
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import cv2
@@ -17,12 +17,19 @@ from pytest_garl.landing_system import Camera
 from pytest_garl.scenarios.maps.map import Map
 from pytest_garl.scenarios.placement import MARKER_SIDE_M, TARGET_MARKER_ID, marker_position_m
 from pytest_garl.scenarios.scenario import Scenario
-from pytest_garl.simulation.camera.ground import Ground, Raster, paint_ground, repaint
+from pytest_garl.simulation.camera.frame import Frame
+from pytest_garl.simulation.camera.ground import PaintedGround, Raster, paint_ground, repaint
 from pytest_garl.simulation.camera.ground_cover import covered
 from pytest_garl.simulation.camera.particles import Particles
 from pytest_garl.simulation.camera.projection import FAR_M, View
 from pytest_garl.simulation.camera.sensor import Sensor
-from pytest_garl.simulation.camera.solids import Layer, Place, Shadow, Solids, draw_shadows
+from pytest_garl.simulation.camera.solids import (
+    BodyPose,
+    PaintedSolid,
+    Shadow,
+    Solids,
+    draw_shadows,
+)
 from pytest_garl.simulation.camera.weather import Conditions, conditions_of
 
 Vector = tuple[float, float, float]
@@ -32,38 +39,6 @@ _SHIFT = 4
 _SPECULAR_RADIUS = 0.10
 """Half-width, as a tangent, of the sun's smeared reflection on a wet rough ground:
 engineering estimate."""
-
-
-class Frame:
-    """One picture: RGB uint8 (H, W, 3), planar depth float32 (H, W), segmentation int32 (H, W).
-
-    A ray that meets nothing has depth 100 and segment -1.  ``pixels`` counts those of each
-    segment from the marker's (1) on.  ``image`` is painted when it is first asked for, and is
-    the same whenever that is.
-    """
-
-    __slots__ = ("_image", "_paint", "depth_m", "pixels", "segmentation")
-
-    def __init__(
-        self,
-        *,
-        paint: Callable[[], NDArray[np.uint8]],
-        depth_m: NDArray[np.float32],
-        segmentation: NDArray[np.int32],
-        pixels: NDArray[np.intp],
-    ) -> None:
-        self._paint = paint
-        self._image: NDArray[np.uint8] | None = None
-        self.depth_m = depth_m
-        self.segmentation = segmentation
-        self.pixels = pixels
-
-    @property
-    def image(self) -> NDArray[np.uint8]:
-        """What the camera's sensor delivers."""
-        if self._image is None:
-            self._image = self._paint()
-        return self._image
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -88,8 +63,8 @@ class _Scene:
     footprint_m: float
     sky: NDArray[np.bool_] | None
     shadows: Sequence[Shadow]
-    layers: Sequence[Layer]
-    ground: Ground | None
+    layers: Sequence[PaintedSolid]
+    ground: PaintedGround | None
     look: _Look
 
 
@@ -164,7 +139,7 @@ class Renderer:
         )
 
     def render(
-        self, position_m: Vector, attitude: Quaternion, time_s: float, objects: Sequence[Place]
+        self, position_m: Vector, attitude: Quaternion, time_s: float, objects: Sequence[BodyPose]
     ) -> Frame:
         """Return the frame from a camera at ``position_m`` with the UAV's ``attitude``.
 
@@ -201,7 +176,7 @@ class Renderer:
         view, look = scene.view, scene.look
         image = self._ground_image(scene)
         draw_shadows(image, view, scene.shadows, look.conditions)
-        self._gloss(image, view, look.conditions)
+        _add_gloss(image, view, look.conditions, self.camera.focal_px)
         if scene.sky is not None:
             image[scene.sky] = look.air
         for layer in scene.layers:
@@ -288,31 +263,34 @@ class Renderer:
         cv2.fillConvexPoly(segmentation, points, (1.0,), cv2.LINE_8, _SHIFT)
         return view.box(polygon)
 
-    def _gloss(self, image: NDArray[np.uint8], view: View, conditions: Conditions) -> None:
-        """Add the sun's reflection on wet ground, where the mirrored ray meets the sun."""
-        strength = 230.0 * conditions.wetness * conditions.direct_share
-        x, y, z = conditions.sun
-        mirrored = view.axes @ np.array([x, y, -z])
-        if strength < 1 or mirrored[2] < 0.3:
-            return
-        centre = view.pixels(mirrored[None])
-        sigma = _SPECULAR_RADIUS * self.camera.focal_px / float(mirrored[2])
-        # Beyond 3.3 sigma 230 levels are less than one.
-        rows, columns = view.box(np.concatenate([centre - 3.3 * sigma, centre + 3.3 * sigma]))
-        part = image[rows, columns]
-        if part.size == 0:
-            return
-        u, v = centre[0]
-        across = np.exp(-(((np.arange(columns.start, columns.stop) - u) / sigma) ** 2) / 2)
-        down = np.exp(-(((np.arange(rows.start, rows.stop) - v) / sigma) ** 2) / 2)
-        glow = (strength * np.outer(down, across)).astype(np.uint8)
-        cv2.add(part, cv2.cvtColor(glow, cv2.COLOR_GRAY2RGB), part)
 
-
-def _painted(ground: Ground | None) -> Ground:
+def _painted(ground: PaintedGround | None) -> PaintedGround:
     if ground is None:
         raise GarlError("this renderer was made with colour=False; it has no ground to show")
     return ground
+
+
+def _add_gloss(
+    image: NDArray[np.uint8], view: View, conditions: Conditions, focal_px: float
+) -> None:
+    """Add the sun's reflection on wet ground, where the mirrored ray meets the sun."""
+    strength = 230.0 * conditions.wetness * conditions.direct_share
+    x, y, z = conditions.sun
+    mirrored = view.axes @ np.array([x, y, -z])
+    if strength < 1 or mirrored[2] < 0.3:
+        return
+    centre = view.pixels(mirrored[None])
+    sigma = _SPECULAR_RADIUS * focal_px / float(mirrored[2])
+    # Beyond 3.3 sigma 230 levels are less than one.
+    rows, columns = view.box(np.concatenate([centre - 3.3 * sigma, centre + 3.3 * sigma]))
+    part = image[rows, columns]
+    if part.size == 0:
+        return
+    u, v = centre[0]
+    across = np.exp(-(((np.arange(columns.start, columns.stop) - u) / sigma) ** 2) / 2)
+    down = np.exp(-(((np.arange(rows.start, rows.stop) - v) / sigma) ** 2) / 2)
+    glow = (strength * np.outer(down, across)).astype(np.uint8)
+    cv2.add(part, cv2.cvtColor(glow, cv2.COLOR_GRAY2RGB), part)
 
 
 def _fog(image: NDArray[np.uint8], depth: Array, look: _Look) -> None:

@@ -26,7 +26,7 @@ from pytest_garl.simulation.camera.projection import FAR_M, NEAR_M, View
 from pytest_garl.simulation.camera.weather import Conditions
 
 Array = NDArray[np.float32]
-Place = tuple[tuple[float, float, float], float]
+BodyPose = tuple[tuple[float, float, float], float]
 """Position and yaw."""
 _SHIFT = 4
 _TO_GL = np.diag([1.0, -1.0, -1.0, 1.0]).astype(np.float32)
@@ -52,7 +52,7 @@ class _Solid:
     lengths: list[int] = field(default_factory=list)
     """Corners of each outline."""
 
-    def put(self, place: Place, conditions: Conditions) -> None:
+    def put(self, place: BodyPose, conditions: Conditions) -> None:
         at, yaw = place
         self.at = at
         if yaw == self.yaw_rad:
@@ -68,7 +68,7 @@ class _Solid:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Layer:
+class PaintedSolid:
     """The pixels of one solid, float32 (h, w, 3) in a window of the image, where ``covered``."""
 
     rows: slice
@@ -112,7 +112,7 @@ class Solids:
         self._settings.setShadingType(cv2.RASTERIZE_SHADING_FLAT)
         self._settings.setCullingMode(cv2.RASTERIZE_CULLING_NONE)
 
-    def place(self, objects: Sequence[Place]) -> None:
+    def place(self, objects: Sequence[BodyPose]) -> None:
         """Put the dynamic objects, in the map's order, where they are now."""
         for solid, place in zip(self._moving, objects, strict=True):
             solid.put(place, self._conditions)
@@ -131,7 +131,7 @@ class Solids:
 
     def draw(
         self, depth: Array, segmentation: NDArray[np.int32], view: View
-    ) -> tuple[NDArray[np.intp], list[Layer]]:
+    ) -> tuple[NDArray[np.intp], list[PaintedSolid]]:
         """Draw all solids into depth and segmentation.
 
         Returns how many pixels each segment got, and what to put on the image, in order.
@@ -164,7 +164,9 @@ class Solids:
                     layers.append(layer)
         return pixels, layers
 
-    def _rasterise(self, corners: Array, paint: Array, depth: Array, view: View) -> Layer | None:
+    def _rasterise(
+        self, corners: Array, paint: Array, depth: Array, view: View
+    ) -> PaintedSolid | None:
         """Draw camera-frame triangles (corners (3 n, 3), paint (n, 3)) where they are nearest.
 
         OpenCV's rasteriser costs by the area of its target, so it gets only the window
@@ -192,7 +194,7 @@ class Solids:
             self._settings,
         )
         covered = cv2.extractChannel(drawn, 0) > 0
-        return Layer(rows=rows, columns=columns, covered=covered, drawn=drawn)
+        return PaintedSolid(rows=rows, columns=columns, covered=covered, drawn=drawn)
 
     def _shade(self, solid: _Solid, level: int) -> Array:
         """Return the mesh's colours in this light, kept until the solid turns.

@@ -27,7 +27,7 @@ TURN_RATE_RADPS = 2 * math.pi
 """A being turns on the spot within about a second: engineering estimate."""
 
 
-class MovingObject:
+class Npc:
     """One dynamic object of one flight."""
 
     def __init__(self, scenario: Scenario, map: Map, name: str, policy: ObjectPolicy) -> None:
@@ -91,7 +91,7 @@ class MovingObject:
         reach = self.type.radius_m + self.speed_mps * DECISION_STEP_S + _LOOK_AHEAD_M
         self._near = [solid for solid in self._solids if _gap(solid, self.x_m, self.y_m) < reach]
 
-    def advance(self, dt_s: float, others: Sequence[MovingObject] = ()) -> None:
+    def advance(self, dt_s: float, others: Sequence[Npc] = ()) -> None:
         """Move on: towards the wanted velocity, along solids and ``others``, never through them."""
         dvx, dvy = self._wanted[0] - self.vx_mps, self._wanted[1] - self.vy_mps
         change = math.hypot(dvx, dvy)
@@ -111,7 +111,7 @@ class MovingObject:
             most = TURN_RATE_RADPS * dt_s
             self.yaw_rad += min(most, max(-most, turn))
 
-    def _met(self, others: Sequence[MovingObject]) -> list[Disc]:
+    def _met(self, others: Sequence[Npc]) -> list[Disc]:
         """Return the others that are near enough, and as high, to be bumped into."""
         return [
             Disc(
@@ -153,7 +153,7 @@ def _gap(solid: Disc, x: float, y: float) -> float:
     return math.hypot(x - solid.x_m, y - solid.y_m) - solid.radius_m - 1e-9
 
 
-def _solids_at(bodies: Sequence[Body], thing: MovingObject) -> tuple[Disc, ...]:
+def _solids_at(bodies: Sequence[Body], thing: Npc) -> tuple[Disc, ...]:
     return tuple(
         disc
         for body in bodies

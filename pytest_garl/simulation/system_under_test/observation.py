@@ -9,9 +9,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pytest_garl.landing_system import Observation
-from pytest_garl.simulation.camera.renderer import Frame
+from pytest_garl.simulation.camera.frame import Frame
+from pytest_garl.simulation.physics.vehicle import Quaternion, Vector
 
 Array = TypeVar("Array", bound=np.ndarray[Any, Any])
+POSITION_NOISE_M = 0.02
+VELOCITY_NOISE_MPS = 0.05
+"""Engineering estimate: RTK gives centimetres; 0.05 m/s is u-blox's stated accuracy (M8)."""
 _NOT_PAINTED = np.zeros((0, 0, 3), np.uint8)
 
 
@@ -38,16 +42,18 @@ def observe(
     frame: Frame,
     *,
     time_s: float,
-    position_m: NDArray[np.float64],
-    velocity_mps: NDArray[np.float64],
-    attitude: NDArray[np.float64],
+    position_m: Vector,
+    velocity_mps: Vector,
+    attitude: Quaternion,
+    rng: np.random.Generator,
 ) -> Observation:
-    """Return the observation of a frame; its arrays become read-only."""
+    """Return what a frame shows, the pose with noise drawn from ``rng``; arrays are read-only."""
+    noise = rng.standard_normal(6)
     observation = LazyObservation(
         time_s=time_s,
-        position_m=_frozen(position_m),
-        velocity_mps=_frozen(velocity_mps),
-        attitude=_frozen(attitude),
+        position_m=_frozen(np.array(position_m) + POSITION_NOISE_M * noise[:3]),
+        velocity_mps=_frozen(np.array(velocity_mps) + VELOCITY_NOISE_MPS * noise[3:]),
+        attitude=_frozen(np.array(attitude)),
         image=_NOT_PAINTED,
         depth_m=_frozen(frame.depth_m),
     )

@@ -1,0 +1,53 @@
+"""One picture of the camera: colours, depth, and which body each pixel shows."""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Callable
+
+import numpy as np
+from numpy.typing import NDArray
+
+
+class Frame:
+    """One picture: RGB uint8 (H, W, 3), planar depth float32 (H, W), segmentation int32 (H, W).
+
+    A ray that meets nothing has depth 100 and segment -1.  ``pixels`` counts those of each
+    segment from the marker's (1) on.  ``image`` is painted when it is first asked for, and is
+    the same whenever that is.
+    """
+
+    __slots__ = ("_image", "_paint", "depth_m", "pixels", "segmentation")
+
+    def __init__(
+        self,
+        *,
+        paint: Callable[[], NDArray[np.uint8]],
+        depth_m: NDArray[np.float32],
+        segmentation: NDArray[np.int32],
+        pixels: NDArray[np.intp],
+    ) -> None:
+        self._paint = paint
+        self._image: NDArray[np.uint8] | None = None
+        self.depth_m = depth_m
+        self.segmentation = segmentation
+        self.pixels = pixels
+
+    @property
+    def image(self) -> NDArray[np.uint8]:
+        """What the camera's sensor delivers."""
+        if self._image is None:
+            self._image = self._paint()
+        return self._image
+
+
+@functools.cache
+def blank_frame(height_px: int, width_px: int) -> Frame:
+    """Return a black frame without depth, for systems that use no camera."""
+    shape = height_px, width_px
+    return Frame(
+        paint=lambda: np.zeros((*shape, 3), np.uint8),
+        depth_m=np.zeros(shape, np.float32),
+        segmentation=np.zeros(shape, np.int32),
+        pixels=np.zeros(2, np.intp),
+    )

@@ -1,0 +1,89 @@
+"""The landing system of one flight: how it is made, and what it is asked."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+from pytest_garl.landing_system import (
+    Abort,
+    Airframe,
+    Command,
+    Mission,
+    Observation,
+    VehicleState,
+)
+from pytest_garl.simulation.physics.vehicle import Thrusts
+from pytest_garl.simulation.system_under_test.calls import (
+    BrokenError,
+    StepGuard,
+    SystemCalls,
+    read_airframe,
+)
+from pytest_garl.simulation.system_under_test.diagnostics import Room
+from pytest_garl.simulation.system_under_test.ground_truth import Truth
+from pytest_garl.simulation.system_under_test.validation import read_command, read_thrusts
+
+
+class SystemUnderTest:
+    """A landing system under way; every call may raise BrokenError, which ends the flight.
+
+    ``needs_camera`` and ``observes_truth`` are known once it has started.  ``gave_up`` tells that
+    it has answered ``Abort()``.
+    """
+
+    def __init__(self, make_system: Callable[[], Any], guard: StepGuard | None) -> None:
+        self._make_system = make_system
+        self._calls = SystemCalls(make_system, guard)
+        self._room = Room()
+        self.airframe, self._no_airframe = self._read_airframe()
+        self.needs_camera, self.observes_truth = True, False
+        self.gave_up = False
+
+    def _read_airframe(self) -> tuple[Airframe, BrokenError | None]:
+        """Return the airframe, or the default and what ends the flight when it has begun."""
+        try:
+            return self._calls.ask("airframe", lambda: read_airframe(self._make_system)), None
+        except BrokenError as broken:
+            return Airframe(), broken
+
+    def start(self, mission: Mission) -> None:
+        """Make the system and reset it."""
+        if self._no_airframe:
+            raise self._no_airframe
+        self._system = self._calls.ask("reset", lambda: self._make_system())
+        self._calls.ask("reset", lambda: self._system.reset(mission))
+        self.needs_camera = self._calls.ask(
+            "needs_camera", lambda: bool(getattr(self._system, "needs_camera", True))
+        )
+        self.observes_truth = self._calls.ask(
+            "observe_truth", lambda: getattr(self._system, "observe_truth", None) is not None
+        )
+
+    def observe_truth(self, truth: Truth) -> None:
+        """Show the truth to a system that asks for it: a reference pilot."""
+        self._calls.ask("observe_truth", lambda: self._system.observe_truth(truth))
+
+    def step(self, observation: Observation) -> Command:
+        """Return the checked command for one camera frame."""
+        command: Command = self._calls.ask(
+            "step", lambda: read_command(self._system.step(observation), self._room)
+        )
+        self.gave_up = isinstance(command, Abort)
+        return command
+
+    def control(self, state: VehicleState, max_thrust_n: float) -> Thrusts:
+        """Return the checked thrusts of a system that has its own flight control, in newtons."""
+        thrusts: Thrusts = self._calls.ask(
+            "control", lambda: read_thrusts(self._system.control(state), max_thrust_n)
+        )
+        return thrusts
+
+    def not_finite(self, time_s: float) -> BrokenError:
+        """Return what ends a flight whose state is no longer finite."""
+        return self._calls.nonsense(
+            "NotFinite",
+            f"after {time_s:.2f} s the flight is no longer one of finite numbers; expected "
+            "commands and an airframe that the physics can follow",
+            "step",
+        )
