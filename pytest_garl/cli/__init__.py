@@ -79,9 +79,8 @@ def _exit(number: int, frame: object) -> NoReturn:
 @click.group(cls=_Group, context_settings={"help_option_names": ["-h", "--help"]})
 @click.version_option(package_name="pytest-garl", prog_name="garl")
 def main() -> None:
-    """Tools beside pytest --garl-budget=N.
+    """Prepare a search and manage its results.
 
-    The search itself is pytest: run `pytest --garl-budget=40` where your landing tests are.
-    This command prepares what a search uses, and looks after what it found.
-    `garl COMMAND --help` explains a command.
+    pytest runs the search itself: `pytest --garl-budget=40`. Run this command in the same
+    folder. `garl COMMAND --help` explains a command.
     """

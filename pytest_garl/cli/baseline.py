@@ -1,4 +1,4 @@
-"""``garl baseline`` and ``garl diff``: what a stack does today, and what a change does to it."""
+"""``garl baseline`` and ``garl diff``: save the present rates of a stack, and compare a change."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ _SURVEY = (
         multiple=True,
         help="The landing system; may be given several times.",
     ),
-    click.option("--maps", default="court,lawn", show_default=True, help="Separated by commas."),
+    click.option("--maps", default="court,lawn", show_default=True, help="Maps, with commas."),
     click.option(
         "--count",
         type=click.IntRange(min=1),
@@ -49,27 +49,27 @@ _SURVEY = (
         type=click.Choice(["confined", "full"]),
         default="confined",
         show_default=True,
-        help="How bad the weather may get, as for --garl-weather.",
+        help="How bad the weather may become, as for --garl-weather.",
     ),
     click.option(
         "--npcs",
         default="waypoint",
         show_default=True,
-        help="Who moves people, dogs and birds, as for --garl-npcs.",
+        help="NPC policy, which moves people, dogs and birds, as for --garl-npcs.",
     ),
     click.option(
         "--distance-m",
         type=float,
         default=1.5,
         show_default=True,
-        help="How far off the marker a landing may be.",
+        help="Largest allowed distance of a landing from the marker.",
     ),
     click.option(
         "--time-s",
         type=float,
         default=120.0,
         show_default=True,
-        help="How long a landing may take.",
+        help="Longest allowed time of a landing.",
     ),
     click.option(
         "--abort",
@@ -82,7 +82,8 @@ _SURVEY = (
         "--simulator",
         metavar="MODULE:FUNCTION",
         default="",
-        help="What your hook pytest_garl_fly returns (default: the built-in simulator).",
+        help="The function that your hook pytest_garl_fly returns (default: the built-in "
+        "simulator).",
     ),
     click.option(
         "--workers",
@@ -102,7 +103,7 @@ def _survey_options(command: Callable[..., Any]) -> Callable[..., Any]:
 
 @click.group()
 def baseline() -> None:
-    """Save what a landing system does today; pytest --garl-baseline=FILE compares with it."""
+    """Save the present verdicts of a landing system, for pytest --garl-baseline=FILE."""
 
 
 @baseline.command()
@@ -111,15 +112,15 @@ def baseline() -> None:
     "--from-ledger",
     "ledger",
     type=_FILE,
-    help="Keep what a finished search flew, such as .garl/ledger.sqlite; fly nothing.",
+    help="Fly nothing: keep the scenarios of a finished search, such as .garl/ledger.sqlite.",
 )
-@click.option("--out", type=_FILE, required=True, help="The file to write, to be committed.")
+@click.option("--out", type=_FILE, required=True, help="The file to write; commit it.")
 def save(
     ledger: Path | None, out: Path, workers: int, systems: tuple[str, ...], **chosen: Any
 ) -> None:
-    """Fly random scenarios with the landing system of this folder, and keep them.
+    """Fly random scenarios with the landing system of this folder, and save the verdicts.
 
-    Run it where you run pytest. The same options choose the same scenarios, whatever the system.
+    Run it where you run pytest. The same options choose the same scenarios for every system.
     """
     from pytest_garl.baselines import file as files
     from pytest_garl.baselines.record import from_ledger, survey_checkout
@@ -174,7 +175,7 @@ def scenario(file: Path, name: str) -> None:
     type=click.FloatRange(min=0, max=1, min_open=True, max_open=True),
     default=0.05,
     show_default=True,
-    help="How often a landing system that is no worse may fail, per map.",
+    help="False-alarm rate per map: how often HEAD may fail although it is no worse.",
 )
 def diff(
     base: Path,
@@ -186,9 +187,9 @@ def diff(
 ) -> None:
     """Fly the same scenarios with two checkouts of a landing stack and compare pair by pair.
 
-    BASE and HEAD are folders, such as two git worktrees. The exit status is 1 if HEAD is worse: a
-    new type of violation, significantly more violations or aborts, or an inconclusive flight. Both
-    fly with the simulator and the policies of this installation, and with the maps of this folder.
+    BASE and HEAD are folders, such as two git worktrees. The exit status is 1 if HEAD has a new
+    type of violation, significantly more violations or aborts, or an inconclusive flight. Both
+    use the simulator and the NPC policies of this installation, and the maps of this folder.
     """
     from pytest_garl.baselines.record import compare_sets, fly_beside, survey_checkout
     from pytest_garl.execution.checkout import Checkout

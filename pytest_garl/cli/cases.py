@@ -1,4 +1,4 @@
-"""``garl cases``: look at saved cases, fly them again, keep them tidy."""
+"""``garl cases``: show saved cases, fly them again, and delete stale ones."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ FOLDER = click.option(
     type=click.Path(path_type=Path, file_okay=False),
     default=DEFAULT,
     show_default=True,
-    help="Where the cases are (the ini key garl_cases).",
+    help="Folder of the cases (the ini key garl_cases).",
 )
 
 
@@ -57,7 +57,7 @@ FOLDER = click.option(
 @FOLDER
 @click.pass_context
 def cases(context: click.Context, folder: Path) -> None:
-    """Look after saved violations: list, show, replay, accept, promote, shrink, prune, check.
+    """Manage saved violations: list, show, replay, accept, promote, shrink, prune, check.
 
     A case is a file under scenarios/regressions/<system>/. Run these commands where you run pytest.
     """
@@ -75,7 +75,7 @@ FILE = click.argument("file", type=click.Path(path_type=Path, exists=True, dir_o
 @cases.command("list")
 @click.pass_obj
 def list_(folders: _Folders) -> None:
-    """List all cases with what they say."""
+    """List all cases with status, signature, robustness and number of objects."""
     found = corpus.every_entry(folders.cases, folders.maps)
     if not found:
         _say(f"no cases in {folders.cases}; a search saves what it finds")
@@ -128,7 +128,7 @@ def _coloured(status: str) -> Text:
 @FILE
 @click.pass_obj
 def show(folders: _Folders, file: Path) -> None:
-    """Tell what happens in a case, in words and physical units."""
+    """Show what happens in a case, in words and physical units."""
     case = folders.case(file)
     evidence = case.evidence
     _say(f"{case.id}  {case.status}  {case.system}")
@@ -162,17 +162,21 @@ def _totals(case: Case) -> list[tuple[str, float]]:
 
 @cases.command("replay")
 @FILE
-@click.option("--live", is_flag=True, help="Let the policy steer instead of the recorded moves.")
+@click.option(
+    "--live",
+    is_flag=True,
+    help="Let the NPC policy move the objects, instead of their recorded moves.",
+)
 @click.option(
     "--video",
     type=click.Path(path_type=Path, dir_okay=False),
-    help="Draw the flight into this .mp4: the camera's view beside a plan (extra: video).",
+    help="Draw the flight as an .mp4: the camera's view beside a map (extra: video).",
 )
 @click.pass_context
 def replay_(context: click.Context, file: Path, live: bool, video: Path | None) -> None:
     """Fly a case again and answer FIXED, FAILED, STALE or UNDECIDED (exit status 0, 1, 3, 3).
 
-    The tests that found it judge: pytest flies this one case in a process of its own.  If the case
+    The tests that found it judge: pytest flies this one case in a process of its own. If the case
     names no test, the built-in verdict judges.
     """
     folders: _Folders = context.obj
@@ -218,7 +222,7 @@ def _answer(result: Replay) -> None:
 def accept(folders: _Folders, files: tuple[Path, ...]) -> None:
     """Make cases known: they are expected to fail until they are fixed.
 
-    A committed case is known already; this is for a project without git.
+    Use it in a project without git. A committed case is known already.
     """
     found = [(file, folders.case(file)) for file in files]
     for file, case in found:
@@ -230,11 +234,11 @@ def accept(folders: _Folders, files: tuple[Path, ...]) -> None:
 @FILE
 @click.pass_obj
 def promote(folders: _Folders, file: Path) -> None:
-    """Say that a case is fixed: from now on it must pass.
+    """Mark a case as fixed: from now on it must pass.
 
-    It is flown first, with its recorded moves and, if the reference pilot can avoid it, with a
-    live policy too.  It stays open if it fails, if it is undecided, or if nothing shows that a
-    repair of the landing system is why it passes.
+    The command flies the case first, with its recorded moves and, if the reference pilot can
+    avoid the violation, with a live policy too. The case stays open if it fails, if it is
+    undecided, or if nothing shows that a repair of the landing system made it pass.
     """
     case, told = folders.case(file), []
     for live in (False, True) if case.avoidable == "live" else (False,):
@@ -266,15 +270,15 @@ def _refusal(result: Replay, how: str) -> str:
     type=click.IntRange(min=LEAST_FLIGHTS),
     default=40,
     show_default=True,
-    help="Flights to spend at most.",
+    help="Maximal number of flights.",
 )
 @click.option("--workers", default=2, show_default=True, help="Flying child processes.")
 @click.pass_obj
 def shrink(folders: _Folders, file: Path, flights: int, workers: int) -> None:
     """Shrink a case further, from its own record.
 
-    The file is replaced only by a case that is no worse in any respect (objects, genes, moves,
-    size, neighbours that fail) and better in at least one.
+    The command replaces the file only by a case that is no worse in any respect (objects, genes,
+    moves, size, neighbours that fail) and better in at least one.
     """
     from pytest_garl.plugin.case_tests import means_of
     from pytest_garl.regressions.reshrink import KEPT, shrink_case
@@ -299,10 +303,10 @@ def shrink(folders: _Folders, file: Path, flights: int, workers: int) -> None:
 @click.option("--yes", is_flag=True, help="Delete without asking.")
 @click.pass_obj
 def prune(folders: _Folders, yes: bool) -> None:
-    """Fly all cases that are not fixed and delete those that are stale.
+    """Fly all cases that are not fixed, and delete stale ones.
 
-    A stale case passes, but nothing shows that the landing system was repaired: see the table in
-    docs/cases.md. A case that fails, or is undecided, stays.
+    A stale case passes, but nothing shows that the landing system was repaired (see the table in
+    docs/cases.md). A case that fails, or is undecided, stays.
     """
     kept = 0
     for entry in corpus.every_entry(folders.cases, folders.maps):
@@ -315,13 +319,13 @@ def prune(folders: _Folders, yes: bool) -> None:
         _say(f"{entry.path}: passes, but {'; '.join(result.reasons)}")
         if yes or click.confirm("delete it?"):
             entry.path.unlink()
-    _say(f"{kept} cases still say something")
+    _say(f"{kept} cases are not stale")
 
 
 @cases.command()
 @click.pass_obj
 def check(folders: _Folders) -> None:
-    """Check all files without flying: readable, named after what they hold, system importable."""
+    """Check all files without flying: readable, named after their content, system importable."""
     problems = []
     found = corpus.every_entry(folders.cases, folders.maps)
     for entry in found:

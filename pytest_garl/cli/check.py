@@ -1,4 +1,4 @@
-"""``garl check``: fly a landing system before a search does, and say what is wrong with it."""
+"""``garl check``: fly a landing system before a search does, and name its faults."""
 
 from __future__ import annotations
 
@@ -22,12 +22,12 @@ LIMIT_S = 1800.0
     multiple=True,
     default=("lawn",),
     show_default=True,
-    help="Where to fly; may be given several times.",
+    help="Map to fly on; may be given several times.",
 )
 @click.option(
     "--seconds",
     type=click.FloatRange(min=0, min_open=True),
-    help="End each flight after so many simulated seconds.  [default: when it landed, or 120]",
+    help="End each flight after this simulated time.  [default: when it landed, or 120]",
 )
 @click.option(
     "--nondeterministic",
@@ -37,11 +37,11 @@ LIMIT_S = 1800.0
 def check(
     system: str, maps: tuple[str, ...], seconds: float | None, nondeterministic: bool
 ) -> None:
-    """Fly a landing system without moving objects and name what is wrong with it.
+    """Fly a landing system without moving objects and name its faults.
 
     It flies two scenarios, and the first one again. Run it where you run pytest. The exit status is
-    1 for a fault that a search would meet in every flight; warnings tell what else a search would
-    meet.
+    1 if there is a fault that a search would meet in every flight. Warnings name other problems of
+    a search.
     """
     from pytest_garl.testing import check_landing_system
 

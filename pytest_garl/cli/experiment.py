@@ -1,4 +1,4 @@
-"""``garl experiment``: fly systems × maps × methods × seeds, and report what came of it."""
+"""``garl experiment``: fly systems × maps × methods × seeds, and report the results."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ _FOLDER = click.Path(path_type=Path, file_okay=False)
 @click.command(epilog="Example: garl experiment docs/experiments/smoke.toml --out=.garl/smoke")
 @click.argument("file", type=click.Path(path_type=Path, exists=True, dir_okay=False))
 @click.option(
-    "--report", is_flag=True, help="Fly nothing: write the report from the rows there are."
+    "--report", is_flag=True, help="Fly nothing: write the report from the existing rows."
 )
 @click.option(
     "--out",
@@ -38,7 +38,7 @@ _FOLDER = click.Path(path_type=Path, file_okay=False)
     type=_FOLDER,
     default=Path(".garl/experiments"),
     show_default=True,
-    help="Ledgers of the runs; an interrupted run goes on from there.",
+    help="Folder of the runs' ledgers; an interrupted run continues from there.",
 )
 @click.option(
     "--workers",
@@ -48,10 +48,10 @@ _FOLDER = click.Path(path_type=Path, file_okay=False)
     help="Flying child processes.",
 )
 def experiment(file: Path, report: bool, out: Path | None, folder: Path, workers: int) -> None:
-    """Fly the searches that FILE asks for and its rows lack.
+    """Fly the searches of FILE that its rows lack.
 
     FILE is a TOML file; the rows are a CSV file of its name beside it. Run it where you run pytest.
-    Each finished run is added at once; interrupted, the same command goes on.
+    Each finished run is added at once. If you interrupt it, the same command continues.
     """
     from pytest_garl.experiments import results as rows
     from pytest_garl.experiments.campaign import Place, fly

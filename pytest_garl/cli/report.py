@@ -1,4 +1,4 @@
-"""``garl report``: what a run found, for people and for programs."""
+"""``garl report``: report the findings of a run, for people and for programs."""
 
 from __future__ import annotations
 
@@ -19,7 +19,9 @@ from pytest_garl.reports.run_report import report_of
     type=click.Path(path_type=Path, dir_okay=False),
     default=Path(".garl/ledger.sqlite"),
 )
-@click.option("--json", "as_json", is_flag=True, help="Write JSON, as docs/report.md says.")
+@click.option(
+    "--json", "as_json", is_flag=True, help="Write JSON; docs/report.md explains the keys."
+)
 @click.option(
     "--out",
     type=click.Path(path_type=Path, dir_okay=False),
@@ -27,9 +29,9 @@ from pytest_garl.reports.run_report import report_of
 )
 @FOLDER
 def report(ledger: Path, as_json: bool, out: Path | None, folder: Path) -> None:
-    """Tell what the run in LEDGER (default .garl/ledger.sqlite) found.
+    """Report the findings of the run in LEDGER (default .garl/ledger.sqlite).
 
-    It works while the run goes on, and after one that was killed.
+    It works while the run goes on, and after a run was killed.
     """
     found = report_of(ledger, folder, (Path.cwd() / "scenarios" / "maps",))
     text = json.dumps(found, indent=2) + "\n" if as_json else _words(found)

@@ -1,4 +1,4 @@
-"""``garl train``: train the policy that steers people, dogs and birds."""
+"""``garl train``: train the NPC policy, which moves people, dogs and birds."""
 
 from __future__ import annotations
 
@@ -29,23 +29,23 @@ RECENT = 50
     type=click.Choice(["dqn", "dqn-paper", "online-rl"]),
     default="dqn",
     show_default=True,
-    help="What is learned: to collide with a UAV that avoids what it sees (dqn), or the paper's "
-    "state and reward against a UAV that flies straight down (dqn-paper), or to change weather and "
-    "light as well, as the paper's online rival does (online-rl).",
+    help="dqn learns to collide with a UAV that avoids what it sees. dqn-paper learns by the "
+    "paper's state and reward against a UAV that flies straight down. online-rl also learns to "
+    "change weather and light, as the paper's Online RL.",
 )
 @click.option(
     "--map",
     "maps",
     default="court,lawn",
     show_default=True,
-    help="Maps to train on, separated by commas; your own lie in scenarios/maps/.",
+    help="Maps to train on, separated by commas; your own are in scenarios/maps/.",
 )
 @click.option(
     "--type",
     "kinds",
     default=",".join(OBJECT_TYPES),
     show_default=True,
-    help="Types of objects that will be steered, separated by commas.",
+    help="Types of objects that the policy moves, separated by commas.",
 )
 @click.option(
     "--system",
@@ -55,26 +55,28 @@ RECENT = 50
 @click.option(
     "--state",
     type=click.Choice(["paper", "extended", "relative"]),
-    help="What the policy sees, instead of what --policy says: the paper's four numbers, nine "
-    "with the paper's actions, or ten in the object's own frame.",
+    help="Input of the network, instead of that of --policy: the paper's four numbers, nine with "
+    "the paper's actions, or ten in the object's own frame.",
 )
 @click.option(
     "--uav",
     type=click.Choice(["straight", "avoiding", "both"]),
-    help="What it learns against, instead of what --policy says.",
+    help="The UAV to learn against, instead of that of --policy.",
 )
 @click.option(
     "--reward",
     type=click.Choice(["paper", "collision-first"]),
-    help="What it is rewarded for, instead of what --policy says.",
+    help="The reward, instead of that of --policy.",
 )
-@click.option("--episodes", type=click.IntRange(1), default=800, show_default=True)
+@click.option(
+    "--episodes", type=click.IntRange(1), default=800, show_default=True, help="Per training."
+)
 @click.option(
     "--seeds",
     type=click.IntRange(1),
     default=5,
     show_default=True,
-    help="Trainings from different seeds; the best in validation is kept.",
+    help="Number of trainings, each from its own seed; the best in validation is kept.",
 )
 @click.option("--seed", type=click.IntRange(0), default=0, show_default=True, help="First seed.")
 @click.option(
@@ -89,21 +91,22 @@ RECENT = 50
     type=click.Path(path_type=Path, file_okay=False),
     default=Path(".garl/train"),
     show_default=True,
-    help="Checkpoints and curves; an interrupted training goes on from there.",
+    help="Folder of checkpoints and curves; an interrupted training continues from there.",
 )
 @click.option(
     "--out",
     type=click.Path(path_type=Path, dir_okay=False),
     default=Path("policy.npz"),
     show_default=True,
-    help="Where the best weights go; the manifest (.json) and the curve (.png) go beside them.",
+    help="File for the best weights; the manifest (.json) and the curve (.png) are written beside "
+    "it.",
 )
 def train(**asked: Any) -> None:
-    """Train a policy in the surrogate and write its weights.
+    """Train an NPC policy in the surrogate and write its weights.
 
     The surrogate is a landing on the project's own simulator: one object, a marker at a fixed
-    place, a UAV that knows where it is. It takes some five minutes per seed on two cores.
-    Then steer with it: pytest --garl-budget=40 --garl-npcs=policy.npz
+    place, and a UAV that knows the place. A seed takes about five minutes on two cores.
+    Then use the weights: pytest --garl-budget=40 --garl-npcs=policy.npz
     """
     if asked["out"].suffix != ".npz":
         raise GarlError(f"--out: found {str(asked['out'])!r}, expected a name that ends in .npz")
@@ -208,7 +211,7 @@ class _Progress:
         self._bar.stop()
 
     def episode(self, seed: int, record: Any) -> None:
-        """Show what an episode came to."""
+        """Show the result of an episode."""
         if seed not in self._tasks:
             self._recent.clear()
             self._tasks[seed] = self._bar.add_task(
@@ -221,7 +224,7 @@ class _Progress:
         self._bar.update(self._tasks[seed], completed=record.episode + 1, note=note)
 
     def validated(self, seed: int, rate: float) -> None:
-        """Show how a trained policy fared."""
+        """Show the result of a trained policy in validation."""
         note = f"validated: collisions {100 * rate:.0f} %"
         done = self._plan.training.episodes
         if seed not in self._tasks:

@@ -58,27 +58,26 @@ OPTIONS = (
     Option(
         name="budget",
         metavar="N",
-        help="Search: fly N scenarios per landing system and map. Without it only saved cases "
-        "are flown, and all other tests of landings are skipped.",
+        help="Search: fly N scenarios per landing system and map. Without it pytest flies saved "
+        "cases only, and skips all other landing tests.",
     ),
     Option(
         name="seed",
         metavar="SEED",
         default="0",
-        help="Seed of the search: a whole number, or 'random' to draw one, which the header "
-        "prints. The same seed gives the same results (default: 0).",
+        help="Seed of the search: a whole number, or 'random'. The header prints the seed. The "
+        "same seed gives the same results (default: 0).",
     ),
     Option(
         name="method",
         metavar="METHOD",
         default="garl",
-        help=f"How scenarios are proposed: {', '.join(METHODS)}, or a search of your own as "
-        "module:factory (default: garl).",
+        help=f"Search method: {', '.join(METHODS)}, or your own as module:factory (default: garl).",
     ),
     Option(
         name="population",
         metavar="N",
-        help="Scenarios that are bred at a time (default: a tenth of the budget, 8 to 20).",
+        help="Scenarios in a generation (default: a tenth of the budget, 8 to 20).",
     ),
     Option(
         name="map",
@@ -89,30 +88,31 @@ OPTIONS = (
     Option(
         name="workers",
         metavar="N",
-        help="Fly in N child processes, whatever the -n of pytest-xdist; 0 flies inside pytest, "
-        "for a debugger (default: one per CPU core, with a Ray cluster one per CPU of it).",
+        help="Fly in N child processes, independent of the -n of pytest-xdist. With 0 pytest "
+        "itself flies, so that a debugger works (default: one per CPU core, or per CPU of a Ray "
+        "cluster).",
     ),
     Option(
         name="pool",
         metavar="WHERE",
         default="local",
-        help="Where flights are flown: 'local' in child processes, 'ray' on the Ray cluster of "
-        "RAY_ADDRESS or, if that is not set, on one that is started here and ends with the run; "
-        "'ray' needs pytest-garl[ray]. The results are the same (default: local).",
+        help="Where to fly: 'local' flies in child processes, 'ray' on the Ray cluster of "
+        "RAY_ADDRESS. If RAY_ADDRESS is not set, 'ray' starts a cluster here, which ends with the "
+        "run. 'ray' needs pytest-garl[ray]. The results are the same (default: local).",
     ),
     Option(
         name="weather",
         metavar="RANGE",
         default="confined",
-        help="How bad the weather may get: 'confined' keeps its genes in [0, 0.15], 'full' lets "
-        "them reach 1 (default: confined).",
+        help="How bad the weather may become: 'confined' keeps its genes in [0, 0.15], 'full' in "
+        "[0, 1] (default: confined).",
     ),
     Option(
         name="timeout",
         metavar="SECONDS",
         default="10",
-        help="Wall-clock seconds that one call of the landing system may take; a call that takes "
-        "longer counts as hung (default: 10).",
+        help="Limit in wall-clock seconds for one call of the landing system; a longer call "
+        "counts as hung (default: 10).",
     ),
     Option(
         name="repeat",
@@ -124,36 +124,37 @@ OPTIONS = (
         name="duplicates",
         metavar="HOW",
         default="xfail",
-        help="How to report a test that fails in the same assertion and for the same signature "
-        "as an earlier slot of the search: 'xfail' or 'fail' (default: xfail).",
+        help="How to report a test that fails in the same assertion and with the same signature "
+        "as in an earlier slot of the search: 'xfail' or 'fail' (default: xfail).",
     ),
     Option(
         name="shrink",
         metavar="N",
-        help="Flights to confirm, shrink and save each new kind of violation that a search found: "
-        "8 or more; a Python exception or a hang takes 2. With 0 nothing is confirmed, shrunk or "
-        "saved (default: 12, but for all kinds together no more than the search itself).",
+        help="Flights to confirm, shrink and save each new kind of violation: 8 or more; a Python "
+        "exception or a hang takes 2. With 0 nothing is confirmed, shrunk or saved (default: 12, "
+        "but at most as many for all kinds together as the search has).",
     ),
     Option(
         name="baseline",
         metavar="FILE",
-        help="Gate: fly the scenarios of a file that `garl baseline save` wrote, and fail on a new "
-        "type of violation, significantly more violations or aborts, or an inconclusive flight.",
+        help="Gate: fly the scenarios of a file that `garl baseline save` wrote. It fails if "
+        "there is a new type of violation, if there are significantly more violations or aborts, "
+        "or if a flight is inconclusive.",
     ),
     Option(
         name="level",
         metavar="P",
         default="0.05",
-        help="How often the gate may fail a landing system that is no worse than the baseline, per "
-        "map: a share between 0 and 1 (default: 0.05).",
+        help="False-alarm rate of the gate per map: how often it may fail a landing system that "
+        "is no worse than the baseline, between 0 and 1 (default: 0.05).",
     ),
     Option(
         name="npcs",
         metavar="POLICY",
-        help=f"Who moves people, dogs and birds: {', '.join(POLICIES)}, or weights (.npz) that "
-        "`garl train` wrote (default: dqn; dqn-paper for the methods garl-paper and "
+        help=f"NPC policy, which moves people, dogs and birds: {', '.join(POLICIES)}, or weights "
+        "(.npz) that `garl train` wrote (default: dqn; dqn-paper for the methods garl-paper and "
         "surrogate-random, online-rl for online-rl, waypoint for random, destination for ga and "
-        "offline-rl; for --garl-repeat those of the search).",
+        "offline-rl; with --garl-repeat the policy of the search).",
     ),
 )
 
@@ -167,20 +168,22 @@ def add_options(parser: pytest.Parser) -> None:
         )
         parser.addini(
             f"garl_{option.name}",
-            help=f"Value of --garl-{option.name} where the command line gives none.",
+            help=f"Value of --garl-{option.name} if the command line has none.",
             default=option.default,
         )
     group.addoption(
         "--garl-resume",
         action="store_true",
-        help="Continue the interrupted run in the ledger. Options, landing system and versions "
-        "must be as they were.",
+        help="Continue the interrupted run of the ledger. Options, landing system and versions "
+        "must not have changed.",
     )
-    parser.addini("garl_dir", help="Folder of the ledger and the flights.", default=".garl")
+    parser.addini(
+        "garl_dir", help="Folder of the ledger and the records of flights.", default=".garl"
+    )
     parser.addini("garl_cases", help="Folder of the saved cases.", default="scenarios/regressions")
     parser.addini(
         "garl_xfail_strict",
-        help="Whether a saved case that is open and passes fails the run.",
+        help="Whether an open saved case that passes fails the run.",
         type="bool",
         default=False,
     )

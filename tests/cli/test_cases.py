@@ -137,7 +137,7 @@ def test_replay_answers_failed_then_fixed_and_promote_believes_only_the_latter(f
 def test_what_passes_in_another_world_is_stale_and_can_be_pruned(file: Path) -> None:
     file.write_text(file.read_text().replace(LAWN.sha256, "0" * 64))
     assert garl("replay", file).exit_code == 1
-    assert "1 cases still say something" in garl("prune", "--yes").output
+    assert "1 cases are not stale" in garl("prune", "--yes").output
     repaired()
     stale = garl("replay", file)
     assert stale.output.startswith("STALE")
