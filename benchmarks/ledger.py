@@ -18,10 +18,10 @@ def main(flights: int = 2000) -> None:
         ledger.add_slots("s", 0, dict.fromkeys(range(flights), "x" * 900))
         began = time.perf_counter()
         for _ in range(flights):
-            claim = ledger.claim()
+            claim = ledger.queue.claim()
             assert claim is not None
-            ledger.count("idle_s", 0.001)
-            ledger.record(claim, result, "0" * 64, 1.0)
+            ledger.queue.count("idle_s", 0.001)
+            ledger.queue.record(claim, result, "0" * 64, 1.0)
         each = (time.perf_counter() - began) / flights
         print(f"ledger: {1e3 * each:.2f} ms per flight")
 

@@ -48,7 +48,11 @@ def both(workers: int) -> Iterator[Sequence[Contender]]:
         for name in ("local", "ray"):
             folder = stack.enter_context(tempfile.TemporaryDirectory(prefix="garl-"))
             ledger = Ledger.create(Path(folder) / "ledger.sqlite", {})
-            pool = ray_pool(ledger, workers, ROOT) if name == "ray" else local_pool(ledger, workers)
+            pool = (
+                ray_pool(ledger.queue, workers, ROOT)
+                if name == "ray"
+                else local_pool(ledger.queue, workers)
+            )
             stack.callback(pool.close)
             found.append(Contender(name=name, ledger=ledger, pool=pool))
         yield found

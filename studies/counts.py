@@ -40,7 +40,7 @@ def count(ledger: Ledger, search: str, map: str) -> dict[str, int | str]:
         for key, low, high in zip(genome.keys, genome.lower, genome.upper, strict=True)
         if key.endswith(".velocity")
     ]
-    for flight in ledger.flown(search):
+    for flight in ledger.queries.flown(search):
         scenario, outcome = load_scenario(flight.scenario), flight.result["outcome"]
         if flight.signature:
             kinds[flight.signature] += 1
@@ -74,7 +74,7 @@ def main() -> None:
     for path in sorted(folder.glob("*/ledger.sqlite")):
         with closing(Ledger(path)) as ledger:
             for search, text in ledger.searches():
-                row = rows.get(ledger.result_hash(search)[:HASH])
+                row = rows.get(ledger.queries.result_hash(search)[:HASH])
                 if row is None:
                     continue
                 lines[row.result_hash] = {

@@ -76,10 +76,10 @@ def rows_of(path: Path, method: str, seed: int, budget: int) -> list[dict[str, A
     rows = []
     for name in ("court", "lawn"):
         genome = genome_for(load_map(name))
-        flown = [each for each in ledger.results() if each[1] == name]
+        flown = [each for each in ledger.queries.results() if each[1] == name]
         verdicts = [Verdict.from_json(each[-1]["verdict"]) for each in flown]
         texts = [
-            ledger.scenarios(generation, slot, name)[system]
+            ledger.queries.scenarios(generation, slot, name)[system]
             for system, _, generation, slot, _ in flown
         ]
         # As in the paper's RQ: how different the violating scenarios are from each other, by the
@@ -101,7 +101,7 @@ def rows_of(path: Path, method: str, seed: int, budget: int) -> list[dict[str, A
                 "top10": top_k(verdicts) or "",
                 "signatures": len({v.signature for v in verdicts if v.paper_violation}),
                 "parameter_distance": f"{np.mean(diversity(np.array(genes))):.3f}" if genes else "",
-                "result_hash": ledger.result_hash()[:16],
+                "result_hash": ledger.queries.result_hash()[:16],
             }
         )
     return rows

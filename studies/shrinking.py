@@ -20,7 +20,8 @@ from typing import Any
 import numpy as np
 
 from pytest_garl.execution.job import Job, load_scenario, loads
-from pytest_garl.execution.ledger import Ledger, Row
+from pytest_garl.execution.ledger import Ledger
+from pytest_garl.execution.ledger_queries import LedgerFlight
 from pytest_garl.execution.local_pool import local_pool
 from pytest_garl.execution.on_demand import Done, Errands, Fly
 from pytest_garl.regressions.new_case import find_colliding_object
@@ -77,15 +78,15 @@ class Violation:
 
 def violations(ledger: Ledger, count: int) -> list[Violation]:
     """Return violations, one of each kind, then a second of each, until there are enough."""
-    kinds: defaultdict[tuple[str, str], list[Row]] = defaultdict(list)
-    for row in ledger.violating():
+    kinds: defaultdict[tuple[str, str], list[LedgerFlight]] = defaultdict(list)
+    for row in ledger.queries.violating():
         kinds[row.search, row.signature].append(row)
     turns = itertools.zip_longest(*kinds.values())
     rows = [row for turn in turns for row in turn if row is not None]
     return [_violation(ledger, row) for row in rows[:count]]
 
 
-def _violation(ledger: Ledger, row: Row) -> Violation:
+def _violation(ledger: Ledger, row: LedgerFlight) -> Violation:
     text = ledger.job(row.search)
     assert text is not None
     done = Done(result=row.result, sha256=row.sha256, record=Path())
@@ -186,7 +187,7 @@ def main() -> None:
     ]
     path = Path(".garl/shrinking/ledger.sqlite")
     ledger = Ledger(path) if path.is_file() else Ledger.create(path, {})
-    pool = local_pool(ledger, arguments.workers)
+    pool = local_pool(ledger.queue, arguments.workers)
     try:
         # As many at a time as keep the workers busy; what is done is written down.
         for start in range(0, len(wanted), AT_A_TIME):

@@ -69,7 +69,7 @@ def main() -> None:
     arguments = parser.parse_args()
     name, generation, index = arguments.slot.rsplit("-", 2)
     ledger = Ledger(arguments.garl_dir / "ledger.sqlite")
-    scenarios = ledger.scenarios(int(generation[1:]), int(index[1:]), name)
+    scenarios = ledger.queries.scenarios(int(generation[1:]), int(index[1:]), name)
     flights = arguments.garl_dir / "flights"
     paths = sorted(flights.glob(f"*-{arguments.slot}.npz"))
     if not paths:

@@ -120,7 +120,7 @@ def from_ledger(path: Path) -> Baseline:
     ledger = Ledger(path)
     try:
         check_stored(ledger)
-        searches = [(loads(job), ledger.flown(search)) for search, job in ledger.searches()]
+        searches = [(loads(job), ledger.queries.flown(search)) for search, job in ledger.searches()]
         method = str(ledger.fact("method") or "")
     finally:
         ledger.close()

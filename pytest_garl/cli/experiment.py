@@ -13,7 +13,7 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 from rich.text import Text
 
 if TYPE_CHECKING:
-    from pytest_garl.execution.ledger import Progress as Flown
+    from pytest_garl.execution.ledger_queries import SearchProgress
     from pytest_garl.experiments.results import Row
     from pytest_garl.experiments.spec import Run
 
@@ -104,7 +104,7 @@ class _Shown:
         wanted = run.budget * len(run.maps)
         self._bar.reset(self._task, total=wanted, description="flying", visible=True)
 
-    def flies(self, searches: Sequence[Flown]) -> None:
+    def flies(self, searches: Sequence[SearchProgress]) -> None:
         self._bar.update(self._task, completed=sum(each.flown for each in searches))
         self._bar.refresh()
 

@@ -58,7 +58,7 @@ def own_pool(workers: int, checkout: Checkout | None = None) -> Iterator[tuple[L
     """Give a ledger and children for as long as the block lasts; they may see one checkout only."""
     with tempfile.TemporaryDirectory(prefix="garl-") as scratch:
         ledger = Ledger.create(Path(scratch) / "ledger.sqlite", {})
-        pool = local_pool(ledger, workers, checkout)
+        pool = local_pool(ledger.queue, workers, checkout)
         try:
             yield ledger, pool
         finally:

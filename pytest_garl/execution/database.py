@@ -1,20 +1,45 @@
-"""SQLite whose errors are those of the ledger."""
+"""The SQLite file of a ledger: its tables, its connection, and errors that say what to do."""
 
 from __future__ import annotations
 
+import contextlib
 import sqlite3
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 from pytest_garl.errors import LedgerError
+from pytest_garl.files.json_values import parsed
+from pytest_garl.messages import printable, shown
 
 REMEDY = (
     "Is it a ledger, is there space, may it be written? Fix that and go on with --garl-resume, or "
     "choose another folder with the ini key garl_dir"
 )
+VERSION = 4
+"""Of the tables below; a ledger of another version is not continued."""
+SCHEMA = """
+CREATE TABLE run (key TEXT PRIMARY KEY, value TEXT NOT NULL);
+CREATE TABLE search (
+    id TEXT PRIMARY KEY, system TEXT NOT NULL, map TEXT NOT NULL, wanted INTEGER NOT NULL,
+    job TEXT NOT NULL, kind TEXT NOT NULL DEFAULT 'search'
+);
+CREATE TABLE slot (
+    search TEXT NOT NULL, generation INTEGER NOT NULL, slot INTEGER NOT NULL,
+    scenario TEXT NOT NULL, state TEXT NOT NULL DEFAULT 'waiting', pid INTEGER, lease REAL,
+    attempts INTEGER NOT NULL DEFAULT 0, after TEXT NOT NULL DEFAULT '',
+    result TEXT, objectives TEXT, sha256 TEXT, wall_s REAL,
+    PRIMARY KEY (search, generation, slot)
+);
+CREATE INDEX slot_state ON slot (state, after DESC, generation, slot);
+CREATE TABLE seat (pid INTEGER PRIMARY KEY, owner INTEGER NOT NULL);
+CREATE TABLE meter (name TEXT PRIMARY KEY, value REAL NOT NULL);
+"""
+SearchKind = Literal["search", "case", "errand"]
+"""What flights are for: a search's budget, saved cases, or something beside them, such as flying a
+violation once more.  Figures and the result hash are those of the searches."""
 _LONGEST = 64_000_000
 """Bytes in one value: a damaged file may say that one fills the memory."""
 
@@ -39,13 +64,20 @@ class Rows:
 
 
 class Database:
-    """A connection whose errors are those of the ledger."""
+    """A connection to a ledger's file; its errors are LedgerErrors."""
 
     def __init__(self, path: Path) -> None:
-        self._path = path
+        self.path = path
         with self._explained():
             self._connection = sqlite3.connect(path, timeout=30, isolation_level=None)
             self._connection.setlimit(sqlite3.SQLITE_LIMIT_LENGTH, _LONGEST)
+        self.execute("PRAGMA journal_mode=WAL")
+        self.execute("PRAGMA synchronous=NORMAL")
+
+    def create_tables(self) -> None:
+        """Create the tables of a ledger in an empty file."""
+        with self._explained():
+            self._connection.executescript(SCHEMA)
 
     def execute(self, sql: str, values: Sequence[Any] = ()) -> Rows:
         """Run one statement and fetch what it returns: a damaged page may show only then."""
@@ -58,14 +90,21 @@ class Database:
         with self._explained():
             self._connection.executemany(sql, rows)
 
-    def executescript(self, sql: str) -> None:
-        """Run several statements."""
-        with self._explained():
-            self._connection.executescript(sql)
-
     def close(self) -> None:
         """Close the file."""
         self._connection.close()
+
+    @contextmanager
+    def transaction(self) -> Iterator[None]:
+        """Hold the write lock over several statements."""
+        self.execute("BEGIN IMMEDIATE")
+        try:
+            yield
+        except BaseException:
+            with contextlib.suppress(LedgerError):
+                self.execute("ROLLBACK")
+            raise
+        self.execute("COMMIT")
 
     @contextmanager
     def _explained(self) -> Iterator[None]:
@@ -73,4 +112,36 @@ class Database:
             yield
         except (sqlite3.Error, UnicodeDecodeError) as error:
             # What SQLite says of a damaged file may hold bytes of it.
-            raise LedgerError(f"{self._path}: {error}. {REMEDY}") from error
+            raise LedgerError(f"{self.path}: {error}. {REMEDY}") from error
+
+
+def result_in(text: str) -> dict[str, Any]:
+    """Return a flight's result; control characters in what a landing system said are written out.
+
+    Raises LedgerError for a text that holds none.
+    """
+    try:
+        result = parsed(text)
+    except ValueError as error:
+        raise LedgerError(f"a result in the ledger is damaged: {error}. {REMEDY}") from error
+    if not isinstance(result, dict):
+        raise LedgerError(f"a result in the ledger is damaged: found {shown(result)}. {REMEDY}")
+    # JSON escapes all that is no ASCII, control characters too.
+    return _seen(result) if "\\u" in text else result
+
+
+def _seen(value: Any) -> Any:
+    if isinstance(value, dict):
+        return {key: _seen(item) for key, item in value.items()}
+    if isinstance(value, list):
+        return [_seen(item) for item in value]
+    return printable(value) if isinstance(value, str) else value
+
+
+def set_aside(path: Path) -> None:
+    """Keep one older ledger, whole, before a new one takes its place."""
+    with contextlib.suppress(sqlite3.Error), contextlib.closing(sqlite3.connect(path)) as old:
+        old.execute("PRAGMA wal_checkpoint(TRUNCATE)")
+    for suffix in ("-wal", "-shm"):
+        path.with_name(path.name + suffix).unlink(missing_ok=True)
+    path.replace(path.with_name(f"{path.stem}-previous{path.suffix}"))

@@ -11,7 +11,7 @@ from typing import Any
 
 from pytest_garl.errors import LedgerError
 from pytest_garl.execution.database import REMEDY
-from pytest_garl.execution.ledger import Claim
+from pytest_garl.execution.ledger_queue import Claim
 from pytest_garl.execution.reference import Reference
 from pytest_garl.execution.slot import flight_name
 from pytest_garl.files.json_values import made, parsed

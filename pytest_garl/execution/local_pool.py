@@ -10,23 +10,23 @@ from pathlib import Path
 from pytest_garl import cpu_dispatch
 from pytest_garl.execution.checkout import Checkout
 from pytest_garl.execution.job import fly_job, load_scenario, loads, record_file
-from pytest_garl.execution.ledger import Claim, Ledger
+from pytest_garl.execution.ledger_queue import Claim, WorkQueue
 from pytest_garl.execution.pool import Pool
 from pytest_garl.execution.process_pool import POLL_S, ChildPool
 from pytest_garl.execution.slot import flight_name
 from pytest_garl.execution.worker_failure import Death, settle
 
 
-def local_pool(ledger: Ledger, workers: int, checkout: Checkout | None = None) -> Pool:
+def local_pool(queue: WorkQueue, workers: int, checkout: Checkout | None = None) -> Pool:
     """Return a pool of so many children, or one that flies in this process where it is none.
 
     Where this process computes otherwise than children do, it takes one child instead of none.
     With a ``checkout`` they see the modules of that landing stack and of no other.
     """
     if workers == 0 and cpu_dispatch.pin():
-        return Here(ledger)
+        return Here(queue)
     folders = checkout.arguments if checkout else ()
-    return ChildPool(ledger, Flyers(seats=max(1, workers), folders=folders))
+    return ChildPool(queue, Flyers(seats=max(1, workers), folders=folders))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -36,40 +36,40 @@ class Flyers:
     seats: int
     folders: tuple[str, ...] = ()
     patience_s: float = 3.0
-    settle: Callable[[Ledger, Claim, Death], None] = settle
+    settle: Callable[[WorkQueue, Claim, Death], None] = settle
     """Decides what a death means for the slot that was in flight."""
 
     def command(self, ledger: Path) -> Sequence[str]:
         """Return the module that a child runs, and its arguments."""
         return ["pytest_garl.execution.worker", str(ledger), *self.folders]
 
-    def bury(self, ledger: Ledger, pid: int, death: Death) -> bool:
+    def bury(self, queue: WorkQueue, pid: int, death: Death) -> bool:
         """Settle what a child had in flight; return whether it was flying at all."""
-        claim = ledger.claim_of(pid)
+        claim = queue.claim_of(pid)
         if claim is None:
             return False
-        self.settle(ledger, claim, death)
+        self.settle(queue, claim, death)
         return True
 
 
 class Here:
     """Flies one slot after the other in this process, for a debugger."""
 
-    def __init__(self, ledger: Ledger) -> None:
-        self._ledger = ledger
+    def __init__(self, queue: WorkQueue) -> None:
+        self._queue = queue
 
     def turn(self) -> None:
         """Fly one slot."""
-        claim = self._ledger.claim(lease_s=None)
+        claim = self._queue.claim(lease_s=None)
         if claim is None:
-            self._ledger.release_dead()
+            self._queue.release_dead()
             time.sleep(POLL_S)
             return
         job = loads(claim.job)
         slot_id = flight_name(claim.search, claim.generation, claim.slot, job.map)
         record_file(job, claim).unlink(missing_ok=True)
         result, sha256, wall_s = fly_job(job, load_scenario(claim.scenario), slot_id, None)
-        self._ledger.record(claim, result, sha256, wall_s)
+        self._queue.record(claim, result, sha256, wall_s)
 
     def close(self) -> None:
         """Nothing flies between two turns."""

@@ -16,7 +16,7 @@ from typing import IO, Any, Protocol
 
 from pytest_garl import cpu_dispatch
 from pytest_garl.errors import LedgerError, PoolError
-from pytest_garl.execution.ledger import Ledger
+from pytest_garl.execution.ledger_queue import WorkQueue
 from pytest_garl.execution.processes import read_report, report_file
 from pytest_garl.execution.worker_failure import Death
 
@@ -41,7 +41,7 @@ class Crew(Protocol):
     def command(self, ledger: Path) -> Sequence[str]:
         """Return the module that a child runs, and its arguments."""
 
-    def bury(self, ledger: Ledger, pid: int, death: Death) -> bool:
+    def bury(self, queue: WorkQueue, pid: int, death: Death) -> bool:
         """Settle what a child had in flight; return whether it was flying at all."""
 
 
@@ -98,8 +98,8 @@ class _Child:
 class ChildPool:
     """The children of this process; several pools share a ledger and its seats."""
 
-    def __init__(self, ledger: Ledger, crew: Crew) -> None:
-        self._ledger, self._crew = ledger, crew
+    def __init__(self, queue: WorkQueue, crew: Crew) -> None:
+        self._queue, self._crew = queue, crew
         self._children: dict[int, _Child] = {}
         self._losses = 0
         self._flown = 0.0
@@ -110,9 +110,9 @@ class ChildPool:
             if child.has_ended():
                 del self._children[pid]
                 self._bury(pid, child)
-        self._ledger.release_dead()
+        self._queue.release_dead()
         seats = self._crew.seats
-        while len(self._children) < seats and self._ledger.take_seat(seats, self._spawn):
+        while len(self._children) < seats and self._queue.take_seat(seats, self._spawn):
             pass
         time.sleep(POLL_S)
 
@@ -125,14 +125,14 @@ class ChildPool:
             child.close()
             with contextlib.suppress(LedgerError):
                 # What cannot be given back is given back when the run is resumed.
-                self._ledger.release(pid)
-                self._ledger.leave_seat(pid)
+                self._queue.release(pid)
+                self._queue.leave_seat(pid)
         self._children.clear()
 
     def _spawn(self) -> int:
         said = tempfile.TemporaryFile("a+b")  # noqa: SIM115 (closed when the child is gone)
         report = report_file()
-        module, *arguments = self._crew.command(self._ledger.path)
+        module, *arguments = self._crew.command(self._queue.path)
         parent = [str(os.getpid()), str(report)]
         process = subprocess.Popen(
             [sys.executable, "-m", module, *parent, *arguments],
@@ -151,7 +151,7 @@ class ChildPool:
         try:
             facts, status = child.reported(), child.process.wait()
             if "cannot_go_on" in facts:
-                self._ledger.release(pid)
+                self._queue.release(pid)
                 raise PoolError(facts["cannot_go_on"].strip())
             failure = facts.get("failure")
             death = Death(
@@ -164,15 +164,15 @@ class ChildPool:
                 else None,
                 watched=bool(facts),
             )
-            if not self._crew.bury(self._ledger, pid, death):
+            if not self._crew.bury(self._queue, pid, death):
                 self._lose(death)
         finally:
-            self._ledger.leave_seat(pid)
+            self._queue.leave_seat(pid)
             child.close()
 
     def _lose(self, death: Death) -> None:
         """Give up if child after child ends without a flight; one may end between two flights."""
-        flown = self._ledger.flights()
+        flown = self._queue.flights()
         if flown > self._flown:
             self._flown, self._losses = flown, 0
         if death.status != 0 or not death.watched:

@@ -7,8 +7,9 @@ import sqlite3
 from typing import Any, get_args
 
 from pytest_garl.errors import GarlError, LedgerError
+from pytest_garl.execution.database import VERSION, SearchKind, result_in
 from pytest_garl.execution.job import load_scenario, loads
-from pytest_garl.execution.ledger import VERSION, Kind, Ledger, result_in
+from pytest_garl.execution.ledger import Ledger
 from pytest_garl.files.json_values import made
 from pytest_garl.messages import shortened, shown
 from pytest_garl.simulation.flight import Crash
@@ -55,7 +56,7 @@ def check_stored(ledger: Ledger) -> None:
 
 def _problem(ledger: Ledger) -> str:
     try:
-        (answer,) = ledger.select("PRAGMA quick_check(1)")[0]
+        (answer,) = ledger.database.execute("PRAGMA quick_check(1)").fetchall()[0]
         if answer != "ok":
             return str(answer)
         return (
@@ -70,7 +71,7 @@ def _problem(ledger: Ledger) -> str:
 
 def _wrong_type(ledger: Ledger, table: str) -> str:
     names = ", ".join(f"typeof({column})" for column in _TYPES[table])
-    for found in ledger.select(f"SELECT DISTINCT {names} FROM {table}"):
+    for found in ledger.database.execute(f"SELECT DISTINCT {names} FROM {table}"):
         for (column, expected), kind in zip(_TYPES[table].items(), found, strict=True):
             if kind not in expected.split():
                 return f"{table}.{column}: found {kind}, expected {' or '.join(expected.split())}"
@@ -84,8 +85,10 @@ def _wrong_version(ledger: Ledger) -> str:
 
 
 def _wrong_search(ledger: Ledger) -> str:
-    for search, job, kind, wanted in ledger.select("SELECT id, job, kind, wanted FROM search"):
-        if kind not in get_args(Kind) or wanted < 0:
+    for search, job, kind, wanted in ledger.database.execute(
+        "SELECT id, job, kind, wanted FROM search"
+    ):
+        if kind not in get_args(SearchKind) or wanted < 0:
             return f"search {shown(search)}: found {shown((kind, wanted))}"
         try:
             loads(job)
@@ -95,8 +98,10 @@ def _wrong_search(ledger: Ledger) -> str:
 
 
 def _wrong_slot(ledger: Ledger) -> str:
-    searches = {search for (search,) in ledger.select("SELECT id FROM search")}
-    rows = ledger.select("SELECT search, generation, slot, state, scenario, result FROM slot")
+    searches = {search for (search,) in ledger.database.execute("SELECT id FROM search")}
+    rows = ledger.database.execute(
+        "SELECT search, generation, slot, state, scenario, result FROM slot"
+    )
     for search, generation, slot, state, scenario, result in rows:
         where = f"slot {generation}/{slot} of {shortened(search)}"
         if search not in searches or min(generation, slot) < 0 or state not in _STATES:

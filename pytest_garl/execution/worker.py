@@ -12,7 +12,7 @@ from time import monotonic, sleep
 from pytest_garl import cpu_dispatch
 from pytest_garl.errors import GarlError, LandingSystemError, LedgerError
 from pytest_garl.execution.checkout import see_only
-from pytest_garl.execution.ledger import Claim, Ledger
+from pytest_garl.execution.ledger_queue import Claim, WorkQueue
 from pytest_garl.execution.processes import Parent, run_child
 from pytest_garl.execution.slot import flight_name
 from pytest_garl.execution.supervisor import Watch, supervise
@@ -70,9 +70,9 @@ class Flyer:
         while (claim := self._next()) is not None:
             try:
                 result, sha256, wall_s = self._fly(claim)
-                with closing(Ledger(self._path, self._owner)) as ledger:
-                    ledger.record(claim, result, sha256, wall_s)
-                    ledger.count("idle_s", self._idle_s)
+                with closing(WorkQueue.open(self._path, self._owner)) as queue:
+                    queue.record(claim, result, sha256, wall_s)
+                    queue.count("idle_s", self._idle_s)
             except Exception as error:
                 if _cannot_go_on(error) and not state.limited():
                     raise
@@ -88,24 +88,24 @@ class Flyer:
         to one of them then would go anywhere.
         """
         try:
-            with closing(Ledger(self._path, self._owner)) as ledger:
-                return self._claimed(ledger)
+            with closing(WorkQueue.open(self._path, self._owner)) as queue:
+                return self._claimed(queue)
         except GarlError:
             if not self._system:
                 raise
             # What flew here may be the reason; otherwise a fresh process will say the same.
             return None
 
-    def _claimed(self, ledger: Ledger) -> Claim | None:
+    def _claimed(self, queue: WorkQueue) -> Claim | None:
         idle_since = monotonic()
         while getppid() == self._owner:
-            claim = ledger.claim(flown=self._system)
+            claim = queue.claim(flown=self._system)
             self._idle_s = monotonic() - idle_since
             if claim is not None:
                 return claim
-            if self._system and ledger.others_wait(self._system):
+            if self._system and queue.others_wait(self._system):
                 break
-            if self._system and self._idle_s > RESTART_S and ledger.alone_waits():
+            if self._system and self._idle_s > RESTART_S and queue.alone_waits():
                 break
             sleep(IDLE_S)
         return None

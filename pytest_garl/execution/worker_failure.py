@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Any
 
 from pytest_garl.execution.job import broken_result, loads
-from pytest_garl.execution.ledger import Claim, Ledger
+from pytest_garl.execution.ledger_queue import Claim, WorkQueue
 from pytest_garl.scenarios.maps.map import load_map
 
 ATTEMPTS = 3
@@ -47,16 +47,16 @@ class Death:
         return "killed" if self.status == -signal.SIGKILL or not self.watched else "died"
 
 
-def settle(ledger: Ledger, claim: Claim, death: Death) -> None:
+def settle(queue: WorkQueue, claim: Claim, death: Death) -> None:
     """Decide what a death means for the slot that was in flight."""
     earlier = claim.after.split()
     if death.cause == "died" or death.cause in earlier or len(earlier) + 1 == ATTEMPTS:
         again = death.cause in earlier
         undecided = death.cause != "died" and not again
-        ledger.record(claim, _result(claim, death, again, undecided), "", 0.0)
+        queue.record(claim, _result(claim, death, again, undecided), "", 0.0)
     else:
-        ledger.fly_alone(claim, " ".join([*earlier, death.cause]))
-        ledger.count("retried")
+        queue.fly_alone(claim, " ".join([*earlier, death.cause]))
+        queue.count("retried")
 
 
 def _result(claim: Claim, death: Death, again: bool, undecided: bool) -> dict[str, Any]:

@@ -14,7 +14,8 @@ import numpy as np
 from pytest_garl.adversary.recorded import recorded_spec
 from pytest_garl.errors import LedgerError
 from pytest_garl.execution.job import load_scenario
-from pytest_garl.execution.ledger import Ledger, Row
+from pytest_garl.execution.ledger import Ledger
+from pytest_garl.execution.ledger_queries import LedgerFlight
 from pytest_garl.execution.local_pool import local_pool
 from pytest_garl.execution.on_demand import Errands, Fly
 from pytest_garl.execution.reference import reference_to
@@ -48,7 +49,7 @@ def pilot(
         for search in searches
         for flight in drawn[search.key]
     }
-    with closing(_opened(path)) as ledger, closing(local_pool(ledger, workers)) as pool:
+    with closing(_opened(path)) as ledger, closing(local_pool(ledger.queue, workers)) as pool:
         avoided = Errands(ledger, pool, tick).run(flights)
     return tuple(
         Piloted(
@@ -61,7 +62,7 @@ def pilot(
     )
 
 
-def _drawn(violating: Sequence[Row], limit: int, seed: int) -> list[Row]:
+def _drawn(violating: Sequence[LedgerFlight], limit: int, seed: int) -> list[LedgerFlight]:
     count = min(limit, len(violating))
     chosen = np.random.default_rng(seed).choice(len(violating), count, replace=False)
     return [violating[index] for index in sorted(int(each) for each in chosen)]
@@ -73,7 +74,7 @@ def _opened(path: Path) -> Ledger:
     return Ledger.create(path, {})
 
 
-def _avoided(search: Search, flight: Row, fly: Fly) -> bool:
+def _avoided(search: Search, flight: LedgerFlight, fly: Fly) -> bool:
     """Whether the reference pilot comes through without a violation."""
     scenario, done = load_scenario(flight.scenario), done_of(flight, search.job)
     behaviour = recorded_behaviour(done, scenario, search.map)

@@ -13,7 +13,8 @@ from typing import Protocol
 
 from pytest_garl.adversary.scripted import policy_spec
 from pytest_garl.errors import GarlError
-from pytest_garl.execution.ledger import Ledger, Progress
+from pytest_garl.execution.ledger import Ledger
+from pytest_garl.execution.ledger_queries import SearchProgress
 from pytest_garl.experiments import results as files
 from pytest_garl.experiments.avoidability import pilot
 from pytest_garl.experiments.measure import Piloted, row_of, searches_of
@@ -43,7 +44,7 @@ class Watch(Protocol):
     def begins(self, run: Run, number: int, total: int) -> None:
         """Note that a run begins, the ``number``-th of all ``total``, those flown before too."""
 
-    def flies(self, searches: Sequence[Progress]) -> None:
+    def flies(self, searches: Sequence[SearchProgress]) -> None:
         """Note how far the run is; called often."""
 
     def pilots(self) -> None:

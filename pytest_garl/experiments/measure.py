@@ -11,9 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pytest_garl.cpu_dispatch import of_children
-from pytest_garl.execution import ledger as ledgers
 from pytest_garl.execution.job import Job, load_scenario, loads
 from pytest_garl.execution.ledger import Ledger
+from pytest_garl.execution.ledger_queries import LedgerFlight
 from pytest_garl.experiments.results import ExperimentError, Row
 from pytest_garl.experiments.spec import KINDS, Run
 from pytest_garl.regressions.follow_up import done_of
@@ -35,7 +35,7 @@ class Search:
 
     key: str
     job: Job
-    flights: tuple[ledgers.Row, ...]
+    flights: tuple[LedgerFlight, ...]
 
     @property
     def map(self) -> Map:
@@ -48,7 +48,7 @@ class Search:
         return tuple(Verdict.from_json(flight.result["verdict"]) for flight in self.flights)
 
     @property
-    def violating(self) -> tuple[ledgers.Row, ...]:
+    def violating(self) -> tuple[LedgerFlight, ...]:
         """The flights that violated as the paper defines it."""
         return tuple(
             flight
@@ -75,7 +75,7 @@ def searches_of(run: Run, ledger: Ledger) -> tuple[Search, ...]:
                 f"{run.tests}: found more than one landing system with tests on {job.map}, "
                 "expected one; name a file, or one of its tests, that has one"
             )
-        found[job.map] = Search(key=key, job=job, flights=tuple(ledger.flown(key)))
+        found[job.map] = Search(key=key, job=job, flights=tuple(ledger.queries.flown(key)))
     for map in run.maps:
         flown = len(found[map].flights) if map in found else 0
         if flown != run.budget:
@@ -96,8 +96,8 @@ def row_of(
     weather_of, genes = chromosomes(scenarios, search.map, str(ledger.fact("weather")))
     violating = np.array([each.paper_violation for each in verdicts])
     cells = covered(search)
-    flying_s = ledger.flying_s(search.key)
-    all_s = sum(ledger.flying_s(key) for key, _ in ledger.searches())
+    flying_s = ledger.queries.flying_s(search.key)
+    all_s = sum(ledger.queries.flying_s(key) for key, _ in ledger.searches())
     return Row(
         system=run.system,
         map=job.map,
@@ -121,7 +121,7 @@ def row_of(
         covered=int(cells.sum()),
         cells=cells.size,
         flying_s=flying_s,
-        idle_s=ledger.meters().get("idle_s", 0.0) * flying_s / all_s if all_s else 0.0,
+        idle_s=ledger.queries.meters().get("idle_s", 0.0) * flying_s / all_s if all_s else 0.0,
         workers=workers,
         landing_system=job.system.name,
         landing_system_sha256=job.system_sha256[:HASH],
@@ -131,7 +131,7 @@ def row_of(
         version=str(ledger.fact(FACT_VERSION)),
         package_sha256=str(ledger.fact(FACT_SOURCES)),
         machine=of_children(),
-        result_hash=ledger.result_hash(search.key)[:HASH],
+        result_hash=ledger.queries.result_hash(search.key)[:HASH],
     )
 
 

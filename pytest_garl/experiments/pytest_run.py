@@ -15,7 +15,8 @@ from pathlib import Path
 from typing import IO
 
 from pytest_garl.errors import LedgerError
-from pytest_garl.execution.ledger import Ledger, Progress
+from pytest_garl.execution.ledger import Ledger
+from pytest_garl.execution.ledger_queries import SearchProgress
 from pytest_garl.experiments.results import ExperimentError
 from pytest_garl.experiments.spec import Run
 
@@ -28,7 +29,7 @@ _SEARCHED = (0, 1)
 
 
 def search(
-    run: Run, folder: Path, workers: int, tick: Callable[[Sequence[Progress]], None]
+    run: Run, folder: Path, workers: int, tick: Callable[[Sequence[SearchProgress]], None]
 ) -> Path:
     """Fly a run's searches, or go on with them; return the ledger.
 
@@ -118,9 +119,9 @@ def _begun(ledger: Path) -> bool:
     return False
 
 
-def _progress(ledger: Path) -> Sequence[Progress]:
+def _progress(ledger: Path) -> Sequence[SearchProgress]:
     """Return how far the searches are; nothing while the ledger is being made."""
     if ledger.is_file():
         with contextlib.suppress(LedgerError), closing(Ledger(ledger)) as opened:
-            return opened.progress()
+            return opened.queries.progress()
     return ()

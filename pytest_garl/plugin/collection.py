@@ -180,7 +180,7 @@ def _recorded(options: Options, target: Target) -> dict[str, str]:
     ledger = Ledger(path)
     try:
         check_stored(ledger)
-        return ledger.scenarios(target.slot.generation, target.slot.index, target.map)
+        return ledger.queries.scenarios(target.slot.generation, target.slot.index, target.map)
     finally:
         ledger.close()
 

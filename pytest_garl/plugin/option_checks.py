@@ -87,7 +87,9 @@ def _unknown(options: Options) -> Iterator[str]:
     try:
         ledger = Ledger(path)
         try:
-            found = ledger.scenarios(int(match["generation"]), int(match["slot"]), match["map"])
+            found = ledger.queries.scenarios(
+                int(match["generation"]), int(match["slot"]), match["map"]
+            )
             if not found:
                 held = _held(ledger)
                 yield f"--garl-repeat={options.repeat}: no such slot in {path}; it holds {held}"
@@ -100,7 +102,7 @@ def _unknown(options: Options) -> Iterator[str]:
 def _held(ledger: Ledger) -> str:
     """Say which slots a ledger holds."""
     slots: dict[str, list[Slot]] = {}
-    for _, map, generation, index, _ in ledger.results():
+    for _, map, generation, index, _ in ledger.queries.results():
         slots.setdefault(map, []).append(Slot(generation=generation, index=index))
     ranges = [f"{min(those).id(map)} to {max(those).id(map)}" for map, those in slots.items()]
     return ", ".join(ranges) or "no flights"

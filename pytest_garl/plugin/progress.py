@@ -18,7 +18,8 @@ from typing import Any
 import pytest
 
 from pytest_garl.errors import LedgerError
-from pytest_garl.execution.ledger import Ledger, Progress
+from pytest_garl.execution.ledger import Ledger
+from pytest_garl.execution.ledger_queries import SearchProgress
 from pytest_garl.plugin.run import SELECTED, Run
 from pytest_garl.plugin.wrapping import begin_line, width_of
 from pytest_garl.regressions.forecast import RemainingWork, flights_after_search
@@ -69,7 +70,7 @@ def _ticking(
 class Stand:
     """How far a run is: the searches, the flights that follow them, and what was found."""
 
-    searches: Sequence[Progress]
+    searches: Sequence[SearchProgress]
     kinds: Mapping[str, int]
     nearest: Mapping[str, tuple[float, str]]
     seconds: float
@@ -167,16 +168,16 @@ class Reader:
         if now - self._read < self._every_s:
             return None
         self._read = now
-        searches = ledger.progress()
+        searches = ledger.queries.progress()
         if not searches:
             return None
         self._began = self._began or now
-        beside = ledger.meters().get("errands", 0)
+        beside = ledger.queries.meters().get("errands", 0)
         left_s = None
         if self._run.rest is None:
             options = self._run.options
             cap = options.budget if options.shrink_capped else None
-            new = Counter(search for search, _ in ledger.kinds())
+            new = Counter(search for search, _ in ledger.queries.kinds())
             self._expected = sum(
                 flights_after_search(each, options.shrink, cap) for each in new.values()
             )
@@ -187,8 +188,8 @@ class Reader:
             left_s = max(0.0, self._rest.seconds - (now - self._rest_began))
         return Stand(
             searches=searches,
-            kinds=ledger.violations(),
-            nearest=ledger.nearest(),
+            kinds=ledger.queries.violations(),
+            nearest=ledger.queries.nearest(),
             seconds=now - self._began,
             selected=int(ledger.fact(SELECTED) or 0),
             beside=beside,

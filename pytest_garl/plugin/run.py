@@ -14,7 +14,8 @@ from typing import TYPE_CHECKING, Any, TextIO
 import pytest
 
 from pytest_garl.errors import LedgerError
-from pytest_garl.execution.ledger import Kind, Ledger
+from pytest_garl.execution.database import SearchKind
+from pytest_garl.execution.ledger import Ledger
 from pytest_garl.execution.pool import Pool, wait_for
 from pytest_garl.execution.reference import BUILT_IN, Reference, reference_to, simulator_sha256
 from pytest_garl.execution.slot import Slot, flight_name
@@ -250,7 +251,7 @@ class Run:
         if options.repeat or not options.shrink:
             return False
         # Interrupted twice, pytest tells of the status that it began with.
-        return all(each.flown >= each.all for each in self.ledger.progress())
+        return all(each.flown >= each.all for each in self.ledger.queries.progress())
 
     def lower_targets(self, target: Target) -> list[Target]:
         """Return what the selected tests of lower slots of a search test."""
@@ -341,7 +342,7 @@ class Run:
         flights = len(wanted)
         if method.learns:
             flights = max(slots) * self.options.population + len(slots[max(slots)])
-        kind: Kind = "case" if case else "search"
+        kind: SearchKind = "case" if case else "search"
         self.ledger.add_search(search, name, target.map, flights, job.dumps(), kind)
         nodes = [item.nodeid for each in self.items[search].values() for item in each]
         files = sorted({node.partition("::")[0] for node in nodes})

@@ -76,8 +76,8 @@ def pursue(run: Run, session: pytest.Session) -> None:
 
 def _flight_s(run: Run, wanted: Sequence[CaseRequest]) -> dict[str, float]:
     """Return how long a flight of each signature took in the search."""
-    known = run.ledger.kinds()
-    any_s = run.ledger.seconds_per_flight() or run.flight_s
+    known = run.ledger.queries.kinds()
+    any_s = run.ledger.queries.seconds_per_flight() or run.flight_s
     return {each.name: known.get((each.search, each.signature)) or any_s for each in wanted}
 
 

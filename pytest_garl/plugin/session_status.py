@@ -53,7 +53,7 @@ def _undecided(run: Run) -> Iterator[str]:
     """Yield which searches left too many flights without a result."""
     flown: Counter[tuple[str, str]] = Counter()
     without: dict[tuple[str, str], list[str]] = {}
-    for system, map, generation, index, result in run.ledger.results():
+    for system, map, generation, index, result in run.ledger.queries.results():
         flown[system, map] += 1
         if result["outcome"] == "inconclusive":
             slot = Slot(generation=generation, index=index).id(map)
@@ -70,7 +70,7 @@ def _undecided(run: Run) -> Iterator[str]:
 
 def _unrepeated(tally: Tally, run: Run) -> Iterator[str]:
     """Yield which searches found too many violations that did not show again."""
-    flown = Counter((system, map) for system, map, *_ in run.ledger.results())
+    flown = Counter((system, map) for system, map, *_ in run.ledger.queries.results())
     for (system, map), slots in _by_search(tally).items():
         allowed = max(1, flown[system, map] // SHARE)
         if len(slots) > allowed:

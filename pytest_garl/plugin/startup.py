@@ -73,9 +73,9 @@ def begin_run(config: pytest.Config, options: Options) -> Run:
 
 def _pool(ledger: Ledger, options: Options) -> Pool:
     if options.pool == "ray":
-        return ray_pool(ledger, options.workers, options.root)
+        return ray_pool(ledger.queue, options.workers, options.root)
     assert options.workers is not None
-    return local_pool(ledger, options.workers)
+    return local_pool(ledger.queue, options.workers)
 
 
 def _shared(options: Options) -> Ledger:
@@ -137,7 +137,7 @@ def _seconds_per_flight(options: Options) -> float | None:
     try:
         ledger = Ledger(path)
         try:
-            return ledger.seconds_per_flight()
+            return ledger.queries.seconds_per_flight()
         finally:
             ledger.close()
     except Exception:  # noqa: BLE001 (an unreadable old ledger only costs the estimate)

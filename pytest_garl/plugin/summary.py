@@ -36,7 +36,7 @@ def _header(run: Run) -> str:
     options = run.options
     if options.repeat:
         return f"garl: repeating {options.repeat}"
-    done = sum(search.flown for search in run.ledger.progress()) if options.resume else 0
+    done = sum(search.flown for search in run.ledger.queries.progress()) if options.resume else 0
     before = f"resuming after {done} flights; " if options.resume else ""
     return (
         f"garl: {before}budget {options.budget} per system and map, method {options.method}, "
@@ -162,13 +162,15 @@ def _searches(reporter: Any, run: Run) -> None:
     if words:
         reporter.write_line(wrapped(words, width))
     reporter.write_line(wrapped(_spent(run), width))
-    searches = run.ledger.progress()
+    searches = run.ledger.queries.progress()
     done, total = sum(each.flown for each in searches), sum(each.all for each in searches)
     if done < total and not run.options.repeat:
         reporter.write_line(
             f"not finished: {done} of {total} flown; the same command with --garl-resume goes on"
         )
-    reporter.write_line(f"ledger: {run.ledger.path}  results {run.ledger.result_hash()[:16]}")
+    reporter.write_line(
+        f"ledger: {run.ledger.path}  results {run.ledger.queries.result_hash()[:16]}"
+    )
 
 
 def fold_skips(reporter: Any) -> None:
@@ -243,7 +245,7 @@ def again_command(found: Found, kind: Kind, config: pytest.Config) -> str:
 
 def _spent(run: Run) -> str:
     """Return what the run cost beside the budget."""
-    meters = run.ledger.meters()
+    meters = run.ledger.queries.meters()
     flying, idle = meters.get("flying_s", 0.0), meters.get("idle_s", 0.0)
     pursued = sum(each.finding.flights for each in run.pursued)
     repeats = meters.get("errands", 0) - pursued

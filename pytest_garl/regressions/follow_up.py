@@ -10,7 +10,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from pytest_garl.execution.job import Job, load_scenario, loads
-from pytest_garl.execution.ledger import Ledger, Row
+from pytest_garl.execution.ledger import Ledger
+from pytest_garl.execution.ledger_queries import LedgerFlight
 from pytest_garl.execution.on_demand import Done, Errands, Fly
 from pytest_garl.execution.pool import Pool
 from pytest_garl.execution.slot import flight_name
@@ -107,7 +108,7 @@ def case_requests(
             for signature in wanted[search]
             if signature in rows
         }
-        cap = len(ledger.flown(search)) if shrinking.capped else None
+        cap = len(ledger.queries.flown(search)) if shrinking.capped else None
         map = load_map(job.map, place.map_folders)
         found += [
             CaseRequest(
@@ -191,9 +192,9 @@ def is_known(case: Case, map: str) -> bool:
     return case.scenario.map == map and case.status == "open"
 
 
-def _by_search(ledger: Ledger) -> dict[str, dict[str, list[Row]]]:
-    found: dict[str, dict[str, list[Row]]] = {}
-    for row in ledger.violating():
+def _by_search(ledger: Ledger) -> dict[str, dict[str, list[LedgerFlight]]]:
+    found: dict[str, dict[str, list[LedgerFlight]]] = {}
+    for row in ledger.queries.violating():
         found.setdefault(row.search, defaultdict(list))[row.signature].append(row)
     return found
 
@@ -201,12 +202,12 @@ def _by_search(ledger: Ledger) -> dict[str, dict[str, list[Row]]]:
 def _failures(
     ledger: Ledger,
     search: str,
-    violating: Sequence[Row],
+    violating: Sequence[LedgerFlight],
     user_assertion: UserAssertion | None,
     job: Job,
 ) -> tuple[tuple[Scenario, Done], ...]:
     """Return scenarios with their flights: those that violated, or those that a test refuses."""
-    rows = ledger.flown(search) if user_assertion else violating
+    rows = ledger.queries.flown(search) if user_assertion else violating
     flights = [(load_scenario(row.scenario), done_of(row, job)) for row in rows]
     if user_assertion is None:
         return tuple(flights)
@@ -217,7 +218,7 @@ def _failures(
     )
 
 
-def done_of(row: Row, job: Job) -> Done:
+def done_of(row: LedgerFlight, job: Job) -> Done:
     """Return a search's flight as what is flown beside it comes back."""
     name = flight_name(row.search, row.generation, row.slot, job.map)
     return Done(result=row.result, sha256=row.sha256, record=Path(job.flights) / f"{name}.npz")

@@ -43,7 +43,7 @@ def report_of(path: Path, cases: Path, map_folders: tuple[Path, ...]) -> dict[st
     ledger = Ledger(path)
     try:
         found = found_by(ledger, [Own(**each) for each in ledger.fact(OWN_FACT) or ()])
-        progress = ledger.progress()
+        progress = ledger.queries.progress()
         wanted: Counter[tuple[str, str]] = Counter()
         for each in progress:
             wanted[each.system, each.map] += each.all
@@ -51,7 +51,7 @@ def report_of(path: Path, cases: Path, map_folders: tuple[Path, ...]) -> dict[st
         searches = [
             _search(ledger, each, wanted[each.system, each.map], saved, path) for each in found
         ]
-        meters = ledger.meters()
+        meters = ledger.queries.meters()
         return {
             "schema": "pytest-garl-report",
             "version": VERSION,
@@ -60,7 +60,7 @@ def report_of(path: Path, cases: Path, map_folders: tuple[Path, ...]) -> dict[st
             "complete": ledger.fact(ENDED) is not None
             and all(each.flown == each.all for each in progress),
             "run": {key: ledger.fact(key) for key in _RUN},
-            "results_sha256": ledger.result_hash(),
+            "results_sha256": ledger.queries.result_hash(),
             "time": {
                 "began": ledger.fact(BEGAN),
                 "ended": ledger.fact(ENDED),
@@ -125,7 +125,7 @@ def _search(
 
 def _flight(ledger: Ledger, found: Found, name: str) -> dict[str, Any]:
     slot = found.slots[name]
-    result, trajectory, scenario = ledger.flight(found.system, found.map, slot)
+    result, trajectory, scenario = ledger.queries.flight(found.system, found.map, slot)
     return {
         "slot": name,
         "seed": json.loads(scenario)["seed"],

@@ -72,7 +72,7 @@ class Found:
 def found_by(ledger: Ledger, own: Iterable[Own] = ()) -> list[Found]:
     """Return what each search of a ledger found."""
     flown: dict[tuple[str, str], list[tuple[Slot, dict[str, Any]]]] = {}
-    for system, map, generation, index, result in ledger.results():
+    for system, map, generation, index, result in ledger.queries.results():
         slot = Slot(generation=generation, index=index)
         flown.setdefault((system, map), []).append((slot, result))
     mine: dict[tuple[str, str], list[Own]] = {}

@@ -248,9 +248,9 @@ def write_ledger(path: Path, of: Job, method: str = "") -> None:
     ledger.add_search("a", "stack.landing:Lander", "lawn", 2, of.dumps())
     texts = [dump_scenario(each) for each in Survey(count=2).scenarios(LAWN)]
     ledger.add_slots("a", 0, dict(enumerate(texts)))
-    claim = ledger.claim()
+    claim = ledger.queue.claim()
     assert claim is not None
-    ledger.record(claim, result(), "ab" * 32, 0.1)
+    ledger.queue.record(claim, result(), "ab" * 32, 0.1)
     ledger.close()
 
 

@@ -41,11 +41,11 @@ class Instant:
         self.handed_out: list[str] = []
 
     def turn(self) -> None:
-        claim = self.ledger.claim()
+        claim = self.ledger.queue.claim()
         assert claim is not None
         if not self.handed_out:
             self.handed_out = [text for text, _ in self.ledger.generation(claim.search, 0)]
-        self.ledger.record(claim, {"index": claim.slot}, "", 0.0)
+        self.ledger.queue.record(claim, {"index": claim.slot}, "", 0.0)
 
     def close(self) -> None:
         pass
@@ -68,7 +68,7 @@ def test_all_flights_are_handed_out_before_the_first_is_awaited(pool: Instant) -
 
 def test_flights_beside_a_search_count_as_none(pool: Instant) -> None:
     fly(pool)
-    assert pool.ledger.progress() == []
+    assert pool.ledger.queries.progress() == []
     assert pool.ledger.searches() == []
 
 

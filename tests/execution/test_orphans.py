@@ -21,7 +21,7 @@ from pytest_garl.execution.ledger import Ledger
 from pytest_garl.execution.local_pool import Flyers
 
 ledger = Ledger.create(Path(sys.argv[1]), {})
-pool = ChildPool(ledger, Flyers(seats=1))
+pool = ChildPool(ledger.queue, Flyers(seats=1))
 pool.turn()
 print(*pool._children, flush=True)
 time.sleep(600)

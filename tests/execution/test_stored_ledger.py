@@ -12,9 +12,9 @@ import pytest
 
 from pytest_garl.baselines.record import from_ledger
 from pytest_garl.errors import LedgerError
-from pytest_garl.execution.database import Database
+from pytest_garl.execution.database import VERSION, Database, result_in
 from pytest_garl.execution.job import dump_scenario, load_scenario, loads
-from pytest_garl.execution.ledger import VERSION, Ledger, result_in
+from pytest_garl.execution.ledger import Ledger
 from pytest_garl.execution.stored_ledger import check_stored
 from tests.baselines.test_file import job, result, write_ledger
 from tests.execution.flying import scenario
@@ -120,7 +120,7 @@ def test_a_ledger_without_a_table_is_one_error(path: Path, table: str) -> None:
 def test_a_page_that_is_damaged_shows_as_an_error_of_the_ledger(path: Path) -> None:
     ledger = Ledger(path)
     ledger.add_slots("a", 1, {slot: dump_scenario(scenario(0.1)) for slot in range(200)})
-    ledger.select("PRAGMA wal_checkpoint(TRUNCATE)")
+    ledger.database.execute("PRAGMA wal_checkpoint(TRUNCATE)")
     ledger.close()
     content = bytearray(path.read_bytes())
     for page in range(8, len(content) // 4096):
@@ -130,9 +130,9 @@ def test_a_page_that_is_damaged_shows_as_an_error_of_the_ledger(path: Path) -> N
         _checked(path)
     ledger = Ledger(path)
     with pytest.raises(LedgerError, match="database disk image is malformed"):
-        ledger.scenarios(1, 150, "lawn")
+        ledger.queries.scenarios(1, 150, "lawn")
     with pytest.raises(LedgerError, match="database disk image is malformed"):
-        ledger.result_hash()
+        ledger.queries.result_hash()
     ledger.close()
 
 

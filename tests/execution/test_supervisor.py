@@ -61,7 +61,7 @@ class Field:
     def __init__(self, folder: Path) -> None:
         self.folder = folder
         self.ledger = Ledger.create(folder / "ledger.sqlite", {})
-        self.pool = ChildPool(self.ledger, Flyers(seats=1, patience_s=60.0))
+        self.pool = ChildPool(self.ledger.queue, Flyers(seats=1, patience_s=60.0))
 
     def fly(self, system: type, timeout_s: float = 20.0, simulator: Any = None) -> Flown:
         """Fly a system and then a good one."""
@@ -81,7 +81,7 @@ class Field:
             result=result,
             sha256=self.ledger.sha256("bad", 0, 0),
             neighbour=self.ledger.sha256("good", 1, 0),
-            meters=self.ledger.meters(),
+            meters=self.ledger.queries.meters(),
         )
 
 
@@ -237,7 +237,7 @@ def test_children_that_end_between_flights_end_no_run(field: Field) -> None:
         os.kill(child, signal.SIGKILL)
         while child in field.pool._children:
             field.pool.turn()
-    assert field.ledger.meters()["flights"] == MOST_LOSSES + 2
+    assert field.ledger.queries.meters()["flights"] == MOST_LOSSES + 2
 
 
 def test_children_that_end_before_they_fly_end_the_run(field: Field) -> None:

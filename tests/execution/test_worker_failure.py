@@ -6,7 +6,8 @@ from typing import Any
 import pytest
 
 from pytest_garl.execution.job import dump_scenario
-from pytest_garl.execution.ledger import Claim, Ledger
+from pytest_garl.execution.ledger import Ledger
+from pytest_garl.execution.ledger_queue import Claim
 from pytest_garl.execution.worker_failure import Death, settle
 from tests.execution.flying import Good, job_of, scenario
 
@@ -26,7 +27,7 @@ def ledger(tmp_path: Path) -> Ledger:
 
 
 def claimed(ledger: Ledger) -> Claim:
-    claim = ledger.claim()
+    claim = ledger.queue.claim()
     assert claim is not None
     return claim
 
@@ -45,26 +46,26 @@ def test_what_the_machine_may_have_done_is_flown_again_when_nobody_else_flies(
     ledger: Ledger, death: Death, after: str
 ) -> None:
     first, other = claimed(ledger), claimed(ledger)
-    settle(ledger, first, death)
+    settle(ledger.queue, first, death)
     assert ledger.result("s", 0, 0) is None
-    assert ledger.claim() is None
-    ledger.record(other, {}, "", 0.0)
-    assert ledger.claim(flown="m:Class") is None
-    assert ledger.alone_waits()
+    assert ledger.queue.claim() is None
+    ledger.queue.record(other, {}, "", 0.0)
+    assert ledger.queue.claim(flown="m:Class") is None
+    assert ledger.queue.alone_waits()
     again = claimed(ledger)
     assert (again.slot, again.after, again.attempt) == (0, after, 2)
-    assert not ledger.alone_waits()
-    assert ledger.meters()["retried"] == 1
+    assert not ledger.queue.alone_waits()
+    assert ledger.queries.meters()["retried"] == 1
 
 
 def test_a_process_that_ends_itself_is_a_finding_at_once(ledger: Ledger) -> None:
-    settle(ledger, claimed(ledger), DIED)
+    settle(ledger.queue, claimed(ledger), DIED)
     result = ledger.result("s", 0, 0)
     assert result is not None
     assert result["verdict"]["signature"] == "V:died:signal-11"
     assert result["crash"]["message"] == "its process ended with signal 11"
     assert result["crash"]["traceback"] == "no fuel"
-    assert "retried" not in ledger.meters()
+    assert "retried" not in ledger.queries.meters()
 
 
 @pytest.mark.parametrize(
@@ -84,9 +85,9 @@ def test_what_happens_again_alone_is_a_finding(
     ledger: Ledger, death: Death, signature: str, message: str
 ) -> None:
     first = claimed(ledger)
-    ledger.record(claimed(ledger), {}, "", 0.0)
-    settle(ledger, first, death)
-    settle(ledger, claimed(ledger), death)
+    ledger.queue.record(claimed(ledger), {}, "", 0.0)
+    settle(ledger.queue, first, death)
+    settle(ledger.queue, claimed(ledger), death)
     result = ledger.result("s", 0, 0)
     assert result is not None
     assert result["verdict"]["signature"] == signature
@@ -95,12 +96,12 @@ def test_what_happens_again_alone_is_a_finding(
 
 def test_three_flights_that_end_each_in_another_way_leave_it_undecided(ledger: Ledger) -> None:
     first = claimed(ledger)
-    ledger.record(claimed(ledger), {}, "", 0.0)
-    settle(ledger, first, HUNG)
-    settle(ledger, claimed(ledger), KILLED)
+    ledger.queue.record(claimed(ledger), {}, "", 0.0)
+    settle(ledger.queue, first, HUNG)
+    settle(ledger.queue, claimed(ledger), KILLED)
     third = claimed(ledger)
     assert (third.after, third.attempt) == ("hung killed", 3)
-    settle(ledger, third, BROKE)
+    settle(ledger.queue, third, BROKE)
     result = ledger.result("s", 0, 0)
     assert result is not None
     assert (result["outcome"], result["verdict"]["signature"]) == ("inconclusive", "")
@@ -109,21 +110,21 @@ def test_three_flights_that_end_each_in_another_way_leave_it_undecided(ledger: L
 
 def test_a_finding_after_another_death_is_one(ledger: Ledger) -> None:
     first = claimed(ledger)
-    ledger.record(claimed(ledger), {}, "", 0.0)
-    settle(ledger, first, KILLED)
-    settle(ledger, claimed(ledger), DIED)
+    ledger.queue.record(claimed(ledger), {}, "", 0.0)
+    settle(ledger.queue, first, KILLED)
+    settle(ledger.queue, claimed(ledger), DIED)
     assert crash(ledger)["message"] == "its process ended with signal 11"
 
 
 def test_what_is_given_back_is_flown_as_if_it_had_not_been_claimed(ledger: Ledger) -> None:
     first = claimed(ledger)
-    ledger.give_back(first)
+    ledger.queue.give_back(first)
     assert claimed(ledger) == first
-    ledger.record(claimed(ledger), {}, "", 0.0)
-    settle(ledger, first, HUNG)
+    ledger.queue.record(claimed(ledger), {}, "", 0.0)
+    settle(ledger.queue, first, HUNG)
     alone = claimed(ledger)
     assert (alone.after, alone.attempt) == ("hung", 2)
-    ledger.give_back(alone)
+    ledger.queue.give_back(alone)
     assert claimed(ledger) == alone
-    ledger.release(alone.pid)
+    ledger.queue.release(alone.pid)
     assert claimed(ledger) == alone

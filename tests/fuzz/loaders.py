@@ -189,11 +189,11 @@ def _write_ledger(path: Path) -> None:
     ledger.add_search("s", "tests.execution.flying:Good", "lawn", 8, test_baseline.job().dumps())
     ledger.add_slots("s", 0, {slot: _dumped(slot) for slot in range(8)})
     for _ in range(6):
-        claim = ledger.claim()
+        claim = ledger.queue.claim()
         assert claim is not None
-        ledger.record(claim, *fly_job(job, load_scenario(claim.scenario), "one", None))
+        ledger.queue.record(claim, *fly_job(job, load_scenario(claim.scenario), "one", None))
     ledger.note_objectives("s", 0, [(0.5, 1.0)] * 8)
-    ledger.select("PRAGMA wal_checkpoint(TRUNCATE)")
+    ledger.database.execute("PRAGMA wal_checkpoint(TRUNCATE)")
     ledger.close()
 
 
@@ -225,17 +225,17 @@ def _use(ledger: Ledger) -> None:
             if result is not None:
                 threat(result)
                 assert result["verdict"]["signature"] is not None
-        ledger.flown(search)
-    for *_, result in ledger.results():
+        ledger.queries.flown(search)
+    for *_, result in ledger.queries.results():
         Verdict.from_json(result["verdict"])
-    ledger.progress()
-    ledger.violations()
-    ledger.nearest()
-    ledger.violating()
-    ledger.result_hash()
-    ledger.meters()
-    ledger.seconds_per_flight()
-    for text in ledger.scenarios(0, 1, "lawn").values():
+    ledger.queries.progress()
+    ledger.queries.violations()
+    ledger.queries.nearest()
+    ledger.queries.violating()
+    ledger.queries.result_hash()
+    ledger.queries.meters()
+    ledger.queries.seconds_per_flight()
+    for text in ledger.queries.scenarios(0, 1, "lawn").values():
         load_scenario(text)
 
 

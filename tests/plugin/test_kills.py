@@ -60,9 +60,9 @@ class Outcome:
 
 def outcome(folder: Path) -> Outcome:
     ledger = Ledger(folder / ".garl" / "ledger.sqlite")
-    meters = {name: ledger.meters().get(name, 0.0) for name in ("flights", "errands")}
+    meters = {name: ledger.queries.meters().get(name, 0.0) for name in ("flights", "errands")}
     found = Outcome(
-        hash=ledger.result_hash(),
+        hash=ledger.queries.result_hash(),
         cases={path.name: path.read_bytes() for path in folder.glob("scenarios/**/*.toml")},
         meters=meters,
     )

@@ -77,7 +77,7 @@ def run(pytester: pytest.Pytester, *args: str) -> pytest.RunResult:
 def result_hash(pytester: pytest.Pytester) -> str:
     ledger = Ledger(pytester.path / ".garl" / "ledger.sqlite")
     try:
-        return ledger.result_hash()
+        return ledger.queries.result_hash()
     finally:
         ledger.close()
 

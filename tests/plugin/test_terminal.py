@@ -16,7 +16,8 @@ from typing import cast
 
 import pytest
 
-from pytest_garl.execution.ledger import Ledger, Progress
+from pytest_garl.execution.ledger import Ledger
+from pytest_garl.execution.ledger_queries import SearchProgress
 from pytest_garl.plugin import progress
 from pytest_garl.plugin.progress import Stand, text
 from pytest_garl.plugin.run import Run
@@ -149,8 +150,8 @@ def test_a_dead_worker_leaves_no_litter(pytester: pytest.Pytester) -> None:
 
 
 TWO = (
-    Progress(system="m:A", map="court", flown=3, all=4, generation=1),
-    Progress(system="m:A", map="lawn", flown=1, all=4, generation=0),
+    SearchProgress(system="m:A", map="court", flown=3, all=4, generation=1),
+    SearchProgress(system="m:A", map="lawn", flown=1, all=4, generation=0),
 )
 STAND = Stand(
     searches=TWO,
@@ -182,13 +183,8 @@ def test_the_first_line_now_and_then_counts_the_time_before_it(
     )
     reader.wait()
     clock[0] += 30.0
-    ledger = SimpleNamespace(
-        progress=lambda: [TWO[1]],
-        meters=dict,
-        violations=dict,
-        nearest=dict,
-        fact=lambda key: None,
-    )
+    queries = SimpleNamespace(progress=lambda: [TWO[1]], meters=dict, violations=dict, nearest=dict)
+    ledger = SimpleNamespace(queries=queries, fact=lambda key: None)
     stand = reader.read(cast(Ledger, ledger))
     assert stand is not None
     assert stand.seconds == 30.0
@@ -204,7 +200,7 @@ def test_a_narrow_terminal_gets_whole_words(width: int) -> None:
 
 
 def test_the_line_follows_the_forecast_once_there_is_one() -> None:
-    done = Progress(system="m:A", map="court", flown=4, all=4, generation=0)
+    done = SearchProgress(system="m:A", map="court", flown=4, all=4, generation=0)
     stand = Stand(
         searches=[done],
         kinds={"IV": 3},
@@ -235,7 +231,7 @@ def test_lf_flies_exactly_the_failing_slots_again(
     result.assert_outcomes(failed=2)
     assert failed(result) == first
     ledger = Ledger(pytester.path / ".garl" / "ledger.sqlite")
-    flown = {f"lawn-g{each[2]:02d}-s{each[3]:02d}" for each in ledger.results()}
+    flown = {f"lawn-g{each[2]:02d}-s{each[3]:02d}" for each in ledger.queries.results()}
     ledger.close()
     assert flown == {re.findall(r"\[(.+)\]", line)[0] for line in first}
 

@@ -30,10 +30,10 @@ def searched(path: Path, name: str, budget: int, wanted: tuple[Slot, ...] = ()) 
     breeder = Breeder(ledger, "s", make_method(name, plan), generations)
     while True:
         breeder.advance()
-        claim = ledger.claim()
+        claim = ledger.queue.claim()
         if claim is None:
             return ledger
-        ledger.record(claim, result(load_scenario(claim.scenario)), "", 0.0)
+        ledger.queue.record(claim, result(load_scenario(claim.scenario)), "", 0.0)
 
 
 # Two more fly the scenarios of random search, each with other objects.
@@ -48,7 +48,7 @@ def test_every_budget_is_flown_exactly(tmp_path: Path, name: str) -> None:
             if flown is not None
         ]
         assert len(texts) == len(set(texts)) == budget
-        assert ledger.meters()["flights"] == budget
+        assert ledger.queries.meters()["flights"] == budget
         ledger.close()
 
 

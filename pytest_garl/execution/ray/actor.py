@@ -15,7 +15,8 @@ from typing import Any
 
 from pytest_garl import cpu_dispatch
 from pytest_garl.execution.job import Job, loads
-from pytest_garl.execution.ledger import Claim, Ledger
+from pytest_garl.execution.ledger import Ledger
+from pytest_garl.execution.ledger_queue import Claim, WorkQueue
 from pytest_garl.execution.local_pool import Flyers
 from pytest_garl.execution.pool import wait_for
 from pytest_garl.execution.process_pool import ChildPool
@@ -65,7 +66,7 @@ class Pilot:
         self._folder = Path(tempfile.mkdtemp(prefix=".garl-pilot-", dir=here / base.scratch))
         os.chdir(here / base.inside)
         self._ledger = Ledger.create(self._folder / "ledger.sqlite", {})
-        self._pool = ChildPool(self._ledger, Flyers(seats=1, settle=self._note))
+        self._pool = ChildPool(self._ledger.queue, Flyers(seats=1, settle=self._note))
         self._flown = 0
         self._death: Death | None = None
 
@@ -112,10 +113,10 @@ class Pilot:
     def _at_home(self, text: str) -> str:
         return self._relocation.home_again(text) if self._relocation else text
 
-    def _note(self, ledger: Ledger, claim: Claim, death: Death) -> None:
+    def _note(self, queue: WorkQueue, claim: Claim, death: Death) -> None:
         """Remember a death and take the slot out of the queue: it is flown once."""
         self._death = death
-        ledger.record(claim, {}, "", 0.0)
+        queue.record(claim, {}, "", 0.0)
 
 
 def versions() -> dict[str, str]:

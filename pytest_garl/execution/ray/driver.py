@@ -21,7 +21,7 @@ from pathlib import Path
 from typing import Any
 
 from pytest_garl.errors import PoolError
-from pytest_garl.execution.ledger import Ledger
+from pytest_garl.execution.ledger_queue import WorkQueue
 from pytest_garl.execution.processes import Parent, named, run_child
 from pytest_garl.execution.ray.actor import Base
 from pytest_garl.execution.ray.scheduler import Fleet
@@ -42,7 +42,7 @@ def main(parent: Parent, ledger: str, root: str, workers: str) -> None:
     address = os.environ.get("RAY_ADDRESS") or "local"
     there = own(int(workers)) if address == "local" else joined(address, Path(root), path.parent)
     with there as (ray, base, cpus):
-        fleet = Fleet(ray, Ledger(path), base, int(workers) or cpus)
+        fleet = Fleet(ray, WorkQueue.open(path), base, int(workers) or cpus)
         try:
             while parent.lives():
                 fleet.turn()

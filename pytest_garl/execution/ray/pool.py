@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from pytest_garl.errors import PoolError
-from pytest_garl.execution.ledger import Ledger
+from pytest_garl.execution.ledger_queue import WorkQueue
 from pytest_garl.execution.pool import Pool
 from pytest_garl.execution.process_pool import ChildPool
 from pytest_garl.execution.worker_failure import Death
@@ -19,13 +19,13 @@ INSTALL = "pip install 'pytest-garl[ray]'"
 REACH_S = 5.0
 
 
-def ray_pool(ledger: Ledger, workers: int | None, root: Path) -> Pool:
+def ray_pool(queue: WorkQueue, workers: int | None, root: Path) -> Pool:
     """Return a pool of ``workers`` flights at a time; None: as many as the cluster has CPUs.
 
     The cluster is that of RAY_ADDRESS, which gets a copy of the project at ``root``, or else one on
     this machine that begins and ends with the pool.
     """
-    return ChildPool(ledger, Driver(workers=workers, root=root))
+    return ChildPool(queue, Driver(workers=workers, root=root))
 
 
 def check_ray(address: str) -> None:
@@ -72,7 +72,7 @@ class Driver:
             str(self.workers or 0),
         ]
 
-    def bury(self, ledger: Ledger, pid: int, death: Death) -> bool:
+    def bury(self, queue: WorkQueue, pid: int, death: Death) -> bool:
         """Give back all slots: nothing flies in the driver, so its death says nothing of them."""
-        ledger.release(pid)
+        queue.release(pid)
         return False

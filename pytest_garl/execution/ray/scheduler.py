@@ -11,7 +11,7 @@ from typing import Any
 
 from pytest_garl.errors import LedgerError, PoolError
 from pytest_garl.execution.job import loads, record_file
-from pytest_garl.execution.ledger import Claim, Ledger
+from pytest_garl.execution.ledger_queue import Claim, WorkQueue
 from pytest_garl.execution.ray.actor import Base, Landed, Pilot, versions
 from pytest_garl.execution.worker import IDLE_S
 from pytest_garl.execution.worker_failure import Death, settle
@@ -27,8 +27,8 @@ class Fleet:
     ``ray`` is the module, which a process that does not fly by it shall not have to import.
     """
 
-    def __init__(self, ray: Any, ledger: Ledger, base: Base, size: int) -> None:
-        self._ray, self._ledger, self._base, self._size = ray, ledger, base, size
+    def __init__(self, ray: Any, queue: WorkQueue, base: Base, size: int) -> None:
+        self._ray, self._queue, self._base, self._size = ray, queue, base, size
         # One CPU is one flight: it flies on one thread.
         self._hire = ray.remote(num_cpus=1)(Pilot)
         self._arriving: dict[Any, Any] = {}
@@ -68,7 +68,7 @@ class Fleet:
         """Hire pilots while there is more to fly than pilots who could."""
         free = len(self._arriving) + len(self._idle)
         room = self._size - free - len(self._flying)
-        for _ in range(min(room, self._ledger.waiting() - free)):
+        for _ in range(min(room, self._queue.waiting() - free)):
             pilot = self._hire.remote(self._base)
             self._arriving[pilot.about.remote()] = pilot
 
@@ -100,11 +100,11 @@ class Fleet:
         while self._idle:
             pilot, since, flown = self._idle[-1]
             # A pilot's child flies one landing system; for another it starts anew.
-            claim = self._ledger.claim(flown=flown) or self._ledger.claim()
+            claim = self._queue.claim(flown=flown) or self._queue.claim()
             if claim is None:
                 return
             self._idle.pop()
-            self._ledger.count("idle_s", time.monotonic() - since)
+            self._queue.count("idle_s", time.monotonic() - since)
             record_file(loads(claim.job), claim).unlink(missing_ok=True)
             self._flying[pilot.fly.remote(claim)] = pilot, claim
 
@@ -117,10 +117,10 @@ class Fleet:
             self._lose(claim, error)
             return
         if isinstance(flight, Death):
-            settle(self._ledger, claim, flight)
+            settle(self._queue, claim, flight)
         else:
             _keep(flight, claim)
-            self._ledger.record(claim, flight.result, flight.sha256, flight.wall_s)
+            self._queue.record(claim, flight.result, flight.sha256, flight.wall_s)
         self._rest(pilot, loads(claim.job).system.name)
 
     def _lose(self, claim: Claim, error: Exception) -> None:
@@ -133,7 +133,7 @@ class Fleet:
         if self._lost[slot] > MOST_LOSSES:
             times = self._lost[slot]
             raise PoolError(f"Ray lost the worker that flew the same slot {times} times: {error}")
-        self._ledger.give_back(claim)
+        self._queue.give_back(claim)
 
 
 def unlike(ours: Mapping[str, str], theirs: Mapping[str, str]) -> str:

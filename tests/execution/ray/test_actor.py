@@ -11,7 +11,7 @@ import pytest
 
 from pytest_garl.errors import PoolError
 from pytest_garl.execution.job import dump_scenario, fly_job, loads
-from pytest_garl.execution.ledger import Claim
+from pytest_garl.execution.ledger_queue import Claim
 from pytest_garl.execution.ray.actor import Base, Landed, Pilot
 from pytest_garl.execution.reference import Reference, reference_to
 from pytest_garl.execution.worker_failure import Death

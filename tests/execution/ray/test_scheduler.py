@@ -9,7 +9,8 @@ import pytest
 
 from pytest_garl.errors import PoolError
 from pytest_garl.execution.job import dump_scenario
-from pytest_garl.execution.ledger import Claim, Ledger
+from pytest_garl.execution.ledger import Ledger
+from pytest_garl.execution.ledger_queue import Claim
 from pytest_garl.execution.ray.actor import Base, Landed, versions
 from pytest_garl.execution.ray.scheduler import Fleet, unlike
 from pytest_garl.execution.worker_failure import Death
@@ -95,7 +96,7 @@ def ledger(tmp_path: Path) -> Ledger:
 
 
 def fly(ray: FakeRay, ledger: Ledger, size: int = 2) -> Fleet:
-    fleet = Fleet(ray, ledger, Base(), size)
+    fleet = Fleet(ray, ledger.queue, Base(), size)
     for _ in range(100):
         if not ledger.unflown("search", 0):
             break
@@ -110,7 +111,7 @@ def test_all_is_flown_and_recorded_with_the_records_where_the_job_wants_them(
     fly(ray, ledger).close()
     assert ledger.generation("search", 0) == [(dump_scenario(scenario()), LANDED.result)] * 3
     assert ledger.sha256("search", 0, 2) == "hash"
-    assert ledger.meters()["flying_s"] == 4.5
+    assert ledger.queries.meters()["flying_s"] == 4.5
     files = {path.name: path.read_bytes() for path in (tmp_path / "flights").iterdir()}
     assert files == {f"search-lawn-g00-s0{index}.npz": b"record" for index in range(3)}
     assert (ray.hired, ray.most, ray.closed) == (2, 2, 2)
@@ -127,7 +128,7 @@ def test_a_lost_worker_loses_nothing_and_says_nothing_of_the_system(ledger: Ledg
     ray = FakeRay(fly=lambda claim: next(losses))
     fly(ray, ledger)
     assert [result for _, result in ledger.generation("search", 0)] == [LANDED.result] * 3
-    assert "retried" not in ledger.meters()
+    assert "retried" not in ledger.queries.meters()
     assert ray.hired == 4
 
 
@@ -169,7 +170,7 @@ def test_a_death_is_settled_as_in_the_local_pool(ledger: Ledger) -> None:
     assert result is not None
     assert result["verdict"]["signature"] == "V:died:signal-9"
     assert [claim.after for claim in claims if claim.slot == 0] == ["", "killed"]
-    assert ledger.meters()["retried"] == 1
+    assert ledger.queries.meters()["retried"] == 1
 
 
 def test_a_slot_to_fly_alone_is_flown_even_if_its_worker_is_lost(ledger: Ledger) -> None:

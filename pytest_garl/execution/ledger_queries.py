@@ -1,0 +1,199 @@
+"""What a ledger tells about its flights: progress, results, violations, costs and the hash."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import re
+from dataclasses import dataclass
+from typing import Any
+
+from pytest_garl.execution.database import Database, SearchKind, result_in
+from pytest_garl.execution.slot import Slot
+
+_ADDRESS = re.compile(r"0x[0-9a-f]+")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SearchProgress:
+    """How far a search is: slots flown of all, and the latest generation bred."""
+
+    system: str
+    map: str
+    flown: int
+    all: int
+    generation: int
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class LedgerFlight:
+    """A flown slot."""
+
+    search: str
+    generation: int
+    slot: int
+    scenario: str
+    result: dict[str, Any]
+    sha256: str
+
+    @property
+    def signature(self) -> str:
+        """The violation's signature."""
+        return str(self.result["verdict"]["signature"])
+
+
+class LedgerQueries:
+    """Answers questions about a ledger's flights, and changes nothing."""
+
+    def __init__(self, database: Database) -> None:
+        self._database = database
+
+    def progress(self) -> list[SearchProgress]:
+        """Return how far each search is."""
+        rows = self._database.execute(
+            "SELECT system, map, coalesce(sum(state = 'flown'), 0), wanted, "
+            "coalesce(max(generation), 0) FROM search "
+            "LEFT JOIN slot ON search.id = slot.search WHERE kind = 'search' "
+            "GROUP BY search.id ORDER BY system, map"
+        )
+        return [
+            SearchProgress(system=system, map=map, flown=flown, all=wanted, generation=generation)
+            for system, map, flown, wanted, generation in rows
+        ]
+
+    def results(
+        self, kind: SearchKind = "search"
+    ) -> list[tuple[str, str, int, int, dict[str, Any]]]:
+        """Return (system, map, generation, slot, result) of all flown slots in slot order."""
+        rows = self._database.execute(
+            "SELECT system, map, generation, slot, result FROM slot "
+            "JOIN search ON search.id = slot.search WHERE state = 'flown' AND kind = ? "
+            "ORDER BY system, map, generation, slot",
+            (kind,),
+        )
+        return [(*row[:4], result_in(row[4])) for row in rows]
+
+    def violating(self) -> list[LedgerFlight]:
+        """Return the searches' violations in slot order."""
+        return self._rows("json_extract(result, '$.verdict.primary') IS NOT NULL")
+
+    def flown(self, search: str) -> list[LedgerFlight]:
+        """Return all flights of a search in slot order."""
+        return self._rows("search.id = ?", search)
+
+    def _rows(self, condition: str, *values: str) -> list[LedgerFlight]:
+        rows = self._database.execute(
+            "SELECT search, generation, slot, scenario, result, sha256 FROM slot "
+            "JOIN search ON search.id = slot.search WHERE kind = 'search' AND state = 'flown' "
+            f"AND {condition} ORDER BY system, map, generation, slot",
+            values,
+        )
+        return [
+            LedgerFlight(
+                search=row[0],
+                generation=row[1],
+                slot=row[2],
+                scenario=row[3],
+                result=result_in(row[4]),
+                sha256=row[5] or "",
+            )
+            for row in rows
+        ]
+
+    def flight(self, system: str, map: str, slot: Slot) -> tuple[dict[str, Any], str, str]:
+        """Return result, trajectory's hash and scenario of a search's flown slot."""
+        row = self._database.execute(
+            "SELECT result, coalesce(sha256, ''), scenario FROM slot "
+            "JOIN search ON search.id = slot.search WHERE kind = 'search' AND system = ? "
+            "AND map = ? AND generation = ? AND slot = ?",
+            (system, map, slot.generation, slot.index),
+        ).fetchone()
+        return json.loads(row[0]), str(row[1]), str(row[2])
+
+    def scenarios(self, generation: int, slot: int, map: str) -> dict[str, str]:
+        """Return the scenario of a slot for each system that has one."""
+        rows = self._database.execute(
+            "SELECT system, scenario FROM slot JOIN search ON search.id = slot.search "
+            "WHERE kind = 'search' AND map = ? AND generation = ? AND slot = ?",
+            (map, generation, slot),
+        )
+        return dict(rows.fetchall())
+
+    def nearest(self) -> dict[str, tuple[float, str]]:
+        """Return each property's smallest decided margin so far, with its unit."""
+        rows = self._database.execute(
+            "SELECT json_extract(m.value, '$.property') AS name, "
+            "min(json_extract(m.value, '$.value')), json_extract(m.value, '$.unit') "
+            "FROM slot JOIN search ON search.id = slot.search, "
+            "json_each(slot.result, '$.verdict.margins') AS m "
+            "WHERE kind = 'search' AND state = 'flown' AND json_extract(m.value, '$.decided') "
+            "GROUP BY name"
+        )
+        return {name: (value, unit) for name, value, unit in rows}
+
+    def violations(self) -> dict[str, int]:
+        """Return how often each type of violation was found."""
+        rows = self._database.execute(
+            "SELECT json_extract(result, '$.verdict.violation_type') AS type, count(*) FROM slot "
+            "JOIN search ON search.id = slot.search WHERE kind = 'search' "
+            "AND state = 'flown' AND type IS NOT NULL GROUP BY type ORDER BY type"
+        )
+        return dict(rows.fetchall())
+
+    def kinds(self) -> dict[tuple[str, str], float]:
+        """Return the mean wall time of a flight of each kind of violation: search, signature."""
+        rows = self._database.execute(
+            "SELECT search.id, json_extract(result, '$.verdict.signature') AS signature, "
+            "avg(coalesce(wall_s, 0)) FROM slot JOIN search ON search.id = slot.search "
+            "WHERE kind = 'search' AND state = 'flown' "
+            "AND json_extract(result, '$.verdict.primary') IS NOT NULL "
+            "GROUP BY search.id, signature"
+        )
+        return {(search, signature): float(wall_s) for search, signature, wall_s in rows}
+
+    def meters(self) -> dict[str, float]:
+        """Return what the run spent so far."""
+        return dict(
+            self._database.execute("SELECT name, value FROM meter ORDER BY name").fetchall()
+        )
+
+    def seconds_per_flight(self) -> float | None:
+        """Return the mean wall time of a flight on one process, if any was flown."""
+        row = self._database.execute(
+            "SELECT avg(wall_s) FROM slot WHERE state = 'flown'"
+        ).fetchone()
+        return None if row[0] is None else float(row[0])
+
+    def flying_s(self, search: str) -> float:
+        """Return the wall time of all flights of a search, each on one process."""
+        row = self._database.execute(
+            "SELECT coalesce(sum(wall_s), 0) FROM slot WHERE search = ?", (search,)
+        ).fetchone()
+        return float(row[0])
+
+    def result_hash(self, search: str = "") -> str:
+        """Return a hash of all results that two equal runs share, or of one search's."""
+        digest = hashlib.sha256()
+        rows = self._database.execute(
+            "SELECT system, map, generation, slot, scenario, result, objectives, sha256 FROM slot "
+            "JOIN search ON search.id = slot.search WHERE kind = 'search' AND ? IN ('', search.id) "
+            "ORDER BY system, map, generation, slot",
+            (search,),
+        )
+        for row in rows:
+            digest.update(_comparable(row).encode())
+        return digest.hexdigest()
+
+
+def _comparable(row: tuple[Any, ...]) -> str:
+    """Return a slot without what differs from run to run and means nothing.
+
+    These are addresses, and where a process was when it was ended.
+    """
+    *before, result, objectives, sha256 = row
+    if result is not None:
+        values = json.loads(result)
+        if values.get("crash"):
+            values["crash"].pop("traceback", None)
+        result = json.dumps(values, sort_keys=True)
+    return _ADDRESS.sub("0x", json.dumps([*before, result, objectives, sha256]))

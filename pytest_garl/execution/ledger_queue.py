@@ -1,0 +1,237 @@
+"""The queue of a ledger: hands out slots to the processes that fly, and takes their results."""
+
+from __future__ import annotations
+
+import json
+import os
+from dataclasses import dataclass
+from pathlib import Path
+from time import monotonic
+from typing import Any
+
+from pytest_garl.execution.database import Database
+from pytest_garl.execution.processes import alive
+
+_METERS = {"search": "flights", "case": "cases", "errand": "errands"}
+_NEXT, _NEXT_OF_SYSTEM = (
+    "SELECT search, generation, slot, scenario, after, attempts FROM slot "
+    f"WHERE state = 'waiting' {condition} ORDER BY after DESC, generation, slot, search"
+    for condition in ("", "AND search IN (SELECT id FROM search WHERE system = ?)")
+)
+LEASE_S = 30.0
+"""So long the claim of a dead process is left to those who watched it, and that of a living one to
+it where nobody watches: its id was given to another."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Claim:
+    """One slot that the process ``pid`` shall fly, or see to it that it is flown.
+
+    ``after`` is how earlier flights of it ended their processes, such as "hung" or "hung killed";
+    then it is flown once more, alone.  ``attempt`` counts from 1.
+    """
+
+    search: str
+    generation: int
+    slot: int
+    scenario: str
+    job: str
+    after: str
+    attempt: int
+    pid: int
+
+
+class WorkQueue:
+    """The slots that wait for a flight, and those that processes have claimed.
+
+    Slots are claimed for the process ``pid``: this one, or the one that watches it.
+    """
+
+    def __init__(self, database: Database, pid: int | None = None) -> None:
+        self.path = database.path
+        self._database = database
+        self._pid = os.getpid() if pid is None else pid
+
+    @classmethod
+    def open(cls, path: Path, pid: int | None = None) -> WorkQueue:
+        """Open the queue of a ledger by itself, as a flying process does."""
+        return cls(Database(path), pid)
+
+    def close(self) -> None:
+        """Close the file."""
+        self._database.close()
+
+    def claim(self, lease_s: float | None = LEASE_S, *, flown: str = "") -> Claim | None:
+        """Take the next unflown slot; one that ended its process is handed out while nobody flies.
+
+        ``flown`` names the landing system that this process has flown: it gets slots of that one
+        alone, and none that ended a process.  ``lease_s`` is how long the claim is kept as in
+        ``release_dead``; None: while the process lives.
+        """
+        with self._database.transaction():
+            flying, alone = self._database.execute(
+                "SELECT count(*), coalesce(sum(after != ''), 0) FROM slot WHERE state = 'claimed'"
+            ).fetchone()
+            if alone:
+                return None
+            row = self._database.execute(f"{_NEXT} LIMIT 1").fetchone()
+            if row and flown and not row[4]:
+                row = self._database.execute(f"{_NEXT_OF_SYSTEM} LIMIT 1", (flown,)).fetchone()
+            if row is None or (row[4] and (flying or flown)):
+                return None
+            self._database.execute(
+                "UPDATE slot SET state = 'claimed', pid = ?, lease = ?, attempts = attempts + 1 "
+                "WHERE search = ? AND generation = ? AND slot = ?",
+                (self._pid, None if lease_s is None else monotonic() + lease_s, *row[:3]),
+            )
+            job = self._database.execute("SELECT job FROM search WHERE id = ?", row[:1]).fetchone()[
+                0
+            ]
+        return Claim(
+            search=row[0],
+            generation=row[1],
+            slot=row[2],
+            scenario=row[3],
+            job=job,
+            after=row[4],
+            attempt=row[5] + 1,
+            pid=self._pid,
+        )
+
+    def others_wait(self, flown: str) -> bool:
+        """Return whether slots wait, but none of the system that a process has flown."""
+        own, others = self._database.execute(
+            "SELECT coalesce(sum(system = ?), 0), coalesce(sum(system != ?), 0) "
+            "FROM slot JOIN search ON search.id = slot.search WHERE state = 'waiting'",
+            (flown, flown),
+        ).fetchone()
+        return bool(others) and not own
+
+    def alone_waits(self) -> bool:
+        """Return whether nobody flies and a slot waits for a fresh process to fly it alone."""
+        flying, waiting = self._database.execute(
+            "SELECT coalesce(sum(state = 'claimed'), 0), coalesce(sum(after != ''), 0) FROM slot "
+            "WHERE state IN ('claimed', 'waiting')"
+        ).fetchone()
+        return not flying and bool(waiting)
+
+    def waiting(self) -> int:
+        """Return how many slots could be handed out."""
+        row = self._database.execute("SELECT count(*) FROM slot WHERE state = 'waiting'").fetchone()
+        return int(row[0])
+
+    def record(self, claim: Claim, result: dict[str, Any], sha256: str, wall_s: float) -> None:
+        """Write down what a flight came to; a slot that has a result keeps it."""
+        text = json.dumps(result, sort_keys=True, allow_nan=False)
+        with self._database.transaction():
+            done = self._database.execute(
+                "UPDATE slot SET state = 'flown', pid = NULL, lease = NULL, "
+                "result = ?, sha256 = ?, wall_s = ? "
+                "WHERE search = ? AND generation = ? AND slot = ? AND state = 'claimed'",
+                (text, sha256, wall_s, claim.search, claim.generation, claim.slot),
+            )
+            if done.rowcount:
+                kind = self._database.execute(
+                    "SELECT kind FROM search WHERE id = ?", (claim.search,)
+                ).fetchone()[0]
+                self.count(_METERS[kind])
+                self.count("flying_s", wall_s)
+
+    def claim_of(self, pid: int) -> Claim | None:
+        """Return the slot that a process has in flight; it may be gone by then."""
+        row = self._database.execute(
+            "SELECT s.search, generation, slot, scenario, job, after, attempts FROM slot s "
+            "JOIN search ON search.id = s.search WHERE pid = ? AND state = 'claimed'",
+            (pid,),
+        ).fetchone()
+        if row is None:
+            return None
+        return Claim(
+            search=row[0],
+            generation=row[1],
+            slot=row[2],
+            scenario=row[3],
+            job=row[4],
+            after=row[5],
+            attempt=row[6],
+            pid=pid,
+        )
+
+    def release(self, pid: int) -> None:
+        """Give back all that a process has in flight, as if it had not been claimed."""
+        self._database.execute(
+            "UPDATE slot SET state = 'waiting', pid = NULL, lease = NULL, "
+            "attempts = attempts - 1 WHERE pid = ? AND state = 'claimed'",
+            (pid,),
+        )
+
+    def give_back(self, claim: Claim) -> None:
+        """Give back one slot, as if it had not been claimed."""
+        self._hand_out(claim, claim.attempt - 1, claim.after)
+
+    def fly_alone(self, claim: Claim, after: str) -> None:
+        """Hand out a slot once more, when nobody else flies; say how its flights ended."""
+        self._hand_out(claim, claim.attempt, after)
+
+    def _hand_out(self, claim: Claim, attempts: int, after: str) -> None:
+        self._database.execute(
+            "UPDATE slot SET state = 'waiting', pid = NULL, lease = NULL, attempts = ?, after = ? "
+            "WHERE search = ? AND generation = ? AND slot = ? AND state = 'claimed' AND pid = ?",
+            (attempts, after, claim.search, claim.generation, claim.slot, claim.pid),
+        )
+
+    def reset(self) -> None:
+        """Give back all slots that are claimed; nobody may be flying."""
+        self._database.execute("DELETE FROM seat")
+        self._database.execute(
+            "UPDATE slot SET state = 'waiting', pid = NULL, lease = NULL, "
+            "attempts = max(0, attempts - 1) WHERE state = 'claimed'"
+        )
+
+    def release_dead(self) -> None:
+        """Give back the slots of processes that are gone with those who watched them.
+
+        A dead child whose pool lives is left to it for a while: it knows what the death means.
+        A living one is never silent: its supervisor ends it where it hangs.
+        """
+        rows = self._database.execute(
+            "SELECT slot.pid, lease, owner FROM slot LEFT JOIN seat ON seat.pid = slot.pid "
+            "WHERE state = 'claimed'"
+        ).fetchall()
+        for pid, lease, owner in rows:
+            lapsed = lease is not None and lease < monotonic()
+            flies, watched = alive(pid), owner is not None and alive(owner)
+            if not (flies or watched) or (lapsed and not (flies and watched)):
+                self.release(pid)
+
+    def take_seat(self, limit: int, spawn: Any) -> bool:
+        """Start a child by ``spawn() -> pid`` unless ``limit`` of them live already."""
+        with self._database.transaction():
+            for pid, owner in self._database.execute("SELECT pid, owner FROM seat").fetchall():
+                if not alive(pid) and not alive(owner):
+                    self._database.execute("DELETE FROM seat WHERE pid = ?", (pid,))
+            taken = self._database.execute("SELECT count(*) FROM seat").fetchone()[0]
+            if taken >= limit:
+                return False
+            self._database.execute("INSERT INTO seat VALUES (?, ?)", (spawn(), os.getpid()))
+        return True
+
+    def leave_seat(self, pid: int) -> None:
+        """Free a dead child's seat."""
+        self._database.execute("DELETE FROM seat WHERE pid = ?", (pid,))
+
+    def count(self, meter: str, amount: float = 1.0) -> None:
+        """Add to a meter: what the run spent, beside its results."""
+        self._database.execute(
+            "INSERT INTO meter VALUES (?, ?) "
+            "ON CONFLICT (name) DO UPDATE SET value = value + excluded.value",
+            (meter, amount),
+        )
+
+    def flights(self) -> float:
+        """Return how many flights came to their end, whatever they were for."""
+        row = self._database.execute(
+            "SELECT coalesce(sum(value), 0) FROM meter WHERE name IN (?, ?, ?)",
+            tuple(_METERS.values()),
+        ).fetchone()
+        return float(row[0])

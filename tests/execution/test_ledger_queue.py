@@ -1,0 +1,131 @@
+from __future__ import annotations
+
+import os
+import subprocess
+from pathlib import Path
+
+import pytest
+
+from pytest_garl.execution.ledger import Ledger
+from pytest_garl.execution.ledger_queue import WorkQueue
+from tests.execution.ledgers import FACTS, waiting_ledger
+
+
+def test_a_slot_is_handed_out_once_and_recorded_once(tmp_path: Path) -> None:
+    ledger = waiting_ledger(tmp_path / "ledger.sqlite")
+    claims = [ledger.queue.claim() for _ in range(4)]
+    assert [claim.slot if claim else None for claim in claims] == [0, 1, 2, None]
+    assert claims[0] is not None
+    ledger.queue.record(claims[0], {"n": 1}, "hash", 0.1)
+    ledger.queue.record(claims[0], {"n": 2}, "other", 0.1)
+    assert ledger.result("s", 0, 0) == {"n": 1}
+    assert ledger.queries.meters()["flights"] == 1
+
+
+def test_a_claim_of_a_silent_process_lapses(tmp_path: Path) -> None:
+    ledger = waiting_ledger(tmp_path / "ledger.sqlite")
+    first = ledger.queue.claim(lease_s=-1.0)
+    assert first is not None
+    ledger.queue.release_dead()
+    again = ledger.queue.claim()
+    assert again is not None
+    assert again.slot == first.slot
+    ledger.queue.release_dead()
+    other = ledger.queue.claim(lease_s=None)
+    assert other is not None
+    assert other.slot == 1
+
+
+def test_a_claim_of_a_child_that_lives_never_lapses(tmp_path: Path) -> None:
+    """Its pool watches it: it may be silent for as long as it flies."""
+    ledger = waiting_ledger(tmp_path / "ledger.sqlite")
+    assert ledger.queue.take_seat(1, os.getpid)
+    assert ledger.queue.claim(lease_s=-1.0)
+    ledger.queue.release_dead()
+    assert ledger.queue.claim_of(os.getpid())
+
+
+@pytest.mark.parametrize(("lease_s", "kept"), [(3600.0, True), (-1.0, False)])
+def test_a_dead_child_is_left_to_its_pool_for_as_long_as_the_lease(
+    tmp_path: Path, lease_s: float, kept: bool
+) -> None:
+    path = tmp_path / "ledger.sqlite"
+    ledger = waiting_ledger(path)
+    with subprocess.Popen(["true"]) as child:
+        child.wait()
+    assert ledger.queue.take_seat(1, lambda: child.pid)
+    assert WorkQueue.open(path, child.pid).claim(lease_s=lease_s)
+    ledger.queue.release_dead()
+    assert (ledger.queue.claim_of(child.pid) is not None) == kept
+
+
+def test_a_dead_child_whose_pool_is_gone_is_given_back_at_once(tmp_path: Path) -> None:
+    path = tmp_path / "ledger.sqlite"
+    ledger = waiting_ledger(path)
+    with subprocess.Popen(["true"]) as child:
+        child.wait()
+    assert WorkQueue.open(path, child.pid).claim()
+    ledger.queue.release_dead()
+    assert ledger.queue.claim_of(child.pid) is None
+
+
+def test_nobody_flies_beside_a_slot_that_flies_again(tmp_path: Path) -> None:
+    ledger = waiting_ledger(tmp_path / "ledger.sqlite")
+    first = ledger.queue.claim()
+    assert first is not None
+    ledger.queue.fly_alone(first, "died")
+    again = ledger.queue.claim()
+    assert again is not None
+    assert (again.slot, again.after, again.attempt) == (first.slot, "died", 2)
+    assert ledger.queue.waiting() == 2
+    assert ledger.queue.claim() is None
+    ledger.queue.record(again, {"n": 1}, "", 0.0)
+    beside = ledger.queue.claim()
+    assert beside is not None
+    assert beside.slot == 1
+
+
+def test_a_slot_flies_again_when_the_others_have_come_down(tmp_path: Path) -> None:
+    ledger = waiting_ledger(tmp_path / "ledger.sqlite")
+    first, other = ledger.queue.claim(), ledger.queue.claim()
+    assert first is not None
+    assert other is not None
+    ledger.queue.fly_alone(first, "hung")
+    assert ledger.queue.claim() is None
+    ledger.queue.record(other, {"n": 1}, "", 0.0)
+    again = ledger.queue.claim()
+    assert again is not None
+    assert again.slot == first.slot
+
+
+def test_a_run_that_is_resumed_twice_counts_no_attempt_of_what_was_in_flight(
+    tmp_path: Path,
+) -> None:
+    ledger = waiting_ledger(tmp_path / "ledger.sqlite")
+    for _ in range(2):
+        claim = ledger.queue.claim()
+        assert claim is not None
+        assert (claim.slot, claim.attempt) == (0, 1)
+        ledger.close()
+        ledger = Ledger.resume(tmp_path / "ledger.sqlite", FACTS)
+    again = ledger.queue.claim()
+    assert again is not None
+    assert again.attempt == 1
+    beside = ledger.queue.claim()
+    assert beside is not None
+    assert beside.slot == 1
+
+
+def test_process_that_has_flown_gets_slots_of_its_own_system_alone(tmp_path: Path) -> None:
+    ledger = waiting_ledger(tmp_path / "ledger.sqlite")
+    ledger.add_search("t", "systems:Other", "court", 2, "{}")
+    ledger.add_slots("t", 0, {0: "d", 1: "e"})
+    first = ledger.queue.claim(flown="systems:Other")
+    again = ledger.queue.claim(flown="systems:Other")
+    assert first is not None
+    assert again is not None
+    assert [(first.search, first.slot), (again.search, again.slot)] == [("t", 0), ("t", 1)]
+    assert ledger.queue.claim(flown="systems:Other") is None
+    assert ledger.queue.others_wait("systems:Other")
+    assert not ledger.queue.others_wait("systems:Good")
+    assert ledger.queue.claim(flown="systems:Good") is not None
