@@ -29,7 +29,7 @@ _HOMES = {
         "VehicleState",
         "VelocitySetpoint",
     ),
-    "pytest_garl.plugin.fixtures": ("Landing",),
+    "pytest_garl.plugin.landing": ("Landing",),
     "pytest_garl.simulation.flight": ("Flight",),
     "pytest_garl.simulation.npc_policy": ("Move", "PolicySpec", "Situation"),
     "pytest_garl.verdicts.verdict": ("Limits",),

@@ -15,7 +15,7 @@ from pytest_garl.landing_system import (
     VehicleState,
     VelocitySetpoint,
 )
-from pytest_garl.plugin.fixtures import Landing
+from pytest_garl.plugin.landing import Landing
 from pytest_garl.simulation.flight import Flight
 from pytest_garl.simulation.npc_policy import Move, PolicySpec, Situation
 from pytest_garl.verdicts.verdict import Limits

@@ -15,11 +15,12 @@ from pytest_garl.baselines.file import Baseline, SampleSet, load
 from pytest_garl.baselines.pairs import Fate
 from pytest_garl.baselines.record import compare_flights, moved_on, unlike
 from pytest_garl.errors import GarlError
-from pytest_garl.plugin.arguments import RUN
-from pytest_garl.plugin.collection import FIRST, Target, name_of, read_marker
-from pytest_garl.plugin.fixtures import stop
+from pytest_garl.plugin.fixtures import abort_session
+from pytest_garl.plugin.keys import RUN, is_xdist_worker
+from pytest_garl.plugin.marker import read_marker
 from pytest_garl.plugin.options import Options
 from pytest_garl.plugin.run import Run
+from pytest_garl.plugin.target import FIRST, Target, name_of
 
 GATE_REPORT = "garl.gate"
 """The user property under which a gate's sentences reach the summary, also from xdist's workers."""
@@ -68,7 +69,7 @@ class BaselineGateItem(pytest.Item):
                 known=run.expected_signatures(self._target),
             )
         except GarlError as error:
-            stop(self, error)
+            abort_session(self, error)
         caution = [f"note: {base.caution}"] if base.caution else []
         self._tell([*found.sentences(), *self._hint(found, run.options.baseline), *caution])
         if not found.passed:
@@ -135,7 +136,7 @@ class BaselineGatePlugin:
 
     def pytest_collection_finish(self, session: pytest.Session) -> None:
         """Refuse to begin where the command line asks for a gate and no selected test has one."""
-        worker = hasattr(session.config, "workerinput")
+        worker = is_xdist_worker(session.config)
         if not worker and not any(isinstance(item, BaselineGateItem) for item in session.items):
             problem = self._nothing(session.config)
             if problem:

@@ -6,11 +6,11 @@ from typing import Any
 
 import pytest
 
-from pytest_garl.plugin.collection import Target
 from pytest_garl.plugin.faults import Fault
 from pytest_garl.plugin.report_edits import expect, paragraphs, tell
 from pytest_garl.plugin.run import Run
 from pytest_garl.plugin.suggested_commands import shown
+from pytest_garl.plugin.target import Target
 from pytest_garl.regressions.case import Case
 from pytest_garl.verdicts.wording import headline
 

@@ -11,7 +11,7 @@ import pytest
 from pytest_garl.errors import GarlError
 from pytest_garl.execution.reference import BUILT_IN, Reference, reference_to
 from pytest_garl.execution.sources import data_files
-from pytest_garl.plugin.arguments import target_of
+from pytest_garl.plugin.keys import target_of
 from pytest_garl.plugin.user_assertions import ItemAssertion
 from pytest_garl.regressions.case import Case
 from pytest_garl.regressions.judging import alone_in_a_folder, arguments

@@ -8,10 +8,10 @@ from typing import Any
 import pytest
 
 from pytest_garl.execution.on_demand import Done
-from pytest_garl.plugin.arguments import LANDING
-from pytest_garl.plugin.collection import Target
 from pytest_garl.plugin.failed_statement import failure_of
+from pytest_garl.plugin.keys import LANDING
 from pytest_garl.plugin.run import Run, test_of
+from pytest_garl.plugin.target import Target
 from pytest_garl.plugin.user_assertions import ItemAssertion
 from pytest_garl.regressions.user_failure import UserFailure
 from pytest_garl.verdicts.statistics import share_interval

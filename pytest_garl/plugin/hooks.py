@@ -10,21 +10,20 @@ import pytest
 
 from pytest_garl.errors import GarlError
 from pytest_garl.plugin import hookspecs
-from pytest_garl.plugin.arguments import (
+from pytest_garl.plugin.arguments import add_options, computes, is_enabled
+from pytest_garl.plugin.fixtures import end_unjudged, garl_slot, landing, npcs, scenario
+from pytest_garl.plugin.keys import (
     BEGUN,
     FATAL,
     FOUND,
     OWN,
     RUN,
     TALLY,
-    add_options,
-    asked,
-    computes,
-    flies,
+    is_landing_item,
+    is_xdist_worker,
     name_slots,
     target_of,
 )
-from pytest_garl.plugin.fixtures import end_unjudged, garl_slot, landing, npcs, scenario
 from pytest_garl.plugin.tally import Tally
 
 __all__ = ["garl_slot", "landing", "npcs", "scenario"]
@@ -59,10 +58,10 @@ def pytest_configure(config: pytest.Config) -> None:
         "time_s=120, abort='ok'); whether it does the same in the same flight (default: True); "
         "data files that it reads, so that --garl-resume knows when they change.",
     )
-    if not hasattr(config, "workerinput"):
+    if not is_xdist_worker(config):
         config.stash[TALLY] = Tally()
         config.pluginmanager.register(config.stash[TALLY], "garl_tally")
-    if not asked(config):
+    if not is_enabled(config):
         return
     from pytest_garl.plugin.option_checks import check_usage
     from pytest_garl.plugin.options import read_options
@@ -120,11 +119,11 @@ def pytest_collection_finish(session: pytest.Session) -> None:
     if config.option.collectonly:
         return
     name_slots(session.items)
-    if asked(config) and not hasattr(config, "workerinput"):
+    if is_enabled(config) and not is_xdist_worker(config):
         from pytest_garl.plugin.option_checks import check_selection
 
         check_selection(config, session.items)
-    if RUN not in config.stash and any(flies(item) for item in session.items):
+    if RUN not in config.stash and any(is_landing_item(item) for item in session.items):
         _begin(config)
     run = config.stash.get(RUN, None)
     if run is not None:

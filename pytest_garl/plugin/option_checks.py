@@ -9,7 +9,8 @@ import pytest
 from pytest_garl.errors import GarlError
 from pytest_garl.execution.ledger import Ledger
 from pytest_garl.execution.slot import Slot
-from pytest_garl.plugin.arguments import OPTIONS, flies
+from pytest_garl.plugin.arguments import OPTIONS
+from pytest_garl.plugin.keys import is_landing_item
 from pytest_garl.plugin.options import SLOT_ID, Options
 
 OF_A_SEARCH = ("seed", "method", "population", "weather", "duplicates", "shrink", "resume")
@@ -30,7 +31,7 @@ def check_usage(config: pytest.Config, options: Options) -> None:
 def check_selection(config: pytest.Config, items: Iterable[pytest.Item]) -> None:
     """Raise UsageError where maps or a slot are asked for that no selected test flies."""
     landings = [item for item in items if "garl_slot" in getattr(item, "fixturenames", ())]
-    if not landings or any(flies(item) for item in items):
+    if not landings or any(is_landing_item(item) for item in items):
         return
     repeat, maps = config.getoption("--garl-repeat"), config.getoption("--garl-map")
     if repeat:

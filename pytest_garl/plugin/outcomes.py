@@ -7,13 +7,13 @@ from typing import Any
 
 import pytest
 
-from pytest_garl.plugin.arguments import EXCUSED, FAILURE, FOUND, OWN, UNREPEATED
 from pytest_garl.plugin.case_outcomes import explain_failing, explain_passing
-from pytest_garl.plugin.collection import FIRST, Target, name_of
 from pytest_garl.plugin.faults import Fault, Repeats, fault_of, repeats, told_by, write_down
+from pytest_garl.plugin.keys import EXCUSED, FAILURE, FOUND, OWN, UNREPEATED, is_xdist_worker
 from pytest_garl.plugin.report_edits import expect, paragraphs, tell
 from pytest_garl.plugin.run import Run, reflight_key
 from pytest_garl.plugin.suggested_commands import repeat_line
+from pytest_garl.plugin.target import FIRST, Target, name_of
 from pytest_garl.verdicts.wording import headline
 
 OWN_FAILURE = "garl.own_failure"
@@ -103,7 +103,7 @@ def _note_test(
     """Remember which test found a violation: it judges the case that is saved."""
     if fault.own and not fault.user_assertion.runs_on_any_flight:
         return
-    worker = hasattr(item.config, "workerinput")
+    worker = is_xdist_worker(item.config)
     if fault.own:
         run.user_assertions[target.search, fault.signature] = fault.user_assertion
         if worker:

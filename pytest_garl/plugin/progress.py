@@ -20,6 +20,7 @@ import pytest
 from pytest_garl.errors import LedgerError
 from pytest_garl.execution.ledger import Ledger
 from pytest_garl.execution.ledger_queries import SearchProgress
+from pytest_garl.plugin.keys import is_xdist_worker
 from pytest_garl.plugin.run import SELECTED, Run
 from pytest_garl.plugin.wrapping import begin_line, width_of
 from pytest_garl.regressions.forecast import RemainingWork, flights_after_search
@@ -37,7 +38,7 @@ def live(run: Run, config: pytest.Config) -> Iterator[None]:
     when nobody else writes.  xdist's controller runs no item; there a thread draws, and steps aside
     when pytest writes.  Elsewhere a line is written now and then.
     """
-    if hasattr(config, "workerinput"):
+    if is_xdist_worker(config):
         yield
     elif not _is_terminal():
         with _ticking(run, Beat(run, config).refresh, lambda: None), _reporting(run, config):

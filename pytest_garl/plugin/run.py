@@ -20,9 +20,11 @@ from pytest_garl.execution.pool import Pool, wait_for
 from pytest_garl.execution.reference import BUILT_IN, Reference, reference_to, simulator_sha256
 from pytest_garl.execution.slot import Slot, flight_name
 from pytest_garl.execution.sources import combined_sha256, data_files, sources_of
-from pytest_garl.plugin.arguments import POLICIES, target_of
-from pytest_garl.plugin.collection import FIRST, Target, name_of, repeated
+from pytest_garl.plugin.arguments import POLICIES
+from pytest_garl.plugin.collection import repeated
+from pytest_garl.plugin.keys import is_xdist_worker, target_of
 from pytest_garl.plugin.options import Options
+from pytest_garl.plugin.target import FIRST, Target, name_of
 
 if TYPE_CHECKING:
     from pytest_garl.execution.job import Job
@@ -243,7 +245,7 @@ class Run:
 
     def may_save(self, session: pytest.Session) -> bool:
         """Whether this process has seen a search to its end and may save what it found."""
-        options, worker = self.options, hasattr(session.config, "workerinput")
+        options, worker = self.options, is_xdist_worker(session.config)
         ended = session.exitstatus in (pytest.ExitCode.OK, pytest.ExitCode.TESTS_FAILED)
         stopped = bool(session.shouldfail or session.shouldstop)
         if not (ended and self.loop_finished) or stopped or worker:

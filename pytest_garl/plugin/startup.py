@@ -20,6 +20,7 @@ from pytest_garl.execution.processes import alive
 from pytest_garl.execution.ray.pool import check_ray, ray_pool
 from pytest_garl.execution.reference import BUILT_IN, package_sha256, reference_to
 from pytest_garl.execution.stored_ledger import check_stored
+from pytest_garl.plugin.keys import is_xdist_worker
 from pytest_garl.plugin.options import Options
 from pytest_garl.plugin.run import Run
 from pytest_garl.reports.run_report import BEGAN, utc
@@ -34,7 +35,7 @@ def begin_run(config: pytest.Config, options: Options) -> Run:
     lock = None
     if not options.searches:
         ledger = _shared(options)
-    elif hasattr(config, "workerinput"):
+    elif is_xdist_worker(config):
         ledger = Ledger(options.ledger)
     else:
         lock = _lock(options.ledger)

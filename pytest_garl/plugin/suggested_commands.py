@@ -11,7 +11,7 @@ import pytest
 from pytest_garl.messages import printable
 
 if TYPE_CHECKING:
-    from pytest_garl.plugin.collection import Target
+    from pytest_garl.plugin.target import Target
 
 _FOLDERS = ("garl_dir", "garl_cases")
 

@@ -7,7 +7,7 @@ from collections import Counter
 
 import pytest
 
-from pytest_garl.plugin.arguments import EXCUSED, FAILURE, NOTHING, SLOT, UNREPEATED
+from pytest_garl.plugin.keys import EXCUSED, FAILURE, NOTHING, SLOT, UNREPEATED
 
 FLOWN = "garl.outcome"
 SIGNATURE = "garl.signature"

@@ -11,10 +11,10 @@ from typing import Any
 import pytest
 
 from pytest_garl.errors import GarlError
-from pytest_garl.plugin.arguments import target_of
-from pytest_garl.plugin.collection import Target
 from pytest_garl.plugin.failed_statement import FAILS, failure_of
-from pytest_garl.plugin.fixtures import Landing
+from pytest_garl.plugin.keys import target_of
+from pytest_garl.plugin.landing import Landing
+from pytest_garl.plugin.target import Target
 from pytest_garl.regressions.user_failure import UserFailure
 from pytest_garl.scenarios.scenario import Scenario
 

@@ -11,7 +11,7 @@ from typing import Any
 import pytest
 
 from pytest_garl.plugin.failed_statement import failure_of
-from pytest_garl.plugin.fixtures import Landing
+from pytest_garl.plugin.landing import Landing
 from pytest_garl.regressions.user_failure import UserFailure
 
 RESULT = {

@@ -200,7 +200,7 @@ def test_a_folder_of_cases_that_cannot_be_written_is_told_in_the_summary(
 
 def test_landing_is_exported_for_annotations() -> None:
     import pytest_garl
-    from pytest_garl.plugin.fixtures import Landing
+    from pytest_garl.plugin.landing import Landing
 
     assert pytest_garl.Landing is Landing
     assert "Landing" in pytest_garl.__all__

@@ -1,0 +1,165 @@
+"""One flown landing, as a test sees it: the fixture ``landing``."""
+
+from __future__ import annotations
+
+import functools
+import math
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from types import FrameType
+from typing import TYPE_CHECKING, Any, NoReturn
+
+import pytest
+
+from pytest_garl.plugin.failed_statement import AttributeRead, code_of
+
+if TYPE_CHECKING:
+    from pytest_garl.plugin.target import Target
+    from pytest_garl.simulation.flight import Flight
+    from pytest_garl.verdicts.verdict import Limits, Verdict
+
+
+class Landing:
+    """One flown landing, as a test sees it.
+
+    Reading a property that the flight did not decide skips the test with the reason;
+    ``final_distance_m`` and ``elapsed_s`` can always be read.  ``reads`` is what ``test`` has read
+    so far, so that a failure can be told from another property's.
+    """
+
+    def __init__(
+        self,
+        target: Target,
+        result: dict[str, Any],
+        record: Path,
+        test: Callable[..., Any] | None = None,
+    ) -> None:
+        self._target, self._result, self._record = target, result, record
+        self._code = code_of(test) if test else None
+        self.slot: str = target.name
+        self.reads: list[AttributeRead] = []
+
+    @property
+    def result(self) -> dict[str, Any]:
+        """The flight's result as it stands in the ledger."""
+        self._note("result")
+        return self._result
+
+    @property
+    def outcome(self) -> str:
+        """How the flight ended: landed, collision, not_landed, aborted."""
+        self._note("outcome")
+        return str(self._result["outcome"])
+
+    @property
+    def final_distance_m(self) -> float:
+        """Horizontal distance from the marker's centre where the flight ended, however it did."""
+        self._note("final_distance_m")
+        return float(self._result["final_distance_m"])
+
+    @property
+    def elapsed_s(self) -> float:
+        """Time from the mission's start to the flight's end, however it ended."""
+        self._note("elapsed_s")
+        return float(self._result["elapsed_s"])
+
+    def __repr__(self) -> str:
+        from pytest_garl.verdicts.wording import headline
+
+        return f"<Landing {self.slot}: {headline(self._verdict.story)}>"
+
+    @property
+    def limits(self) -> Limits:
+        """The limits of the marker."""
+        return self._target.limits
+
+    @property
+    def distance_to_landing_m(self) -> float:
+        """Horizontal distance from the UAV to the marker's centre where it landed.
+
+        Where it touched the ground too far off before it gave up, that place counts.
+        """
+        self._note("distance_to_landing_m")
+        if self.outcome == "landed":
+            return self.final_distance_m
+        touched: float | None = self._result.get("off_marker_m")
+        if touched is None:
+            self._undecided()
+        return touched
+
+    @property
+    def time_to_landing_s(self) -> float:
+        """Time from the mission's start to the landing; infinite if it never landed."""
+        self._note("time_to_landing_s")
+        if self.outcome == "not_landed":
+            return math.inf
+        if self.outcome != "landed":
+            self._undecided()
+        if self.verdict.primary == "distance":
+            # One event, one failing test: what landed elsewhere is not late as well.
+            return min(self.elapsed_s, self.limits.time_s)
+        return self.elapsed_s
+
+    @property
+    def collisions(self) -> tuple[str, ...]:
+        """Names of the bodies that the UAV hit; "ground" for a hard touchdown."""
+        self._note("collisions")
+        return tuple(self._result["collisions"])
+
+    @property
+    def verdict(self) -> Verdict:
+        """The built-in judgement."""
+        self._note("verdict")
+        return self._verdict
+
+    @functools.cached_property
+    def _verdict(self) -> Verdict:
+        from pytest_garl.verdicts.verdict import Verdict
+
+        return Verdict.from_json(self._result["verdict"])
+
+    @property
+    def inconclusive(self) -> bool:
+        """Whether the flight came to no end, and so decides nothing."""
+        return bool(self._result["outcome"] == "inconclusive")
+
+    @property
+    def unjudged(self) -> str:
+        """Why no assertion can judge the flight, or nothing where one can."""
+        if self.inconclusive:
+            return f"inconclusive: {self._result['undecided']}"
+        if self._verdict.primary == "crash":
+            return f"not decided: {self._verdict.story}"
+        return "not decided: the landing was aborted" if self._verdict.primary == "abort" else ""
+
+    @property
+    def complaint(self) -> str:
+        """The landing system's own traceback below the story of a flight without judge."""
+        if self.inconclusive:
+            return (
+                f"{self.unjudged}. Nothing was decided: fly it again while the machine has nothing "
+                "else to do, or allow more time with --garl-timeout."
+            )
+        crash: dict[str, Any] | None = self._result["crash"]
+        story = self._verdict.story
+        return f"{story}\n\n{crash['traceback']}" if crash and crash["traceback"] else story
+
+    @functools.cached_property
+    def flight(self) -> Flight:
+        """The flight's whole record, loaded from its file."""
+        from pytest_garl.simulation.flight_file import load
+
+        return load(self._record)
+
+    def _undecided(self) -> NoReturn:
+        pytest.skip(f"not decided: {self._result['undecided']}")
+
+    def _note(self, name: str) -> None:
+        """Remember what the test reads, and in which line of its own body."""
+        frame: FrameType | None = sys._getframe(2)
+        if frame is None or frame.f_code.co_filename == __file__:
+            return
+        while frame is not None and frame.f_code is not self._code:
+            frame = frame.f_back
+        self.reads.append(AttributeRead(name=name, line=frame.f_lineno if frame else 0))

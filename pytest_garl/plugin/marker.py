@@ -1,0 +1,111 @@
+"""What a test's marker ``garl`` says."""
+
+from __future__ import annotations
+
+import dataclasses
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import pytest
+
+from pytest_garl.errors import GarlError
+from pytest_garl.execution.reference import check_system
+from pytest_garl.execution.slot import Slot
+from pytest_garl.execution.sources import data_files
+from pytest_garl.plugin.options import Options
+from pytest_garl.plugin.target import Target
+
+if TYPE_CHECKING:
+    from pytest_garl.verdicts.verdict import Limits
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class MarkerArguments:
+    """What a marker says."""
+
+    system: type
+    maps: tuple[str, ...]
+    limits: Limits
+    deterministic: bool
+    files: tuple[str, ...]
+
+    def target(self, map: str, slot: Slot) -> Target:
+        """Return what an item tests that flies a slot on a map."""
+        return Target(
+            system=self.system,
+            map=map,
+            limits=self.limits,
+            slot=slot,
+            deterministic=self.deterministic,
+            files=self.files,
+        )
+
+
+def read_marker(marker: pytest.Mark, options: Options) -> MarkerArguments:
+    """Return what a marker says; raise GarlError for one that makes no sense."""
+    from pytest_garl.scenarios.maps.map import load_map, map_names
+    from pytest_garl.verdicts.verdict import Limits
+
+    known = {"system", "maps", "limits", "deterministic", "files"}
+    unknown = sorted(set(marker.kwargs) - known)
+    if unknown or marker.args:
+        raise GarlError(
+            f"mark.garl: found {', '.join(unknown) or 'positional arguments'}, expected keywords "
+            "system=, maps=, limits=, deterministic= and files="
+        )
+    if "system" not in marker.kwargs:
+        raise GarlError("mark.garl: system= is missing; give the landing system's class")
+    system = marker.kwargs["system"]
+    check_system(system)
+    maps = marker.kwargs.get("maps", ("court", "lawn"))
+    maps = (maps,) if isinstance(maps, str) else tuple(maps)
+    if not maps:
+        there = ", ".join(map_names(options.map_folders))
+        raise GarlError(f"mark.garl: maps=[]: nothing to fly on; expected one or more of {there}")
+    for map in maps:
+        load_map(map, options.map_folders)
+    limits = marker.kwargs.get("limits", Limits())
+    if isinstance(limits, dict):
+        limits = _limits(limits)
+    if not isinstance(limits, Limits):
+        raise GarlError(f"mark.garl: limits={limits!r}: expected pytest_garl.limits(...)")
+    deterministic = marker.kwargs.get("deterministic", True)
+    if not isinstance(deterministic, bool):
+        raise GarlError(f"mark.garl: deterministic={deterministic!r}: expected True or False")
+    return MarkerArguments(
+        system=system,
+        maps=tuple(m for m in maps if not options.maps or m in options.maps),
+        limits=limits,
+        deterministic=deterministic,
+        files=_files(marker.kwargs.get("files", ()), options),
+    )
+
+
+def _limits(given: dict[Any, Any]) -> Limits:
+    from pytest_garl.verdicts.verdict import Limits
+
+    known = [field.name for field in dataclasses.fields(Limits)]
+    unknown = [str(key) for key in given if key not in known]
+    if unknown:
+        raise GarlError(
+            f"mark.garl: limits={given!r}: found {', '.join(unknown)}, expected "
+            f"{', '.join(known[:-1])} or {known[-1]}, such as limits(distance_m=1.0)"
+        )
+    return Limits(**given)
+
+
+def _files(given: Any, options: Options) -> tuple[str, ...]:
+    """Return the marker's data files; raise GarlError for what is none."""
+    named = isinstance(given, list | tuple) and all(isinstance(each, str | Path) for each in given)
+    if not named:
+        raise GarlError(f"mark.garl: files={given!r}: expected a list of paths, as ['model.onnx']")
+    files = tuple(str(each) for each in given)
+    try:
+        data_files(files, options.root)
+    except FileNotFoundError as error:
+        raise GarlError(
+            f"mark.garl: files: there is no {str(error)!r} below {options.root}; expected a file "
+            "or a folder"
+        ) from error
+    return files

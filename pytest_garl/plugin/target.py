@@ -1,0 +1,72 @@
+"""What one item tests: a system on a map, with a slot of a search, a saved case or a file."""
+
+from __future__ import annotations
+
+import dataclasses
+import functools
+import hashlib
+import json
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from pytest_garl.execution.reference import reference_to
+from pytest_garl.execution.slot import Slot
+
+if TYPE_CHECKING:
+    from pytest_garl.regressions.corpus import CorpusEntry
+    from pytest_garl.verdicts.verdict import Limits
+
+FIRST = Slot(generation=0, index=0)
+"""The one slot of what is no search."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Target:
+    """What an item tests: which system on which map, and what it flies."""
+
+    system: type
+    map: str
+    limits: Limits
+    slot: Slot
+    deterministic: bool = True
+    """Whether the system does the same in the same flight, as its marker says."""
+    files: tuple[str, ...] = ()
+    """Data files of the system, below the project's root."""
+    file: str = ""
+    """A scenario file to repeat; empty for a slot of a search."""
+    entry: CorpusEntry | None = None
+    """A saved case."""
+    live: bool = False
+    """Whether the case's objects are steered as in a search, and do not repeat their moves."""
+
+    @property
+    def name(self) -> str:
+        """The slot's id in the item's name."""
+        if self.entry is not None:
+            return f"case-{self.entry.name}{'-live' if self.live else ''}"
+        return f"file-{Path(self.file).stem}" if self.file else self.slot.id(self.map)
+
+    @property
+    def broken(self) -> str:
+        """What is wrong with the case's file, if anything is."""
+        return self.entry.problem if self.entry is not None else ""
+
+    @functools.cached_property
+    def search(self) -> str:
+        """Key of the search that the slot belongs to; each flight of a case has its own."""
+        reference = reference_to(self.system)
+        facts: list[Any] = [
+            reference.module,
+            reference.qualname,
+            self.map,
+            dataclasses.asdict(self.limits),
+        ]
+        if self.entry is not None:
+            facts += [str(self.entry.path), self.live]
+        return hashlib.sha256(json.dumps(facts).encode()).hexdigest()[:16]
+
+
+def name_of(system: type) -> str:
+    """Return a system's name in ledgers and cases: "module:class"."""
+    return f"{system.__module__}:{system.__qualname__}"
