@@ -19,6 +19,36 @@ from pytest_garl.messages import shown
 SYSTEM_NAME = re.compile(r"\w[\w-]*(\.\w[\w-]*)*:[^\W\d]\w*(\.[^\W\d]\w*)*")
 """Of a class, "module:class", names with dots between: what is imported is no path to elsewhere."""
 
+HASHED = (
+    "adversary",
+    "cpu_dispatch.py",
+    "execution",
+    "files",
+    "landing_system.py",
+    "scenarios",
+    "search",
+    "simulation",
+    "verdicts",
+)
+"""Folders and modules of this package that shape a search: its hash covers them."""
+NOT_HASHED = (
+    "__init__.py",
+    "baselines",
+    "cli",
+    "errors.py",
+    "experiments",
+    "fixtures.py",
+    "messages.py",
+    "plugin",
+    "regressions",
+    "reports",
+    "testing.py",
+    "video",
+)
+"""Folders and modules of this package that start searches or show their results."""
+HASHED_SUFFIXES = (".npz", ".obj", ".py", ".toml")
+"""Files of weights, of meshes, of sources and of maps."""
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Reference:
@@ -73,13 +103,13 @@ def reference_to(thing: Any) -> Reference:
 
 @functools.cache
 def package_sha256() -> str:
-    """Hash what of this package shapes a search: its sources, maps and shipped weights."""
+    """Hash what of this package shapes a search: its sources, maps, meshes and weights."""
     home = Path(__file__).parents[1]
-    rooms = ("files", "scenarios", "simulation", "adversary", "verdicts", "execution", "search")
-    digest = hashlib.sha256((home / "landing_system.py").read_bytes())
-    for file in sorted(file for room in rooms for file in (home / room).rglob("*")):
-        if file.suffix in (".py", ".toml", ".npz"):
-            digest.update(file.relative_to(home).as_posix().encode() + file.read_bytes())
+    digest = hashlib.sha256()
+    for place in (home / name for name in HASHED):
+        for file in sorted(place.rglob("*")) if place.is_dir() else [place]:
+            if file.suffix in HASHED_SUFFIXES:
+                digest.update(file.relative_to(home).as_posix().encode() + file.read_bytes())
     return digest.hexdigest()
 
 

@@ -15,7 +15,7 @@ def fresh() -> str:
     return reference.package_sha256()
 
 
-def test_the_package_is_known_by_what_shapes_a_search(
+def test_the_hash_changes_with_the_files_that_shape_a_search_alone(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     home = Path(reference.__file__).parents[1]
@@ -33,3 +33,25 @@ def test_the_package_is_known_by_what_shapes_a_search(
     assert changed != here
     (copy / "verdicts" / "judge.py").rename(copy / "verdicts" / "jury.py")
     assert fresh() != changed
+
+
+def test_every_folder_and_module_is_either_hashed_or_listed_as_not_hashed() -> None:
+    home = Path(reference.__file__).parents[1]
+    found = [
+        place.name
+        for place in home.iterdir()
+        if place.suffix == ".py" or (place.is_dir() and any(place.rglob("*.py")))
+    ]
+    assert sorted(found) == sorted([*reference.HASHED, *reference.NOT_HASHED])
+
+
+def test_every_data_file_in_a_hashed_folder_has_a_hashed_suffix() -> None:
+    """Weights also have a manifest in JSON, which says how they were trained."""
+    home = Path(reference.__file__).parents[1]
+    suffixes = {
+        file.suffix
+        for name in reference.HASHED
+        for file in (home / name).rglob("*")
+        if file.is_file() and "__pycache__" not in file.parts
+    }
+    assert suffixes == {".json", *reference.HASHED_SUFFIXES}
