@@ -14,10 +14,9 @@ from rich.text import Text
 
 from pytest_garl.errors import GarlError
 from pytest_garl.messages import printable
-from pytest_garl.regressions import corpus
-from pytest_garl.regressions.acceptance import acceptance_of
 from pytest_garl.regressions.case import Case
 from pytest_garl.regressions.case_file import load
+from pytest_garl.regressions.corpus import Corpus, replace_file
 from pytest_garl.regressions.description import meanings
 from pytest_garl.regressions.replay import Replay, replay, system_of
 
@@ -32,13 +31,13 @@ _ENDLESS = 100_000
 
 
 @dataclasses.dataclass(frozen=True, slots=True, kw_only=True)
-class _Folders:
-    cases: Path
+class _Project:
     root: Path
+    corpus: Corpus
 
     @property
     def maps(self) -> tuple[Path, ...]:
-        return (self.root / "scenarios" / "maps",)
+        return self.corpus.map_folders
 
     def case(self, file: Path) -> Case:
         return load(file, self.maps)
@@ -61,7 +60,8 @@ def cases(context: click.Context, folder: Path) -> None:
 
     A case is a file under scenarios/regressions/<system>/. Run these commands where you run pytest.
     """
-    context.obj = _Folders(cases=folder, root=Path.cwd())
+    root = Path.cwd()
+    context.obj = _Project(root=root, corpus=Corpus(folder, (root / "scenarios" / "maps",)))
 
 
 def _say(text: str, *, err: bool = False) -> None:
@@ -74,11 +74,11 @@ FILE = click.argument("file", type=click.Path(path_type=Path, exists=True, dir_o
 
 @cases.command("list")
 @click.pass_obj
-def list_(folders: _Folders) -> None:
+def list_(project: _Project) -> None:
     """List all cases with status, signature, robustness and number of objects."""
-    found = corpus.every_entry(folders.cases, folders.maps)
+    found = project.corpus.all_entries()
     if not found:
-        _say(f"no cases in {folders.cases}; a search saves what it finds")
+        _say(f"no cases in {project.corpus.folder}; a search saves what it finds")
         return
     table = Table(box=None, header_style="bold")
     for name in ("case", "status", "signature", "robust", "objects"):
@@ -101,14 +101,13 @@ def list_(folders: _Folders) -> None:
     for entry in found:
         if entry.case is None:
             _say(entry.problem)
-    known = acceptance_of(folders.cases)
     new = [
         str(entry.path)
         for entry in found
         if entry.case is not None
         and entry.case.status != "fixed"
         and not entry.case.edge
-        and not known.covers(entry.path, entry.case)
+        and not project.corpus.is_accepted(entry)
     ]
     if new:
         _say("\nNew, so that pytest fails on them until they are fixed, committed or accepted:")
@@ -127,16 +126,16 @@ def _coloured(status: str) -> Text:
 @cases.command()
 @FILE
 @click.pass_obj
-def show(folders: _Folders, file: Path) -> None:
+def show(project: _Project, file: Path) -> None:
     """Show what happens in a case, in words and physical units."""
-    case = folders.case(file)
+    case = project.case(file)
     evidence = case.evidence
     _say(f"{case.id}  {case.status}  {case.system}")
     _say(f"{case.violation.signature}: {case.violation.story}\n")
     table = Table(box=None, header_style="bold")
     for name in ("what", "value", "meaning"):
         table.add_column(name)
-    for row in meanings(case.scenario, folders.maps):
+    for row in meanings(case.scenario, project.maps):
         table.add_row(*(Text(cell) for cell in row))
     _console().print(table)
     for key, by in _totals(case):
@@ -179,14 +178,14 @@ def replay_(context: click.Context, file: Path, live: bool, video: Path | None) 
     The tests that found it judge: pytest flies this one case in a process of its own. If the case
     names no test, the built-in verdict judges.
     """
-    folders: _Folders = context.obj
-    case = folders.case(file)
+    project: _Project = context.obj
+    case = project.case(file)
     if video is not None:
         from pytest_garl.video.encoder import program
 
         # Before the flight: it is for nothing if it cannot be drawn.
         program()
-    result = replay(case, folders.root, folders.maps, live=live)
+    result = replay(case, project.root, project.maps, live=live)
     _answer(result)
     if video is not None:
         if result.flight is None:
@@ -194,7 +193,7 @@ def replay_(context: click.Context, file: Path, live: bool, video: Path | None) 
         from pytest_garl.landing_system import airframe_of
         from pytest_garl.video import save_video
 
-        camera = airframe_of(system_of(case, folders.root)).camera
+        camera = airframe_of(system_of(case, project.root)).camera
         save_video(video, result.flight, case.scenario, result.map, camera, result.signature)
         _say(f"drawn: {video}")
     context.exit(STATUS[result.answer])
@@ -219,30 +218,30 @@ def _answer(result: Replay) -> None:
     type=click.Path(path_type=Path, exists=True, dir_okay=False),
 )
 @click.pass_obj
-def accept(folders: _Folders, files: tuple[Path, ...]) -> None:
+def accept(project: _Project, files: tuple[Path, ...]) -> None:
     """Make cases known: they are expected to fail until they are fixed.
 
     Use it in a project without git. A committed case is known already.
     """
-    found = [(file, folders.case(file)) for file in files]
+    found = [(file, project.case(file)) for file in files]
     for file, case in found:
-        corpus.replace(file, dataclasses.replace(case, accepted=True))
+        replace_file(file, dataclasses.replace(case, accepted=True))
         _say(f"{file}: accepted; it is expected to fail ({case.violation.signature})")
 
 
 @cases.command()
 @FILE
 @click.pass_obj
-def promote(folders: _Folders, file: Path) -> None:
+def promote(project: _Project, file: Path) -> None:
     """Mark a case as fixed: from now on it must pass.
 
     The command flies the case first, with its recorded moves and, if the reference pilot can
     avoid the violation, with a live policy too. The case stays open if it fails, if it is
     undecided, or if nothing shows that a repair of the landing system made it pass.
     """
-    case, told = folders.case(file), []
+    case, told = project.case(file), []
     for live in (False, True) if case.avoidable == "live" else (False,):
-        result = replay(case, folders.root, folders.maps, live=live)
+        result = replay(case, project.root, project.maps, live=live)
         how = "a live policy" if live else "its recorded moves"
         if result.answer != "FIXED":
             raise GarlError(f"{file}: {_refusal(result, how)}; it stays {case.status}")
@@ -250,7 +249,7 @@ def promote(folders: _Folders, file: Path) -> None:
             told.append(f"with {how} the landing system gave up; it did not land")
         if not live:
             told.append(f"judged by {result.judge}")
-    corpus.replace(file, dataclasses.replace(case, status="fixed"))
+    replace_file(file, dataclasses.replace(case, status="fixed"))
     _say(f"{file}: fixed; from now on it must pass")
     for line in told:
         _say(line)
@@ -274,7 +273,7 @@ def _refusal(result: Replay, how: str) -> str:
 )
 @click.option("--workers", default=2, show_default=True, help="Flying child processes.")
 @click.pass_obj
-def shrink(folders: _Folders, file: Path, flights: int, workers: int) -> None:
+def shrink(project: _Project, file: Path, flights: int, workers: int) -> None:
     """Shrink a case further, from its own record.
 
     The command replaces the file only by a case that is no worse in any respect (objects, genes,
@@ -283,16 +282,16 @@ def shrink(folders: _Folders, file: Path, flights: int, workers: int) -> None:
     from pytest_garl.plugin.case_tests import means_of
     from pytest_garl.regressions.reshrink import KEPT, shrink_case
 
-    case = folders.case(file)
-    means = means_of(case, folders.root)
-    finding = shrink_case(case, folders.root, folders.maps, flights, workers, means)
+    case = project.case(file)
+    means = means_of(case, project.root)
+    finding = shrink_case(case, project.root, project.maps, flights, workers, means)
     spent = f"{finding.flights} flights"
     if finding.case is None and finding.reason != KEPT:
         raise GarlError(f"{file}: {finding.reason}; `garl cases replay {file}` tells more")
     if finding.case is None:
         _say(f"{file}: {finding.reason} ({spent}); it stays as it is")
         return
-    path = corpus.replace(file, finding.case)
+    path = replace_file(file, finding.case)
     evidence = finding.case.evidence
     renewed = finding.case.id == case.id
     done = "its evidence is renewed" if renewed else f"all in all removed {evidence.removed}"
@@ -302,17 +301,17 @@ def shrink(folders: _Folders, file: Path, flights: int, workers: int) -> None:
 @cases.command()
 @click.option("--yes", is_flag=True, help="Delete without asking.")
 @click.pass_obj
-def prune(folders: _Folders, yes: bool) -> None:
+def prune(project: _Project, yes: bool) -> None:
     """Fly all cases that are not fixed, and delete stale ones.
 
     A stale case passes, but nothing shows that the landing system was repaired (see the table in
     docs/cases.md). A case that fails, or is undecided, stays.
     """
     kept = 0
-    for entry in corpus.every_entry(folders.cases, folders.maps):
+    for entry in project.corpus.all_entries():
         if entry.case is None or entry.case.status == "fixed":
             continue
-        result = replay(entry.case, folders.root, folders.maps)
+        result = replay(entry.case, project.root, project.maps)
         if result.answer != "STALE":
             kept += 1
             continue
@@ -324,10 +323,10 @@ def prune(folders: _Folders, yes: bool) -> None:
 
 @cases.command()
 @click.pass_obj
-def check(folders: _Folders) -> None:
+def check(project: _Project) -> None:
     """Check all files without flying: readable, named after their content, system importable."""
     problems = []
-    found = corpus.every_entry(folders.cases, folders.maps)
+    found = project.corpus.all_entries()
     for entry in found:
         case = entry.case
         if case is None:
@@ -338,11 +337,11 @@ def check(folders: _Folders) -> None:
                 f"{entry.path}: its content has the name {case.id}; it was changed by hand, or "
                 "renamed"
             )
-        test = folders.root / case.test.partition("::")[0]
+        test = project.root / case.test.partition("::")[0]
         if "::" in case.test and not test.is_file():
             problems.append(f"{entry.path}: key 'test': there is no file {test}")
         try:
-            system_of(case, folders.root)
+            system_of(case, project.root)
         except GarlError as error:
             problems.append(f"{entry.path}: {error}")
     for problem in problems:

@@ -10,6 +10,7 @@ import click
 
 from pytest_garl.cli.cases import FOLDER
 from pytest_garl.files.atomic import save_text
+from pytest_garl.regressions.corpus import Corpus
 from pytest_garl.reports.run_report import report_of
 
 
@@ -33,7 +34,7 @@ def report(ledger: Path, as_json: bool, out: Path | None, folder: Path) -> None:
 
     It works while the run goes on, and after a run was killed.
     """
-    found = report_of(ledger, folder, (Path.cwd() / "scenarios" / "maps",))
+    found = report_of(ledger, Corpus(folder, (Path.cwd() / "scenarios" / "maps",)))
     text = json.dumps(found, indent=2) + "\n" if as_json else _words(found)
     if out is None:
         click.echo(text, nl=False)

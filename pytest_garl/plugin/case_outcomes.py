@@ -42,7 +42,7 @@ def explain_failing(
     if case.edge and excuses:
         return expect(report, f"edge: fails; {signature} ({file})")
     expected = (same and case.status == "open") or (excuses and case.status == "unavoidable")
-    if expected and run.acceptance.covers(target.entry.path, case):
+    if expected and run.options.corpus.is_accepted(target.entry):
         word = "known" if case.status == "open" else "unavoidable"
         return expect(report, f"{word}: {signature} ({file})")
     other = run.expected_signatures(target).get(fault.signature) if fault.own and not same else None

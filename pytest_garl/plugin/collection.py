@@ -39,20 +39,19 @@ def targets_for(marker: pytest.Mark, options: Options, test: str) -> list[Target
 def _saved_targets(marked: MarkerArguments, options: Options, test: str) -> Iterator[Target]:
     if not options.cases.is_dir() and not options.cases.is_symlink():
         return
-    from pytest_garl.regressions.corpus import entries
     from pytest_garl.scenarios.maps.map import map_names
 
     there = map_names(options.map_folders)
-    for entry in entries(options.cases, name_of(marked.system), options.map_folders):
-        head = entry.head
-        if head is None or head.map not in there:
+    for entry in options.corpus.entries(name_of(marked.system)):
+        header = entry.header
+        if header is None or header.map not in there:
             yield dataclasses.replace(marked.target("", FIRST), entry=entry)
             continue
-        if head.map not in marked.maps or head.own_test not in ("", test):
+        if header.map not in marked.maps or header.own_test not in ("", test):
             continue
-        target = dataclasses.replace(marked.target(head.map, FIRST), entry=entry)
+        target = dataclasses.replace(marked.target(header.map, FIRST), entry=entry)
         yield target
-        if head.status == "fixed" and head.avoidable == "live":
+        if header.status == "fixed" and header.avoidable == "live":
             yield dataclasses.replace(target, live=True)
 
 

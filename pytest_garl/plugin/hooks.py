@@ -213,8 +213,9 @@ def pytest_report_collectionfinish(config: pytest.Config) -> list[str]:
     from pytest_garl.plugin.summary import forecast
 
     lines = forecast(run)
-    if run.acceptance.problem:
-        lines.append(_known_by_mark(run.acceptance.problem))
+    problem = run.options.corpus.acceptance.problem
+    if problem:
+        lines.append(_known_by_mark(problem))
     return lines
 
 

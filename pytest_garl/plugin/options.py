@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import os
 import re
 from dataclasses import dataclass
@@ -14,6 +15,7 @@ from pytest_garl.errors import GarlError
 from pytest_garl.plugin.arguments import METHODS, OPTIONS, POLICIES, Option
 
 if TYPE_CHECKING:
+    from pytest_garl.regressions.corpus import Corpus
     from pytest_garl.scenarios.genes import WeatherRange
 
 SLOT_ID = re.compile(r"(?P<map>.+)-g(?P<generation>\d{2,})-s(?P<slot>\d{2,})")
@@ -25,7 +27,7 @@ LEAST_SHRINK = 8
 """Fewer say nothing: ``pursuit.LEAST``, which to import takes long."""
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, kw_only=True)
 class Options:
     """What the user wants, checked."""
 
@@ -66,6 +68,13 @@ class Options:
     def map_folders(self) -> tuple[Path, ...]:
         """Where a user's own maps lie."""
         return (self.root / "scenarios" / "maps",)
+
+    @functools.cached_property
+    def corpus(self) -> Corpus:
+        """The saved cases, read once."""
+        from pytest_garl.regressions.corpus import Corpus
+
+        return Corpus(self.cases, self.map_folders)
 
     @property
     def ledger(self) -> Path:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import functools
 import hashlib
 import os
 import sys
@@ -30,7 +29,6 @@ if TYPE_CHECKING:
     from pytest_garl.execution.job import Job
     from pytest_garl.execution.on_demand import Done
     from pytest_garl.plugin.user_assertions import ItemAssertion
-    from pytest_garl.regressions.acceptance import Acceptance
     from pytest_garl.regressions.follow_up import InvestigatedSignature
     from pytest_garl.regressions.forecast import RemainingWork
     from pytest_garl.scenarios.scenario import Scenario
@@ -222,26 +220,12 @@ class Run:
 
         What is repeated is to be seen, known or not.
         """
-        from pytest_garl.regressions.corpus import entries
-        from pytest_garl.regressions.follow_up import is_known
-
         options = self.options
         if options.repeat:
             return {}
-        return {
-            entry.case.violation.signature: entry.path.name
-            for entry in entries(options.cases, name_of(target.system), options.map_folders)
-            if entry.case is not None
-            and is_known(entry.case, target.map)
-            and self.acceptance.covers(entry.path, entry.case)
-        }
-
-    @functools.cached_property
-    def acceptance(self) -> Acceptance:
-        """Which saved cases are known: what git said when it was first asked."""
-        from pytest_garl.regressions.acceptance import acceptance_of
-
-        return acceptance_of(self.options.cases)
+        system = name_of(target.system)
+        expected = options.corpus.expected_signatures(system, target.map, accepted=True)
+        return {signature: entry.path.name for signature, entry in expected.items()}
 
     def may_save(self, session: pytest.Session) -> bool:
         """Whether this process has seen a search to its end and may save what it found."""

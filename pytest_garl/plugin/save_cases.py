@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import functools
 import os
 import shlex
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -20,7 +22,6 @@ from pytest_garl.regressions.case import Case
 from pytest_garl.regressions.case_request import CaseRequest
 from pytest_garl.regressions.follow_up import (
     InvestigatedSignature,
-    Place,
     ShrinkBudget,
     case_requests,
     follow_up,
@@ -38,20 +39,15 @@ PILOT = {
 def pursue(run: Run, session: pytest.Session) -> None:
     """Pursue new signatures; what comes of it is told in the summary."""
     options, config = run.options, session.config
-    place = Place(
-        root=options.root,
-        cases=options.cases,
-        # A build server's tree is thrown away: what is to stay goes out as a patch.
-        patches=options.folder / "patches" if os.environ.get("CI") else None,
-        map_folders=options.map_folders,
-    )
     reporter: Any = config.pluginmanager.get_plugin("terminalreporter")
     try:
         for nodeid, signature in sorted(run.reported_failures.items()):
             target, user_assertion = collect_assertion(session, nodeid)
             run.user_assertions[target.search, signature] = user_assertion
         shrinking = ShrinkBudget(each=options.shrink, capped=options.shrink_capped)
-        wanted = case_requests(run.ledger, place, shrinking, run.user_assertions, run.finding_tests)
+        wanted = case_requests(
+            run.ledger, options.corpus, shrinking, run.user_assertions, run.finding_tests
+        )
         if wanted:
             most = sum(each.budget for each in shares(wanted))
             run.rest = remaining_work(wanted, _flight_s(run, wanted), options.workers or 1)
@@ -61,7 +57,7 @@ def pursue(run: Run, session: pytest.Session) -> None:
                 f"at most {counted(most, 'flight')}, about {duration(run.rest.seconds)}"
             )
         with live(run, config):
-            run.pursued = follow_up(run.ledger, run.pool, place, wanted, run.on_wait)
+            run.pursued = follow_up(run.ledger, run.pool, wanted, _saver(run), run.on_wait)
     except KeyboardInterrupt:
         begin_line(reporter)
         reporter.write_line(
@@ -72,6 +68,16 @@ def pursue(run: Run, session: pytest.Session) -> None:
         begin_line(reporter)
         reporter.write_line(f"garl: {error}", red=True)
         run.save_problem = str(error)
+
+
+def _saver(run: Run) -> Callable[[Case], Path | None]:
+    """Return how to save a case: as a file, or as a patch if the tree must not change."""
+    options = run.options
+    if not os.environ.get("CI"):
+        return options.corpus.save
+    # A build server deletes the tree after the run; a patch can be kept.
+    patches = options.folder / "patches"
+    return functools.partial(options.corpus.save_patch, patches=patches, root=options.root)
 
 
 def _flight_s(run: Run, wanted: Sequence[CaseRequest]) -> dict[str, float]:

@@ -22,7 +22,7 @@ class Acceptance:
         return case.accepted or path.relative_to(self.cases).as_posix() in self.committed
 
 
-def acceptance_of(cases: Path) -> Acceptance:
+def read_acceptance(cases: Path) -> Acceptance:
     """Ask git which files of a folder are in its index."""
     if not cases.is_dir():
         return Acceptance(cases=cases, committed=frozenset())

@@ -6,12 +6,12 @@ import dataclasses
 import difflib
 import functools
 from collections.abc import Iterator
-from dataclasses import dataclass
 from pathlib import Path
 
 from pytest_garl.errors import GarlError, ScenarioError
 from pytest_garl.files.atomic import alone, save_text
 from pytest_garl.messages import printable
+from pytest_garl.regressions.acceptance import Acceptance, read_acceptance
 from pytest_garl.regressions.case import Case
 from pytest_garl.regressions.case_file import CaseHeader, dumps, load, load_header
 
@@ -20,163 +20,178 @@ class CorpusError(GarlError):
     """A folder of cases that cannot be read or written."""
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclasses.dataclass(frozen=True, kw_only=True)
 class CorpusEntry:
     """One file of the corpus.
 
-    ``head`` is what collecting needs; the rest of the file is read when somebody asks for it.
+    ``header`` is enough to collect tests; the rest of the file is read when ``case`` or ``problem``
+    is asked for.
     """
 
     path: Path
-    changed: int
+    changed_ns: int
     map_folders: tuple[Path, ...]
-    head: CaseHeader | None
-    fault: str = ""
+    header: CaseHeader | None
+    header_problem: str = ""
 
     @property
     def name(self) -> str:
-        """Name in item ids: that of the file."""
+        """The name in item ids: that of the file."""
         return self.path.stem
 
     @property
     def case(self) -> Case | None:
-        """The case, or None where something is wrong with the file."""
-        return None if self.fault else _load(self.path, self.changed, self.map_folders)[0]
+        """The case, or None if something is wrong with the file."""
+        return self._content[0]
 
     @property
     def problem(self) -> str:
-        """What is wrong with the file: source, key, what was expected; nothing for a good one."""
-        return self.fault or _load(self.path, self.changed, self.map_folders)[1]
+        """What is wrong with the file (source, key, what was expected); empty for a good one."""
+        return self._content[1]
 
-
-def folder_of(cases: Path, system: str) -> Path:
-    """Return where the cases of a system ("module:class") lie: under its module's own name."""
-    return cases / system.partition(":")[0].rpartition(".")[2]
-
-
-def entries(cases: Path, system: str, map_folders: tuple[Path, ...]) -> tuple[CorpusEntry, ...]:
-    """Return the files of a system in the order of their names, broken ones among them."""
-    _check_link(cases)
-    return tuple(
-        _of_system(entry, system) for entry in _in_folder(folder_of(cases, system), map_folders)
-    )
-
-
-def every_entry(cases: Path, map_folders: tuple[Path, ...]) -> tuple[CorpusEntry, ...]:
-    """Return all files of the corpus, system by system."""
-    _check_link(cases)
-    try:
-        there = sorted(cases.iterdir()) if cases.is_dir() else ()
-    except OSError as error:
-        raise CorpusError(f"{cases}: cannot be read: {error.strerror}") from error
-    folders = [each for each in there if each.is_dir() or each.is_symlink()]
-    return tuple(entry for folder in folders for entry in _in_folder(folder, map_folders))
-
-
-def _check_link(cases: Path) -> None:
-    if cases.is_symlink() and not cases.exists():
-        raise CorpusError(
-            f"{cases}: found a symbolic link that leads nowhere, expected a folder of cases"
-        )
-
-
-def _in_folder(folder: Path, map_folders: tuple[Path, ...]) -> Iterator[CorpusEntry]:
-    for path in sorted(folder.glob("*.toml")):
+    @functools.cached_property
+    def _content(self) -> tuple[Case | None, str]:
+        if self.header_problem:
+            return None, self.header_problem
         try:
-            changed = path.stat().st_mtime_ns
-        except OSError as error:
-            if path.is_symlink():
-                yield _lost(path, map_folders, str(error.strerror))
-            # Else it is gone since it was listed: somebody is cleaning up.
-            continue
-        yield _read(path, changed, map_folders)
-    if folder.is_symlink() and not folder.exists():
-        yield _lost(folder, map_folders, "there is no such folder")
+            return load(self.path, self.map_folders), ""
+        except ScenarioError as error:
+            return None, str(error)
 
 
-def _lost(path: Path, map_folders: tuple[Path, ...], reason: str) -> CorpusEntry:
-    """Return an entry that tells of a symbolic link without a file: a case may be lost."""
-    fault = (
-        f"{path}: cannot be read: found a symbolic link that leads nowhere ({reason}), expected "
-        "a file; remove it, or restore what it points to"
-    )
-    return CorpusEntry(
-        path=path, changed=0, map_folders=map_folders, head=None, fault=printable(fault)
-    )
+class Corpus:
+    """The saved cases of a project.
 
-
-@functools.lru_cache(maxsize=10_000)
-def _read(path: Path, changed: int, map_folders: tuple[Path, ...]) -> CorpusEntry:
-    """Read a file's head once, however many tests fly it."""
-    try:
-        head, fault = load_header(path), ""
-    except ScenarioError as error:
-        head, fault = None, str(error)
-    return CorpusEntry(path=path, changed=changed, map_folders=map_folders, head=head, fault=fault)
-
-
-@functools.lru_cache(maxsize=10_000)
-def _load(path: Path, changed: int, map_folders: tuple[Path, ...]) -> tuple[Case | None, str]:
-    del changed
-    try:
-        return load(path, map_folders), ""
-    except ScenarioError as error:
-        return None, str(error)
-
-
-def _of_system(entry: CorpusEntry, system: str) -> CorpusEntry:
-    if entry.head is None or entry.head.system == system:
-        return entry
-    fault = (
-        f"{entry.path}: key 'system': found {entry.head.system!r}, expected {system!r}, the only "
-        "system with tests whose cases lie in this folder"
-    )
-    return dataclasses.replace(entry, head=None, fault=fault)
-
-
-def known(cases: Path, case: Case, map_folders: tuple[Path, ...]) -> Path | None:
-    """Return the file that expects the same failure: system, map, signature and test.
-
-    One that nobody could avoid expects no failure but its own.
+    A folder is listed once, and a file is read at most once, however many tests fly its case.
+    Saving looks at the folder again: another process may have saved the same case.
     """
-    for entry in entries(cases, case.system, map_folders):
-        if entry.case is None or not _same(entry.case, case):
-            continue
-        if entry.case.status == "open" or entry.name == case.id:
-            return entry.path
-    return None
+
+    def __init__(self, folder: Path, map_folders: tuple[Path, ...] = ()) -> None:
+        self.folder, self.map_folders = folder, map_folders
+        self._entries: dict[Path, CorpusEntry] = {}
+        self._listed: dict[Path, tuple[CorpusEntry, ...]] = {}
+
+    def entries(self, system: str) -> tuple[CorpusEntry, ...]:
+        """Return the files of a system in the order of their names, broken ones among them."""
+        self._check_link()
+        return tuple(_of_system(entry, system) for entry in self._in(self._folder_of(system)))
+
+    def all_entries(self) -> tuple[CorpusEntry, ...]:
+        """Return all files of the corpus, system by system."""
+        self._check_link()
+        try:
+            found = sorted(self.folder.iterdir()) if self.folder.is_dir() else ()
+        except OSError as error:
+            raise CorpusError(f"{self.folder}: cannot be read: {error.strerror}") from error
+        folders = [each for each in found if each.is_dir() or each.is_symlink()]
+        return tuple(entry for folder in folders for entry in self._in(folder))
+
+    @functools.cached_property
+    def acceptance(self) -> Acceptance:
+        """What git said of the folder when it was first asked."""
+        return read_acceptance(self.folder)
+
+    def is_accepted(self, entry: CorpusEntry) -> bool:
+        """Return whether somebody knows of a case: it is committed or marked as accepted."""
+        return entry.case is not None and self.acceptance.covers(entry.path, entry.case)
+
+    def expected_signatures(
+        self, system: str, map: str, *, accepted: bool = False
+    ) -> dict[str, CorpusEntry]:
+        """Return the signatures that open cases expect of a system on a map, with their files.
+
+        An unavoidable case says nothing about other violations with its signature.  ``accepted``
+        leaves out cases that nobody has accepted.
+        """
+        return {
+            entry.case.violation.signature: entry
+            for entry in self.entries(system)
+            if entry.case is not None
+            and entry.case.scenario.map == map
+            and entry.case.status == "open"
+            and (not accepted or self.is_accepted(entry))
+        }
+
+    def save(self, case: Case) -> Path | None:
+        """Write a new case; return its file, or None if the same failure is saved already."""
+        folder = self._folder_of(case.system)
+        with alone(folder):
+            self._listed.pop(folder, None)
+            if self._find(case) is not None:
+                return None
+            self._listed.pop(folder, None)
+            return save_text(folder / f"{case.id}.toml", dumps(case))
+
+    def save_patch(self, case: Case, patches: Path, root: Path) -> Path:
+        """Write a patch that adds the case; the tree itself is left alone."""
+        path = self._folder_of(case.system) / f"{case.id}.toml"
+        try:
+            text = patch_of(path, root, dumps(case))
+        except ValueError as error:
+            raise CorpusError(
+                f"{self.folder}: lies outside of the project at {root}: no patch"
+            ) from error
+        return save_text(patches / f"{case.id}.patch", text)
+
+    def _folder_of(self, system: str) -> Path:
+        return folder_of(self.folder, system)
+
+    def _find(self, case: Case) -> CorpusEntry | None:
+        """Return the file that expects the same failure: system, map, signature and test.
+
+        An unavoidable case expects no failure but its own.
+        """
+        for entry in self.entries(case.system):
+            if entry.case is None or _failure(entry.case) != _failure(case):
+                continue
+            if entry.case.status == "open" or entry.name == case.id:
+                return entry
+        return None
+
+    def _check_link(self) -> None:
+        if self.folder.is_symlink() and not self.folder.exists():
+            raise CorpusError(
+                f"{self.folder}: found a symbolic link that leads nowhere, expected a folder of "
+                "cases"
+            )
+
+    def _in(self, folder: Path) -> tuple[CorpusEntry, ...]:
+        if folder not in self._listed:
+            self._listed[folder] = tuple(self._list(folder))
+        return self._listed[folder]
+
+    def _list(self, folder: Path) -> Iterator[CorpusEntry]:
+        for path in sorted(folder.glob("*.toml")):
+            try:
+                changed_ns = path.stat().st_mtime_ns
+            except OSError as error:
+                if path.is_symlink():
+                    yield _lost(path, str(error.strerror))
+                # Else another process removed it after it was listed.
+                continue
+            yield self._read(path, changed_ns)
+        if folder.is_symlink() and not folder.exists():
+            yield _lost(folder, "there is no such folder")
+
+    def _read(self, path: Path, changed_ns: int) -> CorpusEntry:
+        known = self._entries.get(path)
+        if known is None or known.changed_ns != changed_ns:
+            known = self._entries[path] = _read(path, changed_ns, self.map_folders)
+        return known
 
 
-def _same(one: Case, other: Case) -> bool:
-    return _key(one) == _key(other)
-
-
-def _key(case: Case) -> tuple[str, ...]:
-    return (
-        case.system,
-        case.scenario.map,
-        case.violation.signature,
-        case.own_test,
-        case.assertion,
-    )
-
-
-def save(cases: Path, case: Case, map_folders: tuple[Path, ...] = ()) -> Path | None:
-    """Write a new case; return its file, or None where the same failure is known already."""
-    folder = folder_of(cases, case.system)
-    with alone(folder):
-        if known(cases, case, map_folders) is not None:
-            return None
-        return save_text(folder / f"{case.id}.toml", dumps(case))
-
-
-def replace(path: Path, case: Case) -> Path:
+def replace_file(path: Path, case: Case) -> Path:
     """Write a case in place of the one in ``path``, under the name that it should have."""
     with alone(path.parent):
         written = save_text(path.with_name(f"{case.id}.toml"), dumps(case))
         if written != path:
             path.unlink(missing_ok=True)
         return written
+
+
+def folder_of(cases: Path, system: str) -> Path:
+    """Return where the cases of a system ("module:class") lie: under its module's own name."""
+    return cases / system.partition(":")[0].rpartition(".")[2]
 
 
 def patch_of(path: Path, root: Path, text: str) -> str:
@@ -187,11 +202,47 @@ def patch_of(path: Path, root: Path, text: str) -> str:
     return f"diff --git a/{name} b/{name}\nnew file mode 100644\n{''.join(body)}"
 
 
-def save_patch(folder: Path, cases: Path, root: Path, case: Case) -> Path:
-    """Write a patch that adds the case; the tree itself is left alone."""
-    path = folder_of(cases, case.system) / f"{case.id}.toml"
+def _read(path: Path, changed_ns: int, map_folders: tuple[Path, ...]) -> CorpusEntry:
     try:
-        text = patch_of(path, root, dumps(case))
-    except ValueError as error:
-        raise CorpusError(f"{cases}: lies outside of the project at {root}: no patch") from error
-    return save_text(folder / f"{case.id}.patch", text)
+        header, problem = load_header(path), ""
+    except ScenarioError as error:
+        header, problem = None, str(error)
+    return CorpusEntry(
+        path=path,
+        changed_ns=changed_ns,
+        map_folders=map_folders,
+        header=header,
+        header_problem=problem,
+    )
+
+
+def _lost(path: Path, reason: str) -> CorpusEntry:
+    """Return an entry for a symbolic link without a file: a case may be lost."""
+    problem = (
+        f"{path}: cannot be read: found a symbolic link that leads nowhere ({reason}), expected "
+        "a file; remove it, or restore what it points to"
+    )
+    return CorpusEntry(
+        path=path, changed_ns=0, map_folders=(), header=None, header_problem=printable(problem)
+    )
+
+
+def _of_system(entry: CorpusEntry, system: str) -> CorpusEntry:
+    if entry.header is None or entry.header.system == system:
+        return entry
+    problem = (
+        f"{entry.path}: key 'system': found {entry.header.system!r}, expected {system!r}, the only "
+        "system with tests whose cases lie in this folder"
+    )
+    return dataclasses.replace(entry, header=None, header_problem=problem)
+
+
+def _failure(case: Case) -> tuple[str, ...]:
+    """Return the facts that two cases of the same failure share."""
+    return (
+        case.system,
+        case.scenario.map,
+        case.violation.signature,
+        case.own_test,
+        case.assertion,
+    )

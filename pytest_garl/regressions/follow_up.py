@@ -17,7 +17,7 @@ from pytest_garl.execution.pool import Pool
 from pytest_garl.execution.slot import flight_name
 from pytest_garl.regressions.case import Case
 from pytest_garl.regressions.case_request import CaseRequest, CaseResult
-from pytest_garl.regressions.corpus import entries, save, save_patch
+from pytest_garl.regressions.corpus import Corpus
 from pytest_garl.regressions.investigation import (
     EXCEPTION,
     LEAST,
@@ -46,16 +46,6 @@ class ShrinkBudget:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Place:
-    """Where cases go: the corpus in the project, or patches where the tree must not change."""
-
-    root: Path
-    cases: Path
-    patches: Path | None
-    map_folders: tuple[Path, ...]
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
 class InvestigatedSignature:
     """What became of one new signature: its case and the file, or the reason for none."""
 
@@ -67,7 +57,7 @@ class InvestigatedSignature:
 
 def case_requests(
     ledger: Ledger,
-    place: Place,
+    corpus: Corpus,
     shrinking: ShrinkBudget,
     own: Mapping[tuple[str, str], UserAssertion] | None = None,
     found_by: Mapping[tuple[str, str], str] | None = None,
@@ -91,14 +81,9 @@ def case_requests(
         text = ledger.job(search)
         assert text is not None
         job = loads(text)
-        system = job.system.name
         if noted is None:
-            known = {
-                entry.case.violation.signature
-                for entry in entries(place.cases, system, place.map_folders)
-                if entry.case is not None and is_known(entry.case, job.map)
-            }
-            wanted[search] = [signature for signature in rows if signature not in known]
+            expected = corpus.expected_signatures(job.system.name, job.map)
+            wanted[search] = [signature for signature in rows if signature not in expected]
         else:
             wanted[search] = noted.get(search, [])
         new = {
@@ -109,7 +94,7 @@ def case_requests(
             if signature in rows
         }
         cap = len(ledger.queries.flown(search)) if shrinking.capped else None
-        map = load_map(job.map, place.map_folders)
+        map = load_map(job.map, corpus.map_folders)
         found += [
             CaseRequest(
                 name=f"{search} {signature}",
@@ -184,14 +169,6 @@ def _divided(most: Sequence[int], flights: int) -> list[int]:
     return given
 
 
-def is_known(case: Case, map: str) -> bool:
-    """Whether a case says that violations with its signature are expected on a map.
-
-    One that nobody could avoid says nothing of others with its signature.
-    """
-    return case.scenario.map == map and case.status == "open"
-
-
 def _by_search(ledger: Ledger) -> dict[str, dict[str, list[LedgerFlight]]]:
     found: dict[str, dict[str, list[LedgerFlight]]] = {}
     for row in ledger.queries.violating():
@@ -227,8 +204,8 @@ def done_of(row: LedgerFlight, job: Job) -> Done:
 def follow_up(
     ledger: Ledger,
     pool: Pool,
-    place: Place,
     wanted: Sequence[CaseRequest],
+    save: Callable[[Case], Path | None],
     tick: Callable[[], None],
 ) -> tuple[InvestigatedSignature, ...]:
     """Pursue all signatures at once and save their cases; the order is always the same.
@@ -244,7 +221,7 @@ def follow_up(
     for each in wanted:
         if each.name not in findings:
             findings[each.name] = as_found(each)
-    return tuple(_saved(each, findings[each.name], place) for each in wanted)
+    return tuple(_saved(each, findings[each.name], save) for each in wanted)
 
 
 def _reached(
@@ -259,17 +236,13 @@ def _pursue(request: CaseRequest, fly: Fly) -> CaseResult:
     return CaseBuilder(request, fly).run()
 
 
-def _saved(request: CaseRequest, finding: CaseResult, place: Place) -> InvestigatedSignature:
+def _saved(
+    request: CaseRequest, finding: CaseResult, save: Callable[[Case], Path | None]
+) -> InvestigatedSignature:
     job = request.job
     return InvestigatedSignature(
         system=job.system.name,
         map=job.map,
         finding=finding,
-        file=_file(finding.case, place) if finding.case else None,
+        file=save(finding.case) if finding.case else None,
     )
-
-
-def _file(case: Case, place: Place) -> Path | None:
-    if place.patches is not None:
-        return save_patch(place.patches, place.cases, place.root, case)
-    return save(place.cases, case, place.map_folders)

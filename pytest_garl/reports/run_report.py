@@ -15,8 +15,7 @@ from typing import Any
 
 from pytest_garl.errors import LedgerError
 from pytest_garl.execution.ledger import Ledger
-from pytest_garl.regressions.acceptance import acceptance_of
-from pytest_garl.regressions.corpus import every_entry
+from pytest_garl.regressions.corpus import Corpus
 from pytest_garl.reports.violation_kinds import Found, Own, found_by
 from pytest_garl.verdicts.paper_metrics import top_k
 from pytest_garl.verdicts.statistics import share_interval
@@ -36,7 +35,7 @@ def utc() -> str:
     return datetime.now(UTC).isoformat(timespec="seconds")
 
 
-def report_of(path: Path, cases: Path, map_folders: tuple[Path, ...]) -> dict[str, Any]:
+def report_of(path: Path, corpus: Corpus) -> dict[str, Any]:
     """Return the run in a ledger, however far it came, with the saved cases of its systems."""
     if not path.is_file():
         raise LedgerError(f"there is no ledger at {path}; run a search first")
@@ -47,7 +46,7 @@ def report_of(path: Path, cases: Path, map_folders: tuple[Path, ...]) -> dict[st
         wanted: Counter[tuple[str, str]] = Counter()
         for each in progress:
             wanted[each.system, each.map] += each.all
-        saved = _cases(cases, map_folders, {search.system for search in found})
+        saved = _cases(corpus, {search.system for search in found})
         searches = [
             _search(ledger, each, wanted[each.system, each.map], saved, path) for each in found
         ]
@@ -142,11 +141,10 @@ def _again(found: Found, slot: str, path: Path) -> str:
     return " ".join(words if folder == ".garl" else [*words, "-o", f"garl_dir={folder}"])
 
 
-def _cases(folder: Path, map_folders: tuple[Path, ...], systems: set[str]) -> list[dict[str, Any]]:
+def _cases(corpus: Corpus, systems: set[str]) -> list[dict[str, Any]]:
     """Return the saved cases of systems; a file that cannot be read is `garl cases check`'s."""
-    acceptance = acceptance_of(folder)
     found = []
-    for entry in every_entry(folder, map_folders):
+    for entry in corpus.all_entries():
         case = entry.case
         if case is None or case.system not in systems:
             continue
@@ -157,7 +155,7 @@ def _cases(folder: Path, map_folders: tuple[Path, ...], systems: set[str]) -> li
                 "map": case.scenario.map,
                 "signature": case.violation.signature,
                 "status": case.status,
-                "known": acceptance.covers(entry.path, case),
+                "known": corpus.is_accepted(entry),
                 "story": case.violation.story,
             }
         )

@@ -13,7 +13,7 @@ from click.testing import CliRunner, Result
 from pytest_garl.cli import main
 from pytest_garl.regressions.case import Case, Evidence, Violation
 from pytest_garl.regressions.case_file import load
-from pytest_garl.regressions.corpus import replace, save
+from pytest_garl.regressions.corpus import Corpus, replace_file
 from pytest_garl.scenarios.chromosome import decode
 from pytest_garl.scenarios.genes import genome_for
 from pytest_garl.scenarios.maps.map import load_map
@@ -79,7 +79,7 @@ def file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
     monkeypatch.setattr(sys, "path", [*sys.path])
     (tmp_path / "stack_of_test.py").write_text(SYSTEM)
     (tmp_path / "broken").touch()
-    path = save(tmp_path / "scenarios" / "regressions", broken_lander())
+    path = Corpus(tmp_path / "scenarios" / "regressions").save(broken_lander())
     assert path is not None
     yield path.relative_to(tmp_path)
     sys.modules.pop("stack_of_test", None)
@@ -114,7 +114,7 @@ def test_list_tells_what_is_new_until_it_is_accepted(file: Path) -> None:
 def test_nothing_is_said_of_neighbours_where_none_was_tried(file: Path) -> None:
     case = load(file)
     evidence = dataclasses.replace(case.evidence, neighbours=0, neighbours_failed=0)
-    file = replace(file, dataclasses.replace(case, evidence=evidence))
+    file = replace_file(file, dataclasses.replace(case, evidence=evidence))
     assert "neighbours" not in garl("show", file).output
     assert "0/0" not in garl("list").output
 
@@ -189,7 +189,7 @@ def test_a_replay_draws_a_film(file: Path) -> None:
 
 
 def test_a_list_shows_signatures_as_they_are_and_no_animals(tmp_path: Path) -> None:
-    save(tmp_path, dog_case())
+    Corpus(tmp_path).save(dog_case())
     listed = CliRunner().invoke(
         main, ["cases", "--folder", str(tmp_path), "list"], env={"COLUMNS": "200"}
     )

@@ -13,7 +13,7 @@ from click.testing import CliRunner, Result
 
 from pytest_garl.cli import main
 from pytest_garl.regressions.case_file import load
-from pytest_garl.regressions.corpus import replace
+from pytest_garl.regressions.corpus import replace_file
 from tests.plugin.test_cases import OWN, change, dodge
 from tests.plugin.test_plugin import write_project
 
@@ -171,7 +171,7 @@ CONTACT = (
 def simulator_is_as_it_was(file: Path) -> None:
     """Let a case have been saved before its simulator was hashed."""
     case = load(file)
-    replace(
+    replace_file(
         file,
         dataclasses.replace(case, evidence=dataclasses.replace(case.evidence, simulator_sha256="")),
     )
@@ -196,7 +196,7 @@ def test_a_case_of_a_property_of_ones_own_is_shrunk_by_its_test(project: Path) -
     own = saved(project, "own")
     case = load(own)
     foggy = case.scenario.replace({"environment.dust": 0.1, "environment.snow": 0.14})
-    file = replace(own, dataclasses.replace(case, scenario=foggy))
+    file = replace_file(own, dataclasses.replace(case, scenario=foggy))
     shrunk(file, 30)
     better = load(saved(project, "own"))
     assert better.scenario["environment.dust"] == 0.0

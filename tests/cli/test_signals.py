@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 
 from pytest_garl.execution.processes import named
-from pytest_garl.regressions.corpus import save
+from pytest_garl.regressions.corpus import Corpus
 from tests.cli.test_cases import broken_lander
 
 SLOW = """
@@ -34,7 +34,7 @@ def test_a_cancelled_command_leaves_no_folder_and_no_process(tmp_path: Path, num
     scratch.mkdir()
     (project / "stack_of_test").mkdir(parents=True)
     (project / "stack_of_test" / "__init__.py").write_text(SLOW)
-    file = save(project / "scenarios", broken_lander(), ())
+    file = Corpus(project / "scenarios").save(broken_lander())
     assert file
     start = "from pytest_garl.cli import main; main()"
     command = [sys.executable, "-c", start, "cases", "shrink", str(file), "--workers=1"]

@@ -81,9 +81,7 @@ def _cases() -> list[str]:
 
 
 def _load_case(path: Path, rng: random.Random) -> None:
-    corpus._read.cache_clear()
-    corpus._load.cache_clear()
-    (entry,) = corpus.every_entry(path.parent.parent, ())
+    (entry,) = corpus.Corpus(path.parent.parent).all_entries()
     if entry.problem:
         raise GarlError(entry.problem)
     case = entry.case

@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
-import os
-import subprocess
 from pathlib import Path
 
 import pytest
@@ -12,8 +9,6 @@ import pytest
 from pytest_garl.baselines import file as baselines
 from pytest_garl.errors import OptionError, ScenarioError
 from pytest_garl.regressions.case_file import dumps, load, load_header, loads
-from pytest_garl.regressions.corpus import CorpusError, entries, every_entry, save, save_patch
-from pytest_garl.scenarios.maps import map as package
 from pytest_garl.scenarios.maps.map import load_map
 from pytest_garl.verdicts.verdict import Limits
 from tests.baselines.test_file import baseline
@@ -92,71 +87,6 @@ def test_other_limits_that_make_no_sense_are_told() -> None:
         Limits(abort="no")  # type: ignore[arg-type]
 
 
-def _folder(tmp_path: Path) -> Path:
-    folder = tmp_path / "landing"
-    folder.mkdir()
-    (folder / "good.toml").write_text(TEXT)
-    return folder
-
-
-@pytest.mark.parametrize(
-    "text",
-    ["seed = " + "[" * 3000, "seed = " + "9" * 5000, "x" * 1_000_001, "[" * 3000],
-    ids=["nested", "digits", "large", "header"],
-)
-def test_a_file_that_cannot_be_parsed_is_a_fault_of_its_own(tmp_path: Path, text: str) -> None:
-    folder = _folder(tmp_path)
-    (folder / "bad.toml").write_text(text)
-    bad, good = entries(tmp_path, SYSTEM, ())
-    assert bad.head is None
-    assert bad.problem.startswith(f"{folder / 'bad.toml'}: ")
-    assert len(bad.problem) < 300
-    assert good.case == case()
-
-
-def test_a_case_that_is_no_regular_file_is_a_fault_of_its_own(tmp_path: Path) -> None:
-    folder = _folder(tmp_path)
-    (folder / "device.toml").symlink_to("/dev/zero")
-    os.mkfifo(folder / "pipe.toml")
-    (folder / "sub.toml").mkdir()
-    found = {entry.name: entry.problem for entry in every_entry(tmp_path, ())}
-    assert "found a device, expected a regular file" in found["device"]
-    assert "found a pipe, expected a regular file" in found["pipe"]
-    assert "found a folder, expected a regular file" in found["sub"]
-    assert found["good"] == ""
-
-
-def test_a_link_that_leads_nowhere_is_told_and_not_passed_over(tmp_path: Path) -> None:
-    folder = _folder(tmp_path)
-    (folder / "lost.toml").symlink_to("gone.toml")
-    (folder / "round.toml").symlink_to("round.toml")
-    for found in (entries(tmp_path, SYSTEM, ()), every_entry(tmp_path, ())):
-        problems = {entry.name: entry.problem for entry in found}
-        assert "found a symbolic link that leads nowhere (No such file" in problems["lost"]
-        assert "found a symbolic link that leads nowhere (Too many" in problems["round"]
-        assert problems["good"] == ""
-
-
-@pytest.mark.parametrize("target", ["elsewhere", "landing", "landing/round.toml"])
-def test_a_folder_that_is_a_link_to_nothing_is_told(tmp_path: Path, target: str) -> None:
-    (tmp_path / "landing").symlink_to(target)
-    for found in (entries(tmp_path, SYSTEM, ()), every_entry(tmp_path, ())):
-        (entry,) = found
-        assert entry.case is None
-        assert "found a symbolic link that leads nowhere" in entry.problem
-
-
-def test_a_folder_of_cases_that_cannot_be_read_is_one_error(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    def refuse(self: Path) -> None:
-        raise PermissionError(13, "Permission denied")
-
-    monkeypatch.setattr(Path, "iterdir", refuse)
-    with pytest.raises(CorpusError, match="cannot be read: Permission denied"):
-        every_entry(tmp_path, ())
-
-
 def test_the_head_of_a_case_is_read_within_the_limit(tmp_path: Path) -> None:
     (tmp_path / "a.toml").write_text(TEXT + "#" * 1_000_000)
     for read in (load, load_header):
@@ -203,46 +133,3 @@ def test_no_baseline_is_saved_that_could_not_be_read(
     (tmp_path / "base.toml").write_text(BASELINE)
     with pytest.raises(ScenarioError, match=r"bytes, expected at most .* `garl baseline save`"):
         baselines.load(tmp_path / "base.toml")
-
-
-@pytest.mark.parametrize("name", ['la"wn', "la\\wn", "la wn", "ländle", "a'b;c$d", "-m", "m" * 50])
-def test_the_patch_of_a_case_on_a_map_with_a_strange_name_applies(
-    tmp_path: Path, name: str
-) -> None:
-    maps = tmp_path / "scenarios" / "maps"
-    maps.mkdir(parents=True)
-    (maps / f"{name}.toml").write_text((Path(package.__file__).parent / "lawn.toml").read_text())
-    plain = case()
-    strange = dataclasses.replace(
-        plain, scenario=dataclasses.replace(plain.scenario, map=load_map(name, [maps]).name)
-    )
-    folder = tmp_path / "cases"
-    patch = save_patch(tmp_path / "patches", folder, tmp_path, strange)
-    subprocess.run(["git", "init", "-q"], cwd=tmp_path, check=True)
-    subprocess.run(["git", "apply", str(patch)], cwd=tmp_path, check=True)
-    (entry,) = every_entry(folder, (maps,))
-    assert entry.problem == ""
-    assert entry.case == strange
-
-
-def test_a_corpus_that_is_a_link_to_nothing_is_one_error(tmp_path: Path) -> None:
-    (tmp_path / "regressions").symlink_to("gone")
-    with pytest.raises(CorpusError, match="regressions: found a symbolic link that leads nowhere"):
-        every_entry(tmp_path / "regressions", ())
-    with pytest.raises(CorpusError, match="regressions: found a symbolic link that leads nowhere"):
-        entries(tmp_path / "regressions", SYSTEM, ())
-
-
-def test_a_long_signature_makes_no_file_name_that_is_too_long(tmp_path: Path) -> None:
-    strange = case(signature=f"own:test_{'x' * 400}:12345678")
-    path = save(tmp_path, strange)
-    assert path is not None
-    assert len(path.name) < 100
-    assert load(path) == strange
-
-
-def test_a_link_to_a_file_beside_the_cases_is_no_lost_case(tmp_path: Path) -> None:
-    _folder(tmp_path)
-    (tmp_path / "notes.txt").write_text("")
-    (tmp_path / "link").symlink_to("notes.txt")
-    assert [entry.name for entry in every_entry(tmp_path, ())] == ["good"]

@@ -1,7 +1,6 @@
 from __future__ import annotations
 
 import dataclasses
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -12,7 +11,6 @@ from pytest_garl.errors import ScenarioError
 from pytest_garl.messages import printable
 from pytest_garl.regressions.case import Case, Evidence, Violation
 from pytest_garl.regressions.case_file import dumps, loads
-from pytest_garl.regressions.corpus import entries, every_entry, patch_of, replace, save
 from pytest_garl.scenarios.chromosome import decode
 from pytest_garl.scenarios.genes import genome_for, with_destinations
 from pytest_garl.scenarios.maps.map import load_map
@@ -190,38 +188,3 @@ def test_the_name_tells_map_type_and_subject_and_differs_between_scenarios() -> 
     assert fixed.id == first.id
     assert case(signature="V:PlannerError@planning_ego").id.startswith("lawn-V-PlannerError-")
     assert case(signature="I?:unknown").id.startswith("lawn-I-unknown-")
-
-
-def test_one_file_per_way_to_fail(tmp_path: Path) -> None:
-    path = save(tmp_path, case())
-    assert path == tmp_path / "landing" / f"{case().id}.toml"
-    assert save(tmp_path, case(story="Another flight, the same signature.")) is None
-    assert save(tmp_path, case(signature="IV:dog:descent:seen")) is not None
-    assert len(every_entry(tmp_path, ())) == 2
-
-
-def test_what_was_fixed_and_comes_back_is_saved_anew(tmp_path: Path) -> None:
-    path = save(tmp_path, case())
-    assert path is not None
-    replace(path, dataclasses.replace(case(), status="fixed"))
-    again = dataclasses.replace(case(), policy="greedy", moves=((NAMES[-1], ()),))
-    assert save(tmp_path, again) is not None
-    found = entries(tmp_path, SYSTEM, ())
-    assert sorted(each.case.status for each in found if each.case) == ["fixed", "open"]
-
-
-def test_a_file_that_changes_is_read_again(tmp_path: Path) -> None:
-    path = save(tmp_path, case())
-    assert path is not None
-    assert entries(tmp_path, SYSTEM, ())[0].case == case()
-    path.write_text("schema = ")
-    assert "not valid TOML" in entries(tmp_path, SYSTEM, ())[0].problem
-
-
-def test_a_patch_says_how_to_make_the_file(tmp_path: Path) -> None:
-    patch = patch_of(tmp_path / "scenarios" / "a.toml", tmp_path, "one\ntwo\n")
-    assert patch.splitlines()[:2] == [
-        "diff --git a/scenarios/a.toml b/scenarios/a.toml",
-        "new file mode 100644",
-    ]
-    assert patch.endswith("@@ -0,0 +1,2 @@\n+one\n+two\n")

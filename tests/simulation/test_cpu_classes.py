@@ -18,7 +18,7 @@ from pytest_garl.execution.batch import fly_all, own_pool
 from pytest_garl.execution.job import Job
 from pytest_garl.execution.reference import BUILT_IN, Reference
 from pytest_garl.regressions.case import Case
-from pytest_garl.regressions.corpus import every_entry
+from pytest_garl.regressions.corpus import Corpus
 from pytest_garl.scenarios.maps.map import load_map
 
 Found = tuple[Path, Case]
@@ -80,7 +80,7 @@ needs_avx2 = pytest.mark.skipif(not cpu_dispatch.has_baseline(), reason="this CP
 def case_of_each(wanted: Callable[[Case], bool], best: Callable[..., Any]) -> list[Found]:
     """Return a saved case of each landing system: of those wanted the shortest, or the longest."""
     found: dict[str, list[Found]] = {}
-    for entry in every_entry(ROOT / "scenarios" / "regressions", ()):
+    for entry in Corpus(ROOT / "scenarios" / "regressions").all_entries():
         case = entry.case
         if case is not None and not case.changes and wanted(case):
             found.setdefault(case.system, []).append((entry.path, case))
