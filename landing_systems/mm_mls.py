@@ -48,7 +48,7 @@ PATIENCE_S = 45.0
 REFUGE_M = 4.5
 """How high to wait while something is: above people, and above birds that fly at 3 m."""
 
-Place = tuple[float, float, float]
+Vector = tuple[float, float, float]
 
 
 class MultiModuleLandingSystem:
@@ -153,7 +153,7 @@ class MultiModuleLandingSystem:
                 return
 
     def _give_way(
-        self, now: float, decision: Decision, seen: tuple[Detection, ...], at: Place
+        self, now: float, decision: Decision, seen: tuple[Detection, ...], at: Vector
     ) -> Command:
         """Climb straight up, where the UAV came from, without asking the planner."""
         self._decision.interrupt()

@@ -13,7 +13,7 @@ from pytest_garl import Detection, Diagnostics, Mission
 Phase = Literal[
     "take-off", "transit", "search", "confirm", "approach", "descend", "commit", "regain", "abort"
 ]
-Place = tuple[float, float]
+GroundPoint = tuple[float, float]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -64,7 +64,7 @@ class Decision:
 
     phase: Phase
     goal_m: tuple[float, float, float]
-    target_m: Place | None
+    target_m: GroundPoint | None
     note: str = ""
 
     def diagnostics(
@@ -91,13 +91,13 @@ class DecisionModule:
         self._mission = mission
         self._p = parameters or DecisionParameters()
         self._phase: Phase = "take-off"
-        self._target: Place | None = None
+        self._target: GroundPoint | None = None
         self._seen_at = 0.0
-        self._recent: deque[Place | None] = deque(maxlen=self._p.confirm_window)
+        self._recent: deque[GroundPoint | None] = deque(maxlen=self._p.confirm_window)
         self._retries = 0
         self._regain_height = mission.search_altitude_m
-        self._searched: list[Place] = []
-        self._candidate: Place | None = None
+        self._searched: list[GroundPoint] = []
+        self._candidate: GroundPoint | None = None
         self._candidate_at = 0.0
 
     def decide(
@@ -129,7 +129,7 @@ class DecisionModule:
         if self._phase == "commit":
             self._phase = "approach"
 
-    def _spot(self, seen: Iterable[Detection]) -> Place | None:
+    def _spot(self, seen: Iterable[Detection]) -> GroundPoint | None:
         """Pick the detection of the wanted marker, the one nearest to the target if several."""
         good = [
             (item.position_m[0], item.position_m[1])
@@ -142,7 +142,7 @@ class DecisionModule:
         anchor = self._target or self._mission.gps_position_m
         return min(good, key=lambda place: math.dist(place, anchor))
 
-    def _note_sight(self, time_s: float, spot: Place | None) -> None:
+    def _note_sight(self, time_s: float, spot: GroundPoint | None) -> None:
         self._recent.append(spot)
         if spot is None:
             return
@@ -159,7 +159,7 @@ class DecisionModule:
         elif self._agreed() is not None:
             self._target, self._seen_at = self._agreed(), time_s
 
-    def _agreed(self) -> Place | None:
+    def _agreed(self) -> GroundPoint | None:
         """Return the middle of the recent sightings if enough of them agree."""
         places = [place for place in self._recent if place is not None]
         if len(places) < self._p.confirm_count:
@@ -191,7 +191,7 @@ class DecisionModule:
                 return self._go("abort", position, "the marker was not found")
         return self._go("search", (*self._searched[0], mission.search_altitude_m))
 
-    def _pattern(self) -> list[Place]:
+    def _pattern(self) -> list[GroundPoint]:
         """Rings about the told coordinate, out to where the marker may lie at most."""
         gps_x, gps_y = self._mission.gps_position_m
         places = []

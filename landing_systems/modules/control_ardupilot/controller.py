@@ -6,27 +6,15 @@ import math
 from typing import Literal
 
 from landing_systems.modules.control_ardupilot.altitude import VerticalControl
-from landing_systems.modules.control_ardupilot.attitude import AttitudeControl
-from landing_systems.modules.control_ardupilot.descent import (
-    descent_rate,
-    descent_rate_over_target,
-)
 from landing_systems.modules.control_ardupilot.guidance import ZERO, Setpoint, follow
-from landing_systems.modules.control_ardupilot.land_detector import (
-    MAX_TILT_ERROR_RAD,
-    MAX_TILT_REQUEST_RAD,
-    LandDetector,
-)
-from landing_systems.modules.control_ardupilot.mixer import FREE, mixed
+from landing_systems.modules.control_ardupilot.land_detector import LandDetector
+from landing_systems.modules.control_ardupilot.land_mode import LandMode
+from landing_systems.modules.control_ardupilot.motor_output import MotorOutput
 from landing_systems.modules.control_ardupilot.parameters import ArduPilotParameters, tuned
-from landing_systems.modules.control_ardupilot.position import GRAVITY_MPS2, HorizontalControl
-from landing_systems.modules.control_ardupilot.precision_landing import (
-    Instruction,
-    PrecisionLanding,
-)
-from landing_systems.modules.control_ardupilot.rates import RateControl
+from landing_systems.modules.control_ardupilot.position import HorizontalControl
+from landing_systems.modules.control_ardupilot.precision_landing import PrecisionLanding
 from landing_systems.modules.control_ardupilot.rotations import Vector, yaw_of
-from landing_systems.modules.control_ardupilot.shaping import Pair, clamped
+from landing_systems.modules.control_ardupilot.shaping import Pair
 from landing_systems.modules.control_ardupilot.spool import Spool
 from landing_systems.modules.control_ardupilot.vehicle import vehicle_of
 from pytest_garl import Airframe, MotorThrusts, VehicleState
@@ -39,9 +27,6 @@ LIFTED_MPS = 0.10
 """The vehicle has left the ground: engineering choice, above what springs and noise do."""
 MOVING_MPS2 = 3.0
 """ArduPilot does not let the motors idle for a landing while it feels more than this."""
-MIX_UP_PER_S = 2.0
-MIX_DOWN_PER_S = 0.5
-"""ArduPilot's slew rates of the priority of attitude over throttle."""
 
 
 class ArduPilotControl:
@@ -52,36 +37,24 @@ class ArduPilotControl:
     """
 
     def __init__(self, airframe: Airframe, parameters: ArduPilotParameters | None = None) -> None:
-        if not airframe.control_rate_hz:
-            raise ValueError(
-                "ArduPilotControl flies the motors: expected an airframe with a control_rate_hz, "
-                f"found {airframe.control_rate_hz}; declare Airframe(control_rate_hz=240)"
-            )
         vehicle = vehicle_of(airframe)
         self.parameters = parameters or tuned(vehicle.hover_throttle)
         self._full_n = vehicle.max_thrust_n
-        self._dt = 1 / airframe.control_rate_hz
+        self._dt = _control_step_s(airframe)
         self.reset()
 
     def reset(self) -> None:
         """Stand on the ground with the motors off."""
         p, dt = self.parameters, self._dt
         self.mode: Mode = "stopped"
-        self.precision = PrecisionLanding(p)
-        self.instruction: Instruction | None = None
-        """What precision landing wants in this step; None without it."""
+        self._landing = LandMode(p)
         self._horizontal, self._vertical = HorizontalControl(p, dt), VerticalControl(p, dt)
-        self._attitude, self._rates = AttitudeControl(p, dt), RateControl(p, dt)
+        self._motors = MotorOutput(p, dt, self._full_n)
         self._detector, self._spool = LandDetector(dt), Spool(p.mot_spool_time, dt)
-        self._limits = FREE
-        self._mix = p.atc_thr_mix_min
         self._ramp, self._lifted = 0.0, False
-        self._before: Vector | None = None
-        self._time_s = 0.0
-        self._ground_m = 0.0
+        self._velocity: Vector | None = None
+        self._time_s = self._ground_m = self._take_off_m = self._yaw = 0.0
         self._hold: Pair = (0.0, 0.0)
-        self._take_off_m = 0.0
-        self._yaw = 0.0
         self._setpoint: Setpoint | None = None
         self._state: VehicleState | None = None
 
@@ -96,12 +69,15 @@ class ArduPilotControl:
         return self.mode != "stopped" and self._lifted
 
     @property
+    def precision(self) -> PrecisionLanding:
+        """What LAND makes of the measured landing target."""
+        return self._landing.precision
+
+    @property
     def target_position_m(self) -> Vector:
         """The shaped target (x, y, z) that the position loop follows."""
         x, y = self._horizontal.target.position
         return x, y, self._vertical.target.position
-
-    # Orders -----------------------------------------------------------------------------------
 
     def take_off(self, height_m: float) -> None:
         """Start the motors and climb straight up to a height above the ground; then hold.
@@ -155,39 +131,21 @@ class ArduPilotControl:
         if self.mode in ("stopped", "land"):
             return
         self.mode = "land"
-        self._hold = self._horizontal.target.stopping_point()
-        self.precision.begin()
+        self._landing.begin(self._horizontal.target.stopping_point())
 
     def landing_target(self, position_m: Vector, time_s: float) -> None:
         """Take a detector's measurement of the target's place in the world, as of ``time_s``.
 
         It is told before and during LAND; what counts is known 2 s after the first.
         """
-        state = self._state
-        if state is None:
-            return
-        wx, wy, wz = state.angular_velocity_radps
-        self.precision.target.measure(
-            (position_m[0], position_m[1]),
-            time_s,
-            state.position_m[2] - position_m[2],
-            math.sqrt(wx * wx + wy * wy + wz * wz),
-        )
-
-    # One control step -------------------------------------------------------------------------
+        if self._state is not None:
+            self._landing.measure(position_m, time_s, self._state)
 
     def control(self, state: VehicleState) -> MotorThrusts:
         """Return the motor thrusts for the next control step."""
-        velocity = state.velocity_mps
         self._state, self._time_s = state, state.time_s
-        before = self._before or velocity
-        self._before = velocity
-        rate = 1 / self._dt
-        acceleration = (
-            (velocity[0] - before[0]) * rate,
-            (velocity[1] - before[1]) * rate,
-            (velocity[2] - before[2]) * rate,
-        )
+        acceleration = _slope(self._velocity or state.velocity_mps, state.velocity_mps, self._dt)
+        self._velocity = state.velocity_mps
         spool = self._spool.update(self.mode != "stopped")
         if self.mode == "stopped" or spool == "ground idle":
             # ArduPilot disarms when it has landed: the motors stop at once, not by a ramp.
@@ -202,12 +160,10 @@ class ArduPilotControl:
         self._ground_m = z
         self._horizontal.reset((x, y), (0.0, 0.0))
         self._vertical.reset(z, 0.0, 0.0)
-        self._attitude.reset(state.attitude)
-        self._rates.reset()
+        self._motors.reset(state.attitude)
         self._detector.reset(landed=True)
         self._hold = x, y
         self._yaw = yaw_of(state.attitude)
-        self._limits = FREE
 
     def _aim(self, state: VehicleState) -> None:
         """Move the targets by what the mode wants."""
@@ -216,7 +172,9 @@ class ArduPilotControl:
         if not self._lifted:
             self._hold = state.position_m[0], state.position_m[1]
         elif self.mode == "land":
-            self._descend(state)
+            height = state.position_m[2] - self._ground_m
+            maybe = self._detector.maybe_landed
+            self._landing.aim(state, height, horizontal, vertical, maybe_landed=maybe)
         elif self.mode == "guided" and self._setpoint is not None:
             follow(self._setpoint, state.time_s, horizontal, vertical, p)
         else:
@@ -224,64 +182,28 @@ class ArduPilotControl:
             height = self._ground_m + self._take_off_m
             vertical.target.towards(height, 0.0, -p.wpnav_speed_dn, p.wpnav_speed_up)
 
-    def _descend(self, state: VehicleState) -> None:
-        p, horizontal, vertical = self.parameters, self._horizontal, self._vertical
-        x, y, z = state.position_m
-        height = z - self._ground_m
-        rate = descent_rate(height, p)
-        order = None
-        if p.plnd_enabled:
-            order = self.precision.update(state.time_s, state.position_m, height)
-        self.instruction = order
-        if order is not None and order.goal_m is not None:
-            self._hold = order.goal_m[:2]
-            vertical.target.towards(order.goal_m[2], 0.0, -p.wpnav_speed_dn, p.wpnav_speed_up)
-        else:
-            if order is not None and order.target_m is not None:
-                self._hold = order.target_m
-                error = math.dist(order.target_m, (x, y))
-                rate = descent_rate_over_target(rate, height, error, p)
-            elif order is not None and order.action == "hold":
-                rate = 0.0
-            vertical.target.at_velocity(rate)
-        if self._detector.maybe_landed:
-            horizontal.relax((x, y), (state.velocity_mps[0], state.velocity_mps[1]))
-        else:
-            horizontal.target.towards(self._hold, top=p.wpnav_speed)
-
     def _fly(self, state: VehicleState, acceleration: Vector) -> MotorThrusts:
-        p, limits = self.parameters, self._limits
+        motors = self._motors
         x, y, z = state.position_m
         vx, vy, vz = state.velocity_mps
+        wanted: Pair = (0.0, 0.0)
         if self._lifted:
-            ax, ay = self._horizontal.acceleration((x, y), (vx, vy))
-            limited = limits.lower or limits.upper
+            wanted = self._horizontal.acceleration((x, y), (vx, vy))
+            limited = motors.limits.lower or motors.limits.upper
             throttle = self._vertical.throttle(z, vz, acceleration[2], limited)
         else:
-            ax = ay = 0.0
             throttle = self._lift(state)
-        rates = self._attitude.rates((ax, ay, GRAVITY_MPS2), self._yaw, state.attitude)
-        roll, pitch, yaw = self._rates.outputs(rates, state.angular_velocity_radps, limits)
-        tangent = math.sqrt(ax * ax + ay * ay) / GRAVITY_MPS2
-        request = math.atan(tangent)
-        if p.atc_angle_boost:
-            throttle *= math.sqrt(1 + tangent * tangent)
-        self._favour(request, acceleration)
-        lift = max(0.0, throttle)
-        shares, self._limits = mixed(
-            roll,
-            pitch,
-            yaw,
-            throttle,
-            average_max=lift * (1 - self._mix) + p.mot_thst_hover * self._mix,
-            yaw_headroom=p.mot_yaw_headroom,
-            top=self._spool.top,
+        calm = (
+            self._lifted
+            and self._vertical.velocity_target < 0
+            and self._detector.acceleration_mps2 < MOVING_MPS2
+        )
+        thrusts = motors.thrusts(
+            state, wanted, throttle, yaw=self._yaw, top=self._spool.top, calm=calm
         )
         if self._lifted:
-            self._detect(state, acceleration, request)
-        full = self._full_n
-        a, b, c, d = shares
-        return MotorThrusts(newtons=(a * full, b * full, c * full, d * full))
+            self._detect(state, acceleration)
+        return thrusts
 
     def _lift(self, state: VehicleState) -> float:
         """Raise the throttle until the vehicle leaves the ground, then hand it over."""
@@ -295,29 +217,32 @@ class ArduPilotControl:
             self._detector.reset(landed=False)
         return throttle
 
-    def _favour(self, tilt_request_rad: float, acceleration: Vector) -> None:
-        """Choose how far attitude may raise the throttle: little only while coming down."""
-        p = self.parameters
-        calm = (
-            self._lifted
-            and self._vertical.velocity_target < 0
-            and tilt_request_rad < MAX_TILT_REQUEST_RAD
-            and self._attitude.tilt_error_rad < MAX_TILT_ERROR_RAD
-            and self._detector.acceleration_mps2 < MOVING_MPS2
-        )
-        wanted = p.atc_thr_mix_min if calm else p.atc_thr_mix_max
-        up, down = MIX_UP_PER_S * self._dt, MIX_DOWN_PER_S * self._dt
-        self._mix = clamped(wanted, self._mix - down, self._mix + up)
-
-    def _detect(self, state: VehicleState, acceleration: Vector, request: float) -> None:
-        detector = self._detector
-        detector.update(
-            throttle_low=self._limits.lower and self._mix <= self.parameters.atc_thr_mix_min,
-            tilt_request_rad=request,
-            tilt_error_rad=self._attitude.tilt_error_rad,
+    def _detect(self, state: VehicleState, acceleration: Vector) -> None:
+        self._detector.update(
+            throttle_low=self._motors.throttle_low,
+            tilt_request_rad=self._motors.tilt_request_rad,
+            tilt_error_rad=self._motors.tilt_error_rad,
             acceleration=acceleration,
             climb_mps=state.velocity_mps[2],
             height_m=state.position_m[2] - self._ground_m,
         )
-        if detector.landed and self.mode == "land":
+        if self._detector.landed and self.mode == "land":
             self.mode = "stopped"
+
+
+def _control_step_s(airframe: Airframe) -> float:
+    if not airframe.control_rate_hz:
+        raise ValueError(
+            "ArduPilotControl flies the motors: expected an airframe with a control_rate_hz, "
+            f"found {airframe.control_rate_hz}; declare Airframe(control_rate_hz=240)"
+        )
+    return 1 / airframe.control_rate_hz
+
+
+def _slope(before: Vector, now: Vector, dt_s: float) -> Vector:
+    rate = 1 / dt_s
+    return (
+        (now[0] - before[0]) * rate,
+        (now[1] - before[1]) * rate,
+        (now[2] - before[2]) * rate,
+    )

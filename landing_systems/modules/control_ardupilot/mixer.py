@@ -13,7 +13,7 @@ from typing import NamedTuple
 Shares = tuple[float, float, float, float]
 
 
-class Limits(NamedTuple):
+class MotorLimits(NamedTuple):
     """What a mix could not give; integrators look at it."""
 
     tilt: bool = False
@@ -22,7 +22,7 @@ class Limits(NamedTuple):
     upper: bool = False
 
 
-FREE = Limits()
+FREE = MotorLimits()
 
 
 def mixed(
@@ -34,7 +34,7 @@ def mixed(
     average_max: float,
     yaw_headroom: float,
     top: float = 1.0,
-) -> tuple[Shares, Limits]:
+) -> tuple[Shares, MotorLimits]:
     """Return the motors' shares of full thrust and what had to be cut.
 
     A command of 1 on an axis moves every motor by half its range.  ``throttle`` is the wanted
@@ -73,4 +73,4 @@ def mixed(
         level = 1 - high * scale
         upper = True
     shares = level + fl * scale, level + fr * scale, level + rr * scale, level + rl * scale
-    return shares, Limits(cut_tilt, cut_yaw or cut_tilt, lower, upper)
+    return shares, MotorLimits(cut_tilt, cut_yaw or cut_tilt, lower, upper)

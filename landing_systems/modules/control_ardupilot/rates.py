@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from landing_systems.modules.control_ardupilot.mixer import Limits
+from landing_systems.modules.control_ardupilot.mixer import MotorLimits
 from landing_systems.modules.control_ardupilot.parameters import ArduPilotParameters, RatePid
 from landing_systems.modules.control_ardupilot.pid import Pid
 from landing_systems.modules.control_ardupilot.rotations import Vector
@@ -23,7 +23,7 @@ class RateControl:
         for item in (self._roll, self._pitch, self._yaw):
             item.reset()
 
-    def outputs(self, wanted: Vector, measured: Vector, limits: Limits) -> Vector:
+    def outputs(self, wanted: Vector, measured: Vector, limits: MotorLimits) -> Vector:
         """Return roll, pitch and yaw; ``limits`` are those of the last mix."""
         roll = self._roll.update(wanted[0], measured[0], limits.tilt)
         pitch = self._pitch.update(wanted[1], measured[1], limits.tilt)

@@ -149,22 +149,32 @@ def main(
     # What is shipped is replaced only by what has been calibrated.
     draft = place / "draft.json"
     write_weights(draft, networks, (1.0, 0.0), about)
-    logits, right = calibration_set(draft, seed, calibration_scenarios, court=not without_court)
+    curve, about["calibrated_on"] = _calibrate(
+        draft, seed, calibration_scenarios, not without_court
+    )
+    about["minutes_of_this_call"] = round((time.perf_counter() - began) / 60, 1)
+    write_weights(out, networks, curve, about)
+    size = sum(len(content) for content in networks.values()) / 1e6
+    detections = about["calibrated_on"]["detections"]
+    click.echo(f"{out}: {size:.2f} MB of weights, calibrated on {detections} detections")
+
+
+def _calibrate(
+    draft: Path, seed: int, scenarios: int, court: bool
+) -> tuple[tuple[float, float], dict[str, float]]:
+    """Return slope and offset of the confidences' curve, and what it was fitted on."""
+    logits, right = calibration_set(draft, seed, scenarios, court=court)
     try:
         slope, offset = calibration.fit(logits, right)
     except ValueError as error:
         raise click.ClickException(str(error)) from error
     confidences = 1 / (1 + np.exp(-(slope * np.array(logits) + offset)))
     bins = calibration.reliability(confidences.tolist(), right)
-    about["calibrated_on"] = {
+    return (round(slope, 6), round(offset, 6)), {
         "detections": len(right),
         "right": sum(right),
         "error": round(calibration.calibration_error(bins), 4),
     }
-    about["minutes_of_this_call"] = round((time.perf_counter() - began) / 60, 1)
-    write_weights(out, networks, (round(slope, 6), round(offset, 6)), about)
-    size = sum(len(content) for content in networks.values()) / 1e6
-    click.echo(f"{out}: {size:.2f} MB of weights, calibrated on {len(right)} detections")
 
 
 def _reader(plan: IdentityPlan, place: Path, shards: int, device: str) -> IdentityNet:
