@@ -15,7 +15,7 @@ from contextlib import ExitStack, contextmanager
 from pathlib import Path
 
 from landing_systems.opencv_mls import OpenCvLandingSystem
-from pytest_garl.adversary.scripted import policy_spec
+from pytest_garl.adversary.catalogue import policy_spec
 from pytest_garl.baselines.record import Survey
 from pytest_garl.execution.batch import fly_all
 from pytest_garl.execution.job import Job

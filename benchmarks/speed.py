@@ -25,11 +25,11 @@ from landing_systems.modules.movement_watch import MovementWatch
 from landing_systems.modules.planning_ego import EgoPlanner
 from landing_systems.opencv_mls import OpenCvLandingSystem
 from landing_systems.tphyolo_mls import TphYoloLandingSystem
-from pytest_garl.adversary.scripted import policy_spec
+from pytest_garl.adversary.catalogue import policy_spec
 from pytest_garl.landing_system import Camera
 from pytest_garl.scenarios.genes import genome_for
 from pytest_garl.scenarios.maps.map import load_map
-from pytest_garl.search.methods.random_search import propose
+from pytest_garl.search.methods.random import propose
 from pytest_garl.simulation.camera.renderer import Renderer
 from pytest_garl.simulation.fly import fly
 from pytest_garl.simulation.physics.npc import Npc

@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from pytest_garl import cpu_dispatch
-from pytest_garl.adversary.scripted import policy_spec
+from pytest_garl.adversary.catalogue import policy_spec
 from pytest_garl.errors import LandingSystemError
 from pytest_garl.execution.job import PAPER_LIMIT_S
 from pytest_garl.execution.metering import Meter, OutOfTimeError
@@ -24,7 +24,7 @@ from pytest_garl.scenarios.genes import genome_for
 from pytest_garl.scenarios.maps.map import Map, load_map
 from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.scenarios.validity import repair
-from pytest_garl.search.methods.random_search import propose
+from pytest_garl.search.methods.random import propose
 from pytest_garl.simulation.flight import Flight
 from pytest_garl.simulation.flight_file import parted_s
 from pytest_garl.simulation.fly import fly

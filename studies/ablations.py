@@ -21,7 +21,7 @@ import numpy as np
 from scipy.stats import t
 
 from pytest_garl import cpu_dispatch
-from pytest_garl.adversary.scripted import policy_spec
+from pytest_garl.adversary.catalogue import policy_spec
 from pytest_garl.adversary.training.uav_models import AvoidingPilot
 from pytest_garl.landing_system import Abort, Command, Observation
 from pytest_garl.scenarios.chromosome import encode

@@ -16,11 +16,11 @@ from pathlib import Path
 from typing import Any
 
 from pytest_garl import cpu_dispatch
-from pytest_garl.adversary.scripted import policy_spec
+from pytest_garl.adversary.catalogue import policy_spec
 from pytest_garl.scenarios.genes import WEATHER, genome_for
 from pytest_garl.scenarios.maps.map import load_map
 from pytest_garl.scenarios.scenario import Scenario
-from pytest_garl.search.methods.random_search import propose
+from pytest_garl.search.methods.random import propose
 from pytest_garl.simulation.npc_policy import PolicySpec
 from studies.oracle import oracle_spec
 from studies.rows import append, read, share

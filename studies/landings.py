@@ -16,14 +16,14 @@ from typing import Any
 
 import numpy as np
 
-from pytest_garl.adversary.scripted import policy_spec
+from pytest_garl.adversary.catalogue import policy_spec
 from pytest_garl.scenarios.bodies import Body, Part
 from pytest_garl.scenarios.chromosome import decode
 from pytest_garl.scenarios.genes import genome_for
 from pytest_garl.scenarios.maps.map import Map, load_map
 from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.scenarios.validity import UAV_CLEARANCE_M, repair
-from pytest_garl.search.methods.random_search import propose
+from pytest_garl.search.methods.random import propose
 from pytest_garl.simulation.fly import fly
 
 SEED = 1

@@ -21,9 +21,9 @@ import torch
 from rich.progress import Progress
 
 from pytest_garl import cpu_dispatch
-from pytest_garl.adversary.learned import WEIGHTS, save
+from pytest_garl.adversary.catalogue import WEIGHTS, policy_spec
+from pytest_garl.adversary.learned import save
 from pytest_garl.adversary.observations import VIEWS
-from pytest_garl.adversary.scripted import policy_spec
 from pytest_garl.adversary.training import rewards
 from pytest_garl.adversary.training.dqn import Experience, Learner, Training
 from pytest_garl.adversary.training.episode import Episode, draw_episode
@@ -31,7 +31,7 @@ from pytest_garl.adversary.training.uav_models import AvoidingPilot, Caution, Ha
 from pytest_garl.scenarios.genes import WEATHER, genome_for
 from pytest_garl.scenarios.maps.map import Map, load_map
 from pytest_garl.scenarios.scenario import Scenario
-from pytest_garl.search.methods.random_search import propose
+from pytest_garl.search.methods.random import propose
 from studies.adversary import CHUNK, MAPS, SYSTEMS
 from studies.rows import append, read, share
 

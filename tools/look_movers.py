@@ -15,12 +15,12 @@ import cv2
 import numpy as np
 
 from landing_systems.opencv_mls import OpenCvLandingSystem
-from pytest_garl.adversary.scripted import policy_spec
+from pytest_garl.adversary.catalogue import policy_spec
 from pytest_garl.landing_system import Camera
 from pytest_garl.scenarios.genes import WEATHER, genome_for
 from pytest_garl.scenarios.maps.map import Map, load_map
 from pytest_garl.scenarios.scenario import Scenario
-from pytest_garl.search.methods.random_search import propose
+from pytest_garl.search.methods.random import propose
 from pytest_garl.simulation.camera.renderer import Renderer
 from pytest_garl.simulation.flight import Flight
 from pytest_garl.simulation.fly import fly

@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from pytest_garl.adversary.catalogue import WEIGHTS
 from pytest_garl.adversary.observations import VIEWS, on_turn
 from pytest_garl.errors import PolicyError
 from pytest_garl.files.arrays import unpack
@@ -23,7 +24,6 @@ from pytest_garl.messages import listed, shown
 from pytest_garl.simulation.npc_policy import STAY, Move, PolicySpec, Situation
 
 Array = NDArray[np.float64]
-WEIGHTS = Path(__file__).with_name("weights")
 FORMAT = 1
 _LARGEST = MEGABYTE
 """Bytes of weights, packed or not: two hundred times those that are shipped."""
@@ -108,7 +108,7 @@ def read_manifest(path: Path) -> dict[str, Any]:
     """Return the manifest of weights at ``path``; raise PolicyError where it is no manifest."""
     if not path.is_file():
         raise PolicyError(
-            f"object policy: there are no weights at {path}; expected a file of `garl train`"
+            f"NPC policy: there are no weights at {path}; expected a file of `garl train`"
         )
     file = path.with_suffix(".json")
     try:
@@ -168,4 +168,4 @@ def _path(name: str) -> Path:
 
 
 def _wrong(path: Path, problem: str) -> PolicyError:
-    return PolicyError(f"object policy: {path} {problem}{_REMEDY}")
+    return PolicyError(f"NPC policy: {path} {problem}{_REMEDY}")

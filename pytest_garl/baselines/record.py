@@ -8,7 +8,8 @@ from dataclasses import dataclass, field
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
-from pytest_garl.adversary.scripted import check_policy, policy_spec
+from pytest_garl.adversary.catalogue import policy_spec
+from pytest_garl.adversary.policy_check import check_policy
 from pytest_garl.baselines.comparison import LEVEL, Comparison, compare
 from pytest_garl.baselines.file import Baseline, BaselineError, Sample, SampleSet
 from pytest_garl.baselines.pairs import Answer, Pair, answer_of
@@ -24,7 +25,7 @@ from pytest_garl.regressions.robustness import COUNT, neighbours
 from pytest_garl.scenarios.genes import WeatherRange, genome_for
 from pytest_garl.scenarios.maps.map import Map, load_map
 from pytest_garl.scenarios.scenario import Scenario
-from pytest_garl.search.methods.random_search import propose
+from pytest_garl.search.methods.random import propose
 from pytest_garl.simulation.npc_policy import PolicySpec
 from pytest_garl.verdicts.verdict import Limits
 

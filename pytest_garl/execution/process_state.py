@@ -16,11 +16,13 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any
 
+from pytest_garl.adversary.catalogue import scripted_policies
+
 OURS = "pytest_garl"
 FLYING = (
     "adversary.learned",
     "adversary.recorded",
-    "adversary.scripted",
+    *(f"adversary.policies.{name}" for name in scripted_policies()),
     "execution.job",
     "simulation.flight_file",
     "simulation.fly",

@@ -10,18 +10,8 @@ from collections import namedtuple
 
 import pytest
 
-METHODS = ("garl", "garl-paper", "ga", "offline-rl", "online-rl", "random", "surrogate-random")
-POLICIES = (
-    "dqn",
-    "dqn-paper",
-    "online-rl",
-    "greedy",
-    "stand",
-    "destination",
-    "waypoint",
-    "random_walk",
-    "stationary",
-)
+from pytest_garl.adversary.catalogue import DEFAULT_POLICY, policy_names
+from pytest_garl.search.catalogue import DEFAULT_METHOD, method_names
 
 Option = namedtuple("Option", ["name", "metavar", "help", "default"], defaults=[""])
 """One option: its name without ``garl-``, default, and what ``--help`` says."""
@@ -43,8 +33,9 @@ OPTIONS = (
     Option(
         name="method",
         metavar="METHOD",
-        default="garl",
-        help=f"Search method: {', '.join(METHODS)}, or your own as module:factory (default: garl).",
+        default=DEFAULT_METHOD,
+        help=f"Search method: {', '.join(method_names())}, or your own as module:factory "
+        f"(default: {DEFAULT_METHOD}).",
     ),
     Option(
         name="population",
@@ -123,10 +114,9 @@ OPTIONS = (
     Option(
         name="npcs",
         metavar="POLICY",
-        help=f"NPC policy, which moves people, dogs and birds: {', '.join(POLICIES)}, or weights "
-        "(.npz) that `garl train` wrote (default: dqn; dqn-paper for the methods garl-paper and "
-        "surrogate-random, online-rl for online-rl, waypoint for random, destination for ga and "
-        "offline-rl; with --garl-repeat the policy of the search).",
+        help=f"NPC policy, which moves people, dogs and birds: {', '.join(policy_names())}, or "
+        f"weights (.npz) that `garl train` wrote (default: {DEFAULT_POLICY}; the methods of the "
+        "paper have their own, see docs/methods.md; with --garl-repeat the policy of the search).",
     ),
 )
 

@@ -9,7 +9,7 @@ from typing import Any
 
 import pytest
 
-from pytest_garl.adversary.scripted import policy_spec
+from pytest_garl.adversary.catalogue import policy_spec
 from pytest_garl.baselines.comparison import Comparison
 from pytest_garl.baselines.file import Baseline, SampleSet, load
 from pytest_garl.baselines.pairs import Fate

@@ -30,7 +30,7 @@ def garl_slot(request: pytest.FixtureRequest) -> Target:
 @pytest.fixture(scope="session")
 def npcs(request: pytest.FixtureRequest) -> PolicySpec:
     """Return who moves the dynamic objects; override it in a conftest.py to change that."""
-    from pytest_garl.adversary.scripted import policy_spec
+    from pytest_garl.adversary.catalogue import policy_spec
 
     run = request.config.stash.get(RUN, None)
     return policy_spec(run.options.npcs if run else "dqn")
@@ -38,7 +38,7 @@ def npcs(request: pytest.FixtureRequest) -> PolicySpec:
 
 def checked_policy(given: object) -> PolicySpec:
     """Return what the fixture ``npcs`` names; raise PolicyError for what names no policy."""
-    from pytest_garl.adversary.scripted import policy_spec
+    from pytest_garl.adversary.catalogue import policy_spec
     from pytest_garl.errors import PolicyError
     from pytest_garl.simulation.npc_policy import PolicySpec
 

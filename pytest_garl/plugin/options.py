@@ -11,8 +11,10 @@ from typing import TYPE_CHECKING, Any, Literal, cast
 
 import pytest
 
+from pytest_garl.adversary.catalogue import policy_names
 from pytest_garl.errors import GarlError
-from pytest_garl.plugin.arguments import METHODS, OPTIONS, POLICIES, Option
+from pytest_garl.plugin.arguments import OPTIONS, Option
+from pytest_garl.search.catalogue import default_policy, find_method, method_names
 
 if TYPE_CHECKING:
     from pytest_garl.regressions.corpus import Corpus
@@ -196,9 +198,7 @@ def _among(name: str, text: str, known: tuple[str, ...]) -> str:
 
 def _method(text: str) -> str:
     if ":" not in text:
-        return _among("method", text, METHODS)
-    from pytest_garl.search.catalogue import find_method
-
+        return _among("method", text, method_names())
     try:
         find_method(text)
     except GarlError as error:
@@ -206,24 +206,13 @@ def _method(text: str) -> str:
     return text
 
 
-POLICY_OF = {
-    "garl-paper": "dqn-paper",
-    "ga": "destination",
-    "offline-rl": "destination",
-    "online-rl": "online-rl",
-    "random": "waypoint",
-    "surrogate-random": "dqn-paper",
-}
-"""Who moves objects where nobody says: what is part of each of the paper's methods."""
-
-
 def _npcs(text: str, method: str) -> str:
     if not text:
-        return POLICY_OF.get(method, "dqn")
-    if text in POLICIES:
+        return default_policy(method)
+    if text in policy_names():
         return text
     if not text.endswith(".npz"):
-        expected = f"one of {', '.join(POLICIES)}, or weights (.npz) that `garl train` wrote"
+        expected = f"one of {', '.join(policy_names())}, or weights (.npz) that `garl train` wrote"
         raise _wrong("npcs", text, expected)
     return text
 

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any, TextIO
 
 import pytest
 
+from pytest_garl.adversary.catalogue import policy_names
 from pytest_garl.errors import LedgerError
 from pytest_garl.execution.database import SearchKind
 from pytest_garl.execution.ledger import Ledger
@@ -19,7 +20,6 @@ from pytest_garl.execution.pool import Pool, wait_for
 from pytest_garl.execution.reference import BUILT_IN, Reference, reference_to, simulator_sha256
 from pytest_garl.execution.slot import Slot, flight_name
 from pytest_garl.execution.sources import combined_sha256, data_files, sources_of
-from pytest_garl.plugin.arguments import POLICIES
 from pytest_garl.plugin.collection import repeated
 from pytest_garl.plugin.keys import is_xdist_worker, target_of
 from pytest_garl.plugin.options import Options
@@ -309,7 +309,7 @@ class Run:
                 self._add(search, wanted, npcs)
 
     def _add(self, search: str, wanted: Mapping[Slot, Target], npcs: PolicySpec) -> None:
-        from pytest_garl.adversary.scripted import check_policy
+        from pytest_garl.adversary.policy_check import check_policy
         from pytest_garl.execution.job import loads
         from pytest_garl.scenarios.maps.map import load_map
         from pytest_garl.search.breeder import Breeder
@@ -394,20 +394,20 @@ def reflight_key(target: Target, index: int) -> str:
 
 def _steered(target: Target, npcs: PolicySpec) -> PolicySpec:
     """Return who moves the objects: a case's are those of its record, or of its policy."""
+    from pytest_garl.adversary.catalogue import policy_spec
     from pytest_garl.adversary.recorded import recorded_spec
-    from pytest_garl.adversary.scripted import policy_spec
 
     case = target.entry.case if target.entry else None
     if case is None:
         return npcs
     if not target.live:
         return recorded_spec(dict(case.moves), dict(case.changes))
-    return policy_spec(case.policy) if case.policy in POLICIES else npcs
+    return policy_spec(case.policy) if case.policy in policy_names() else npcs
 
 
 def _of_today(npcs: PolicySpec) -> PolicySpec:
     """Return a policy with the weights that its file holds today."""
-    from pytest_garl.adversary.scripted import policy_spec
+    from pytest_garl.adversary.catalogue import policy_spec
 
     weights = str(dict(npcs.arguments).get("weights", ""))
     return replace(npcs, arguments=policy_spec(weights).arguments) if weights else npcs

@@ -11,7 +11,7 @@ from typing import Any, TextIO
 
 import pytest
 
-from pytest_garl.adversary.scripted import policy_spec
+from pytest_garl.adversary.catalogue import policy_spec
 from pytest_garl.errors import LedgerError
 from pytest_garl.execution.ledger import Ledger
 from pytest_garl.execution.local_pool import local_pool

@@ -8,8 +8,8 @@ from pathlib import Path
 from typing import Literal
 
 from pytest_garl import cpu_dispatch
+from pytest_garl.adversary.catalogue import policy_spec
 from pytest_garl.adversary.recorded import recorded_spec
-from pytest_garl.adversary.scripted import policy_spec
 from pytest_garl.errors import GarlError, LandingSystemError
 from pytest_garl.execution.job import PAPER_LIMIT_S
 from pytest_garl.execution.reference import (

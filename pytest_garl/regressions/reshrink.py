@@ -9,7 +9,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
-from pytest_garl.adversary.scripted import policy_spec
+from pytest_garl.adversary.catalogue import policy_spec
 from pytest_garl.execution.batch import own_pool
 from pytest_garl.execution.job import Job
 from pytest_garl.execution.on_demand import Errands, Fly

@@ -1,46 +1,61 @@
-"""The search methods by name; each is one module behind one interface."""
+"""The search methods by name, without the cost of importing them.
+
+A shipped method is one module in ``search/methods/`` that declares ``METHOD``.  The method has the
+name of the file, with dashes for underscores.  A user's own method is named "module:factory".
+
+Every pytest run imports this module for ``--help``, so only the module of the method in use is
+imported.
+"""
 
 from __future__ import annotations
 
+import functools
 import importlib
-import itertools
-import math
-import reprlib
-import traceback
-from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from types import MappingProxyType
-from typing import NoReturn, TypeVar
+from typing import TYPE_CHECKING
 
+from pytest_garl.adversary.catalogue import DEFAULT_POLICY
 from pytest_garl.errors import GarlError
-from pytest_garl.scenarios.scenario import Scenario
-from pytest_garl.search.method import Flown, Method, Plan
 
-T = TypeVar("T")
+if TYPE_CHECKING:
+    from collections.abc import Callable
 
-METHODS: Mapping[str, str] = MappingProxyType(
-    {
-        "garl": "pytest_garl.search.methods.garl:Garl",
-        "garl-paper": "pytest_garl.search.methods.garl_paper:method",
-        "ga": "pytest_garl.search.methods.ga:method",
-        "offline-rl": "pytest_garl.search.methods.offline_rl:method",
-        "online-rl": "pytest_garl.search.methods.online_rl:method",
-        "random": "pytest_garl.search.methods.random_search:RandomSearch",
-        "surrogate-random": "pytest_garl.search.methods.surrogate_random:method",
-    }
-)
-"""Where each method is made, so that only the one in use is imported."""
+    from pytest_garl.search.method import Method, MethodDeclaration, Plan
+
+DEFAULT_METHOD = "garl"
+
+
+@functools.cache
+def method_names() -> tuple[str, ...]:
+    """Return the names of all shipped methods."""
+    files = Path(__file__).with_name("methods").iterdir()
+    modules = (file.stem for file in files if file.suffix == ".py" and file.stem != "__init__")
+    return tuple(sorted(name.replace("_", "-") for name in modules))
+
+
+def declaration_of(name: str) -> MethodDeclaration:
+    """Return what the module of a shipped method declares."""
+    module = importlib.import_module(f"{_PACKAGE}.{name.replace('-', '_')}")
+    found: MethodDeclaration = module.METHOD
+    return found
+
+
+def default_policy(name: str) -> str:
+    """Return the NPC policy that belongs to a method, for searches that name no policy."""
+    return declaration_of(name).policy if name in method_names() else DEFAULT_POLICY
 
 
 def find_method(name: str) -> Callable[[Plan], Method]:
     """Return the factory of a shipped method, or of one named "module:factory"."""
-    module, _, attribute = METHODS.get(name, name).partition(":")
+    if name in method_names():
+        return declaration_of(name).make
+    module, _, attribute = name.partition(":")
     try:
         make: Callable[[Plan], Method] = getattr(importlib.import_module(module), attribute)
     except (ImportError, AttributeError, ValueError) as error:
         raise GarlError(
             f"search method {name!r}: cannot be loaded ({error}); expected one of "
-            f"{', '.join(METHODS)}, or 'module:factory' of an importable module"
+            f"{', '.join(method_names())}, or 'module:factory' of an importable module"
         ) from error
     return make
 
@@ -48,58 +63,23 @@ def find_method(name: str) -> Callable[[Plan], Method]:
 def make_method(name: str, plan: Plan) -> Method:
     """Return a fresh search by the method called ``name``.
 
-    Raises GarlError, there and later, where a user's own method raises or returns nonsense.
+    Raises GarlError if the method needs an extra that is not installed.  For a user's own method,
+    this function and the method that it returns raise GarlError if the method raises or returns
+    something invalid.
     """
     make = find_method(name)
-    return make(plan) if name in METHODS else _Own(name, make, plan)
+    if name not in method_names():
+        from pytest_garl.search.own_method import OwnMethod
 
-
-class _Own:
-    """A user's own method; whatever is wrong with it is one error that names it."""
-
-    def __init__(self, name: str, make: Callable[[Plan], Method], plan: Plan) -> None:
-        self._name, self._population = name, plan.population
-        self._method = self._call("the factory", lambda: make(plan))
-        missing = [each for each in ("learns", "ask", "tell") if not hasattr(self._method, each)]
-        if missing:
-            self._refuse("the factory", self._method, f"a method with {', '.join(missing)}")
-
-    @property
-    def learns(self) -> bool:
-        return bool(self._method.learns)
-
-    def ask(self) -> Sequence[Scenario]:
-        found = self._call("ask()", self._method.ask)
-        right = isinstance(found, Sequence) and all(isinstance(each, Scenario) for each in found)
-        if not right or len(found) < self._population:
-            self._refuse("ask()", found, f"a list of {self._population} pytest_garl scenarios")
-        return found
-
-    def tell(self, flown: Sequence[Flown]) -> Sequence[tuple[float, ...]]:
-        told = self._call("tell()", lambda: self._method.tell(flown))
-        try:
-            found = [tuple(float(value) for value in each) for each in told]
-        except (TypeError, ValueError):
-            found = []
-        if len(found) != len(flown) or not all(map(math.isfinite, itertools.chain(*found))):
-            expected = f"a list of {len(flown)} tuples of finite numbers, one for each flight"
-            self._refuse("tell()", told, expected)
-        return found
-
-    def _call(self, what: str, function: Callable[[], T]) -> T:
-        try:
-            return function()
-        except Exception as error:
-            # Not ours to name: it is a user's code.
-            frame = traceback.extract_tb(error.__traceback__)[-1]
-            raise GarlError(
-                f"search method {self._name!r}: {what} raised {type(error).__name__}: {error} "
-                f"({Path(frame.filename).name}:{frame.lineno})"
-            ) from error
-
-    def _refuse(self, what: str, found: object, expected: str) -> NoReturn:
-        shown = reprlib.repr(found)
+        return OwnMethod(name, make, plan)
+    try:
+        return make(plan)
+    except ImportError as error:
         raise GarlError(
-            f"search method {self._name!r}: {what} returned {shown}, expected {expected} "
-            "(pytest_garl.search.method.Method tells more)"
-        )
+            f"the search method {name} needs more than flying does ({error}): "
+            f"pip install 'pytest-garl[{declaration_of(name).extra}]', or choose another "
+            "--garl-method"
+        ) from error
+
+
+_PACKAGE = f"{__package__}.methods"

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any, Protocol
 
@@ -45,3 +45,17 @@ class Method(Protocol):
 
     def tell(self, flown: Sequence[Flown]) -> Sequence[tuple[float, ...]]:
         """Learn from the generation; return each flight's objectives, for the ledger."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class MethodDeclaration:
+    """What a module of ``search/methods/`` declares as ``METHOD``.
+
+    ``make`` starts a search.  It may import what only this method needs.
+    """
+
+    make: Callable[[Plan], Method]
+    policy: str
+    """The NPC policy that belongs to the method; ``--garl-npcs`` overrides it."""
+    extra: str = ""
+    """The extra of pytest-garl that the method needs."""

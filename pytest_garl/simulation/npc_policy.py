@@ -89,7 +89,7 @@ class ObjectPolicy(Protocol):
 
 def decision(policy: ObjectPolicy, situation: Situation) -> Move:
     """Return the policy's move; raise PolicyError if it raises or answers what is no move."""
-    name = f"object policy {type(policy).__name__}, deciding for {situation.self.name}"
+    name = f"NPC policy {type(policy).__name__}, deciding for {situation.self.name}"
     try:
         move = policy.decide(situation)
     except Exception as error:
@@ -143,7 +143,7 @@ class PolicySpec:
             factory = getattr(importlib.import_module(module), attribute)
         except (ImportError, AttributeError) as error:
             raise PolicyError(
-                f"object policy {self.name!r}: {self.factory!r} cannot be loaded ({error}); "
+                f"NPC policy {self.name!r}: {self.factory!r} cannot be loaded ({error}); "
                 "expected 'module:attribute' of an importable module"
             ) from error
         try:
@@ -152,7 +152,7 @@ class PolicySpec:
             raise
         except Exception as error:
             raise PolicyError(
-                f"object policy {self.name!r}: {self.factory} with {dict(self.arguments)} raised "
+                f"NPC policy {self.name!r}: {self.factory} with {dict(self.arguments)} raised "
                 f"{type(error).__name__}: {error}"
             ) from error
         return policy

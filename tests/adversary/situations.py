@@ -1,11 +1,14 @@
 from __future__ import annotations
 
+import numpy as np
+
+from pytest_garl.adversary.catalogue import policy_spec
 from pytest_garl.scenarios.chromosome import decode
 from pytest_garl.scenarios.genes import genome_for
 from pytest_garl.scenarios.maps.map import load_map
 from pytest_garl.scenarios.object_types import OBJECT_TYPES
 from pytest_garl.scenarios.scenario import Scenario
-from pytest_garl.simulation.npc_policy import ObjectState, Situation
+from pytest_garl.simulation.npc_policy import DECISION_STEP_S, ObjectState, Situation
 
 MAP = load_map("court")
 GENOME = genome_for(MAP)
@@ -42,3 +45,17 @@ def situation(
         map=MAP,
         scenario=scenario,
     )
+
+
+def walk(name: str, start: tuple[float, float], decisions: int) -> list[tuple[float, float]]:
+    """Walk without inertia around a marker at (3, 1)."""
+    policy = policy_spec(name).make()
+    place, path = start, [start]
+    policy.reset(situation(being(place), marker=(3, 1)), np.random.default_rng(0))
+    for _ in range(decisions):
+        me = being(place)
+        move = policy.decide(situation(me, marker=(3, 1)))
+        step = me.speed_mps * DECISION_STEP_S
+        place = (place[0] + step * move.x, place[1] + step * move.y)
+        path.append(place)
+    return path

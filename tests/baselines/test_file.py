@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from pytest_garl.adversary.scripted import policy_spec
+from pytest_garl.adversary.catalogue import policy_spec
 from pytest_garl.baselines.file import (
     Baseline,
     BaselineError,
@@ -40,7 +40,7 @@ from pytest_garl.regressions.robustness import neighbours
 from pytest_garl.scenarios.genes import WIND, genome_for, with_destinations
 from pytest_garl.scenarios.maps.map import load_map
 from pytest_garl.scenarios.scenario import Scenario
-from pytest_garl.search.methods.random_search import propose
+from pytest_garl.search.methods.random import propose
 from pytest_garl.verdicts.verdict import Limits
 
 LAWN, COURT = load_map("lawn"), load_map("court")

@@ -101,7 +101,7 @@ def test_a_system_that_one_checkout_lacks_is_a_clear_error(checkouts: Path) -> N
         ((), "found neither --system nor --from-ledger"),
         (("--system=stack.system:Lander", "--maps=moon"), "unknown map 'moon'"),
         (("--system=stack.system:Lander", "--maps=,"), "found ',', expected names such as"),
-        (("--system=stack.system:Lander", "--npcs=cats"), "unknown object policy 'cats'"),
+        (("--system=stack.system:Lander", "--npcs=cats"), "unknown NPC policy 'cats'"),
         (("--system=stack.system:Lander", "--simulator=mine"), "expected MODULE:FUNCTION"),
         (("--from-ledger=.garl/ledger.sqlite",), "there is no ledger"),
     ],

@@ -6,7 +6,7 @@ from typing import Any
 
 import pytest
 
-from pytest_garl.adversary.scripted import policy_spec
+from pytest_garl.adversary.catalogue import policy_spec
 from pytest_garl.baselines.record import Survey
 from pytest_garl.errors import LedgerError
 from pytest_garl.execution.batch import fly_all, own_pool

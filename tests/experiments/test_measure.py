@@ -6,7 +6,7 @@ import pytest
 from pytest_garl.experiments.measure import chromosomes
 from pytest_garl.scenarios.genes import genome_for, with_destinations
 from pytest_garl.scenarios.maps.map import load_map
-from pytest_garl.search.methods.random_search import propose
+from pytest_garl.search.methods.random import propose
 
 MAP = load_map("lawn")
 

@@ -88,7 +88,7 @@ def test_objects_may_be_steered_by_another_policy_than_the_searchs_own(tmp_path:
     ("method", "words"),
     [
         ("gral with dqn", "search method 'gral'"),
-        ("garl with dnq", "unknown object policy 'dnq'; expected one of"),
+        ("garl with dnq", "unknown NPC policy 'dnq'; expected one of"),
     ],
 )
 def test_an_unknown_search_or_policy_is_found_before_anything_flies(

@@ -7,7 +7,7 @@ import pytest
 
 from landing_systems.mm_mls import MultiModuleLandingSystem
 from landing_systems.tphyolo_mls import TphYoloLandingSystem
-from pytest_garl.adversary.scripted import policy_spec
+from pytest_garl.adversary.catalogue import policy_spec
 from pytest_garl.scenarios.chromosome import decode
 from pytest_garl.scenarios.genes import genome_for
 from pytest_garl.scenarios.maps.map import Map, load_map

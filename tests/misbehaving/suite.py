@@ -16,7 +16,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from pytest_garl.adversary.scripted import policy_spec
+from pytest_garl.adversary.catalogue import policy_spec
 from pytest_garl.errors import GarlError
 from pytest_garl.execution.batch import fly_all, own_pool
 from pytest_garl.execution.ledger import Ledger

@@ -159,7 +159,7 @@ def test_a_command_to_keep_patches_names_those_of_this_run(
     ("fixture", "told"),
     [
         ("return 'waypoint'", ""),
-        ("return 'wayponit'", "unknown object policy 'wayponit'; expected one of"),
+        ("return 'wayponit'", "unknown NPC policy 'wayponit'; expected one of"),
         (
             "return 3",
             "fixture npcs: found 3, expected the name of a policy as --garl-npcs takes it",

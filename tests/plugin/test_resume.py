@@ -15,7 +15,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from pytest_garl.adversary.learned import WEIGHTS, Network, save
+from pytest_garl.adversary.catalogue import WEIGHTS
+from pytest_garl.adversary.learned import Network, save
 from tests.plugin.test_plugin import project, result_hash, run
 
 SLOW = """

@@ -10,7 +10,7 @@ from typing import Any
 
 import pytest
 
-from pytest_garl.adversary.scripted import policy_spec
+from pytest_garl.adversary.catalogue import policy_spec
 from pytest_garl.execution.on_demand import Done
 from pytest_garl.plugin.run import _steered
 from pytest_garl.regressions.case import Case

@@ -8,8 +8,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from pytest_garl.adversary.catalogue import policy_spec
 from pytest_garl.adversary.recorded import LANDING_ZONE_M, recorded_spec
-from pytest_garl.adversary.scripted import policy_spec
 from pytest_garl.errors import PolicyError
 from pytest_garl.regressions.move_reduction import _round, shorter_records
 from pytest_garl.regressions.robustness import neighbours
@@ -18,7 +18,7 @@ from pytest_garl.scenarios.genes import genome_for
 from pytest_garl.scenarios.maps.map import load_map
 from pytest_garl.scenarios.placement import start_genes
 from pytest_garl.scenarios.validity import problems
-from pytest_garl.search.methods.random_search import propose
+from pytest_garl.search.methods.random import propose
 from pytest_garl.simulation.fly import fly
 from pytest_garl.simulation.system_under_test.reference_pilot import ReferencePilot
 

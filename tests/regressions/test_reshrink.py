@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-from pytest_garl.adversary.scripted import policy_spec
+from pytest_garl.adversary.catalogue import policy_spec
 from pytest_garl.execution.job import Job
 from pytest_garl.execution.on_demand import Done
 from pytest_garl.execution.reference import BUILT_IN, Reference, simulator_sha256

@@ -10,9 +10,9 @@ from pytest_garl.execution.slot import Slot, population, slots
 from pytest_garl.scenarios.genes import genome_for
 from pytest_garl.scenarios.maps.map import load_map
 from pytest_garl.search.breeder import Breeder
-from pytest_garl.search.catalogue import METHODS, make_method
+from pytest_garl.search.catalogue import make_method, method_names
 from pytest_garl.search.method import Plan
-from tests.search.methods.test_nsga2 import result
+from tests.search.searches import result
 
 MAP = load_map("court")
 GENOME = genome_for(MAP)
@@ -37,7 +37,7 @@ def searched(path: Path, name: str, budget: int, wanted: tuple[Slot, ...] = ()) 
 
 
 # Two more fly the scenarios of random search, each with other objects.
-@pytest.mark.parametrize("name", sorted({*METHODS} - {"surrogate-random", "online-rl"}))
+@pytest.mark.parametrize("name", sorted({*method_names()} - {"surrogate-random", "online-rl"}))
 def test_every_budget_is_flown_exactly(tmp_path: Path, name: str) -> None:
     for budget in range(1, 61):
         ledger = searched(tmp_path / f"{budget}.sqlite", name, budget)

@@ -1,70 +1,48 @@
 from __future__ import annotations
 
-import types
-from typing import Any
+import subprocess
+import sys
 
 import pytest
 
+from pytest_garl.adversary.catalogue import DEFAULT_POLICY, policy_names
 from pytest_garl.errors import GarlError
-from pytest_garl.scenarios.genes import genome_for
-from pytest_garl.scenarios.maps.map import load_map
-from pytest_garl.search.catalogue import make_method
-from pytest_garl.search.method import Flown, Plan
-from pytest_garl.search.methods.random_search import RandomSearch
-
-LAWN = load_map("lawn")
-PLAN = Plan(map=LAWN, genome=genome_for(LAWN), seed=0, population=2)
-
-
-class Own(RandomSearch):
-    """A user's own method; the tests below break one of its parts."""
+from pytest_garl.search.catalogue import (
+    DEFAULT_METHOD,
+    declaration_of,
+    default_policy,
+    make_method,
+    method_names,
+)
+from tests.search.searches import bred, plan
 
 
-@pytest.fixture
-def own(monkeypatch: pytest.MonkeyPatch) -> types.ModuleType:
-    module = types.ModuleType("own_method")
-    module.make = Own  # type: ignore[attr-defined]
-    monkeypatch.setitem(__import__("sys").modules, "own_method", module)
-    return module
+def test_each_file_of_a_method_declares_one() -> None:
+    assert DEFAULT_METHOD in method_names()
+    for name in method_names():
+        declared = declaration_of(name)
+        assert callable(declared.make)
+        assert declared.policy in policy_names()
 
 
-def test_an_own_method_flies_as_it_is(own: types.ModuleType) -> None:
-    ours, shipped = make_method("own_method:make", PLAN), make_method("random", PLAN)
-    assert ours.ask() == shipped.ask()
-    assert ours.learns is False
+def test_a_method_brings_its_policy_and_an_own_method_the_default() -> None:
+    assert default_policy("ga") == "destination"
+    assert default_policy("online-rl") == "online-rl"
+    assert default_policy("my_search:Hill") == DEFAULT_POLICY == default_policy(DEFAULT_METHOD)
 
 
-def test_a_factory_that_gives_no_method_is_named(own: types.ModuleType) -> None:
-    own.make = lambda plan: 3  # type: ignore[attr-defined]
-    with pytest.raises(GarlError, match="'own_method:make': the factory returned 3, expected a"):
-        make_method("own_method:make", PLAN)
+def test_the_catalogue_imports_no_method_and_no_numpy() -> None:
+    code = (
+        "import sys; from pytest_garl.search.catalogue import method_names; method_names(); "
+        "print(*[name for name in sys.modules if 'numpy' in name or '.methods' in name])"
+    )
+    command = [sys.executable, "-c", code]
+    done = subprocess.run(command, capture_output=True, text=True, check=True)
+    assert done.stdout.split() == []
 
 
-def test_what_an_own_method_raises_is_one_error_with_its_place(own: types.ModuleType) -> None:
-    def broken(plan: Plan) -> Any:
-        raise ZeroDivisionError("no seed")
-
-    own.make = broken  # type: ignore[attr-defined]
-    expected = r"the factory raised ZeroDivisionError: no seed \(test_methods.py:\d+\)"
-    with pytest.raises(GarlError, match=expected):
-        make_method("own_method:make", PLAN)
-
-
-@pytest.mark.parametrize("nonsense", [None, 7, [], ["a", "b"]])
-def test_generations_of_anything_but_scenarios_are_refused(
-    own: types.ModuleType, monkeypatch: pytest.MonkeyPatch, nonsense: object
-) -> None:
-    monkeypatch.setattr(Own, "ask", lambda self: nonsense, raising=False)
-    with pytest.raises(GarlError, match=r"ask\(\) returned .*, expected a list of 2 pytest_garl"):
-        make_method("own_method:make", PLAN).ask()
-
-
-@pytest.mark.parametrize("nonsense", [None, [], [(0.0,)], [(0.0,), (float("nan"),)], ["ab", "cd"]])
-def test_objectives_that_are_no_numbers_are_refused(
-    own: types.ModuleType, monkeypatch: pytest.MonkeyPatch, nonsense: object
-) -> None:
-    monkeypatch.setattr(Own, "tell", lambda self, flown: nonsense, raising=False)
-    method = make_method("own_method:make", PLAN)
-    flown = [Flown(scenario=each, result={}) for each in method.ask()]
-    with pytest.raises(GarlError, match=r"tell\(\) returned .*, expected a list of 2 tuples"):
-        method.tell(flown)
+def test_an_own_method_is_named_by_its_module() -> None:
+    own = make_method("pytest_garl.search.methods.garl_paper:make", plan())
+    assert bred(own, 2) == bred(make_method("garl-paper", plan()), 2)
+    with pytest.raises(GarlError, match=r"'nowhere:method'.*cannot be loaded.*one of ga, garl"):
+        make_method("nowhere:method", plan())

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from pytest_garl import Command, Mission, Observation, PositionSetpoint
+from pytest_garl.adversary.catalogue import policy_spec
 from pytest_garl.adversary.recorded import recorded_spec
-from pytest_garl.adversary.scripted import policy_spec
 from pytest_garl.execution.on_demand import Done
 from pytest_garl.landing_system import Airframe, Camera
 from pytest_garl.regressions.case import RecordedBehaviour
@@ -17,7 +17,7 @@ from pytest_garl.regressions.new_case import recorded_behaviour
 from pytest_garl.scenarios.genes import ENVIRONMENT, genome_for
 from pytest_garl.scenarios.maps.map import load_map
 from pytest_garl.scenarios.scenario import Scenario
-from pytest_garl.search.methods.random_search import propose
+from pytest_garl.search.methods.random import propose
 from pytest_garl.simulation.camera.renderer import Renderer
 from pytest_garl.simulation.environment import changed, environment_at
 from pytest_garl.simulation.flight import Flight

@@ -20,14 +20,14 @@ from pytest_garl import (
     PositionSetpoint,
     VelocitySetpoint,
 )
-from pytest_garl.adversary.scripted import policy_spec
+from pytest_garl.adversary.catalogue import policy_spec
 from pytest_garl.landing_system import Airframe
 from pytest_garl.scenarios.chromosome import decode
 from pytest_garl.scenarios.genes import GPS_ERROR, WIND, genome_for
 from pytest_garl.scenarios.maps.map import load_map
 from pytest_garl.scenarios.object_types import OBJECT_TYPES
 from pytest_garl.scenarios.validity import repair
-from pytest_garl.search.methods.random_search import propose
+from pytest_garl.search.methods.random import propose
 from pytest_garl.simulation.flight_file import load, save
 from pytest_garl.simulation.fly import fly
 from pytest_garl.simulation.system_under_test.reference_pilot import ReferencePilot

@@ -6,7 +6,7 @@ import math
 
 import pytest
 
-from pytest_garl.adversary.scripted import policy_spec
+from pytest_garl.adversary.catalogue import policy_spec
 from pytest_garl.baselines.record import Survey
 from pytest_garl.landing_system import Abort, Command, Land, Mission, Observation, PositionSetpoint
 from pytest_garl.scenarios.maps.map import load_map

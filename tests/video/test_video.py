@@ -15,13 +15,13 @@ import pytest
 from numpy.typing import NDArray
 
 from pytest_garl import Command, Mission, Observation, PositionSetpoint
-from pytest_garl.adversary.scripted import policy_spec
+from pytest_garl.adversary.catalogue import policy_spec
 from pytest_garl.errors import GarlError
 from pytest_garl.landing_system import Airframe, Camera, Detection, Diagnostics
 from pytest_garl.scenarios.genes import genome_for
 from pytest_garl.scenarios.maps.map import load_map
 from pytest_garl.scenarios.placement import marker_genes
-from pytest_garl.search.methods.random_search import propose
+from pytest_garl.search.methods.random import propose
 from pytest_garl.simulation.flight import Contact, Flight, Track
 from pytest_garl.simulation.fly import fly
 from pytest_garl.video import frames, rate_hz, save_video, write

@@ -22,21 +22,21 @@ from __future__ import annotations
 import dataclasses
 
 import numpy as np
-from pymoo.operators.mutation.pm import mut_pm
 
 from pytest_garl.scenarios.genes import with_destinations
-from pytest_garl.search.method import Plan
+from pytest_garl.search.method import Method, MethodDeclaration, Plan
 from pytest_garl.search.methods.garl_paper import objectives
-from pytest_garl.search.methods.nsga2 import Matrix, Nsga2
-from pytest_garl.search.operators import MUTATION_PROBABILITY
+from pytest_garl.search.operators import MUTATION_PROBABILITY, Matrix
 
 ETA = 20.0
 """Distribution index of the mutation (Deb et al. 2002): steps are mostly below a tenth of the
 range."""
 
 
-def method(plan: Plan) -> Nsga2:
+def make(plan: Plan) -> Method:
     """Return the search; its genome is the plan's with a destination for each object."""
+    from pytest_garl.search.nsga2 import Nsga2
+
     plan = dataclasses.replace(plan, genome=with_destinations(plan.genome))
     return Nsga2("ga", plan, objectives, 3, polynomial_mutation)
 
@@ -45,7 +45,12 @@ def polynomial_mutation(
     offspring: Matrix, lower: Matrix, upper: Matrix, rng: np.random.Generator
 ) -> Matrix:
     """Return a copy in which each property moves with the paper's probability of 0.2."""
+    from pymoo.operators.mutation.pm import mut_pm
+
     count = len(offspring)
     rates, indices = np.full(count, MUTATION_PROBABILITY), np.full(count, ETA)
     mutated: Matrix = mut_pm(offspring, lower, upper, indices, rates, False, random_state=rng)
     return mutated
+
+
+METHOD = MethodDeclaration(make=make, policy="destination")

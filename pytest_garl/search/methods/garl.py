@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 from pytest_garl.scenarios.chromosome import decode, encode
 from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.scenarios.validity import repair
-from pytest_garl.search.method import Flown, Plan
+from pytest_garl.search.method import Flown, MethodDeclaration, Plan
 from pytest_garl.search.objectives import threat
 from pytest_garl.search.operators import (
     CANDIDATES,
@@ -218,3 +218,6 @@ class Garl:
 def cell_of(result: dict[str, Any]) -> str:
     """Return how a flight failed or nearly did: a signature, or the outcome."""
     return str(result["verdict"]["signature"] or result["closest_call"] or result["outcome"])
+
+
+METHOD = MethodDeclaration(make=Garl, policy="dqn")

@@ -28,14 +28,16 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from pytest_garl.search.method import Flown, Plan
-from pytest_garl.search.methods.nsga2 import Matrix, Nsga2
+from pytest_garl.search.method import Flown, Method, MethodDeclaration, Plan
 from pytest_garl.search.objectives import diversity
-from pytest_garl.search.operators import property_mutation
+from pytest_garl.search.operators import Matrix, property_mutation
 
 
-def method(plan: Plan) -> Nsga2:
+def make(plan: Plan) -> Method:
     """Return the search; populations of 20 and rates of 0.2 as in the paper."""
+    # pymoo takes a second to import.
+    from pytest_garl.search.nsga2 import Nsga2
+
     return Nsga2("garl-paper", plan, objectives, 3, property_mutation)
 
 
@@ -44,3 +46,6 @@ def objectives(chromosomes: Matrix, flown: Sequence[Flown]) -> Matrix:
     distance = [item.result["final_distance_m"] for item in flown]
     elapsed = [item.result["elapsed_s"] for item in flown]
     return np.column_stack([distance, elapsed, diversity(chromosomes)])
+
+
+METHOD = MethodDeclaration(make=make, policy="dqn-paper")

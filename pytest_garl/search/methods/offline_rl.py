@@ -36,14 +36,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from pytest_garl.errors import GarlError
 from pytest_garl.execution.job import PAPER_LIMIT_S
 from pytest_garl.scenarios.chromosome import decode, encode
 from pytest_garl.scenarios.genes import Genome, with_destinations
 from pytest_garl.scenarios.maps.map import Map
 from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.scenarios.validity import problems, repair
-from pytest_garl.search.method import Flown, Plan
+from pytest_garl.search.method import Flown, MethodDeclaration, Plan
 
 if TYPE_CHECKING:
     from pytest_garl.adversary.training.dqn import Learner
@@ -71,11 +70,6 @@ class Link:
     seed: int
     before: Row | None = None
     edit: int = 0
-
-
-def method(plan: Plan) -> OfflineRl:
-    """Return the search; raise GarlError where PyTorch is missing."""
-    return OfflineRl(plan)
 
 
 class OfflineRl:
@@ -198,14 +192,12 @@ def reward(distance_m: float, elapsed_s: float, spread: float, map: Map, genome:
 
 
 def _learner(size: int, actions: int, seed: int) -> Learner:
-    try:
-        from pytest_garl.adversary.training.dqn import Learner, Training
-    except ImportError as error:
-        raise GarlError(
-            "the search method offline-rl learns by PyTorch, which flying does not need "
-            f"({error}): pip install 'pytest-garl[train]', or choose another --garl-method"
-        ) from error
+    from pytest_garl.adversary.training.dqn import Learner, Training
+
     training = Training(
         seed=seed, batch=BATCH, warm_up=BATCH, target_every=TARGET_EVERY, double=False, steps=1
     )
     return Learner(size, actions, training)
+
+
+METHOD = MethodDeclaration(make=OfflineRl, policy="destination", extra="train")

@@ -24,10 +24,7 @@ Where paper and code differ, or say nothing:
 
 from __future__ import annotations
 
-from pytest_garl.search.method import Plan
-from pytest_garl.search.methods.random_search import RandomSearch
+from pytest_garl.search.method import MethodDeclaration
+from pytest_garl.search.methods.random import RandomSearch
 
-
-def method(plan: Plan) -> RandomSearch:
-    """Return the search."""
-    return RandomSearch(plan)
+METHOD = MethodDeclaration(make=RandomSearch, policy="online-rl")

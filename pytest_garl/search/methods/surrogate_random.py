@@ -10,10 +10,7 @@ the two compare pair by pair.
 
 from __future__ import annotations
 
-from pytest_garl.search.method import Plan
-from pytest_garl.search.methods.random_search import RandomSearch
+from pytest_garl.search.method import MethodDeclaration
+from pytest_garl.search.methods.random import RandomSearch
 
-
-def method(plan: Plan) -> RandomSearch:
-    """Return the search."""
-    return RandomSearch(plan)
+METHOD = MethodDeclaration(make=RandomSearch, policy="dqn-paper")

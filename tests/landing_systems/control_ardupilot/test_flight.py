@@ -20,7 +20,7 @@ from pytest_garl import (
     PositionSetpoint,
     VehicleState,
 )
-from pytest_garl.adversary.scripted import policy_spec
+from pytest_garl.adversary.catalogue import policy_spec
 from pytest_garl.scenarios.chromosome import decode
 from pytest_garl.scenarios.genes import WIND, genome_for
 from pytest_garl.scenarios.maps.map import load_map

@@ -5,16 +5,10 @@ import itertools
 import numpy as np
 import pytest
 
-from pytest_garl.adversary.scripted import policy_spec
-from pytest_garl.errors import PolicyError
 from pytest_garl.scenarios.genes import genome_for, with_destinations
-from pytest_garl.scenarios.placement import object_destination_m
 from pytest_garl.search.catalogue import make_method
 from pytest_garl.search.methods.ga import polynomial_mutation
-from pytest_garl.search.methods.random_search import propose
-from pytest_garl.simulation.fly import fly
-from pytest_garl.simulation.system_under_test.reference_pilot import ReferencePilot
-from tests.search.methods.test_nsga2 import MAP, bred, plan
+from tests.search.searches import MAP, bred, plan
 
 NAMES = [name for name, _ in MAP.object_names]
 
@@ -47,35 +41,6 @@ def test_mutation_moves_as_many_properties_as_the_papers_and_mostly_a_little() -
     steps = np.abs(moved - rows)[:, :2] / (upper - lower)[:2]
     assert (steps[steps > 0] < 0.1).mean() > 0.8
     assert (moved[:, 2] < 0.15).any()
-
-
-@pytest.mark.sim
-def test_objects_walk_to_their_destination_and_back() -> None:
-    scenario = propose(MAP, with_destinations(genome_for(MAP)), 2, 0, 1)[0]
-    scenario = scenario.replace({f"{name}.velocity": 1.0 for name in NAMES})
-    # Clear of bodies, and of each other.
-    places = ((-0.8, 0.8), (0.8, 0.8), (-0.8, -0.8), (0.8, -0.8))
-    ends = {
-        f"{n}.destination_{axis}": at[i]
-        for n, at in zip(NAMES, places, strict=True)
-        for i, axis in enumerate("xy")
-    }
-    flight = fly(scenario.replace(ends), ReferencePilot, policy_spec("destination"), map=MAP)
-    for item in flight.objects:
-        goal = object_destination_m(scenario.replace(ends), MAP, item.name)
-        assert goal is not None
-        way = item.track.position_m[:, :2]
-        from_goal = np.linalg.norm(way - np.array(goal), axis=1)
-        there = int(from_goal.argmin())
-        assert from_goal[there] < 1.5, item.name
-        from_start = np.linalg.norm(way[there:] - way[0], axis=1)
-        assert from_start.min() < 0.5 * from_start[0], item.name
-
-
-def test_objects_without_a_destination_are_told() -> None:
-    scenario = propose(MAP, genome_for(MAP), 2, 0, 1)[0]
-    with pytest.raises(PolicyError, match=r"no gene 'person-1.destination_x'.*--garl-method"):
-        fly(scenario, ReferencePilot, policy_spec("destination"), map=MAP, time_limit_s=1)
 
 
 def test_an_object_keeps_its_destination_with_its_start() -> None:

@@ -13,7 +13,7 @@ from pytest_garl.scenarios.maps.map import load_map
 from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.search.method import Flown, Plan
 from pytest_garl.search.methods.garl import EXPLORES, FAR, NEAR, Garl, cell_of
-from pytest_garl.search.methods.random_search import RandomSearch
+from pytest_garl.search.methods.random import RandomSearch
 from pytest_garl.verdicts.paper_metrics import mean_distance
 
 MAP = load_map("court")

@@ -18,7 +18,7 @@ from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.search.catalogue import make_method
 from pytest_garl.search.method import Flown
 from pytest_garl.search.methods.offline_rl import OfflineRl, edits_of, reward
-from tests.search.methods.test_nsga2 import MAP, bred, plan, result
+from tests.search.searches import MAP, bred, plan, result
 
 GENOME = with_destinations(genome_for(MAP))
 

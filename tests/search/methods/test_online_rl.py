@@ -2,17 +2,11 @@ from __future__ import annotations
 
 import pytest
 
-from pytest_garl.adversary.scripted import policy_spec
-from pytest_garl.search.catalogue import make_method
-from pytest_garl.search.methods.random_search import propose
+from pytest_garl.adversary.catalogue import policy_spec
+from pytest_garl.search.methods.random import propose
 from pytest_garl.simulation.fly import fly
 from pytest_garl.simulation.system_under_test.reference_pilot import ReferencePilot
-from tests.search.methods.test_nsga2 import GENOME, MAP, plan
-
-
-def test_the_scenarios_are_those_of_random_search() -> None:
-    ours, random = (make_method(name, plan()) for name in ("online-rl", "random"))
-    assert [ours.ask() for _ in range(3)] == [random.ask() for _ in range(3)]
+from tests.search.searches import GENOME, MAP
 
 
 @pytest.mark.sim

@@ -1,4 +1,4 @@
-"""NSGA-II by pymoo's ask and tell, with the paper's operators (DESIGN 7)."""
+"""NSGA-II by pymoo's ask and tell, with the operators of the paper (Algorithm 1)."""
 
 from __future__ import annotations
 

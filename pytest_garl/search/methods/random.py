@@ -18,7 +18,7 @@ from pytest_garl.scenarios.genes import Genome
 from pytest_garl.scenarios.maps.map import Map
 from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.scenarios.validity import repair
-from pytest_garl.search.method import Flown, Plan
+from pytest_garl.search.method import Flown, MethodDeclaration, Plan
 
 
 class RandomSearch:
@@ -53,3 +53,6 @@ def propose(map: Map, genome: Genome, seed: int, generation: int, size: int) -> 
         own_seed = int(rng.integers(2**32))
         scenarios.append(repair(decode(chromosome, genome, map=map.name, seed=own_seed), map))
     return scenarios
+
+
+METHOD = MethodDeclaration(make=RandomSearch, policy="waypoint")

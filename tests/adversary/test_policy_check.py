@@ -1,53 +1,21 @@
 from __future__ import annotations
 
-import itertools
 import math
 from typing import Any
 
 import numpy as np
 import pytest
 
-from pytest_garl.adversary.scripted import LEARNED, POLICIES, check_policy, policy_spec
+from pytest_garl.adversary.catalogue import policy_names, policy_spec
+from pytest_garl.adversary.policy_check import check_policy
 from pytest_garl.errors import PolicyError
-from pytest_garl.simulation.npc_policy import DECISION_STEP_S, Move, PolicySpec, Situation
-from tests.adversary.situations import MAP, being, situation
+from pytest_garl.simulation.npc_policy import Move, PolicySpec, Situation
+from tests.adversary.situations import MAP
 
 
-def walk(name: str, start: tuple[float, float], decisions: int) -> list[tuple[float, float]]:
-    """Walk without inertia around a marker at (3, 1)."""
-    policy = policy_spec(name).make()
-    place, path = start, [start]
-    policy.reset(situation(being(place), marker=(3, 1)), np.random.default_rng(0))
-    for _ in range(decisions):
-        me = being(place)
-        move = policy.decide(situation(me, marker=(3, 1)))
-        step = me.speed_mps * DECISION_STEP_S
-        place = (place[0] + step * move.x, place[1] + step * move.y)
-        path.append(place)
-    return path
-
-
-def test_greedy_walks_across_the_marker_again_and_again() -> None:
-    path = walk("greedy", (-4.0, 1.0), 40)
-    sides = [math.copysign(1, x - 3) for x, _ in path if abs(x - 3) > 0.4]
-    assert sum(a != b for a, b in itertools.pairwise(sides)) >= 5
-    steps = [math.dist(a, b) for a, b in itertools.pairwise(path)]
-    assert min(steps) == pytest.approx(1.0)
-
-
-def test_stand_walks_to_the_marker_and_stays() -> None:
-    path = walk("stand", (-4.3, 2.0), 12)
-    assert math.dist(path[-1], (3, 1)) < 1e-6
-
-
-@pytest.mark.parametrize("name", [*POLICIES, *LEARNED])
+@pytest.mark.parametrize("name", policy_names())
 def test_every_shipped_policy_passes_the_check(name: str) -> None:
     check_policy(policy_spec(name), MAP)
-
-
-def test_an_unknown_name_lists_the_known_ones() -> None:
-    with pytest.raises(PolicyError, match=r"'gredy'.*dqn.*greedy.*\.npz"):
-        policy_spec("gredy")
 
 
 class Wild:

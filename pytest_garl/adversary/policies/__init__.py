@@ -1,0 +1,1 @@
+"""The scripted NPC policies: one module each, with the name of the policy."""

@@ -1,0 +1,21 @@
+"""stationary: an NPC stays where it starts."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from pytest_garl.simulation.npc_policy import STAY, Move, Situation
+
+
+class Stationary:
+    """Stays where it starts."""
+
+    def reset(self, situation: Situation, rng: np.random.Generator) -> None:
+        """Nothing to prepare."""
+
+    def decide(self, situation: Situation) -> Move:
+        """Stay."""
+        return STAY
+
+
+POLICY = Stationary

@@ -1,0 +1,74 @@
+"""A user's own search method, checked at every call."""
+
+from __future__ import annotations
+
+import itertools
+import math
+import reprlib
+import traceback
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import NoReturn, TypeVar
+
+from pytest_garl.errors import GarlError
+from pytest_garl.scenarios.scenario import Scenario
+from pytest_garl.search.method import Flown, Method, Plan
+
+T = TypeVar("T")
+
+
+class OwnMethod:
+    """Passes calls on to a user's own method; any mistake in it is a GarlError that names it.
+
+    ``name`` is "module:factory", ``make`` that factory.
+    """
+
+    def __init__(self, name: str, make: Callable[[Plan], Method], plan: Plan) -> None:
+        self._name, self._population = name, plan.population
+        self._method = self._call("the factory", lambda: make(plan))
+        missing = [each for each in ("learns", "ask", "tell") if not hasattr(self._method, each)]
+        if missing:
+            self._refuse("the factory", self._method, f"a method with {', '.join(missing)}")
+
+    @property
+    def learns(self) -> bool:
+        """Whether a generation depends on the results of the one before."""
+        return bool(self._method.learns)
+
+    def ask(self) -> Sequence[Scenario]:
+        """Return the next generation."""
+        found = self._call("ask()", self._method.ask)
+        right = isinstance(found, Sequence) and all(isinstance(each, Scenario) for each in found)
+        if not right or len(found) < self._population:
+            self._refuse("ask()", found, f"a list of {self._population} pytest_garl scenarios")
+        return found
+
+    def tell(self, flown: Sequence[Flown]) -> Sequence[tuple[float, ...]]:
+        """Let the method learn; return its objectives."""
+        told = self._call("tell()", lambda: self._method.tell(flown))
+        try:
+            found = [tuple(float(value) for value in each) for each in told]
+        except (TypeError, ValueError):
+            found = []
+        if len(found) != len(flown) or not all(map(math.isfinite, itertools.chain(*found))):
+            expected = f"a list of {len(flown)} tuples of finite numbers, one for each flight"
+            self._refuse("tell()", told, expected)
+        return found
+
+    def _call(self, what: str, function: Callable[[], T]) -> T:
+        try:
+            return function()
+        except Exception as error:
+            # Not ours to name: it is a user's code.
+            frame = traceback.extract_tb(error.__traceback__)[-1]
+            raise GarlError(
+                f"search method {self._name!r}: {what} raised {type(error).__name__}: {error} "
+                f"({Path(frame.filename).name}:{frame.lineno})"
+            ) from error
+
+    def _refuse(self, what: str, found: object, expected: str) -> NoReturn:
+        shown = reprlib.repr(found)
+        raise GarlError(
+            f"search method {self._name!r}: {what} returned {shown}, expected {expected} "
+            "(pytest_garl.search.method.Method tells more)"
+        )

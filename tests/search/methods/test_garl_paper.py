@@ -1,0 +1,38 @@
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+import pytest
+
+from pytest_garl.scenarios.chromosome import encode
+from pytest_garl.scenarios.scenario import Scenario
+from pytest_garl.search.catalogue import make_method
+from pytest_garl.search.method import Flown
+from tests.search.searches import GENOME, bred, plan, result
+
+
+def test_selection_finds_more_of_what_it_wants() -> None:
+    def share(made: Sequence[Sequence[Scenario]]) -> float:
+        return float(np.mean([result(s)["final_distance_m"] > 1.0 for made in made for s in made]))
+
+    runs = [bred(make_method("garl-paper", plan(seed, population=20)), 15) for seed in range(4)]
+    early = float(np.mean([share(generations[:2]) for generations in runs]))
+    late = float(np.mean([share(generations[-5:]) for generations in runs]))
+    assert late > early + 0.1
+
+
+def test_a_scenarios_seed_is_inherited_with_its_objects() -> None:
+    first, second = bred(make_method("garl-paper", plan()), 2)
+    assert {each.seed for each in second} <= {each.seed for each in first}
+
+
+def test_objectives_of_the_paper_are_distance_time_and_diversity() -> None:
+    method = make_method("garl-paper", plan())
+    scenarios = method.ask()
+    values = method.tell([Flown(scenario=each, result=result(each)) for each in scenarios])
+    rows = GENOME.normalise(np.array([encode(each, GENOME) for each in scenarios]))
+    for scenario, row, (distance, elapsed, spread) in zip(scenarios, rows, values, strict=True):
+        assert distance == result(scenario)["final_distance_m"]
+        assert elapsed == 30.0
+        assert spread == pytest.approx(np.linalg.norm(rows - row, axis=1).sum() / len(rows))
