@@ -1,7 +1,9 @@
 from __future__ import annotations
 
+import re
 import subprocess
 import sys
+from pathlib import Path
 
 import pytest
 
@@ -38,3 +40,10 @@ def test_the_catalogue_imports_no_policy_and_no_numpy() -> None:
     command = [sys.executable, "-c", code]
     done = subprocess.run(command, capture_output=True, text=True, check=True)
     assert done.stdout.split() == []
+
+
+def test_the_page_on_policies_has_a_row_for_each() -> None:
+    page = (Path(__file__).parents[2] / "docs" / "adversary.md").read_text()
+    table = page[: page.index("\n## ")]
+    rows = re.findall(r"^\| `([a-z_-]+)`.* \| .+ \|$", table, re.MULTILINE)
+    assert sorted(rows) == sorted(policy_names())

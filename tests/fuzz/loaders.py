@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 
 from pytest_garl.adversary import learned as network
+from pytest_garl.adversary.catalogue import WEIGHTS
 from pytest_garl.baselines import file as baseline
 from pytest_garl.baselines import record as survey
 from pytest_garl.errors import GarlError
@@ -122,7 +123,7 @@ def _load_scenario(path: Path, rng: random.Random) -> None:
 def _weights(folder: Path, *, stamp: bool = True) -> Path:
     path = folder / "mine.npz"
     for suffix in (".npz", ".json"):
-        shutil.copy(network.WEIGHTS / f"dqn{suffix}", path.with_suffix(suffix))
+        shutil.copy(WEIGHTS / f"dqn{suffix}", path.with_suffix(suffix))
     return path
 
 

@@ -1,7 +1,9 @@
 from __future__ import annotations
 
+import re
 import subprocess
 import sys
+from pathlib import Path
 
 import pytest
 
@@ -46,3 +48,15 @@ def test_an_own_method_is_named_by_its_module() -> None:
     assert bred(own, 2) == bred(make_method("garl-paper", plan()), 2)
     with pytest.raises(GarlError, match=r"'nowhere:method'.*cannot be loaded.*one of ga, garl"):
         make_method("nowhere:method", plan())
+
+
+def test_the_page_on_methods_has_a_row_for_each_with_its_policy() -> None:
+    page = (Path(__file__).parents[2] / "docs" / "methods.md").read_text()
+    table = page[: page.index("\n## ")]
+    rows = re.findall(r"^\| `([a-z-]+)`.* \| (.+) \| `([a-z_-]+)` \|$", table, re.MULTILINE)
+    assert {name: policy for name, _, policy in rows} == {
+        name: declaration_of(name).policy for name in method_names()
+    }
+    for name, text, _ in rows:
+        extra = declaration_of(name).extra
+        assert (f"pytest-garl[{extra}]" in text) == bool(extra), name
