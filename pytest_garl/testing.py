@@ -74,7 +74,7 @@ def check_landing_system(
 ) -> Check:
     """Fly a class in two scenarios and return what it showed; raise LandingSystemError for a fault.
 
-    Checks that the class has the contract's methods and can be imported by a child process, that
+    Checks that the class has the contract's methods and can be imported by a worker process, that
     its airframe is one, that it returns commands, leaves its observations alone, decides the same
     in the same flight, and that ``reset`` forgets the flight before: one instance flies the first
     scenario, the second and the first again, and each flight is compared with that of a fresh
@@ -84,7 +84,7 @@ def check_landing_system(
     120 s).  ``deterministic=False`` turns a difference between equal flights into a warning.
     ``limit_s`` is the computing time (CPU) for all flights; a slow system is compared over shorter
     ones.  A call that takes 30 s is taken for hanging.  Where NumPy was loaded earlier, and
-    computes by other instructions than a search flies by, all this happens in a child process.
+    computes by other instructions than a search flies by, all this happens in a worker process.
     """
     check_system(system)
     _check_airframe(system)

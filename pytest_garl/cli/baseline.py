@@ -90,7 +90,7 @@ _SURVEY = (
         type=click.IntRange(min=1),
         default=lambda: os.cpu_count() or 1,
         show_default="one per CPU core",
-        help="Flying child processes.",
+        help="Number of worker processes.",
     ),
 )
 

@@ -271,7 +271,7 @@ def _refusal(result: Replay, how: str) -> str:
     show_default=True,
     help="Maximal number of flights.",
 )
-@click.option("--workers", default=2, show_default=True, help="Flying child processes.")
+@click.option("--workers", default=2, show_default=True, help="Number of worker processes.")
 @click.pass_obj
 def shrink(project: _Project, file: Path, flights: int, workers: int) -> None:
     """Shrink a case further, from its own record.

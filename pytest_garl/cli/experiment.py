@@ -45,7 +45,7 @@ _FOLDER = click.Path(path_type=Path, file_okay=False)
     type=click.IntRange(min=1),
     default=lambda: os.cpu_count() or 1,
     show_default="one per CPU core",
-    help="Flying child processes.",
+    help="Number of worker processes.",
 )
 def experiment(file: Path, report: bool, out: Path | None, folder: Path, workers: int) -> None:
     """Fly the searches of FILE that its rows lack.

@@ -27,11 +27,11 @@ class Checkout:
 
     @property
     def arguments(self) -> tuple[str, ...]:
-        """The folders as arguments of a process that calls :func:`see_only`."""
+        """The folders as arguments of a process that calls :func:`isolate_imports`."""
         return tuple(str(each.resolve()) for each in (self.folder, *self.others))
 
 
-def see_only(folders: Sequence[str]) -> None:
+def isolate_imports(folders: Sequence[str]) -> None:
     """Import from the first folder before all else, and never from the others.
 
     The working directory is hidden as well: ``python -m`` puts it first, and it may be another
@@ -74,7 +74,7 @@ def describe(checkout: Checkout, system: str) -> tuple[Reference, str]:
 
 def main(system: str, folders: Sequence[str]) -> None:
     """Import a system and write what :func:`describe` wants to know."""
-    see_only(folders)
+    isolate_imports(folders)
     try:
         found = system_named(system)
     except LandingSystemError as error:

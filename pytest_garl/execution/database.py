@@ -18,7 +18,7 @@ REMEDY = (
     "Is it a ledger, is there space, may it be written? Fix that and go on with --garl-resume, or "
     "choose another folder with the ini key garl_dir"
 )
-VERSION = 4
+VERSION = 5
 """Of the tables below; a ledger of another version is not continued."""
 SCHEMA = """
 CREATE TABLE run (key TEXT PRIMARY KEY, value TEXT NOT NULL);
@@ -34,10 +34,10 @@ CREATE TABLE slot (
     PRIMARY KEY (search, generation, slot)
 );
 CREATE INDEX slot_state ON slot (state, after DESC, generation, slot);
-CREATE TABLE seat (pid INTEGER PRIMARY KEY, owner INTEGER NOT NULL);
+CREATE TABLE worker (pid INTEGER PRIMARY KEY, owner INTEGER NOT NULL);
 CREATE TABLE meter (name TEXT PRIMARY KEY, value REAL NOT NULL);
 """
-SearchKind = Literal["search", "case", "errand"]
+SearchKind = Literal["search", "case", "on_demand"]
 """What flights are for: a search's budget, saved cases, or something beside them, such as flying a
 violation once more.  Figures and the result hash are those of the searches."""
 _LONGEST = 64_000_000

@@ -12,7 +12,7 @@ from typing import Any
 from pytest_garl.execution.database import Database
 from pytest_garl.execution.processes import alive
 
-_METERS = {"search": "flights", "case": "cases", "errand": "errands"}
+_METERS = {"search": "flights", "case": "cases", "on_demand": "on_demand"}
 _NEXT, _NEXT_OF_SYSTEM = (
     "SELECT search, generation, slot, scenario, after, attempts FROM slot "
     f"WHERE state = 'waiting' {condition} ORDER BY after DESC, generation, slot, search"
@@ -182,7 +182,7 @@ class WorkQueue:
 
     def reset(self) -> None:
         """Give back all slots that are claimed; nobody may be flying."""
-        self._database.execute("DELETE FROM seat")
+        self._database.execute("DELETE FROM worker")
         self._database.execute(
             "UPDATE slot SET state = 'waiting', pid = NULL, lease = NULL, "
             "attempts = max(0, attempts - 1) WHERE state = 'claimed'"
@@ -195,7 +195,7 @@ class WorkQueue:
         A living one is never silent: its supervisor ends it where it hangs.
         """
         rows = self._database.execute(
-            "SELECT slot.pid, lease, owner FROM slot LEFT JOIN seat ON seat.pid = slot.pid "
+            "SELECT slot.pid, lease, owner FROM slot LEFT JOIN worker ON worker.pid = slot.pid "
             "WHERE state = 'claimed'"
         ).fetchall()
         for pid, lease, owner in rows:
@@ -204,21 +204,21 @@ class WorkQueue:
             if not (flies or watched) or (lapsed and not (flies and watched)):
                 self.release(pid)
 
-    def take_seat(self, limit: int, spawn: Any) -> bool:
+    def register_worker(self, limit: int, spawn: Any) -> bool:
         """Start a child by ``spawn() -> pid`` unless ``limit`` of them live already."""
         with self._database.transaction():
-            for pid, owner in self._database.execute("SELECT pid, owner FROM seat").fetchall():
+            for pid, owner in self._database.execute("SELECT pid, owner FROM worker").fetchall():
                 if not alive(pid) and not alive(owner):
-                    self._database.execute("DELETE FROM seat WHERE pid = ?", (pid,))
-            taken = self._database.execute("SELECT count(*) FROM seat").fetchone()[0]
+                    self._database.execute("DELETE FROM worker WHERE pid = ?", (pid,))
+            taken = self._database.execute("SELECT count(*) FROM worker").fetchone()[0]
             if taken >= limit:
                 return False
-            self._database.execute("INSERT INTO seat VALUES (?, ?)", (spawn(), os.getpid()))
+            self._database.execute("INSERT INTO worker VALUES (?, ?)", (spawn(), os.getpid()))
         return True
 
-    def leave_seat(self, pid: int) -> None:
+    def unregister_worker(self, pid: int) -> None:
         """Free a dead child's seat."""
-        self._database.execute("DELETE FROM seat WHERE pid = ?", (pid,))
+        self._database.execute("DELETE FROM worker WHERE pid = ?", (pid,))
 
     def count(self, meter: str, amount: float = 1.0) -> None:
         """Add to a meter: what the run spent, beside its results."""

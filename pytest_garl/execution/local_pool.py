@@ -1,4 +1,4 @@
-"""The local pool: flies on this machine, in child processes or inside this one."""
+"""The local pool: flies on this machine, in worker processes or inside this one."""
 
 from __future__ import annotations
 
@@ -12,9 +12,9 @@ from pytest_garl.execution.checkout import Checkout
 from pytest_garl.execution.job import fly_job, load_scenario, loads, record_file
 from pytest_garl.execution.ledger_queue import Claim, WorkQueue
 from pytest_garl.execution.pool import Pool
-from pytest_garl.execution.process_pool import POLL_S, ChildPool
+from pytest_garl.execution.process_pool import POLL_S, ProcessPool
 from pytest_garl.execution.slot import flight_name
-from pytest_garl.execution.worker_failure import Death, settle
+from pytest_garl.execution.worker_failure import WorkerExit, retry_or_record
 
 
 def local_pool(queue: WorkQueue, workers: int, checkout: Checkout | None = None) -> Pool:
@@ -24,35 +24,35 @@ def local_pool(queue: WorkQueue, workers: int, checkout: Checkout | None = None)
     With a ``checkout`` they see the modules of that landing stack and of no other.
     """
     if workers == 0 and cpu_dispatch.pin():
-        return Here(queue)
+        return InProcessPool(queue)
     folders = checkout.arguments if checkout else ()
-    return ChildPool(queue, Flyers(seats=max(1, workers), folders=folders))
+    return ProcessPool(queue, FlightWorkers(max_workers=max(1, workers), folders=folders))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Flyers:
+class FlightWorkers:
     """Children that claim, fly and record slot after slot."""
 
-    seats: int
+    max_workers: int
     folders: tuple[str, ...] = ()
     patience_s: float = 3.0
-    settle: Callable[[WorkQueue, Claim, Death], None] = settle
-    """Decides what a death means for the slot that was in flight."""
+    on_exit: Callable[[WorkQueue, Claim, WorkerExit], None] = retry_or_record
+    """Decides what the exit of a worker means for the slot that it flew."""
 
     def command(self, ledger: Path) -> Sequence[str]:
         """Return the module that a child runs, and its arguments."""
         return ["pytest_garl.execution.worker", str(ledger), *self.folders]
 
-    def bury(self, queue: WorkQueue, pid: int, death: Death) -> bool:
+    def handle_exit(self, queue: WorkQueue, pid: int, death: WorkerExit) -> bool:
         """Settle what a child had in flight; return whether it was flying at all."""
         claim = queue.claim_of(pid)
         if claim is None:
             return False
-        self.settle(queue, claim, death)
+        self.on_exit(queue, claim, death)
         return True
 
 
-class Here:
+class InProcessPool:
     """Flies one slot after the other in this process, for a debugger."""
 
     def __init__(self, queue: WorkQueue) -> None:

@@ -131,7 +131,7 @@ class Errands:
         thought.job, thought.search = job, hashlib.sha256(key.encode()).hexdigest()[:16]
         thought.flown += 1
         name = job.system.name
-        self._ledger.add_search(thought.search, name, job.map, 1, job.dumps(), "errand")
+        self._ledger.add_search(thought.search, name, job.map, 1, job.dumps(), "on_demand")
         self._ledger.add_slots(thought.search, 0, {0: text})
 
     def _done(self, job: Job, search: str) -> Done | None:

@@ -1,4 +1,4 @@
-"""A pool of child processes: starts them, looks after them, and ends them."""
+"""A pool of worker processes: starts them, looks after them, and ends them."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from pytest_garl import cpu_dispatch
 from pytest_garl.errors import LedgerError, PoolError
 from pytest_garl.execution.ledger_queue import WorkQueue
 from pytest_garl.execution.processes import read_report, report_file
-from pytest_garl.execution.worker_failure import Death
+from pytest_garl.execution.worker_failure import WorkerExit
 
 POLL_S = 0.02
 MOST_LOSSES = 3
@@ -27,11 +27,11 @@ COMPLAINT_BYTES = 2**16
 """How much is read of what a child said on stderr: its end says why it died."""
 
 
-class Crew(Protocol):
+class WorkerKind(Protocol):
     """What the children of a pool are, and what the death of one means."""
 
     @property
-    def seats(self) -> int:
+    def max_workers(self) -> int:
         """How many there may be, with those of other pools on the ledger."""
 
     @property
@@ -41,7 +41,7 @@ class Crew(Protocol):
     def command(self, ledger: Path) -> Sequence[str]:
         """Return the module that a child runs, and its arguments."""
 
-    def bury(self, queue: WorkQueue, pid: int, death: Death) -> bool:
+    def handle_exit(self, queue: WorkQueue, pid: int, death: WorkerExit) -> bool:
         """Settle what a child had in flight; return whether it was flying at all."""
 
 
@@ -95,10 +95,10 @@ class _Child:
         os.close(self.report)
 
 
-class ChildPool:
-    """The children of this process; several pools share a ledger and its seats."""
+class ProcessPool:
+    """The children of this process; several pools share a ledger and its limit of workers."""
 
-    def __init__(self, queue: WorkQueue, crew: Crew) -> None:
+    def __init__(self, queue: WorkQueue, crew: WorkerKind) -> None:
         self._queue, self._crew = queue, crew
         self._children: dict[int, _Child] = {}
         self._losses = 0
@@ -109,10 +109,12 @@ class ChildPool:
         for pid, child in list(self._children.items()):
             if child.has_ended():
                 del self._children[pid]
-                self._bury(pid, child)
+                self._handle_exit(pid, child)
         self._queue.release_dead()
-        seats = self._crew.seats
-        while len(self._children) < seats and self._queue.take_seat(seats, self._spawn):
+        max_workers = self._crew.max_workers
+        while len(self._children) < max_workers and self._queue.register_worker(
+            max_workers, self._spawn
+        ):
             pass
         time.sleep(POLL_S)
 
@@ -126,7 +128,7 @@ class ChildPool:
             with contextlib.suppress(LedgerError):
                 # What cannot be given back is given back when the run is resumed.
                 self._queue.release(pid)
-                self._queue.leave_seat(pid)
+                self._queue.unregister_worker(pid)
         self._children.clear()
 
     def _spawn(self) -> int:
@@ -146,7 +148,7 @@ class ChildPool:
         self._children[process.pid] = _Child(process=process, said=said, report=report)
         return process.pid
 
-    def _bury(self, pid: int, child: _Child) -> None:
+    def _handle_exit(self, pid: int, child: _Child) -> None:
         """Decide what a child's end means."""
         try:
             facts, status = child.reported(), child.process.wait()
@@ -154,7 +156,7 @@ class ChildPool:
                 self._queue.release(pid)
                 raise PoolError(facts["cannot_go_on"].strip())
             failure = facts.get("failure")
-            death = Death(
+            death = WorkerExit(
                 status=facts.get("status", status),
                 words=facts.get("words", ""),
                 complaint=facts.get("complaint") or child.complaint(),
@@ -164,13 +166,13 @@ class ChildPool:
                 else None,
                 watched=bool(facts),
             )
-            if not self._crew.bury(self._queue, pid, death):
+            if not self._crew.handle_exit(self._queue, pid, death):
                 self._lose(death)
         finally:
-            self._queue.leave_seat(pid)
+            self._queue.unregister_worker(pid)
             child.close()
 
-    def _lose(self, death: Death) -> None:
+    def _lose(self, death: WorkerExit) -> None:
         """Give up if child after child ends without a flight; one may end between two flights."""
         flown = self._queue.flights()
         if flown > self._flown:
@@ -178,4 +180,4 @@ class ChildPool:
         if death.status != 0 or not death.watched:
             self._losses += 1
         if self._losses > MOST_LOSSES:
-            raise PoolError(f"flying children die before they fly:\n{death.complaint.strip()}")
+            raise PoolError(f"worker processes end before they fly:\n{death.complaint.strip()}")

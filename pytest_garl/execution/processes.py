@@ -110,7 +110,7 @@ def adopt_orphans() -> None:
     ctypes.CDLL(None).prctl(_PR_SET_CHILD_SUBREAPER, 1)
 
 
-def run_child(main: Callable[..., None], failing: str) -> None:
+def run_worker(main: Callable[..., None], failing: str) -> None:
     """Run what a child is for, with its parent and its arguments; tell why it cannot go on.
 
     ``failing`` says what it is that failed where an error was not raised on purpose.
@@ -129,4 +129,4 @@ def reason(error: Exception, failing: str) -> str:
     if isinstance(error, GarlError):
         return str(error)
     text = "".join(traceback.format_exception(error))
-    return f"{failing} failed in a child process:\n{text}"
+    return f"{failing} failed in a worker process:\n{text}"

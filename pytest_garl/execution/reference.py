@@ -1,4 +1,4 @@
-"""Classes and functions by name, so that a child process can load them."""
+"""Classes and functions by name, so that a worker process can load them."""
 
 from __future__ import annotations
 
@@ -87,11 +87,11 @@ BUILT_IN = Reference(module="pytest_garl.simulation.fly", file="", qualname="fly
 
 
 def reference_to(thing: Any) -> Reference:
-    """Return where ``thing`` is defined; raise LandingSystemError if no child can find it."""
+    """Return where ``thing`` is defined; raise LandingSystemError if no worker can import it."""
     qualname = getattr(thing, "__qualname__", "")
     if not qualname or "<locals>" in qualname or "<lambda>" in qualname:
         raise LandingSystemError(
-            f"{thing!r} is defined inside a function; child processes cannot import it. "
+            f"{thing!r} is defined inside a function; worker processes cannot import it. "
             "Move it to the top level of a module."
         )
     try:

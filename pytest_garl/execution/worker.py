@@ -1,4 +1,4 @@
-"""A flying child process: claim, note in flight, fly, record, until the parent is gone."""
+"""A flying worker process: claim, note in flight, fly, record, until the parent is gone."""
 
 from __future__ import annotations
 
@@ -11,9 +11,9 @@ from time import monotonic, sleep
 
 from pytest_garl import cpu_dispatch
 from pytest_garl.errors import GarlError, LandingSystemError, LedgerError
-from pytest_garl.execution.checkout import see_only
+from pytest_garl.execution.checkout import isolate_imports
 from pytest_garl.execution.ledger_queue import Claim, WorkQueue
-from pytest_garl.execution.processes import Parent, run_child
+from pytest_garl.execution.processes import Parent, run_worker
 from pytest_garl.execution.slot import flight_name
 from pytest_garl.execution.supervisor import Watch, supervise
 from pytest_garl.simulation.system_under_test.texts import (
@@ -38,7 +38,7 @@ def main(parent: Parent, path: str, *checkouts: str) -> None:
 
     def fly(watch: Watch) -> None:
         if checkouts:
-            see_only(checkouts)
+            isolate_imports(checkouts)
         Flyer(Path(path), owner, watch).run()
 
     supervise(parent, fly, SIMULATOR)
@@ -147,7 +147,7 @@ class Flyer:
             raise
         except Exception as error:
             raise SimulatorError(
-                f"{SIMULATOR} failed in a child process:\n{_text(error)}"
+                f"{SIMULATOR} failed in a worker process:\n{_text(error)}"
             ) from error
 
 
@@ -174,4 +174,4 @@ def _text(error: Exception) -> str:
 
 
 if __name__ == "__main__":
-    run_child(main, SIMULATOR)
+    run_worker(main, SIMULATOR)

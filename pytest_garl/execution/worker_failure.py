@@ -22,7 +22,7 @@ ATTEMPTS = 3
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Death:
+class WorkerExit:
     """How a flying process ended: its exit status (a signal's negative), its last words.
 
     ``hung`` says what took too long, as the beginning of a sentence; ``words`` where that was;
@@ -47,7 +47,7 @@ class Death:
         return "killed" if self.status == -signal.SIGKILL or not self.watched else "died"
 
 
-def settle(queue: WorkQueue, claim: Claim, death: Death) -> None:
+def retry_or_record(queue: WorkQueue, claim: Claim, death: WorkerExit) -> None:
     """Decide what a death means for the slot that was in flight."""
     earlier = claim.after.split()
     if death.cause == "died" or death.cause in earlier or len(earlier) + 1 == ATTEMPTS:
@@ -59,7 +59,7 @@ def settle(queue: WorkQueue, claim: Claim, death: Death) -> None:
         queue.count("retried")
 
 
-def _result(claim: Claim, death: Death, again: bool, undecided: bool) -> dict[str, Any]:
+def _result(claim: Claim, death: WorkerExit, again: bool, undecided: bool) -> dict[str, Any]:
     job = loads(claim.job)
     diagonal = load_map(job.map, tuple(Path(folder) for folder in job.map_folders)).diagonal_m
     kind, error, message, text = _described(death)
@@ -71,7 +71,7 @@ def _result(claim: Claim, death: Death, again: bool, undecided: bool) -> dict[st
     return broken_result(kind, error, message, text, diagonal, inconclusive=undecided)
 
 
-def _described(death: Death) -> tuple[str, str, str, str]:
+def _described(death: WorkerExit) -> tuple[str, str, str, str]:
     """Return kind, error, message and text of what ended a flight."""
     if death.hung:
         return "hung", "Timeout", death.hung, death.words

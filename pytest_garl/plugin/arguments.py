@@ -51,7 +51,7 @@ OPTIONS = (
     Option(
         name="workers",
         metavar="N",
-        help="Fly in N child processes, independent of the -n of pytest-xdist. With 0 pytest "
+        help="Fly in N worker processes, independent of the -n of pytest-xdist. With 0 pytest "
         "itself flies, so that a debugger works (default: one per CPU core, or per CPU of a Ray "
         "cluster).",
     ),
@@ -59,7 +59,7 @@ OPTIONS = (
         name="pool",
         metavar="WHERE",
         default="local",
-        help="Where to fly: 'local' flies in child processes, 'ray' on the Ray cluster of "
+        help="Where to fly: 'local' flies in worker processes, 'ray' on the Ray cluster of "
         "RAY_ADDRESS. If RAY_ADDRESS is not set, 'ray' starts a cluster here, which ends with the "
         "run. 'ray' needs pytest-garl[ray]. The results are the same (default: local).",
     ),

@@ -173,7 +173,7 @@ class Reader:
         if not searches:
             return None
         self._began = self._began or now
-        beside = ledger.queries.meters().get("errands", 0)
+        beside = ledger.queries.meters().get("on_demand", 0)
         left_s = None
         if self._run.rest is None:
             options = self._run.options

@@ -260,7 +260,7 @@ class Run:
         flown = []
         for index in range(count):
             errand = reflight_key(target, index)
-            self.ledger.add_search(errand, name, target.map, 1, job, "errand")
+            self.ledger.add_search(errand, name, target.map, 1, job, "on_demand")
             self.ledger.add_slots(errand, 0, {0: text})
             result = self._wait(errand, FIRST)
             record = (

@@ -50,7 +50,7 @@ def _computed_otherwise(run: Run) -> list[str]:
     wrong, options = cpu_dispatch.disobeying(), run.options
     means = []
     if options.workers == 0:
-        means.append("flown in a child process, not inside pytest")
+        means.append("flown in a worker process, not inside pytest")
     if options.searches:
         means.append("what is bred here may differ from what another make of CPU breeds")
     if not wrong or not means:
@@ -248,7 +248,7 @@ def _spent(run: Run) -> str:
     meters = run.ledger.queries.meters()
     flying, idle = meters.get("flying_s", 0.0), meters.get("idle_s", 0.0)
     pursued = sum(each.finding.flights for each in run.pursued)
-    repeats = meters.get("errands", 0) - pursued
+    repeats = meters.get("on_demand", 0) - pursued
     counts = {
         "flown again after a time-out or a kill": meters.get("retried", 0),
         "to see whether violations repeat": max(0, repeats),

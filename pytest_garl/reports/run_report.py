@@ -70,7 +70,7 @@ def report_of(path: Path, corpus: Corpus) -> dict[str, Any]:
                 "wanted": sum(each.all for each in progress),
                 "flown": sum(each.flown for each in progress),
                 "flown_again": int(meters.get("retried", 0)),
-                "beside": int(meters.get("errands", 0)),
+                "beside": int(meters.get("on_demand", 0)),
             },
             "searches": searches,
             "cases": saved,

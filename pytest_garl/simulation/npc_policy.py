@@ -121,7 +121,7 @@ def _is_change(each: object) -> bool:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PolicySpec:
-    """Names a policy so that a child process can make it and a ledger can compare it.
+    """Names a policy so that a worker process can make it and a ledger can compare it.
 
     ``factory`` is "module:attribute", called with ``arguments`` as keyword arguments for
     each object.

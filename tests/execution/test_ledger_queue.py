@@ -39,7 +39,7 @@ def test_a_claim_of_a_silent_process_lapses(tmp_path: Path) -> None:
 def test_a_claim_of_a_child_that_lives_never_lapses(tmp_path: Path) -> None:
     """Its pool watches it: it may be silent for as long as it flies."""
     ledger = waiting_ledger(tmp_path / "ledger.sqlite")
-    assert ledger.queue.take_seat(1, os.getpid)
+    assert ledger.queue.register_worker(1, os.getpid)
     assert ledger.queue.claim(lease_s=-1.0)
     ledger.queue.release_dead()
     assert ledger.queue.claim_of(os.getpid())
@@ -53,7 +53,7 @@ def test_a_dead_child_is_left_to_its_pool_for_as_long_as_the_lease(
     ledger = waiting_ledger(path)
     with subprocess.Popen(["true"]) as child:
         child.wait()
-    assert ledger.queue.take_seat(1, lambda: child.pid)
+    assert ledger.queue.register_worker(1, lambda: child.pid)
     assert WorkQueue.open(path, child.pid).claim(lease_s=lease_s)
     ledger.queue.release_dead()
     assert (ledger.queue.claim_of(child.pid) is not None) == kept

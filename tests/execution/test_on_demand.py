@@ -44,7 +44,7 @@ def foggier(job: Job) -> Callable[[Fly], tuple[float, str]]:
 def test_each_flight_is_decided_by_the_one_before(job: Job, ledger: Ledger) -> None:
     found = errands(ledger).run({"one": foggier(job), "two": foggier(job)})
     assert found == {"one": (0.12, "I?:unknown"), "two": (0.12, "I?:unknown")}
-    assert ledger.queries.meters()["errands"] == 8
+    assert ledger.queries.meters()["on_demand"] == 8
     # They are no part of any search's figures.
     assert ledger.queries.results() == []
     assert ledger.queries.progress() == []
@@ -53,7 +53,7 @@ def test_each_flight_is_decided_by_the_one_before(job: Job, ledger: Ledger) -> N
 def test_what_was_flown_is_not_flown_again_when_asked_anew(job: Job, ledger: Ledger) -> None:
     first = errands(ledger).run({"one": foggier(job)})
     assert errands(ledger).run({"one": foggier(job)}) == first
-    assert ledger.queries.meters()["errands"] == 4
+    assert ledger.queries.meters()["on_demand"] == 4
 
 
 def test_a_result_comes_with_its_hash_and_its_record(job: Job, ledger: Ledger) -> None:
@@ -93,7 +93,7 @@ def test_an_interruption_ends_the_threads_and_loses_nothing(job: Job, ledger: Le
 
     with pytest.raises(KeyboardInterrupt):
         errands(ledger, tick).run({"one": foggier(job)})
-    flown = ledger.queries.meters()["errands"]
+    flown = ledger.queries.meters()["on_demand"]
     assert 0 < flown < 4
     assert errands(ledger).run({"one": foggier(job)})["one"][0] == 0.12
-    assert ledger.queries.meters()["errands"] == 4
+    assert ledger.queries.meters()["on_demand"] == 4

@@ -16,12 +16,12 @@ from pytest_garl.execution.processes import alive, named
 STARTS_A_CHILD = """
 import sys, time
 from pathlib import Path
-from pytest_garl.execution.process_pool import ChildPool
+from pytest_garl.execution.process_pool import ProcessPool
 from pytest_garl.execution.ledger import Ledger
-from pytest_garl.execution.local_pool import Flyers
+from pytest_garl.execution.local_pool import FlightWorkers
 
 ledger = Ledger.create(Path(sys.argv[1]), {})
-pool = ChildPool(ledger.queue, Flyers(seats=1))
+pool = ProcessPool(ledger.queue, FlightWorkers(max_workers=1))
 pool.turn()
 print(*pool._children, flush=True)
 time.sleep(600)
@@ -68,7 +68,7 @@ def test_a_child_whose_parent_is_another_than_it_was_told_ends_at_once(
     tmp_path: Path, module: str
 ) -> None:
     """As it is if the parent was killed before the child could ask who it is."""
-    code = f"import pytest_garl.execution.{module} as child, sys; child.run_child(child.main, '')"
+    code = f"import pytest_garl.execution.{module} as child, sys; child.run_worker(child.main, '')"
     command = [sys.executable, "-c", code, "1", "2", str(tmp_path / "ledger.sqlite"), ".", "1"]
     done = subprocess.run(command, check=False, capture_output=True, text=True)
     assert (done.returncode, done.stderr) == (1, "")

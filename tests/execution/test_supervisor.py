@@ -14,9 +14,9 @@ import pytest
 from pytest_garl.errors import PoolError
 from pytest_garl.execution.job import dump_scenario, fly_job
 from pytest_garl.execution.ledger import Ledger
-from pytest_garl.execution.local_pool import Flyers
+from pytest_garl.execution.local_pool import FlightWorkers
 from pytest_garl.execution.pool import wait_for
-from pytest_garl.execution.process_pool import MOST_LOSSES, ChildPool
+from pytest_garl.execution.process_pool import MOST_LOSSES, ProcessPool
 from pytest_garl.execution.reference import reference_to
 from pytest_garl.execution.slot import Slot, flight_name
 from pytest_garl.execution.supervisor import LEAST_STANDSTILL_S, Watch
@@ -61,7 +61,7 @@ class Field:
     def __init__(self, folder: Path) -> None:
         self.folder = folder
         self.ledger = Ledger.create(folder / "ledger.sqlite", {})
-        self.pool = ChildPool(self.ledger.queue, Flyers(seats=1, patience_s=60.0))
+        self.pool = ProcessPool(self.ledger.queue, FlightWorkers(max_workers=1, patience_s=60.0))
 
     def fly(self, system: type, timeout_s: float = 20.0, simulator: Any = None) -> Flown:
         """Fly a system and then a good one."""
@@ -246,7 +246,7 @@ def test_children_that_end_before_they_fly_end_the_run(field: Field) -> None:
             os.kill(child, signal.SIGKILL)
 
     field.ledger.add_search("one", "s", "lawn", 1, "{}")
-    with pytest.raises(PoolError, match="flying children die before they fly"):
+    with pytest.raises(PoolError, match="worker processes end before they fly"):
         wait_for(field.ledger, field.pool, "one", NEXT, kill_all)
 
 

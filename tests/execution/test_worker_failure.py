@@ -8,13 +8,13 @@ import pytest
 from pytest_garl.execution.job import dump_scenario
 from pytest_garl.execution.ledger import Ledger
 from pytest_garl.execution.ledger_queue import Claim
-from pytest_garl.execution.worker_failure import Death, settle
+from pytest_garl.execution.worker_failure import WorkerExit, retry_or_record
 from tests.execution.flying import Good, job_of, scenario
 
-DIED = Death(status=-11, complaint="no fuel")
-KILLED = Death(status=-9)
-BROKE = Death(status=0, failure=("TypeError", "no array", "Traceback"))
-HUNG = Death(status=-9, words="in step", hung="one call took longer than 30 s of wall time")
+DIED = WorkerExit(status=-11, complaint="no fuel")
+KILLED = WorkerExit(status=-9)
+BROKE = WorkerExit(status=0, failure=("TypeError", "no array", "Traceback"))
+HUNG = WorkerExit(status=-9, words="in step", hung="one call took longer than 30 s of wall time")
 
 
 @pytest.fixture
@@ -43,10 +43,10 @@ def crash(ledger: Ledger) -> dict[str, Any]:
     ("death", "after"), [(KILLED, "killed"), (HUNG, "hung"), (BROKE, "failed")]
 )
 def test_what_the_machine_may_have_done_is_flown_again_when_nobody_else_flies(
-    ledger: Ledger, death: Death, after: str
+    ledger: Ledger, death: WorkerExit, after: str
 ) -> None:
     first, other = claimed(ledger), claimed(ledger)
-    settle(ledger.queue, first, death)
+    retry_or_record(ledger.queue, first, death)
     assert ledger.result("s", 0, 0) is None
     assert ledger.queue.claim() is None
     ledger.queue.record(other, {}, "", 0.0)
@@ -59,7 +59,7 @@ def test_what_the_machine_may_have_done_is_flown_again_when_nobody_else_flies(
 
 
 def test_a_process_that_ends_itself_is_a_finding_at_once(ledger: Ledger) -> None:
-    settle(ledger.queue, claimed(ledger), DIED)
+    retry_or_record(ledger.queue, claimed(ledger), DIED)
     result = ledger.result("s", 0, 0)
     assert result is not None
     assert result["verdict"]["signature"] == "V:died:signal-11"
@@ -82,12 +82,12 @@ def test_a_process_that_ends_itself_is_a_finding_at_once(ledger: Ledger) -> None
     ],
 )
 def test_what_happens_again_alone_is_a_finding(
-    ledger: Ledger, death: Death, signature: str, message: str
+    ledger: Ledger, death: WorkerExit, signature: str, message: str
 ) -> None:
     first = claimed(ledger)
     ledger.queue.record(claimed(ledger), {}, "", 0.0)
-    settle(ledger.queue, first, death)
-    settle(ledger.queue, claimed(ledger), death)
+    retry_or_record(ledger.queue, first, death)
+    retry_or_record(ledger.queue, claimed(ledger), death)
     result = ledger.result("s", 0, 0)
     assert result is not None
     assert result["verdict"]["signature"] == signature
@@ -97,11 +97,11 @@ def test_what_happens_again_alone_is_a_finding(
 def test_three_flights_that_end_each_in_another_way_leave_it_undecided(ledger: Ledger) -> None:
     first = claimed(ledger)
     ledger.queue.record(claimed(ledger), {}, "", 0.0)
-    settle(ledger.queue, first, HUNG)
-    settle(ledger.queue, claimed(ledger), KILLED)
+    retry_or_record(ledger.queue, first, HUNG)
+    retry_or_record(ledger.queue, claimed(ledger), KILLED)
     third = claimed(ledger)
     assert (third.after, third.attempt) == ("hung killed", 3)
-    settle(ledger.queue, third, BROKE)
+    retry_or_record(ledger.queue, third, BROKE)
     result = ledger.result("s", 0, 0)
     assert result is not None
     assert (result["outcome"], result["verdict"]["signature"]) == ("inconclusive", "")
@@ -111,8 +111,8 @@ def test_three_flights_that_end_each_in_another_way_leave_it_undecided(ledger: L
 def test_a_finding_after_another_death_is_one(ledger: Ledger) -> None:
     first = claimed(ledger)
     ledger.queue.record(claimed(ledger), {}, "", 0.0)
-    settle(ledger.queue, first, KILLED)
-    settle(ledger.queue, claimed(ledger), DIED)
+    retry_or_record(ledger.queue, first, KILLED)
+    retry_or_record(ledger.queue, claimed(ledger), DIED)
     assert crash(ledger)["message"] == "its process ended with signal 11"
 
 
@@ -121,7 +121,7 @@ def test_what_is_given_back_is_flown_as_if_it_had_not_been_claimed(ledger: Ledge
     ledger.queue.give_back(first)
     assert claimed(ledger) == first
     ledger.queue.record(claimed(ledger), {}, "", 0.0)
-    settle(ledger.queue, first, HUNG)
+    retry_or_record(ledger.queue, first, HUNG)
     alone = claimed(ledger)
     assert (alone.after, alone.attempt) == ("hung", 2)
     ledger.queue.give_back(alone)

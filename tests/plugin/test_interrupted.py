@@ -26,7 +26,7 @@ def cases(folder: Path) -> dict[str, bytes]:
 def flown(pytester: pytest.Pytester) -> list[tuple[int, ...]]:
     return query(
         pytester.path / ".garl" / "ledger.sqlite",
-        "SELECT CAST(value AS INT) FROM meter WHERE name IN ('flights', 'errands') ORDER BY name",
+        "SELECT CAST(value AS INT) FROM meter WHERE name IN ('flights', 'on_demand') ORDER BY name",
     )
 
 

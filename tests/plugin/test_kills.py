@@ -60,7 +60,7 @@ class Outcome:
 
 def outcome(folder: Path) -> Outcome:
     ledger = Ledger(folder / ".garl" / "ledger.sqlite")
-    meters = {name: ledger.queries.meters().get(name, 0.0) for name in ("flights", "errands")}
+    meters = {name: ledger.queries.meters().get(name, 0.0) for name in ("flights", "on_demand")}
     found = Outcome(
         hash=ledger.queries.result_hash(),
         cases={path.name: path.read_bytes() for path in folder.glob("scenarios/**/*.toml")},
@@ -121,17 +121,17 @@ class Prey:
         found = query(self.ledger, "SELECT count(*) FROM slot WHERE state = 'flown'")
         return found[0][0] if found else 0
 
-    def seats(self) -> list[int]:
-        return [pid for (pid,) in query(self.ledger, "SELECT pid FROM seat")]
+    def workers(self) -> list[int]:
+        return [pid for (pid,) in query(self.ledger, "SELECT pid FROM worker")]
 
     def flying(self) -> list[int]:
-        return [child for seat in self.seats() for child in children_of(seat)]
+        return [child for worker in self.workers() for child in children_of(worker)]
 
     def all(self) -> Iterator[int]:
         """Yield all of them, pytest first."""
         yield self.process.pid
         yield from self.flying()
-        yield from self.seats()
+        yield from self.workers()
 
 
 def kill(*prey: int) -> None:
@@ -145,7 +145,7 @@ def at_random(prey: Prey, rng: random.Random) -> None:
     flights = rng.randrange(BUDGET + 20)
     prey.until(lambda: prey.flown() >= flights)
     time.sleep(rng.uniform(0.0, 0.1))
-    victims = rng.choice([[prey.process.pid], prey.seats()[:1], prey.flying()[:1], [*prey.all()]])
+    victims = rng.choice([[prey.process.pid], prey.workers()[:1], prey.flying()[:1], [*prey.all()]])
     kill(*victims)
 
 
@@ -154,13 +154,13 @@ def at_a_childs_start(prey: Prey, rng: random.Random) -> None:
     if rng.random() < 0.5:
         # The next one: it takes the place of a child that was killed.
         prey.until(lambda: prey.flown() > 2)
-        before = prey.seats()
+        before = prey.workers()
         kill(*prey.flying()[:1])
-        prey.until(lambda: set(prey.seats()) - set(before))
+        prey.until(lambda: set(prey.workers()) - set(before))
     else:
-        prey.until(prey.seats)
+        prey.until(prey.workers)
     time.sleep(rng.choice([0.0, 0.05, 0.2, 0.4]))
-    kill(rng.choice([prey.process.pid, prey.process.pid, *prey.seats()]))
+    kill(rng.choice([prey.process.pid, prey.process.pid, *prey.workers()]))
 
 
 def while_saving(prey: Prey, rng: random.Random) -> None:

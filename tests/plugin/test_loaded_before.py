@@ -102,7 +102,7 @@ def test_what_is_loaded_before_that_sends_the_flight_to_a_child(unpinned: pytest
     assert told[1] == cpu_dispatch.BASELINE
     assert here[0] != told[0]
     result.stdout.fnmatch_lines(
-        ["garl: loaded before*kernels for nehalem*flown in a child process, not inside pytest;*"]
+        ["garl: loaded before*kernels for nehalem*flown in a worker process, not inside pytest;*"]
     )
 
 

@@ -109,7 +109,7 @@ def pilots(pids: list[int]) -> list[int]:
             command = Path(f"/proc/{pid}/cmdline").read_bytes()
         except OSError:
             continue
-        if command.startswith(b"ray::Pilot"):
+        if command.startswith(b"ray::FlightActor"):
             found.append(pid)
     return found
 
@@ -178,8 +178,8 @@ class TestOnACluster:
         ledger = pytester.path / ".garl" / "ledger.sqlite"
         process = start(pytester, *ON_RAY)
         wait_for(ledger, 5, process, PATIENCE_S)
-        seats = [pid for (pid,) in query(ledger, "SELECT pid FROM seat")]
-        prey = seats if victim == "driver" else pilots(below(cluster))
+        workers = [pid for (pid,) in query(ledger, "SELECT pid FROM worker")]
+        prey = workers if victim == "driver" else pilots(below(cluster))
         os.kill(random.Random(victim).choice(prey), signal.SIGKILL)
         output, _ = process.communicate(timeout=PATIENCE_S)
         assert process.returncode in (0, 1), output

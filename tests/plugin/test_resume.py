@@ -121,26 +121,26 @@ def test_a_killed_run_resumes_as_if_nothing_had_happened(
         run(pytester, *BUDGET)
         undisturbed["hash"] = result_hash(pytester)
         assert query(ledger, f"SELECT count(*) {FLOWN}") == [(30,)]
-    victim = ("pytest", "child", "worker")[moment % 3]
+    victim = ("pytest", "worker", "xdist worker")[moment % 3]
     rng = random.Random(moment)
-    process = start(pytester, *(["-n2"] if victim == "worker" else []))
+    process = start(pytester, *(["-n2"] if victim == "xdist worker" else []))
     wait_for(ledger, rng.randrange(28), process)
     time.sleep(rng.uniform(0, 0.1))
-    seats = [pid for (pid,) in query(ledger, "SELECT pid FROM seat")]
+    workers = [pid for (pid,) in query(ledger, "SELECT pid FROM worker")]
     prey = {
         "pytest": [process.pid],
-        "child": seats,
-        "worker": children_of(process.pid),
+        "worker": workers,
+        "xdist worker": children_of(process.pid),
     }[victim]
     if prey and process.poll() is None:
         os.kill(rng.choice(prey), signal.SIGKILL)
-    # A child that is killed does not end the run: its slot is flown once more.
+    # A worker that is killed does not end the run: its slot is flown once more.
     process.communicate(timeout=60)
     for _ in range(200):
-        if not any(alive(pid) for pid in seats):
+        if not any(alive(pid) for pid in workers):
             break
         time.sleep(0.05)
-    assert not any(alive(pid) for pid in seats), "orphans"
+    assert not any(alive(pid) for pid in workers), "orphans"
     before = query(ledger, f"SELECT generation, slot, sha256 {FLOWN}")
     resumed = run(pytester, *BUDGET, "--garl-resume")
     assert resumed.ret in (0, 1)
@@ -156,13 +156,13 @@ def test_ctrl_c_leaves_no_orphan_and_a_ledger_that_resumes(pytester: pytest.Pyte
     ledger = pytester.path / ".garl" / "ledger.sqlite"
     process = start(pytester)
     wait_for(ledger, 5, process)
-    seats = [pid for (pid,) in query(ledger, "SELECT pid FROM seat")]
+    workers = [pid for (pid,) in query(ledger, "SELECT pid FROM worker")]
     process.send_signal(signal.SIGINT)
     output, _ = process.communicate(timeout=60)
     assert process.returncode == pytest.ExitCode.INTERRUPTED, output
     assert "of 30 flown; the same command with --garl-resume goes on" in output
-    assert seats
-    assert not any(alive(pid) for pid in seats)
+    assert workers
+    assert not any(alive(pid) for pid in workers)
     resumed = run(pytester, *BUDGET, "--garl-resume")
     assert resumed.ret in (0, 1)
     resumed.stdout.fnmatch_lines(["garl: resuming after * flights; budget 30*"])

@@ -1,4 +1,4 @@
-"""A pilot: flies single slots on whatever machine it is put, in a child process of its own."""
+"""A pilot: flies single slots on whatever machine it is put, in a worker process of its own."""
 
 from __future__ import annotations
 
@@ -17,20 +17,20 @@ from pytest_garl import cpu_dispatch
 from pytest_garl.execution.job import Job, loads
 from pytest_garl.execution.ledger import Ledger
 from pytest_garl.execution.ledger_queue import Claim, WorkQueue
-from pytest_garl.execution.local_pool import Flyers
+from pytest_garl.execution.local_pool import FlightWorkers
 from pytest_garl.execution.pool import wait_for
-from pytest_garl.execution.process_pool import ChildPool
+from pytest_garl.execution.process_pool import ProcessPool
 from pytest_garl.execution.ray.path_mapping import Relocation
 from pytest_garl.execution.reference import package_sha256
 from pytest_garl.execution.slot import Slot, flight_name
-from pytest_garl.execution.worker_failure import Death
+from pytest_garl.execution.worker_failure import WorkerExit
 from pytest_garl.simulation.flight import PACKAGES
 
 _FIRST = Slot(generation=0, index=0)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Landed:
+class FlightOutput:
     """A flight that was flown: what the ledger records of it, and the bytes of its record."""
 
     result: dict[str, Any]
@@ -40,7 +40,7 @@ class Landed:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Base:
+class ActorWorkspace:
     """Where pilots work, each in a folder of its own below ``scratch``.
 
     Where ``home`` is set, Ray has put a copy of it into the working directory, in which pilots
@@ -52,7 +52,7 @@ class Base:
     inside: str = "."
 
 
-class Pilot:
+class FlightActor:
     """Flies what it is told, one slot after the other.
 
     The flying is done by a local pool of one child with a ledger of its own, so that a landing
@@ -60,26 +60,28 @@ class Pilot:
     What it means is decided by who asked.
     """
 
-    def __init__(self, base: Base) -> None:
+    def __init__(self, base: ActorWorkspace) -> None:
         here = Path.cwd()
         self._relocation = Relocation(home=base.home, here=str(here)) if base.home else None
         self._folder = Path(tempfile.mkdtemp(prefix=".garl-pilot-", dir=here / base.scratch))
         os.chdir(here / base.inside)
         self._ledger = Ledger.create(self._folder / "ledger.sqlite", {})
-        self._pool = ChildPool(self._ledger.queue, Flyers(seats=1, settle=self._note))
+        self._pool = ProcessPool(
+            self._ledger.queue, FlightWorkers(max_workers=1, on_exit=self._note)
+        )
         self._flown = 0
-        self._death: Death | None = None
+        self._death: WorkerExit | None = None
 
     def about(self) -> tuple[str, dict[str, str]]:
         """Return the machine's name, and the versions of what decides on a flight's bytes."""
         return platform.node(), versions()
 
-    def fly(self, claim: Claim) -> Landed | Death:
+    def fly(self, claim: Claim) -> FlightOutput | WorkerExit:
         """Fly a slot once; return what it came to, or how its process ended."""
         self._flown += 1
         search, flights = str(self._flown), self._folder / "flights"
         job = dataclasses.replace(self._job(claim.job), flights=str(flights))
-        self._ledger.add_search(search, job.system.name, job.map, 1, job.dumps(), "errand")
+        self._ledger.add_search(search, job.system.name, job.map, 1, job.dumps(), "on_demand")
         self._ledger.add_slots(search, 0, {0: claim.scenario}, claim.after)
         result = wait_for(self._ledger, self._pool, search, _FIRST, lambda: None)
         if self._death is not None:
@@ -94,7 +96,7 @@ class Pilot:
         file = flights / f"{flight_name(search, 0, 0, job.map)}.npz"
         record = file.read_bytes()
         file.unlink()
-        return Landed(
+        return FlightOutput(
             result=json.loads(self._at_home(json.dumps(result))),
             sha256=self._ledger.sha256(search, 0, 0),
             wall_s=self._ledger.wall_s(search, 0, 0),
@@ -111,9 +113,9 @@ class Pilot:
         return self._relocation.job(text) if self._relocation else loads(text)
 
     def _at_home(self, text: str) -> str:
-        return self._relocation.home_again(text) if self._relocation else text
+        return self._relocation.to_local(text) if self._relocation else text
 
-    def _note(self, queue: WorkQueue, claim: Claim, death: Death) -> None:
+    def _note(self, queue: WorkQueue, claim: Claim, death: WorkerExit) -> None:
         """Remember a death and take the slot out of the queue: it is flown once."""
         self._death = death
         queue.record(claim, {}, "", 0.0)

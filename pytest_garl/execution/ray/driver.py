@@ -22,9 +22,9 @@ from typing import Any
 
 from pytest_garl.errors import PoolError
 from pytest_garl.execution.ledger_queue import WorkQueue
-from pytest_garl.execution.processes import Parent, named, run_child
-from pytest_garl.execution.ray.actor import Base
-from pytest_garl.execution.ray.scheduler import Fleet
+from pytest_garl.execution.processes import Parent, named, run_worker
+from pytest_garl.execution.ray.actor import ActorWorkspace
+from pytest_garl.execution.ray.scheduler import RayScheduler
 
 PATIENCE_S = 180.0
 """How long Ray may take to connect, with the upload of the project; alone it goes on for ever."""
@@ -42,7 +42,7 @@ def main(parent: Parent, ledger: str, root: str, workers: str) -> None:
     address = os.environ.get("RAY_ADDRESS") or "local"
     there = own(int(workers)) if address == "local" else joined(address, Path(root), path.parent)
     with there as (ray, base, cpus):
-        fleet = Fleet(ray, WorkQueue.open(path), base, int(workers) or cpus)
+        fleet = RayScheduler(ray, WorkQueue.open(path), base, int(workers) or cpus)
         try:
             while parent.lives():
                 fleet.turn()
@@ -51,7 +51,7 @@ def main(parent: Parent, ledger: str, root: str, workers: str) -> None:
 
 
 @contextmanager
-def own(workers: int) -> Iterator[tuple[Any, Base, int]]:
+def own(workers: int) -> Iterator[tuple[Any, ActorWorkspace, int]]:
     """Start a cluster on this machine that ends with the block.
 
     Gives Ray, where pilots work and for how many there are CPUs; raises PoolError.
@@ -72,7 +72,7 @@ def own(workers: int) -> Iterator[tuple[Any, Base, int]]:
             # Short of memory the kernel ends what needs most, the flight, as it does without Ray.
             _system_config={"memory_monitor_refresh_ms": 0},
         ) as ray:
-            yield ray, Base(scratch=folder), cpus
+            yield ray, ActorWorkspace(scratch=folder), cpus
     finally:
         _remove(folder)
 
@@ -90,7 +90,7 @@ def _remove(folder: str) -> None:
 
 
 @contextmanager
-def joined(address: str, root: Path, folder: Path) -> Iterator[tuple[Any, Base, int]]:
+def joined(address: str, root: Path, folder: Path) -> Iterator[tuple[Any, ActorWorkspace, int]]:
     """Join a cluster for as long as the block lasts, and give it a copy of the project at ``root``.
 
     What git ignores is not copied, nor is ``folder``, where the flights are.
@@ -101,7 +101,7 @@ def joined(address: str, root: Path, folder: Path) -> Iterator[tuple[Any, Base, 
     copied = {"working_dir": str(root), "excludes": excludes}
     with _connected(address, runtime_env=copied) as ray:
         cpus = int(ray.cluster_resources().get("CPU", 1))
-        yield ray, Base(home=str(root), inside=inside), cpus
+        yield ray, ActorWorkspace(home=str(root), inside=inside), cpus
 
 
 @contextmanager
@@ -143,4 +143,4 @@ def _give_up(address: str) -> None:
 
 
 if __name__ == "__main__":
-    run_child(main, "the driver of Ray")
+    run_worker(main, "the driver of Ray")

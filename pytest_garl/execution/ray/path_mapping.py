@@ -29,7 +29,7 @@ class Relocation:
             job, system=self._by_name(job.system), simulator=self._by_name(job.simulator)
         )
 
-    def home_again(self, text: str) -> str:
+    def to_local(self, text: str) -> str:
         """Return a text such as a traceback with the paths that it would have at home."""
         return _moved(text, self.here, self.home)
 

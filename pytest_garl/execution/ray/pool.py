@@ -12,8 +12,8 @@ from pathlib import Path
 from pytest_garl.errors import PoolError
 from pytest_garl.execution.ledger_queue import WorkQueue
 from pytest_garl.execution.pool import Pool
-from pytest_garl.execution.process_pool import ChildPool
-from pytest_garl.execution.worker_failure import Death
+from pytest_garl.execution.process_pool import ProcessPool
+from pytest_garl.execution.worker_failure import WorkerExit
 
 INSTALL = "pip install 'pytest-garl[ray]'"
 REACH_S = 5.0
@@ -25,7 +25,7 @@ def ray_pool(queue: WorkQueue, workers: int | None, root: Path) -> Pool:
     The cluster is that of RAY_ADDRESS, which gets a copy of the project at ``root``, or else one on
     this machine that begins and ends with the pool.
     """
-    return ChildPool(queue, Driver(workers=workers, root=root))
+    return ProcessPool(queue, Driver(workers=workers, root=root))
 
 
 def check_ray(address: str) -> None:
@@ -59,7 +59,7 @@ class Driver:
     """To end a cluster takes a second or two, and more on a busy machine."""
 
     @property
-    def seats(self) -> int:
+    def max_workers(self) -> int:
         """One, however many fly: the limit of flights is the driver's."""
         return 1
 
@@ -72,7 +72,7 @@ class Driver:
             str(self.workers or 0),
         ]
 
-    def bury(self, queue: WorkQueue, pid: int, death: Death) -> bool:
+    def handle_exit(self, queue: WorkQueue, pid: int, death: WorkerExit) -> bool:
         """Give back all slots: nothing flies in the driver, so its death says nothing of them."""
         queue.release(pid)
         return False

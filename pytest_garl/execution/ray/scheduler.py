@@ -12,25 +12,25 @@ from typing import Any
 from pytest_garl.errors import LedgerError, PoolError
 from pytest_garl.execution.job import loads, record_file
 from pytest_garl.execution.ledger_queue import Claim, WorkQueue
-from pytest_garl.execution.ray.actor import Base, Landed, Pilot, versions
+from pytest_garl.execution.ray.actor import ActorWorkspace, FlightActor, FlightOutput, versions
 from pytest_garl.execution.worker import IDLE_S
-from pytest_garl.execution.worker_failure import Death, settle
+from pytest_garl.execution.worker_failure import WorkerExit, retry_or_record
 
 MOST_LOSSES = 3
 """Workers of Ray that may be lost with the same slot, or one after the other before they fly."""
 PARTING_S = 2.0
 
 
-class Fleet:
+class RayScheduler:
     """Pilots on a connected cluster, never more than ``size`` nor than there is to fly.
 
     ``ray`` is the module, which a process that does not fly by it shall not have to import.
     """
 
-    def __init__(self, ray: Any, queue: WorkQueue, base: Base, size: int) -> None:
+    def __init__(self, ray: Any, queue: WorkQueue, base: ActorWorkspace, size: int) -> None:
         self._ray, self._queue, self._base, self._size = ray, queue, base, size
         # One CPU is one flight: it flies on one thread.
-        self._hire = ray.remote(num_cpus=1)(Pilot)
+        self._hire = ray.remote(num_cpus=1)(FlightActor)
         self._arriving: dict[Any, Any] = {}
         """Pilots by what will tell about them."""
         self._flying: dict[Any, tuple[Any, Claim]] = {}
@@ -110,14 +110,14 @@ class Fleet:
 
     def _take_in(self, ref: Any, pilot: Any, claim: Claim) -> None:
         try:
-            flight: Landed | Death = self._ray.get(ref)
+            flight: FlightOutput | WorkerExit = self._ray.get(ref)
         except self._ray.exceptions.RayTaskError as error:
             raise PoolError(f"on a node of Ray: {error.cause}") from error
         except self._ray.exceptions.RayError as error:
             self._lose(claim, error)
             return
-        if isinstance(flight, Death):
-            settle(self._queue, claim, flight)
+        if isinstance(flight, WorkerExit):
+            retry_or_record(self._queue, claim, flight)
         else:
             _keep(flight, claim)
             self._queue.record(claim, flight.result, flight.sha256, flight.wall_s)
@@ -145,7 +145,7 @@ def unlike(ours: Mapping[str, str], theirs: Mapping[str, str]) -> str:
     )
 
 
-def _keep(flight: Landed, claim: Claim) -> None:
+def _keep(flight: FlightOutput, claim: Claim) -> None:
     """Write a flight's record where the job wants it, whole or not at all."""
     path = record_file(loads(claim.job), claim)
     scratch = path.with_name(f".{path.name}.{os.getpid()}")

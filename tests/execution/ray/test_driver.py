@@ -12,7 +12,7 @@ import pytest
 from pytest_garl.errors import PoolError
 from pytest_garl.execution.processes import read_report, report_file
 from pytest_garl.execution.ray import driver as ray_driver
-from pytest_garl.execution.ray.actor import Base
+from pytest_garl.execution.ray.actor import ActorWorkspace
 from pytest_garl.execution.ray.pool import check_ray
 
 
@@ -57,7 +57,7 @@ def test_a_cluster_that_is_joined_gets_the_project_without_its_flights(
     (tmp_path / "landing" / "tests").mkdir(parents=True)
     monkeypatch.chdir(tmp_path / "landing" / "tests")
     with ray_driver.joined("head:6379", tmp_path, tmp_path / "runs" / ".garl") as (_, base, cpus):
-        assert (base, cpus) == (Base(home=str(tmp_path), inside="landing/tests"), 6)
+        assert (base, cpus) == (ActorWorkspace(home=str(tmp_path), inside="landing/tests"), 6)
     assert ray.connections == [True, False]
     assert ray.given["address"] == "head:6379"
     assert ray.given["runtime_env"] == {

@@ -58,4 +58,4 @@ def test_a_folder_with_any_name_is_found() -> None:
     ],
 )
 def test_a_traceback_reads_as_at_home(here: str, home: str) -> None:
-    assert MOVED.home_again(here) == home
+    assert MOVED.to_local(here) == home

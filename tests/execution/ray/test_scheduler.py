@@ -11,13 +11,13 @@ from pytest_garl.errors import PoolError
 from pytest_garl.execution.job import dump_scenario
 from pytest_garl.execution.ledger import Ledger
 from pytest_garl.execution.ledger_queue import Claim
-from pytest_garl.execution.ray.actor import Base, Landed, versions
-from pytest_garl.execution.ray.scheduler import Fleet, unlike
-from pytest_garl.execution.worker_failure import Death
+from pytest_garl.execution.ray.actor import ActorWorkspace, FlightOutput, versions
+from pytest_garl.execution.ray.scheduler import RayScheduler, unlike
+from pytest_garl.execution.worker_failure import WorkerExit
 from tests.execution.flying import Good, job_of, scenario
 
-LANDED = Landed(result={"outcome": "landed"}, sha256="hash", wall_s=1.5, record=b"record")
-KILLED = Death(status=-9)
+LANDED = FlightOutput(result={"outcome": "landed"}, sha256="hash", wall_s=1.5, record=b"record")
+KILLED = WorkerExit(status=-9)
 
 
 class RayError(Exception):
@@ -60,7 +60,7 @@ class FakeRay:
         assert num_cpus == 1
         return lambda pilot: type("Hire", (), {"remote": staticmethod(self._hire)})
 
-    def _hire(self, base: Base) -> Any:
+    def _hire(self, base: ActorWorkspace) -> Any:
         self.hired += 1
         return type("Actor", (), {name: self._method(name) for name in self._answers})
 
@@ -95,8 +95,8 @@ def ledger(tmp_path: Path) -> Ledger:
     return ledger
 
 
-def fly(ray: FakeRay, ledger: Ledger, size: int = 2) -> Fleet:
-    fleet = Fleet(ray, ledger.queue, Base(), size)
+def fly(ray: FakeRay, ledger: Ledger, size: int = 2) -> RayScheduler:
+    fleet = RayScheduler(ray, ledger.queue, ActorWorkspace(), size)
     for _ in range(100):
         if not ledger.unflown("search", 0):
             break
