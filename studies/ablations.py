@@ -29,7 +29,7 @@ from pytest_garl.scenarios.genes import genome_for
 from pytest_garl.scenarios.maps.map import load_map
 from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.search.catalogue import find_method
-from pytest_garl.search.method import Flown, Method, Plan
+from pytest_garl.search.method import Flown, Method, SearchPlan
 from pytest_garl.search.methods.garl import Garl
 from pytest_garl.simulation.fly import fly
 from pytest_garl.verdicts.judge import closest_call, judge, undecided
@@ -55,12 +55,12 @@ def one(result: dict[str, Any]) -> str:
     return ""
 
 
-def half_exploring(plan: Plan) -> Method:
+def half_exploring(plan: SearchPlan) -> Method:
     """Return ``garl`` with half of its scenarios without parents."""
     return Garl(plan, explores=0.5)
 
 
-VARIANTS: dict[str, Callable[[Plan], Method]] = {
+VARIANTS: dict[str, Callable[[SearchPlan], Method]] = {
     "garl": find_method("garl"),
     "one cell": functools.partial(Garl, cell=one),
     "cells of violations only": functools.partial(Garl, cell=found),
@@ -105,7 +105,7 @@ def fly_one(scenario: Scenario, policy: str) -> dict[str, Any]:
 def search(name: str, seed: int, map: str, pool: Executor) -> dict[str, Any]:
     """Run one search to the end of its budget."""
     place = load_map(map)
-    plan = Plan(map=place, genome=genome_for(place), seed=seed, population=POPULATION)
+    plan = SearchPlan(map=place, genome=genome_for(place), seed=seed, population=POPULATION)
     flown = functools.partial(fly_one, policy=POLICIES.get(name, "dqn"))
     method, verdicts, chromosomes = VARIANTS[name](plan), [], []
     for _ in range(BUDGET // POPULATION):

@@ -23,11 +23,15 @@ from rich.progress import Progress
 from pytest_garl import cpu_dispatch
 from pytest_garl.adversary.catalogue import WEIGHTS, policy_spec
 from pytest_garl.adversary.learned import save
-from pytest_garl.adversary.observations import VIEWS
+from pytest_garl.adversary.observations import ENCODINGS
 from pytest_garl.adversary.training import rewards
 from pytest_garl.adversary.training.dqn import Experience, Learner, Training
 from pytest_garl.adversary.training.episode import Episode, draw_episode
-from pytest_garl.adversary.training.uav_models import AvoidingPilot, Caution, Habits
+from pytest_garl.adversary.training.uav_models import (
+    AvoidanceParameters,
+    AvoidingPilot,
+    FlightStyle,
+)
 from pytest_garl.scenarios.genes import WEATHER, genome_for
 from pytest_garl.scenarios.maps.map import Map, load_map
 from pytest_garl.scenarios.scenario import Scenario
@@ -45,8 +49,8 @@ FIELDS = ("mover", "objects", "system", "map", "chunk", "flights", "collided", "
 
 def warm_learner(training: Training) -> Learner:
     """Return a learner that begins as the shipped policy and is blind to fellows."""
-    view = VIEWS["fellow"]
-    learner = Learner(view.size, 5, training)
+    encoding = ENCODINGS["fellow"]
+    learner = Learner(encoding.size, 5, training)
     with np.load(WEIGHTS / "dqn.npz") as arrays, torch.no_grad():
         linear = [layer for layer in learner.network if isinstance(layer, torch.nn.Linear)]
         for index, layer in enumerate(linear):
@@ -61,7 +65,7 @@ def warm_learner(training: Training) -> Learner:
 def train_together(training: Training, count: int) -> Learner:
     """Train objects that share weights, one episode after the other."""
     torch.set_num_threads(1)
-    learner, view = warm_learner(training), VIEWS["fellow"]
+    learner, encoding = warm_learner(training), ENCODINGS["fellow"]
     maps = [load_map(name) for name in MAPS]
     with Progress() as bar:
         task = bar.add_task("together", total=training.episodes)
@@ -69,25 +73,27 @@ def train_together(training: Training, count: int) -> Learner:
             rng = np.random.default_rng([training.seed, number])
             kinds = [KINDS[int(index)] for index in rng.integers(3, size=count)]
             scenario, place = draw_episode(maps[int(rng.integers(2))], kinds, rng)
-            pilot = functools.partial(AvoidingPilot, Habits.drawn(rng), Caution.drawn(rng))
+            pilot = functools.partial(
+                AvoidingPilot, FlightStyle.drawn(rng), AvoidanceParameters.drawn(rng)
+            )
             episode = Episode(scenario, place, pilot)
             experiences = [Experience(learner) for _ in kinds]
             epsilon = max(training.epsilon_least, training.epsilon * training.epsilon_decay**number)
             while episode.outcome is None:
-                _decide(episode, learner, experiences, view, epsilon)
+                _decide(episode, learner, experiences, encoding, epsilon)
             episode.close()
             bar.update(task, completed=number + 1)
     return learner
 
 
 def _decide(
-    episode: Episode, learner: Learner, experiences: list[Experience], view: Any, epsilon: float
+    episode: Episode, learner: Learner, experiences: list[Experience], encoding: Any, epsilon: float
 ) -> None:
     before = episode.situations
-    states = np.stack([view.state(situation) for situation in before])
+    states = np.stack([encoding.state(situation) for situation in before])
     actions = learner.act(states, epsilon)
     episode.step(
-        [view.moves(seen)[int(action)] for seen, action in zip(before, actions, strict=True)]
+        [encoding.moves(seen)[int(action)] for seen, action in zip(before, actions, strict=True)]
     )
     after = episode.situations
     collided, cut = episode.hit is not None, episode.outcome == "not_landed"
@@ -104,7 +110,7 @@ def _decide(
             states[index],
             int(actions[index]),
             reward,
-            view.state(after[index]),
+            encoding.state(after[index]),
             ended=ended,
             cut=cut,
         )

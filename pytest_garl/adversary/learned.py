@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pytest_garl.adversary.catalogue import WEIGHTS
-from pytest_garl.adversary.observations import VIEWS, on_turn
+from pytest_garl.adversary.observations import ENCODINGS, on_turn
 from pytest_garl.errors import PolicyError
 from pytest_garl.files.arrays import unpack
 from pytest_garl.files.json_values import parsed
@@ -54,17 +54,17 @@ class LearnedPolicy:
 
     def __init__(self, weights: str, sha256: str) -> None:
         self._network = _load(weights, sha256)
-        self._view = VIEWS[self._network.state]
+        self._encoding = ENCODINGS[self._network.state]
 
     def reset(self, situation: Situation, rng: np.random.Generator) -> None:
         """Nothing to prepare: the state says everything."""
 
     def decide(self, situation: Situation) -> Move:
         """Return the best action, or stay where it is another's turn."""
-        if self._view.in_turn and not on_turn(situation):
+        if self._encoding.in_turn and not on_turn(situation):
             return STAY
-        values = self._network.values(self._view.state(situation))
-        return self._view.moves(situation)[int(np.argmax(values))]
+        values = self._network.values(self._encoding.state(situation))
+        return self._encoding.moves(situation)[int(np.argmax(values))]
 
 
 def learned_spec(name: str) -> PolicySpec:
@@ -120,9 +120,9 @@ def read_manifest(path: Path) -> dict[str, Any]:
     known = {"format", "state", "sha256"} <= manifest.keys()
     if not known or manifest["format"] != FORMAT:
         raise _wrong(file, f"is not a manifest of format {FORMAT}")
-    if str(manifest["state"]) not in VIEWS:
+    if str(manifest["state"]) not in ENCODINGS:
         state = shown(manifest["state"])
-        raise _wrong(file, f"names the state {state}; known: {', '.join(VIEWS)}")
+        raise _wrong(file, f"names the state {state}; known: {', '.join(ENCODINGS)}")
     return manifest
 
 
@@ -152,7 +152,7 @@ def _load(weights: str, sha256: str) -> Network:
 
 
 def _check(path: Path, layers: Sequence[tuple[Array, Array]], state: str) -> None:
-    size, actions = VIEWS[state].size, VIEWS[state].actions
+    size, actions = ENCODINGS[state].size, ENCODINGS[state].actions
     for weight, bias in layers:
         if weight.ndim != 2 or bias.shape != weight.shape[:1] or weight.shape[1] != size:
             raise _wrong(path, f"has a layer of shape {weight.shape} where {size} numbers go in")

@@ -154,7 +154,7 @@ def relative_moves(situation: Situation) -> tuple[Move, ...]:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class View:
+class Encoding:
     """How a policy sees: the state's size, the state, what the actions mean and how many there are.
 
     ``in_turn`` is whether at each decision one object acts, drawn at random, and all others stay.
@@ -167,13 +167,13 @@ class View:
     in_turn: bool = False
 
 
-VIEWS: Mapping[str, View] = MappingProxyType(
+ENCODINGS: Mapping[str, Encoding] = MappingProxyType(
     {
-        "paper": View(size=4, state=paper, moves=compass_moves),
-        "extended": View(size=9, state=extended, moves=compass_moves),
-        "relative": View(size=10, state=relative, moves=relative_moves),
-        "fellow": View(size=12, state=fellow, moves=relative_moves),
-        "online": View(
+        "paper": Encoding(size=4, state=paper, moves=compass_moves),
+        "extended": Encoding(size=9, state=extended, moves=compass_moves),
+        "relative": Encoding(size=10, state=relative, moves=relative_moves),
+        "fellow": Encoding(size=12, state=fellow, moves=relative_moves),
+        "online": Encoding(
             size=4 + len(ENVIRONMENT) + 2,
             state=online,
             moves=online_moves,
@@ -182,7 +182,7 @@ VIEWS: Mapping[str, View] = MappingProxyType(
         ),
     }
 )
-"""Each view by the name that a policy's manifest gives."""
+"""Each encoding by the name that a policy's manifest gives."""
 
 
 def _heading(situation: Situation) -> tuple[float, float]:

@@ -9,7 +9,7 @@ from pytest_garl.scenarios.chromosome import decode
 from pytest_garl.scenarios.genes import genome_for, with_destinations
 from pytest_garl.scenarios.maps.map import Map
 from pytest_garl.scenarios.object_types import OBJECT_TYPES
-from pytest_garl.simulation.npc_policy import ObjectState, PolicySpec, Situation, decision
+from pytest_garl.simulation.npc_policy import NpcState, PolicySpec, Situation, decision
 
 
 def check_policy(spec: PolicySpec, map: Map) -> None:
@@ -20,7 +20,7 @@ def check_policy(spec: PolicySpec, map: Map) -> None:
     x_min, x_max, y_min, y_max = map.bounds_m
     genome = with_destinations(genome_for(map))
     states = [
-        ObjectState(
+        NpcState(
             name=name,
             type=OBJECT_TYPES[kind],
             position_m=(x_min, y_min, OBJECT_TYPES[kind].altitude_m),

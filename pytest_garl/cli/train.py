@@ -18,7 +18,7 @@ from pytest_garl.landing_system import Airframe, airframe_of
 from pytest_garl.scenarios.object_types import OBJECT_TYPES
 
 if TYPE_CHECKING:
-    from pytest_garl.adversary.training.train import Plan
+    from pytest_garl.adversary.training.train import TrainingPlan
 
 RECENT = 50
 
@@ -128,8 +128,8 @@ def train(**asked: Any) -> None:
     )
 
 
-def _plan(asked: dict[str, Any]) -> Plan:
-    from pytest_garl.adversary.training.train import PRESETS, Plan
+def _plan(asked: dict[str, Any]) -> TrainingPlan:
+    from pytest_garl.adversary.training.train import PRESETS, TrainingPlan
     from pytest_garl.scenarios.maps.map import load_map
 
     kinds = _words(asked["kinds"])
@@ -139,7 +139,7 @@ def _plan(asked: dict[str, Any]) -> Plan:
     given = {name: asked[name] for name in ("state", "uav", "reward") if asked[name]}
     folders = (Path.cwd() / "scenarios" / "maps",)
     wishes, training = PRESETS[asked["policy"]]
-    return Plan(
+    return TrainingPlan(
         name=asked["policy"],
         surrogate=dataclasses.replace(
             wishes,
@@ -183,7 +183,7 @@ def _airframe(reference: str | None) -> Airframe:
 class _Progress:
     """A bar per seed with the recent reward and collision rate."""
 
-    def __init__(self, plan: Plan) -> None:
+    def __init__(self, plan: TrainingPlan) -> None:
         from rich.progress import (
             BarColumn,
             MofNCompleteColumn,

@@ -372,12 +372,12 @@ class Run:
         from pytest_garl.scenarios.genes import genome_for
         from pytest_garl.scenarios.maps.map import load_map
         from pytest_garl.search.catalogue import make_method
-        from pytest_garl.search.method import Plan
+        from pytest_garl.search.method import SearchPlan
 
         if any(each.entry for each in wanted.values()) or self.options.repeat:
             return _Repeat({slot: repeated(self.options, each) for slot, each in wanted.items()})
         map = load_map(next(iter(wanted.values())).map, self.options.map_folders)
-        plan = Plan(
+        plan = SearchPlan(
             map=map,
             genome=genome_for(map, weather=self.options.weather),
             seed=self.options.seed,

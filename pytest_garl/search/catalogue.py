@@ -20,7 +20,7 @@ from pytest_garl.errors import GarlError
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from pytest_garl.search.method import Method, MethodDeclaration, Plan
+    from pytest_garl.search.method import Method, MethodDeclaration, SearchPlan
 
 DEFAULT_METHOD = "garl"
 
@@ -45,13 +45,13 @@ def default_policy(name: str) -> str:
     return declaration_of(name).policy if name in method_names() else DEFAULT_POLICY
 
 
-def find_method(name: str) -> Callable[[Plan], Method]:
+def find_method(name: str) -> Callable[[SearchPlan], Method]:
     """Return the factory of a shipped method, or of one named "module:factory"."""
     if name in method_names():
         return declaration_of(name).make
     module, _, attribute = name.partition(":")
     try:
-        make: Callable[[Plan], Method] = getattr(importlib.import_module(module), attribute)
+        make: Callable[[SearchPlan], Method] = getattr(importlib.import_module(module), attribute)
     except (ImportError, AttributeError, ValueError) as error:
         raise GarlError(
             f"search method {name!r}: cannot be loaded ({error}); expected one of "
@@ -60,7 +60,7 @@ def find_method(name: str) -> Callable[[Plan], Method]:
     return make
 
 
-def make_method(name: str, plan: Plan) -> Method:
+def make_method(name: str, plan: SearchPlan) -> Method:
     """Return a fresh search by the method called ``name``.
 
     Raises GarlError if the method needs an extra that is not installed.  For a user's own method,

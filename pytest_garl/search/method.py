@@ -12,7 +12,7 @@ from pytest_garl.scenarios.scenario import Scenario
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Plan:
+class SearchPlan:
     """What a search is given: where, over which genes, from which seed, how many at a time."""
 
     map: Map
@@ -54,7 +54,7 @@ class MethodDeclaration:
     ``make`` starts a search.  It may import what only this method needs.
     """
 
-    make: Callable[[Plan], Method]
+    make: Callable[[SearchPlan], Method]
     policy: str
     """The NPC policy that belongs to the method; ``--garl-npcs`` overrides it."""
     extra: str = ""

@@ -18,7 +18,7 @@ from pymoo.operators.survival.rank_and_crowding import RankAndCrowding
 from pytest_garl.scenarios.chromosome import decode, encode
 from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.scenarios.validity import repair
-from pytest_garl.search.method import Flown, Plan
+from pytest_garl.search.method import Flown, SearchPlan
 from pytest_garl.search.operators import nuclear_gene_crossover
 
 Matrix = NDArray[np.float64]
@@ -40,7 +40,7 @@ class Nsga2:
     learns = True
 
     def __init__(
-        self, name: str, plan: Plan, objectives: Objectives, width: int, mutation: Mutation
+        self, name: str, plan: SearchPlan, objectives: Objectives, width: int, mutation: Mutation
     ) -> None:
         self._plan, self._objectives, self._mutation = plan, objectives, mutation
         place = hashlib.sha256(f"{name} {plan.map.name}".encode()).digest()

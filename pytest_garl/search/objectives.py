@@ -25,7 +25,7 @@ def diversity(generation: Matrix) -> Matrix:
     return means
 
 
-def threat(result: Mapping[str, Any]) -> float:
+def violation_proximity(result: Mapping[str, Any]) -> float:
     """Return how near a flight came to a violation: 1 for a violation, 0 for none in sight.
 
     Each decided property contributes its margin as a share of its limit; the smallest

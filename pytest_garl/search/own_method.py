@@ -12,7 +12,7 @@ from typing import NoReturn, TypeVar
 
 from pytest_garl.errors import GarlError
 from pytest_garl.scenarios.scenario import Scenario
-from pytest_garl.search.method import Flown, Method, Plan
+from pytest_garl.search.method import Flown, Method, SearchPlan
 
 T = TypeVar("T")
 
@@ -23,7 +23,7 @@ class OwnMethod:
     ``name`` is "module:factory", ``make`` that factory.
     """
 
-    def __init__(self, name: str, make: Callable[[Plan], Method], plan: Plan) -> None:
+    def __init__(self, name: str, make: Callable[[SearchPlan], Method], plan: SearchPlan) -> None:
         self._name, self._population = name, plan.population
         self._method = self._call("the factory", lambda: make(plan))
         missing = [each for each in ("learns", "ask", "tell") if not hasattr(self._method, each)]

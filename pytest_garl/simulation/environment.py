@@ -6,10 +6,10 @@ from collections.abc import Iterable
 
 from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.simulation.flight import Flight
-from pytest_garl.simulation.npc_policy import DECISION_STEP_S, Change
+from pytest_garl.simulation.npc_policy import DECISION_STEP_S, GeneChange
 
 
-def changed(scenario: Scenario, changes: Iterable[Change]) -> Scenario:
+def changed(scenario: Scenario, changes: Iterable[GeneChange]) -> Scenario:
     """Return the scenario after changes, made one after the other, each clipped to 0 to 1."""
     for key, by in changes:
         scenario = scenario.replace({key: min(1.0, max(0.0, scenario[key] + by))})

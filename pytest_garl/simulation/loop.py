@@ -17,7 +17,7 @@ from pytest_garl.simulation.camera.renderer import Renderer
 from pytest_garl.simulation.contacts import Contacts
 from pytest_garl.simulation.environment import changed
 from pytest_garl.simulation.flight import Flight, Outcome
-from pytest_garl.simulation.npc_policy import DECISION_STEP_S, Change, ObjectPolicy, Situation
+from pytest_garl.simulation.npc_policy import DECISION_STEP_S, GeneChange, NpcPolicy, Situation
 from pytest_garl.simulation.physics.flight_control import FlightControl
 from pytest_garl.simulation.physics.npc import Npc
 from pytest_garl.simulation.physics.vehicle import (
@@ -52,7 +52,7 @@ class Loop:
         self,
         scenario: Scenario,
         system: Callable[[], Any],
-        policy: Callable[[], ObjectPolicy],
+        policy: Callable[[], NpcPolicy],
         map: Map,
         time_limit_s: float,
         guard: StepGuard | None,
@@ -183,7 +183,7 @@ class Loop:
             npc.advance(TICKS_PER_NPC_STEP / PHYSICS_RATE_HZ, self.npcs)
             self._world.move(npc.name, npc.position_m, npc.yaw_rad, (npc.vx_mps, npc.vy_mps, 0.0))
 
-    def _change(self, changes: Sequence[Change]) -> None:
+    def _change(self, changes: Sequence[GeneChange]) -> None:
         scenario = changed(self.scenario, changes)
         if scenario != self.scenario:
             self.scenario = scenario

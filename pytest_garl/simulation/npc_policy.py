@@ -22,7 +22,7 @@ DECISION_STEP_S = 0.5
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class ObjectState:
+class NpcState:
     """Ground truth about one dynamic object at a decision; positions (x, y, z) in metres.
 
     ``speed_mps`` is how fast this object may move: its velocity gene times its type's
@@ -44,8 +44,8 @@ class Situation:
     """
 
     time_s: float
-    self: ObjectState
-    others: tuple[ObjectState, ...]
+    self: NpcState
+    others: tuple[NpcState, ...]
     uav_position_m: tuple[float, float, float]
     uav_velocity_mps: tuple[float, float, float]
     marker_position_m: tuple[float, float]
@@ -53,7 +53,7 @@ class Situation:
     scenario: Scenario
 
 
-Change = tuple[str, float]
+GeneChange = tuple[str, float]
 """A gene of the environment, and what is added to it: ``("environment.fog", 0.01)``."""
 
 
@@ -68,13 +68,13 @@ class Move:
 
     x: float
     y: float
-    changes: tuple[Change, ...] = ()
+    changes: tuple[GeneChange, ...] = ()
 
 
 STAY = Move(x=0.0, y=0.0)
 
 
-class ObjectPolicy(Protocol):
+class NpcPolicy(Protocol):
     """Decides every 0.5 s where one object goes; one instance serves one object.
 
     ``rng`` is the object's own generator, derived from the scenario's seed.
@@ -87,7 +87,7 @@ class ObjectPolicy(Protocol):
         """Return the wanted velocity until the next decision."""
 
 
-def decision(policy: ObjectPolicy, situation: Situation) -> Move:
+def decision(policy: NpcPolicy, situation: Situation) -> Move:
     """Return the policy's move; raise PolicyError if it raises or answers what is no move."""
     name = f"NPC policy {type(policy).__name__}, deciding for {situation.self.name}"
     try:
@@ -136,7 +136,7 @@ class PolicySpec:
         """The hash of a learned policy's weights; empty for the others."""
         return str(dict(self.arguments).get("sha256", ""))
 
-    def make(self) -> ObjectPolicy:
+    def make(self) -> NpcPolicy:
         """Return a fresh policy for one object; raise PolicyError where there is none."""
         module, _, attribute = self.factory.partition(":")
         try:
@@ -147,7 +147,7 @@ class PolicySpec:
                 "expected 'module:attribute' of an importable module"
             ) from error
         try:
-            policy: ObjectPolicy = factory(**dict(self.arguments))
+            policy: NpcPolicy = factory(**dict(self.arguments))
         except PolicyError:
             raise
         except Exception as error:

@@ -8,7 +8,7 @@ from pytest_garl.scenarios.genes import genome_for
 from pytest_garl.scenarios.maps.map import load_map
 from pytest_garl.scenarios.object_types import OBJECT_TYPES
 from pytest_garl.scenarios.scenario import Scenario
-from pytest_garl.simulation.npc_policy import DECISION_STEP_S, ObjectState, Situation
+from pytest_garl.simulation.npc_policy import DECISION_STEP_S, NpcState, Situation
 
 MAP = load_map("court")
 GENOME = genome_for(MAP)
@@ -17,8 +17,8 @@ SCENARIO = decode(GENOME.nominal, GENOME, map="court", seed=0)
 
 def being(
     place: tuple[float, float], kind: str = "person", speed_mps: float = 2.0, name: str = "it"
-) -> ObjectState:
-    return ObjectState(
+) -> NpcState:
+    return NpcState(
         name=name,
         type=OBJECT_TYPES[kind],
         position_m=(*place, OBJECT_TYPES[kind].altitude_m),
@@ -28,11 +28,11 @@ def being(
 
 
 def situation(
-    me: ObjectState,
+    me: NpcState,
     *,
     uav: tuple[float, float, float] = (0.0, 0.0, 10.0),
     marker: tuple[float, float] = (0.0, 0.0),
-    others: tuple[ObjectState, ...] = (),
+    others: tuple[NpcState, ...] = (),
     scenario: Scenario = SCENARIO,
 ) -> Situation:
     return Situation(

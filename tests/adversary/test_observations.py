@@ -7,7 +7,7 @@ from collections import Counter
 import numpy as np
 import pytest
 
-from pytest_garl.adversary.observations import ACTIONS, VIEWS, on_turn
+from pytest_garl.adversary.observations import ACTIONS, ENCODINGS, on_turn
 from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.simulation.npc_policy import Move
 from tests.adversary.situations import SCENARIO, being, situation
@@ -15,17 +15,19 @@ from tests.adversary.situations import SCENARIO, being, situation
 
 def test_the_papers_state_is_object_and_uav_relative_to_the_marker() -> None:
     seen = situation(being((3.0, -1.0)), uav=(5.0, 6.0, 9.0), marker=(1.0, 2.0))
-    assert VIEWS["paper"].state(seen) == pytest.approx([0.2, -0.3, 0.4, 0.4])
+    assert ENCODINGS["paper"].state(seen) == pytest.approx([0.2, -0.3, 0.4, 0.4])
 
 
 def test_the_extended_state_adds_what_timing_needs() -> None:
     seen = situation(being((3.0, -1.0), "bird", 8.0), uav=(5.0, 6.0, 9.0), marker=(1.0, 2.0))
-    assert VIEWS["extended"].state(seen)[4:] == pytest.approx([0.9, -0.5, 1.0, 3.1 / 3, 2.9 / 3])
+    assert ENCODINGS["extended"].state(seen)[4:] == pytest.approx(
+        [0.9, -0.5, 1.0, 3.1 / 3, 2.9 / 3]
+    )
 
 
 @pytest.mark.parametrize("name", ["relative", "fellow"])
 def test_a_relative_state_is_the_same_from_all_sides(name: str) -> None:
-    view = VIEWS[name]
+    encoding = ENCODINGS[name]
 
     def turned(angle: float) -> tuple[np.ndarray, list[tuple[float, float]]]:
         def at(x: float, y: float) -> tuple[float, float]:
@@ -38,7 +40,7 @@ def test_a_relative_state_is_the_same_from_all_sides(name: str) -> None:
             marker=at(0.5, 0.5),
             others=(being(at(2.0, 2.0), name="other"),),
         )
-        moves = [at(m.x, m.y) for m in view.moves(seen)]
+        moves = [at(m.x, m.y) for m in encoding.moves(seen)]
         # Turned back, moves are what they were.
         back = [
             (
@@ -47,7 +49,7 @@ def test_a_relative_state_is_the_same_from_all_sides(name: str) -> None:
             )
             for x, y in moves
         ]
-        return view.state(seen), back
+        return encoding.state(seen), back
 
     state, moves = turned(0.0)
     for angle in (0.7, 2.0, -1.3):
@@ -58,13 +60,15 @@ def test_a_relative_state_is_the_same_from_all_sides(name: str) -> None:
 
 def test_ahead_is_towards_the_uavs_column() -> None:
     seen = situation(being((4.0, 3.0)), uav=(1.0, -1.0, 7.0))
-    ahead = VIEWS["relative"].moves(seen)[3]
+    ahead = ENCODINGS["relative"].moves(seen)[3]
     assert (ahead.x, ahead.y) == pytest.approx((-0.6, -0.8))
-    assert VIEWS["paper"].moves(seen) == ACTIONS
+    assert ENCODINGS["paper"].moves(seen) == ACTIONS
 
 
 def test_alone_the_fellow_is_far_away() -> None:
-    assert VIEWS["fellow"].state(situation(being((4.0, 3.0))))[-2:] == pytest.approx([-2.0, 0.0])
+    assert ENCODINGS["fellow"].state(situation(being((4.0, 3.0))))[-2:] == pytest.approx(
+        [-2.0, 0.0]
+    )
 
 
 def conditions(**genes: float) -> Scenario:
@@ -75,15 +79,15 @@ def test_the_online_rival_sees_places_weather_light_and_the_markers_genes() -> N
     scenario = conditions(fog=0.15, road_snow=0.075, sun_position=0.25)
     scenario = scenario.replace({"marker.x": -0.5, "marker.y": 1.0})
     seen = situation(being((2.0, -3.0)), uav=(4.0, 4.0, 9.0), scenario=scenario)
-    state = VIEWS["online"].state(seen)
-    assert state[:4] == pytest.approx(VIEWS["paper"].state(seen))
+    state = ENCODINGS["online"].state(seen)
+    assert state[:4] == pytest.approx(ENCODINGS["paper"].state(seen))
     assert state[4:] == pytest.approx([0, 1, 0, 0, 0, 0, 0, 0.5, 0.25, -0.5, 1.0])
 
 
 def test_the_online_rival_has_the_papers_23_actions() -> None:
-    view = VIEWS["online"]
-    moves = view.moves(situation(being((2.0, -3.0)), scenario=conditions(fog=0.05, dust=0.08)))
-    assert len(moves) == view.actions == 23
+    encoding = ENCODINGS["online"]
+    moves = encoding.moves(situation(being((2.0, -3.0)), scenario=conditions(fog=0.05, dust=0.08)))
+    assert len(moves) == encoding.actions == 23
     assert moves[:5] == ACTIONS
     dust_up, dust_down, fog_up, fog_down = moves[5:9]
     assert dust_up == Move(x=0.0, y=0.0, changes=(("environment.dust", 0.01),))
@@ -97,7 +101,7 @@ def test_the_online_rival_has_the_papers_23_actions() -> None:
 
 def test_the_online_rival_keeps_to_the_confined_range() -> None:
     def fog(value: float) -> list[float]:
-        moves = VIEWS["online"].moves(situation(being((0, 0)), scenario=conditions(fog=value)))
+        moves = ENCODINGS["online"].moves(situation(being((0, 0)), scenario=conditions(fog=value)))
         return [by for move in moves for key, by in move.changes if key == "environment.fog"]
 
     assert fog(0.145) == pytest.approx([0.005, -0.01])
@@ -127,9 +131,9 @@ def test_one_object_is_drawn_for_each_decision() -> None:
     assert on_turn(situation(being((0.0, 0.0))))
 
 
-@pytest.mark.parametrize("name", VIEWS)
+@pytest.mark.parametrize("name", ENCODINGS)
 def test_states_are_bounded_and_as_long_as_they_say(name: str) -> None:
     seen = situation(being((4000.0, -3000.0)), uav=(1e6, 0.0, 500.0))
-    state = VIEWS[name].state(seen)
-    assert state.shape == (VIEWS[name].size,)
+    state = ENCODINGS[name].state(seen)
+    assert state.shape == (ENCODINGS[name].size,)
     assert np.abs(state).max() <= 10.0

@@ -32,7 +32,7 @@ from pytest_garl.scenarios.chromosome import decode
 from pytest_garl.scenarios.genes import genome_for
 from pytest_garl.scenarios.maps import map as maps
 from pytest_garl.scenarios.validity import problems
-from pytest_garl.search.objectives import threat
+from pytest_garl.search.objectives import violation_proximity
 from pytest_garl.simulation import flight_file
 from pytest_garl.verdicts.verdict import Verdict
 from tests.baselines import test_file as test_baseline
@@ -222,7 +222,7 @@ def _use(ledger: Ledger) -> None:
         for text, result in ledger.generation(search, 0):
             load_scenario(text)
             if result is not None:
-                threat(result)
+                violation_proximity(result)
                 assert result["verdict"]["signature"] is not None
         ledger.queries.flown(search)
     for *_, result in ledger.queries.results():

@@ -7,14 +7,14 @@ from typing import Any
 from pytest_garl.scenarios.genes import genome_for
 from pytest_garl.scenarios.maps.map import load_map
 from pytest_garl.scenarios.scenario import Scenario
-from pytest_garl.search.method import Flown, Method, Plan
+from pytest_garl.search.method import Flown, Method, SearchPlan
 
 MAP = load_map("court")
 GENOME = genome_for(MAP)
 
 
-def plan(seed: int = 0, population: int = 8) -> Plan:
-    return Plan(map=MAP, genome=GENOME, seed=seed, population=population)
+def plan(seed: int = 0, population: int = 8) -> SearchPlan:
+    return SearchPlan(map=MAP, genome=GENOME, seed=seed, population=population)
 
 
 def result(scenario: Scenario) -> dict[str, Any]:

@@ -11,7 +11,7 @@ from pytest_garl.scenarios.genes import genome_for
 from pytest_garl.scenarios.maps.map import load_map
 from pytest_garl.search.breeder import Breeder
 from pytest_garl.search.catalogue import make_method, method_names
-from pytest_garl.search.method import Plan
+from pytest_garl.search.method import SearchPlan
 from tests.search.searches import result
 
 MAP = load_map("court")
@@ -21,7 +21,7 @@ GENOME = genome_for(MAP)
 def searched(path: Path, name: str, budget: int, wanted: tuple[Slot, ...] = ()) -> Ledger:
     """Breed and fly, by a formula, until nothing is left to do."""
     size = population(budget)
-    plan = Plan(map=MAP, genome=GENOME, seed=1, population=size)
+    plan = SearchPlan(map=MAP, genome=GENOME, seed=1, population=size)
     generations: dict[int, list[int]] = {}
     for slot in wanted or slots(budget, size):
         generations.setdefault(slot.generation, []).append(slot.index)

@@ -9,11 +9,11 @@ from pytest_garl.errors import GarlError
 from pytest_garl.scenarios.genes import genome_for
 from pytest_garl.scenarios.maps.map import load_map
 from pytest_garl.search.catalogue import make_method
-from pytest_garl.search.method import Flown, Plan
+from pytest_garl.search.method import Flown, SearchPlan
 from pytest_garl.search.methods.random import RandomSearch
 
 LAWN = load_map("lawn")
-PLAN = Plan(map=LAWN, genome=genome_for(LAWN), seed=0, population=2)
+PLAN = SearchPlan(map=LAWN, genome=genome_for(LAWN), seed=0, population=2)
 
 
 class Own(RandomSearch):
@@ -41,7 +41,7 @@ def test_a_factory_that_gives_no_method_is_named(own: types.ModuleType) -> None:
 
 
 def test_an_error_in_an_own_method_is_reported_with_its_place(own: types.ModuleType) -> None:
-    def broken(plan: Plan) -> Any:
+    def broken(plan: SearchPlan) -> Any:
         raise ZeroDivisionError("no seed")
 
     own.make = broken  # type: ignore[attr-defined]

@@ -10,10 +10,15 @@ import gymnasium
 import numpy as np
 from numpy.typing import NDArray
 
-from pytest_garl.adversary.observations import LIMIT, VIEWS
+from pytest_garl.adversary.observations import ENCODINGS, LIMIT
 from pytest_garl.adversary.training import rewards
 from pytest_garl.adversary.training.episode import Episode, draw_episode, in_any_environment
-from pytest_garl.adversary.training.uav_models import AvoidingPilot, Caution, Habits, StraightPilot
+from pytest_garl.adversary.training.uav_models import (
+    AvoidanceParameters,
+    AvoidingPilot,
+    FlightStyle,
+    StraightPilot,
+)
 from pytest_garl.landing_system import Airframe
 from pytest_garl.scenarios.maps.map import Map
 
@@ -43,7 +48,7 @@ class Surrogate:
 class SurrogateEnv(gymnasium.Env[Observation, np.int64]):
     """One object, a marker at a fixed place, a UAV from take-off to landing or collision.
 
-    Actions are those of the state's view, one every 0.5 s; the observation is its vector.
+    Actions are those of the state's encoding, one every 0.5 s; the observation is its vector.
     ``info`` tells ``collided``, ``outcome`` and, with the paper's reward, ``hidden``, the
     share of the marker in the frame that is covered.  A step after the end changes nothing.
     """
@@ -52,9 +57,11 @@ class SurrogateEnv(gymnasium.Env[Observation, np.int64]):
 
     def __init__(self, surrogate: Surrogate) -> None:
         self.surrogate = surrogate
-        self._view = VIEWS[surrogate.state]
-        self.observation_space = gymnasium.spaces.Box(-LIMIT, LIMIT, (self._view.size,), np.float32)
-        self.action_space = gymnasium.spaces.Discrete(self._view.actions)
+        self._encoding = ENCODINGS[surrogate.state]
+        self.observation_space = gymnasium.spaces.Box(
+            -LIMIT, LIMIT, (self._encoding.size,), np.float32
+        )
+        self.action_space = gymnasium.spaces.Discrete(self._encoding.actions)
         self._episode: Episode | None = None
 
     def reset(
@@ -71,10 +78,10 @@ class SurrogateEnv(gymnasium.Env[Observation, np.int64]):
             scenario = in_any_environment(scenario, place, rng)
         avoiding = rng.random() < {"straight": 0.0, "both": 0.5, "avoiding": 1.0}[surrogate.uav]
         # The paper's UAV always flies alike; ours as differently as landing systems do.
-        habits = Habits() if surrogate.uav == "straight" else Habits.drawn(rng)
-        pilot: Any = functools.partial(StraightPilot, habits)
+        style = FlightStyle() if surrogate.uav == "straight" else FlightStyle.drawn(rng)
+        pilot: Any = functools.partial(StraightPilot, style)
         if avoiding:
-            pilot = functools.partial(AvoidingPilot, habits, Caution.drawn(rng))
+            pilot = functools.partial(AvoidingPilot, style, AvoidanceParameters.drawn(rng))
         pilot.airframe = surrogate.airframe
         camera = surrogate.airframe.camera if surrogate.reward == "paper" else None
         self._episode = Episode(scenario, place, pilot, camera=camera)
@@ -87,7 +94,7 @@ class SurrogateEnv(gymnasium.Env[Observation, np.int64]):
             observation, info = self._observe()
             return observation, 0.0, True, False, info
         before = self._distance_m()
-        moves = self._view.moves(episode.situations[0])
+        moves = self._encoding.moves(episode.situations[0])
         episode.step([moves[int(action)]])
         observation, info = self._observe()
         collided = bool(info["collided"])
@@ -120,7 +127,7 @@ class SurrogateEnv(gymnasium.Env[Observation, np.int64]):
 
     def _observe(self) -> tuple[Observation, dict[str, Any]]:
         episode = self._current()
-        observation = self._view.state(episode.situations[0])
+        observation = self._encoding.state(episode.situations[0])
         return observation, {"outcome": episode.outcome or "", "collided": episode.hit is not None}
 
     def _distance_m(self) -> float:

@@ -46,7 +46,7 @@ PACKAGES = ("pytest-garl", "numpy", "torch", "gymnasium", "pybullet")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Plan:
+class TrainingPlan:
     """One call of ``garl train``."""
 
     name: str
@@ -60,7 +60,7 @@ class Plan:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Outcome:
+class TrainingResult:
     """Which seed was kept, each seed's collision rate in validation, the kept one's in others."""
 
     best: int
@@ -69,10 +69,10 @@ class Outcome:
 
 
 def train_best(
-    plan: Plan,
+    plan: TrainingPlan,
     episode: Callable[[int, EpisodeRecord], None] = lambda seed, record: None,
     validated: Callable[[int, float], None] = lambda seed, rate: None,
-) -> Outcome:
+) -> TrainingResult:
     """Train every seed, validate, write the best weights, its manifest and all curves.
 
     Interrupted, it goes on from the checkpoints in the plan's folder.
@@ -93,11 +93,11 @@ def train_best(
     save(plan.out, networks[best], _about(plan, best, curves[best], scores, report))
     draw_curves(curves, plan.out.with_suffix(".png"))
     rates = {seed: score.rate for seed, score in scores.items()}
-    return Outcome(best=best, rates=rates, report=report)
+    return TrainingResult(best=best, rates=rates, report=report)
 
 
 def _about(
-    plan: Plan,
+    plan: TrainingPlan,
     best: int,
     curve: Sequence[EpisodeRecord],
     scores: Mapping[int, Score],

@@ -24,7 +24,7 @@ SLOW_BELOW_M = 1.5
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Habits:
+class FlightStyle:
     """How a UAV flies: cruise height, speeds over ground and downwards."""
 
     cruise_m: float = 10.0
@@ -32,8 +32,8 @@ class Habits:
     descent_mps: float = 1.0
 
     @classmethod
-    def drawn(cls, rng: np.random.Generator) -> Habits:
-        """Draw habits as different as those of landing systems."""
+    def drawn(cls, rng: np.random.Generator) -> FlightStyle:
+        """Draw a style; styles differ as much as those of landing systems."""
         return cls(
             cruise_m=float(rng.uniform(8.0, 12.0)),
             speed_mps=float(rng.uniform(2.0, 4.0)),
@@ -42,7 +42,7 @@ class Habits:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Caution:
+class AvoidanceParameters:
     """When a UAV climbs away from what its depth camera shows.
 
     From an object within ``radius_m`` of its column and ``below_m`` under it, seen for
@@ -56,8 +56,8 @@ class Caution:
     climb_mps: float = 1.0
 
     @classmethod
-    def drawn(cls, rng: np.random.Generator) -> Caution:
-        """Draw a caution; which one a landing system has nobody knows."""
+    def drawn(cls, rng: np.random.Generator) -> AvoidanceParameters:
+        """Draw parameters, because those of a landing system are unknown."""
         return cls(
             radius_m=float(rng.uniform(1.5, 3.0)),
             below_m=float(rng.uniform(2.5, 6.0)),
@@ -73,8 +73,8 @@ class StraightPilot:
     airframe = Airframe()
     needs_camera = False
 
-    def __init__(self, habits: Habits | None = None) -> None:
-        self._habits = habits or Habits()
+    def __init__(self, style: FlightStyle | None = None) -> None:
+        self._style = style or FlightStyle()
 
     def reset(self, mission: Mission) -> None:
         """Start on the ground."""
@@ -89,20 +89,20 @@ class StraightPilot:
     def step(self, observation: Observation) -> Command:
         """Climb, cross, descend, land."""
         x, y, z = (float(value) for value in observation.position_m)
-        habits = self._habits
+        style = self._style
         if self._truth is None:
-            return PositionSetpoint(position_m=(x, y, habits.cruise_m))
+            return PositionSetpoint(position_m=(x, y, style.cruise_m))
         goal = self._truth.marker_m
         offset = math.dist((x, y), goal)
-        self._up |= z > habits.cruise_m - 1.0
+        self._up |= z > style.cruise_m - 1.0
         if not self._up:
-            return PositionSetpoint(position_m=(*self._home[:2], habits.cruise_m))
+            return PositionSetpoint(position_m=(*self._home[:2], style.cruise_m))
         self._there |= offset < CENTRED_M
         if not self._there:
-            return PositionSetpoint(position_m=(*goal, habits.cruise_m), speed_mps=habits.speed_mps)
+            return PositionSetpoint(position_m=(*goal, style.cruise_m), speed_mps=style.speed_mps)
         if z < LAND_BELOW_M:
             return Land(speed_mps=0.4)
-        descent = habits.descent_mps if z > SLOW_BELOW_M else 0.5 * habits.descent_mps
+        descent = style.descent_mps if z > SLOW_BELOW_M else 0.5 * style.descent_mps
         climb = -descent if offset < CENTRED_M else 0.0
         return VelocitySetpoint(velocity_mps=(*_towards(goal, (x, y)), climb))
 
@@ -110,9 +110,11 @@ class StraightPilot:
 class AvoidingPilot(StraightPilot):
     """Climbs away from objects that a depth camera under its belly could see."""
 
-    def __init__(self, habits: Habits | None = None, caution: Caution | None = None) -> None:
-        super().__init__(habits)
-        self._caution = caution or Caution()
+    def __init__(
+        self, style: FlightStyle | None = None, avoidance: AvoidanceParameters | None = None
+    ) -> None:
+        super().__init__(style)
+        self._avoidance = avoidance or AvoidanceParameters()
 
     def reset(self, mission: Mission) -> None:
         """Start on the ground, with nothing in sight."""
@@ -124,7 +126,7 @@ class AvoidingPilot(StraightPilot):
 
     def step(self, observation: Observation) -> Command:
         """Climb where something is below, land where nothing is."""
-        now, caution, truth = observation.time_s, self._caution, self._truth
+        now, avoidance, truth = observation.time_s, self._avoidance, self._truth
         if truth is None:
             return super().step(observation)
         place = tuple(float(value) for value in observation.position_m)
@@ -132,13 +134,13 @@ class AvoidingPilot(StraightPilot):
             self._clear_since = now
             if self._seen_since is None:
                 self._seen_since = now
-            self._climbing |= now - self._seen_since >= caution.delay_s
+            self._climbing |= now - self._seen_since >= avoidance.delay_s
         else:
             self._seen_since = None
-            self._climbing &= now - self._clear_since < caution.clear_s
+            self._climbing &= now - self._clear_since < avoidance.clear_s
         if self._climbing:
             x, y, z = place
-            climb = caution.climb_mps if z < self._habits.cruise_m else 0.0
+            climb = avoidance.climb_mps if z < self._style.cruise_m else 0.0
             goal = truth.marker_m if self._there else (x, y)
             return VelocitySetpoint(velocity_mps=(*_towards(goal, (x, y)), climb))
         return super().step(observation)
@@ -148,9 +150,9 @@ class AvoidingPilot(StraightPilot):
         below = place[2] - item.type.top_m
         dx, dy = abs(item.position_m[0] - place[0]), abs(item.position_m[1] - place[1])
         reach = item.type.radius_m
-        if not 0 < below < self._caution.below_m:
+        if not 0 < below < self._avoidance.below_m:
             return False
-        if math.hypot(dx, dy) - reach > self._caution.radius_m:
+        if math.hypot(dx, dy) - reach > self._avoidance.radius_m:
             return False
         # The camera covers as much to each side along x as the frame is high, along y as it
         # is wide, seen from a level UAV with its nose east.

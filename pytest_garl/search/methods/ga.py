@@ -24,7 +24,7 @@ import dataclasses
 import numpy as np
 
 from pytest_garl.scenarios.genes import with_destinations
-from pytest_garl.search.method import Method, MethodDeclaration, Plan
+from pytest_garl.search.method import Method, MethodDeclaration, SearchPlan
 from pytest_garl.search.methods.garl_paper import objectives
 from pytest_garl.search.operators import MUTATION_PROBABILITY, Matrix
 
@@ -33,7 +33,7 @@ ETA = 20.0
 range."""
 
 
-def make(plan: Plan) -> Method:
+def make(plan: SearchPlan) -> Method:
     """Return the search; its genome is the plan's with a destination for each object."""
     from pytest_garl.search.nsga2 import Nsga2
 

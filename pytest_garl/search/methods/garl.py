@@ -23,8 +23,8 @@ from numpy.typing import NDArray
 from pytest_garl.scenarios.chromosome import decode, encode
 from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.scenarios.validity import repair
-from pytest_garl.search.method import Flown, MethodDeclaration, Plan
-from pytest_garl.search.objectives import threat
+from pytest_garl.search.method import Flown, MethodDeclaration, SearchPlan
+from pytest_garl.search.objectives import violation_proximity
 from pytest_garl.search.operators import (
     CANDIDATES,
     CROSSOVER_PROBABILITY,
@@ -44,7 +44,7 @@ step: what decides whether centimetres are missing."""
 WEATHERS = 0.5
 """Share of these that also meet in another weather, that of a flight that was not aborted."""
 PROGRESS = 0.01
-"""A child that raises its cell's threat by so much has succeeded."""
+"""A child that raises its cell's proximity to a violation by so much has succeeded."""
 NEAREST = 0.1
 """The largest step shrinks with the distance to a violation, down to this share of it."""
 SPREADS = 0.75
@@ -76,7 +76,7 @@ class Garl:
 
     def __init__(
         self,
-        plan: Plan,
+        plan: SearchPlan,
         *,
         explores: float = EXPLORES,
         aims: float = AIMS,
@@ -107,7 +107,7 @@ class Garl:
         return [self._new() for _ in range(self._plan.population)]
 
     def tell(self, flown: Sequence[Flown]) -> Sequence[tuple[float, ...]]:
-        """Put each flight into its cell; return its threat."""
+        """Put each flight into its cell; return its proximity to a violation."""
         for item in flown:
             name = self._cell(item.result)
             worth = self._worth(name, item)
@@ -115,7 +115,7 @@ class Garl:
             wins, losses = self._trials[arm]
             self._trials[arm] = MEMORY * wins + worth, MEMORY * losses + 1 - worth
             self._cells[name].append(item)
-        return [(threat(item.result),) for item in flown]
+        return [(violation_proximity(item.result),) for item in flown]
 
     def _worth(self, name: str, item: Flown) -> float:
         """Return how much of a success a flight is, 0 to 1."""
@@ -123,8 +123,8 @@ class Garl:
         if signature:
             self._signatures[signature] += 1
             return float(self._signatures[signature] ** -0.5)
-        best = max((threat(other.result) for other in self._cells[name]), default=-1.0)
-        return float(threat(item.result) > best + PROGRESS)
+        best = max((violation_proximity(other.result) for other in self._cells[name]), default=-1.0)
+        return float(violation_proximity(item.result) > best + PROGRESS)
 
     def _new(self) -> Scenario:
         """Return a scenario that was not asked for before."""
@@ -179,7 +179,7 @@ class Garl:
         first = self._elite(name)
         row, seed = encode(first.scenario, genome), first.scenario.seed
         # What nearly fails needs a small change, and so does what shall fail again.
-        largest = LARGEST_STEP * max(NEAREST, 1 - threat(first.result))
+        largest = LARGEST_STEP * max(NEAREST, 1 - violation_proximity(first.result))
         body = f"{first.result['closest_body']}."
         aim = np.array([key.startswith(body) for key in genome.keys])
         if way == FAR:
@@ -206,8 +206,8 @@ class Garl:
     def _elite(self, name: str) -> Flown:
         """Return one of a cell's flights that came nearest to a violation, or violated."""
         cell = self._cells[name]
-        most = max(threat(item.result) for item in cell)
-        elites = [item for item in cell if threat(item.result) == most]
+        most = max(violation_proximity(item.result) for item in cell)
+        elites = [item for item in cell if violation_proximity(item.result) == most]
         return elites[int(self._rng.integers(len(elites)))]
 
     def _scenario(self, row: Matrix, seed: int) -> Scenario:

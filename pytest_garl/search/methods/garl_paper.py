@@ -28,12 +28,12 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from pytest_garl.search.method import Flown, Method, MethodDeclaration, Plan
+from pytest_garl.search.method import Flown, Method, MethodDeclaration, SearchPlan
 from pytest_garl.search.objectives import diversity
 from pytest_garl.search.operators import Matrix, property_mutation
 
 
-def make(plan: Plan) -> Method:
+def make(plan: SearchPlan) -> Method:
     """Return the search; populations of 20 and rates of 0.2 as in the paper."""
     # pymoo takes a second to import.
     from pytest_garl.search.nsga2 import Nsga2

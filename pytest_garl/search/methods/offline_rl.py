@@ -42,7 +42,7 @@ from pytest_garl.scenarios.genes import Genome, with_destinations
 from pytest_garl.scenarios.maps.map import Map
 from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.scenarios.validity import problems, repair
-from pytest_garl.search.method import Flown, MethodDeclaration, Plan
+from pytest_garl.search.method import Flown, MethodDeclaration, SearchPlan
 
 if TYPE_CHECKING:
     from pytest_garl.adversary.training.dqn import Learner
@@ -77,7 +77,7 @@ class OfflineRl:
 
     learns = True
 
-    def __init__(self, plan: Plan) -> None:
+    def __init__(self, plan: SearchPlan) -> None:
         self._map, self._population = plan.map, plan.population
         self._genome = genome = with_destinations(plan.genome)
         self._edits = edits_of(genome)

@@ -18,7 +18,7 @@ from pytest_garl.scenarios.genes import Genome
 from pytest_garl.scenarios.maps.map import Map
 from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.scenarios.validity import repair
-from pytest_garl.search.method import Flown, MethodDeclaration, Plan
+from pytest_garl.search.method import Flown, MethodDeclaration, SearchPlan
 
 
 class RandomSearch:
@@ -26,7 +26,7 @@ class RandomSearch:
 
     learns = False
 
-    def __init__(self, plan: Plan) -> None:
+    def __init__(self, plan: SearchPlan) -> None:
         self._plan, self._generation = plan, 0
 
     def ask(self) -> Sequence[Scenario]:

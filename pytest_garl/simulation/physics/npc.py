@@ -14,8 +14,8 @@ from pytest_garl.scenarios.validity import Disc, discs_of
 from pytest_garl.simulation.npc_policy import (
     DECISION_STEP_S,
     Move,
-    ObjectPolicy,
-    ObjectState,
+    NpcPolicy,
+    NpcState,
     Situation,
     decision,
 )
@@ -30,7 +30,7 @@ TURN_RATE_RADPS = 2 * math.pi
 class Npc:
     """One dynamic object of one flight."""
 
-    def __init__(self, scenario: Scenario, map: Map, name: str, policy: ObjectPolicy) -> None:
+    def __init__(self, scenario: Scenario, map: Map, name: str, policy: NpcPolicy) -> None:
         kind = dict(map.object_names)[name]
         self.name = name
         self.type = OBJECT_TYPES[kind]
@@ -64,9 +64,9 @@ class Npc:
         )
 
     @property
-    def state(self) -> ObjectState:
+    def state(self) -> NpcState:
         """What a policy may know of it."""
-        return ObjectState(
+        return NpcState(
             name=self.name,
             type=self.type,
             position_m=self.position_m,

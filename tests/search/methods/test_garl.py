@@ -11,13 +11,13 @@ from pytest_garl.scenarios.chromosome import encode
 from pytest_garl.scenarios.genes import genome_for
 from pytest_garl.scenarios.maps.map import load_map
 from pytest_garl.scenarios.scenario import Scenario
-from pytest_garl.search.method import Flown, Plan
+from pytest_garl.search.method import Flown, SearchPlan
 from pytest_garl.search.methods.garl import EXPLORES, FAR, NEAR, Garl, cell_of
 from pytest_garl.search.methods.random import RandomSearch
 from pytest_garl.verdicts.paper_metrics import mean_distance
 
 MAP = load_map("court")
-PLAN = Plan(map=MAP, genome=genome_for(MAP), seed=0, population=20)
+PLAN = SearchPlan(map=MAP, genome=genome_for(MAP), seed=0, population=20)
 
 
 def result(signature: str, closest_call: str = "", distance_m: float = 0.0) -> dict[str, Any]:
