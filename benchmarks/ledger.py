@@ -7,11 +7,31 @@ import time
 from pathlib import Path
 
 from pytest_garl.execution.ledger import Ledger
+from pytest_garl.execution.result import FlightResult
+from pytest_garl.verdicts.verdict import Margin, Verdict
 
 
 def main(flights: int = 2000) -> None:
     """Print the mean time of one flight's bookkeeping."""
-    result = {"verdict": {"story": "x" * 300, "signature": "", "margins": [{"value": 1.0}] * 4}}
+    result = FlightResult(
+        outcome="landed",
+        final_distance_m=1.0,
+        elapsed_s=30.0,
+        collisions=(),
+        undecided="",
+        closest_call="",
+        closest_body="",
+        verdict=Verdict(
+            outcome="landed",
+            primary=None,
+            violation_type=None,
+            signature="",
+            paper_violation=False,
+            margins=(Margin(property="time", value=1.0, unit="s"),) * 4,
+            story="x" * 300,
+        ),
+        crash=None,
+    )
     with tempfile.TemporaryDirectory() as folder:
         ledger = Ledger.create(Path(folder) / "ledger.sqlite", {})
         ledger.add_search("s", "system", "court", flights, "{}" * 500)

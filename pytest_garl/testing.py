@@ -14,7 +14,6 @@ from typing import Any, NamedTuple
 from pytest_garl import cpu_dispatch
 from pytest_garl.adversary.catalogue import policy_spec
 from pytest_garl.errors import LandingSystemError
-from pytest_garl.execution.job import PAPER_LIMIT_S
 from pytest_garl.execution.metering import Meter, OutOfTimeError
 from pytest_garl.execution.reference import check_system
 from pytest_garl.execution.separate_process import ask_apart
@@ -30,7 +29,7 @@ from pytest_garl.simulation.flight_file import parted_s
 from pytest_garl.simulation.fly import fly
 from pytest_garl.verdicts.judge import judge
 from pytest_garl.verdicts.phases import reports_detections, reports_targets
-from pytest_garl.verdicts.verdict import Limits
+from pytest_garl.verdicts.verdict import PAPER_LIMITS, Limits
 
 FLIGHTS = 40
 """What the estimate of a search's time is for: the budget that the README begins with."""
@@ -114,8 +113,8 @@ class _Checker:
         self, system: type, map: str, seconds: float | None, deterministic: bool, limit_s: float
     ) -> None:
         self._system, self._deterministic = system, deterministic
-        self._seconds = seconds or PAPER_LIMIT_S
-        self._whole = seconds is None or seconds >= PAPER_LIMIT_S
+        self._seconds = seconds or PAPER_LIMITS.time_s
+        self._whole = seconds is None or seconds >= PAPER_LIMITS.time_s
         self._map = load_map(map, (Path.cwd() / "scenarios" / "maps",))
         self._calm, self._drawn = _scenarios(self._map)
         self._meter = Meter(limit_s)

@@ -23,6 +23,8 @@ from scipy.stats import t
 from pytest_garl import cpu_dispatch
 from pytest_garl.adversary.catalogue import policy_spec
 from pytest_garl.adversary.training.uav_models import AvoidingPilot
+from pytest_garl.execution.flight import judged
+from pytest_garl.execution.result import FlightResult
 from pytest_garl.landing_system import Abort, Command, Observation
 from pytest_garl.scenarios.chromosome import encode
 from pytest_garl.scenarios.genes import genome_for
@@ -32,9 +34,8 @@ from pytest_garl.search.catalogue import find_method
 from pytest_garl.search.method import Flown, Method, SearchPlan
 from pytest_garl.search.methods.garl import Garl
 from pytest_garl.simulation.fly import fly
-from pytest_garl.verdicts.judge import closest_call, judge, undecided
 from pytest_garl.verdicts.paper_metrics import mean_distance, top_k
-from pytest_garl.verdicts.verdict import Limits, Verdict
+from pytest_garl.verdicts.verdict import PAPER_LIMITS
 from studies.rows import append, read
 
 FILE = Path("docs/ablations.csv")
@@ -45,12 +46,12 @@ PATIENCE_S = 60.0
 FIELDS = ("variant", "seed", "map", "budget", "violations", "top10", "signatures", "distance")
 
 
-def found(result: dict[str, Any]) -> str:
+def found(result: FlightResult) -> str:
     """Name the cell by the violation alone: near misses of all kinds share one."""
-    return str(result["verdict"]["signature"] or result["outcome"])
+    return result.signature or result.outcome
 
 
-def one(result: dict[str, Any]) -> str:
+def one(result: FlightResult) -> str:
     """Name one cell for all: what comes nearest to a violation is bred from, whatever it is."""
     return ""
 
@@ -87,19 +88,9 @@ class Pilot(AvoidingPilot):
         return Abort() if observation.time_s > PATIENCE_S else super().step(observation)
 
 
-def fly_one(scenario: Scenario, policy: str) -> dict[str, Any]:
-    """Return the result of one flight, as a ledger holds it."""
-    flight = fly(scenario, Pilot, policy_spec(policy))
-    call, body = closest_call(flight)
-    return {
-        "outcome": flight.outcome,
-        "final_distance_m": flight.final_distance_m,
-        "elapsed_s": flight.elapsed_s,
-        "undecided": undecided(flight),
-        "closest_call": call,
-        "closest_body": body,
-        "verdict": judge(flight, Limits()).to_json(),
-    }
+def fly_one(scenario: Scenario, policy: str) -> FlightResult:
+    """Return the result of one flight."""
+    return judged(fly(scenario, Pilot, policy_spec(policy)), PAPER_LIMITS)
 
 
 def search(name: str, seed: int, map: str, pool: Executor) -> dict[str, Any]:
@@ -112,7 +103,7 @@ def search(name: str, seed: int, map: str, pool: Executor) -> dict[str, Any]:
         scenarios = method.ask()
         results = list(pool.map(flown, scenarios))
         method.tell([Flown(scenario=s, result=r) for s, r in zip(scenarios, results, strict=True)])
-        verdicts += [Verdict.from_json(result["verdict"]) for result in results]
+        verdicts += [result.verdict for result in results]
         chromosomes += [plan.genome.normalise(encode(each, plan.genome)) for each in scenarios]
     return {
         "variant": name,

@@ -41,7 +41,7 @@ def count(ledger: Ledger, search: str, map: str) -> dict[str, int | str]:
         if key.endswith(".velocity")
     ]
     for flight in ledger.queries.flown(search):
-        scenario, outcome = load_scenario(flight.scenario), flight.result["outcome"]
+        scenario, outcome = load_scenario(flight.scenario), flight.result.outcome
         if flight.signature:
             kinds[flight.signature] += 1
         counts[outcome] += 1

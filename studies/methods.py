@@ -21,7 +21,6 @@ from pytest_garl.scenarios.genes import genome_for
 from pytest_garl.scenarios.maps.map import load_map
 from pytest_garl.search.objectives import diversity
 from pytest_garl.verdicts.paper_metrics import top_k
-from pytest_garl.verdicts.verdict import Verdict
 from studies.rows import append, read, share
 
 FILE = Path("docs/methods.csv")
@@ -77,7 +76,7 @@ def rows_of(path: Path, method: str, seed: int, budget: int) -> list[dict[str, A
     for name in ("court", "lawn"):
         genome = genome_for(load_map(name))
         flown = [each for each in ledger.queries.results() if each[1] == name]
-        verdicts = [Verdict.from_json(each[-1]["verdict"]) for each in flown]
+        verdicts = [each[-1].verdict for each in flown]
         texts = [
             ledger.queries.scenarios(generation, slot, name)[system]
             for system, _, generation, slot, _ in flown

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any, Literal
+from typing import Literal
+
+from pytest_garl.execution.result import FlightResult
 
 Fate = Literal["same", "broke", "fixed", "changed"]
 DIFFERENT: tuple[Fate, ...] = ("broke", "fixed", "changed")
@@ -54,13 +55,12 @@ def type_of(signature: str) -> str:
     return signature.partition(":")[0].rstrip("?")
 
 
-def answer_of(result: Mapping[str, Any], sha256: str) -> Answer:
+def answer_of(result: FlightResult, sha256: str) -> Answer:
     """Return the answer in a flight's result, as the ledger holds it."""
-    verdict = result["verdict"]
     return Answer(
-        outcome=result["outcome"],
-        signature=verdict["signature"],
-        paper_violation=verdict["paper_violation"],
+        outcome=result.outcome,
+        signature=result.signature,
+        paper_violation=result.verdict.paper_violation,
         sha256=sha256,
     )
 

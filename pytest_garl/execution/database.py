@@ -11,8 +11,6 @@ from pathlib import Path
 from typing import Any, Literal
 
 from pytest_garl.errors import LedgerError
-from pytest_garl.files.json_values import parsed
-from pytest_garl.messages import printable, shown
 
 REMEDY = (
     "Is it a ledger, is there space, may it be written? Fix that and go on with --garl-resume, or "
@@ -113,29 +111,6 @@ class Database:
         except (sqlite3.Error, UnicodeDecodeError) as error:
             # What SQLite says of a damaged file may hold bytes of it.
             raise LedgerError(f"{self.path}: {error}. {REMEDY}") from error
-
-
-def result_in(text: str) -> dict[str, Any]:
-    """Return a flight's result; control characters in what a landing system said are written out.
-
-    Raises LedgerError for a text that holds none.
-    """
-    try:
-        result = parsed(text)
-    except ValueError as error:
-        raise LedgerError(f"a result in the ledger is damaged: {error}. {REMEDY}") from error
-    if not isinstance(result, dict):
-        raise LedgerError(f"a result in the ledger is damaged: found {shown(result)}. {REMEDY}")
-    # JSON escapes all that is no ASCII, control characters too.
-    return _seen(result) if "\\u" in text else result
-
-
-def _seen(value: Any) -> Any:
-    if isinstance(value, dict):
-        return {key: _seen(item) for key, item in value.items()}
-    if isinstance(value, list):
-        return [_seen(item) for item in value]
-    return printable(value) if isinstance(value, str) else value
 
 
 def set_aside(path: Path) -> None:

@@ -16,11 +16,11 @@ from pytest_garl.execution.database import (
     VERSION,
     Database,
     SearchKind,
-    result_in,
     set_aside,
 )
 from pytest_garl.execution.ledger_queries import LedgerQueries
 from pytest_garl.execution.ledger_queue import WorkQueue
+from pytest_garl.execution.result import FlightResult, parse_result
 from pytest_garl.files.json_values import parsed
 from pytest_garl.messages import shortened
 
@@ -159,13 +159,13 @@ class Ledger:
                 "--garl-resume to begin anew"
             )
 
-    def generation(self, search: str, generation: int) -> list[tuple[str, dict[str, Any] | None]]:
+    def generation(self, search: str, generation: int) -> list[tuple[str, FlightResult | None]]:
         """Return (scenario, result or None) of a generation's slots in order."""
         rows = self.database.execute(
             "SELECT scenario, result FROM slot WHERE search = ? AND generation = ? ORDER BY slot",
             (search, generation),
         )
-        return [(text, None if result is None else result_in(result)) for text, result in rows]
+        return [(text, None if result is None else parse_result(result)) for text, result in rows]
 
     def unflown(self, search: str, generation: int) -> int:
         """Return how many of a generation's slots have no result yet."""
@@ -188,7 +188,7 @@ class Ledger:
                 ],
             )
 
-    def result(self, search: str, generation: int, slot: int) -> dict[str, Any] | None:
+    def result(self, search: str, generation: int, slot: int) -> FlightResult | None:
         """Return a flown slot's result, or None."""
         row = self.database.execute(
             "SELECT result FROM slot WHERE search = ? AND generation = ? AND slot = ?",
@@ -196,7 +196,7 @@ class Ledger:
         ).fetchone()
         if row is None or row[0] is None:
             return None
-        return result_in(row[0])
+        return parse_result(row[0])
 
     def scenario(self, search: str, generation: int, slot: int) -> str | None:
         """Return a slot's scenario, or None where it has not been bred."""

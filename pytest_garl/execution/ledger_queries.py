@@ -8,7 +8,8 @@ import re
 from dataclasses import dataclass
 from typing import Any
 
-from pytest_garl.execution.database import Database, SearchKind, result_in
+from pytest_garl.execution.database import Database, SearchKind
+from pytest_garl.execution.result import FlightResult, parse_result
 from pytest_garl.execution.slot import Slot
 
 _ADDRESS = re.compile(r"0x[0-9a-f]+")
@@ -33,13 +34,13 @@ class LedgerFlight:
     generation: int
     slot: int
     scenario: str
-    result: dict[str, Any]
+    result: FlightResult
     sha256: str
 
     @property
     def signature(self) -> str:
         """The violation's signature."""
-        return str(self.result["verdict"]["signature"])
+        return self.result.signature
 
 
 class LedgerQueries:
@@ -61,9 +62,7 @@ class LedgerQueries:
             for system, map, flown, wanted, generation in rows
         ]
 
-    def results(
-        self, kind: SearchKind = "search"
-    ) -> list[tuple[str, str, int, int, dict[str, Any]]]:
+    def results(self, kind: SearchKind = "search") -> list[tuple[str, str, int, int, FlightResult]]:
         """Return (system, map, generation, slot, result) of all flown slots in slot order."""
         rows = self._database.execute(
             "SELECT system, map, generation, slot, result FROM slot "
@@ -71,7 +70,7 @@ class LedgerQueries:
             "ORDER BY system, map, generation, slot",
             (kind,),
         )
-        return [(*row[:4], result_in(row[4])) for row in rows]
+        return [(*row[:4], parse_result(row[4])) for row in rows]
 
     def violating(self) -> list[LedgerFlight]:
         """Return the searches' violations in slot order."""
@@ -94,13 +93,13 @@ class LedgerQueries:
                 generation=row[1],
                 slot=row[2],
                 scenario=row[3],
-                result=result_in(row[4]),
+                result=parse_result(row[4]),
                 sha256=row[5] or "",
             )
             for row in rows
         ]
 
-    def flight(self, system: str, map: str, slot: Slot) -> tuple[dict[str, Any], str, str]:
+    def flight(self, system: str, map: str, slot: Slot) -> tuple[FlightResult, str, str]:
         """Return result, trajectory's hash and scenario of a search's flown slot."""
         row = self._database.execute(
             "SELECT result, coalesce(sha256, ''), scenario FROM slot "
@@ -108,7 +107,7 @@ class LedgerQueries:
             "AND map = ? AND generation = ? AND slot = ?",
             (system, map, slot.generation, slot.index),
         ).fetchone()
-        return json.loads(row[0]), str(row[1]), str(row[2])
+        return parse_result(row[0]), str(row[1]), str(row[2])
 
     def scenarios(self, generation: int, slot: int, map: str) -> dict[str, str]:
         """Return the scenario of a slot for each system that has one."""

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import os
 from dataclasses import dataclass
 from pathlib import Path
@@ -11,6 +10,7 @@ from typing import Any
 
 from pytest_garl.execution.database import Database
 from pytest_garl.execution.processes import alive
+from pytest_garl.execution.result import FlightResult
 
 _METERS = {"search": "flights", "case": "cases", "on_demand": "on_demand"}
 _NEXT, _NEXT_OF_SYSTEM = (
@@ -120,9 +120,9 @@ class WorkQueue:
         row = self._database.execute("SELECT count(*) FROM slot WHERE state = 'waiting'").fetchone()
         return int(row[0])
 
-    def record(self, claim: Claim, result: dict[str, Any], sha256: str, wall_s: float) -> None:
+    def record(self, claim: Claim, result: FlightResult, sha256: str, wall_s: float) -> None:
         """Write down what a flight came to; a slot that has a result keeps it."""
-        text = json.dumps(result, sort_keys=True, allow_nan=False)
+        text = result.dumps()
         with self._database.transaction():
             done = self._database.execute(
                 "UPDATE slot SET state = 'flown', pid = NULL, lease = NULL, "

@@ -9,7 +9,8 @@ from pathlib import Path
 
 from pytest_garl import cpu_dispatch
 from pytest_garl.execution.checkout import Checkout
-from pytest_garl.execution.job import fly_job, load_scenario, loads, record_file
+from pytest_garl.execution.flight import fly_job
+from pytest_garl.execution.job import load_scenario, loads, record_file
 from pytest_garl.execution.ledger_queue import Claim, WorkQueue
 from pytest_garl.execution.pool import Pool
 from pytest_garl.execution.process_pool import POLL_S, ProcessPool

@@ -16,11 +16,12 @@ from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Protocol, TypeVar
+from typing import Protocol, TypeVar
 
 from pytest_garl.execution.job import Job, dump_scenario
 from pytest_garl.execution.ledger import Ledger
 from pytest_garl.execution.pool import Pool
+from pytest_garl.execution.result import FlightResult
 from pytest_garl.execution.slot import flight_name
 from pytest_garl.scenarios.scenario import Scenario
 
@@ -31,14 +32,14 @@ T = TypeVar("T")
 class Done:
     """A flight that was asked for: its result, its trajectory's hash, where its record is."""
 
-    result: dict[str, Any]
+    result: FlightResult
     sha256: str
     record: Path
 
     @property
     def signature(self) -> str:
         """The violation's signature, empty for a flight without violation."""
-        return str(self.result["verdict"]["signature"])
+        return self.result.signature
 
 
 class Fly(Protocol):

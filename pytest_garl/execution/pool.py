@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any, Protocol
+from typing import Protocol
 
 from pytest_garl.execution.ledger import Ledger
+from pytest_garl.execution.result import FlightResult
 from pytest_garl.execution.slot import Slot
 
 
@@ -25,7 +26,7 @@ class Pool(Protocol):
 
 def wait_for(
     ledger: Ledger, pool: Pool, search: str, slot: Slot, tick: Callable[[], None]
-) -> dict[str, Any]:
+) -> FlightResult:
     """Return a slot's result when it is flown; ``tick`` is called before and while waiting."""
     tick()
     while (result := ledger.result(search, slot.generation, slot.index)) is None:

@@ -2,18 +2,15 @@
 
 from __future__ import annotations
 
-import dataclasses
 import sqlite3
-from typing import Any, get_args
+from typing import get_args
 
 from pytest_garl.errors import GarlError, LedgerError
-from pytest_garl.execution.database import VERSION, SearchKind, result_in
+from pytest_garl.execution.database import VERSION, SearchKind
 from pytest_garl.execution.job import load_scenario, loads
 from pytest_garl.execution.ledger import Ledger
-from pytest_garl.files.json_values import made
+from pytest_garl.execution.result import parse_result
 from pytest_garl.messages import shortened, shown
-from pytest_garl.simulation.flight import Crash
-from pytest_garl.verdicts.verdict import Verdict
 
 _TYPES = {
     "run": {"key": "text", "value": "text"},
@@ -113,30 +110,7 @@ def _wrong_slot(ledger: Ledger) -> str:
         try:
             load_scenario(scenario)
             if result is not None:
-                made(_Result, _plain(result_in(result)))
+                parse_result(result)
         except (GarlError, ValueError) as error:
             return f"{where}: {error.__cause__ or error}"
     return ""
-
-
-@dataclasses.dataclass(frozen=True, slots=True, kw_only=True)
-class _Result:
-    """What everybody may rely on in the result of a flight."""
-
-    outcome: str
-    final_distance_m: float
-    elapsed_s: float
-    collisions: tuple[str, ...]
-    undecided: str
-    closest_call: str
-    closest_body: str
-    verdict: Verdict
-    crash: Crash | None
-
-
-_FIELDS = [field.name for field in dataclasses.fields(_Result)]
-
-
-def _plain(result: dict[str, Any]) -> dict[str, Any]:
-    """Return what of a result is checked; there may be more."""
-    return {key: value for key, value in result.items() if key in _FIELDS}

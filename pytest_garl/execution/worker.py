@@ -14,6 +14,7 @@ from pytest_garl.errors import GarlError, LandingSystemError, LedgerError
 from pytest_garl.execution.checkout import isolate_imports
 from pytest_garl.execution.ledger_queue import Claim, WorkQueue
 from pytest_garl.execution.processes import Parent, run_worker
+from pytest_garl.execution.result import FlightResult
 from pytest_garl.execution.slot import flight_name
 from pytest_garl.execution.supervisor import Watch, supervise
 from pytest_garl.simulation.system_under_test.texts import (
@@ -110,8 +111,9 @@ class Flyer:
             sleep(IDLE_S)
         return None
 
-    def _fly(self, claim: Claim) -> tuple[dict[str, object], str, float]:
-        from pytest_garl.execution.job import fly_job, load_scenario, loads, record_file
+    def _fly(self, claim: Claim) -> tuple[FlightResult, str, float]:
+        from pytest_garl.execution.flight import fly_job
+        from pytest_garl.execution.job import load_scenario, loads, record_file
 
         job, scenario = loads(claim.job), load_scenario(claim.scenario)
         if not job.system.module.startswith(_TRUSTED):
@@ -135,7 +137,8 @@ class Flyer:
 
     def _prove_simulator(self, claim: Claim) -> None:
         """Fly what failed with the reference pilot; raise GarlError if that fails as well."""
-        from pytest_garl.execution.job import fly_job, load_scenario, loads
+        from pytest_garl.execution.flight import fly_job
+        from pytest_garl.execution.job import load_scenario, loads
         from pytest_garl.execution.reference import reference_to
         from pytest_garl.simulation.system_under_test.reference_pilot import ReferencePilot
 

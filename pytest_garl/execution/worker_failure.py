@@ -9,13 +9,14 @@ landing system, at the first time.
 from __future__ import annotations
 
 import signal
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
 
-from pytest_garl.execution.job import broken_result, loads
+from pytest_garl.execution.job import loads
 from pytest_garl.execution.ledger_queue import Claim, WorkQueue
+from pytest_garl.execution.result import FlightResult, broken_result
 from pytest_garl.scenarios.maps.map import load_map
+from pytest_garl.simulation.flight import Crash
 
 ATTEMPTS = 3
 """A flight that hangs, is killed and makes the simulator fail, each once, is left undecided."""
@@ -59,25 +60,33 @@ def retry_or_record(queue: WorkQueue, claim: Claim, death: WorkerExit) -> None:
         queue.count("retried")
 
 
-def _result(claim: Claim, death: WorkerExit, again: bool, undecided: bool) -> dict[str, Any]:
+def _result(claim: Claim, death: WorkerExit, again: bool, undecided: bool) -> FlightResult:
     job = loads(claim.job)
     diagonal = load_map(job.map, tuple(Path(folder) for folder in job.map_folders)).diagonal_m
-    kind, error, message, text = _described(death)
+    crash = _crash(death)
     if undecided:
         how = f"each of {ATTEMPTS} flights ended its process in a different way"
-        message = f"{how}, at last: {message}"
+        crash = replace(crash, message=f"{how}, at last: {crash.message}")
     elif again:
-        message += ", twice"
-    return broken_result(kind, error, message, text, diagonal, inconclusive=undecided)
+        crash = replace(crash, message=f"{crash.message}, twice")
+    return broken_result(crash, diagonal, inconclusive=undecided)
 
 
-def _described(death: WorkerExit) -> tuple[str, str, str, str]:
-    """Return kind, error, message and text of what ended a flight."""
+def _crash(death: WorkerExit) -> Crash:
+    """Return what ended a flight."""
     if death.hung:
-        return "hung", "Timeout", death.hung, death.words
+        return Crash(
+            kind="hung", error="Timeout", message=death.hung, where="", traceback=death.words
+        )
     if death.failure:
         error, message, text = death.failure
         message = f"the simulator, which flies the reference pilot, failed with {error}: {message}"
-        return "broke", error, message, text
+        return Crash(kind="broke", error=error, message=message, where="", traceback=text)
     how = f"signal {-death.status}" if death.status < 0 else f"exit status {death.status}"
-    return "died", how.replace(" ", "-"), f"its process ended with {how}", death.complaint
+    return Crash(
+        kind="died",
+        error=how.replace(" ", "-"),
+        message=f"its process ended with {how}",
+        where="",
+        traceback=death.complaint,
+    )

@@ -45,7 +45,7 @@ class Search:
     @property
     def verdicts(self) -> tuple[Verdict, ...]:
         """What the flights came to."""
-        return tuple(Verdict.from_json(flight.result["verdict"]) for flight in self.flights)
+        return tuple(flight.result.verdict for flight in self.flights)
 
     @property
     def violating(self) -> tuple[LedgerFlight, ...]:
@@ -110,7 +110,7 @@ def row_of(
         off=kinds["off"],
         hard=kinds["hard"],
         aborted=sum(each.outcome == "aborted" for each in verdicts),
-        inconclusive=sum(each.result["outcome"] == "inconclusive" for each in search.flights),
+        inconclusive=sum(each.result.inconclusive for each in search.flights),
         unavoidable=piloted.unavoidable if piloted else None,
         piloted=piloted.tried if piloted else None,
         top10=top_k(verdicts),

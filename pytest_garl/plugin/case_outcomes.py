@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import pytest
 
+from pytest_garl.execution.result import FlightResult
 from pytest_garl.plugin.faults import Fault
 from pytest_garl.plugin.report_edits import expect, paragraphs, tell
 from pytest_garl.plugin.run import Run
@@ -29,16 +28,16 @@ def explain_failing(
     target: Target,
     case: Case,
     fault: Fault,
-    result: dict[str, Any],
+    result: FlightResult,
 ) -> None:
     """Judge a case that fails: an open one may fail as it did before, a fixed one must not."""
     assert target.entry is not None
-    verdict, file = result["verdict"], shown(target.entry.path, item.config)
+    verdict, file = result.verdict, shown(target.entry.path, item.config)
     report.user_properties.append((CASE, file))
     signature = case.violation.signature
     same = fault.signature == signature
     # Who cannot be avoided may be met in any way; that excuses nothing that the case is not about.
-    excuses = same or not (fault.own or verdict["violation_type"] == "V")
+    excuses = same or not (fault.own or verdict.violation_type == "V")
     if case.edge and excuses:
         return expect(report, f"edge: fails; {signature} ({file})")
     expected = (same and case.status == "open") or (excuses and case.status == "unavoidable")
@@ -56,7 +55,7 @@ def explain_failing(
         state = "fails in another way"
     told = [
         f"Saved: {signature}. {case.violation.story}",
-        f"Flown: {fault.signature}. {verdict['story']}",
+        f"Flown: {fault.signature}. {verdict.story}",
     ]
     again = f"See it: garl cases replay {file}"
     # The first line, which holds a path, is left whole.
@@ -64,7 +63,7 @@ def explain_failing(
     if expected:
         lines.append(f"If that is known: commit it, or: garl cases accept {file}")
     # What happened comes first, as pytest cuts the line at the end.
-    return tell(report, lines, f"{headline(verdict['story'])}; this case {state}", again)
+    return tell(report, lines, f"{headline(verdict.story)}; this case {state}", again)
 
 
 def explain_passing(
@@ -73,14 +72,14 @@ def explain_passing(
     run: Run,
     target: Target,
     case: Case,
-    result: dict[str, Any],
+    result: FlightResult,
 ) -> None:
     """Say that an open case passes; once, where that is to fail the run."""
     assert target.entry is not None
     file = shown(target.entry.path, item.config)
     if case.edge:
         return expect(report, f"edge: passes; {case.violation.signature} ({file})")
-    if case.status != "open" or result["verdict"]["primary"] is not None:
+    if case.status != "open" or result.verdict.primary is not None:
         return None
     stale = "; ".join(run.unproven(target))
     said = (STALE, f"{file} passes, but {stale}") if stale else (MAYBE_FIXED, file)

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import pytest
 
 from pytest_garl.execution.on_demand import Done
+from pytest_garl.execution.result import FlightResult
 from pytest_garl.plugin.failed_statement import failure_of
 from pytest_garl.plugin.keys import LANDING
 from pytest_garl.plugin.run import Run, test_of
@@ -43,8 +43,8 @@ class Fault:
 
     def shows_in(self, run: Run, target: Target, done: Done) -> bool:
         """Whether the same assertion of the test fails for the same reason in another flight."""
-        verdict = done.result["verdict"]
-        if not self.own and verdict["signature"] != self.signature:
+        verdict = done.result.verdict
+        if not self.own and verdict.signature != self.signature:
             return False
         if self.failure is None:
             return True
@@ -53,21 +53,21 @@ class Fault:
         found = self.user_assertion.failure(done.result, done.record, run.scenario(target))
         if found is None or found.assertion != self.failure.assertion:
             return False
-        return found.is_about(verdict["primary"]) is not self.own
+        return found.is_about(verdict.primary) is not self.own
 
     def shows_again_in(self, run: Run, target: Target, done: Done) -> bool:
         """Whether a flight that was flown once more has the same violation."""
         if self.own:
             return self.shows_in(run, target, done)
-        return bool(done.result["verdict"]["signature"] == self.signature)
+        return done.signature == self.signature
 
 
 def fault_of(
-    item: pytest.Function, target: Target, result: dict[str, Any], error: BaseException
+    item: pytest.Function, target: Target, result: FlightResult, error: BaseException
 ) -> Fault | None:
     """Return what a failing item tells of, or None where the test itself is at fault."""
     assertion, test = ItemAssertion(item, target), test_of(item)
-    signature = str(result["verdict"]["signature"])
+    signature = result.signature
     landing = item.stash.get(LANDING, None)
     if landing is not None and landing.unjudged:
         return Fault(
@@ -77,7 +77,7 @@ def fault_of(
     failure = failure_of(item.originalname, item.obj, error, reads)
     if failure is None:
         return None
-    own = not failure.is_about(result["verdict"]["primary"])
+    own = not failure.is_about(result.verdict.primary)
     signature = failure.signature if own else signature
     return Fault(signature=signature, test=test, failure=failure, own=own, user_assertion=assertion)
 

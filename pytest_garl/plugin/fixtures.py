@@ -72,13 +72,12 @@ def landing(request: pytest.FixtureRequest, garl_slot: Target, npcs: PolicySpec)
         abort_session(request.node, error)
     item = request.node
     landing = Landing(garl_slot, result, run.record(garl_slot), getattr(item, "obj", None))
-    verdict = result["verdict"]
     item.user_properties += [
-        ("garl.outcome", result["outcome"]),
-        ("garl.signature", verdict["signature"]),
-        ("garl.story", verdict["story"]),
-        ("garl.final_distance_m", result["final_distance_m"]),
-        ("garl.elapsed_s", result["elapsed_s"]),
+        ("garl.outcome", result.outcome),
+        ("garl.signature", result.signature),
+        ("garl.story", result.verdict.story),
+        ("garl.final_distance_m", result.final_distance_m),
+        ("garl.elapsed_s", result.elapsed_s),
         ("garl.trajectory_sha256", run.trajectory_sha256(garl_slot)),
     ]
     if reasons := run.unproven(garl_slot):

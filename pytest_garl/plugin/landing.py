@@ -15,6 +15,7 @@ import pytest
 from pytest_garl.plugin.failed_statement import AttributeRead, code_of
 
 if TYPE_CHECKING:
+    from pytest_garl.execution.result import FlightResult
     from pytest_garl.plugin.target import Target
     from pytest_garl.simulation.flight import Flight
     from pytest_garl.verdicts.verdict import Limits, Verdict
@@ -31,7 +32,7 @@ class Landing:
     def __init__(
         self,
         target: Target,
-        result: dict[str, Any],
+        result: FlightResult,
         record: Path,
         test: Callable[..., Any] | None = None,
     ) -> None:
@@ -41,7 +42,7 @@ class Landing:
         self.reads: list[AttributeRead] = []
 
     @property
-    def result(self) -> dict[str, Any]:
+    def result(self) -> FlightResult:
         """The flight's result as it stands in the ledger."""
         self._note("result")
         return self._result
@@ -50,24 +51,24 @@ class Landing:
     def outcome(self) -> str:
         """How the flight ended: landed, collision, not_landed, aborted."""
         self._note("outcome")
-        return str(self._result["outcome"])
+        return self._result.outcome
 
     @property
     def final_distance_m(self) -> float:
         """Horizontal distance from the marker's centre where the flight ended, however it did."""
         self._note("final_distance_m")
-        return float(self._result["final_distance_m"])
+        return self._result.final_distance_m
 
     @property
     def elapsed_s(self) -> float:
         """Time from the mission's start to the flight's end, however it ended."""
         self._note("elapsed_s")
-        return float(self._result["elapsed_s"])
+        return self._result.elapsed_s
 
     def __repr__(self) -> str:
         from pytest_garl.verdicts.wording import headline
 
-        return f"<Landing {self.slot}: {headline(self._verdict.story)}>"
+        return f"<Landing {self.slot}: {headline(self._result.verdict.story)}>"
 
     @property
     def limits(self) -> Limits:
@@ -83,7 +84,7 @@ class Landing:
         self._note("distance_to_landing_m")
         if self.outcome == "landed":
             return self.final_distance_m
-        touched: float | None = self._result.get("off_marker_m")
+        touched = self._result.off_marker_m
         if touched is None:
             self._undecided()
         return touched
@@ -105,33 +106,28 @@ class Landing:
     def collisions(self) -> tuple[str, ...]:
         """Names of the bodies that the UAV hit; "ground" for a hard touchdown."""
         self._note("collisions")
-        return tuple(self._result["collisions"])
+        return self._result.collisions
 
     @property
     def verdict(self) -> Verdict:
         """The built-in judgement."""
         self._note("verdict")
-        return self._verdict
-
-    @functools.cached_property
-    def _verdict(self) -> Verdict:
-        from pytest_garl.verdicts.verdict import Verdict
-
-        return Verdict.from_json(self._result["verdict"])
+        return self._result.verdict
 
     @property
     def inconclusive(self) -> bool:
         """Whether the flight came to no end, and so decides nothing."""
-        return bool(self._result["outcome"] == "inconclusive")
+        return self._result.inconclusive
 
     @property
     def unjudged(self) -> str:
         """Why no assertion can judge the flight, or nothing where one can."""
         if self.inconclusive:
-            return f"inconclusive: {self._result['undecided']}"
-        if self._verdict.primary == "crash":
-            return f"not decided: {self._verdict.story}"
-        return "not decided: the landing was aborted" if self._verdict.primary == "abort" else ""
+            return f"inconclusive: {self._result.undecided}"
+        verdict = self._result.verdict
+        if verdict.primary == "crash":
+            return f"not decided: {verdict.story}"
+        return "not decided: the landing was aborted" if verdict.primary == "abort" else ""
 
     @property
     def complaint(self) -> str:
@@ -141,9 +137,9 @@ class Landing:
                 f"{self.unjudged}. Nothing was decided: fly it again while the machine has nothing "
                 "else to do, or allow more time with --garl-timeout."
             )
-        crash: dict[str, Any] | None = self._result["crash"]
-        story = self._verdict.story
-        return f"{story}\n\n{crash['traceback']}" if crash and crash["traceback"] else story
+        crash = self._result.crash
+        story = self._result.verdict.story
+        return f"{story}\n\n{crash.traceback}" if crash and crash.traceback else story
 
     @functools.cached_property
     def flight(self) -> Flight:
@@ -153,7 +149,7 @@ class Landing:
         return load(self._record)
 
     def _undecided(self) -> NoReturn:
-        pytest.skip(f"not decided: {self._result['undecided']}")
+        pytest.skip(f"not decided: {self._result.undecided}")
 
     def _note(self, name: str) -> None:
         """Remember what the test reads, and in which line of its own body."""

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import json
-from typing import Any
 
 import pytest
 
+from pytest_garl.execution.result import FlightResult
 from pytest_garl.plugin.case_outcomes import explain_failing, explain_passing
 from pytest_garl.plugin.faults import Fault, Repeats, fault_of, repeats, told_by, write_down
 from pytest_garl.plugin.keys import EXCUSED, FAILURE, FOUND, OWN, UNREPEATED, is_xdist_worker
@@ -38,8 +38,8 @@ def explain(
         if fault is None:
             lines = [f"The test itself raised {type(error).__name__}; that violates no property."]
             report.sections.append(("garl: what happened", "\n".join([*lines, again])))
-        elif result["outcome"] == "inconclusive":
-            tell(report, [again], result["undecided"], again)
+        elif result.inconclusive:
+            tell(report, [again], result.undecided, again)
         elif case is not None:
             explain_failing(report, item, run, target, case, fault, result)
         else:
@@ -54,7 +54,7 @@ def _explain_fault(
     run: Run,
     target: Target,
     fault: Fault,
-    result: dict[str, Any],
+    result: FlightResult,
 ) -> None:
     """Report what a search found, unless it is known, was told already, or does not repeat."""
     _note_own(report, target, fault)
@@ -79,9 +79,9 @@ def _explain_fault(
     lines = [f"{fault.signature}: a property of your own" if fault.own else fault.signature]
     if fault.own and not fault.user_assertion.runs_on_any_flight:
         lines.append("It is not saved: its test takes more than landing and scenario.")
-    elif fault.own and result["verdict"]["primary"] is not None:
+    elif fault.own and result.verdict.primary is not None:
         lines.append("It is saved only if it fails in a flight that violates nothing else, too.")
-    story = result["verdict"]["story"]
+    story = result.verdict.story
     told = [*_unusual(item.config, run, target), *doubts]
     what = fault.failure.message if fault.own and fault.failure else headline(story)
     again = repeat_line(item, target)

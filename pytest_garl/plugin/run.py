@@ -8,7 +8,7 @@ import sys
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TextIO
+from typing import TYPE_CHECKING, TextIO
 
 import pytest
 
@@ -28,6 +28,7 @@ from pytest_garl.plugin.target import FIRST, Target, name_of
 if TYPE_CHECKING:
     from pytest_garl.execution.job import Job
     from pytest_garl.execution.on_demand import Done
+    from pytest_garl.execution.result import FlightResult
     from pytest_garl.plugin.user_assertions import ItemAssertion
     from pytest_garl.regressions.follow_up import InvestigatedSignature
     from pytest_garl.regressions.forecast import RemainingWork
@@ -91,7 +92,7 @@ class Run:
     items: dict[str, dict[Slot, list[Selected]]] = field(default_factory=dict)
     targets: dict[str, dict[Slot, Target]] = field(default_factory=dict)
     breeders: dict[str, Breeder] = field(default_factory=dict)
-    results: dict[tuple[str, Slot], dict[str, Any]] = field(default_factory=dict)
+    results: dict[tuple[str, Slot], FlightResult] = field(default_factory=dict)
     pursued: tuple[InvestigatedSignature, ...] = ()
     """What became of new signatures after the search."""
     rest: RemainingWork | None = None
@@ -170,7 +171,7 @@ class Run:
         """Whether a test has run, in whichever process."""
         return bool(self.ledger.fact(f"told ran {nodeid}"))
 
-    def fly(self, target: Target, npcs: PolicySpec) -> dict[str, Any]:
+    def fly(self, target: Target, npcs: PolicySpec) -> FlightResult:
         """Return the slot's result after it and all lower selected slots are flown."""
         self._register(target, npcs)
         search = target.search
@@ -244,7 +245,7 @@ class Run:
         search = target.search
         return [self.targets[search][slot] for slot in self._lower(search, target.slot)]
 
-    def result(self, target: Target) -> dict[str, Any]:
+    def result(self, target: Target) -> FlightResult:
         """Return what a slot came to that is flown, or will be."""
         return self._wait(target.search, target.slot)
 
@@ -285,7 +286,7 @@ class Run:
     def _lower(self, search: str, below: Slot) -> list[Slot]:
         return [slot for slot in sorted(self.items[search]) if slot < below]
 
-    def _wait(self, search: str, slot: Slot) -> dict[str, Any]:
+    def _wait(self, search: str, slot: Slot) -> FlightResult:
         """Return a slot's result; what is flown never changes and is asked for once."""
         known = self.results.get((search, slot))
         if known is None:

@@ -55,7 +55,7 @@ def _undecided(run: Run) -> Iterator[str]:
     without: dict[tuple[str, str], list[str]] = {}
     for system, map, generation, index, result in run.ledger.queries.results():
         flown[system, map] += 1
-        if result["outcome"] == "inconclusive":
+        if result.inconclusive:
             slot = Slot(generation=generation, index=index).id(map)
             without.setdefault((system, map), []).append(slot)
     for (system, map), slots in without.items():

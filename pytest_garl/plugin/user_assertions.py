@@ -11,6 +11,7 @@ from typing import Any
 import pytest
 
 from pytest_garl.errors import GarlError
+from pytest_garl.execution.result import FlightResult
 from pytest_garl.plugin.failed_statement import FAILS, failure_of
 from pytest_garl.plugin.keys import target_of
 from pytest_garl.plugin.landing import Landing
@@ -53,18 +54,16 @@ class ItemAssertion:
         return self._parameters <= _AVAILABLE
 
     def __call__(
-        self, result: dict[str, Any], record: Path, scenario: Scenario
+        self, result: FlightResult, record: Path, scenario: Scenario
     ) -> UserFailure | None:
         """Return how the test fails on a flight without built-in violation, or None.
 
         A saved case of a user's property shows that property alone.
         """
-        violates = result["verdict"]["primary"] is not None
+        violates = result.verdict.violation
         return None if violates else self.failure(result, record, scenario)
 
-    def failure(
-        self, result: dict[str, Any], record: Path, scenario: Scenario
-    ) -> UserFailure | None:
+    def failure(self, result: FlightResult, record: Path, scenario: Scenario) -> UserFailure | None:
         """Return how the test fails on a flight, or None."""
         landing = Landing(self._target, result, record, self._function)
         if landing.unjudged:

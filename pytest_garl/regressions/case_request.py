@@ -48,8 +48,8 @@ class CaseRequest:
         """
         if self.user_assertion is not None or not self.violations:
             return False
-        crash = self.violations[0][1].result["crash"]
-        return crash is not None and crash["kind"] in ("raised", "nonsense", "hung")
+        crash = self.violations[0][1].result.crash
+        return crash is not None and crash.kind in ("raised", "nonsense", "hung")
 
     def failed(self, scenario: Scenario, done: Done) -> bool:
         """Whether a flight failed in the way that is asked about."""

@@ -55,7 +55,7 @@ def case_of(request: CaseRequest, failure: Failure, avoidable: Avoidable) -> Cas
         status="unavoidable" if avoidable == "no" else "open",
         avoidable=avoidable,
         scenario=failure.scenario,
-        violation=_violation(Verdict.from_json(done.result["verdict"]), flight, own),
+        violation=_violation(done.result.verdict, flight, own),
         policy=job.npcs.name,
         policy_sha256=job.npcs.sha256,
         moves=failure.behaviour.moves,
@@ -118,9 +118,8 @@ def recorded_behaviour(done: Done, scenario: Scenario, map: Map) -> RecordedBeha
 
 def find_colliding_object(done: Done) -> str:
     """Return the moving object that the UAV hit, if it did."""
-    hit = done.result["collisions"]
-    kind = done.result["verdict"]["violation_type"]
-    return str(hit[-1]) if hit and kind == "IV" else ""
+    hit, kind = done.result.collisions, done.result.verdict.violation_type
+    return hit[-1] if hit and kind == "IV" else ""
 
 
 def removed(first: Scenario, last: Scenario, map: Map) -> str:

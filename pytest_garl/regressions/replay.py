@@ -11,7 +11,6 @@ from pytest_garl import cpu_dispatch
 from pytest_garl.adversary.catalogue import policy_spec
 from pytest_garl.adversary.recorded import recorded_spec
 from pytest_garl.errors import GarlError, LandingSystemError
-from pytest_garl.execution.job import PAPER_LIMIT_S
 from pytest_garl.execution.reference import (
     BUILT_IN,
     simulator_sha256,
@@ -26,6 +25,7 @@ from pytest_garl.simulation.flight import Flight
 from pytest_garl.simulation.flight_file import load
 from pytest_garl.simulation.fly import fly
 from pytest_garl.verdicts.judge import judge
+from pytest_garl.verdicts.verdict import PAPER_LIMITS
 
 Answer = Literal["FIXED", "FAILED", "STALE", "UNDECIDED"]
 BUILT_IN_VERDICT = "the built-in verdict"
@@ -130,7 +130,7 @@ def _by_verdict(case: Case, folder: Path, map: Map, judged_by: str, live: bool) 
     system = system_of(case, folder)
     cpu_dispatch.check()
     npcs = policy_spec(case.policy) if live else recorded_spec(dict(case.moves), dict(case.changes))
-    limit = max(PAPER_LIMIT_S, case.limits.time_s)
+    limit = max(PAPER_LIMITS.time_s, case.limits.time_s)
     flight = fly(case.scenario, system, npcs, map=map, time_limit_s=limit)
     verdict = judge(flight, case.limits)
     sources = Sources(

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Protocol
 
+from pytest_garl.execution.result import FlightResult
 from pytest_garl.scenarios.scenario import Scenario
 
 ABOUT: dict[str, frozenset[str]] = {
@@ -47,6 +48,6 @@ class UserAssertion(Protocol):
     """UserAssertion a user's assertion about a flight."""
 
     def __call__(
-        self, result: dict[str, Any], record: Path, scenario: Scenario
+        self, result: FlightResult, record: Path, scenario: Scenario
     ) -> UserFailure | None:
         """Return how the test fails on a flight without built-in violation, or None."""

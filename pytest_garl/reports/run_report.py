@@ -93,7 +93,7 @@ def _search(
         "violating_interval_95": [low, high],
         "violating_by_the_paper": sum(verdict.paper_violation for verdict in verdicts),
         "tenth_violation": top_k(verdicts),
-        "outcomes": dict(sorted(Counter(str(each["outcome"]) for each in found.results).items())),
+        "outcomes": dict(sorted(Counter(each.outcome for each in found.results).items())),
         "types": dict(
             sorted(Counter(str(v.violation_type) for v in verdicts if v.violation_type).items())
         ),
@@ -128,9 +128,9 @@ def _flight(ledger: Ledger, found: Found, name: str) -> dict[str, Any]:
     return {
         "slot": name,
         "seed": json.loads(scenario)["seed"],
-        "outcome": result["outcome"],
-        "final_distance_m": result["final_distance_m"],
-        "elapsed_s": result["elapsed_s"],
+        "outcome": result.outcome,
+        "final_distance_m": result.final_distance_m,
+        "elapsed_s": result.elapsed_s,
         "trajectory_sha256": trajectory,
     }
 

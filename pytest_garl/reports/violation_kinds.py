@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
-from typing import Any
 
 from pytest_garl.execution.ledger import Ledger
+from pytest_garl.execution.result import FlightResult
 from pytest_garl.execution.slot import Slot
 from pytest_garl.verdicts.verdict import Verdict
 from pytest_garl.verdicts.wording import headline
@@ -42,7 +42,7 @@ class Found:
     map: str
     files: tuple[str, ...]
     slots: Mapping[str, Slot]
-    results: tuple[dict[str, Any], ...]
+    results: tuple[FlightResult, ...]
     verdicts: tuple[Verdict, ...]
     kinds: tuple[Kind, ...]
     violating: int
@@ -55,7 +55,7 @@ class Found:
 
     def count(self, outcome: str) -> int:
         """Return how many flights ended so."""
-        return sum(result["outcome"] == outcome for result in self.results)
+        return sum(result.outcome == outcome for result in self.results)
 
     @property
     def crashes(self) -> Mapping[str, int]:
@@ -63,7 +63,7 @@ class Found:
         counts: dict[str, int] = {}
         for result, verdict in zip(self.results, self.verdicts, strict=True):
             if verdict.violation_type == "V":
-                kind = result["crash"]["kind"] if result["crash"] else "raised"
+                kind = result.crash.kind if result.crash else "raised"
                 word = kind if kind in ("died", "hung", "broke") else "Python error"
                 counts[word] = counts.get(word, 0) + 1
         return counts
@@ -71,7 +71,7 @@ class Found:
 
 def found_by(ledger: Ledger, own: Iterable[Own] = ()) -> list[Found]:
     """Return what each search of a ledger found."""
-    flown: dict[tuple[str, str], list[tuple[Slot, dict[str, Any]]]] = {}
+    flown: dict[tuple[str, str], list[tuple[Slot, FlightResult]]] = {}
     for system, map, generation, index, result in ledger.queries.results():
         slot = Slot(generation=generation, index=index)
         flown.setdefault((system, map), []).append((slot, result))
@@ -88,10 +88,10 @@ def _found(
     ledger: Ledger,
     system: str,
     map: str,
-    rows: list[tuple[Slot, dict[str, Any]]],
+    rows: list[tuple[Slot, FlightResult]],
     own: list[Own],
 ) -> Found:
-    verdicts = [Verdict.from_json(result["verdict"]) for _, result in rows]
+    verdicts = [result.verdict for _, result in rows]
     slots: dict[str, list[tuple[str, str]]] = {}
     for (slot, _), verdict in zip(rows, verdicts, strict=True):
         if verdict.violation:

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import Protocol
 
+from pytest_garl.execution.result import FlightResult
 from pytest_garl.scenarios.genes import Genome
 from pytest_garl.scenarios.maps.map import Map
 from pytest_garl.scenarios.scenario import Scenario
@@ -26,7 +27,7 @@ class Flown:
     """A scenario with the result of its flight, as the ledger holds it."""
 
     scenario: Scenario
-    result: dict[str, Any]
+    result: FlightResult
 
 
 class Method(Protocol):

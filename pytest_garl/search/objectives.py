@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import Any
-
 import numpy as np
 from numpy.typing import NDArray
 
+from pytest_garl.execution.result import FlightResult
 from pytest_garl.verdicts.judge import CLOSE_CALL_M
 
 Matrix = NDArray[np.float64]
@@ -25,22 +23,22 @@ def diversity(generation: Matrix) -> Matrix:
     return means
 
 
-def violation_proximity(result: Mapping[str, Any]) -> float:
+def violation_proximity(result: FlightResult) -> float:
     """Return how near a flight came to a violation: 1 for a violation, 0 for none in sight.
 
     Each decided property contributes its margin as a share of its limit; the smallest
     counts.  A flight that aborted decided neither distance nor time: the distance to the
     nearest body is what is left.
     """
-    verdict = result["verdict"]
-    if verdict["primary"] is not None:
+    verdict = result.verdict
+    if verdict.violation:
         return 1.0
     shares = []
-    for margin in verdict["margins"]:
-        if margin["property"] == "collision":
-            shares.append(margin["value"] / CLOSE_CALL_M)
-        elif margin["property"] == "distance" and margin["decided"]:
-            shares.append(margin["value"] / (margin["value"] + result["final_distance_m"]))
-        elif margin["property"] == "time" and margin["decided"]:
-            shares.append(margin["value"] / (margin["value"] + result["elapsed_s"]))
+    for margin in verdict.margins:
+        if margin.property == "collision":
+            shares.append(margin.value / CLOSE_CALL_M)
+        elif margin.property == "distance" and margin.decided:
+            shares.append(margin.value / (margin.value + result.final_distance_m))
+        elif margin.property == "time" and margin.decided:
+            shares.append(margin.value / (margin.value + result.elapsed_s))
     return 1.0 - min(1.0, max(0.0, min(shares, default=1.0)))

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-import dataclasses
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, Literal, Self
+from typing import Literal
 
 from pytest_garl.errors import OptionError
 from pytest_garl.messages import shown
@@ -47,6 +46,10 @@ class Limits:
             )
 
 
+PAPER_LIMITS = Limits()
+"""The limits of the paper."""
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Margin:
     """Distance of a property from its violation: signed, negative if the property is violated.
@@ -85,16 +88,6 @@ class Verdict:
     def violation(self) -> bool:
         """Whether the flight violated a safety property."""
         return self.primary is not None
-
-    def to_json(self) -> dict[str, Any]:
-        """Return plain values, as files hold them."""
-        return dataclasses.asdict(self)
-
-    @classmethod
-    def from_json(cls, values: Mapping[str, Any]) -> Self:
-        """Return the verdict whose :meth:`to_json` gave ``values``."""
-        margins = tuple(Margin(**item) for item in values["margins"])
-        return cls(**{**values, "margins": margins})
 
 
 PAPER_LIMITS = Limits()

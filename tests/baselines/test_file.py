@@ -3,7 +3,6 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
 
 import pytest
 from hypothesis import given, settings
@@ -31,7 +30,7 @@ from pytest_garl.baselines.record import (
 )
 from pytest_garl.cpu_dispatch import of_children
 from pytest_garl.errors import ScenarioError
-from pytest_garl.execution.job import Job, broken_result, dump_scenario
+from pytest_garl.execution.job import Job, dump_scenario
 from pytest_garl.execution.ledger import Ledger
 from pytest_garl.execution.on_demand import Done
 from pytest_garl.execution.reference import BUILT_IN, Reference
@@ -42,6 +41,7 @@ from pytest_garl.scenarios.maps.map import load_map
 from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.search.methods.random import propose
 from pytest_garl.verdicts.verdict import Limits
+from tests.support.results import flight_result
 
 LAWN, COURT = load_map("lawn"), load_map("court")
 LANDED = Answer(outcome="landed", signature="", sha256="ab" * 32)
@@ -215,8 +215,7 @@ def test_two_sets_are_compared_scenario_by_scenario_and_only_equal_ones() -> Non
 
     def fly(scenarios: Sequence[Scenario]) -> list[Done]:
         flown.extend(scenarios)
-        violation = {**result(), "outcome": "collision"}
-        violation["verdict"] = {"signature": DOG.signature, "paper_violation": True}
+        violation = flight_result(DOG.signature)
         return [Done(result=violation, sha256="", record=Path())] * len(scenarios)
 
     found = compare_sets(before, after, LAWN, fly)
@@ -230,17 +229,14 @@ def test_two_sets_are_compared_scenario_by_scenario_and_only_equal_ones() -> Non
 
 
 def test_flights_that_decide_nothing_fail_the_gate_by_name() -> None:
-    unsure = {**result(), "outcome": "inconclusive"}
-    flights = [Done(result=each, sha256="", record=Path()) for each in (result(), unsure, result())]
+    unsure = flight_result(outcome="inconclusive")
+    flights = [
+        Done(result=each, sha256="", record=Path())
+        for each in (flight_result(), unsure, flight_result())
+    ]
     found = compare_flights(sample_set(), flights, LAWN, lambda _: [])
     assert found.reasons == ("inconclusive: lawn-1",)
     assert [pair.name for pair in found.pairs] == ["lawn-0", "lawn-2"]
-
-
-def result() -> dict[str, Any]:
-    crashed = broken_result("died", "E", "", "", 9.0, inconclusive=True)
-    verdict = {**crashed["verdict"], "outcome": "landed"}
-    return {**crashed, "outcome": "landed", "crash": None, "verdict": verdict}
 
 
 def write_ledger(path: Path, of: Job, method: str = "") -> None:
@@ -250,7 +246,7 @@ def write_ledger(path: Path, of: Job, method: str = "") -> None:
     ledger.add_slots("a", 0, dict(enumerate(texts)))
     claim = ledger.queue.claim()
     assert claim is not None
-    ledger.queue.record(claim, result(), "ab" * 32, 0.1)
+    ledger.queue.record(claim, flight_result(), "ab" * 32, 0.1)
     ledger.close()
 
 

@@ -111,7 +111,7 @@ def test_the_figures_are_those_of_the_ledger(project: Path) -> None:
     search, _ = next(each for each in ledger.searches() if '"map": "lawn"' in each[1])
     flights, map = ledger.queries.flown(search), load_map("lawn")
     assert len(flights) == row.budget == 12
-    bad = [flight for flight in flights if flight.result["verdict"]["paper_violation"]]
+    bad = [flight for flight in flights if flight.result.verdict.paper_violation]
     assert row.violations == len(bad) > 0
     assert row.type_iv == sum(f.signature.startswith("IV:") for f in flights)
     assert set(row.signatures) == {flight.signature for flight in bad}
@@ -119,7 +119,7 @@ def test_the_figures_are_those_of_the_ledger(project: Path) -> None:
     cells = set()
     for flight in bad:
         x, y = marker_position_m(load_scenario(flight.scenario), map)
-        off = flight.result["final_distance_m"]
+        off = flight.result.final_distance_m
         # Some places lie beyond the lawn, which counts as nowhere.
         if abs(x + off) < 10:
             cells |= {((x + off) // 2, y // 2, z) for z in (0, 6)}

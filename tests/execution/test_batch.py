@@ -16,6 +16,7 @@ from pytest_garl.execution.reference import BUILT_IN, Reference
 from pytest_garl.scenarios.maps.map import load_map
 from pytest_garl.verdicts.verdict import Limits
 from tests.execution.flying import Good, Replaces, job_of, scenario
+from tests.support.results import flight_result
 
 JOB = Job(
     system=Reference(module="stack", file="", qualname="Lander"),
@@ -45,7 +46,7 @@ class Instant:
         assert claim is not None
         if not self.handed_out:
             self.handed_out = [text for text, _ in self.ledger.generation(claim.search, 0)]
-        self.ledger.queue.record(claim, {"index": claim.slot}, "", 0.0)
+        self.ledger.queue.record(claim, flight_result(elapsed_s=claim.slot), "", 0.0)
 
     def close(self) -> None:
         pass
@@ -56,9 +57,9 @@ def pool(tmp_path: Path) -> Instant:
     return Instant(Ledger.create(tmp_path / "ledger.sqlite", {}))
 
 
-def fly(pool: Instant, job: Job = JOB, count: int = 3) -> list[int]:
+def fly(pool: Instant, job: Job = JOB, count: int = 3) -> list[float]:
     flights = fly_all(pool.ledger, pool, job, SCENARIOS[:count])
-    return [done.result["index"] for done in flights]
+    return [done.result.elapsed_s for done in flights]
 
 
 def test_all_flights_are_handed_out_before_the_first_is_awaited(pool: Instant) -> None:

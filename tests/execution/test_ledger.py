@@ -11,6 +11,7 @@ from pytest_garl.errors import LedgerError
 from pytest_garl.execution.database import VERSION
 from pytest_garl.execution.ledger import Ledger
 from tests.execution.ledgers import FACTS, waiting_ledger
+from tests.support.results import flight_result
 
 
 def test_slots_are_bred_the_same_way_or_not_at_all(tmp_path: Path) -> None:
@@ -24,11 +25,11 @@ def test_resuming_gives_back_what_was_in_flight(tmp_path: Path) -> None:
     ledger = waiting_ledger(tmp_path / "ledger.sqlite")
     claim = ledger.queue.claim()
     assert claim is not None
-    ledger.queue.record(claim, {"n": 1}, "", 0.0)
+    ledger.queue.record(claim, flight_result(), "", 0.0)
     ledger.queue.claim()
     ledger.close()
     ledger = Ledger.resume(tmp_path / "ledger.sqlite", FACTS)
-    assert ledger.result("s", 0, 0) == {"n": 1}
+    assert ledger.result("s", 0, 0) == flight_result()
     again = ledger.queue.claim()
     assert again is not None
     assert (again.slot, again.after) == (1, "")

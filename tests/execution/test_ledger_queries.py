@@ -5,6 +5,7 @@ from pathlib import Path
 
 from pytest_garl.execution.ledger import Ledger
 from tests.execution.ledgers import waiting_ledger
+from tests.support.results import crash, flight_result
 
 
 def test_where_a_process_was_when_it_was_ended_is_no_part_of_the_hash(tmp_path: Path) -> None:
@@ -12,7 +13,7 @@ def test_where_a_process_was_when_it_was_ended_is_no_part_of_the_hash(tmp_path: 
         ledger = waiting_ledger(path)
         claim = ledger.queue.claim()
         assert claim is not None
-        ledger.queue.record(claim, {"crash": {"error": "Timeout", "traceback": text}}, "", 0.0)
+        ledger.queue.record(claim, flight_result(crash=crash(traceback=text)), "", 0.0)
         return ledger.queries.result_hash()
 
     assert flown(tmp_path / "one.sqlite", "line 3") == flown(tmp_path / "two.sqlite", "line 4")
@@ -25,19 +26,19 @@ def test_the_hash_covers_results_not_costs(tmp_path: Path) -> None:
         claim = ledger.queue.claim()
         assert claim is not None
         where = f"Thread 0x{os.getpid() + int(10 * wall_s):x}"
-        ledger.queue.record(claim, {"traceback": where}, "hash", wall_s)
+        ledger.queue.record(claim, flight_result(undecided=where), "hash", wall_s)
         hashes.add(ledger.queries.result_hash())
         ledger.close()
     assert len(hashes) == 1
 
 
 def test_a_search_has_a_hash_and_a_time_of_its_own(tmp_path: Path) -> None:
-    def flown(path: Path, value: int) -> Ledger:
+    def flown(path: Path, value: float) -> Ledger:
         ledger = waiting_ledger(path)
         ledger.add_search("t", "systems:Good", "lawn", 1, "{}")
         ledger.add_slots("t", 0, {0: "d"})
         while claim := ledger.queue.claim():
-            result = {"n": value if claim.search == "t" else 1}
+            result = flight_result(elapsed_s=value if claim.search == "t" else 1)
             ledger.queue.record(claim, result, "hash", 0.5)
         return ledger
 

@@ -9,6 +9,7 @@ import pytest
 from pytest_garl.execution.ledger import Ledger
 from pytest_garl.execution.ledger_queue import WorkQueue
 from tests.execution.ledgers import FACTS, waiting_ledger
+from tests.support.results import flight_result
 
 
 def test_a_slot_is_handed_out_once_and_recorded_once(tmp_path: Path) -> None:
@@ -16,9 +17,9 @@ def test_a_slot_is_handed_out_once_and_recorded_once(tmp_path: Path) -> None:
     claims = [ledger.queue.claim() for _ in range(4)]
     assert [claim.slot if claim else None for claim in claims] == [0, 1, 2, None]
     assert claims[0] is not None
-    ledger.queue.record(claims[0], {"n": 1}, "hash", 0.1)
-    ledger.queue.record(claims[0], {"n": 2}, "other", 0.1)
-    assert ledger.result("s", 0, 0) == {"n": 1}
+    ledger.queue.record(claims[0], flight_result(), "hash", 0.1)
+    ledger.queue.record(claims[0], flight_result(elapsed_s=2.0), "other", 0.1)
+    assert ledger.result("s", 0, 0) == flight_result()
     assert ledger.queries.meters()["flights"] == 1
 
 
@@ -79,7 +80,7 @@ def test_nobody_flies_beside_a_slot_that_flies_again(tmp_path: Path) -> None:
     assert (again.slot, again.after, again.attempt) == (first.slot, "died", 2)
     assert ledger.queue.waiting() == 2
     assert ledger.queue.claim() is None
-    ledger.queue.record(again, {"n": 1}, "", 0.0)
+    ledger.queue.record(again, flight_result(), "", 0.0)
     beside = ledger.queue.claim()
     assert beside is not None
     assert beside.slot == 1
@@ -92,7 +93,7 @@ def test_a_slot_flies_again_when_the_others_have_come_down(tmp_path: Path) -> No
     assert other is not None
     ledger.queue.fly_alone(first, "hung")
     assert ledger.queue.claim() is None
-    ledger.queue.record(other, {"n": 1}, "", 0.0)
+    ledger.queue.record(other, flight_result(), "", 0.0)
     again = ledger.queue.claim()
     assert again is not None
     assert again.slot == first.slot

@@ -60,7 +60,7 @@ def test_a_result_comes_with_its_hash_and_its_record(job: Job, ledger: Ledger) -
     done: Done = errands(ledger).run({"x": lambda fly: fly(job, scenario(0.0))})["x"]
     assert done.record.is_file()
     assert len(done.sha256) == 64
-    assert done.result["outcome"] == "landed"
+    assert done.result.outcome == "landed"
 
 
 def test_another_job_flies_another_system(job: Job, ledger: Ledger) -> None:

@@ -29,7 +29,7 @@ def no_alarm() -> Iterator[None]:
 
 
 def test_what_flights_import_and_hide_changes_nothing(state: ProcessState, tmp_path: Path) -> None:
-    from pytest_garl.execution.job import fly_job
+    from pytest_garl.execution.flight import fly_job
 
     fly_job(job_of(Good, tmp_path), scenario(), "flight", None)
     with warnings.catch_warnings():

@@ -12,14 +12,17 @@ from typing import Any
 import pytest
 
 from pytest_garl.errors import PoolError
-from pytest_garl.execution.job import dump_scenario, fly_job
+from pytest_garl.execution.flight import fly_job
+from pytest_garl.execution.job import dump_scenario
 from pytest_garl.execution.ledger import Ledger
 from pytest_garl.execution.local_pool import FlightWorkers
 from pytest_garl.execution.pool import wait_for
 from pytest_garl.execution.process_pool import MOST_LOSSES, ProcessPool
 from pytest_garl.execution.reference import reference_to
+from pytest_garl.execution.result import FlightResult
 from pytest_garl.execution.slot import Slot, flight_name
 from pytest_garl.execution.supervisor import LEAST_STANDSTILL_S, Watch
+from pytest_garl.simulation.flight import Crash
 from tests.execution.flying import Exits, Good, Slow, job_of, scenario
 from tests.execution.misbehaving import (
     ClosesFiles,
@@ -45,14 +48,19 @@ from tests.plugin import tiny_simulator
 class Flown:
     """What a system's flight came to, and one of a good system after it."""
 
-    result: dict[str, Any]
+    result: FlightResult
     sha256: str
     neighbour: str
     meters: dict[str, float]
 
     @property
     def signature(self) -> str:
-        return str(self.result["verdict"]["signature"])
+        return self.result.signature
+
+
+def crash_of(flown: Flown) -> Crash:
+    assert flown.result.crash is not None
+    return flown.result.crash
 
 
 class Field:
@@ -110,16 +118,14 @@ def test_a_call_that_hangs_is_a_finding_whatever_it_does_to_the_process(
 ) -> None:
     flown = field.fly(system, timeout_s=0.5)
     assert flown.signature == "V:hung:Timeout"
-    assert flown.result["crash"]["message"] == (
-        "one call took longer than 1.5 s of wall time, twice"
-    )
+    assert crash_of(flown).message == ("one call took longer than 1.5 s of wall time, twice")
     assert flown.neighbour == undisturbed
 
 
 def test_a_hang_is_told_with_the_line_where_it_was(field: Field) -> None:
     flown = field.fly(HoldsTheLock, timeout_s=0.5)
-    assert "misbehaving.py" in flown.result["crash"]["traceback"]
-    assert "in step" in flown.result["crash"]["traceback"]
+    assert "misbehaving.py" in crash_of(flown).traceback
+    assert "in step" in crash_of(flown).traceback
 
 
 def works_between_calls(*args: Any, guard: Any, **more: Any) -> Any:
@@ -132,7 +138,7 @@ def works_between_calls(*args: Any, guard: Any, **more: Any) -> Any:
 
 def test_the_time_of_the_simulator_is_not_charged_to_the_system(field: Field) -> None:
     flown = field.fly(Good, timeout_s=2.0, simulator=works_between_calls)
-    assert flown.result["outcome"] == "landed"
+    assert flown.result.outcome == "landed"
     assert "retried" not in flown.meters
 
 
@@ -148,7 +154,7 @@ def test_a_slow_flight_counts_as_if_it_had_had_more_time_at_once(
 def test_a_process_that_dies_once_is_a_finding(field: Field, undisturbed: str) -> None:
     flown = field.fly(DiesOnce)
     assert flown.signature == "V:died:signal-11"
-    assert "in step" in flown.result["crash"]["traceback"]
+    assert "in step" in crash_of(flown).traceback
     assert "retried" not in flown.meters
     assert flown.neighbour == undisturbed
 
@@ -212,7 +218,7 @@ def test_what_harms_the_process_harms_nobody_else(
 def test_a_simulator_that_fails_in_one_flight_alone_is_proved_by_the_reference_pilot(
     field: Field,
 ) -> None:
-    message = field.fly(ReplacesZeros).result["crash"]["message"]
+    message = crash_of(field.fly(ReplacesZeros)).message
     assert message.startswith("the simulator, which flies the reference pilot, failed with TypeE")
 
 

@@ -1,7 +1,6 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
 
 import pytest
 
@@ -9,7 +8,9 @@ from pytest_garl.execution.job import dump_scenario
 from pytest_garl.execution.ledger import Ledger
 from pytest_garl.execution.ledger_queue import Claim
 from pytest_garl.execution.worker_failure import WorkerExit, retry_or_record
+from pytest_garl.simulation.flight import Crash
 from tests.execution.flying import Good, job_of, scenario
+from tests.support.results import flight_result
 
 DIED = WorkerExit(status=-11, complaint="no fuel")
 KILLED = WorkerExit(status=-9)
@@ -32,11 +33,11 @@ def claimed(ledger: Ledger) -> Claim:
     return claim
 
 
-def crash(ledger: Ledger) -> dict[str, Any]:
+def crash(ledger: Ledger) -> Crash:
     result = ledger.result("s", 0, 0)
     assert result is not None
-    found: dict[str, Any] = result["crash"]
-    return found
+    assert result.crash is not None
+    return result.crash
 
 
 @pytest.mark.parametrize(
@@ -49,7 +50,7 @@ def test_what_the_machine_may_have_done_is_flown_again_when_nobody_else_flies(
     retry_or_record(ledger.queue, first, death)
     assert ledger.result("s", 0, 0) is None
     assert ledger.queue.claim() is None
-    ledger.queue.record(other, {}, "", 0.0)
+    ledger.queue.record(other, flight_result(), "", 0.0)
     assert ledger.queue.claim(flown="m:Class") is None
     assert ledger.queue.alone_waits()
     again = claimed(ledger)
@@ -62,9 +63,9 @@ def test_a_process_that_ends_itself_is_a_finding_at_once(ledger: Ledger) -> None
     retry_or_record(ledger.queue, claimed(ledger), DIED)
     result = ledger.result("s", 0, 0)
     assert result is not None
-    assert result["verdict"]["signature"] == "V:died:signal-11"
-    assert result["crash"]["message"] == "its process ended with signal 11"
-    assert result["crash"]["traceback"] == "no fuel"
+    assert result.signature == "V:died:signal-11"
+    assert crash(ledger).message == "its process ended with signal 11"
+    assert crash(ledger).traceback == "no fuel"
     assert "retried" not in ledger.queries.meters()
 
 
@@ -85,18 +86,18 @@ def test_what_happens_again_alone_is_a_finding(
     ledger: Ledger, death: WorkerExit, signature: str, message: str
 ) -> None:
     first = claimed(ledger)
-    ledger.queue.record(claimed(ledger), {}, "", 0.0)
+    ledger.queue.record(claimed(ledger), flight_result(), "", 0.0)
     retry_or_record(ledger.queue, first, death)
     retry_or_record(ledger.queue, claimed(ledger), death)
     result = ledger.result("s", 0, 0)
     assert result is not None
-    assert result["verdict"]["signature"] == signature
-    assert crash(ledger)["message"] == message
+    assert result.signature == signature
+    assert crash(ledger).message == message
 
 
 def test_three_flights_that_end_each_in_another_way_leave_it_undecided(ledger: Ledger) -> None:
     first = claimed(ledger)
-    ledger.queue.record(claimed(ledger), {}, "", 0.0)
+    ledger.queue.record(claimed(ledger), flight_result(), "", 0.0)
     retry_or_record(ledger.queue, first, HUNG)
     retry_or_record(ledger.queue, claimed(ledger), KILLED)
     third = claimed(ledger)
@@ -104,23 +105,23 @@ def test_three_flights_that_end_each_in_another_way_leave_it_undecided(ledger: L
     retry_or_record(ledger.queue, third, BROKE)
     result = ledger.result("s", 0, 0)
     assert result is not None
-    assert (result["outcome"], result["verdict"]["signature"]) == ("inconclusive", "")
-    assert result["undecided"].startswith("each of 3 flights ended its process in a different way")
+    assert (result.outcome, result.signature) == ("inconclusive", "")
+    assert result.undecided.startswith("each of 3 flights ended its process in a different way")
 
 
 def test_a_finding_after_another_death_is_one(ledger: Ledger) -> None:
     first = claimed(ledger)
-    ledger.queue.record(claimed(ledger), {}, "", 0.0)
+    ledger.queue.record(claimed(ledger), flight_result(), "", 0.0)
     retry_or_record(ledger.queue, first, KILLED)
     retry_or_record(ledger.queue, claimed(ledger), DIED)
-    assert crash(ledger)["message"] == "its process ended with signal 11"
+    assert crash(ledger).message == "its process ended with signal 11"
 
 
 def test_what_is_given_back_is_flown_as_if_it_had_not_been_claimed(ledger: Ledger) -> None:
     first = claimed(ledger)
     ledger.queue.give_back(first)
     assert claimed(ledger) == first
-    ledger.queue.record(claimed(ledger), {}, "", 0.0)
+    ledger.queue.record(claimed(ledger), flight_result(), "", 0.0)
     retry_or_record(ledger.queue, first, HUNG)
     alone = claimed(ledger)
     assert (alone.after, alone.attempt) == ("hung", 2)

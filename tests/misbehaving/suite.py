@@ -86,15 +86,15 @@ def fly_suite(
 def _row(run: _Run, system: type, calm: Scenario, undisturbed: str) -> Row:
     timeout_s = 1.0 if system.__module__ == hangs.__name__ else 10.0
     done = run.fly(system, calm, timeout_s)
-    kind = done.result["verdict"]["violation_type"]
-    came_to = done.result["verdict"]["signature"] if kind else done.result["outcome"]
+    kind = done.result.verdict.violation_type
+    came_to = done.signature if kind else done.result.outcome
     expected = getattr(system, "comes_to", "finding")
     problem = ""
     if expected == "finding" and kind != "V":
         problem = "is no finding"
-    if expected == "harmless" and done.result["outcome"] != "landed":
+    if expected == "harmless" and done.result.outcome != "landed":
         problem = "did not land"
-    if done.result["outcome"] == "inconclusive":
+    if done.result.inconclusive:
         problem = "was not decided"
     beside = run.hash_of_neighbour(calm)
     if beside != undisturbed:
@@ -133,7 +133,7 @@ class _Run:
     def hash_of_neighbour(self, scenario: Scenario) -> str:
         """Return the hash of the well-behaved system's flight, or what it came to instead."""
         done = self.fly(NeighbourLander, scenario)
-        return done.sha256 if done.result["outcome"] == "landed" else str(done.result)[:300]
+        return done.sha256 if done.result.outcome == "landed" else str(done.result)[:300]
 
 
 @contextmanager

@@ -13,23 +13,16 @@ import pytest
 from pytest_garl.plugin.failed_statement import failure_of
 from pytest_garl.plugin.landing import Landing
 from pytest_garl.regressions.user_failure import UserFailure
+from tests.support.results import flight_result
 
-RESULT = {
-    "outcome": "collision",
-    "final_distance_m": 3.0,
-    "elapsed_s": 14.0,
-    "collisions": ["dog-1"],
-    "undecided": "collision",
-    "verdict": {
-        "outcome": "collision",
-        "primary": "collision",
-        "violation_type": "IV",
-        "signature": "IV:dog:last-metre:unseen",
-        "paper_violation": True,
-        "margins": [],
-        "story": "Collided with dog-1.",
-    },
-}
+RESULT = flight_result(
+    "IV:dog:last-metre:unseen",
+    final_distance_m=3.0,
+    elapsed_s=14.0,
+    collisions=("dog-1",),
+    undecided="collision",
+    story="Collided with dog-1.",
+)
 
 
 def failing(tmp_path: Path, body: str, helpers: str = "") -> UserFailure | None:

@@ -21,6 +21,7 @@ from pytest_garl.simulation.fly import fly
 from pytest_garl.simulation.system_under_test.reference_pilot import ReferencePilot
 from tests.regressions.test_case_file import NAMES, case, changing
 from tests.simulation.test_environment import LAWN, SCENARIO, WEATHERMAKER
+from tests.support.results import flight_result
 
 
 @pytest.fixture
@@ -28,7 +29,7 @@ def recorded(tmp_path: Path) -> Case:
     """Return a case of a flight during which the dog's policy let it snow."""
     flight = fly(SCENARIO, ReferencePilot, WEATHERMAKER, map=LAWN)
     save(flight, tmp_path / "flight.npz")
-    done = Done(result={}, sha256=flight.sha256, record=tmp_path / "flight.npz")
+    done = Done(result=flight_result(), sha256=flight.sha256, record=tmp_path / "flight.npz")
     behaviour = recorded_behaviour(done, SCENARIO, LAWN)
     assert behaviour.changes
     plain = case()

@@ -13,6 +13,8 @@ from pytest_garl.regressions.investigation import EXCEPTION, LEAST, PILOTS
 from pytest_garl.scenarios.chromosome import decode
 from pytest_garl.scenarios.genes import genome_for
 from pytest_garl.scenarios.maps.map import load_map
+from tests.support.results import crash as broken
+from tests.support.results import flight_result
 
 LAWN = load_map("lawn")
 GENOME = genome_for(LAWN)
@@ -20,7 +22,7 @@ GENOME = genome_for(LAWN)
 
 def kind(number: int, *, cap: int | None, budget: int = 12, crash: str = "") -> CaseRequest:
     scenario = decode(GENOME.nominal, GENOME, map="lawn", seed=number)
-    result: dict[str, Any] = {"crash": {"kind": crash} if crash else None}
+    result = flight_result(crash=broken(crash) if crash else None)
     done = Done(result=result, sha256="", record=Path("none"))
     job: Any = None
     return CaseRequest(

@@ -4,7 +4,6 @@ import dataclasses
 import random
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
 
 import pytest
 
@@ -12,6 +11,7 @@ from pytest_garl.adversary.catalogue import policy_spec
 from pytest_garl.execution.job import Job
 from pytest_garl.execution.on_demand import Done
 from pytest_garl.execution.reference import BUILT_IN, Reference, simulator_sha256
+from pytest_garl.execution.result import FlightResult
 from pytest_garl.regressions.case import Case
 from pytest_garl.regressions.case_file import size_of
 from pytest_garl.regressions.case_request import CaseRequest
@@ -25,6 +25,7 @@ from pytest_garl.verdicts.verdict import Limits
 from tests.regressions.test_case_file import LAWN, NAMES
 from tests.regressions.test_case_file import case as dog_case
 from tests.regressions.test_shrink import COLLIDING_OBJECT, violation
+from tests.support.results import flight_result
 
 SIGNATURE = "IV:dog:last-metre:unseen"
 Fails = Callable[[Scenario, str], bool]
@@ -43,21 +44,8 @@ JOB = Job(
 )
 
 
-def result(signature: str) -> dict[str, Any]:
-    verdict: dict[str, Any] = {
-        "outcome": "collision" if signature else "landed",
-        "primary": "collision" if signature else None,
-        "violation_type": "IV" if signature else None,
-        "signature": signature,
-        "paper_violation": bool(signature),
-        "margins": [],
-        "story": "A story.",
-    }
-    return {
-        "verdict": verdict,
-        "collisions": [COLLIDING_OBJECT] if signature else [],
-        "crash": None,
-    }
+def result(signature: str) -> FlightResult:
+    return flight_result(signature, collisions=(COLLIDING_OBJECT,) if signature else ())
 
 
 class Flights:

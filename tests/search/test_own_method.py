@@ -11,6 +11,7 @@ from pytest_garl.scenarios.maps.map import load_map
 from pytest_garl.search.catalogue import make_method
 from pytest_garl.search.method import Flown, SearchPlan
 from pytest_garl.search.methods.random import RandomSearch
+from tests.support.results import flight_result
 
 LAWN = load_map("lawn")
 PLAN = SearchPlan(map=LAWN, genome=genome_for(LAWN), seed=0, population=2)
@@ -65,6 +66,6 @@ def test_objectives_that_are_no_numbers_are_refused(
 ) -> None:
     monkeypatch.setattr(Own, "tell", lambda self, flown: nonsense, raising=False)
     method = make_method("own_method:make", PLAN)
-    flown = [Flown(scenario=each, result={}) for each in method.ask()]
+    flown = [Flown(scenario=each, result=flight_result()) for each in method.ask()]
     with pytest.raises(GarlError, match=r"tell\(\) returned .*, expected a list of 2 tuples"):
         method.tell(flown)

@@ -25,6 +25,7 @@ from pytest_garl.simulation.flight_file import load, save
 from pytest_garl.simulation.fly import fly
 from pytest_garl.simulation.npc_policy import Move, PolicySpec, Situation
 from pytest_garl.simulation.randomness import generator
+from tests.support.results import flight_result
 
 LAWN = load_map("lawn")
 SCENARIO = propose(LAWN, genome_for(LAWN), 3, 0, 1)[0]
@@ -166,7 +167,7 @@ def test_a_policy_knows_the_environment_as_it_is() -> None:
 def test_recorded_changes_fly_the_same_flight_to_the_byte(tmp_path: Path) -> None:
     flight, seen = flown()
     save(flight, tmp_path / "flight.npz")
-    done = Done(result={}, sha256=flight.sha256, record=tmp_path / "flight.npz")
+    done = Done(result=flight_result(), sha256=flight.sha256, record=tmp_path / "flight.npz")
     behaviour = recorded_behaviour(done, SCENARIO, LAWN)
     assert [name for name, _ in behaviour.changes] == ["dog-1"]
     again, seen_again = flown(recorded_spec(dict(behaviour.moves), dict(behaviour.changes)))
@@ -187,7 +188,7 @@ def test_a_file_of_a_flight_that_changed_nothing_says_nothing_of_it(tmp_path: Pa
     with np.load(tmp_path / "flight.npz") as file:
         assert b'"changes"' not in file["header"].tobytes()
     assert all(item.changes == () for item in load(tmp_path / "flight.npz").objects)
-    done = Done(result={}, sha256="", record=tmp_path / "flight.npz")
+    done = Done(result=flight_result(), sha256="", record=tmp_path / "flight.npz")
     assert recorded_behaviour(done, SCENARIO, LAWN) == RecordedBehaviour(
         moves=recorded_behaviour(done, SCENARIO, LAWN).moves
     )

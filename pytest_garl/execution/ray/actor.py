@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-import json
 import os
 import platform
 import shutil
@@ -11,7 +10,6 @@ import tempfile
 from dataclasses import dataclass
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
-from typing import Any
 
 from pytest_garl import cpu_dispatch
 from pytest_garl.execution.job import Job, loads
@@ -22,18 +20,24 @@ from pytest_garl.execution.pool import wait_for
 from pytest_garl.execution.process_pool import ProcessPool
 from pytest_garl.execution.ray.path_mapping import Relocation
 from pytest_garl.execution.reference import package_sha256
+from pytest_garl.execution.result import FlightResult, broken_result
 from pytest_garl.execution.slot import Slot, flight_name
 from pytest_garl.execution.worker_failure import WorkerExit
-from pytest_garl.simulation.flight import PACKAGES
+from pytest_garl.files.json_values import parsed
+from pytest_garl.simulation.flight import PACKAGES, Crash
 
 _FIRST = Slot(generation=0, index=0)
+_NO_RESULT = broken_result(
+    Crash(kind="died", error="", message="", where="", traceback=""), diagonal_m=0.0
+)
+"""Stands in the private ledger for a flight whose process ended; nobody reads it."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FlightOutput:
     """A flight that was flown: what the ledger records of it, and the bytes of its record."""
 
-    result: dict[str, Any]
+    result: FlightResult
     sha256: str
     wall_s: float
     record: bytes
@@ -97,7 +101,7 @@ class FlightActor:
         record = file.read_bytes()
         file.unlink()
         return FlightOutput(
-            result=json.loads(self._at_home(json.dumps(result))),
+            result=FlightResult.from_json(parsed(self._at_home(result.dumps()))),
             sha256=self._ledger.sha256(search, 0, 0),
             wall_s=self._ledger.wall_s(search, 0, 0),
             record=record,
@@ -118,7 +122,7 @@ class FlightActor:
     def _note(self, queue: WorkQueue, claim: Claim, death: WorkerExit) -> None:
         """Remember a death and take the slot out of the queue: it is flown once."""
         self._death = death
-        queue.record(claim, {}, "", 0.0)
+        queue.record(claim, _NO_RESULT, "", 0.0)
 
 
 def versions() -> dict[str, str]:

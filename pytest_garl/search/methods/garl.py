@@ -15,11 +15,11 @@ from __future__ import annotations
 import hashlib
 from collections import Counter, defaultdict
 from collections.abc import Callable, Sequence
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from pytest_garl.execution.result import FlightResult
 from pytest_garl.scenarios.chromosome import decode, encode
 from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.scenarios.validity import repair
@@ -84,7 +84,7 @@ class Garl:
         learns_cells: bool = True,
         crossover: float = CROSSOVER_PROBABILITY,
         spreads: float = SPREADS,
-        cell: Callable[[dict[str, Any]], str] | None = None,
+        cell: Callable[[FlightResult], str] | None = None,
     ) -> None:
         self._plan, self._explores, self._aims = plan, explores, aims
         self._weathers, self._learns_cells = weathers, learns_cells
@@ -119,7 +119,7 @@ class Garl:
 
     def _worth(self, name: str, item: Flown) -> float:
         """Return how much of a success a flight is, 0 to 1."""
-        signature = item.result["verdict"]["signature"]
+        signature = item.result.signature
         if signature:
             self._signatures[signature] += 1
             return float(self._signatures[signature] ** -0.5)
@@ -180,7 +180,7 @@ class Garl:
         row, seed = encode(first.scenario, genome), first.scenario.seed
         # What nearly fails needs a small change, and so does what shall fail again.
         largest = LARGEST_STEP * max(NEAREST, 1 - violation_proximity(first.result))
-        body = f"{first.result['closest_body']}."
+        body = f"{first.result.closest_body}."
         aim = np.array([key.startswith(body) for key in genome.keys])
         if way == FAR:
             return self._scenario(self._spread(row, ~(aim | self._weather)), seed)
@@ -200,7 +200,7 @@ class Garl:
     def _in_other_weather(self) -> Scenario:
         """Return a flight that was not aborted, or any where all were."""
         every = [item for name in sorted(self._cells) for item in self._cells[name]]
-        good = [item for item in every if item.result["outcome"] != "aborted"] or every
+        good = [item for item in every if item.result.outcome != "aborted"] or every
         return good[int(self._rng.integers(len(good)))].scenario
 
     def _elite(self, name: str) -> Flown:
@@ -215,9 +215,9 @@ class Garl:
         return repair(decode(row, plan.genome, map=plan.map.name, seed=seed), plan.map)
 
 
-def cell_of(result: dict[str, Any]) -> str:
+def cell_of(result: FlightResult) -> str:
     """Return how a flight failed or nearly did: a signature, or the outcome."""
-    return str(result["verdict"]["signature"] or result["closest_call"] or result["outcome"])
+    return result.signature or result.closest_call or result.outcome
 
 
 METHOD = MethodDeclaration(make=Garl, policy="dqn")

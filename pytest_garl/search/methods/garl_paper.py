@@ -43,8 +43,8 @@ def make(plan: SearchPlan) -> Method:
 
 def objectives(chromosomes: Matrix, flown: Sequence[Flown]) -> Matrix:
     """Distance to landing, time to landing and diversity, all maximised; shape (k, 3)."""
-    distance = [item.result["final_distance_m"] for item in flown]
-    elapsed = [item.result["elapsed_s"] for item in flown]
+    distance = [item.result.final_distance_m for item in flown]
+    elapsed = [item.result.elapsed_s for item in flown]
     return np.column_stack([distance, elapsed, diversity(chromosomes)])
 
 

@@ -36,13 +36,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from pytest_garl.execution.job import PAPER_LIMIT_S
 from pytest_garl.scenarios.chromosome import decode, encode
 from pytest_garl.scenarios.genes import Genome, with_destinations
 from pytest_garl.scenarios.maps.map import Map
 from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.scenarios.validity import problems, repair
 from pytest_garl.search.method import Flown, MethodDeclaration, SearchPlan
+from pytest_garl.verdicts.verdict import PAPER_LIMITS
 
 if TYPE_CHECKING:
     from pytest_garl.adversary.training.dqn import Learner
@@ -112,7 +112,7 @@ class OfflineRl:
         values = []
         with one_thread():
             for link, row, item in zip(self._chains, rows, flown, strict=True):
-                distance, elapsed = item.result["final_distance_m"], item.result["elapsed_s"]
+                distance, elapsed = item.result.final_distance_m, item.result.elapsed_s
                 spread = float(np.linalg.norm(self._past - row, axis=1).mean())
                 values.append((distance, elapsed, spread))
                 if link.before is not None:
@@ -186,7 +186,7 @@ def reward(distance_m: float, elapsed_s: float, spread: float, map: Map, genome:
     x_min, x_max, y_min, y_max = map.bounds_m
     return (
         distance_m / math.hypot(x_max - x_min, y_max - y_min)
-        + elapsed_s / PAPER_LIMIT_S
+        + elapsed_s / PAPER_LIMITS.time_s
         + spread / math.sqrt(genome.size)
     )
 

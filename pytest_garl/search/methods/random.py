@@ -37,7 +37,7 @@ class RandomSearch:
 
     def tell(self, flown: Sequence[Flown]) -> Sequence[tuple[float, ...]]:
         """Return each flight's distance and time to landing."""
-        return [(item.result["final_distance_m"], item.result["elapsed_s"]) for item in flown]
+        return [(item.result.final_distance_m, item.result.elapsed_s) for item in flown]
 
 
 def propose(map: Map, genome: Genome, seed: int, generation: int, size: int) -> Sequence[Scenario]:

@@ -10,7 +10,8 @@ from pathlib import Path
 import pytest
 
 from pytest_garl.errors import PoolError
-from pytest_garl.execution.job import dump_scenario, fly_job, loads
+from pytest_garl.execution.flight import fly_job
+from pytest_garl.execution.job import dump_scenario, loads
 from pytest_garl.execution.ledger_queue import Claim
 from pytest_garl.execution.ray.actor import ActorWorkspace, FlightActor, FlightOutput
 from pytest_garl.execution.reference import Reference, reference_to
@@ -120,6 +121,7 @@ def test_a_pilot_in_a_copy_of_the_project_tells_of_home(
         pilot.close()
     assert Path.cwd() == copy / "inside"
     assert isinstance(found, FlightOutput)
-    assert found.result["crash"]["message"] == "no plan"
-    assert f'File "{home}/systems.py"' in found.result["crash"]["traceback"]
-    assert str(copy) not in json.dumps(found.result)
+    assert found.result.crash is not None
+    assert found.result.crash.message == "no plan"
+    assert f'File "{home}/systems.py"' in found.result.crash.traceback
+    assert str(copy) not in found.result.dumps()

@@ -15,8 +15,9 @@ from pytest_garl.execution.ray.actor import ActorWorkspace, FlightOutput, versio
 from pytest_garl.execution.ray.scheduler import RayScheduler, unlike
 from pytest_garl.execution.worker_failure import WorkerExit
 from tests.execution.flying import Good, job_of, scenario
+from tests.support.results import flight_result
 
-LANDED = FlightOutput(result={"outcome": "landed"}, sha256="hash", wall_s=1.5, record=b"record")
+LANDED = FlightOutput(result=flight_result(), sha256="hash", wall_s=1.5, record=b"record")
 KILLED = WorkerExit(status=-9)
 
 
@@ -168,7 +169,7 @@ def test_a_death_is_settled_as_in_the_local_pool(ledger: Ledger) -> None:
     fly(FakeRay(fly=die), ledger)
     result = ledger.result("search", 0, 0)
     assert result is not None
-    assert result["verdict"]["signature"] == "V:died:signal-9"
+    assert result.signature == "V:died:signal-9"
     assert [claim.after for claim in claims if claim.slot == 0] == ["", "killed"]
     assert ledger.queries.meters()["retried"] == 1
 

@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import dataclasses
 from collections import Counter
 from collections.abc import Iterable
 from typing import Any
@@ -7,6 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from pytest_garl.execution.result import FlightResult
 from pytest_garl.scenarios.chromosome import encode
 from pytest_garl.scenarios.genes import genome_for
 from pytest_garl.scenarios.maps.map import load_map
@@ -15,28 +17,19 @@ from pytest_garl.search.method import Flown, SearchPlan
 from pytest_garl.search.methods.garl import EXPLORES, FAR, NEAR, Garl, cell_of
 from pytest_garl.search.methods.random import RandomSearch
 from pytest_garl.verdicts.paper_metrics import mean_distance
+from pytest_garl.verdicts.verdict import Margin
+from tests.support.results import flight_result
 
 MAP = load_map("court")
 PLAN = SearchPlan(map=MAP, genome=genome_for(MAP), seed=0, population=20)
 
 
-def result(signature: str, closest_call: str = "", distance_m: float = 0.0) -> dict[str, Any]:
-    margin = {"property": "collision", "value": distance_m, "unit": "m", "decided": True}
-    return {
-        "outcome": "collision" if signature else "landed",
-        "final_distance_m": 0.1,
-        "elapsed_s": 30.0,
-        "closest_call": closest_call,
-        "closest_body": "",
-        "verdict": {
-            "primary": "collision" if signature else None,
-            "signature": signature,
-            "margins": [margin],
-        },
-    }
+def result(signature: str, closest_call: str = "", distance_m: float = 0.0) -> FlightResult:
+    margin = Margin(property="collision", value=distance_m, unit="m")
+    return flight_result(signature, closest_call=closest_call, margins=(margin,))
 
 
-def common_and_rare(scenario: Scenario) -> dict[str, Any]:
+def common_and_rare(scenario: Scenario) -> FlightResult:
     """Hit a fast dog in a fifth of all scenarios; what needs three genes is rare."""
     if scenario["dog-1.velocity"] > 0.8:
         return result("common")
@@ -53,7 +46,7 @@ def search(method: Any, generations: int) -> Counter[str]:
     for _ in range(generations):
         flown = [Flown(scenario=s, result=common_and_rare(s)) for s in method.ask()]
         method.tell(flown)
-        found.update(item.result["verdict"]["signature"] for item in flown)
+        found.update(item.result.signature for item in flown)
     return found
 
 
@@ -148,7 +141,7 @@ def test_the_marker_is_put_where_none_has_been_near() -> None:
 def test_what_is_bred_far_from_a_violation_keeps_its_weather_and_who_was_hit() -> None:
     method = Garl(PLAN, explores=0.0)
     first = method.ask()[:1]
-    told = {**result("IV:dog"), "closest_body": "dog-1"}
+    told = dataclasses.replace(result("IV:dog"), closest_body="dog-1")
     method.tell([Flown(scenario=each, result=told) for each in first])
     (parent,) = genes(first)
     kept = WEATHER | np.array([key.startswith("dog-1.") for key in PLAN.genome.keys])

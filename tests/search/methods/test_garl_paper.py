@@ -14,7 +14,7 @@ from tests.search.searches import GENOME, bred, plan, result
 
 def test_selection_finds_more_of_what_it_wants() -> None:
     def share(made: Sequence[Sequence[Scenario]]) -> float:
-        return float(np.mean([result(s)["final_distance_m"] > 1.0 for made in made for s in made]))
+        return float(np.mean([result(s).final_distance_m > 1.0 for made in made for s in made]))
 
     runs = [bred(make_method("garl-paper", plan(seed, population=20)), 15) for seed in range(4)]
     early = float(np.mean([share(generations[:2]) for generations in runs]))
@@ -33,6 +33,6 @@ def test_objectives_of_the_paper_are_distance_time_and_diversity() -> None:
     values = method.tell([Flown(scenario=each, result=result(each)) for each in scenarios])
     rows = GENOME.normalise(np.array([encode(each, GENOME) for each in scenarios]))
     for scenario, row, (distance, elapsed, spread) in zip(scenarios, rows, values, strict=True):
-        assert distance == result(scenario)["final_distance_m"]
+        assert distance == result(scenario).final_distance_m
         assert elapsed == 30.0
         assert spread == pytest.approx(np.linalg.norm(rows - row, axis=1).sum() / len(rows))

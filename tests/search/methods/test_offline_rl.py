@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import dataclasses
 import itertools
 import math
 import sys
@@ -99,7 +100,7 @@ def test_diversity_is_measured_to_every_scenario_so_far() -> None:
         rows += own
         for row, item, told in zip(own, flown, method.tell(flown), strict=True):
             wanted = np.linalg.norm(np.array(rows) - row, axis=1).mean()
-            assert told == pytest.approx((item.result["final_distance_m"], 30.0, wanted))
+            assert told == pytest.approx((item.result.final_distance_m, 30.0, wanted))
 
 
 def test_it_learns_what_pays() -> None:
@@ -111,7 +112,10 @@ def test_it_learns_what_pays() -> None:
         covers = [each["environment.road_snow"] / 0.15 for each in scenarios]
         method.tell(
             [
-                Flown(scenario=each, result={**result(each), "final_distance_m": 40 * cover})
+                Flown(
+                    scenario=each,
+                    result=dataclasses.replace(result(each), final_distance_m=40 * cover),
+                )
                 for each, cover in zip(scenarios, covers, strict=True)
             ]
         )

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-import json
 import math
 from collections.abc import Callable
 from pathlib import Path
@@ -11,7 +10,7 @@ from typing import Any
 
 import pytest
 
-from pytest_garl.execution.job import fly_job
+from pytest_garl.execution.flight import fly_job
 from pytest_garl.execution.reference import reference_to
 from pytest_garl.landing_system import Diagnostics
 from pytest_garl.simulation.flight import Flight, Step
@@ -56,8 +55,8 @@ def test_flight_that_is_not_finite_is_a_finding(
 ) -> None:
     job = dataclasses.replace(job_of(Good, tmp_path), simulator=reference_to(simulator))
     result, sha256, _ = fly_job(job, scenario(), "court-g00-s00", None)
-    assert result["outcome"] == "crashed"
-    assert result["verdict"]["signature"] == "V:nonsense:NotFinite"
-    assert f"holds a NaN or an infinity in {words}" in result["verdict"]["story"]
-    json.dumps(result, allow_nan=False)
+    assert result.outcome == "crashed"
+    assert result.signature == "V:nonsense:NotFinite"
+    assert f"holds a NaN or an infinity in {words}" in result.verdict.story
+    result.dumps()
     assert (sha256, list(tmp_path.iterdir())) == ("", [])

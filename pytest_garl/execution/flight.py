@@ -1,0 +1,68 @@
+"""One flight as a job says: flown, judged, its record saved."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from pytest_garl.execution.job import Job
+from pytest_garl.execution.result import FlightResult, broken_result
+from pytest_garl.scenarios.maps.map import load_map
+from pytest_garl.scenarios.scenario import Scenario
+from pytest_garl.simulation.flight import Crash
+from pytest_garl.verdicts.verdict import PAPER_LIMITS
+
+if TYPE_CHECKING:
+    from pytest_garl.simulation.flight import Flight
+    from pytest_garl.verdicts.verdict import Limits
+
+
+def fly_job(job: Job, scenario: Scenario, name: str, guard: Any) -> tuple[FlightResult, str, float]:
+    """Fly, judge and save a flight; return its result, its trajectory's hash, its wall time.
+
+    ``name`` is that of its record.  If the flight holds a number that is not finite, that is a
+    finding, and no record is left.
+    """
+    from pytest_garl.simulation.flight_file import NotFiniteError, save
+
+    for entry in job.path:
+        if entry not in sys.path:
+            sys.path.append(entry)
+    map = load_map(job.map, tuple(Path(folder) for folder in job.map_folders))
+    flight = job.simulator.load()(
+        scenario,
+        job.system.load(),
+        job.npcs,
+        map=map,
+        time_limit_s=max(PAPER_LIMITS.time_s, job.limits.time_s),
+        guard=guard,
+    )
+    try:
+        save(flight, Path(job.flights) / f"{name}.npz")
+    except NotFiniteError as error:
+        crash = Crash(
+            kind="nonsense", error="NotFinite", message=str(error), where="", traceback=""
+        )
+        return broken_result(crash, map.diagonal_m), "", flight.wall_s
+    return judged(flight, job.limits), flight.sha256, flight.wall_s
+
+
+def judged(flight: Flight, limits: Limits) -> FlightResult:
+    """Return the result of a flight."""
+    from pytest_garl.verdicts.judge import closest_call, judge, off_marker_m, undecided
+
+    call, body = closest_call(flight)
+    collided = flight.outcome == "collision"
+    return FlightResult(
+        outcome=flight.outcome,
+        final_distance_m=flight.final_distance_m,
+        elapsed_s=flight.elapsed_s,
+        collisions=tuple(contact.body for contact in flight.contacts) if collided else (),
+        undecided=undecided(flight),
+        off_marker_m=off_marker_m(flight, limits),
+        closest_call=call,
+        closest_body=body,
+        verdict=judge(flight, limits),
+        crash=flight.crash,
+    )

@@ -1,0 +1,119 @@
+"""The result of a flight: what the ledger keeps of it, and everybody else reads."""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any, Self
+
+from pytest_garl.errors import LedgerError
+from pytest_garl.execution.database import REMEDY
+from pytest_garl.files.json_values import made, parsed
+from pytest_garl.messages import printable
+from pytest_garl.simulation.flight import Crash
+from pytest_garl.verdicts.verdict import PAPER_LIMITS, Verdict
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class FlightResult:
+    """How one flight ended and how it was judged.
+
+    ``outcome`` is that of the flight, or "inconclusive" if it came to no end.
+    ``final_distance_m`` is horizontal, from the UAV to the marker's centre at the end;
+    ``elapsed_s`` is the simulated time since the mission's start.  ``collisions`` are the names
+    of the bodies that the UAV hit.  ``undecided`` says why a property could not be judged.
+    ``off_marker_m`` is the distance of a touchdown too far from the marker before the UAV gave up.
+    ``closest_call`` is the signature that a near miss would have had, ``closest_body`` the body
+    of that near miss; both are empty without one.
+    """
+
+    outcome: str
+    final_distance_m: float
+    elapsed_s: float
+    collisions: tuple[str, ...]
+    undecided: str
+    closest_call: str
+    closest_body: str
+    verdict: Verdict
+    crash: Crash | None
+    off_marker_m: float | None = None
+
+    @property
+    def signature(self) -> str:
+        """The violation's signature, empty for a flight without violation."""
+        return self.verdict.signature
+
+    @property
+    def inconclusive(self) -> bool:
+        """Whether the flight came to no end, and so decides nothing."""
+        return self.outcome == "inconclusive"
+
+    def to_json(self) -> dict[str, Any]:
+        """Return plain values, as the ledger holds them."""
+        return dataclasses.asdict(self)
+
+    @classmethod
+    def from_json(cls, values: Any) -> Self:
+        """Return the result whose :meth:`to_json` gave ``values``; unknown keys are left out.
+
+        Raises ValueError that names the field, what was found and what was expected.
+        """
+        if isinstance(values, Mapping):
+            values = {"off_marker_m": None} | {
+                key: value for key, value in values.items() if key in _FIELDS
+            }
+        return made(cls, values)
+
+    def dumps(self) -> str:
+        """Return the text that the ledger holds: the same bytes for equal results."""
+        return json.dumps(self.to_json(), sort_keys=True, allow_nan=False)
+
+
+_FIELDS = frozenset(field.name for field in dataclasses.fields(FlightResult))
+
+
+def parse_result(text: str) -> FlightResult:
+    """Return the result in a text of the ledger; raise LedgerError for a damaged one.
+
+    Control characters in what a landing system said are written out.
+    """
+    try:
+        values = parsed(text)
+        # JSON escapes all characters beyond ASCII, and control characters too.
+        return FlightResult.from_json(_printable(values) if "\\u" in text else values)
+    except ValueError as error:
+        raise LedgerError(f"a result in the ledger is damaged: {error}. {REMEDY}") from error
+
+
+def _printable(value: Any) -> Any:
+    if isinstance(value, dict):
+        return {key: _printable(item) for key, item in value.items()}
+    if isinstance(value, list):
+        return [_printable(item) for item in value]
+    return printable(value) if isinstance(value, str) else value
+
+
+def broken_result(crash: Crash, diagonal_m: float, *, inconclusive: bool = False) -> FlightResult:
+    """Return the result of a flight without a record; ``diagonal_m`` is that of its map."""
+    verb = "made nonsense" if crash.kind == "nonsense" else crash.kind
+    return FlightResult(
+        outcome="inconclusive" if inconclusive else "crashed",
+        final_distance_m=diagonal_m,
+        elapsed_s=PAPER_LIMITS.time_s,
+        collisions=(),
+        undecided=crash.message,
+        closest_call="",
+        closest_body="",
+        verdict=Verdict(
+            outcome="crashed",
+            primary=None if inconclusive else "crash",
+            violation_type=None if inconclusive else "V",
+            signature="" if inconclusive else f"V:{crash.kind}:{crash.error}",
+            paper_violation=False,
+            margins=(),
+            story=f"The landing system {verb}: {crash.message}.",
+        ),
+        crash=crash,
+    )
