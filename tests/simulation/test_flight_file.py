@@ -10,8 +10,11 @@ from typing import Any
 import numpy as np
 import pytest
 
+from pytest_garl.adversary.catalogue import policy_spec
 from pytest_garl.errors import GarlError
 from pytest_garl.landing_system import Detection, Diagnostics
+from pytest_garl.scenarios.genes import genome_for
+from pytest_garl.search.methods.random import propose
 from pytest_garl.simulation import flight_file
 from pytest_garl.simulation.flight import (
     Contact,
@@ -23,6 +26,10 @@ from pytest_garl.simulation.flight import (
     Step,
     Track,
 )
+from pytest_garl.simulation.flight_file import load, save
+from pytest_garl.simulation.fly import fly
+from pytest_garl.simulation.system_under_test.reference_pilot import ReferencePilot
+from tests.support.flights import LAWN
 
 Header = dict[str, Any]
 
@@ -194,3 +201,14 @@ def test_a_flight_larger_than_the_memory_is_refused(
     monkeypatch.setattr(flight_file, "LARGEST_UNPACKED_BYTES", 500)
     with pytest.raises(GarlError, match="bytes when unpacked, expected at most 500"):
         flight_file.load(file)
+
+
+def test_a_flight_survives_its_file(tmp_path: Path) -> None:
+    scenario = propose(LAWN, genome_for(LAWN), 3, 0, 1)[0]
+    flight = fly(scenario, ReferencePilot, policy_spec("waypoint"), time_limit_s=5)
+    save(flight, tmp_path / "flight.npz")
+    back = load(tmp_path / "flight.npz")
+    for name in ("outcome", "sha256", "events", "steps", "contacts", "separations", "decoys"):
+        assert getattr(back, name) == getattr(flight, name)
+    assert (back.uav.position_m == flight.uav.position_m).all()
+    assert (back.objects[0].moves == flight.objects[0].moves).all()

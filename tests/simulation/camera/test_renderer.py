@@ -237,7 +237,7 @@ def test_a_body_beside_the_camera_is_clipped_not_lost() -> None:
     assert np.isfinite(frame.depth_m).all()
 
 
-def test_what_stands_before_the_sky_has_its_own_depth_from_any_height() -> None:
+def test_a_body_before_the_sky_has_its_own_depth_from_any_height() -> None:
     made, map = renderer("lawn")
     tree = map.bodies[0]
     half = math.radians(75) / 2

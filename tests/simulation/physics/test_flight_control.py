@@ -1,0 +1,72 @@
+"""The flight control of systems that give setpoints."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from collections.abc import Iterator
+
+import numpy as np
+import pytest
+
+from pytest_garl import (
+    Abort,
+    Airframe,
+    Command,
+    Land,
+    Observation,
+    PositionSetpoint,
+)
+from pytest_garl.simulation.fly import fly
+from tests.support.answers import flight_of
+from tests.support.flights import EMPTY, STAND, Hovers, Scripted, nominal
+
+
+def test_the_vehicle_holds_its_place_in_wind() -> None:
+    flight = fly(nominal(wind__x=0.5), Hovers, STAND, map=EMPTY, time_limit_s=20)
+    late = flight.uav.position_m[flight.uav.time_s > 12]
+    error = np.linalg.norm(late - np.array([0.0, -16.5, 3.0]), axis=1)
+    assert error.max() < 0.2
+
+
+def test_a_step_in_position_does_not_overshoot() -> None:
+    flight = fly(nominal(), Hovers, STAND, map=EMPTY, time_limit_s=15)
+    assert flight.uav.position_m[:, 2].max() < 3.0 + 0.05 * 2.8
+    assert flight.uav.position_m[-1, 2] == pytest.approx(3.0, abs=0.1)
+
+
+class Turns(Scripted):
+    """Turns its nose, then gives the landing to the flight control."""
+
+    last: Command
+
+    def step(self, observation: Observation) -> Command:
+        if observation.time_s < 4:
+            return dataclasses.replace(self.hover(3.0), yaw_rad=1.0)
+        return self.last
+
+
+@pytest.mark.parametrize("last", [Land(), Abort()])
+def test_landing_and_aborting_keep_the_yaw(last: Command) -> None:
+    flight = flight_of(type("Turns", (Turns,), {"last": last}), 8)
+    x, y, z, w = flight.uav.attitude[-1]
+    assert math.atan2(2 * (w * z + x * y), 1 - 2 * (y * y + z * z)) == pytest.approx(1.0, abs=0.05)
+
+
+def test_abort_keeps_the_yaw_that_a_system_with_its_own_control_was_flying() -> None:
+    from pytest_garl.simulation.physics.flight_control import FlightControl
+    from pytest_garl.simulation.physics.vehicle import Motion, vehicle_model
+
+    control = FlightControl(vehicle_model(Airframe()))
+    half = math.sin(0.5), math.cos(0.5)
+    turned = Motion((0.0, 0.0, 5.0), (0.0, 0.0, 0.0), (0.0, 0.0, *half), (0.0, 0.0, 0.0))
+    control.take(PositionSetpoint(position_m=(0.0, 0.0, 5.0), yaw_rad=1.0))
+    control.take(Abort())
+    fl, fr, rr, rl = control.thrusts(turned, Abort(), 1 / 240)
+    assert fl + rr == pytest.approx(fr + rl)
+
+
+@pytest.fixture(autouse=True)
+def _no_numpy_warnings() -> Iterator[None]:
+    with np.errstate(all="raise"):
+        yield
