@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import re
+import tomllib
 import typing
 from pathlib import Path
 
@@ -69,6 +70,29 @@ def test_page_has_no_dead_link(page: Path) -> None:
         target = (page.parent / file).resolve() if file else page
         assert target.exists(), link
         assert not anchor or anchor in anchors(target), link
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: str(page.relative_to(ROOT)))
+def test_page_names_no_missing_file(page: Path) -> None:
+    if page.name == "CHANGELOG.md":
+        return
+    rooms = "pytest_garl|landing_systems|tests|docs|studies|benchmarks|tools"
+    named = re.findall(rf"`((?:{rooms})/[\w/.-]*)`", page.read_text())
+    assert [name for name in named if not (ROOT / name).exists()] == []
+    modules = re.findall(rf"python -m ((?:{rooms})[\w.]*)", page.read_text())
+    paths = [ROOT / name.replace(".", "/") for name in modules]
+    assert [each for each in paths if not (each.with_suffix(".py").exists() or each.is_dir())] == []
+
+
+def test_architecture_shows_the_layers_that_are_checked() -> None:
+    config = tomllib.loads((ROOT / "pyproject.toml").read_text())
+    contracts = config["tool"]["importlinter"]["contracts"]
+    (layers,) = (each["layers"] for each in contracts if each["type"] == "layers")
+    table = (ROOT / "ARCHITECTURE.md").read_text().partition("| room | ")[2].partition("\n\n")[0]
+    rows = [re.findall(r"`(\w+)`", line.split("|")[1]) for line in table.splitlines()[2:]]
+    # The alias module of one release stands alone at the top.
+    checked = [sorted(each.split(" | ")) for each in layers if each != "fixtures"]
+    assert [sorted(row) for row in rows] == checked
 
 
 def test_index_leads_to_every_page() -> None:
