@@ -16,7 +16,7 @@ from pathlib import Path
 
 from landing_systems.opencv_mls import OpenCvLandingSystem
 from pytest_garl.adversary.catalogue import policy_spec
-from pytest_garl.baselines.record import Survey
+from pytest_garl.baselines.record import BaselineSpec
 from pytest_garl.execution.batch import fly_all
 from pytest_garl.execution.job import Job
 from pytest_garl.execution.ledger import Ledger
@@ -71,7 +71,7 @@ def in_turns(
     contenders: Sequence[Contender], job: Job, rounds: int, flights: int
 ) -> Mapping[str, float]:
     """Return each pool's wall time over all rounds of so many flights, and check their results."""
-    scenarios = Survey(count=rounds * flights).scenarios(load_map(job.map))
+    scenarios = BaselineSpec(count=rounds * flights).scenarios(load_map(job.map))
     spent = dict.fromkeys((each.name for each in contenders), 0.0)
     hashes: dict[str, list[str]] = {name: [] for name in spent}
     for number in range(rounds):
@@ -120,7 +120,9 @@ def main() -> None:
     )
     with both(workers) as contenders:
         for each in contenders:
-            seconds, _ = flown_s(each, short, Survey(count=1, seed=1).scenarios(load_map("lawn")))
+            seconds, _ = flown_s(
+                each, short, BaselineSpec(count=1, seed=1).scenarios(load_map("lawn"))
+            )
             print(f"{each.name}: first flight after {seconds:.1f} s", flush=True)
         for what, job, flights in (
             ("stand-in", short, arguments.short),

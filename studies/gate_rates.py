@@ -16,8 +16,8 @@ from pathlib import Path
 import numpy as np
 
 from pytest_garl.baselines.comparison import LEVEL, Comparison, compare
-from pytest_garl.baselines.gate_statistics import holm
-from pytest_garl.baselines.pairs import Answer, Pair
+from pytest_garl.baselines.gate_statistics import holm_adjusted
+from pytest_garl.baselines.pairs import FlightSummary, Pair
 from pytest_garl.regressions.robustness import COUNT
 from studies.rows import read, share
 
@@ -26,21 +26,21 @@ COUNTS, PAGE = DOCS / "experiments" / "counts.csv", DOCS / "gate.md"
 BEGIN, END = "<!-- Written by `python -m studies.gate rates`: -->\n", "<!-- To here. -->\n"
 BUDGETS = (50, 100, 400)
 SHAKEN = (0.1, 0.25, 0.5, 1.0)
-LANDED = Answer(outcome="landed", signature="", sha256="base")
-ABORTED = Answer(outcome="aborted", signature="", sha256="base")
-KNOWN = Answer(outcome="collision", signature="IV:person:descent:seen", sha256="head")
-NEW = Answer(outcome="collision", signature="III:tree:descent", sha256="head")
+LANDED = FlightSummary(outcome="landed", signature="", sha256="base")
+ABORTED = FlightSummary(outcome="aborted", signature="", sha256="base")
+KNOWN = FlightSummary(outcome="collision", signature="IV:person:descent:seen", sha256="head")
+NEW = FlightSummary(outcome="collision", signature="III:tree:descent", sha256="head")
 RARE = (
-    Answer(outcome="not_landed", signature="II:lost:descent", sha256="base"),
-    Answer(outcome="landed", signature="I:phantom:descent", sha256="base"),
-    Answer(outcome="not_landed", signature="late:not-landed:search", sha256="base"),
-    Answer(outcome="crashed", signature="V:ValueError@planner.plan", sha256="base"),
+    FlightSummary(outcome="not_landed", signature="II:lost:descent", sha256="base"),
+    FlightSummary(outcome="landed", signature="I:phantom:descent", sha256="base"),
+    FlightSummary(outcome="not_landed", signature="late:not-landed:search", sha256="base"),
+    FlightSummary(outcome="crashed", signature="V:ValueError@planner.plan", sha256="base"),
 )
 EXPECTED = 2.5
 """Flights of a baseline in which each rare type is expected: of 0.6 to 5, about the number at which
 four of them fool the gate most often."""
 Random = np.random.Generator
-Beside = Callable[[Answer], Answer]
+Beside = Callable[[FlightSummary], FlightSummary]
 """What a neighbour comes to of a flight that came to an answer."""
 
 
@@ -49,10 +49,10 @@ class Stack:
     """A landing stack as a distribution: each flight comes to one of the answers."""
 
     name: str
-    answers: tuple[Answer, ...]
+    answers: tuple[FlightSummary, ...]
     shares: tuple[float, ...]
 
-    def draw(self, count: int, rng: Random) -> list[Answer]:
+    def draw(self, count: int, rng: Random) -> list[FlightSummary]:
         """Return what ``count`` flights come to."""
         return [self.answers[index] for index in rng.choice(len(self.shares), count, p=self.shares)]
 
@@ -69,14 +69,14 @@ class Stack:
 
 def measured(system: str, method: str) -> Stack:
     """Return a landing system in the scenarios of a method: all its rows of the counts together."""
-    counts = Counter[Answer]()
+    counts = Counter[FlightSummary]()
     for row in read(COUNTS):
         if (row["system"], row["method"]) == (system, method):
             counts[LANDED] += int(row["landed"])
             counts[ABORTED] += int(row["aborted"])
             for kind in filter(None, row["kinds"].split("|")):
                 signature, _, count = kind.rpartition("=")
-                answer = Answer(outcome="collision", signature=signature, sha256="base")
+                answer = FlightSummary(outcome="collision", signature=signature, sha256="base")
                 counts[answer] += int(count)
     total = counts.total()
     return Stack(
@@ -104,7 +104,9 @@ def alike(probability: float, rng: Random) -> Beside:
     return lambda answer: answer if rng.random() < probability else LANDED
 
 
-def shaken(base: Sequence[Answer], part: float, stack: Stack, rng: Random) -> list[Answer]:
+def shaken(
+    base: Sequence[FlightSummary], part: float, stack: Stack, rng: Random
+) -> list[FlightSummary]:
     """Return the flights with a part of them drawn anew: these have other bytes, the rest not."""
     head = list(base)
     chosen = rng.choice(len(head), round(part * len(head)), replace=False)
@@ -113,7 +115,9 @@ def shaken(base: Sequence[Answer], part: float, stack: Stack, rng: Random) -> li
     return head
 
 
-def worsened(head: Sequence[Answer], part: float, into: Answer, rng: Random) -> list[Answer]:
+def worsened(
+    head: Sequence[FlightSummary], part: float, into: FlightSummary, rng: Random
+) -> list[FlightSummary]:
     """Return the flights with a part of all, taken from those that land, ending in a violation."""
     landed = [index for index, answer in enumerate(head) if answer.outcome == "landed"]
     count = min(len(landed), int(rng.binomial(len(head), part)))
@@ -121,23 +125,27 @@ def worsened(head: Sequence[Answer], part: float, into: Answer, rng: Random) -> 
     return [into if index in chosen else answer for index, answer in enumerate(head)]
 
 
-def gated(base: Sequence[Answer], head: Sequence[Answer], beside: Beside) -> Comparison:
+def gated(
+    base: Sequence[FlightSummary], head: Sequence[FlightSummary], beside: Beside
+) -> Comparison:
     """Return what the gate says, neighbours of new types flown."""
     pairs = [
         Pair(name=str(index), base=before, head=after)
         for index, (before, after) in enumerate(zip(base, head, strict=True))
     ]
     found = compare(pairs)
-    if not found.to_confirm:
+    if not found.pairs_to_confirm:
         return found
-    flown = {pair.name: [beside(pair.head) for _ in range(COUNT)] for pair in found.to_confirm}
+    flown = {
+        pair.name: [beside(pair.head) for _ in range(COUNT)] for pair in found.pairs_to_confirm
+    }
     return compare(pairs, neighbours=flown)
 
 
 def uncorrected(found: Comparison) -> bool:
     """Whether a gate would fail that believes each new type that shows, whatever its p-value."""
-    rates = holm([found.violations.p, found.aborts.p])
-    return min(rates) <= LEVEL or any(each.shown for each in found.new_types)
+    rates = holm_adjusted([found.violations.p, found.aborts.p])
+    return min(rates) <= LEVEL or any(each.is_supported for each in found.new_types)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -173,7 +181,7 @@ def detected(
     budget: int,
     part: float,
     worse: float,
-    into: Answer,
+    into: FlightSummary,
     robust: float,
     draws: int,
     rng: Random,

@@ -1,4 +1,4 @@
-"""Baselines: scenarios with what a landing system made of them, as one TOML file without code."""
+"""Baselines: scenarios and the results of their flights, as one TOML file without code."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from pytest_garl.baselines.pairs import Answer
+from pytest_garl.baselines.pairs import FlightSummary
 from pytest_garl.errors import GarlError, ScenarioError
 from pytest_garl.files.atomic import save_text
 from pytest_garl.files.reading import MEGABYTE, read_text
@@ -21,8 +21,8 @@ from pytest_garl.verdicts.verdict import Limits
 
 SCHEMA = 1
 LARGEST_BYTES = 4 * MEGABYTE
-"""Some six thousand flights, each a line of 600 bytes.  Reading TOML takes up to a hundred times as
-much memory."""
+"""About six thousand flights, each a line of 600 bytes.  Reading TOML takes up to a hundred times
+as much memory."""
 _KEYS = {
     "system",
     "map",
@@ -39,24 +39,24 @@ _OUTCOMES = ("landed", "collision", "not_landed", "aborted", "crashed", "inconcl
 
 
 class BaselineError(GarlError):
-    """A baseline that cannot be made, written or compared with."""
+    """A baseline cannot be made, written or compared with."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Sample:
-    """One scenario and what its flight came to."""
+class BaselineFlight:
+    """One scenario and the summary of its flight."""
 
     scenario: Scenario
-    answer: Answer
+    summary: FlightSummary
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class SampleSet:
-    """What one landing system made of scenarios on one map, and all that they were flown with.
+class BaselineSet:
+    """Flights of one landing system on one map, and the conditions of these flights.
 
-    ``system`` and ``simulator`` are "module:name"; ``npcs`` names who moved the objects, and
-    ``npcs_sha256`` is that of a learned policy's weights, else empty.  ``method`` is the search
-    method that chose the scenarios, empty where that is not known.
+    ``system`` and ``simulator`` are "module:name".  ``npcs`` is the NPC policy, ``npcs_sha256`` the
+    hash of a learned policy's weights and else empty.  ``method`` is the search method that chose
+    the scenarios; it is empty if that is not known.
     """
 
     system: str
@@ -66,7 +66,7 @@ class SampleSet:
     npcs: str
     npcs_sha256: str
     limits: Limits
-    samples: tuple[Sample, ...]
+    flights: tuple[BaselineFlight, ...]
     method: str = ""
 
     @property
@@ -75,8 +75,8 @@ class SampleSet:
         return f"{self.system.rpartition(':')[2]}-{self.map}"
 
     @property
-    def caution(self) -> str:
-        """What somebody must know who compares a landing system with this set, or nothing."""
+    def warning(self) -> str:
+        """A warning for comparisons with this set; empty if there is none."""
         if self.method in ("", "random"):
             return ""
         return (
@@ -85,20 +85,20 @@ class SampleSet:
             "scenarios are"
         )
 
-    def name(self, index: int) -> str:
-        """Return a sample's name, such as ``court-17``."""
+    def scenario_name(self, index: int) -> str:
+        """Return a scenario's name, such as ``court-17``."""
         return f"{self.map}-{index}"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Baseline:
-    """Sets of one or more systems and maps; the hashes hold on CPUs of the class ``cpu``."""
+    """Sets of one or more systems and maps; the hashes are valid on CPUs of the class ``cpu``."""
 
     cpu: str
     versions: tuple[tuple[str, str], ...]
-    sets: tuple[SampleSet, ...]
+    sets: tuple[BaselineSet, ...]
 
-    def of(self, system: str, map: str) -> SampleSet | None:
+    def find(self, system: str, map: str) -> BaselineSet | None:
         """Return the set of a system on a map, if there is one."""
         found = (each for each in self.sets if (each.system, each.map) == (system, map))
         return next(found, None)
@@ -120,9 +120,9 @@ def dumps(baseline: Baseline) -> str:
     return "\n".join(lines) + "\n"
 
 
-def _set_lines(each: SampleSet) -> list[str]:
+def _set_lines(each: BaselineSet) -> list[str]:
     limits = each.limits
-    keys = [key for key, _ in each.samples[0].scenario.genes]
+    keys = [key for key, _ in each.flights[0].scenario.genes]
     return [
         "[[set]]",
         f"system = {quoted(each.system)}",
@@ -138,17 +138,17 @@ def _set_lines(each: SampleSet) -> list[str]:
         "# Each: seed, outcome, signature, violation as the paper defines it, SHA-256 of the",
         "# trajectory, values of the genes.",
         "flights = [",
-        *(f"  {_row(sample)}," for sample in each.samples),
+        *(f"  {_row(flight)}," for flight in each.flights),
         "]",
     ]
 
 
-def _row(sample: Sample) -> str:
-    scenario, answer = sample.scenario, sample.answer
+def _row(flight: BaselineFlight) -> str:
+    scenario, summary = flight.scenario, flight.summary
     values = ", ".join(repr(value) for _, value in scenario.genes)
     return (
-        f"[{scenario.seed}, {quoted(answer.outcome)}, {quoted(answer.signature)}, "
-        f"{str(answer.paper_violation).lower()}, {quoted(answer.sha256)}, [{values}]]"
+        f"[{scenario.seed}, {quoted(summary.outcome)}, {quoted(summary.signature)}, "
+        f"{str(summary.paper_violation).lower()}, {quoted(summary.sha256)}, [{values}]]"
     )
 
 
@@ -164,7 +164,7 @@ def loads(text: str, load_map: Callable[[str], Map], *, source: str = "baseline"
         versions=tuple((name, versions.text(name)) for name in versions.values),
         sets=tuple(_read_set(table, load_map) for table in top.tables("set")),
     )
-    _checked(baseline, lambda problem: top.error("set", problem))
+    _check(baseline, lambda problem: top.error("set", problem))
     return baseline
 
 
@@ -178,11 +178,11 @@ def load(path: Path, search_path: tuple[Path, ...] = ()) -> Baseline:
 
 
 def save(path: Path, baseline: Baseline) -> None:
-    """Write the file; what stood there before is replaced as a whole."""
-    _checked(baseline, lambda problem: BaselineError(f"{path}: {problem}"))
+    """Write the file atomically; an existing one is replaced."""
+    _check(baseline, lambda problem: BaselineError(f"{path}: {problem}"))
     text = dumps(baseline)
     if len(text.encode()) > LARGEST_BYTES:
-        flights = sum(len(each.samples) for each in baseline.sets)
+        flights = sum(len(each.flights) for each in baseline.sets)
         raise BaselineError(
             f"{path}: found {flights} flights in {len(text.encode())} bytes, expected at most "
             f"{LARGEST_BYTES}; save fewer flights"
@@ -190,29 +190,29 @@ def save(path: Path, baseline: Baseline) -> None:
     save_text(path, text)
 
 
-def _checked(baseline: Baseline, wrong: Callable[[str], GarlError]) -> None:
-    """Raise what ``wrong`` makes of a problem between sets or samples."""
+def _check(baseline: Baseline, error: Callable[[str], GarlError]) -> None:
+    """Raise the error that ``error`` makes of a message if sets or flights do not fit together."""
     if not baseline.sets:
-        raise wrong("found none, expected at least one [[set]]")
+        raise error("found none, expected at least one [[set]]")
     places = [(each.system, each.map) for each in baseline.sets]
     twice = next((place for place in places if places.count(place) > 1), None)
     if twice:
-        raise wrong(f"found {twice[0]} on {twice[1]} twice, expected one set of each")
+        raise error(f"found {twice[0]} on {twice[1]} twice, expected one set of each")
     for each in baseline.sets:
-        if not each.samples:
-            raise wrong(f"{each.system} on {each.map}: found no flights, expected at least one")
+        if not each.flights:
+            raise error(f"{each.system} on {each.map}: found no flights, expected at least one")
         shapes = {
-            (tuple(key for key, _ in sample.scenario.genes), sample.scenario.absent)
-            for sample in each.samples
+            (tuple(key for key, _ in flight.scenario.genes), flight.scenario.absent)
+            for flight in each.flights
         }
         if len(shapes) > 1 or any(absent for _, absent in shapes):
-            raise wrong(
+            raise error(
                 f"{each.system} on {each.map}: found scenarios of different genes or without some "
                 "of the map's objects, expected those of a search, with all of them"
             )
 
 
-def _read_set(table: Table, load_map: Callable[[str], Map]) -> SampleSet:
+def _read_set(table: Table, load_map: Callable[[str], Map]) -> BaselineSet:
     table.only(_KEYS)
     for key in ("system", "simulator"):
         if not all(table.text(key).partition(":")):
@@ -225,7 +225,7 @@ def _read_set(table: Table, load_map: Callable[[str], Map]) -> SampleSet:
     rows = table.get("flights")
     if not isinstance(rows, list):
         raise table.error("flights", f"found {shown(rows)}, expected a list of flights")
-    return SampleSet(
+    return BaselineSet(
         system=table.text("system"),
         map=map.name,
         map_sha256=table.text("map_sha256"),
@@ -234,21 +234,21 @@ def _read_set(table: Table, load_map: Callable[[str], Map]) -> SampleSet:
         npcs_sha256=table.text("npcs_sha256"),
         method=table.text("method", ""),
         limits=read_limits(table.table("limits")),
-        samples=tuple(
+        flights=tuple(
             _read_row(table, index, row, map.name, properties) for index, row in enumerate(rows)
         ),
     )
 
 
 def _read_genes(table: Table, map: Map) -> tuple[Property, ...]:
-    """Return the properties that the columns of values stand for."""
+    """Return the genes whose values the flights list, in the order of the key ``genes``."""
     keys = table.texts("genes")
     genome = genome_like(keys, map)
     if keys != genome.keys:
         wrong = sorted({*keys} ^ {*genome.keys})
         raise table.error(
             "genes",
-            f"found others than those of the map {map.name!r}, or in another order "
+            f"found genes other than those of the map {map.name!r}, or in another order "
             f"({listed(wrong) or 'order'}); if the map has changed, save a baseline anew",
         )
     return genome.properties
@@ -256,7 +256,7 @@ def _read_genes(table: Table, map: Map) -> tuple[Property, ...]:
 
 def _read_row(
     table: Table, index: int, row: Any, map: str, properties: tuple[Property, ...]
-) -> Sample:
+) -> BaselineFlight:
     key = f"flights[{index}]"
     kinds = (int, str, str, bool, str, list)
     if (
@@ -285,9 +285,9 @@ def _read_row(
                 key, f"{item.key}: found {shown(value)}, expected {item.low:g} to {item.high:g}"
             )
     genes = tuple((item.key, float(value)) for item, value in zip(properties, values, strict=True))
-    return Sample(
+    return BaselineFlight(
         scenario=Scenario(map=map, seed=seed, genes=genes),
-        answer=Answer(
+        summary=FlightSummary(
             outcome=outcome,
             signature=printable(signature),
             paper_violation=paper_violation,

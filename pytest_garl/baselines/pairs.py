@@ -1,4 +1,4 @@
-"""Two flights of one scenario: what each came to, and what became of the scenario."""
+"""Two flights of one scenario, one of each landing system, and the difference between them."""
 
 from __future__ import annotations
 
@@ -7,16 +7,18 @@ from typing import Literal
 
 from pytest_garl.execution.result import FlightResult
 
-Fate = Literal["same", "broke", "fixed", "changed"]
-DIFFERENT: tuple[Fate, ...] = ("broke", "fixed", "changed")
+PairResult = Literal["same", "broke", "fixed", "changed"]
+"""``broke`` and ``fixed``: the second flight ended worse or better; ``changed``: both violate, in
+different ways."""
+DIFFERENT_RESULTS: tuple[PairResult, ...] = ("broke", "fixed", "changed")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Answer:
-    """What one flight came to, as far as two flights of a scenario are compared.
+class FlightSummary:
+    """The part of a flight's result that the gate compares.
 
-    ``signature`` is empty for a flight without violation; ``paper_violation`` is the paper's
-    narrower definition, which the gate does not use.
+    ``signature`` is empty for a flight without violation.  ``paper_violation`` is the paper's
+    narrower definition, which the gate does not use.  ``sha256`` is the trajectory's hash.
     """
 
     outcome: str
@@ -26,38 +28,38 @@ class Answer:
 
     @property
     def violated(self) -> bool:
-        """Whether a safety property was violated."""
+        """Whether the flight violated a safety property."""
         return bool(self.signature)
 
     @property
     def aborted(self) -> bool:
-        """Whether the landing system gave the landing up."""
+        """Whether the landing system aborted the landing."""
         return self.outcome == "aborted"
 
     @property
     def decided(self) -> bool:
-        """Whether the flight says anything at all about the landing system."""
+        """Whether the flight is evidence about the landing system at all."""
         return self.outcome != "inconclusive"
 
     @property
     def type(self) -> str:
-        """The violation's type, such as IV; empty for a flight without violation."""
-        return type_of(self.signature)
+        """The violation type, such as IV; empty for a flight without violation."""
+        return violation_type_of(self.signature)
 
     @property
-    def words(self) -> str:
-        """The signature, or how a flight without violation ended."""
+    def text(self) -> str:
+        """The signature, or the outcome of a flight without violation."""
         return self.signature or self.outcome
 
 
-def type_of(signature: str) -> str:
-    """Return the type that a signature begins with: IV of "IV:dog:descent:seen"."""
+def violation_type_of(signature: str) -> str:
+    """Return the type at the beginning of a signature: IV of "IV:dog:descent:seen"."""
     return signature.partition(":")[0].rstrip("?")
 
 
-def answer_of(result: FlightResult, sha256: str) -> Answer:
-    """Return the answer in a flight's result, as the ledger holds it."""
-    return Answer(
+def summary_of(result: FlightResult, sha256: str) -> FlightSummary:
+    """Return the summary of a flight's result and the hash of its trajectory."""
+    return FlightSummary(
         outcome=result.outcome,
         signature=result.signature,
         paper_violation=result.verdict.paper_violation,
@@ -67,30 +69,33 @@ def answer_of(result: FlightResult, sha256: str) -> Answer:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Pair:
-    """One scenario, called ``name``, flown by the stack as it was (base) and as it is (head)."""
+    """Two flights of the scenario ``name``: by the saved landing system and by the changed one.
+
+    ``base`` is the saved one's, ``head`` the changed one's, as in a pull request.
+    """
 
     name: str
-    base: Answer
-    head: Answer
+    base: FlightSummary
+    head: FlightSummary
 
     @property
-    def fate(self) -> Fate:
-        """What became of the scenario, violations before aborts."""
+    def result(self) -> PairResult:
+        """How the flight of the head differs; a violation is worse than an abort."""
         before, after = (_badness(each) for each in (self.base, self.head))
         if before != after:
             return "broke" if after > before else "fixed"
         return "same" if self.base.signature == self.head.signature else "changed"
 
     @property
-    def repeated(self) -> bool:
-        """Whether both flights are the same to the byte."""
+    def identical(self) -> bool:
+        """Whether both flights have the same trajectory, byte for byte."""
         return bool(self.base.sha256) and self.base.sha256 == self.head.sha256
 
     @property
-    def words(self) -> str:
-        """How it ended before and after."""
-        return f"{self.name}: {self.base.words} -> {self.head.words}"
+    def text(self) -> str:
+        """The pair in one line, such as ``lawn-2: landed -> IV:dog:descent:seen``."""
+        return f"{self.name}: {self.base.text} -> {self.head.text}"
 
 
-def _badness(answer: Answer) -> int:
-    return 2 if answer.violated else int(answer.aborted)
+def _badness(flight: FlightSummary) -> int:
+    return 2 if flight.violated else int(flight.aborted)

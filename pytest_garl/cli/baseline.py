@@ -17,7 +17,7 @@ from pytest_garl.errors import OptionError
 
 if TYPE_CHECKING:
     from pytest_garl.baselines.comparison import Comparison
-    from pytest_garl.baselines.record import Survey
+    from pytest_garl.baselines.record import BaselineSpec
     from pytest_garl.execution.on_demand import Done
     from pytest_garl.execution.reference import Reference
 
@@ -123,11 +123,11 @@ def save(
     Run it where you run pytest. The same options choose the same scenarios for every system.
     """
     from pytest_garl.baselines import file as files
-    from pytest_garl.baselines.record import from_ledger, survey_checkout
+    from pytest_garl.baselines.record import baseline_from_ledger, fly_baseline
     from pytest_garl.execution.checkout import Checkout
 
     if ledger is not None:
-        made = from_ledger(ledger)
+        made = baseline_from_ledger(ledger)
     elif not systems:
         raise OptionError(
             "garl baseline save: found neither --system nor --from-ledger, expected one of them, "
@@ -135,17 +135,17 @@ def save(
         )
     else:
         checkout = Checkout(folder=Path.cwd())
-        made = survey_checkout(_survey(**chosen), checkout, systems, workers, _progress)
+        made = fly_baseline(_survey(**chosen), checkout, systems, workers, _progress)
     files.save(out, made)
     for each in made.sets:
-        bad = sum(sample.answer.violated for sample in each.samples)
-        given_up = sum(sample.answer.aborted for sample in each.samples)
-        unsure = sum(not sample.answer.decided for sample in each.samples)
-        count = f"{len(each.samples)} flown, {bad} violations, {given_up} aborts"
+        bad = sum(flight.summary.violated for flight in each.flights)
+        given_up = sum(flight.summary.aborted for flight in each.flights)
+        unsure = sum(not flight.summary.decided for flight in each.flights)
+        count = f"{len(each.flights)} flown, {bad} violations, {given_up} aborts"
         left_out = f", {unsure} inconclusive, which the gate leaves out" if unsure else ""
         click.echo(f"{each.title}: {count}{left_out}")
-        if each.caution:
-            click.echo(f"    note: {each.caution}")
+        if each.warning:
+            click.echo(f"    note: {each.warning}")
     click.echo(f"saved {out}; the gate: pytest --garl-baseline={out}")
 
 
@@ -158,10 +158,10 @@ def scenario(file: Path, name: str) -> None:
     from pytest_garl.scenarios.files import dumps
 
     for each in files.load(file, (_maps_folder(),)).sets:
-        for index, sample in enumerate(each.samples):
-            if each.name(index) == name:
+        for index, flight in enumerate(each.flights):
+            if each.scenario_name(index) == name:
                 click.echo(f"# {name} of {file}; objects were moved by {each.npcs}")
-                click.echo(dumps(sample.scenario), nl=False)
+                click.echo(dumps(flight.scenario), nl=False)
                 return
     raise OptionError(f"{file}: holds no scenario {name!r}; expected one such as court-0")
 
@@ -191,7 +191,8 @@ def diff(
     type of violation, significantly more violations or aborts, or an inconclusive flight. Both
     use the simulator and the NPC policies of this installation, and the maps of this folder.
     """
-    from pytest_garl.baselines.record import compare_sets, fly_beside, survey_checkout
+    from pytest_garl.baselines.gate import compare_sets
+    from pytest_garl.baselines.record import fly_baseline, neighbour_flyer
     from pytest_garl.execution.checkout import Checkout
     from pytest_garl.scenarios.maps.map import load_map
 
@@ -201,13 +202,11 @@ def diff(
     checkouts = [
         Checkout(folder=one, others=(other,)) for one, other in ((base, head), (head, base))
     ]
-    before, after = (
-        survey_checkout(survey, each, systems, workers, _progress) for each in checkouts
-    )
+    before, after = (fly_baseline(survey, each, systems, workers, _progress) for each in checkouts)
     passed = True
     for old, new in zip(before.sets, after.sets, strict=True):
         map = load_map(old.map, survey.map_folders)
-        fly = fly_beside(survey, checkouts[1], new, workers, _progress)
+        fly = neighbour_flyer(survey, checkouts[1], new, workers, _progress)
         found = compare_sets(old, new, map, fly, level=level)
         passed = passed and found.passed
         _show(old.title, found)
@@ -223,14 +222,14 @@ def _survey(
     abort: Any,
     simulator: str,
     **rest: Any,
-) -> Survey:
-    from pytest_garl.baselines.record import Survey
+) -> BaselineSpec:
+    from pytest_garl.baselines.record import BaselineSpec
     from pytest_garl.verdicts.verdict import Limits
 
     names = tuple(dict.fromkeys(part.strip() for part in maps.split(",") if part.strip()))
     if not names:
         raise OptionError(f"--maps: found {maps!r}, expected names such as court,lawn")
-    return Survey(
+    return BaselineSpec(
         maps=names,
         limits=Limits(distance_m=distance_m, time_s=time_s, abort=abort),
         simulator=_simulator(simulator),
@@ -262,20 +261,20 @@ def _progress(flights: Iterator[Done], title: str, total: int) -> Iterable[Done]
 
 
 def _show(title: str, found: Comparison) -> None:
-    from pytest_garl.baselines.pairs import DIFFERENT
+    from pytest_garl.baselines.pairs import DIFFERENT_RESULTS
 
     table = Table(box=None, header_style="bold")
     for name in ("scenario", "", "base", "head"):
         table.add_column(name, overflow="fold")
-    for fate in DIFFERENT:
-        for pair in found.of(fate):
+    for result in DIFFERENT_RESULTS:
+        for pair in found.with_result(result):
             # As texts: in a string rich would make an animal of ":dog:".
-            cells = (pair.name, fate, pair.base.words, pair.head.words)
-            table.add_row(*(Text(cell) for cell in cells), style=COLOURS[fate])
+            cells = (pair.name, result, pair.base.text, pair.head.text)
+            table.add_row(*(Text(cell) for cell in cells), style=COLOURS[result])
     console = Console()
     if table.row_count:
         console.print(table)
-    answer, *figures = found.summary()
+    answer, *figures = found.summary_lines()
     click.secho(f"{title}: {answer}", bold=True, fg="green" if found.passed else "red")
     for line in figures:
         click.echo(f"    {line}")

@@ -11,9 +11,10 @@ import pytest
 
 from pytest_garl.adversary.catalogue import policy_spec
 from pytest_garl.baselines.comparison import Comparison
-from pytest_garl.baselines.file import Baseline, SampleSet, load
-from pytest_garl.baselines.pairs import Fate
-from pytest_garl.baselines.record import compare_flights, moved_on, unlike
+from pytest_garl.baselines.compatibility import environment_changes, incompatibilities
+from pytest_garl.baselines.file import Baseline, BaselineSet, load
+from pytest_garl.baselines.gate import compare_flights
+from pytest_garl.baselines.pairs import PairResult
 from pytest_garl.errors import GarlError
 from pytest_garl.plugin.fixtures import abort_session
 from pytest_garl.plugin.keys import RUN, is_xdist_worker
@@ -41,7 +42,7 @@ def register(config: pytest.Config, options: Options) -> None:
 class BaselineGateItem(pytest.Item):
     """Flies one set of the baseline and fails if the landing system is worse."""
 
-    def __init__(self, *, target: Target, base: SampleSet, **rest: Any) -> None:
+    def __init__(self, *, target: Target, base: BaselineSet, **rest: Any) -> None:
         super().__init__(**rest)
         self.garl_gate = base
         self._target = target
@@ -54,7 +55,7 @@ class BaselineGateItem(pytest.Item):
         base = self.garl_gate
         try:
             npcs = policy_spec(base.npcs)
-            differing = unlike(base, run.job(self._target, npcs))
+            differing = incompatibilities(base, run.job(self._target, npcs))
             if differing:
                 refused = f"gate FAILED: no fair comparison, {'; '.join(differing)}"
                 lines = [refused, "If that is wanted, save the baseline anew."]
@@ -62,19 +63,19 @@ class BaselineGateItem(pytest.Item):
                 pytest.fail("\n".join(lines), pytrace=False)
             found = compare_flights(
                 base,
-                run.fly_all(self._target, npcs, [each.scenario for each in base.samples]),
+                run.fly_all(self._target, npcs, [each.scenario for each in base.flights]),
                 load_map(base.map, run.options.map_folders),
                 lambda scenarios: run.fly_all(self._target, npcs, scenarios),
                 level=run.options.level,
-                known=run.expected_signatures(self._target),
+                expected_signatures=run.expected_signatures(self._target),
             )
         except GarlError as error:
             abort_session(self, error)
-        caution = [f"note: {base.caution}"] if base.caution else []
-        self._tell([*found.sentences(), *self._hint(found, run.options.baseline), *caution])
+        caution = [f"note: {base.warning}"] if base.warning else []
+        self._tell([*found.report_lines(), *self._hint(found, run.options.baseline), *caution])
         if not found.passed:
             # The pairs are listed once, in the summary.
-            pytest.fail("\n".join(found.summary()), pytrace=False)
+            pytest.fail("\n".join(found.summary_lines()), pytrace=False)
 
     def _tell(self, lines: Iterable[str]) -> None:
         """Leave lines for the summary."""
@@ -82,8 +83,8 @@ class BaselineGateItem(pytest.Item):
 
     def _hint(self, found: Comparison, file: Path | None) -> Iterator[str]:
         """Say how to look at a pair that is worse."""
-        worse: tuple[Fate, ...] = ("broke", "changed")
-        first = next((pair for fate in worse for pair in found.of(fate)), None)
+        worse: tuple[PairResult, ...] = ("broke", "changed")
+        first = next((pair for result in worse for pair in found.with_result(result)), None)
         if first is not None:
             yield (
                 f"fly it: garl baseline scenario {file} {first.name} > one.toml; "
@@ -123,7 +124,7 @@ class BaselineGatePlugin:
         except GarlError as error:
             raise pytest.Collector.CollectError(f"{collector.nodeid}: {error}") from error
         for map in subject.maps:
-            base = self._baseline.of(name_of(subject.system), map)
+            base = self._baseline.find(name_of(subject.system), map)
             place = (str(collector.path), name_of(subject.system), map)
             if base is not None and place not in self._placed:
                 self._placed.add(place)
@@ -168,7 +169,7 @@ class BaselineGatePlugin:
 
     def pytest_report_header(self) -> str:
         """Say what the gate will fly, at most."""
-        sets = ", ".join(f"{len(each.samples)} of {each.title}" for each in self._baseline.sets)
+        sets = ", ".join(f"{len(each.flights)} of {each.title}" for each in self._baseline.sets)
         return f"garl: gate against {self._file}: {sets}, level {self._options.level:g}"
 
     def pytest_terminal_summary(self, terminalreporter: Any) -> None:
@@ -178,7 +179,7 @@ class BaselineGatePlugin:
         terminalreporter.section("garl: baseline", sep="=")
         if self._problem:
             terminalreporter.write_line(self._problem, red=True)
-        for note in moved_on(self._baseline):
+        for note in environment_changes(self._baseline):
             terminalreporter.write_line(f"note: {note}; differences may be its doing")
         titles = {title for title, *_ in self._told.values()}
         for each in self._baseline.sets:

@@ -127,7 +127,7 @@ def test_the_same_options_save_the_same_bytes_and_a_scenario_can_be_taken_out(
     (saved,) = load(Path("two.toml")).sets
     printed = garl("baseline", "scenario", "two.toml", "lawn-3")
     Path("one.toml").write_text(printed.output)
-    assert load_scenario(Path("one.toml")) == saved.samples[3].scenario
+    assert load_scenario(Path("one.toml")) == saved.flights[3].scenario
     several = garl(*save, "--system=stack.system:GivesUp", "--out=three.toml")
     assert "GivesUp-lawn: 4 flown, " in several.output
     assert [each.title for each in load(Path("three.toml")).sets] == ["Lander-lawn", "GivesUp-lawn"]
@@ -150,5 +150,5 @@ def test_real_flights_become_a_baseline(checkouts: Path) -> None:
     assert "GivesUp-lawn: 1 flown, 1 violations, 1 aborts" in result.output
     (saved,) = load(Path("base.toml")).sets
     assert saved.npcs_sha256
-    assert {sample.answer.signature.partition(":")[0] for sample in saved.samples} == {"abort"}
-    assert all(sample.answer.sha256 for sample in saved.samples)
+    assert {flight.summary.signature.partition(":")[0] for flight in saved.flights} == {"abort"}
+    assert all(flight.summary.sha256 for flight in saved.flights)

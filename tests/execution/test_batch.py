@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 
 from pytest_garl.adversary.catalogue import policy_spec
-from pytest_garl.baselines.record import Survey
+from pytest_garl.baselines.record import BaselineSpec
 from pytest_garl.errors import LedgerError
 from pytest_garl.execution.batch import fly_all, own_pool
 from pytest_garl.execution.job import Job, dump_scenario
@@ -31,7 +31,7 @@ JOB = Job(
     path=(),
     flights="flights",
 )
-SCENARIOS = Survey(count=3).scenarios(load_map("lawn"))
+SCENARIOS = BaselineSpec(count=3).scenarios(load_map("lawn"))
 
 
 class Instant:

@@ -10,13 +10,13 @@ from typing import Any
 
 import pytest
 
-from pytest_garl.baselines.record import from_ledger
+from pytest_garl.baselines.record import baseline_from_ledger
 from pytest_garl.errors import LedgerError
 from pytest_garl.execution.database import VERSION, Database
 from pytest_garl.execution.job import dump_scenario, load_scenario, loads
 from pytest_garl.execution.ledger import Ledger
 from pytest_garl.execution.stored_ledger import check_stored
-from tests.baselines.test_file import job, write_ledger
+from tests.baselines.samples import job, write_ledger
 from tests.execution.flying import scenario
 from tests.support.results import flight_result
 
@@ -107,7 +107,7 @@ def test_a_damaged_row_is_one_short_error(path: Path, sql: str, value: Any, word
     assert str(caught.value).startswith(f"{path}: is damaged or no ledger of this version: ")
     assert len(str(caught.value)) < 800
     with pytest.raises(LedgerError, match=words):
-        from_ledger(path)
+        baseline_from_ledger(path)
 
 
 @pytest.mark.parametrize("table", ["run", "search", "slot", "meter"])

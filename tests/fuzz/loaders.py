@@ -17,7 +17,7 @@ import numpy as np
 from pytest_garl.adversary import learned as network
 from pytest_garl.adversary.catalogue import WEIGHTS
 from pytest_garl.baselines import file as baseline
-from pytest_garl.baselines import record as survey
+from pytest_garl.baselines import record
 from pytest_garl.errors import GarlError
 from pytest_garl.execution.flight import fly_job
 from pytest_garl.execution.job import load_scenario, loads
@@ -35,7 +35,7 @@ from pytest_garl.scenarios.maps import map as maps
 from pytest_garl.scenarios.validity import problems
 from pytest_garl.search.objectives import violation_proximity
 from pytest_garl.simulation import flight_file
-from tests.baselines import test_file as test_baseline
+from tests.baselines import samples as baseline_samples
 from tests.execution.flying import Good, job_of, scenario
 from tests.experiments.samples import row
 from tests.experiments.test_spec import TEXT as PLAN
@@ -185,7 +185,7 @@ def _prepare_ledger(folder: Path, rng: random.Random) -> Path:
 def _write_ledger(path: Path) -> None:
     job = job_of(Good, path.parent)
     ledger = Ledger.create(path, _RUN)
-    ledger.add_search("s", "tests.execution.flying:Good", "lawn", 8, test_baseline.job().dumps())
+    ledger.add_search("s", "tests.execution.flying:Good", "lawn", 8, baseline_samples.job().dumps())
     ledger.add_slots("s", 0, {slot: _dumped(slot) for slot in range(8)})
     for _ in range(6):
         claim = ledger.queue.claim()
@@ -205,7 +205,7 @@ def _dumped(slot: int) -> str:
 def _load_ledger(path: Path, rng: random.Random) -> None:
     kind = rng.randrange(3)
     if kind == 0:
-        baseline.dumps(survey.from_ledger(path))
+        baseline.dumps(record.baseline_from_ledger(path))
         return
     ledger = Ledger.resume(path, _RUN) if kind == 1 else Ledger(path)
     try:
@@ -259,7 +259,7 @@ LOADERS = {
         load=_load_map,
     ),
     "baseline": Loader(
-        prepare=_text_file("base.toml", lambda: [baseline.dumps(test_baseline.baseline())]),
+        prepare=_text_file("base.toml", lambda: [baseline.dumps(baseline_samples.baseline())]),
         load=_load_baseline,
     ),
     "experiment": Loader(prepare=_text_file("plan.toml", lambda: [PLAN]), load=_load_plan),

@@ -11,7 +11,7 @@ from pytest_garl.errors import OptionError, ScenarioError
 from pytest_garl.regressions.case_file import dumps, load, load_header, loads
 from pytest_garl.scenarios.maps.map import load_map
 from pytest_garl.verdicts.verdict import Limits
-from tests.baselines.test_file import baseline
+from tests.baselines.samples import baseline
 from tests.regressions.test_case_file import NAMES, SYSTEM, case, changing
 
 TEXT = dumps(case())

@@ -7,7 +7,7 @@ import math
 import pytest
 
 from pytest_garl.adversary.catalogue import policy_spec
-from pytest_garl.baselines.record import Survey
+from pytest_garl.baselines.record import BaselineSpec
 from pytest_garl.landing_system import Abort, Command, Land, Mission, Observation, PositionSetpoint
 from pytest_garl.scenarios.maps.map import load_map
 from pytest_garl.simulation.fly import fly
@@ -36,7 +36,7 @@ class TouchesFarOff:
 @pytest.mark.sim
 def test_a_system_that_touches_the_ground_far_off_and_gives_up_violates_the_distance() -> None:
     map = load_map("lawn")
-    (scenario,) = Survey(count=1).scenarios(map)
+    (scenario,) = BaselineSpec(count=1).scenarios(map)
     flight = fly(scenario, TouchesFarOff, policy_spec("stand"), map=map)
     verdict = judge(flight, Limits())
     assert flight.outcome == "aborted"

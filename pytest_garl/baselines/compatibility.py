@@ -1,0 +1,44 @@
+"""Whether a session may be compared with a baseline, and what else has changed since."""
+
+from __future__ import annotations
+
+from importlib.metadata import PackageNotFoundError, version
+
+from pytest_garl.baselines.file import Baseline, BaselineSet
+from pytest_garl.execution.job import Job
+from pytest_garl.verdicts.verdict import Limits
+
+
+def incompatibilities(base: BaselineSet, job: Job) -> tuple[str, ...]:
+    """Return conditions that differ from those of the set; with any, rates are not comparable."""
+    conditions = (
+        ("limits", _limits_text(base.limits), _limits_text(job.limits)),
+        (f"map {base.map}", base.map_sha256[:12], job.map_sha256[:12]),
+        ("simulator", base.simulator, job.simulator.name),
+        (f"weights of {base.npcs}", base.npcs_sha256[:12], job.npcs.sha256[:12]),
+    )
+    return tuple(
+        f"{what}: saved with {then}, found {today}"
+        for what, then, today in conditions
+        if then != today
+    )
+
+
+def _limits_text(limits: Limits) -> str:
+    return f"{limits.distance_m:g} m, {limits.time_s:g} s, abort {limits.abort}"
+
+
+def environment_changes(base: Baseline) -> tuple[str, ...]:
+    """Return changes of the CPU class and of packages since the baseline was saved."""
+    from pytest_garl.cpu_dispatch import of_children
+
+    cpu = of_children()
+    found = [] if base.cpu == cpu else [f"the CPU was {base.cpu}, is {cpu}"]
+    for name, then in base.versions:
+        try:
+            today = version(name)
+        except PackageNotFoundError:
+            today = "absent"
+        if then != today:
+            found.append(f"{name} was {then}, is {today}")
+    return tuple(found)

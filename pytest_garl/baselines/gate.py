@@ -1,0 +1,69 @@
+"""The gate: compares flights with a baseline set, and flies neighbours of new violation types."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection, Iterable, Sequence
+
+from pytest_garl.baselines.comparison import LEVEL, Comparison, compare
+from pytest_garl.baselines.file import BaselineError, BaselineSet
+from pytest_garl.baselines.pairs import FlightSummary, Pair, summary_of
+from pytest_garl.execution.on_demand import Done
+from pytest_garl.regressions.robustness import COUNT, neighbours
+from pytest_garl.scenarios.maps.map import Map
+from pytest_garl.scenarios.scenario import Scenario
+
+FlyScenarios = Callable[[Sequence[Scenario]], Sequence[Done]]
+"""Flies scenarios with the changed landing system."""
+
+
+def compare_flights(
+    base: BaselineSet,
+    flights: Iterable[Done],
+    map: Map,
+    fly: FlyScenarios,
+    *,
+    level: float = LEVEL,
+    expected_signatures: Collection[str] = (),
+) -> Comparison:
+    """Return how flights of the set's scenarios, in its order, compare with the set.
+
+    ``fly`` flies neighbours of the scenarios that show a new violation type.
+    """
+    head = [summary_of(done.result, done.sha256) for done in flights]
+    return _compare(base, head, map, fly, level, expected_signatures)
+
+
+def compare_sets(
+    base: BaselineSet, head: BaselineSet, map: Map, fly: FlyScenarios, *, level: float = LEVEL
+) -> Comparison:
+    """Return how two sets compare; raise BaselineError unless their scenarios are the same."""
+    if [each.scenario for each in base.flights] != [each.scenario for each in head.flights]:
+        raise BaselineError(f"{base.title}: the two landing systems did not fly the same scenarios")
+    return _compare(base, [each.summary for each in head.flights], map, fly, level, ())
+
+
+def _compare(
+    base: BaselineSet,
+    head: Sequence[FlightSummary],
+    map: Map,
+    fly: FlyScenarios,
+    level: float,
+    expected_signatures: Collection[str],
+) -> Comparison:
+    pairs = [
+        Pair(name=base.scenario_name(index), base=flight.summary, head=summary)
+        for index, (flight, summary) in enumerate(zip(base.flights, head, strict=True))
+    ]
+    found = compare(pairs, level=level, expected_signatures=expected_signatures)
+    names = [pair.name for pair in found.pairs_to_confirm]
+    if not names:
+        return found
+    scenarios = {
+        base.scenario_name(index): each.scenario for index, each in enumerate(base.flights)
+    }
+    flown = fly([each for name in names for each in neighbours(scenarios[name], map)])
+    summaries = [summary_of(done.result, done.sha256) for done in flown]
+    beside = {
+        name: summaries[index * COUNT : (index + 1) * COUNT] for index, name in enumerate(names)
+    }
+    return compare(pairs, level=level, expected_signatures=expected_signatures, neighbours=beside)

@@ -1,0 +1,70 @@
+"""A small baseline, its job and a ledger of it, which several tests share."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from pytest_garl.adversary.catalogue import policy_spec
+from pytest_garl.baselines.file import (
+    Baseline,
+    BaselineFlight,
+    BaselineSet,
+)
+from pytest_garl.baselines.pairs import FlightSummary
+from pytest_garl.baselines.record import BaselineSpec
+from pytest_garl.execution.job import Job, dump_scenario
+from pytest_garl.execution.ledger import Ledger
+from pytest_garl.execution.reference import BUILT_IN, Reference
+from pytest_garl.scenarios.maps.map import load_map
+from pytest_garl.verdicts.verdict import Limits
+from tests.support.results import flight_result
+
+LAWN, COURT = load_map("lawn"), load_map("court")
+LANDED = FlightSummary(outcome="landed", signature="", sha256="ab" * 32)
+DOG = FlightSummary(outcome="collision", signature="IV:dog:descent:seen", paper_violation=True)
+
+
+def baseline_set(count: int = 3, summary: FlightSummary = LANDED) -> BaselineSet:
+    scenarios = BaselineSpec(count=count).scenarios(LAWN)
+    return BaselineSet(
+        system="stack.landing:Lander",
+        map="lawn",
+        map_sha256=LAWN.sha256,
+        simulator="pytest_garl.simulation.fly:fly",
+        npcs="waypoint",
+        npcs_sha256="",
+        limits=Limits(),
+        flights=tuple(BaselineFlight(scenario=each, summary=summary) for each in scenarios),
+    )
+
+
+def baseline(*sets: BaselineSet) -> Baseline:
+    versions = (("pytest-garl", "0.1.0"), ("numpy", "2.0.0"))
+    return Baseline(cpu="x86_64-avx2", versions=versions, sets=sets or (baseline_set(),))
+
+
+def job(simulator: Reference = BUILT_IN) -> Job:
+    return Job(
+        system=Reference(module="stack.landing", file="", qualname="Lander"),
+        system_sha256="",
+        simulator=simulator,
+        map="lawn",
+        map_sha256=LAWN.sha256,
+        map_folders=(),
+        npcs=policy_spec("waypoint"),
+        limits=Limits(),
+        timeout_s=10.0,
+        path=(),
+        flights="flights",
+    )
+
+
+def write_ledger(path: Path, of: Job, method: str = "") -> None:
+    ledger = Ledger.create(path, {"method": method} if method else {})
+    ledger.add_search("a", "stack.landing:Lander", "lawn", 2, of.dumps())
+    texts = [dump_scenario(each) for each in BaselineSpec(count=2).scenarios(LAWN)]
+    ledger.add_slots("a", 0, dict(enumerate(texts)))
+    claim = ledger.queue.claim()
+    assert claim is not None
+    ledger.queue.record(claim, flight_result(), "ab" * 32, 0.1)
+    ledger.close()

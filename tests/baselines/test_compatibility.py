@@ -1,0 +1,42 @@
+from __future__ import annotations
+
+import dataclasses
+
+from pytest_garl.adversary.catalogue import policy_spec
+from pytest_garl.baselines.compatibility import environment_changes, incompatibilities
+from pytest_garl.baselines.file import (
+    Baseline,
+)
+from pytest_garl.cpu_dispatch import of_children
+from pytest_garl.execution.reference import Reference
+from pytest_garl.verdicts.verdict import Limits
+from tests.baselines.samples import baseline, baseline_set, job
+
+
+def test_incompatibilities_name_conditions_but_not_the_landing_system() -> None:
+    each = baseline_set()
+    assert incompatibilities(each, job()) == ()
+    assert incompatibilities(each, dataclasses.replace(job(), system_sha256="new")) == ()
+    strict = dataclasses.replace(job(), limits=Limits(time_s=60.0))
+    assert incompatibilities(each, strict) == (
+        "limits: saved with 1.5 m, 120 s, abort ok, found 1.5 m, 60 s, abort ok",
+    )
+    other = job(Reference(module="sitl", file="/a/sitl.py", qualname="fly"))
+    assert incompatibilities(each, other) == (
+        "simulator: saved with pytest_garl.simulation.fly:fly, found sitl:fly",
+    )
+    assert incompatibilities(dataclasses.replace(each, map_sha256="0" * 64), job())[0].startswith(
+        "map lawn: "
+    )
+    learned = dataclasses.replace(job(), npcs=policy_spec("dqn"))
+    trained = dataclasses.replace(each, npcs="dqn", npcs_sha256="0" * 64)
+    assert incompatibilities(trained, learned)[0].startswith("weights of dqn: saved with 000")
+
+
+def test_environment_changes_name_cpu_and_versions() -> None:
+    assert "numpy was 2.0.0, is " in " ".join(environment_changes(baseline()))
+    gone = Baseline(cpu="z80", versions=(("no-such-package", "1"),), sets=())
+    assert environment_changes(gone) == (
+        f"the CPU was z80, is {of_children()}",
+        "no-such-package was 1, is absent",
+    )
