@@ -1,0 +1,111 @@
+"""A scenario survives its file; a broken file names the key."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from pytest_garl.errors import ScenarioError
+from pytest_garl.scenarios.chromosome import decode
+from pytest_garl.scenarios.files import dumps, load, loads
+from pytest_garl.scenarios.genes import EXTRAS, genome_for, with_destinations
+from pytest_garl.scenarios.maps.map import load_map
+from pytest_garl.scenarios.scenario import Scenario
+from pytest_garl.scenarios.validity import problems, repair
+
+COURT = load_map("court")
+
+
+def test_extra_genes_survive_the_file() -> None:
+    genome = genome_for(COURT, extras=EXTRAS.values())
+    scenario = decode(genome.nominal, genome, map="court", seed=3).replace({"wind.x": 0.5})
+    assert loads(dumps(scenario), COURT) == scenario
+
+
+def test_destinations_survive_the_file_and_are_asked_of_every_object() -> None:
+    genome = with_destinations(genome_for(COURT))
+    row = genome.random(np.random.default_rng(3))
+    scenario = repair(decode(row, genome, map="court", seed=3), COURT)
+    text = dumps(scenario)
+    assert text.count("[genes.dog-1]") == 1
+    assert loads(text, COURT) == scenario
+    alone = scenario.without("dog-1", "bird-1")
+    assert loads(dumps(alone), COURT) == alone
+    x = scenario["dog-1.destination_x"]
+    with pytest.raises(ScenarioError, match=r"genes.dog-1.destination_x'?: missing"):
+        loads(text.replace(f"destination_x = {x!r}\n", ""), COURT)
+
+
+GOOD = dumps(decode(genome_for(COURT).nominal, genome_for(COURT), map="court", seed=1))
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "expected"),
+    [
+        ("seed = 1", "seed = ", "not valid TOML"),
+        ("fog = 0.0", "fog = 1.5", "'genes.environment.fog': found 1.5"),
+        ("fog = 0.0", "fog = nan", "'genes.environment.fog'"),
+        ("fog = 0.0", 'fog = "thick"', "expected a number"),
+        ("fog = 0.0", "mist = 0.0", "'genes.environment.mist': unknown key"),
+        ("schema = 1", "schema = 9", "'schema': found 9, expected 1"),
+        ('map = "court"', 'map = "lawn"', "expected 'court'"),
+        ("seed = 1", "seed = -1", "'seed'"),
+    ],
+)
+def test_a_broken_scenario_file_names_file_and_key(old: str, new: str, expected: str) -> None:
+    with pytest.raises(ScenarioError) as caught:
+        loads(GOOD.replace(old, new), COURT, source="case.toml")
+    assert "case.toml" in str(caught.value)
+    assert expected in str(caught.value)
+
+
+def test_a_missing_gene_is_named() -> None:
+    with pytest.raises(ScenarioError, match="no gene 'fog'"):
+        Scenario(map="court", seed=0, genes=())["fog"]
+
+
+def test_absent_objects_survive_the_file_and_have_no_genes() -> None:
+    genome = genome_for(COURT)
+    whole = repair(decode(genome.nominal, genome, map="court", seed=4), COURT)
+    name = COURT.object_names[0][0]
+    fewer = whole.without(name)
+    assert not any(key.startswith(f"{name}.") for key, _ in fewer.genes)
+    assert loads(dumps(fewer), COURT) == fewer
+    assert problems(fewer, COURT) == ()
+    assert repair(fewer, COURT) == fewer
+
+
+def test_an_absent_object_must_be_one_of_the_map() -> None:
+    genome = genome_for(COURT)
+    text = dumps(repair(decode(genome.nominal, genome, map="court", seed=4), COURT))
+    text = text.replace("seed = 4", 'seed = 4\nabsent = ["cat-1"]')
+    with pytest.raises(ScenarioError, match=r"'absent': map 'court' has no object cat-1"):
+        loads(text, COURT)
+
+
+SCENARIO = dumps(decode(genome_for(COURT).nominal, genome_for(COURT), map="court", seed=1))
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "words"),
+    [
+        ("fog = 0.0", "fog = " + "9" * 400, "'genes.environment.fog': found 999"),
+        ("fog = 0.0", f"fog = 0x{'f' * 5000}", "'genes.environment.fog': found int too long"),
+        ("fog = 0.0", f'fog = "{"x" * 5000}"', "'genes.environment.fog': found 'xxx"),
+        ("seed = 1", f"seed = {2**63}", "'seed': found 9223372036854775808, expected a whole"),
+        ("fog = 0.0", f'"{"k" * 5000}" = 0.0', "unknown key"),
+        ("fog = 0.0", '"\\u001b[2J" = 0.0', r"'genes.environment.\\x1b\[2J': unknown key"),
+    ],
+)
+def test_a_strange_scenario_is_one_short_error(
+    tmp_path: Path, old: str, new: str, words: str
+) -> None:
+    assert old in SCENARIO
+    file = tmp_path / "one.toml"
+    file.write_text(SCENARIO.replace(old, new))
+    with pytest.raises(ScenarioError, match=words) as caught:
+        load(file)
+    assert str(file) in str(caught.value)
+    assert len(str(caught.value)) < 700

@@ -1,0 +1,24 @@
+"""Two genes place a thing anywhere on a disc, evenly."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from pytest_garl.scenarios.placement import disc_to_square, square_to_disc
+
+
+def test_uniform_genes_give_a_uniform_disc() -> None:
+    rng = np.random.default_rng(0)
+    radii = [np.hypot(*square_to_disc(*rng.uniform(-1, 1, 2))) for _ in range(4000)]
+    # For a uniform disc the squared radius is uniform on [0, 1]: mean 1/2, variance 1/12.
+    assert np.mean(np.square(radii)) == pytest.approx(0.5, abs=0.02)
+    assert np.var(np.square(radii)) == pytest.approx(1 / 12, abs=0.01)
+
+
+@given(x=st.floats(-1, 1), y=st.floats(-1, 1))
+def test_disc_to_square_inverts_square_to_disc(x: float, y: float) -> None:
+    back = disc_to_square(*square_to_disc(x, y))
+    assert square_to_disc(*back) == pytest.approx(square_to_disc(x, y), abs=1e-9)
