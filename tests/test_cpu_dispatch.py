@@ -38,7 +38,7 @@ def cpu(monkeypatch: pytest.MonkeyPatch, flags: frozenset[str], machine: str = "
         (ICE_LAKE | {"avx512_fp16"}, "X86_V4 AVX512_ICL AVX512_SPR", "AVX512-SKX"),
     ],
 )
-def test_only_what_the_cpu_has_is_switched_off(
+def test_only_features_of_the_cpu_are_switched_off(
     flags: frozenset[str], numpy: str, opencv: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     cpu(monkeypatch, flags)

@@ -37,7 +37,7 @@ def test_the_page_of_experiments_tells_every_column_and_every_key() -> None:
     assert told >= TOP_KEYS
 
 
-def test_what_remarks_count_agrees_with_the_rows() -> None:
+def test_counts_in_remarks_agree_with_the_rows() -> None:
     from pytest_garl.experiments.results import read
 
     rows = {row.result_hash: row for row in read(DOCS / "experiments" / "rq.csv")}

@@ -44,7 +44,7 @@ def test_shortened_text_is_one_line_within_the_limit(text: str, limit: int) -> N
         assert shortened(text, limit) == printable(text, keep="")
 
 
-def test_what_is_cut_shows_both_ends() -> None:
+def test_a_cut_text_shows_both_ends() -> None:
     short = shortened("begin" + "x" * 1_000_000 + "end")
     assert len(short) == SHOWN
     assert short.startswith("begin")

@@ -17,7 +17,7 @@ def add_one(path: Path) -> None:
             save_text(path, str(count + 1))
 
 
-def test_who_is_alone_loses_nothing(tmp_path: Path) -> None:
+def test_locked_writers_lose_nothing(tmp_path: Path) -> None:
     path = save_text(tmp_path / "deep" / "count", "0")
     context = multiprocessing.get_context("spawn")
     processes = [context.Process(target=add_one, args=(path,)) for _ in range(2)]
@@ -33,7 +33,7 @@ def test_line_ends_stay_as_they_are(tmp_path: Path) -> None:
     assert save_text(tmp_path / "a", "ü\r\nb\n").read_bytes() == "ü\r\nb\n".encode()
 
 
-def test_where_nothing_can_be_written_is_told(tmp_path: Path) -> None:
+def test_an_unwritable_place_is_named(tmp_path: Path) -> None:
     (tmp_path / "file").touch()
     with pytest.raises(SavingError, match=r"file/a.csv: cannot be saved \(.*file"):
         save_text(tmp_path / "file" / "a.csv", "")

@@ -78,7 +78,7 @@ def test_a_wrong_field_is_named(change: dict[str, object], words: str) -> None:
     ],
     ids=["nested", "digits", "open", "utf-16", "bytes"],
 )
-def test_what_is_no_json_is_one_short_error(text: str | bytes, words: str) -> None:
+def test_invalid_json_is_one_short_error(text: str | bytes, words: str) -> None:
     with pytest.raises(ValueError, match=words) as caught:
         parsed(text)
     assert len(str(caught.value)) < 150

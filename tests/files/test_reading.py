@@ -68,7 +68,7 @@ def _socket(path: Path) -> None:
         (_dangling, "cannot be read: No such file or directory"),
     ],
 )
-def test_what_is_no_regular_file_is_refused(tmp_path: Path, make: object, words: str) -> None:
+def test_only_regular_files_are_read(tmp_path: Path, make: object, words: str) -> None:
     path = tmp_path / "case.toml"
     assert callable(make)
     make(path)

@@ -29,7 +29,9 @@ def test_many_broken_files_neither_hang_nor_fill_the_memory(loader: str) -> None
     assert peak_mb < campaign.MEMORY_BYTES / 1e6
 
 
-def test_what_goes_wrong_is_counted(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_campaign_counts_every_kind_of_failure(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     def outcome(error: BaseException | None) -> str:
         def load(path: Path, rng: object) -> None:
             if error is not None:

@@ -42,7 +42,7 @@ def test_it_lands_on_the_marker_where_nothing_is_in_the_way(system: type) -> Non
     assert phases(flight)[-2:] == ["descend", "commit"]
 
 
-def test_mm_gives_way_to_who_stands_on_the_marker() -> None:
+def test_mm_gives_way_to_a_person_on_the_marker() -> None:
     map, scenario = place((("person", 1),), **{"person-1.velocity": 0.9})
     flight = fly(scenario, MultiModuleLandingSystem, policy_spec("stand"), map=map)
     assert flight.outcome in ("aborted", "not_landed")
@@ -52,7 +52,7 @@ def test_mm_gives_way_to_who_stands_on_the_marker() -> None:
     assert flight.uav.position_m[near & airborne, 2].min() > 2.0
 
 
-def test_mm_shows_what_it_plans() -> None:
+def test_mm_shows_its_planned_path() -> None:
     map, scenario = place()
     flight = fly(scenario, MultiModuleLandingSystem, policy_spec("stationary"), map=map)
     planned = [step.diagnostics.planned_path_m for step in flight.steps if step.diagnostics]

@@ -97,7 +97,7 @@ def test_there_is_a_picture_for_each_camera_frame_and_two_seconds_of_the_end(fil
     assert all((each == film.pictures[-1]).all() for each in film.pictures[-CLOSING_FRAMES:])
 
 
-def test_the_camera_part_is_what_the_system_saw(film: Film) -> None:
+def test_the_camera_pane_shows_the_systems_image(film: Film) -> None:
     # Every fifth frame falls on a recorded pose; between two the pose is interpolated.
     for index, most in ((5, 0.01), (10, 0.01), (12, 3.0), (14, 3.0)):
         shown = film.pictures[index][CAMERA_PART].astype(int)
@@ -145,13 +145,13 @@ def test_the_uav_is_drawn_where_it_is_on_the_map(film: Film) -> None:
     assert math.dist(places.mean(axis=0), on_the_map(x, y)) < 3.0
 
 
-def test_who_stays_at_home_is_not_drawn(film: Film) -> None:
+def test_a_removed_npc_is_not_drawn(film: Film) -> None:
     assert len(painted(film.pictures[-1][MAP_PART], OBJECTS["dog"])) > 20
     assert len(painted(film.pictures[-1][MAP_PART], OBJECTS["person"])) > 20
     assert len(painted(film.pictures[-1][MAP_PART], OBJECTS["bird"])) == 0
 
 
-def test_what_the_system_believes_is_drawn_from_when_it_says_so(film: Film) -> None:
+def test_a_systems_beliefs_are_drawn_from_their_step_on(film: Film) -> None:
     silent, speaking = film.pictures[14], film.pictures[16]
     for part in (CAMERA_PART, MAP_PART):
         assert len(painted(silent[part], SYSTEM)) == 0
@@ -237,9 +237,7 @@ def test_poses_between_two_samples_are_interpolated(film: Film) -> None:
     assert path_until(uav, 0.5).tolist() == [[0.0, 0.0, 1.0], [1.0, 2.0, 1.0]]
 
 
-def test_the_file_is_what_browsers_play_at_the_flights_own_speed(
-    film: Film, tmp_path: Path
-) -> None:
+def test_browsers_play_the_file_at_the_flights_own_speed(film: Film, tmp_path: Path) -> None:
     path = tmp_path / "new" / "flight.mp4"
     save_video(path, film.flight, SCENARIO, LAWN, Hovers.airframe.camera, "II:lost:descent")
     assert list(path.parent.iterdir()) == [path]

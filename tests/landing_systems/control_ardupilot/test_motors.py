@@ -49,9 +49,7 @@ def test_roll_comes_before_yaw_but_yaw_keeps_its_headroom() -> None:
 @pytest.mark.parametrize("throttle", [-1.0, 0.0, 0.2, 0.7, 1.5])
 @pytest.mark.parametrize("roll", [-1.0, 0.0, 0.6])
 @pytest.mark.parametrize("yaw", [-1.0, 0.3])
-def test_no_motor_is_asked_for_what_it_cannot_give(
-    throttle: float, roll: float, yaw: float
-) -> None:
+def test_no_motor_gets_more_than_its_range(throttle: float, roll: float, yaw: float) -> None:
     for pitch in (-1.0, -0.2, 0.9):
         shares = mix(roll, pitch, yaw, throttle, best=0.3)
         assert min(shares) >= -1e-12

@@ -26,7 +26,7 @@ def weights(tmp_path: Path) -> Path:
     return path
 
 
-def test_what_is_written_is_read(weights: Path) -> None:
+def test_written_weights_are_read_back(weights: Path) -> None:
     read = read_weights(weights)
     assert (read.boxes.read_bytes(), read.ids.read_bytes()) == (b"network", b"another")
     assert read.calibration == (1.5, -0.5)

@@ -143,17 +143,17 @@ def ghost_after(seconds: float, stood_s: float, forget_after_s: float | None) ->
     return len(grid.obstacles_m()) > 0
 
 
-def test_what_nobody_looks_at_stays_as_upstream_unless_it_shall_be_forgotten() -> None:
+def test_unseen_cells_stay_occupied_as_upstream_unless_told_to_forget() -> None:
     assert ghost_after(60.0, 0.3, None)
     assert ghost_after(2.0, 0.3, 3.0)
     assert not ghost_after(4.0, 0.3, 3.0)
 
 
-def test_what_stood_still_is_not_forgotten() -> None:
+def test_a_still_obstacle_is_not_forgotten() -> None:
     assert ghost_after(60.0, 1.5, 3.0)
 
 
-def test_what_is_below_something_solid_is_occupied_if_so_set() -> None:
+def test_cells_below_an_obstacle_are_occupied_if_so_set() -> None:
     column = np.array([[0.1, 0.1, z] for z in (0.3, 1.5, 3.0, 3.4, 4.5)])
     for fill, expected in (
         (False, [False, False, True, True, False]),

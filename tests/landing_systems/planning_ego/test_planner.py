@@ -172,7 +172,7 @@ def test_it_flies_to_the_goal_and_waits_for_the_next() -> None:
     assert middle.error is None
 
 
-def test_it_descends_beside_what_it_has_seen_from_above() -> None:
+def test_it_descends_beside_an_obstacle_seen_from_above() -> None:
     boxes: list[Box] = [((-1.0, -1.0, 0.0), (0.5, 1.0, 4.0))]
     planner = EgoPlanner(PARAMETERS, CAMERA)
     above, low = (3.0, 0.0, 7.0), (-3.5, 0.0, 2.0)

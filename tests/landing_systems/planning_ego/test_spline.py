@@ -139,7 +139,7 @@ def test_gradient_of_feasibility(span: float) -> None:
     assert gradient_error(cost(POINTS), cost, POINTS) < 1e-6
 
 
-def test_what_is_slow_enough_costs_nothing() -> None:
+def test_a_slow_trajectory_costs_nothing() -> None:
     cost, gradient = costs.feasibility(POINTS, 50.0, PARAMETERS)
     assert cost == 0
     assert not gradient.any()

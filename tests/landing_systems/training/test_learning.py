@@ -115,7 +115,7 @@ def test_a_marker_cut_by_the_frame_is_answered_for_where_it_is_seen() -> None:
 
 
 @pytest.mark.parametrize(("hidden", "contrast"), [(0.7, 90.0), (0.0, 3.0)])
-def test_what_cannot_be_read_is_neither_marker_nor_ground(hidden: float, contrast: float) -> None:
+def test_an_unreadable_marker_is_neither_marker_nor_ground(hidden: float, contrast: float) -> None:
     doubtful = label(62, 66, 16, hidden=hidden, contrast=contrast)
     targets = targets_of(doubtful, WHOLE, 128, 128)
     assert len(targets.cells) == 0

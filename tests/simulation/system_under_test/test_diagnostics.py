@@ -28,7 +28,7 @@ def test_a_long_text_is_cut_and_says_so() -> None:
     assert command.diagnostics.note.endswith("n... (cut, 2000 characters)")
 
 
-def test_long_path_is_thinned_to_its_first_and_last_and_what_lies_between() -> None:
+def test_a_long_path_keeps_its_ends_and_points_between_them() -> None:
     for count in (0, 1, 99, 100, 101, 199, 1_000):
         path = tuple((float(index), 0.0, 0.0) for index in range(count))
         command = read_command(told(planned_path_m=path), Room())
