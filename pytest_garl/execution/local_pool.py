@@ -13,7 +13,7 @@ from pytest_garl.execution.flight import fly_job
 from pytest_garl.execution.job import load_scenario, loads, record_file
 from pytest_garl.execution.ledger_queue import Claim, WorkQueue
 from pytest_garl.execution.pool import Pool
-from pytest_garl.execution.process_pool import POLL_S, ProcessPool
+from pytest_garl.execution.process_pool import TURN_S, ProcessPool
 from pytest_garl.execution.slot import flight_name
 from pytest_garl.execution.worker_failure import WorkerExit, retry_or_record
 
@@ -36,7 +36,7 @@ class FlightWorkers:
 
     max_workers: int
     folders: tuple[str, ...] = ()
-    patience_s: float = 3.0
+    shutdown_s: float = 3.0
     on_exit: Callable[[WorkQueue, Claim, WorkerExit], None] = retry_or_record
     """Decides what the exit of a worker means for the slot that it flew."""
 
@@ -44,12 +44,12 @@ class FlightWorkers:
         """Return the module that a child runs, and its arguments."""
         return ["pytest_garl.execution.worker", str(ledger), *self.folders]
 
-    def handle_exit(self, queue: WorkQueue, pid: int, death: WorkerExit) -> bool:
+    def handle_exit(self, queue: WorkQueue, pid: int, ended: WorkerExit) -> bool:
         """Settle what a child had in flight; return whether it was flying at all."""
         claim = queue.claim_of(pid)
         if claim is None:
             return False
-        self.on_exit(queue, claim, death)
+        self.on_exit(queue, claim, ended)
         return True
 
 
@@ -64,7 +64,7 @@ class InProcessPool:
         claim = self._queue.claim(lease_s=None)
         if claim is None:
             self._queue.release_dead()
-            time.sleep(POLL_S)
+            time.sleep(TURN_S)
             return
         job = loads(claim.job)
         slot_id = flight_name(claim.search, claim.generation, claim.slot, job.map)

@@ -1,4 +1,4 @@
-"""A pool of worker processes: starts them, looks after them, and ends them."""
+"""A pool of worker processes: starts them, watches them, and ends them."""
 
 from __future__ import annotations
 
@@ -17,60 +17,61 @@ from typing import IO, Any, Protocol
 from pytest_garl import cpu_dispatch
 from pytest_garl.errors import LedgerError, PoolError
 from pytest_garl.execution.ledger_queue import WorkQueue
-from pytest_garl.execution.processes import read_report, report_file
+from pytest_garl.execution.processes import create_report_file, read_report
 from pytest_garl.execution.worker_failure import WorkerExit
 
-POLL_S = 0.02
-MOST_LOSSES = 3
-"""Children that may end, one after the other, before anything is flown: then the pool gives up."""
-COMPLAINT_BYTES = 2**16
-"""How much is read of what a child said on stderr: its end says why it died."""
+TURN_S = 0.02
+"""How long one turn of a pool waits for its workers."""
+MAX_IDLE_EXITS = 3
+"""If more workers than this end one after the other and nothing is flown, the pool gives up."""
+STDERR_BYTES = 2**16
+"""How much of a worker's stderr is read; its end says why the worker died."""
 
 
 class WorkerKind(Protocol):
-    """What the children of a pool are, and what the death of one means."""
+    """The kind of workers in a pool: what they run, and what follows if one ends."""
 
     @property
     def max_workers(self) -> int:
-        """How many there may be, with those of other pools on the ledger."""
+        """How many workers the ledger may have, those of other pools included."""
 
     @property
-    def patience_s(self) -> float:
-        """How long a child may take to end when it is asked to."""
+    def shutdown_s(self) -> float:
+        """How long a worker may take to end after it was asked to."""
 
     def command(self, ledger: Path) -> Sequence[str]:
-        """Return the module that a child runs, and its arguments."""
+        """Return the module that a worker runs, and its arguments."""
 
-    def handle_exit(self, queue: WorkQueue, pid: int, death: WorkerExit) -> bool:
-        """Settle what a child had in flight; return whether it was flying at all."""
+    def handle_exit(self, queue: WorkQueue, pid: int, ended: WorkerExit) -> bool:
+        """Decide on the slot that a worker had claimed; return whether it had claimed one."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class _Child:
+class _Worker:
     process: subprocess.Popen[bytes]
-    said: IO[bytes]
-    """Its stderr: a file, since a pipe that nobody reads blocks a child that says much."""
-    report: int
+    stderr: IO[bytes]
+    """A file: a pipe that nobody reads would block a worker that writes much."""
+    report_file: int
 
     def has_ended(self) -> bool:
-        """Return whether it has; then nothing of its session is left."""
+        """Return whether the process has ended; if so, end the rest of its session."""
         pid = self.process.pid
-        # Not by Popen.poll: that frees the id, and what is left of the session is ended by it.
+        # Popen.poll would free the id, by which the rest of the session is ended.
         if os.waitid(os.P_PID, pid, os.WEXITED | os.WNOHANG | os.WNOWAIT) is None:
             return False
         self._end_session()
         self.process.wait()
         return True
 
-    def ask_to_end(self) -> None:
-        """Ask it to end; Popen.terminate would free the id of one that has ended."""
+    def request_end(self) -> None:
+        """Ask the process to end; Popen.terminate would free the id of one that has ended."""
         os.kill(self.process.pid, signal.SIGTERM)
 
-    def end(self, patience_s: float) -> None:
-        """See that it ends, which it was asked to, and that nothing of its session is left."""
-        until = time.monotonic() + patience_s
+    def end(self, shutdown_s: float) -> None:
+        """Wait for a process that was asked to end, then kill what is left of its session."""
+        until = time.monotonic() + shutdown_s
         while time.monotonic() < until and not self.has_ended():
-            time.sleep(POLL_S / 4)
+            time.sleep(TURN_S / 4)
         if self.process.returncode is None:
             self._end_session()
             self.process.wait()
@@ -79,105 +80,104 @@ class _Child:
         with contextlib.suppress(ProcessLookupError):
             os.killpg(self.process.pid, signal.SIGKILL)
 
-    def reported(self) -> dict[str, Any]:
-        """Return what it, or its supervisor, reported when it ended."""
-        return read_report(self.report)
+    def report(self) -> dict[str, Any]:
+        """Return the last report of the process, or of its supervisor."""
+        return read_report(self.report_file)
 
-    def complaint(self) -> str:
-        """Return the last it said."""
-        size = self.said.seek(0, os.SEEK_END)
-        self.said.seek(max(0, size - COMPLAINT_BYTES))
-        return self.said.read().decode(errors="replace")
+    def last_stderr(self) -> str:
+        """Return the end of the process's stderr."""
+        size = self.stderr.seek(0, os.SEEK_END)
+        self.stderr.seek(max(0, size - STDERR_BYTES))
+        return self.stderr.read().decode(errors="replace")
 
     def close(self) -> None:
-        """Close its files."""
-        self.said.close()
-        os.close(self.report)
+        """Close the files."""
+        self.stderr.close()
+        os.close(self.report_file)
 
 
 class ProcessPool:
-    """The children of this process; several pools share a ledger and its limit of workers."""
+    """The workers that this process has started; several pools share a ledger and its limit."""
 
-    def __init__(self, queue: WorkQueue, crew: WorkerKind) -> None:
-        self._queue, self._crew = queue, crew
-        self._children: dict[int, _Child] = {}
-        self._losses = 0
+    def __init__(self, queue: WorkQueue, kind: WorkerKind) -> None:
+        self._queue, self._kind = queue, kind
+        self._workers: dict[int, _Worker] = {}
+        self._idle_exits = 0
         self._flown = 0.0
 
     def turn(self) -> None:
-        """Look after the children for a moment."""
-        for pid, child in list(self._children.items()):
-            if child.has_ended():
-                del self._children[pid]
-                self._handle_exit(pid, child)
+        """Handle the workers that have ended, start those that are missing, and wait a moment."""
+        for pid, worker in list(self._workers.items()):
+            if worker.has_ended():
+                del self._workers[pid]
+                self._handle_exit(pid, worker)
         self._queue.release_dead()
-        max_workers = self._crew.max_workers
-        while len(self._children) < max_workers and self._queue.register_worker(
-            max_workers, self._spawn
-        ):
+        most = self._kind.max_workers
+        while len(self._workers) < most and self._queue.register_worker(most, self._start):
             pass
-        time.sleep(POLL_S)
+        time.sleep(TURN_S)
 
     def close(self) -> None:
-        """End the children and give back what they had in flight."""
-        for child in self._children.values():
-            child.ask_to_end()
-        for pid, child in self._children.items():
-            child.end(self._crew.patience_s)
-            child.close()
+        """End the workers and give back their slots."""
+        for worker in self._workers.values():
+            worker.request_end()
+        for pid, worker in self._workers.items():
+            worker.end(self._kind.shutdown_s)
+            worker.close()
             with contextlib.suppress(LedgerError):
-                # What cannot be given back is given back when the run is resumed.
+                # If this fails, the slots are given back when the run is resumed.
                 self._queue.release(pid)
                 self._queue.unregister_worker(pid)
-        self._children.clear()
+        self._workers.clear()
 
-    def _spawn(self) -> int:
-        said = tempfile.TemporaryFile("a+b")  # noqa: SIM115 (closed when the child is gone)
-        report = report_file()
-        module, *arguments = self._crew.command(self._queue.path)
-        parent = [str(os.getpid()), str(report)]
+    def _start(self) -> int:
+        stderr = tempfile.TemporaryFile("a+b")  # noqa: SIM115 (closed when the worker has ended)
+        report_file = create_report_file()
+        module, *arguments = self._kind.command(self._queue.path)
+        parent = [str(os.getpid()), str(report_file)]
         process = subprocess.Popen(
             [sys.executable, "-m", module, *parent, *arguments],
             env={**os.environ, **cpu_dispatch.environment()},
             stdin=subprocess.DEVNULL,
             stdout=subprocess.DEVNULL,
-            stderr=said,
-            pass_fds=[report],
+            stderr=stderr,
+            pass_fds=[report_file],
             start_new_session=True,
         )
-        self._children[process.pid] = _Child(process=process, said=said, report=report)
+        worker = _Worker(process=process, stderr=stderr, report_file=report_file)
+        self._workers[process.pid] = worker
         return process.pid
 
-    def _handle_exit(self, pid: int, child: _Child) -> None:
-        """Decide what a child's end means."""
+    def _handle_exit(self, pid: int, worker: _Worker) -> None:
+        """Decide what follows from the end of a worker."""
         try:
-            facts, status = child.reported(), child.process.wait()
+            facts, status = worker.report(), worker.process.wait()
             if "cannot_go_on" in facts:
                 self._queue.release(pid)
                 raise PoolError(facts["cannot_go_on"].strip())
             failure = facts.get("failure")
-            death = WorkerExit(
+            ended = WorkerExit(
                 status=facts.get("status", status),
-                words=facts.get("words", ""),
-                complaint=facts.get("complaint") or child.complaint(),
+                stacks=facts.get("stacks", ""),
+                stderr=facts.get("stderr") or worker.last_stderr(),
                 hung=facts.get("hung", ""),
                 failure=(failure["error"], failure["message"], failure["traceback"])
                 if failure
                 else None,
                 watched=bool(facts),
             )
-            if not self._crew.handle_exit(self._queue, pid, death):
-                self._lose(death)
+            if not self._kind.handle_exit(self._queue, pid, ended):
+                self._count_idle_exit(ended)
         finally:
             self._queue.unregister_worker(pid)
-            child.close()
+            worker.close()
 
-    def _lose(self, death: WorkerExit) -> None:
-        """Give up if child after child ends without a flight; one may end between two flights."""
+    def _count_idle_exit(self, ended: WorkerExit) -> None:
+        """Give up if worker after worker ends without a flight; one may end between two flights."""
         flown = self._queue.flights()
         if flown > self._flown:
-            self._flown, self._losses = flown, 0
-        if death.status != 0 or not death.watched:
-            self._losses += 1
-        if self._losses > MOST_LOSSES:
-            raise PoolError(f"worker processes end before they fly:\n{death.complaint.strip()}")
+            self._flown, self._idle_exits = flown, 0
+        if ended.status != 0 or not ended.watched:
+            self._idle_exits += 1
+        if self._idle_exits > MAX_IDLE_EXITS:
+            raise PoolError(f"worker processes end before they fly:\n{ended.stderr.strip()}")

@@ -1,4 +1,4 @@
-"""Processes: whether others live, and how a child ends with its parent and tells it why."""
+"""Operating-system processes: which of them live, and how a child process is tied to its parent."""
 
 from __future__ import annotations
 
@@ -21,19 +21,19 @@ _PR_SET_CHILD_SUBREAPER = 36
 
 
 def alive(pid: int) -> bool:
-    """Return whether a process is there and has not ended."""
+    """Return whether a process exists and has not ended."""
     try:
         os.kill(pid, 0)
     except ProcessLookupError:
         return False
     except PermissionError:
         return True
-    # A dead process that nobody has asked about yet is no living one.
-    return _state(pid)[:1] != ["Z"]
+    # A zombie has ended; only its parent has not asked for its status yet.
+    return _stat(pid)[:1] != ["Z"]
 
 
-def named(text: str) -> bool:
-    """Return whether a process lives whose command line has this text in it."""
+def any_command_contains(text: str) -> bool:
+    """Return whether the command line of a living process contains this text."""
     for file in Path("/proc").glob("[0-9]*/cmdline"):
         with contextlib.suppress(OSError):
             if os.fsencode(text) in file.read_bytes():
@@ -42,15 +42,15 @@ def named(text: str) -> bool:
 
 
 def children_of(parent: int) -> Iterator[int]:
-    """Yield the processes whose parent is this one, ended ones that nobody asked about included."""
+    """Yield the ids of a process's children, zombies included."""
     for folder in Path("/proc").glob("[0-9]*"):
-        state = _state(int(folder.name))
-        if len(state) > 1 and int(state[1]) == parent:
+        stat = _stat(int(folder.name))
+        if len(stat) > 1 and int(stat[1]) == parent:
             yield int(folder.name)
 
 
-def _state(pid: int) -> list[str]:
-    """Return what the kernel says of a process: its state, its parent, and so on."""
+def _stat(pid: int) -> list[str]:
+    """Return the fields of /proc/PID/stat after the name: state, parent, and so on."""
     try:
         return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()
     except OSError:
@@ -59,74 +59,79 @@ def _state(pid: int) -> list[str]:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Parent:
-    """The process that started this one, and the file in which it is told how this one ended.
+    """The process that started this one, and the file for this one's last report to it.
 
-    The file has no name and nobody else writes it: what a landing system prints is never taken for
-    a report.
+    The file has no name and no other process writes it, so the output of a landing system is never
+    taken for a report.
     """
 
     pid: int
-    report: int
+    file: int
 
     @classmethod
     def of_this_process(cls) -> Parent:
-        """Return the parent that started this process with its first two arguments."""
-        pid, report = sys.argv[1:3]
-        return cls(pid=int(pid), report=int(report))
+        """Return the parent whose id and file are the first two arguments of this process."""
+        pid, file = sys.argv[1:3]
+        return cls(pid=int(pid), file=int(file))
 
     def lives(self) -> bool:
-        """Return whether it is still there."""
+        """Return whether the parent still exists."""
         return os.getppid() == self.pid
 
-    def tell(self, **facts: Any) -> None:
-        """Leave a report, in the place of an earlier one."""
-        os.ftruncate(self.report, 0)
-        os.pwrite(self.report, json.dumps(facts).encode(), 0)
+    def report(self, **facts: Any) -> None:
+        """Write a report; it replaces an earlier one."""
+        os.ftruncate(self.file, 0)
+        os.pwrite(self.file, json.dumps(facts).encode(), 0)
 
 
-def report_file() -> int:
-    """Return the descriptor of a file in memory for the report of a child."""
+def create_report_file() -> int:
+    """Return the descriptor of a file in memory for the report of a child process."""
     return os.memfd_create("garl-report")
 
 
 def read_report(file: int) -> dict[str, Any]:
-    """Return what a child that has ended reported: nothing if it was killed."""
+    """Return the report of a child process that has ended; empty if it was killed."""
     text = os.pread(file, os.fstat(file).st_size, 0)
     facts: dict[str, Any] = json.loads(text) if text else {}
     return facts
 
 
-def end_with(parent: int, number: int = signal.SIGTERM) -> None:
-    """Tie this process to its parent's life, by a signal, and not to Ctrl-C."""
+def end_with_parent(parent: int, number: int = signal.SIGTERM) -> None:
+    """Have the kernel send this process a signal when its parent ends."""
     ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, number)
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
     if os.getppid() != parent:
-        # It ended before the kernel was told to say so.
+        # The parent ended before the call of prctl.
         os._exit(1)
 
 
+def ignore_ctrl_c() -> None:
+    """Ignore SIGINT, which a terminal sends to all processes: the parent ends this one in order."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+
+
 def adopt_orphans() -> None:
-    """Become the parent of all below this process whose own parent ends, in whatever session."""
+    """Become the parent of all processes below this one whose own parent ends, in any session."""
     ctypes.CDLL(None).prctl(_PR_SET_CHILD_SUBREAPER, 1)
 
 
-def run_worker(main: Callable[..., None], failing: str) -> None:
-    """Run what a child is for, with its parent and its arguments; tell why it cannot go on.
+def run_worker(main: Callable[..., None], component: str) -> None:
+    """Run ``main`` with the parent and the other arguments; report an error to the parent.
 
-    ``failing`` says what it is that failed where an error was not raised on purpose.
+    ``component`` names what failed if the error is not one of pytest-garl's own.
     """
     parent = Parent.of_this_process()
-    end_with(parent.pid)
+    ignore_ctrl_c()
+    end_with_parent(parent.pid)
     try:
         main(parent, *sys.argv[3:])
-    except Exception as error:  # noqa: BLE001 (told to the pool, which raises it)
-        parent.tell(cannot_go_on=reason(error, failing))
+    except Exception as error:  # noqa: BLE001 (the pool raises it)
+        parent.report(cannot_go_on=failure_text(error, component))
         sys.exit(1)
 
 
-def reason(error: Exception, failing: str) -> str:
-    """Return why a process cannot go on: neither can another in its place."""
+def failure_text(error: Exception, component: str) -> str:
+    """Return the text of an error that would occur in any other worker as well."""
     if isinstance(error, GarlError):
         return str(error)
     text = "".join(traceback.format_exception(error))
-    return f"{failing} failed in a worker process:\n{text}"
+    return f"{component} failed in a worker process:\n{text}"

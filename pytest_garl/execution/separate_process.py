@@ -16,7 +16,7 @@ from typing import Any
 
 from pytest_garl import cpu_dispatch
 from pytest_garl.errors import GarlError, LandingSystemError
-from pytest_garl.execution.processes import end_with
+from pytest_garl.execution.processes import end_with_parent, ignore_ctrl_c
 from pytest_garl.execution.reference import Reference, reference_to
 
 
@@ -56,7 +56,8 @@ def ask_apart(function: str, system: type, options: Mapping[str, Any]) -> dict[s
 
 def main(parent: str, question: str, answer: str) -> None:
     """Answer a question that stands in one file, in another, while the parent lives."""
-    end_with(int(parent), signal.SIGKILL)
+    ignore_ctrl_c()
+    end_with_parent(int(parent), signal.SIGKILL)
     asked = json.loads(Path(question).read_text())
     sys.path.extend(entry for entry in asked["path"] if entry not in sys.path)
     module, _, name = asked["function"].partition(":")

@@ -1,10 +1,9 @@
-"""The process between a pool and a flying one: watches it, ends it, and tells how it ended.
+"""The supervisor of a flying process: enforces its time limits and reports how it ended.
 
-The flying process runs the landing system's code and can be trusted with nothing: it may hold the
-interpreter for ever, close its files, replace ``time.time`` or be killed.  So its limits are
-watched, and its end is told, by a process that has never run a line of the landing system: the
-flying process is forked from it.  The two share a page of memory.  The supervisor also inherits
-whatever the landing system leaves behind, and ends it.
+A worker is two processes.  The flying process runs the landing system's code, which may hold the
+interpreter for ever, close files, replace ``time.time`` or be killed.  The supervisor never runs a
+line of that code: it forks the flying process, shares one page of memory with it, ends it if it
+hangs, and ends all processes that the landing system leaves behind.
 """
 
 from __future__ import annotations
@@ -29,23 +28,26 @@ from pytest_garl.execution.processes import (
     Parent,
     adopt_orphans,
     children_of,
-    end_with,
-    reason,
+    end_with_parent,
+    failure_text,
+    ignore_ctrl_c,
 )
 
-POLL_MS = 50
-SAID_BYTES = 2**14
-"""How much is kept of what a flying process said on stderr: its end says why it died."""
+STDERR_WAIT_MS = 50
+"""How long the supervisor waits for stderr before it looks at the limits again."""
+STDERR_BYTES = 2**14
+"""How much of a flying process's stderr is kept; its end says why the process died."""
 STANDSTILL = 12
-"""A flight in which the landing system is not called for so many limits of a call stands still: a
-thread holds the interpreter, or an import does not come back.  The simulator's own work between two
+"""If the landing system is not called for so many limits of a call, the flight stands still: a
+thread holds the interpreter, or an import does not return.  The simulator's own work between two
 calls takes a second at most."""
 LEAST_STANDSTILL_S = 120.0
-TURN = 16
-"""How many pieces of what is said on stderr are read before the limits are looked at again."""
+STDERR_READS = 16
+"""How many pieces of stderr are read before the limits are looked at again."""
 DUMP_S = 2.0
-"""How long a process that hangs may take to say where."""
+"""How long a process that hangs may take to dump its stacks."""
 ENDING_S = 5.0
+"""How long the supervisor tries to end the processes below it."""
 _DUMP = signal.SIGRTMAX
 _STDERR = 2
 _BEGAN, _LIMIT, _MOVED, _ENDING, _LENGTH = range(5)
@@ -53,44 +55,44 @@ _TEXT = 64
 _MEMORY_BYTES = 2**16
 
 
-class Watch:
-    """What a flying process notes, in memory that its supervisor reads.
+class FlightMonitor:
+    """What a flying process notes in memory that its supervisor reads.
 
-    To note the begin and the end of a call takes less than a microsecond: a flight control is
-    called 240 times a second.  Only the landing system's own calls count; what the simulator does
-    between them is its own affair, unless nothing goes on at all.
+    Noting the begin and the end of a call takes less than a microsecond, since the flight control
+    calls 240 times a second.  The limit applies to the landing system's calls alone; the
+    simulator's work between them counts only if the whole flight stands still.
     """
 
     def __init__(self) -> None:
         self._memory = mmap.mmap(-1, _MEMORY_BYTES)
         self._numbers = memoryview(self._memory)[:_TEXT].cast("d")
         self.mark = f"\n{secrets.token_hex(16)}\n".encode()
-        """Written to stderr where a flight begins: earlier ones explain nothing about its end."""
+        """Written to stderr when a flight begins: only later output explains how it ended."""
 
     def step_begins(self) -> None:
         """Note that the landing system is called."""
         self._numbers[_BEGAN] = monotonic()
 
     def step_ends(self) -> None:
-        """Note that it came back."""
+        """Note that the call returned."""
         self._numbers[_MOVED] = monotonic()
         self._numbers[_BEGAN] = 0.0
 
     def flight_begins(self, limit_s: float) -> None:
-        """Have calls watched that take longer than the limit."""
+        """Note that a flight begins, and the limit of its calls."""
         with contextlib.suppress(OSError):
             os.write(_STDERR, self.mark)
         self._numbers[_MOVED] = monotonic()
         self._numbers[_LIMIT] = limit_s
 
     def flight_ends(self) -> None:
-        """Have nothing watched; do not come back if the supervisor ends this process already."""
+        """Note that no limit applies; wait for ever if the supervisor is ending this process."""
         self._numbers[_LIMIT] = self._numbers[_BEGAN] = 0.0
         while self._numbers[_ENDING]:
             sleep(1)
 
     def overdue(self) -> str:
-        """Return what takes too long, as the beginning of a sentence, or nothing."""
+        """Return what takes too long as the beginning of a sentence; empty if nothing does."""
         began, limit_s, moved = self._numbers[: _MOVED + 1]
         if not limit_s:
             return ""
@@ -101,12 +103,12 @@ class Watch:
         late = monotonic() > moved + still_s
         return f"neither it nor the simulator went on for {still_s:g} s" if late else ""
 
-    def is_ended(self) -> None:
-        """Note that the flying process will be ended: it shall record nothing any more."""
+    def note_ending(self) -> None:
+        """Note that the flying process is being ended, so that it records nothing more."""
         self._numbers[_ENDING] = 1.0
 
-    def tell(self, **facts: Any) -> None:
-        """Leave a message to the supervisor, shortened to what there is room for."""
+    def report(self, **facts: Any) -> None:
+        """Leave a message to the supervisor; long values are shortened to the room there is."""
         room = _MEMORY_BYTES - _TEXT
         text = json.dumps(facts).encode()
         if len(text) > room:
@@ -115,145 +117,151 @@ class Watch:
         self._memory[_TEXT : _TEXT + len(text)] = text
         self._numbers[_LENGTH] = len(text)
 
-    def told(self) -> dict[str, Any]:
-        """Return the message."""
+    def reported(self) -> dict[str, Any]:
+        """Return the message; empty if there is none."""
         length = int(self._numbers[_LENGTH])
         facts: dict[str, Any] = json.loads(self._memory[_TEXT : _TEXT + length]) if length else {}
         return facts
 
 
-def supervise(parent: Parent, fly: Callable[[Watch], None], failing: str) -> NoReturn:
-    """Run ``fly`` in a process of its own; tell the parent how it ended, and leave nothing running.
+def supervise(parent: Parent, fly: Callable[[FlightMonitor], None], component: str) -> NoReturn:
+    """Run ``fly`` in a process of its own; report to the parent how it ended, and end the rest.
 
-    ``failing`` says what it is that failed where ``fly`` raises an error that is not on purpose.
+    ``component`` names what failed if ``fly`` raises an error that is not one of pytest-garl's own.
     """
-    watch = Watch()
+    monitor = FlightMonitor()
     reading, writing = os.pipe()
     adopt_orphans()
     me = getpid()
     flying = os.fork()
     if not flying:
         os.close(reading)
-        os.close(parent.report)
+        os.close(parent.file)
         os.dup2(writing, _STDERR)
         os.close(writing)
-        _fly(me, watch, fly, failing)
+        _fly(me, monitor, fly, component)
     os.close(writing)
-    _Supervisor(parent, watch, flying, reading).run()
+    _Supervisor(parent, monitor, flying, reading).run()
 
 
-def _fly(supervisor: int, watch: Watch, fly: Callable[[Watch], None], failing: str) -> NoReturn:
-    """Be the flying process: it ends here, whatever the landing system does or leaves."""
+def _fly(
+    supervisor: int,
+    monitor: FlightMonitor,
+    fly: Callable[[FlightMonitor], None],
+    component: str,
+) -> NoReturn:
+    """Run the flying process; it ends here, whatever the landing system does or leaves behind."""
     status = 1
     try:
-        end_with(supervisor, signal.SIGKILL)
+        ignore_ctrl_c()
+        end_with_parent(supervisor, signal.SIGKILL)
         adopt_orphans()
         with contextlib.suppress(OSError):
-            # Short of memory the kernel shall end the flight, and neither pytest nor a neighbour.
+            # If memory is short, the kernel shall end the flight first, not pytest.
             Path("/proc/self/oom_score_adj").write_text("1000")
         faulthandler.enable()
         faulthandler.register(_DUMP, all_threads=True)
-        fly(watch)
+        fly(monitor)
         status = 0
     except SystemExit as error:
         if isinstance(error.code, str):
             os.write(_STDERR, error.code.encode())
         status = error.code if isinstance(error.code, int) else int(error.code is not None)
-    except Exception as error:  # noqa: BLE001 (told to the pool, which raises it)
-        watch.tell(cannot_go_on=reason(error, failing))
-    except BaseException:  # noqa: BLE001 (such as a KeyboardInterrupt of the landing system's own)
+    except Exception as error:  # noqa: BLE001 (the pool raises it)
+        monitor.report(cannot_go_on=failure_text(error, component))
+    except BaseException:  # noqa: BLE001 (such as a landing system's own KeyboardInterrupt)
         traceback.print_exc(file=sys.stderr)
     finally:
-        # Not by sys.exit: the interpreter would wait for threads that a landing system left.
+        # Not by sys.exit: the interpreter would wait for threads of the landing system.
         _exit(status & 0xFF)
 
 
-class _ToldToEndError(BaseException):
-    """Raised where the parent asks this process to end, or is gone."""
+class _EndRequestedError(BaseException):
+    """Raised if the parent asks this process to end, or has ended."""
 
 
 class _Supervisor:
-    def __init__(self, parent: Parent, watch: Watch, flying: int, stderr: int) -> None:
-        self._parent, self._watch, self._flying = parent, watch, flying
+    def __init__(self, parent: Parent, monitor: FlightMonitor, flying: int, stderr: int) -> None:
+        self._parent, self._monitor, self._flying = parent, monitor, flying
         self._stderr = stderr
         self._poll = select.poll()
         self._poll.register(stderr, select.POLLIN)
-        self._listens = True
-        self._said = b""
-        self._words = b""
+        self._is_open = True
+        self._text = b""
+        self._stacks = b""
         self._hung = ""
 
     def run(self) -> NoReturn:
-        """Watch until the flying process has ended or the parent wants it to."""
+        """Supervise until the flying process has ended or the parent asks for the end."""
         try:
-            signal.signal(signal.SIGTERM, _end)
-            status = self._ended()
+            signal.signal(signal.SIGTERM, _request_end)
+            status = self._wait()
             signal.signal(signal.SIGTERM, signal.SIG_IGN)
-            self._listen(0)
+            self._read_stderr(0)
             end_descendants()
-            self._parent.tell(
+            self._parent.report(
                 status=status,
                 hung=self._hung,
-                words=self._words.decode(errors="replace"),
-                complaint=self._said.decode(errors="replace"),
-                **self._watch.told(),
+                stacks=self._stacks.decode(errors="replace"),
+                stderr=self._text.decode(errors="replace"),
+                **self._monitor.reported(),
             )
-        except _ToldToEndError:
+        except _EndRequestedError:
             signal.signal(signal.SIGTERM, signal.SIG_IGN)
             end_descendants()
         finally:
             _exit(0)
 
-    def _ended(self) -> int:
-        """Return the status of the flying process when it has ended; a signal's is negative."""
+    def _wait(self) -> int:
+        """Wait for the flying process to end; return its exit status, a signal's as negative."""
         while True:
             pid, status = os.waitpid(self._flying, os.WNOHANG)
             if pid:
                 return os.waitstatus_to_exitcode(status)
             if not self._parent.lives():
-                raise _ToldToEndError
-            self._hung = self._hung or self._watch.overdue()
+                raise _EndRequestedError
+            self._hung = self._hung or self._monitor.overdue()
             if self._hung:
-                self._stop()
-            self._listen(POLL_MS)
+                self._kill()
+            self._read_stderr(STDERR_WAIT_MS)
 
-    def _stop(self) -> None:
-        """End a process that hangs, after it has said where."""
-        self._watch.is_ended()
-        before, self._said = self._said, b""
+    def _kill(self) -> None:
+        """Have a process that hangs dump its stacks, then kill it."""
+        self._monitor.note_ending()
+        before, self._text = self._text, b""
         os.kill(self._flying, _DUMP)
         until = monotonic() + DUMP_S
-        while monotonic() < until and (self._listen(POLL_MS) or not self._said):
+        while monotonic() < until and (self._read_stderr(STDERR_WAIT_MS) or not self._text):
             pass
-        self._words, self._said = self._said, before
+        self._stacks, self._text = self._text, before
         os.kill(self._flying, signal.SIGKILL)
 
-    def _listen(self, patience_ms: int) -> bool:
-        """Read what was said on stderr; return whether there was any."""
-        heard = False
-        # Who never stops talking is not listened to for ever.
-        for _ in range(TURN):
-            if not self._listens or not self._poll.poll(patience_ms):
+    def _read_stderr(self, wait_ms: int) -> bool:
+        """Read what there is on stderr; return whether there was anything."""
+        found = False
+        # A process that writes without end must not keep the supervisor from the limits.
+        for _ in range(STDERR_READS):
+            if not self._is_open or not self._poll.poll(wait_ms):
                 break
             data = os.read(self._stderr, 2**16)
             if not data:
                 self._poll.unregister(self._stderr)
-                self._listens = False
+                self._is_open = False
                 break
-            heard, patience_ms = True, 0
-            said = (self._said + data).rpartition(self._watch.mark)[2]
-            self._said = said[-SAID_BYTES - len(self._watch.mark) :]
-        if not self._listens and not heard:
-            sleep(patience_ms / 1000)
-        return heard
+            found, wait_ms = True, 0
+            text = (self._text + data).rpartition(self._monitor.mark)[2]
+            self._text = text[-STDERR_BYTES - len(self._monitor.mark) :]
+        if not self._is_open and not found:
+            sleep(wait_ms / 1000)
+        return found
 
 
-def _end(number: int, frame: object) -> NoReturn:
-    raise _ToldToEndError
+def _request_end(number: int, frame: object) -> NoReturn:
+    raise _EndRequestedError
 
 
 def end_descendants() -> None:
-    """End all processes below this one, in whatever session; those of ended ones come to it."""
+    """Kill all processes below this one, in any session; orphans among them come to this one."""
     until = monotonic() + ENDING_S
     while monotonic() < until:
         for pid in children_of(getpid()):

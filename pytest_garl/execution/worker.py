@@ -16,7 +16,7 @@ from pytest_garl.execution.ledger_queue import Claim, WorkQueue
 from pytest_garl.execution.processes import Parent, run_worker
 from pytest_garl.execution.result import FlightResult
 from pytest_garl.execution.slot import flight_name
-from pytest_garl.execution.supervisor import Watch, supervise
+from pytest_garl.execution.supervisor import FlightMonitor, supervise
 from pytest_garl.simulation.system_under_test.texts import (
     MESSAGE_CHARS,
     TRACEBACK_CHARS,
@@ -37,10 +37,10 @@ def main(parent: Parent, path: str, *checkouts: str) -> None:
     """Fly until the parent process is gone; with checkouts, see only the first of them."""
     owner = getpid()
 
-    def fly(watch: Watch) -> None:
+    def fly(monitor: FlightMonitor) -> None:
         if checkouts:
             isolate_imports(checkouts)
-        Flyer(Path(path), owner, watch).run()
+        Flyer(Path(path), owner, monitor).run()
 
     supervise(parent, fly, SIMULATOR)
 
@@ -53,8 +53,8 @@ class Flyer:
     leaves to happen later, must bend the flights of no other.
     """
 
-    def __init__(self, path: Path, owner: int, watch: Watch) -> None:
-        self._path, self._owner, self._watch = path, owner, watch
+    def __init__(self, path: Path, owner: int, monitor: FlightMonitor) -> None:
+        self._path, self._owner, self._monitor = path, owner, monitor
         self._me = getpid()
         self._system = ""
         self._idle_s = 0.0
@@ -77,7 +77,7 @@ class Flyer:
             except Exception as error:
                 if _cannot_go_on(error) and not state.limited():
                     raise
-                self._watch.tell(failure=_described(error))
+                self._monitor.report(failure=_described(error))
                 break
             if state.changed():
                 break
@@ -124,8 +124,8 @@ class Flyer:
             self._prove_simulator(claim)
         try:
             record_file(job, claim).unlink(missing_ok=True)
-            self._watch.flight_begins(limit_s)
-            return fly_job(job, scenario, name, self._watch)
+            self._monitor.flight_begins(limit_s)
+            return fly_job(job, scenario, name, self._monitor)
         except OSError as error:
             # The landing system's own are part of its flight; this one is of the record.
             raise LedgerError(f"{job.flights}: {error.strerror or error}") from error
@@ -133,7 +133,7 @@ class Flyer:
             if getpid() != self._me:
                 # The landing system has forked: only one of the two flies on.
                 _exit(0)
-            self._watch.flight_ends()
+            self._monitor.flight_ends()
 
     def _prove_simulator(self, claim: Claim) -> None:
         """Fly what failed with the reference pilot; raise GarlError if that fails as well."""

@@ -24,16 +24,16 @@ ATTEMPTS = 3
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class WorkerExit:
-    """How a flying process ended: its exit status (a signal's negative), its last words.
+    """How a flying process ended: its exit status (a signal's negative), its last stacks.
 
-    ``hung`` says what took too long, as the beginning of a sentence; ``words`` where that was;
-    ``complaint`` is what was said on stderr; ``failure`` is the error of the simulator, with type,
+    ``hung`` says what took too long, as the beginning of a sentence; ``stacks`` where that was;
+    ``stderr`` is what was said on stderr; ``failure`` is the error of the simulator, with type,
     message and traceback; ``watched`` is false where its supervisor did not live to tell.
     """
 
     status: int
-    words: str = ""
-    complaint: str = ""
+    stacks: str = ""
+    stderr: str = ""
     hung: str = ""
     failure: tuple[str, str, str] | None = None
     watched: bool = True
@@ -48,22 +48,22 @@ class WorkerExit:
         return "killed" if self.status == -signal.SIGKILL or not self.watched else "died"
 
 
-def retry_or_record(queue: WorkQueue, claim: Claim, death: WorkerExit) -> None:
-    """Decide what a death means for the slot that was in flight."""
+def retry_or_record(queue: WorkQueue, claim: Claim, ended: WorkerExit) -> None:
+    """Decide what a ended means for the slot that was in flight."""
     earlier = claim.after.split()
-    if death.cause == "died" or death.cause in earlier or len(earlier) + 1 == ATTEMPTS:
-        again = death.cause in earlier
-        undecided = death.cause != "died" and not again
-        queue.record(claim, _result(claim, death, again, undecided), "", 0.0)
+    if ended.cause == "died" or ended.cause in earlier or len(earlier) + 1 == ATTEMPTS:
+        again = ended.cause in earlier
+        undecided = ended.cause != "died" and not again
+        queue.record(claim, _result(claim, ended, again, undecided), "", 0.0)
     else:
-        queue.fly_alone(claim, " ".join([*earlier, death.cause]))
+        queue.fly_alone(claim, " ".join([*earlier, ended.cause]))
         queue.count("retried")
 
 
-def _result(claim: Claim, death: WorkerExit, again: bool, undecided: bool) -> FlightResult:
+def _result(claim: Claim, ended: WorkerExit, again: bool, undecided: bool) -> FlightResult:
     job = loads(claim.job)
     diagonal = load_map(job.map, tuple(Path(folder) for folder in job.map_folders)).diagonal_m
-    crash = _crash(death)
+    crash = _crash(ended)
     if undecided:
         how = f"each of {ATTEMPTS} flights ended its process in a different way"
         crash = replace(crash, message=f"{how}, at last: {crash.message}")
@@ -72,21 +72,21 @@ def _result(claim: Claim, death: WorkerExit, again: bool, undecided: bool) -> Fl
     return broken_result(crash, diagonal, inconclusive=undecided)
 
 
-def _crash(death: WorkerExit) -> Crash:
+def _crash(ended: WorkerExit) -> Crash:
     """Return what ended a flight."""
-    if death.hung:
+    if ended.hung:
         return Crash(
-            kind="hung", error="Timeout", message=death.hung, where="", traceback=death.words
+            kind="hung", error="Timeout", message=ended.hung, where="", traceback=ended.stacks
         )
-    if death.failure:
-        error, message, text = death.failure
+    if ended.failure:
+        error, message, text = ended.failure
         message = f"the simulator, which flies the reference pilot, failed with {error}: {message}"
         return Crash(kind="broke", error=error, message=message, where="", traceback=text)
-    how = f"signal {-death.status}" if death.status < 0 else f"exit status {death.status}"
+    how = f"signal {-ended.status}" if ended.status < 0 else f"exit status {ended.status}"
     return Crash(
         kind="died",
         error=how.replace(" ", "-"),
         message=f"its process ended with {how}",
         where="",
-        traceback=death.complaint,
+        traceback=ended.stderr,
     )

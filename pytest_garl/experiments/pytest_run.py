@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import ctypes
 import functools
 import os
 import signal
@@ -17,13 +16,14 @@ from typing import IO
 from pytest_garl.errors import LedgerError
 from pytest_garl.execution.ledger import Ledger
 from pytest_garl.execution.ledger_queries import SearchProgress
+from pytest_garl.execution.processes import end_with_parent
 from pytest_garl.experiments.results import ExperimentError
 from pytest_garl.experiments.spec import Run
 
-POLL_S = 0.5
+PROGRESS_EVERY_S = 0.5
+"""Time between two looks at the ledger of a running session."""
 LAST_LINES = 15
 """So much of a failed session's output is shown."""
-_PR_SET_PDEATHSIG = 1
 _SEARCHED = (0, 1)
 """Exit statuses of a session that went to its end: violations are failing tests."""
 
@@ -42,7 +42,7 @@ def search(
         while session.poll() is None:
             tick(_progress(ledger))
             with contextlib.suppress(subprocess.TimeoutExpired):
-                session.wait(POLL_S)
+                session.wait(PROGRESS_EVERY_S)
     if session.returncode not in _SEARCHED:
         lines = log.read_text(errors="replace").strip().splitlines()
         raise ExperimentError(
@@ -89,7 +89,7 @@ def _session(command: Sequence[str], output: IO[bytes]) -> Iterator[subprocess.P
         stderr=subprocess.STDOUT,
         # Ctrl-C is passed on once, below, and not by the terminal as well.
         start_new_session=True,
-        preexec_fn=functools.partial(_end_with, os.getpid()),
+        preexec_fn=functools.partial(end_with_parent, os.getpid()),
     )
     try:
         yield session
@@ -101,13 +101,6 @@ def _session(command: Sequence[str], output: IO[bytes]) -> Iterator[subprocess.P
         if session.poll() is None:
             session.kill()
             session.wait()
-
-
-def _end_with(parent: int) -> None:
-    ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGTERM)
-    if os.getppid() != parent:
-        # It ended before the kernel was told to say so.
-        os._exit(1)
 
 
 def _begun(ledger: Path) -> bool:

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from pytest_garl.execution.processes import named
+from pytest_garl.execution.processes import any_command_contains
 from pytest_garl.regressions.corpus import Corpus
 from tests.cli.test_cases import broken_lander
 
@@ -50,6 +50,6 @@ def test_a_cancelled_command_leaves_no_folder_and_no_process(tmp_path: Path, num
         told = process.communicate(timeout=PATIENCE_S)[0].decode()
     assert process.returncode == (143 if number == signal.SIGTERM else 1), told
     assert list(scratch.glob("garl-*")) == []
-    while named(str(scratch)) and time.monotonic() < until:
+    while any_command_contains(str(scratch)) and time.monotonic() < until:
         time.sleep(0.02)
-    assert not named(str(scratch))
+    assert not any_command_contains(str(scratch))

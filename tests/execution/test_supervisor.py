@@ -17,11 +17,11 @@ from pytest_garl.execution.job import dump_scenario
 from pytest_garl.execution.ledger import Ledger
 from pytest_garl.execution.local_pool import FlightWorkers
 from pytest_garl.execution.pool import wait_for
-from pytest_garl.execution.process_pool import MOST_LOSSES, ProcessPool
+from pytest_garl.execution.process_pool import MAX_IDLE_EXITS, ProcessPool
 from pytest_garl.execution.reference import reference_to
 from pytest_garl.execution.result import FlightResult
 from pytest_garl.execution.slot import Slot, flight_name
-from pytest_garl.execution.supervisor import LEAST_STANDSTILL_S, Watch
+from pytest_garl.execution.supervisor import LEAST_STANDSTILL_S, FlightMonitor
 from pytest_garl.simulation.flight import Crash
 from tests.execution.flying import Exits, Good, Slow, job_of, scenario
 from tests.execution.misbehaving import (
@@ -64,12 +64,12 @@ def crash_of(flown: Flown) -> Crash:
 
 
 class Field:
-    """A ledger and a pool of one child: what one flight leaves, the next one meets."""
+    """A ledger and a pool of one worker: what one flight leaves, the next one meets."""
 
     def __init__(self, folder: Path) -> None:
         self.folder = folder
         self.ledger = Ledger.create(folder / "ledger.sqlite", {})
-        self.pool = ProcessPool(self.ledger.queue, FlightWorkers(max_workers=1, patience_s=60.0))
+        self.pool = ProcessPool(self.ledger.queue, FlightWorkers(max_workers=1, shutdown_s=60.0))
 
     def fly(self, system: type, timeout_s: float = 20.0, simulator: Any = None) -> Flown:
         """Fly a system and then a good one."""
@@ -222,34 +222,34 @@ def test_a_simulator_that_fails_in_one_flight_alone_is_proved_by_the_reference_p
     assert message.startswith("the simulator, which flies the reference pilot, failed with TypeE")
 
 
-def test_children_end_when_asked_whatever_flew_in_them(tmp_path: Path) -> None:
+def test_workers_end_on_request_after_any_flight(tmp_path: Path) -> None:
     field = Field(tmp_path)
     field.fly(WillNotEnd)
-    children = [child.process for child in field.pool._children.values()]
+    workers = [worker.process for worker in field.pool._workers.values()]
     field.pool.close()
     # Nobody had to kill it.
-    assert [child.returncode for child in children] == [0]
+    assert [worker.returncode for worker in workers] == [0]
     field.ledger.close()
 
 
-def test_children_that_end_between_flights_end_no_run(field: Field) -> None:
+def test_workers_that_end_between_flights_do_not_end_the_run(field: Field) -> None:
     job = job_of(Good, field.folder / "flights")
     field.ledger.add_search("one", job.system.name, "lawn", 9, job.dumps())
-    for index in range(MOST_LOSSES + 2):
+    for index in range(MAX_IDLE_EXITS + 2):
         field.ledger.add_slots("one", index, {0: dump_scenario(scenario())})
         slot = Slot(generation=index, index=0)
         wait_for(field.ledger, field.pool, "one", slot, lambda: None)
-        (child,) = field.pool._children
-        os.kill(child, signal.SIGKILL)
-        while child in field.pool._children:
+        (worker,) = field.pool._workers
+        os.kill(worker, signal.SIGKILL)
+        while worker in field.pool._workers:
             field.pool.turn()
-    assert field.ledger.queries.meters()["flights"] == MOST_LOSSES + 2
+    assert field.ledger.queries.meters()["flights"] == MAX_IDLE_EXITS + 2
 
 
-def test_children_that_end_before_they_fly_end_the_run(field: Field) -> None:
+def test_workers_that_end_before_they_fly_end_the_run(field: Field) -> None:
     def kill_all() -> None:
-        for child in field.pool._children:
-            os.kill(child, signal.SIGKILL)
+        for worker in field.pool._workers:
+            os.kill(worker, signal.SIGKILL)
 
     field.ledger.add_search("one", "s", "lawn", 1, "{}")
     with pytest.raises(PoolError, match="worker processes end before they fly"):
@@ -266,13 +266,13 @@ def test_nothing_is_left_beside_the_ledger(tmp_path: Path) -> None:
 
 def test_a_process_that_nothing_changed_flies_on(field: Field) -> None:
     field.fly(Good)
-    (first,) = field.pool._children
+    (first,) = field.pool._workers
     job = job_of(Good, field.folder)
     field.ledger.add_search("more", job.system.name, "lawn", 4, job.dumps())
     field.ledger.add_slots("more", 2, {index: dump_scenario(scenario()) for index in range(4)})
     for index in range(4):
         wait_for(field.ledger, field.pool, "more", Slot(generation=2, index=index), lambda: None)
-    assert list(field.pool._children) == [first]
+    assert list(field.pool._workers) == [first]
 
 
 def test_only_a_call_is_charged_until_nothing_goes_on_at_all(
@@ -281,23 +281,23 @@ def test_only_a_call_is_charged_until_nothing_goes_on_at_all(
     now = 1000.0
     monkeypatch.setattr("pytest_garl.execution.supervisor.monotonic", lambda: now)
     monkeypatch.setattr("pytest_garl.execution.supervisor.os.write", lambda *_: 0)
-    watch = Watch()
-    assert watch.overdue() == ""
-    watch.flight_begins(2.0)
+    monitor = FlightMonitor()
+    assert monitor.overdue() == ""
+    monitor.flight_begins(2.0)
     now += 60.0
-    assert watch.overdue() == ""
-    watch.step_begins()
+    assert monitor.overdue() == ""
+    monitor.step_begins()
     now += 1.9
-    assert watch.overdue() == ""
+    assert monitor.overdue() == ""
     now += 0.2
-    assert watch.overdue() == "one call took longer than 2 s of wall time"
-    watch.step_ends()
+    assert monitor.overdue() == "one call took longer than 2 s of wall time"
+    monitor.step_ends()
     now += LEAST_STANDSTILL_S - 1
-    assert watch.overdue() == ""
+    assert monitor.overdue() == ""
     now += 2
-    assert watch.overdue() == "neither it nor the simulator went on for 120 s"
-    watch.flight_ends()
-    assert watch.overdue() == ""
+    assert monitor.overdue() == "neither it nor the simulator went on for 120 s"
+    monitor.flight_ends()
+    assert monitor.overdue() == ""
 
 
 @pytest.mark.long

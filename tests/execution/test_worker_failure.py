@@ -12,10 +12,10 @@ from pytest_garl.simulation.flight import Crash
 from tests.execution.flying import Good, job_of, scenario
 from tests.support.results import flight_result
 
-DIED = WorkerExit(status=-11, complaint="no fuel")
+DIED = WorkerExit(status=-11, stderr="no fuel")
 KILLED = WorkerExit(status=-9)
 BROKE = WorkerExit(status=0, failure=("TypeError", "no array", "Traceback"))
-HUNG = WorkerExit(status=-9, words="in step", hung="one call took longer than 30 s of wall time")
+HUNG = WorkerExit(status=-9, stacks="in step", hung="one call took longer than 30 s of wall time")
 
 
 @pytest.fixture
@@ -41,13 +41,13 @@ def crash(ledger: Ledger) -> Crash:
 
 
 @pytest.mark.parametrize(
-    ("death", "after"), [(KILLED, "killed"), (HUNG, "hung"), (BROKE, "failed")]
+    ("ended", "after"), [(KILLED, "killed"), (HUNG, "hung"), (BROKE, "failed")]
 )
 def test_what_the_machine_may_have_done_is_flown_again_when_nobody_else_flies(
-    ledger: Ledger, death: WorkerExit, after: str
+    ledger: Ledger, ended: WorkerExit, after: str
 ) -> None:
     first, other = claimed(ledger), claimed(ledger)
-    retry_or_record(ledger.queue, first, death)
+    retry_or_record(ledger.queue, first, ended)
     assert ledger.result("s", 0, 0) is None
     assert ledger.queue.claim() is None
     ledger.queue.record(other, flight_result(), "", 0.0)
@@ -70,7 +70,7 @@ def test_a_process_that_ends_itself_is_a_finding_at_once(ledger: Ledger) -> None
 
 
 @pytest.mark.parametrize(
-    ("death", "signature", "message"),
+    ("ended", "signature", "message"),
     [
         (KILLED, "V:died:signal-9", "its process ended with signal 9, twice"),
         (HUNG, "V:hung:Timeout", "one call took longer than 30 s of wall time, twice"),
@@ -83,12 +83,12 @@ def test_a_process_that_ends_itself_is_a_finding_at_once(ledger: Ledger) -> None
     ],
 )
 def test_what_happens_again_alone_is_a_finding(
-    ledger: Ledger, death: WorkerExit, signature: str, message: str
+    ledger: Ledger, ended: WorkerExit, signature: str, message: str
 ) -> None:
     first = claimed(ledger)
     ledger.queue.record(claimed(ledger), flight_result(), "", 0.0)
-    retry_or_record(ledger.queue, first, death)
-    retry_or_record(ledger.queue, claimed(ledger), death)
+    retry_or_record(ledger.queue, first, ended)
+    retry_or_record(ledger.queue, claimed(ledger), ended)
     result = ledger.result("s", 0, 0)
     assert result is not None
     assert result.signature == signature

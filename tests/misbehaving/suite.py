@@ -22,7 +22,7 @@ from pytest_garl.execution.batch import fly_all, own_pool
 from pytest_garl.execution.ledger import Ledger
 from pytest_garl.execution.on_demand import Done
 from pytest_garl.execution.pool import Pool
-from pytest_garl.execution.processes import named
+from pytest_garl.execution.processes import any_command_contains
 from pytest_garl.execution.reference import BUILT_IN
 from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.verdicts.verdict import Limits
@@ -144,7 +144,7 @@ def _run(folder: Path) -> Iterator[_Run]:
 
 def left_running() -> bool:
     """Return whether a process of a misbehaving system lives on."""
-    return named(processes.LONG_S)
+    return any_command_contains(processes.LONG_S)
 
 
 def main(names: Sequence[str]) -> None:

@@ -16,7 +16,7 @@ from pathlib import Path
 import pytest
 
 from pytest_garl.execution.ledger import Ledger
-from pytest_garl.execution.processes import children_of, named
+from pytest_garl.execution.processes import any_command_contains, children_of
 from tests.plugin.test_plugin import CONFTEST, write_project
 from tests.plugin.test_resume import SLOW, query
 
@@ -187,9 +187,9 @@ def test_a_killed_run_that_is_resumed_is_as_if_nothing_had_happened(
         prey.ledger, "SELECT search, generation, slot, sha256 FROM slot WHERE state = 'flown'"
     )
     until = time.monotonic() + PATIENCE_S
-    while named(str(prey.folder)) and time.monotonic() < until:
+    while any_command_contains(str(prey.folder)) and time.monotonic() < until:
         time.sleep(0.02)
-    assert not named(str(prey.folder)), "orphans"
+    assert not any_command_contains(str(prey.folder)), "orphans"
     cut_short = bool(before) and outcome(prey.folder) != undisturbed
     begun = bool(query(prey.ledger, "SELECT * FROM run WHERE key = 'ledger'"))
     resumed = start(prey.folder, *(["--garl-resume"] if begun else []))

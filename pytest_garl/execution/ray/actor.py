@@ -60,7 +60,7 @@ class FlightActor:
     """Flies what it is told, one slot after the other.
 
     The flying is done by a local pool of one child with a ledger of its own, so that a landing
-    system that dies or hangs takes nothing else with it, and its death reads as it does locally.
+    system that dies or hangs takes nothing else with it, and its ended reads as it does locally.
     What it means is decided by who asked.
     """
 
@@ -74,7 +74,7 @@ class FlightActor:
             self._ledger.queue, FlightWorkers(max_workers=1, on_exit=self._note)
         )
         self._flown = 0
-        self._death: WorkerExit | None = None
+        self._ended: WorkerExit | None = None
 
     def about(self) -> tuple[str, dict[str, str]]:
         """Return the machine's name, and the versions of what decides on a flight's bytes."""
@@ -88,13 +88,13 @@ class FlightActor:
         self._ledger.add_search(search, job.system.name, job.map, 1, job.dumps(), "on_demand")
         self._ledger.add_slots(search, 0, {0: claim.scenario}, claim.after)
         result = wait_for(self._ledger, self._pool, search, _FIRST, lambda: None)
-        if self._death is not None:
-            death, self._death = self._death, None
-            error, message, text = death.failure or ("", "", "")
+        if self._ended is not None:
+            ended, self._ended = self._ended, None
+            error, message, text = ended.failure or ("", "", "")
             return dataclasses.replace(
-                death,
-                words=self._at_home(death.words),
-                complaint=self._at_home(death.complaint),
+                ended,
+                stacks=self._at_home(ended.stacks),
+                stderr=self._at_home(ended.stderr),
                 failure=(error, self._at_home(message), self._at_home(text)) if error else None,
             )
         file = flights / f"{flight_name(search, 0, 0, job.map)}.npz"
@@ -119,9 +119,9 @@ class FlightActor:
     def _at_home(self, text: str) -> str:
         return self._relocation.to_local(text) if self._relocation else text
 
-    def _note(self, queue: WorkQueue, claim: Claim, death: WorkerExit) -> None:
-        """Remember a death and take the slot out of the queue: it is flown once."""
-        self._death = death
+    def _note(self, queue: WorkQueue, claim: Claim, ended: WorkerExit) -> None:
+        """Remember a ended and take the slot out of the queue: it is flown once."""
+        self._ended = ended
         queue.record(claim, _NO_RESULT, "", 0.0)
 
 

@@ -22,7 +22,7 @@ from typing import Any
 
 from pytest_garl.errors import PoolError
 from pytest_garl.execution.ledger_queue import WorkQueue
-from pytest_garl.execution.processes import Parent, named, run_worker
+from pytest_garl.execution.processes import Parent, any_command_contains, run_worker
 from pytest_garl.execution.ray.actor import ActorWorkspace
 from pytest_garl.execution.ray.scheduler import RayScheduler
 
@@ -84,7 +84,7 @@ def _remove(folder: str) -> None:
     it notices that its pilot is gone, and would make the folder again to put its record there.
     """
     until = time.monotonic() + PARTING_S
-    while named(folder) and time.monotonic() < until:
+    while any_command_contains(folder) and time.monotonic() < until:
         time.sleep(0.05)
     shutil.rmtree(folder, ignore_errors=True)
 
@@ -138,7 +138,7 @@ def unreachable(address: str, reason: str) -> str:
 def _give_up(address: str) -> None:
     """End the process from a thread: the call of Ray does not come back."""
     reason = unreachable(address, f"no cluster after {PATIENCE_S:g} s")
-    Parent.of_this_process().tell(cannot_go_on=reason)
+    Parent.of_this_process().report(cannot_go_on=reason)
     os._exit(1)
 
 

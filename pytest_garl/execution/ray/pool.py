@@ -55,7 +55,7 @@ class Driver:
 
     workers: int | None
     root: Path
-    patience_s: float = 30.0
+    shutdown_s: float = 30.0
     """To end a cluster takes a second or two, and more on a busy machine."""
 
     @property
@@ -72,7 +72,7 @@ class Driver:
             str(self.workers or 0),
         ]
 
-    def handle_exit(self, queue: WorkQueue, pid: int, death: WorkerExit) -> bool:
+    def handle_exit(self, queue: WorkQueue, pid: int, ended: WorkerExit) -> bool:
         """Give back all slots: nothing flies in the driver, so its death says nothing of them."""
         queue.release(pid)
         return False

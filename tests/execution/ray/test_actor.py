@@ -56,15 +56,15 @@ def test_a_pilot_flies_what_a_child_of_the_local_pool_would(
 
 
 def test_a_pilot_outlives_what_it_flies(pilot: FlightActor) -> None:
-    death = pilot.fly(claim(Exits))
-    assert death == WorkerExit(status=3, complaint="no fuel\n")
+    ended = pilot.fly(claim(Exits))
+    assert ended == WorkerExit(status=3, stderr="no fuel\n")
     assert isinstance(pilot.fly(claim(Good)), FlightOutput)
 
 
 def test_a_traceback_on_stderr_is_the_landing_systems_own(pilot: FlightActor) -> None:
-    death = pilot.fly(claim(Reports))
-    assert isinstance(death, WorkerExit)
-    assert (death.status, death.cause) == (1, "died")
+    ended = pilot.fly(claim(Reports))
+    assert isinstance(ended, WorkerExit)
+    assert (ended.status, ended.cause) == (1, "died")
 
 
 def test_a_simulator_that_fails_is_no_death_of_the_landing_system(pilot: FlightActor) -> None:
@@ -79,10 +79,10 @@ def test_a_simulator_that_fails_is_no_death_of_the_landing_system(pilot: FlightA
 
 
 def test_a_call_that_hangs_is_told_from_a_death(pilot: FlightActor) -> None:
-    death = pilot.fly(claim(Sleeps, timeout_s=0.3))
-    assert isinstance(death, WorkerExit)
-    assert death.hung == "one call took longer than 0.3 s of wall time"
-    assert "in step" in death.words
+    ended = pilot.fly(claim(Sleeps, timeout_s=0.3))
+    assert isinstance(ended, WorkerExit)
+    assert ended.hung == "one call took longer than 0.3 s of wall time"
+    assert "in step" in ended.stacks
 
 
 def test_a_flight_that_hung_before_has_three_times_the_time_and_counts(pilot: FlightActor) -> None:

@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 
 from pytest_garl.errors import PoolError
-from pytest_garl.execution.processes import read_report, report_file
+from pytest_garl.execution.processes import create_report_file, read_report
 from pytest_garl.execution.ray import driver as ray_driver
 from pytest_garl.execution.ray.actor import ActorWorkspace
 from pytest_garl.execution.ray.pool import check_ray
@@ -149,7 +149,7 @@ def test_a_connection_that_never_comes_ends_the_driver() -> None:
         "ray_driver.version = lambda name: '2.60.0'\n"
         "with ray_driver._connected('head:6379'): pass\n"
     )
-    report = report_file()
+    report = create_report_file()
     command = [sys.executable, "-c", code, str(os.getpid()), str(report)]
     done = subprocess.run(command, check=False, timeout=50, pass_fds=[report])
     assert done.returncode == 1
