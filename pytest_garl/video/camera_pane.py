@@ -12,7 +12,7 @@ from pytest_garl.simulation.camera.projection import View
 from pytest_garl.simulation.camera.renderer import Renderer
 from pytest_garl.simulation.flight import Step
 from pytest_garl.video import drawing
-from pytest_garl.video.pose import Moment
+from pytest_garl.video.pose import Poses
 
 WIDTH, HEIGHT = 640, 480
 
@@ -28,10 +28,10 @@ class CameraPane:
         self._left = (WIDTH - self._size[0]) // 2
         self._top = (HEIGHT - self._size[1]) // 2
 
-    def draw(self, moment: Moment, step: Step | None) -> drawing.Image:
+    def draw(self, poses: Poses, step: Step | None) -> drawing.Image:
         """Return the pane; ``step`` is the landing system's answer to this very frame."""
         frame = self._renderer.render(
-            moment.eye_m, moment.attitude, moment.time_s, moment.objects
+            poses.eye_m, poses.attitude, poses.time_s, poses.objects
         ).image
         way = cv2.INTER_AREA if self._scale < 1 else cv2.INTER_LINEAR
         view = np.asarray(cv2.resize(frame, self._size, interpolation=way), np.uint8)
@@ -39,18 +39,18 @@ class CameraPane:
         # Thick below thin: where a detection is right both outlines can be seen.
         for detection in seen:
             self._detection(view, detection)
-        outline = self._marker(moment)
+        outline = self._marker(poses)
         if len(outline) >= 3:
             drawing.line(view, outline, drawing.MARKER, 2, closed=True)
         pane = np.zeros((HEIGHT, WIDTH, 3), np.uint8)
         pane[self._top : self._top + self._size[1], self._left : self._left + self._size[0]] = view
         return pane
 
-    def _marker(self, moment: Moment) -> NDArray[np.float64]:
+    def _marker(self, poses: Poses) -> NDArray[np.float64]:
         half, (x, y) = MARKER_SIDE_M / 2, self._renderer.marker_m
         square = np.array([[x - half, y + half], [x + half, y + half]])
         square = np.vstack([square, [[x + half, y - half], [x - half, y - half]]])
-        view = View.of(self._renderer.camera, moment.eye_m, moment.attitude)
+        view = View.of(self._renderer.camera, poses.eye_m, poses.attitude)
         return self._pixels(view.ground_polygon(square))
 
     def _detection(self, view: drawing.Image, detection: Detection) -> None:

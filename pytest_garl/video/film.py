@@ -21,8 +21,8 @@ from pytest_garl.video.camera_pane import CameraPane
 from pytest_garl.video.drawing import Image
 from pytest_garl.video.encoder import write
 from pytest_garl.video.map_pane import MapPane
-from pytest_garl.video.pose import moment_at
-from pytest_garl.video.timeline import Strip
+from pytest_garl.video.pose import poses_at
+from pytest_garl.video.timeline import Timeline
 
 CLOSING_S = 2.0
 """How long the last moment, with the outcome, stands still."""
@@ -52,18 +52,18 @@ def frames(
     _check(flight, scenario, place)
     renderer = Renderer(scenario, place, camera, generator(scenario.seed, "sensor"))
     left, right = CameraPane(renderer), MapPane(flight, scenario, place, camera)
-    below = Strip(flight, signature)
+    below = Timeline(flight, signature)
     shown = scenario
     for step in flight.steps:
         if (now := environment_at(scenario, flight, step.time_s)) != shown:
             renderer.change(now)
             shown = now
-        moment = moment_at(flight, step.time_s)
-        side = np.vstack([left.draw(moment, step), below.draw(moment, step)])
-        yield np.hstack([side, right.draw(moment, step)])
-    last, moment = flight.steps[-1] if flight.steps else None, moment_at(flight, flight.elapsed_s)
-    side = np.vstack([left.draw(moment, None), below.draw(moment, last, ended=True)])
-    picture = np.hstack([side, right.draw(moment, last, ended=True)])
+        poses = poses_at(flight, step.time_s)
+        side = np.vstack([left.draw(poses, step), below.draw(poses, step)])
+        yield np.hstack([side, right.draw(poses, step)])
+    last, poses = flight.steps[-1] if flight.steps else None, poses_at(flight, flight.elapsed_s)
+    side = np.vstack([left.draw(poses, None), below.draw(poses, last, ended=True)])
+    picture = np.hstack([side, right.draw(poses, last, ended=True)])
     for _ in range(math.ceil(CLOSING_S * rate_hz(flight, camera))):
         yield picture
 

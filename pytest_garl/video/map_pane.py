@@ -23,7 +23,7 @@ from pytest_garl.simulation.flight import Flight, ObjectRecord, Step
 from pytest_garl.simulation.randomness import generator
 from pytest_garl.video import drawing
 from pytest_garl.video.labels import Labels
-from pytest_garl.video.pose import Moment, path_until
+from pytest_garl.video.pose import Poses, path_until
 
 WIDTH, HEIGHT = 384, 656
 BEYOND_M = 2.0
@@ -57,21 +57,21 @@ class MapPane:
             axis=1,
         )
 
-    def draw(self, moment: Moment, step: Step | None, *, ended: bool = False) -> drawing.Image:
+    def draw(self, poses: Poses, step: Step | None, *, ended: bool = False) -> drawing.Image:
         """Return the pane at one moment; an ``ended`` flight shows what the UAV touched."""
         pane = self._still.copy()
-        self._draw_footprint(pane, moment)
+        self._draw_footprint(pane, poses)
         for item in self._flight.objects:
-            path = self.pixels(path_until(item.track, moment.time_s))
+            path = self.pixels(path_until(item.track, poses.time_s))
             drawing.line(pane, path, _colour(item), 1)
-        drawing.line(pane, self.pixels(path_until(self._flight.uav, moment.time_s)), drawing.UAV, 2)
+        drawing.line(pane, self.pixels(path_until(self._flight.uav, poses.time_s)), drawing.UAV, 2)
         self._draw_thoughts(pane, step)
-        self._write_names(pane, moment)
-        for item, (place, yaw) in zip(self._flight.objects, moment.objects, strict=True):
+        self._write_names(pane, poses)
+        for item, (place, yaw) in zip(self._flight.objects, poses.objects, strict=True):
             self._draw_mover(pane, place, yaw, _radius_m(item), _colour(item))
-        nose = rotate(moment.attitude, (1.0, 0.0, 0.0))
+        nose = rotate(poses.attitude, (1.0, 0.0, 0.0))
         yaw = math.atan2(nose[1], nose[0])
-        self._draw_mover(pane, moment.position_m, yaw, _UAV_RADIUS_M, drawing.UAV)
+        self._draw_mover(pane, poses.position_m, yaw, _UAV_RADIUS_M, drawing.UAV)
         if ended:
             for contact in self._flight.contacts[-1:]:
                 drawing.cross(pane, self._pixel(contact.position_m), 9, drawing.HIT)
@@ -137,9 +137,9 @@ class MapPane:
         arrow = np.array([[16.0, 58], [16, 30], [11, 38], [16, 30], [21, 38]])
         drawing.line(self._still, arrow, drawing.INK, 2)
 
-    def _draw_footprint(self, pane: drawing.Image, moment: Moment) -> None:
+    def _draw_footprint(self, pane: drawing.Image, poses: Poses) -> None:
         """Outline the ground in view, its upper edge thick, unless the horizon is in view."""
-        view = View.of(self._camera, moment.eye_m, moment.attitude)
+        view = View.of(self._camera, poses.eye_m, poses.attitude)
         right, low = self._camera.width_px - 0.5, self._camera.height_px - 0.5
         corners = np.array([[-0.5, -0.5, 1], [right, -0.5, 1], [right, low, 1], [-0.5, low, 1]])
         ground = view.ground_of_pixel @ corners.T
@@ -157,13 +157,13 @@ class MapPane:
         if thoughts.target_m is not None:
             drawing.cross(pane, self._pixel(thoughts.target_m), 10, drawing.SYSTEM)
 
-    def _write_names(self, pane: drawing.Image, moment: Moment) -> None:
+    def _write_names(self, pane: drawing.Image, poses: Poses) -> None:
         labels = Labels(pane)
         half = MARKER_SIDE_M / 2
         labels.keep_clear(self._pixel(self._flight.marker_position_m), half * self._scale)
-        labels.keep_clear(self._pixel(moment.position_m), _UAV_RADIUS_M * self._scale)
+        labels.keep_clear(self._pixel(poses.position_m), _UAV_RADIUS_M * self._scale)
         names = [(name, (x, y), half, drawing.INK) for name, x, y in self._flight.decoys]
-        for item, ((x, y, _), _) in zip(self._flight.objects, moment.objects, strict=True):
+        for item, ((x, y, _), _) in zip(self._flight.objects, poses.objects, strict=True):
             names.append((item.name, (x, y), _radius_m(item), _colour(item)))
         for _, place, radius, _ in names:
             labels.keep_clear(self._pixel(place), radius * self._scale)

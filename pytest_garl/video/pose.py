@@ -14,7 +14,7 @@ from pytest_garl.simulation.flight import Flight, Track
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Moment:
+class Poses:
     """Poses at one time: the UAV's, its camera's place, and (position, yaw) of each object."""
 
     time_s: float
@@ -24,14 +24,14 @@ class Moment:
     objects: tuple[BodyPose, ...]
 
 
-def moment_at(flight: Flight, time_s: float) -> Moment:
+def poses_at(flight: Flight, time_s: float) -> Poses:
     """Interpolate the recorded tracks: positions linearly, attitudes along the shorter turn."""
     position, attitude = _pose(flight.uav, time_s)
     objects = []
     for item in flight.objects:
         place, (_, _, z, w) = _pose(item.track, time_s)
         objects.append((place, 2 * math.atan2(z, w)))
-    return Moment(
+    return Poses(
         time_s=time_s,
         position_m=position,
         attitude=attitude,

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from pytest_garl.simulation.flight import Flight, Step
 from pytest_garl.simulation.physics.vehicle import up_m
 from pytest_garl.video import drawing
-from pytest_garl.video.pose import Moment
+from pytest_garl.video.pose import Poses
 
 WIDTH, HEIGHT = 640, 176
 _LEFT, _RIGHT, _TOP, _BOTTOM = 44, WIDTH - 14, 62, 134
@@ -22,7 +22,7 @@ _LEGEND = (
 )
 
 
-class Strip:
+class Timeline:
     """Draws the strip of one flight; what never moves is drawn once."""
 
     def __init__(self, flight: Flight, signature: str) -> None:
@@ -34,17 +34,17 @@ class Strip:
         self._still = drawing.sheet(WIDTH, HEIGHT)
         self._draw_still()
 
-    def draw(self, moment: Moment, step: Step | None, *, ended: bool = False) -> drawing.Image:
-        """Return the strip at one moment; an ``ended`` flight shows its outcome."""
+    def draw(self, poses: Poses, step: Step | None, *, ended: bool = False) -> drawing.Image:
+        """Return the timeline at one moment; an ``ended`` flight shows its outcome."""
         strip = self._still.copy()
-        height = up_m(float(moment.position_m[2]))
-        past = self._times < moment.time_s
+        height = up_m(float(poses.position_m[2]))
+        past = self._times < poses.time_s
         line = self._pixels(self._times[past], self._heights[past])
-        present = self._pixels(np.array([moment.time_s]), np.array([height]))
+        present = self._pixels(np.array([poses.time_s]), np.array([height]))
         drawing.line(strip, np.vstack([line, present]), drawing.UAV, 2)
         at = (float(present[0, 0]), float(present[0, 1]))
         drawing.disc(strip, at, 4.5, drawing.UAV)
-        clock = f"{moment.time_s:.1f} s of {self._flight.elapsed_s:.1f} s"
+        clock = f"{poses.time_s:.1f} s of {self._flight.elapsed_s:.1f} s"
         drawing.text(strip, clock, (_RIGHT - drawing.width_of(clock, 16), 24), size=16)
         if ended:
             drawing.text(strip, self._outcome(), (14, 48), drawing.HIT, 15, bold=True, most_px=470)

@@ -26,7 +26,7 @@ from pytest_garl.simulation.flight import Contact, Flight, Track
 from pytest_garl.simulation.fly import fly
 from pytest_garl.video import frames, rate_hz, save_video, write
 from pytest_garl.video.drawing import HIT, MARKER, OBJECTS, SYSTEM, UAV, Image
-from pytest_garl.video.pose import moment_at, path_until
+from pytest_garl.video.pose import path_until, poses_at
 from tests.simulation.test_environment import WEATHERMAKER
 
 LAWN = load_map("lawn")
@@ -229,11 +229,11 @@ def test_poses_between_two_samples_are_interpolated(film: Film) -> None:
         velocity_mps=np.zeros((2, 3)),
     )
     flight = dataclasses.replace(film.flight, uav=uav, objects=())
-    middle = moment_at(flight, 0.5)
+    middle = poses_at(flight, 0.5)
     assert middle.position_m == pytest.approx((1.0, 2.0, 1.0))
     assert middle.attitude == pytest.approx((0, 0, math.sin(math.pi / 8), math.cos(math.pi / 8)))
     assert middle.eye_m == pytest.approx((1.0, 2.0, 0.95))
-    assert moment_at(flight, 9.0).position_m == (2.0, 4.0, 1.0)
+    assert poses_at(flight, 9.0).position_m == (2.0, 4.0, 1.0)
     assert path_until(uav, 0.5).tolist() == [[0.0, 0.0, 1.0], [1.0, 2.0, 1.0]]
 
 

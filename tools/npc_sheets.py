@@ -1,7 +1,7 @@
-"""Look at what a policy does with a person, a dog and a bird: one flight each that it hit.
+"""Draw how an NPC policy hits with a person, a dog and a bird: one flight each.
 
-``python -m tools.look_movers`` flies OpenCV-MLS through random scenarios with one object in
-clear weather until that object is hit, writes its last seconds to ``.garl/mover-<kind>.png`` and
+``python -m tools.npc_sheets`` flies OpenCV-MLS through random scenarios with one object in
+clear weather until that object is hit, writes its last seconds to ``.garl/npc-<kind>.png`` and
 prints where UAV and object were.
 """
 
@@ -27,7 +27,7 @@ from pytest_garl.simulation.fly import fly
 from pytest_garl.simulation.randomness import generator
 from pytest_garl.verdicts.judge import judge
 from pytest_garl.verdicts.verdict import Limits
-from tools.look import sheet
+from tools.flight_sheet import sheet
 
 PLACES = {"person": "court", "dog": "lawn", "bird": "court"}
 TRIES = 40

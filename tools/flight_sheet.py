@@ -1,6 +1,6 @@
-"""Look at a recorded flight: its last seconds as a picture, beside the verdict's story.
+"""Draw the last seconds of a recorded flight, beside the description of its verdict.
 
-``python -m tools.look court-g03-s17`` writes ``.garl/court-g03-s17.png``: above what
+``python -m tools.flight_sheet court-g03-s17`` writes ``.garl/court-g03-s17.png``: above what
 the camera saw, below the same moments from the side with the UAV as a circle.
 """
 
