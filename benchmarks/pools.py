@@ -18,7 +18,7 @@ from landing_systems.opencv_mls import OpenCvLandingSystem
 from pytest_garl.adversary.catalogue import policy_spec
 from pytest_garl.baselines.record import BaselineSpec
 from pytest_garl.execution.batch import fly_all
-from pytest_garl.execution.job import Job
+from pytest_garl.execution.job import FlightJob
 from pytest_garl.execution.ledger import Ledger
 from pytest_garl.execution.local_pool import local_pool
 from pytest_garl.execution.pool import Pool
@@ -58,7 +58,9 @@ def both(workers: int) -> Iterator[Sequence[Contender]]:
         yield found
 
 
-def flown_s(each: Contender, job: Job, scenarios: Sequence[Scenario]) -> tuple[float, list[str]]:
+def flown_s(
+    each: Contender, job: FlightJob, scenarios: Sequence[Scenario]
+) -> tuple[float, list[str]]:
     """Return the wall time of these flights, and the hashes of their trajectories."""
     job = dataclasses.replace(job, flights=str(each.ledger.path.parent / "flights"))
     began = time.perf_counter()
@@ -68,7 +70,7 @@ def flown_s(each: Contender, job: Job, scenarios: Sequence[Scenario]) -> tuple[f
 
 
 def in_turns(
-    contenders: Sequence[Contender], job: Job, rounds: int, flights: int
+    contenders: Sequence[Contender], job: FlightJob, rounds: int, flights: int
 ) -> Mapping[str, float]:
     """Return each pool's wall time over all rounds of so many flights, and check their results."""
     scenarios = BaselineSpec(count=rounds * flights).scenarios(load_map(job.map))

@@ -19,11 +19,11 @@ from typing import Any
 
 import numpy as np
 
-from pytest_garl.execution.job import Job, load_scenario, loads
+from pytest_garl.execution.job import FlightJob, load_scenario, loads
 from pytest_garl.execution.ledger import Ledger
 from pytest_garl.execution.ledger_queries import LedgerFlight
 from pytest_garl.execution.local_pool import local_pool
-from pytest_garl.execution.on_demand import Done, Errands, Fly
+from pytest_garl.execution.on_demand import CompletedFlight, FlyFunction, OnDemandFlights
 from pytest_garl.regressions.new_case import find_colliding_object
 from pytest_garl.regressions.shrink import (
     by_hypothesis,
@@ -69,7 +69,7 @@ FIELDS = (
 class Violation:
     """One violation to shrink."""
 
-    job: Job
+    job: FlightJob
     slot: str
     signature: str
     scenario: Scenario
@@ -89,7 +89,7 @@ def violations(ledger: Ledger, count: int) -> list[Violation]:
 def _violation(ledger: Ledger, row: LedgerFlight) -> Violation:
     text = ledger.job(row.search)
     assert text is not None
-    done = Done(result=row.result, sha256=row.sha256, record=Path())
+    done = CompletedFlight(result=row.result, sha256=row.sha256, record=Path())
     return Violation(
         job=loads(text),
         slot=f"g{row.generation:02d}-s{row.slot:02d}",
@@ -99,7 +99,7 @@ def _violation(ledger: Ledger, row: LedgerFlight) -> Violation:
     )
 
 
-def shrink_one(violation: Violation, fly: Fly) -> list[dict[str, Any]]:
+def shrink_one(violation: Violation, fly: FlyFunction) -> list[dict[str, Any]]:
     """Shrink a violation by all passes and by each alone; return a row for each."""
     known: dict[Scenario, bool] = {}
 
@@ -195,7 +195,7 @@ def main() -> None:
                 f"{each.job.map} {each.slot}": functools.partial(shrink_one, each)
                 for each in wanted[start : start + AT_A_TIME]
             }
-            found = Errands(ledger, pool, lambda: None).run(functions)
+            found = OnDemandFlights(ledger, pool, lambda: None).run(functions)
             append(FILE, FIELDS, itertools.chain.from_iterable(found.values()))
     finally:
         pool.close()

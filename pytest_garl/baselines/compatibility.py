@@ -5,11 +5,11 @@ from __future__ import annotations
 from importlib.metadata import PackageNotFoundError, version
 
 from pytest_garl.baselines.file import Baseline, BaselineSet
-from pytest_garl.execution.job import Job
+from pytest_garl.execution.job import FlightJob
 from pytest_garl.verdicts.verdict import Limits
 
 
-def incompatibilities(base: BaselineSet, job: Job) -> tuple[str, ...]:
+def incompatibilities(base: BaselineSet, job: FlightJob) -> tuple[str, ...]:
     """Return conditions that differ from those of the set; with any, rates are not comparable."""
     conditions = (
         ("limits", _limits_text(base.limits), _limits_text(job.limits)),

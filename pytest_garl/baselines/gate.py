@@ -7,18 +7,18 @@ from collections.abc import Callable, Collection, Iterable, Sequence
 from pytest_garl.baselines.comparison import LEVEL, Comparison, compare
 from pytest_garl.baselines.file import BaselineError, BaselineSet
 from pytest_garl.baselines.pairs import FlightSummary, Pair, summary_of
-from pytest_garl.execution.on_demand import Done
+from pytest_garl.execution.on_demand import CompletedFlight
 from pytest_garl.regressions.robustness import COUNT, neighbours
 from pytest_garl.scenarios.maps.map import Map
 from pytest_garl.scenarios.scenario import Scenario
 
-FlyScenarios = Callable[[Sequence[Scenario]], Sequence[Done]]
+FlyScenarios = Callable[[Sequence[Scenario]], Sequence[CompletedFlight]]
 """Flies scenarios with the changed landing system."""
 
 
 def compare_flights(
     base: BaselineSet,
-    flights: Iterable[Done],
+    flights: Iterable[CompletedFlight],
     map: Map,
     fly: FlyScenarios,
     *,

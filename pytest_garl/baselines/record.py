@@ -14,11 +14,11 @@ from pytest_garl.baselines.file import Baseline, BaselineError, BaselineFlight, 
 from pytest_garl.baselines.gate import FlyScenarios
 from pytest_garl.baselines.pairs import summary_of
 from pytest_garl.errors import PolicyError
-from pytest_garl.execution.batch import fly_all, own_pool
+from pytest_garl.execution.batch import fly_all, temporary_pool
 from pytest_garl.execution.checkout import Checkout, describe
-from pytest_garl.execution.job import Job, load_scenario, loads
+from pytest_garl.execution.job import FlightJob, load_scenario, loads
 from pytest_garl.execution.ledger import Ledger
-from pytest_garl.execution.on_demand import Done
+from pytest_garl.execution.on_demand import CompletedFlight
 from pytest_garl.execution.reference import BUILT_IN, Reference
 from pytest_garl.execution.stored_ledger import check_stored
 from pytest_garl.scenarios.genes import WeatherRange, genome_for
@@ -29,7 +29,7 @@ from pytest_garl.simulation.npc_policy import PolicySpec
 from pytest_garl.verdicts.verdict import Limits
 
 TIMEOUT_S = 10.0
-ShowProgress = Callable[[Iterator[Done], str, int], Iterable[Done]]
+ShowProgress = Callable[[Iterator[CompletedFlight], str, int], Iterable[CompletedFlight]]
 """Passes flights on and shows the progress: (flights, title, total) -> the same flights."""
 
 
@@ -66,7 +66,7 @@ def fly_baseline(
     for map in maps:
         check_policy(npcs, map)
     sets = []
-    with own_pool(workers, checkout) as (ledger, pool):
+    with temporary_pool(workers, checkout) as (ledger, pool):
         for (reference, sources), map in itertools.product(found, maps):
             job = _job(spec, checkout, reference, sources, map, ledger.path.parent)
             scenarios = spec.scenarios(map)
@@ -85,10 +85,10 @@ def neighbour_flyer(
 ) -> FlyScenarios:
     """Return a function that flies more scenarios with the landing system of a flown set."""
 
-    def fly(scenarios: Sequence[Scenario]) -> Sequence[Done]:
+    def fly(scenarios: Sequence[Scenario]) -> Sequence[CompletedFlight]:
         reference, sources = describe(checkout, flown.system)
         map = load_map(flown.map, spec.map_folders)
-        with own_pool(workers, checkout) as (ledger, pool):
+        with temporary_pool(workers, checkout) as (ledger, pool):
             job = _job(spec, checkout, reference, sources, map, ledger.path.parent)
             title = f"{checkout.folder}: neighbours"
             return list(show_progress(fly_all(ledger, pool, job, scenarios), title, len(scenarios)))
@@ -103,8 +103,8 @@ def _job(
     sources: str,
     map: Map,
     scratch: Path,
-) -> Job:
-    return Job(
+) -> FlightJob:
+    return FlightJob(
         system=system,
         system_sha256=sources,
         simulator=spec.simulator,
@@ -136,7 +136,7 @@ def baseline_from_ledger(path: Path) -> Baseline:
         flights = [
             (
                 load_scenario(row.scenario),
-                Done(result=row.result, sha256=row.sha256, record=Path()),
+                CompletedFlight(result=row.result, sha256=row.sha256, record=Path()),
             )
             for row in rows
         ]
@@ -160,7 +160,9 @@ def _check_npcs(path: Path, npcs: PolicySpec) -> None:
         )
 
 
-def _set(job: Job, flights: Iterable[tuple[Scenario, Done]], method: str) -> BaselineSet:
+def _set(
+    job: FlightJob, flights: Iterable[tuple[Scenario, CompletedFlight]], method: str
+) -> BaselineSet:
     return BaselineSet(
         system=job.system.name,
         map=job.map,

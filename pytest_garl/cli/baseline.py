@@ -18,7 +18,7 @@ from pytest_garl.errors import OptionError
 if TYPE_CHECKING:
     from pytest_garl.baselines.comparison import Comparison
     from pytest_garl.baselines.record import BaselineSpec
-    from pytest_garl.execution.on_demand import Done
+    from pytest_garl.execution.on_demand import CompletedFlight
     from pytest_garl.execution.reference import Reference
 
 FAILED = 1
@@ -253,7 +253,9 @@ def _maps_folder() -> Path:
     return Path.cwd() / "scenarios" / "maps"
 
 
-def _progress(flights: Iterator[Done], title: str, total: int) -> Iterable[Done]:
+def _progress(
+    flights: Iterator[CompletedFlight], title: str, total: int
+) -> Iterable[CompletedFlight]:
     """Show on a terminal how far flights are; on stderr, which is not what is asked for."""
     console = Console(stderr=True)
     hidden = not console.is_terminal

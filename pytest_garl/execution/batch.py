@@ -12,10 +12,10 @@ from pathlib import Path
 
 from pytest_garl.errors import LedgerError
 from pytest_garl.execution.checkout import Checkout
-from pytest_garl.execution.job import Job, dump_scenario, loads
+from pytest_garl.execution.job import FlightJob, dump_scenario, loads
 from pytest_garl.execution.ledger import Ledger
 from pytest_garl.execution.local_pool import local_pool
-from pytest_garl.execution.on_demand import Done
+from pytest_garl.execution.on_demand import CompletedFlight
 from pytest_garl.execution.pool import Pool, wait_for
 from pytest_garl.execution.slot import Slot, flight_name
 from pytest_garl.scenarios.scenario import Scenario
@@ -24,10 +24,10 @@ from pytest_garl.scenarios.scenario import Scenario
 def fly_all(
     ledger: Ledger,
     pool: Pool,
-    job: Job,
+    job: FlightJob,
     scenarios: Sequence[Scenario],
     tick: Callable[[], None] = lambda: None,
-) -> Iterator[Done]:
+) -> Iterator[CompletedFlight]:
     """Yield what each scenario came to, in order; all are handed out before the first is awaited.
 
     Raises LedgerError if a resumed run flew them in another way.
@@ -46,7 +46,7 @@ def fly_all(
         )
     ledger.add_slots(search, 0, texts)
     for index in texts:
-        yield Done(
+        yield CompletedFlight(
             result=wait_for(ledger, pool, search, Slot(generation=0, index=index), tick),
             sha256=ledger.sha256(search, 0, index),
             record=Path(job.flights) / f"{flight_name(search, 0, index, job.map)}.npz",
@@ -54,7 +54,7 @@ def fly_all(
 
 
 @contextmanager
-def own_pool(workers: int, checkout: Checkout | None = None) -> Iterator[tuple[Ledger, Pool]]:
+def temporary_pool(workers: int, checkout: Checkout | None = None) -> Iterator[tuple[Ledger, Pool]]:
     """Give a ledger and children for as long as the block lasts; they may see one checkout only."""
     with tempfile.TemporaryDirectory(prefix="garl-") as scratch:
         ledger = Ledger.create(Path(scratch) / "ledger.sqlite", {})

@@ -6,7 +6,7 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from pytest_garl.execution.job import Job
+from pytest_garl.execution.job import FlightJob
 from pytest_garl.execution.result import FlightResult, broken_result
 from pytest_garl.scenarios.maps.map import load_map
 from pytest_garl.scenarios.scenario import Scenario
@@ -18,7 +18,9 @@ if TYPE_CHECKING:
     from pytest_garl.verdicts.verdict import Limits
 
 
-def fly_job(job: Job, scenario: Scenario, name: str, guard: Any) -> tuple[FlightResult, str, float]:
+def fly_job(
+    job: FlightJob, scenario: Scenario, name: str, guard: Any
+) -> tuple[FlightResult, str, float]:
     """Fly, judge and save a flight; return its result, its trajectory's hash, its wall time.
 
     ``name`` is that of its record.  If the flight holds a number that is not finite, that is a

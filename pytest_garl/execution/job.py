@@ -23,7 +23,7 @@ _PLACES = {"path", "flights", "map_folders"}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Job:
+class FlightJob:
     """Everything but the scenario, as it stands in the ledger."""
 
     system: Reference
@@ -40,7 +40,7 @@ class Job:
     sources: tuple[tuple[str, str], ...] = ()
     """What the landing system consists of, by name and hash: ``system_sha256`` taken apart."""
 
-    def differences(self, other: Job) -> tuple[str, ...]:
+    def differences(self, other: FlightJob) -> tuple[str, ...]:
         """Return what makes results of ``other`` not comparable to this one's."""
         mine, theirs = dataclasses.asdict(self), dataclasses.asdict(other)
         keys = [key for key in mine if key not in _PLACES and mine[key] != theirs[key]]
@@ -61,10 +61,10 @@ class Job:
         return json.dumps(dataclasses.asdict(self), sort_keys=True)
 
 
-def loads(text: str) -> Job:
+def loads(text: str) -> FlightJob:
     """Return the job in ``text``; raise LedgerError for a damaged one."""
     try:
-        return made(Job, parsed(text))
+        return made(FlightJob, parsed(text))
     except ValueError as error:
         raise LedgerError(f"a job in the ledger is damaged: {error}. {REMEDY}") from error
 
@@ -86,7 +86,7 @@ def load_scenario(text: str) -> Scenario:
     return dataclasses.replace(scenario, genes=genes)
 
 
-def record_file(job: Job, claim: Claim) -> Path:
+def record_file(job: FlightJob, claim: Claim) -> Path:
     """Return where the record of a claimed slot's flight goes."""
     name = flight_name(claim.search, claim.generation, claim.slot, job.map)
     return Path(job.flights) / f"{name}.npz"

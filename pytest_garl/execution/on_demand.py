@@ -1,11 +1,11 @@
-"""Flights beside the searches: asked for one at a time by several trains of thought at once.
+"""Flights beside the searches: several procedures ask for one flight at a time.
 
-Confirming and shrinking decide on each flight by what the one before came to.  Each such train of
-thought is a plain function in a thread of its own that calls ``fly``; this module gathers what they
-ask for, puts it into the ledger, lets the pool fly it and hands the results back.  A thread never
-touches the ledger.  What a function asks for depends on its own results alone, so that neither the
-number of workers nor an interruption changes anything: a resumed run asks the same again and finds
-it flown.
+A procedure, such as the shrinking of a case, decides on each flight by the result of the one
+before.  It is a plain function that calls ``fly``, in a thread of its own.  This module puts the
+flights that procedures ask for into the ledger, lets the pool fly them, and returns the results.
+A thread never touches the ledger.  A procedure's questions depend on its own results alone, so
+that neither the number of workers nor an interruption changes anything: a resumed run asks the
+same questions and finds the answers in the ledger.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Protocol, TypeVar
 
-from pytest_garl.execution.job import Job, dump_scenario
+from pytest_garl.execution.job import FlightJob, dump_scenario
 from pytest_garl.execution.ledger import Ledger
 from pytest_garl.execution.pool import Pool
 from pytest_garl.execution.result import FlightResult
@@ -29,7 +29,7 @@ T = TypeVar("T")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Done:
+class CompletedFlight:
     """A flight that was asked for: its result, its trajectory's hash, where its record is."""
 
     result: FlightResult
@@ -42,10 +42,10 @@ class Done:
         return self.result.signature
 
 
-class Fly(Protocol):
+class FlyFunction(Protocol):
     """Flies a scenario as a job says, and waits for it."""
 
-    def __call__(self, job: Job, scenario: Scenario) -> Done:
+    def __call__(self, job: FlightJob, scenario: Scenario) -> CompletedFlight:
         """Return what the flight came to."""
 
 
@@ -54,17 +54,17 @@ class _StoppedError(BaseException):
 
 
 @dataclass(slots=True, kw_only=True)
-class _Thought:
+class _Procedure:
     """One function under way; None ends its questions, or the wait for an answer."""
 
     name: str
-    asked: queue.SimpleQueue[tuple[Job, Scenario] | None]
-    answers: queue.SimpleQueue[Done | None]
-    job: Job | None = None
+    asked: queue.SimpleQueue[tuple[FlightJob, Scenario] | None]
+    answers: queue.SimpleQueue[CompletedFlight | None]
+    job: FlightJob | None = None
     search: str = ""
     flown: int = 0
 
-    def fly(self, job: Job, scenario: Scenario) -> Done:
+    def fly(self, job: FlightJob, scenario: Scenario) -> CompletedFlight:
         """Ask for a flight and wait for it: what the function is given."""
         self.asked.put((job, scenario))
         answer = self.answers.get()
@@ -75,71 +75,71 @@ class _Thought:
         return answer
 
 
-class Errands:
-    """Runs functions that fly; ``tick`` is called while their flights are waited for."""
+class OnDemandFlights:
+    """Runs procedures; ``on_wait`` is called while their flights are waited for."""
 
-    def __init__(self, ledger: Ledger, pool: Pool, tick: Callable[[], None]) -> None:
-        self._ledger, self._pool, self._tick = ledger, pool, tick
+    def __init__(self, ledger: Ledger, pool: Pool, on_wait: Callable[[], None]) -> None:
+        self._ledger, self._pool, self._on_wait = ledger, pool, on_wait
 
-    def run(self, functions: Mapping[str, Callable[[Fly], T]]) -> dict[str, T]:
+    def run(self, functions: Mapping[str, Callable[[FlyFunction], T]]) -> dict[str, T]:
         """Return what each function returns; raise the first one's error.
 
         The names tell flights of different functions apart and must be the same when resumed.
         """
-        thoughts = [
-            _Thought(name=name, asked=queue.SimpleQueue(), answers=queue.SimpleQueue())
+        procedures = [
+            _Procedure(name=name, asked=queue.SimpleQueue(), answers=queue.SimpleQueue())
             for name in functions
         ]
         with ThreadPoolExecutor(max(1, len(functions)), thread_name_prefix="garl") as threads:
             try:
                 futures = {
-                    thought.name: _begin(threads, thought, functions[thought.name])
-                    for thought in thoughts
+                    procedure.name: _begin(threads, procedure, functions[procedure.name])
+                    for procedure in procedures
                 }
-                self._wait(thoughts)
+                self._wait(procedures)
             finally:
-                for thought in thoughts:
-                    thought.answers.put(None)
+                for procedure in procedures:
+                    procedure.answers.put(None)
         return {name: future.result() for name, future in futures.items()}
 
-    def _wait(self, thoughts: Sequence[_Thought]) -> None:
+    def _wait(self, procedures: Sequence[_Procedure]) -> None:
         """Let the pool fly what is asked for until nobody asks any more."""
-        waiting = list(thoughts)
+        waiting = list(procedures)
         while waiting:
-            waiting = [thought for thought in waiting if not self._advance(thought)]
+            waiting = [procedure for procedure in waiting if not self._advance(procedure)]
             if waiting:
                 self._pool.turn()
-            self._tick()
+            self._on_wait()
 
-    def _advance(self, thought: _Thought) -> bool:
+    def _advance(self, procedure: _Procedure) -> bool:
         """Take a function as far as it goes without a flight; return whether it is done."""
         while True:
-            if thought.job is not None:
-                done = self._done(thought.job, thought.search)
+            if procedure.job is not None:
+                done = self._done(procedure.job, procedure.search)
                 if done is None:
                     return False
-                thought.job = None
-                thought.answers.put(done)
-            wanted = thought.asked.get()
+                procedure.job = None
+                procedure.answers.put(done)
+            wanted = procedure.asked.get()
             if wanted is None:
                 return True
-            self._ask(thought, *wanted)
+            self._ask(procedure, *wanted)
 
-    def _ask(self, thought: _Thought, job: Job, scenario: Scenario) -> None:
+    def _ask(self, procedure: _Procedure, job: FlightJob, scenario: Scenario) -> None:
         text = dump_scenario(scenario)
         # What is asked belongs to the key: resumed with another budget, a function asks otherwise.
-        key = f"errand {thought.name} {thought.flown} {job.flown_facts()} {text}"
-        thought.job, thought.search = job, hashlib.sha256(key.encode()).hexdigest()[:16]
-        thought.flown += 1
+        key = f"errand {procedure.name} {procedure.flown} {job.flown_facts()} {text}"
+        procedure.job, procedure.search = job, hashlib.sha256(key.encode()).hexdigest()[:16]
+        procedure.flown += 1
         name = job.system.name
-        self._ledger.add_search(thought.search, name, job.map, 1, job.dumps(), "on_demand")
-        self._ledger.add_slots(thought.search, 0, {0: text})
+        self._ledger.add_search(procedure.search, name, job.map, 1, job.dumps(), "on_demand")
+        self._ledger.add_slots(procedure.search, 0, {0: text})
 
-    def _done(self, job: Job, search: str) -> Done | None:
+    def _done(self, job: FlightJob, search: str) -> CompletedFlight | None:
         result = self._ledger.result(search, 0, 0)
         if result is None:
             return None
-        return Done(
+        return CompletedFlight(
             result=result,
             sha256=self._ledger.sha256(search, 0, 0),
             record=Path(job.flights) / f"{flight_name(search, 0, 0, job.map)}.npz",
@@ -147,8 +147,8 @@ class Errands:
 
 
 def _begin(
-    threads: ThreadPoolExecutor, thought: _Thought, function: Callable[[Fly], T]
+    threads: ThreadPoolExecutor, procedure: _Procedure, function: Callable[[FlyFunction], T]
 ) -> Future[T]:
-    future = threads.submit(function, thought.fly)
-    future.add_done_callback(lambda _: thought.asked.put(None))
+    future = threads.submit(function, procedure.fly)
+    future.add_done_callback(lambda _: procedure.asked.put(None))
     return future

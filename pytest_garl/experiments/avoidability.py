@@ -17,7 +17,7 @@ from pytest_garl.execution.job import load_scenario
 from pytest_garl.execution.ledger import Ledger
 from pytest_garl.execution.ledger_queries import LedgerFlight
 from pytest_garl.execution.local_pool import local_pool
-from pytest_garl.execution.on_demand import Errands, Fly
+from pytest_garl.execution.on_demand import FlyFunction, OnDemandFlights
 from pytest_garl.execution.reference import reference_to
 from pytest_garl.experiments.measure import Piloted, Search
 from pytest_garl.regressions.follow_up import done_of
@@ -50,7 +50,7 @@ def pilot(
         for flight in drawn[search.key]
     }
     with closing(_opened(path)) as ledger, closing(local_pool(ledger.queue, workers)) as pool:
-        avoided = Errands(ledger, pool, tick).run(flights)
+        avoided = OnDemandFlights(ledger, pool, tick).run(flights)
     return tuple(
         Piloted(
             tried=len(drawn[search.key]),
@@ -74,7 +74,7 @@ def _opened(path: Path) -> Ledger:
     return Ledger.create(path, {})
 
 
-def _avoided(search: Search, flight: LedgerFlight, fly: Fly) -> bool:
+def _avoided(search: Search, flight: LedgerFlight, fly: FlyFunction) -> bool:
     """Whether the reference pilot comes through without a violation."""
     scenario, done = load_scenario(flight.scenario), done_of(flight, search.job)
     behaviour = recorded_behaviour(done, scenario, search.map)

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pytest_garl.cpu_dispatch import of_children
-from pytest_garl.execution.job import Job, load_scenario, loads
+from pytest_garl.execution.job import FlightJob, load_scenario, loads
 from pytest_garl.execution.ledger import Ledger
 from pytest_garl.execution.ledger_queries import LedgerFlight
 from pytest_garl.experiments.results import ExperimentError, Row
@@ -34,7 +34,7 @@ class Search:
     """A finished search: its key in the ledger, its job, its flights in slot order."""
 
     key: str
-    job: Job
+    job: FlightJob
     flights: tuple[LedgerFlight, ...]
 
     @property

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import pytest
 
-from pytest_garl.execution.on_demand import Done
+from pytest_garl.execution.on_demand import CompletedFlight
 from pytest_garl.execution.result import FlightResult
 from pytest_garl.plugin.failed_statement import failure_of
 from pytest_garl.plugin.keys import LANDING
@@ -41,7 +41,7 @@ class Fault:
             return f"{search} {self.signature}"
         return f"{search} {self.signature} {self.test} {self.failure.assertion}"
 
-    def shows_in(self, run: Run, target: Target, done: Done) -> bool:
+    def shows_in(self, run: Run, target: Target, done: CompletedFlight) -> bool:
         """Whether the same assertion of the test fails for the same reason in another flight."""
         verdict = done.result.verdict
         if not self.own and verdict.signature != self.signature:
@@ -55,7 +55,7 @@ class Fault:
             return False
         return found.is_about(verdict.primary) is not self.own
 
-    def shows_again_in(self, run: Run, target: Target, done: Done) -> bool:
+    def shows_again_in(self, run: Run, target: Target, done: CompletedFlight) -> bool:
         """Whether a flight that was flown once more has the same violation."""
         if self.own:
             return self.shows_in(run, target, done)
@@ -115,9 +115,9 @@ def _told(fault: Fault, target: Target) -> str:
     return f"told failure {fault.key(target.search)}"
 
 
-def _done(run: Run, target: Target) -> Done:
+def _done(run: Run, target: Target) -> CompletedFlight:
     sha256 = run.trajectory_sha256(target)
-    return Done(result=run.result(target), sha256=sha256, record=run.record(target))
+    return CompletedFlight(result=run.result(target), sha256=sha256, record=run.record(target))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -26,8 +26,8 @@ from pytest_garl.plugin.options import Options
 from pytest_garl.plugin.target import FIRST, Target, name_of
 
 if TYPE_CHECKING:
-    from pytest_garl.execution.job import Job
-    from pytest_garl.execution.on_demand import Done
+    from pytest_garl.execution.job import FlightJob
+    from pytest_garl.execution.on_demand import CompletedFlight
     from pytest_garl.execution.result import FlightResult
     from pytest_garl.plugin.user_assertions import ItemAssertion
     from pytest_garl.regressions.follow_up import InvestigatedSignature
@@ -249,9 +249,9 @@ class Run:
         """Return what a slot came to that is flown, or will be."""
         return self._wait(target.search, target.slot)
 
-    def refly(self, target: Target, count: int) -> list[Done]:
+    def refly(self, target: Target, count: int) -> list[CompletedFlight]:
         """Fly a flown slot ``count`` times more."""
-        from pytest_garl.execution.on_demand import Done
+        from pytest_garl.execution.on_demand import CompletedFlight
 
         job = self.ledger.job(target.search)
         assert job is not None
@@ -268,12 +268,12 @@ class Run:
                 self.options.folder / "flights" / f"{flight_name(errand, 0, 0, target.map)}.npz"
             )
             sha256 = self.ledger.sha256(errand, 0, 0)
-            flown.append(Done(result=result, sha256=sha256, record=record))
+            flown.append(CompletedFlight(result=result, sha256=sha256, record=record))
         return flown
 
     def fly_all(
         self, target: Target, npcs: PolicySpec, scenarios: Sequence[Scenario]
-    ) -> Sequence[Done]:
+    ) -> Sequence[CompletedFlight]:
         """Return what scenarios come to that are flown beside the searches."""
         from pytest_garl.execution.batch import fly_all
 
@@ -343,15 +343,15 @@ class Run:
             )
         self.breeders[search] = Breeder(self.ledger, search, method, slots)
 
-    def job(self, target: Target, npcs: PolicySpec) -> Job:
+    def job(self, target: Target, npcs: PolicySpec) -> FlightJob:
         """Return what a child must know to fly a target."""
-        from pytest_garl.execution.job import Job
+        from pytest_garl.execution.job import FlightJob
         from pytest_garl.scenarios.maps.map import load_map
 
         map = load_map(target.map, self.options.map_folders)
         sources = self._sources_of(target)
         own = sources_of(self.simulator.load()) if self.simulator != BUILT_IN else ()
-        return Job(
+        return FlightJob(
             system=reference_to(target.system),
             system_sha256=combined_sha256(sources),
             simulator=self.simulator,

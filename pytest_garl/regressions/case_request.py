@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from pytest_garl.execution.job import Job
-from pytest_garl.execution.on_demand import Done
+from pytest_garl.execution.job import FlightJob
+from pytest_garl.execution.on_demand import CompletedFlight
 from pytest_garl.regressions.case import Case, RecordedBehaviour
 from pytest_garl.regressions.robustness import COUNT
 from pytest_garl.regressions.shrink import complexity, genome_of
@@ -26,8 +26,8 @@ class CaseRequest:
 
     name: str
     signature: str
-    violations: tuple[tuple[Scenario, Done], ...]
-    job: Job
+    violations: tuple[tuple[Scenario, CompletedFlight], ...]
+    job: FlightJob
     map: Map
     budget: int
     user_assertion: UserAssertion | None = None
@@ -51,7 +51,7 @@ class CaseRequest:
         crash = self.violations[0][1].result.crash
         return crash is not None and crash.kind in ("raised", "nonsense", "hung")
 
-    def failed(self, scenario: Scenario, done: Done) -> bool:
+    def failed(self, scenario: Scenario, done: CompletedFlight) -> bool:
         """Whether a flight failed in the way that is asked about."""
         if self.user_assertion is None:
             return done.signature == self.signature
@@ -83,7 +83,7 @@ class Failure:
     first: Scenario
     scenario: Scenario
     behaviour: RecordedBehaviour
-    done: Done
+    done: CompletedFlight
     robust: int
     asked: int = COUNT
 

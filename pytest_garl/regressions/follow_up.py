@@ -9,10 +9,10 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from pytest_garl.execution.job import Job, load_scenario, loads
+from pytest_garl.execution.job import FlightJob, load_scenario, loads
 from pytest_garl.execution.ledger import Ledger
 from pytest_garl.execution.ledger_queries import LedgerFlight
-from pytest_garl.execution.on_demand import Done, Errands, Fly
+from pytest_garl.execution.on_demand import CompletedFlight, FlyFunction, OnDemandFlights
 from pytest_garl.execution.pool import Pool
 from pytest_garl.execution.slot import flight_name
 from pytest_garl.regressions.case import Case
@@ -181,8 +181,8 @@ def _failures(
     search: str,
     violating: Sequence[LedgerFlight],
     user_assertion: UserAssertion | None,
-    job: Job,
-) -> tuple[tuple[Scenario, Done], ...]:
+    job: FlightJob,
+) -> tuple[tuple[Scenario, CompletedFlight], ...]:
     """Return scenarios with their flights: those that violated, or those that a test refuses."""
     rows = ledger.queries.flown(search) if user_assertion else violating
     flights = [(load_scenario(row.scenario), done_of(row, job)) for row in rows]
@@ -195,10 +195,12 @@ def _failures(
     )
 
 
-def done_of(row: LedgerFlight, job: Job) -> Done:
+def done_of(row: LedgerFlight, job: FlightJob) -> CompletedFlight:
     """Return a search's flight as what is flown beside it comes back."""
     name = flight_name(row.search, row.generation, row.slot, job.map)
-    return Done(result=row.result, sha256=row.sha256, record=Path(job.flights) / f"{name}.npz")
+    return CompletedFlight(
+        result=row.result, sha256=row.sha256, record=Path(job.flights) / f"{name}.npz"
+    )
 
 
 def follow_up(
@@ -214,10 +216,10 @@ def follow_up(
     """
     findings: dict[str, CaseResult] = {}
     while reached := _reached(wanted, findings):
-        functions: dict[str, Callable[[Fly], CaseResult]] = {
+        functions: dict[str, Callable[[FlyFunction], CaseResult]] = {
             each.name: functools.partial(_pursue, each) for each in reached
         }
-        findings |= Errands(ledger, pool, tick).run(functions)
+        findings |= OnDemandFlights(ledger, pool, tick).run(functions)
     for each in wanted:
         if each.name not in findings:
             findings[each.name] = as_found(each)
@@ -232,7 +234,7 @@ def _reached(
     return [each for each in shares(waiting, findings) if each.budget]
 
 
-def _pursue(request: CaseRequest, fly: Fly) -> CaseResult:
+def _pursue(request: CaseRequest, fly: FlyFunction) -> CaseResult:
     return CaseBuilder(request, fly).run()
 
 

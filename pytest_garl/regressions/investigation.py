@@ -6,8 +6,8 @@ import dataclasses
 from collections.abc import Callable, Iterator, Sequence
 
 from pytest_garl.adversary.recorded import recorded_spec
-from pytest_garl.execution.job import Job
-from pytest_garl.execution.on_demand import Done, Fly
+from pytest_garl.execution.job import FlightJob
+from pytest_garl.execution.on_demand import CompletedFlight, FlyFunction
 from pytest_garl.execution.reference import reference_to
 from pytest_garl.regressions.case import Avoidable, Case, RecordedBehaviour
 from pytest_garl.regressions.case_request import CaseRequest, CaseResult, Failure, simplest_first
@@ -43,9 +43,9 @@ CANDIDATES = 3
 class CaseBuilder:
     """The train of thought about one signature; every flight goes through ``fly``."""
 
-    def __init__(self, request: CaseRequest, fly: Fly) -> None:
+    def __init__(self, request: CaseRequest, fly: FlyFunction) -> None:
         self._request, self._fly, self._flights, self._piloted = request, fly, 0, 0
-        self._flown: dict[Scenario, Done] = dict(request.violations)
+        self._flown: dict[Scenario, CompletedFlight] = dict(request.violations)
 
     def run(self) -> CaseResult:
         """Return what was found out."""
@@ -99,11 +99,11 @@ class CaseBuilder:
             reason=reason,
         )
 
-    def _go(self, job: Job, scenario: Scenario) -> Done:
+    def _go(self, job: FlightJob, scenario: Scenario) -> CompletedFlight:
         self._flights += 1
         return self._fly(job, scenario)
 
-    def _again(self, scenario: Scenario, behaviour: RecordedBehaviour) -> Done:
+    def _again(self, scenario: Scenario, behaviour: RecordedBehaviour) -> CompletedFlight:
         """Fly with recorded moves."""
         spec = recorded_spec(dict(behaviour.moves), dict(behaviour.changes))
         return self._go(dataclasses.replace(self._request.job, npcs=spec), scenario)
@@ -141,7 +141,11 @@ class CaseBuilder:
         return None
 
     def _asked(
-        self, first: Scenario, scenario: Scenario, behaviour: RecordedBehaviour, done: Done
+        self,
+        first: Scenario,
+        scenario: Scenario,
+        behaviour: RecordedBehaviour,
+        done: CompletedFlight,
     ) -> Failure:
         robust = self._robust(scenario, behaviour)
         return Failure(
@@ -187,7 +191,7 @@ class CaseBuilder:
         alone = not failure.behaviour.moves
         return "live" if alone or self._comes_through(pilot, scenario) else "recorded"
 
-    def _comes_through(self, pilot: Job, scenario: Scenario) -> bool:
+    def _comes_through(self, pilot: FlightJob, scenario: Scenario) -> bool:
         self._piloted += 1
         done = self._go(pilot, scenario)
         return not done.signature and not self._request.failed(scenario, done)

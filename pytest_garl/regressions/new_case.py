@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from pytest_garl.execution.on_demand import Done
+from pytest_garl.execution.on_demand import CompletedFlight
 from pytest_garl.execution.reference import simulator_sha256
 from pytest_garl.regressions.case import Avoidable, Case, Evidence, RecordedBehaviour, Violation
 from pytest_garl.regressions.case_request import (
@@ -31,7 +31,7 @@ def as_found(request: CaseRequest) -> CaseResult:
 
 
 def unasked(
-    first: Scenario, scenario: Scenario, behaviour: RecordedBehaviour, done: Done
+    first: Scenario, scenario: Scenario, behaviour: RecordedBehaviour, done: CompletedFlight
 ) -> Failure:
     """Return a failure of which no neighbour was flown."""
     return Failure(
@@ -101,7 +101,7 @@ def _violation(verdict: Verdict, flight: Flight | None, own: UserFailure | None)
     )
 
 
-def recorded_behaviour(done: Done, scenario: Scenario, map: Map) -> RecordedBehaviour:
+def recorded_behaviour(done: CompletedFlight, scenario: Scenario, map: Map) -> RecordedBehaviour:
     """Return what each object did in a flight; nothing where its process did not live."""
     names = [name for name, _ in map.without(scenario.absent).object_names]
     if not done.record.exists():
@@ -116,7 +116,7 @@ def recorded_behaviour(done: Done, scenario: Scenario, map: Map) -> RecordedBeha
     )
 
 
-def find_colliding_object(done: Done) -> str:
+def find_colliding_object(done: CompletedFlight) -> str:
     """Return the moving object that the UAV hit, if it did."""
     hit, kind = done.result.collisions, done.result.verdict.violation_type
     return hit[-1] if hit and kind == "IV" else ""

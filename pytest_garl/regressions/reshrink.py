@@ -10,9 +10,9 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from pytest_garl.adversary.catalogue import policy_spec
-from pytest_garl.execution.batch import own_pool
-from pytest_garl.execution.job import Job
-from pytest_garl.execution.on_demand import Errands, Fly
+from pytest_garl.execution.batch import temporary_pool
+from pytest_garl.execution.job import FlightJob
+from pytest_garl.execution.on_demand import FlyFunction, OnDemandFlights
 from pytest_garl.execution.reference import (
     BUILT_IN,
     Reference,
@@ -70,8 +70,8 @@ def shrink_case(
     means = means or Means()
     map = load_map(case.scenario.map, map_folders)
     system = system_of(case, folder)
-    with own_pool(workers) as (ledger, pool):
-        job = Job(
+    with temporary_pool(workers) as (ledger, pool):
+        job = FlightJob(
             system=reference_to(system),
             system_sha256=sources_sha256(system, dict(means.files)),
             simulator=means.simulator,
@@ -95,16 +95,16 @@ def shrink_case(
             test=case.test,
         )
 
-        def think(fly: Fly) -> CaseResult:
+        def think(fly: FlyFunction) -> CaseResult:
             return CaseReshrinker(request, fly, case).run()
 
-        return Errands(ledger, pool, lambda: None).run({case.id: think})[case.id]
+        return OnDemandFlights(ledger, pool, lambda: None).run({case.id: think})[case.id]
 
 
 class CaseReshrinker(CaseBuilder):
     """The train of thought about a saved case: it begins with what its file says."""
 
-    def __init__(self, request: CaseRequest, fly: Fly, case: Case) -> None:
+    def __init__(self, request: CaseRequest, fly: FlyFunction, case: Case) -> None:
         super().__init__(request, fly)
         self._case = case
 

@@ -12,7 +12,7 @@ from pytest_garl.baselines.file import (
 )
 from pytest_garl.baselines.pairs import FlightSummary
 from pytest_garl.baselines.record import BaselineSpec
-from pytest_garl.execution.job import Job, dump_scenario
+from pytest_garl.execution.job import FlightJob, dump_scenario
 from pytest_garl.execution.ledger import Ledger
 from pytest_garl.execution.reference import BUILT_IN, Reference
 from pytest_garl.scenarios.maps.map import load_map
@@ -43,8 +43,8 @@ def baseline(*sets: BaselineSet) -> Baseline:
     return Baseline(cpu="x86_64-avx2", versions=versions, sets=sets or (baseline_set(),))
 
 
-def job(simulator: Reference = BUILT_IN) -> Job:
-    return Job(
+def job(simulator: Reference = BUILT_IN) -> FlightJob:
+    return FlightJob(
         system=Reference(module="stack.landing", file="", qualname="Lander"),
         system_sha256="",
         simulator=simulator,
@@ -59,7 +59,7 @@ def job(simulator: Reference = BUILT_IN) -> Job:
     )
 
 
-def write_ledger(path: Path, of: Job, method: str = "") -> None:
+def write_ledger(path: Path, of: FlightJob, method: str = "") -> None:
     ledger = Ledger.create(path, {"method": method} if method else {})
     ledger.add_search("a", "stack.landing:Lander", "lawn", 2, of.dumps())
     texts = [dump_scenario(each) for each in BaselineSpec(count=2).scenarios(LAWN)]

@@ -10,7 +10,7 @@ from pytest_garl.baselines.file import (
     BaselineError,
 )
 from pytest_garl.baselines.gate import compare_flights, compare_sets
-from pytest_garl.execution.on_demand import Done
+from pytest_garl.execution.on_demand import CompletedFlight
 from pytest_garl.regressions.robustness import neighbours
 from pytest_garl.scenarios.scenario import Scenario
 from tests.baselines.samples import DOG, LAWN, baseline_set
@@ -23,10 +23,10 @@ def test_sets_are_compared_by_scenario_and_refused_if_the_scenarios_differ() -> 
     after = dataclasses.replace(after, flights=(*after.flights[:2], broken))
     flown: list[Scenario] = []
 
-    def fly(scenarios: Sequence[Scenario]) -> list[Done]:
+    def fly(scenarios: Sequence[Scenario]) -> list[CompletedFlight]:
         flown.extend(scenarios)
         violation = flight_result(DOG.signature)
-        return [Done(result=violation, sha256="", record=Path())] * len(scenarios)
+        return [CompletedFlight(result=violation, sha256="", record=Path())] * len(scenarios)
 
     found = compare_sets(before, after, LAWN, fly)
     assert [pair.text for pair in found.with_result("broke")] == [
@@ -43,7 +43,7 @@ def test_sets_are_compared_by_scenario_and_refused_if_the_scenarios_differ() -> 
 def test_the_gate_names_inconclusive_flights() -> None:
     unsure = flight_result(outcome="inconclusive")
     flights = [
-        Done(result=each, sha256="", record=Path())
+        CompletedFlight(result=each, sha256="", record=Path())
         for each in (flight_result(), unsure, flight_result())
     ]
     found = compare_flights(baseline_set(), flights, LAWN, lambda _: [])

@@ -7,7 +7,7 @@ import sys
 import time
 from pathlib import Path
 
-from pytest_garl.execution.job import Job
+from pytest_garl.execution.job import FlightJob
 from pytest_garl.execution.reference import reference_to
 from pytest_garl.landing_system import Land, Observation
 from pytest_garl.scenarios.chromosome import decode
@@ -79,8 +79,8 @@ def scenario(fog: float = 0.0) -> Scenario:
     return nominal.replace({"environment.fog": fog})
 
 
-def job_of(system: type, flights: Path, timeout_s: float = 10.0) -> Job:
-    return Job(
+def job_of(system: type, flights: Path, timeout_s: float = 10.0) -> FlightJob:
+    return FlightJob(
         system=reference_to(system),
         system_sha256="",
         simulator=reference_to(tiny_simulator.fly),

@@ -9,8 +9,8 @@ import pytest
 from pytest_garl.adversary.catalogue import policy_spec
 from pytest_garl.baselines.record import BaselineSpec
 from pytest_garl.errors import LedgerError
-from pytest_garl.execution.batch import fly_all, own_pool
-from pytest_garl.execution.job import Job, dump_scenario
+from pytest_garl.execution.batch import fly_all, temporary_pool
+from pytest_garl.execution.job import FlightJob, dump_scenario
 from pytest_garl.execution.ledger import Ledger
 from pytest_garl.execution.reference import BUILT_IN, Reference
 from pytest_garl.scenarios.maps.map import load_map
@@ -18,7 +18,7 @@ from pytest_garl.verdicts.verdict import Limits
 from tests.execution.flying import Good, Replaces, job_of, scenario
 from tests.support.results import flight_result
 
-JOB = Job(
+JOB = FlightJob(
     system=Reference(module="stack", file="", qualname="Lander"),
     system_sha256="one",
     simulator=BUILT_IN,
@@ -57,7 +57,7 @@ def pool(tmp_path: Path) -> Instant:
     return Instant(Ledger.create(tmp_path / "ledger.sqlite", {}))
 
 
-def fly(pool: Instant, job: Job = JOB, count: int = 3) -> list[float]:
+def fly(pool: Instant, job: FlightJob = JOB, count: int = 3) -> list[float]:
     flights = fly_all(pool.ledger, pool, job, SCENARIOS[:count])
     return [done.result.elapsed_s for done in flights]
 
@@ -102,7 +102,7 @@ def test_jobs_differ_in_what_is_flown_and_not_in_where_it_lies(
 
 
 def test_what_one_system_replaces_in_its_process_bends_no_flight_of_another(tmp_path: Path) -> None:
-    with own_pool(1) as (ledger, pool):
+    with temporary_pool(1) as (ledger, pool):
 
         def hash_of(system: type, distance_m: float) -> str:
             # Limits of their own make a search of their own.

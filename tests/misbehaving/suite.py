@@ -18,9 +18,9 @@ from typing import Any
 
 from pytest_garl.adversary.catalogue import policy_spec
 from pytest_garl.errors import GarlError
-from pytest_garl.execution.batch import fly_all, own_pool
+from pytest_garl.execution.batch import fly_all, temporary_pool
 from pytest_garl.execution.ledger import Ledger
-from pytest_garl.execution.on_demand import Done
+from pytest_garl.execution.on_demand import CompletedFlight
 from pytest_garl.execution.pool import Pool
 from pytest_garl.execution.processes import any_command_contains
 from pytest_garl.execution.reference import BUILT_IN
@@ -111,7 +111,7 @@ class _Run:
         self._ledger, self._pool, self._folder = ledger, pool, folder
         self._flown = 0
 
-    def fly(self, system: type, scenario: Scenario, timeout_s: float = 10.0) -> Done:
+    def fly(self, system: type, scenario: Scenario, timeout_s: float = 10.0) -> CompletedFlight:
         """Fly once; raise TimeoutError where the run hangs."""
         self._flown += 1
         until = time.monotonic() + PATIENCE_S
@@ -138,7 +138,7 @@ class _Run:
 
 @contextmanager
 def _run(folder: Path) -> Iterator[_Run]:
-    with own_pool(1) as (ledger, pool):
+    with temporary_pool(1) as (ledger, pool):
         yield _Run(ledger, pool, folder)
 
 

@@ -11,7 +11,7 @@ from typing import Any
 import pytest
 
 from pytest_garl.adversary.catalogue import policy_spec
-from pytest_garl.execution.on_demand import Done
+from pytest_garl.execution.on_demand import CompletedFlight
 from pytest_garl.plugin.run import _steered
 from pytest_garl.regressions.case import Case
 from pytest_garl.regressions.new_case import recorded_behaviour
@@ -29,7 +29,9 @@ def recorded(tmp_path: Path) -> Case:
     """Return a case of a flight during which the dog's policy let it snow."""
     flight = fly(SCENARIO, ReferencePilot, WEATHERMAKER, map=LAWN)
     save(flight, tmp_path / "flight.npz")
-    done = Done(result=flight_result(), sha256=flight.sha256, record=tmp_path / "flight.npz")
+    done = CompletedFlight(
+        result=flight_result(), sha256=flight.sha256, record=tmp_path / "flight.npz"
+    )
     behaviour = recorded_behaviour(done, SCENARIO, LAWN)
     assert behaviour.changes
     plain = case()

@@ -5,7 +5,7 @@ from typing import Any
 
 import pytest
 
-from pytest_garl.execution.on_demand import Done
+from pytest_garl.execution.on_demand import CompletedFlight
 from pytest_garl.regressions.case_request import CaseRequest, CaseResult
 from pytest_garl.regressions.follow_up import shares
 from pytest_garl.regressions.forecast import flights_after_search, remaining_work
@@ -23,7 +23,7 @@ GENOME = genome_for(LAWN)
 def kind(number: int, *, cap: int | None, budget: int = 12, crash: str = "") -> CaseRequest:
     scenario = decode(GENOME.nominal, GENOME, map="lawn", seed=number)
     result = flight_result(crash=broken(crash) if crash else None)
-    done = Done(result=result, sha256="", record=Path("none"))
+    done = CompletedFlight(result=result, sha256="", record=Path("none"))
     job: Any = None
     return CaseRequest(
         name=f"search {number}",

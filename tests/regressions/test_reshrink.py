@@ -8,8 +8,8 @@ from pathlib import Path
 import pytest
 
 from pytest_garl.adversary.catalogue import policy_spec
-from pytest_garl.execution.job import Job
-from pytest_garl.execution.on_demand import Done
+from pytest_garl.execution.job import FlightJob
+from pytest_garl.execution.on_demand import CompletedFlight
 from pytest_garl.execution.reference import BUILT_IN, Reference, simulator_sha256
 from pytest_garl.execution.result import FlightResult
 from pytest_garl.regressions.case import Case
@@ -29,7 +29,7 @@ from tests.support.results import flight_result
 
 SIGNATURE = "IV:dog:last-metre:unseen"
 Fails = Callable[[Scenario, str], bool]
-JOB = Job(
+JOB = FlightJob(
     system=Reference(module="stack.landing", file="", qualname="Lander"),
     system_sha256="ab" * 32,
     simulator=BUILT_IN,
@@ -54,17 +54,17 @@ class Flights:
     def __init__(self, fails: Fails) -> None:
         self.fails, self.count = fails, 0
 
-    def __call__(self, job: Job, scenario: Scenario) -> Done:
+    def __call__(self, job: FlightJob, scenario: Scenario) -> CompletedFlight:
         self.count += 1
         pilot = job.system.qualname == "ReferencePilot"
         failed = not pilot and self.fails(scenario, job.npcs.name)
-        return Done(
+        return CompletedFlight(
             result=result(SIGNATURE if failed else ""), sha256="cd" * 32, record=Path("/nowhere/x")
         )
 
 
 def request(budget: int, *scenarios: Scenario) -> CaseRequest:
-    found = Done(result=result(SIGNATURE), sha256="", record=Path("/nowhere/x"))
+    found = CompletedFlight(result=result(SIGNATURE), sha256="", record=Path("/nowhere/x"))
     return CaseRequest(
         name=f"search {SIGNATURE}",
         signature=SIGNATURE,

@@ -14,8 +14,8 @@ import pytest
 
 from pytest_garl import cpu_dispatch
 from pytest_garl.adversary.recorded import recorded_spec
-from pytest_garl.execution.batch import fly_all, own_pool
-from pytest_garl.execution.job import Job
+from pytest_garl.execution.batch import fly_all, temporary_pool
+from pytest_garl.execution.job import FlightJob
 from pytest_garl.execution.reference import BUILT_IN, Reference
 from pytest_garl.regressions.case import Case
 from pytest_garl.regressions.corpus import Corpus
@@ -100,11 +100,11 @@ ROBUST = case_of_each(lambda case: not case.edge, max)
 def flown_by_a_child() -> list[tuple[str, str]]:
     """Return verdict and hash of each case, flown as a search flies."""
     flown = []
-    with own_pool(1) as (ledger, pool):
+    with temporary_pool(1) as (ledger, pool):
         for _, case in SHORT:
             map = load_map(case.scenario.map)
             module, _, qualname = case.system.partition(":")
-            job = Job(
+            job = FlightJob(
                 system=Reference(module=module, file="", qualname=qualname),
                 system_sha256="",
                 simulator=BUILT_IN,

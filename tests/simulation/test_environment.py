@@ -10,7 +10,7 @@ import pytest
 from pytest_garl import Command, Mission, Observation, PositionSetpoint
 from pytest_garl.adversary.catalogue import policy_spec
 from pytest_garl.adversary.recorded import recorded_spec
-from pytest_garl.execution.on_demand import Done
+from pytest_garl.execution.on_demand import CompletedFlight
 from pytest_garl.landing_system import Airframe, Camera
 from pytest_garl.regressions.case import RecordedBehaviour
 from pytest_garl.regressions.new_case import recorded_behaviour
@@ -167,7 +167,9 @@ def test_a_policy_knows_the_environment_as_it_is() -> None:
 def test_recorded_changes_fly_the_same_flight_to_the_byte(tmp_path: Path) -> None:
     flight, seen = flown()
     save(flight, tmp_path / "flight.npz")
-    done = Done(result=flight_result(), sha256=flight.sha256, record=tmp_path / "flight.npz")
+    done = CompletedFlight(
+        result=flight_result(), sha256=flight.sha256, record=tmp_path / "flight.npz"
+    )
     behaviour = recorded_behaviour(done, SCENARIO, LAWN)
     assert [name for name, _ in behaviour.changes] == ["dog-1"]
     again, seen_again = flown(recorded_spec(dict(behaviour.moves), dict(behaviour.changes)))
@@ -188,7 +190,7 @@ def test_a_file_of_a_flight_that_changed_nothing_says_nothing_of_it(tmp_path: Pa
     with np.load(tmp_path / "flight.npz") as file:
         assert b'"changes"' not in file["header"].tobytes()
     assert all(item.changes == () for item in load(tmp_path / "flight.npz").objects)
-    done = Done(result=flight_result(), sha256="", record=tmp_path / "flight.npz")
+    done = CompletedFlight(result=flight_result(), sha256="", record=tmp_path / "flight.npz")
     assert recorded_behaviour(done, SCENARIO, LAWN) == RecordedBehaviour(
         moves=recorded_behaviour(done, SCENARIO, LAWN).moves
     )

@@ -12,7 +12,7 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
 from pytest_garl import cpu_dispatch
-from pytest_garl.execution.job import Job, loads
+from pytest_garl.execution.job import FlightJob, loads
 from pytest_garl.execution.ledger import Ledger
 from pytest_garl.execution.ledger_queue import Claim, WorkQueue
 from pytest_garl.execution.local_pool import FlightWorkers
@@ -113,7 +113,7 @@ class FlightActor:
         self._ledger.close()
         shutil.rmtree(self._folder, ignore_errors=True)
 
-    def _job(self, text: str) -> Job:
+    def _job(self, text: str) -> FlightJob:
         return self._relocation.job(text) if self._relocation else loads(text)
 
     def _at_home(self, text: str) -> str:

@@ -7,7 +7,7 @@ import json
 import re
 from dataclasses import dataclass
 
-from pytest_garl.execution.job import Job, loads
+from pytest_garl.execution.job import FlightJob, loads
 from pytest_garl.execution.reference import Reference
 
 
@@ -18,7 +18,7 @@ class Relocation:
     home: str
     here: str
 
-    def job(self, text: str) -> Job:
+    def job(self, text: str) -> FlightJob:
         """Return the job in ``text`` as it reads here.
 
         What lies outside the project was not copied: it is imported by name, wherever this machine
