@@ -32,7 +32,7 @@ from pytest_garl.scenarios.maps.map import load_map
 from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.search.catalogue import find_method
 from pytest_garl.search.method import Flown, Method, SearchPlan
-from pytest_garl.search.methods.garl import Garl
+from pytest_garl.search.methods.garl import Garl, GarlParameters
 from pytest_garl.simulation.fly import fly
 from pytest_garl.verdicts.paper_metrics import mean_distance, top_k
 from pytest_garl.verdicts.verdict import PAPER_LIMITS
@@ -58,20 +58,25 @@ def one(result: FlightResult) -> str:
 
 def half_exploring(plan: SearchPlan) -> Method:
     """Return ``garl`` with half of its scenarios without parents."""
-    return Garl(plan, explores=0.5)
+    return Garl(plan, GarlParameters(explore_share=0.5))
+
+
+def garl_with(**parameters: Any) -> Callable[[SearchPlan], Method]:
+    """Return the factory of ``garl`` with other parameters."""
+    return functools.partial(Garl, parameters=GarlParameters(**parameters))
 
 
 VARIANTS: dict[str, Callable[[SearchPlan], Method]] = {
     "garl": find_method("garl"),
-    "one cell": functools.partial(Garl, cell=one),
-    "cells of violations only": functools.partial(Garl, cell=found),
-    "without exploring": functools.partial(Garl, explores=0.0),
+    "one cell": garl_with(cell=one),
+    "cells of violations only": garl_with(cell=found),
+    "without exploring": garl_with(explore_share=0.0),
     "half of it exploring": half_exploring,
-    "cells in turn": functools.partial(Garl, learns_cells=False),
-    "without aimed steps": functools.partial(Garl, aims=0.0),
-    "without other weather": functools.partial(Garl, weathers=0.0),
-    "without crossover": functools.partial(Garl, crossover=0.0),
-    "without spreading": functools.partial(Garl, spreads=0.0),
+    "cells in turn": garl_with(learns_cells=False),
+    "without aimed steps": garl_with(aimed_share=0.0),
+    "without other weather": garl_with(other_weather_share=0.0),
+    "without crossover": garl_with(crossover_probability=0.0),
+    "without spreading": garl_with(spread_share=0.0),
     "garl-paper": find_method("garl-paper"),
     "random": find_method("random"),
     "random with dqn": find_method("random"),

@@ -15,6 +15,7 @@ from __future__ import annotations
 import hashlib
 from collections import Counter, defaultdict
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -36,60 +37,59 @@ from pytest_garl.search.operators import (
     nuclear_gene_crossover,
 )
 
-EXPLORES = 0.25
-"""Share of scenarios that have no parents, so that cells are still found late in a search."""
-AIMS = 0.5
-"""Share of children that differ from a parent in the object that it came nearest to, by a small
-step: what decides whether centimetres are missing."""
-WEATHERS = 0.5
-"""Share of these that also meet in another weather, that of a flight that was not aborted."""
-PROGRESS = 0.01
-"""A child that raises its cell's proximity to a violation by so much has succeeded."""
-NEAREST = 0.1
-"""The largest step shrinks with the distance to a violation, down to this share of it."""
-SPREADS = 0.75
-"""Share of places and speeds that are put away from all asked for before, in a scenario without
-parents and in one bred far from its parent."""
-MEMORY = 0.9
-"""What a trial still counts for after one more of its arm: cells change as they are searched."""
 NEAR, FAR = "near", "far"
 """Ways to breed: by small steps, or with all but the nearest object spread out."""
 
 Genes = tuple[tuple[str, float], ...]
 Arm = tuple[str, str]
-"""What is chosen between: a cell and a way to breed from it."""
-ORPHAN: Arm = ("", "")
-"""What has no parents."""
+"""A choice of the bandit: a cell and a way to breed from it."""
+NO_PARENT: Arm = ("", "")
+"""The arm of scenarios that are drawn at random."""
+
+
+def cell_of(result: FlightResult) -> str:
+    """Return how a flight failed or nearly failed: its signature, or else its outcome."""
+    return result.signature or result.closest_call or result.outcome
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class GarlParameters:
+    """All parameters of the search.
+
+    ``python -m studies.ablations`` measures what each part of the search is worth.
+    """
+
+    explore_share: float = 0.25
+    """Share of scenarios without parents, so that cells are still found late in a search."""
+    aimed_share: float = 0.5
+    """Share of children bred near whose small steps change only the object that their parent came
+    nearest to: that object decides whether centimetres are missing."""
+    other_weather_share: float = 0.5
+    """Share of aimed children that also get the weather of another flight that was not aborted."""
+    crossover_probability: float = CROSSOVER_PROBABILITY
+    """The paper's probability, for children bred near that are not aimed."""
+    spread_share: float = 0.75
+    """Share of places and speeds that are put away from all asked for before, in a scenario without
+    parents and in one bred far from its parent."""
+    least_progress: float = 0.01
+    """A child succeeds if it raises its cell's proximity to a violation by this much."""
+    least_step_share: float = 0.1
+    """The largest step shrinks with the distance to a violation, down to this share of it."""
+    trial_weight: float = 0.9
+    """Weight of an arm's trials after one more trial, because cells change as they are searched."""
+    learns_cells: bool = True
+    """Whether cells are chosen by their success; otherwise each in turn."""
+    cell: Callable[[FlightResult], str] = cell_of
+    """The name of a flight's cell, from the flight's result."""
 
 
 class Garl:
-    """The archive of cells, and how it is bred from.
-
-    ``explores`` is the share of scenarios without parents, ``aims`` that of children bred near
-    whose steps are aimed, ``weathers`` that of these in another weather, ``crossover`` the
-    paper's probability for the others, ``spreads`` the share of genes that are spread out,
-    ``cell`` names the cell of a flight's result; ``learns_cells`` is whether cells are chosen by
-    their success instead of in turn.
-    """
+    """The archive of cells, and how it is bred from."""
 
     learns = True
 
-    def __init__(
-        self,
-        plan: SearchPlan,
-        *,
-        explores: float = EXPLORES,
-        aims: float = AIMS,
-        weathers: float = WEATHERS,
-        learns_cells: bool = True,
-        crossover: float = CROSSOVER_PROBABILITY,
-        spreads: float = SPREADS,
-        cell: Callable[[FlightResult], str] | None = None,
-    ) -> None:
-        self._plan, self._explores, self._aims = plan, explores, aims
-        self._weathers, self._learns_cells = weathers, learns_cells
-        self._crossover, self._spreads = crossover, spreads
-        self._cell = cell or cell_of
+    def __init__(self, plan: SearchPlan, parameters: GarlParameters | None = None) -> None:
+        self._plan, self._parameters = plan, parameters or GarlParameters()
         place = hashlib.sha256(f"garl {plan.map.name}".encode()).digest()
         key = int.from_bytes(place[:4], "big")
         self._rng = np.random.default_rng(np.random.SeedSequence(plan.seed, spawn_key=(key,)))
@@ -108,12 +108,13 @@ class Garl:
 
     def tell(self, flown: Sequence[Flown]) -> Sequence[tuple[float, ...]]:
         """Put each flight into its cell; return its proximity to a violation."""
+        weight = self._parameters.trial_weight
         for item in flown:
-            name = self._cell(item.result)
+            name = self._parameters.cell(item.result)
             worth = self._worth(name, item)
             arm = self._arms[item.scenario.genes]
             wins, losses = self._trials[arm]
-            self._trials[arm] = MEMORY * wins + worth, MEMORY * losses + 1 - worth
+            self._trials[arm] = weight * wins + worth, weight * losses + 1 - worth
             self._cells[name].append(item)
         return [(violation_proximity(item.result),) for item in flown]
 
@@ -124,14 +125,14 @@ class Garl:
             self._signatures[signature] += 1
             return float(self._signatures[signature] ** -0.5)
         best = max((violation_proximity(other.result) for other in self._cells[name]), default=-1.0)
-        return float(violation_proximity(item.result) > best + PROGRESS)
+        return float(violation_proximity(item.result) > best + self._parameters.least_progress)
 
     def _new(self) -> Scenario:
         """Return a scenario that was not asked for before."""
         while True:
-            explores = not self._cells or self._rng.random() < self._explores
-            arm = ORPHAN if explores else self._choose()
-            scenario = self._random() if arm == ORPHAN else self._child(*arm)
+            explores = not self._cells or self._rng.random() < self._parameters.explore_share
+            arm = NO_PARENT if explores else self._choose()
+            scenario = self._random() if arm == NO_PARENT else self._child(*arm)
             if scenario.genes not in self._arms:
                 self._arms[scenario.genes] = arm
                 self._asked.append(encode(scenario, self._plan.genome))
@@ -142,7 +143,7 @@ class Garl:
         arms = [(name, NEAR) for name in sorted(self._cells)]
         # What is but nearly a violation hangs on all of its genes.
         arms += [(name, FAR) for name, _ in arms if name in self._signatures]
-        if not self._learns_cells:
+        if not self._parameters.learns_cells:
             bred = Counter(self._arms.values())
             return min(arms, key=lambda arm: bred[arm])
         trials = np.array([self._trials[arm] for arm in arms])
@@ -159,11 +160,11 @@ class Garl:
         """
         rng, genome, spread = self._rng, self._plan.genome, row.copy()
         asked = np.array(self._asked) if self._asked else row[None]
-        marker = self._marker
-        for column in np.flatnonzero(which & ~marker & (rng.random(row.size) < self._spreads)):
+        marker, share = self._marker, self._parameters.spread_share
+        for column in np.flatnonzero(which & ~marker & (rng.random(row.size) < share)):
             drawn = rng.uniform(genome.lower[column], genome.upper[column], CANDIDATES)
             spread[column] = drawn[farthest_from_all(drawn, asked[:, column])]
-        if (which & marker).any() and rng.random() < self._spreads:
+        if (which & marker).any() and rng.random() < share:
             shape = CANDIDATES, int(marker.sum())
             places = rng.uniform(genome.lower[marker], genome.upper[marker], shape)
             spread[marker] = places[farthest_from_nearest(places, asked[:, marker])]
@@ -179,21 +180,24 @@ class Garl:
         first = self._elite(name)
         row, seed = encode(first.scenario, genome), first.scenario.seed
         # What nearly fails needs a small change, and so does what shall fail again.
-        largest = LARGEST_STEP * max(NEAREST, 1 - violation_proximity(first.result))
+        largest = LARGEST_STEP * max(
+            self._parameters.least_step_share, 1 - violation_proximity(first.result)
+        )
         body = f"{first.result.closest_body}."
         aim = np.array([key.startswith(body) for key in genome.keys])
         if way == FAR:
             return self._scenario(self._spread(row, ~(aim | self._weather)), seed)
-        if aim.any() and rng.random() < self._aims:
+        if aim.any() and rng.random() < self._parameters.aimed_share:
             moved = local_steps(
                 row[None], genome.lower, genome.upper, rng, probability=1.0, largest=largest
             )[0]
-            if rng.random() < self._weathers:
+            if rng.random() < self._parameters.other_weather_share:
                 row = np.where(self._weather, encode(self._in_other_weather(), genome), row)
             return self._scenario(np.where(aim, moved, row), seed)
         second = self._elite(str(rng.choice(sorted(self._cells)))).scenario
         pair = np.array([[*row, seed], [*encode(second, genome), second.seed]])
-        crossed = nuclear_gene_crossover(pair, genome.borders, rng, self._crossover)[:1]
+        probability = self._parameters.crossover_probability
+        crossed = nuclear_gene_crossover(pair, genome.borders, rng, probability)[:1]
         moved = local_steps(crossed[:, :-1], genome.lower, genome.upper, rng, largest=largest)[0]
         return self._scenario(moved, int(crossed[0, -1]))
 
@@ -213,11 +217,6 @@ class Garl:
     def _scenario(self, row: Matrix, seed: int) -> Scenario:
         plan = self._plan
         return repair(decode(row, plan.genome, map=plan.map.name, seed=seed), plan.map)
-
-
-def cell_of(result: FlightResult) -> str:
-    """Return how a flight failed or nearly did: a signature, or the outcome."""
-    return result.signature or result.closest_call or result.outcome
 
 
 METHOD = MethodDeclaration(make=Garl, policy="dqn")

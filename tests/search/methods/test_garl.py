@@ -14,7 +14,7 @@ from pytest_garl.scenarios.genes import genome_for
 from pytest_garl.scenarios.maps.map import load_map
 from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.search.method import Flown, SearchPlan
-from pytest_garl.search.methods.garl import EXPLORES, FAR, NEAR, Garl, cell_of
+from pytest_garl.search.methods.garl import FAR, NEAR, Garl, GarlParameters, cell_of
 from pytest_garl.search.methods.random import RandomSearch
 from pytest_garl.verdicts.paper_metrics import mean_distance
 from pytest_garl.verdicts.verdict import Margin
@@ -67,13 +67,13 @@ def test_cells_of_which_nothing_is_known_are_bred_from_alike() -> None:
     bred: Counter[str] = Counter()
     for _ in range(30):
         bred.update(seeds[each.seed] for each in search_.ask() if each.seed in seeds)
-    share = 30 * 20 * (1 - EXPLORES) / 4
+    share = 30 * 20 * (1 - GarlParameters().explore_share) / 4
     for cell in ("a", "b", "c", ""):
         assert 0.7 * share < bred[cell] < 1.3 * share
 
 
 def test_a_cell_whose_children_succeed_is_bred_from_more_often() -> None:
-    method = Garl(PLAN, explores=0.0, crossover=0.0)
+    method = Garl(PLAN, GarlParameters(explore_share=0.0, crossover_probability=0.0))
     lines: dict[int, str] = {}
     bred: Counter[str] = Counter()
     for _ in range(5):
@@ -113,7 +113,7 @@ WEATHER = np.array([key.startswith("environment.") for key in PLAN.genome.keys])
 
 
 def test_places_and_speeds_are_spread_out_and_weather_is_not() -> None:
-    spread, plain = Garl(PLAN), Garl(PLAN, spreads=0.0)
+    spread, plain = Garl(PLAN), Garl(PLAN, GarlParameters(spread_share=0.0))
     found, by_chance = (
         genes(each for _ in range(10) for each in method.ask()) for method in (spread, plain)
     )
@@ -135,11 +135,11 @@ def test_the_marker_is_put_where_none_has_been_near() -> None:
         np.fill_diagonal(every, np.inf)
         return float(every.min(axis=1).mean())
 
-    assert apart(Garl(PLAN)) > 1.2 * apart(Garl(PLAN, spreads=0.0))
+    assert apart(Garl(PLAN)) > 1.2 * apart(Garl(PLAN, GarlParameters(spread_share=0.0)))
 
 
 def test_what_is_bred_far_from_a_violation_keeps_its_weather_and_who_was_hit() -> None:
-    method = Garl(PLAN, explores=0.0)
+    method = Garl(PLAN, GarlParameters(explore_share=0.0))
     first = method.ask()[:1]
     told = dataclasses.replace(result("IV:dog"), closest_body="dog-1")
     method.tell([Flown(scenario=each, result=told) for each in first])
@@ -159,7 +159,7 @@ def test_only_from_what_violates_is_bred_far() -> None:
 
 
 def test_one_cell_for_all_is_bred_from() -> None:
-    method = Garl(PLAN, explores=0.0, cell=lambda result: "")
+    method = Garl(PLAN, GarlParameters(explore_share=0.0, cell=lambda result: ""))
     first = method.ask()
     method.tell([Flown(scenario=each, result=result("", "near")) for each in first])
     seeds = {each.seed for each in first}
