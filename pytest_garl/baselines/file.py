@@ -202,10 +202,10 @@ def _check(baseline: Baseline, error: Callable[[str], GarlError]) -> None:
         if not each.flights:
             raise error(f"{each.system} on {each.map}: found no flights, expected at least one")
         shapes = {
-            (tuple(key for key, _ in flight.scenario.genes), flight.scenario.absent)
+            (tuple(key for key, _ in flight.scenario.genes), flight.scenario.removed_objects)
             for flight in each.flights
         }
-        if len(shapes) > 1 or any(absent for _, absent in shapes):
+        if len(shapes) > 1 or any(removed for _, removed in shapes):
             raise error(
                 f"{each.system} on {each.map}: found scenarios of different genes or without some "
                 "of the map's objects, expected those of a search, with all of them"

@@ -72,14 +72,19 @@ def loads(text: str) -> FlightJob:
 def dump_scenario(scenario: Scenario) -> str:
     """Return a scenario as one line of JSON."""
     values = {"map": scenario.map, "seed": scenario.seed, "genes": scenario.genes}
-    return json.dumps(values | ({"absent": scenario.absent} if scenario.absent else {}))
+    return json.dumps(
+        values | ({"absent": scenario.removed_objects} if scenario.removed_objects else {})
+    )
 
 
 def load_scenario(text: str) -> Scenario:
     """Return the scenario in a line of JSON; raise LedgerError for a damaged one."""
     try:
         values = parsed(text)
-        scenario = made(Scenario, {"absent": [], **values} if isinstance(values, dict) else values)
+        if isinstance(values, dict):
+            removed = values.pop("absent", [])
+            values["removed_objects"] = removed
+        scenario = made(Scenario, values)
     except ValueError as error:
         raise LedgerError(f"a scenario in the ledger is damaged: {error}. {REMEDY}") from error
     genes = tuple((key, float(value)) for key, value in scenario.genes)

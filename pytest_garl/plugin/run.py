@@ -319,8 +319,8 @@ class Run:
         npcs = _steered(target, npcs)
         job = self.job(target, npcs)
         case = target.entry.case if target.entry else None
-        absent = case.scenario.absent if case else ()
-        check_policy(npcs, load_map(job.map, self.options.map_folders).without(absent))
+        removed = case.scenario.removed_objects if case else ()
+        check_policy(npcs, load_map(job.map, self.options.map_folders).without(removed))
         name = name_of(target.system)
         slots: dict[int, list[int]] = {}
         for slot in sorted(wanted):

@@ -109,10 +109,16 @@ class Case:
     @property
     def id(self) -> str:
         """A name such as ``court-IV-dog-3f9a12``, the same for the same scenario."""
-        facts = (self.system, self.scenario, self.violation.signature, self.moves, self.own_test)
+        scenario = self.scenario
+        # The ids of committed cases depend on these letters.
+        facts = (
+            f"({self.system!r}, Scenario(map={scenario.map!r}, seed={scenario.seed!r}, "
+            f"genes={scenario.genes!r}, absent={scenario.removed_objects!r}), "
+            f"{self.violation.signature!r}, {self.moves!r}, {self.own_test!r})"
+        )
         # Nothing where nothing was changed, so that the names of other cases stay.
         changes = repr(self.changes) if self.changes else ""
-        digest = hashlib.sha256(f"{facts!r}{changes}".encode()).hexdigest()
+        digest = hashlib.sha256(f"{facts}{changes}".encode()).hexdigest()
         words = self.violation.signature.split(":")[:2] or [self.violation.type]
         subject = "-".join(_SAFE.sub("_", word.partition("@")[0]).strip("_") for word in words)
         # A file's name has 255 bytes at most, and that of a test may be longer.

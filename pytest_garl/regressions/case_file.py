@@ -76,8 +76,8 @@ def dumps(case: Case) -> str:
         lines.append(f"test = {_text(case.test)}")
     if case.assertion:
         lines.append(f"assertion = {_text(case.assertion)}")
-    if scenario.absent:
-        lines.append(f"absent = [{', '.join(_text(name) for name in scenario.absent)}]")
+    if scenario.removed_objects:
+        lines.append(f"absent = [{', '.join(_text(name) for name in scenario.removed_objects)}]")
     lines += [
         "",
         "[violation]",
@@ -202,8 +202,8 @@ def loads(text: str, load_map: Callable[[str], Map], *, source: str = "case") ->
         ),
         policy=policy.text("name"),
         policy_sha256=policy.text("sha256"),
-        moves=_read_moves(top.table("moves"), map, scenario.absent),
-        changes=_read_changes(top.table("changes"), map, scenario.absent)
+        moves=_read_moves(top.table("moves"), map, scenario.removed_objects),
+        changes=_read_changes(top.table("changes"), map, scenario.removed_objects)
         if "changes" in top.values
         else (),
         evidence=_read_evidence(top.table("evidence")),
@@ -255,8 +255,8 @@ def read_limits(table: Table) -> Limits:
     )
 
 
-def _read_moves(table: Table, map: Map, absent: Sequence[str]) -> tuple[tuple[str, MoveList], ...]:
-    names = [name for name, _ in map.residents if name not in absent]
+def _read_moves(table: Table, map: Map, removed: Sequence[str]) -> tuple[tuple[str, MoveList], ...]:
+    names = [name for name, _ in map.all_objects if name not in removed]
     table.only(names)
     return tuple((name, _read_runs(table, name)) for name in names)
 
@@ -284,8 +284,8 @@ def _read_runs(table: Table, name: str) -> MoveList:
     return tuple(moves)
 
 
-def _read_changes(table: Table, map: Map, absent: Sequence[str]) -> Changes:
-    names = [name for name, _ in map.residents if name not in absent]
+def _read_changes(table: Table, map: Map, removed: Sequence[str]) -> Changes:
+    names = [name for name, _ in map.all_objects if name not in removed]
     table.only(names)
     expected = f"expected a list of [decision, gene, number] with one of {', '.join(ENVIRONMENT)}"
     found = []

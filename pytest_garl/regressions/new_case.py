@@ -103,7 +103,7 @@ def _violation(verdict: Verdict, flight: Flight | None, own: UserFailure | None)
 
 def recorded_behaviour(done: CompletedFlight, scenario: Scenario, map: Map) -> RecordedBehaviour:
     """Return what each object did in a flight; nothing where its process did not live."""
-    names = [name for name, _ in map.without(scenario.absent).object_names]
+    names = [name for name, _ in map.without(scenario.removed_objects).object_names]
     if not done.record.exists():
         return RecordedBehaviour(moves=tuple((name, ()) for name in names))
     objects = load(done.record).objects

@@ -159,7 +159,7 @@ class CaseReshrinker(CaseBuilder):
         """Return the simplest failure in which the objects that are left repeat their record."""
 
         def recorded_behaviour(scenario: Scenario) -> RecordedBehaviour:
-            return _without(first.behaviour, scenario.absent)
+            return _without(first.behaviour, scenario.removed_objects)
 
         def fails(scenario: Scenario) -> bool:
             return self._request.failed(
@@ -231,11 +231,11 @@ class CaseReshrinker(CaseBuilder):
         )
 
 
-def _without(behaviour: RecordedBehaviour, absent: tuple[str, ...]) -> RecordedBehaviour:
-    """Return what those did who are not absent."""
+def _without(behaviour: RecordedBehaviour, removed: tuple[str, ...]) -> RecordedBehaviour:
+    """Return the behaviour of the objects that are not removed."""
     return RecordedBehaviour(
-        moves=tuple(each for each in behaviour.moves if each[0] not in absent),
-        changes=tuple(each for each in behaviour.changes if each[0] not in absent),
+        moves=tuple(each for each in behaviour.moves if each[0] not in removed),
+        changes=tuple(each for each in behaviour.changes if each[0] not in removed),
     )
 
 

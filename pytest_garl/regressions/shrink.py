@@ -191,7 +191,7 @@ def _simplifications(trials: Trials, colliding_object: str) -> list[list[Change]
 
 
 def _sends_home(name: str) -> Change:
-    return lambda scenario: scenario if name in scenario.absent else scenario.without(name)
+    return lambda scenario: scenario if name in scenario.removed_objects else scenario.without(name)
 
 
 def _resets(values: dict[str, float]) -> Change:

@@ -24,8 +24,8 @@ def dumps(scenario: Scenario) -> str:
         f"map = {quoted(scenario.map)}",
         f"seed = {scenario.seed}",
     ]
-    if scenario.absent:
-        names = ", ".join(quoted(name) for name in scenario.absent)
+    if scenario.removed_objects:
+        names = ", ".join(quoted(name) for name in scenario.removed_objects)
         lines.append(f"absent = [{names}]")
     return "\n".join([*lines, *gene_lines(scenario)]) + "\n"
 
@@ -58,9 +58,9 @@ def loads(text: str, map: Map, *, source: str = "scenario") -> Scenario:
 
 def read_genes(top: Table, map: Map) -> Scenario:
     """Return the scenario in a document's ``seed``, ``absent`` and ``genes``."""
-    absent = top.texts("absent")
+    removed = top.texts("absent")
     try:
-        map = map.without(absent)
+        map = map.without(removed)
     except ScenarioError as error:
         raise top.error("absent", str(error)) from error
     sections = top.table("genes")
@@ -80,7 +80,9 @@ def read_genes(top: Table, map: Map) -> Scenario:
         head, _, name = item.key.partition(".")
         genes.append((item.key, tables[head].number(name, low=item.low, high=item.high)))
     seed = top.integer("seed")
-    return Scenario(map=map.name, seed=seed, genes=tuple(genes), absent=map.absent)
+    return Scenario(
+        map=map.name, seed=seed, genes=tuple(genes), removed_objects=map.removed_objects
+    )
 
 
 def map_name_in(text: str, *, source: str = "scenario") -> str:

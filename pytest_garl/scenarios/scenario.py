@@ -18,14 +18,14 @@ class Scenario:
     ``("person-1.velocity", 0.8)``.  What a value means in metres or lux is said by the
     genome's properties and the simulator.  ``seed`` feeds the sensor noise, the falling
     particles and the undirected object moves; it does not depend on the scenario's slot.
-    ``absent`` names those of the map's objects that stay at home and have no genes; searches
-    fly with all of them, shrinking sends home whom a violation does not need.
+    ``removed_objects`` names the objects of the map that this scenario flies without; they have no
+    genes.  A search removes none; shrinking removes those that a violation does not need.
     """
 
     map: str
     seed: int
     genes: tuple[tuple[str, float], ...]
-    absent: tuple[str, ...] = ()
+    removed_objects: tuple[str, ...] = ()
 
     def __getitem__(self, key: str) -> float:
         """Return the value of a property; raise ScenarioError for one that is not there."""
@@ -53,4 +53,6 @@ class Scenario:
         for name in names:
             self[f"{name}.velocity"]
         genes = tuple(pair for pair in self.genes if pair[0].partition(".")[0] not in names)
-        return dataclasses.replace(self, genes=genes, absent=tuple(sorted({*self.absent, *names})))
+        return dataclasses.replace(
+            self, genes=genes, removed_objects=tuple(sorted({*self.removed_objects, *names}))
+        )

@@ -73,7 +73,7 @@ def _discs(body: Body, part: Part) -> Iterable[Disc]:
 
 def problems(scenario: Scenario, map: Map) -> tuple[str, ...]:
     """Return what is wrong with the scenario, one sentence each; nothing if it is valid."""
-    map = map.without(scenario.absent)
+    map = map.without(scenario.removed_objects)
     discs = tuple(disc for body in map.bodies for disc in discs_of(body))
     marker = marker_position_m(scenario, map)
     found = list(_marker_problems(marker, map, discs))
@@ -90,7 +90,7 @@ def repair(scenario: Scenario, map: Map) -> Scenario:
     A valid scenario comes back unchanged.  The marker is mended first, then the objects
     in order, each against what is settled already.
     """
-    map = map.without(scenario.absent)
+    map = map.without(scenario.removed_objects)
     discs = tuple(disc for body in map.bodies for disc in discs_of(body))
     marker = marker_position_m(scenario, map)
     if any(_marker_problems(marker, map, discs)):

@@ -34,7 +34,7 @@ def fly(
     exception, its SystemExit included; KeyboardInterrupt passes through.
     """
     began = time.perf_counter()
-    place = (map or load_map(scenario.map)).without(scenario.absent)
+    place = (map or load_map(scenario.map)).without(scenario.removed_objects)
     flight = Loop(scenario, system, npcs.make, place, time_limit_s, guard).run()
     flight = dataclasses.replace(
         flight,

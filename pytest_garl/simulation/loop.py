@@ -100,7 +100,7 @@ class Loop:
     def begin(self) -> None:
         """Reset the NPCs' policies and the landing system."""
         # By its place among all NPCs of the map: removing one changes nothing for the others.
-        numbers = {name: index for index, (name, _) in enumerate(self.map.residents)}
+        numbers = {name: index for index, (name, _) in enumerate(self.map.all_objects)}
         for npc in self.npcs:
             rng = generator(self.scenario.seed, "objects", numbers[npc.name])
             npc.policy.reset(self.situation(npc), rng)

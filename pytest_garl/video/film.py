@@ -43,12 +43,12 @@ def frames(
 ) -> Iterator[Image]:
     """Yield the film's pictures, RGB uint8 (656, 1024, 3): one per camera frame, then the end.
 
-    ``map`` is the scenario's, with or without its absent objects; ``camera`` the one that
+    ``map`` is the scenario's, with or without its removed objects; ``camera`` the one that
     flew; ``signature`` the verdict's, empty for a flight without violation.  The end is the
     last moment with the outcome, for ``CLOSING_S``.  Raises GarlError where the flight is not
     one of this scenario.
     """
-    place = map.without(scenario.absent)
+    place = map.without(scenario.removed_objects)
     _check(flight, scenario, place)
     renderer = Renderer(scenario, place, camera, generator(scenario.seed, "sensor"))
     left, right = CameraPane(renderer), MapPane(flight, scenario, place, camera)

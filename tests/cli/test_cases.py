@@ -153,7 +153,7 @@ def test_shrinking_goes_on(file: Path) -> None:
     (path,) = Path("scenarios/regressions/stack_of_test").glob("*.toml")
     case = load(path)
     assert case.scenario["environment.fog"] == 0.0
-    assert len(case.scenario.absent) == len(LAWN.residents)
+    assert len(case.scenario.removed_objects) == len(LAWN.all_objects)
     assert case.status == "open"
 
 

@@ -83,7 +83,7 @@ def test_what_a_search_finds_is_saved_small_and_then_expected(searched: pytest.P
     fog, dog = cases(searched)
     assert (fog.name[:14], dog.name[:11]) == ("lawn-I-unknown", "lawn-IV-dog")
     found = load(dog)
-    assert set(found.scenario.absent) == {"bird-1", "person-1", "person-2"}
+    assert set(found.scenario.removed_objects) == {"bird-1", "person-1", "person-2"}
     assert found.scenario["environment.fog"] == 0.0
     assert 0.7 < found.scenario["dog-1.velocity"] < 0.8
     assert load(fog).scenario["environment.fog"] < 0.12
@@ -161,7 +161,7 @@ def test_a_python_exception_takes_two_flights_at_most(pytester: pytest.Pytester)
     result = run(pytester, "--garl-budget=4", "--garl-workers=0", "--garl-shrink=100")
     result.stdout.fnmatch_lines(["*1 new kind of violation, at most 2 flights, *"])
     (path,) = cases(pytester)
-    assert len(load(path).scenario.absent) == 4
+    assert len(load(path).scenario.removed_objects) == 4
     assert "; 1 flight)" in result.stdout.str().replace("\n    ", " ")
 
 
@@ -484,7 +484,7 @@ def test_a_property_of_ones_own_is_shrunk_and_saved_for_its_test(
     assert (case.test, case.own_test) == ("test_it.py::test_own", "test_own")
     assert case.violation.type == "own"
     assert case.violation.story.startswith("test_own: too much snow")
-    assert len(case.scenario.absent) == 4
+    assert len(case.scenario.removed_objects) == 4
     assert 0.1 <= case.scenario["environment.snow"] <= 0.11
     commit(pytester.path)
     known = run(pytester)

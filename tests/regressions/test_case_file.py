@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import dataclasses
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -10,7 +11,7 @@ from hypothesis import strategies as st
 from pytest_garl.errors import ScenarioError
 from pytest_garl.messages import printable
 from pytest_garl.regressions.case import Case, Evidence, Violation
-from pytest_garl.regressions.case_file import dumps, loads
+from pytest_garl.regressions.case_file import dumps, load, loads
 from pytest_garl.scenarios.chromosome import decode
 from pytest_garl.scenarios.genes import genome_for, with_destinations
 from pytest_garl.scenarios.maps.map import load_map
@@ -18,6 +19,7 @@ from pytest_garl.scenarios.validity import repair
 from pytest_garl.verdicts.verdict import Limits
 
 LAWN = load_map("lawn")
+ROOT = Path(__file__).parents[2]
 NAMES = [name for name, _ in LAWN.object_names]
 SYSTEM = "stack.landing:Lander"
 
@@ -59,6 +61,25 @@ def test_a_case_survives_its_file_and_has_the_same_bytes_again() -> None:
     text = dumps(case())
     assert loads(text, load_map) == case()
     assert dumps(loads(text, load_map)) == text
+
+
+COMMITTED = [
+    path
+    for folder in ("scenarios/regressions", "docs/tutorial/scenarios/regressions")
+    for path in sorted((ROOT / folder).glob("*/*.toml"))
+]
+
+
+@pytest.mark.parametrize("path", COMMITTED, ids=lambda path: path.stem)
+def test_a_committed_case_keeps_its_bytes_and_its_name(path: Path) -> None:
+    committed = load(path)
+    assert dumps(committed) == path.read_text(encoding="utf-8")
+    assert committed.id == path.stem
+
+
+def test_the_id_of_a_case_stays() -> None:
+    assert case().id == "lawn-IV-dog-33ab15"
+    assert changing().id == "lawn-IV-dog-96cf0c"
 
 
 @settings(deadline=None)

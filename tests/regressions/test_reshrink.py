@@ -83,7 +83,7 @@ def saved(scenario: Scenario, *, neighbours_failed: int = 3) -> Case:
         neighbours_failed=neighbours_failed,
         removed="0 of 4 objects, 1 of 15 genes off nominal",
     )
-    names = [name for name in NAMES if name not in scenario.absent]
+    names = [name for name in NAMES if name not in scenario.removed_objects]
     moves = tuple((name, ((0.0, 0.0), (0.5, -0.25))) for name in names)
     return dataclasses.replace(
         dog_case(), scenario=scenario, moves=moves, evidence=evidence, policy="stationary"
@@ -101,14 +101,14 @@ FIRST = violation().replace({f"{COLLIDING_OBJECT}.velocity": 0.9, "environment.f
 
 
 def by_record(scenario: Scenario, npcs: str) -> bool:
-    return npcs == "recorded" and COLLIDING_OBJECT not in scenario.absent
+    return npcs == "recorded" and COLLIDING_OBJECT not in scenario.removed_objects
 
 
 def test_a_case_is_shrunk_from_its_own_record() -> None:
     case = saved(FIRST)
     better, _ = shrunk(case, by_record)
     assert better is not None
-    assert set(better.scenario.absent) == {*NAMES} - {COLLIDING_OBJECT}
+    assert set(better.scenario.removed_objects) == {*NAMES} - {COLLIDING_OBJECT}
     assert better.moves == ((COLLIDING_OBJECT, dict(case.moves)[COLLIDING_OBJECT]),)
     assert better.scenario["environment.fog"] == 0.0
     assert better.evidence.removed.startswith("3 of 4 objects, ")
@@ -124,11 +124,11 @@ def test_what_only_a_policy_makes_simpler_is_found_as_well() -> None:
             near = [neighbour for each in records for neighbour in neighbours(each, LAWN)]
             return scenario in records or scenario in near
         records.add(scenario)
-        return COLLIDING_OBJECT not in scenario.absent
+        return COLLIDING_OBJECT not in scenario.removed_objects
 
     better, _ = shrunk(saved(FIRST), fails)
     assert better is not None
-    assert set(better.scenario.absent) == {*NAMES} - {COLLIDING_OBJECT}
+    assert set(better.scenario.removed_objects) == {*NAMES} - {COLLIDING_OBJECT}
 
 
 @pytest.mark.parametrize("seed", range(30))

@@ -39,7 +39,7 @@ def in_fog(scenario: Scenario) -> bool:
 
 
 def two_of_them(scenario: Scenario) -> bool:
-    return fast(scenario) and NAMES[-1] not in scenario.absent
+    return fast(scenario) and NAMES[-1] not in scenario.removed_objects
 
 
 FIRST = violation().replace({f"{COLLIDING_OBJECT}.velocity": 0.9, "environment.fog": 0.12})
@@ -49,7 +49,7 @@ def test_all_that_a_failure_does_not_need_is_gone_after_few_flights() -> None:
     found = shrink(
         FIRST, fast, LAWN, 100, colliding_object=COLLIDING_OBJECT, passes=(reset_and_bisect,)
     )
-    assert set(found.simplest.absent) == {*NAMES} - {COLLIDING_OBJECT}
+    assert set(found.simplest.removed_objects) == {*NAMES} - {COLLIDING_OBJECT}
     assert complexity(found.simplest, genome_of(FIRST, LAWN))[1] == 1
     assert 0.3 <= found.simplest[f"{COLLIDING_OBJECT}.velocity"] <= 0.3 + 0.9 / 8
     assert found.flights <= 6
@@ -121,7 +121,7 @@ def test_destinations_survive_shrinking_with_fewer_digits() -> None:
     assert found.simplest[f"{COLLIDING_OBJECT}.destination_y"] == pytest.approx(
         first[f"{COLLIDING_OBJECT}.destination_y"], abs=0.005
     )
-    assert set(found.simplest.absent) == {*NAMES} - {COLLIDING_OBJECT}
+    assert set(found.simplest.removed_objects) == {*NAMES} - {COLLIDING_OBJECT}
     assert not any(key.startswith(NAMES[-1]) for key, _ in found.simplest.genes)
 
 

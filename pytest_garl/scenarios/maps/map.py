@@ -55,8 +55,8 @@ class Map:
     """One place: ground, static bodies, the objects that live there, bounds and mission.
 
     ``bounds_m`` is (x_min, x_max, y_min, y_max); ``objects`` are (type, count) pairs;
-    ``sha256`` is that of the file, part of a run's identity.  ``absent`` are objects that stay
-    at home in one scenario; the file knows none.
+    ``sha256`` is that of the file, part of a run's identity.  ``removed_objects`` are those that
+    one scenario flies without; the file names none.
     """
 
     name: str
@@ -68,11 +68,11 @@ class Map:
     bodies: tuple[Body, ...]
     objects: tuple[tuple[str, int], ...]
     sha256: str
-    absent: tuple[str, ...] = ()
+    removed_objects: tuple[str, ...] = ()
 
     @property
-    def residents(self) -> tuple[tuple[str, str], ...]:
-        """(name, type) of each dynamic object, absent or not, in order."""
+    def all_objects(self) -> tuple[tuple[str, str], ...]:
+        """(name, type) of each dynamic object, removed or not, in order."""
         return tuple(
             (f"{kind}-{index}", kind)
             for kind, count in self.objects
@@ -82,18 +82,18 @@ class Map:
     @property
     def object_names(self) -> tuple[tuple[str, str], ...]:
         """(name, type) of each dynamic object there is: ``("person-1", "person")``, in order."""
-        return tuple(pair for pair in self.residents if pair[0] not in self.absent)
+        return tuple(pair for pair in self.all_objects if pair[0] not in self.removed_objects)
 
-    def without(self, absent: Iterable[str]) -> Map:
+    def without(self, removed: Iterable[str]) -> Map:
         """Return the map with these objects at home; raise ScenarioError for unknown ones."""
-        names = tuple(sorted(absent))
-        known = [name for name, _ in self.residents]
+        names = tuple(sorted(removed))
+        known = [name for name, _ in self.all_objects]
         unknown = [name for name in names if name not in known]
         if unknown:
             raise ScenarioError(
                 f"map {self.name!r} has no object {listed(unknown)}; it has {listed(known)}"
             )
-        return dataclasses.replace(self, absent=names)
+        return dataclasses.replace(self, removed_objects=names)
 
     @property
     def diagonal_m(self) -> float:
