@@ -4,9 +4,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-LARGEST_POPULATION = 20
-SMALLEST_POPULATION = 8
-
 
 @dataclass(frozen=True, slots=True, kw_only=True, order=True)
 class Slot:
@@ -18,12 +15,6 @@ class Slot:
     def id(self, map: str) -> str:
         """Return the slot's name in item ids."""
         return f"{map}-g{self.generation:02d}-s{self.index:02d}"
-
-
-def population(budget: int) -> int:
-    """Return 20, or less for small budgets: a tenth of the budget, at least 8."""
-    wanted = min(LARGEST_POPULATION, max(SMALLEST_POPULATION, budget // 10))
-    return min(wanted, budget)
 
 
 def slots(budget: int, size: int) -> tuple[Slot, ...]:

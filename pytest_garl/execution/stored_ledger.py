@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import dataclasses
 import sqlite3
+from collections.abc import Mapping
+from pathlib import Path
 from typing import get_args
 
 from pytest_garl.errors import GarlError, LedgerError
@@ -10,7 +13,9 @@ from pytest_garl.execution.database import VERSION, SearchKind
 from pytest_garl.execution.job import load_scenario, loads
 from pytest_garl.execution.ledger import Ledger
 from pytest_garl.execution.result import parse_result
+from pytest_garl.execution.slot import Slot
 from pytest_garl.messages import shortened, shown
+from pytest_garl.scenarios.scenario import Scenario
 
 _TYPES = {
     "run": {"key": "text", "value": "text"},
@@ -39,6 +44,47 @@ _TYPES = {
 }
 """SQLite keeps in any column whatever a damaged page says."""
 _STATES = ("waiting", "claimed", "flown")
+
+
+@dataclasses.dataclass(frozen=True, slots=True, kw_only=True)
+class StoredSlot:
+    """A slot of an earlier run: the NPC policy, and for each landing system the scenario."""
+
+    map: str
+    slot: Slot
+    npcs: str
+    scenarios: Mapping[str, Scenario]
+
+
+def read_slot(path: Path, map: str, slot: Slot) -> StoredSlot:
+    """Return a slot of the ledger at ``path``; raise LedgerError where there is none."""
+    if not path.is_file():
+        raise LedgerError(
+            f"there is no ledger at {path}; run a search first, or give a scenario file"
+        )
+    ledger = Ledger(path)
+    try:
+        check_stored(ledger)
+        found = ledger.queries.scenarios(slot.generation, slot.index, map)
+        if not found:
+            raise LedgerError(f"no such slot in {path}; it holds {_flown_slots(ledger)}")
+        return StoredSlot(
+            map=map,
+            slot=slot,
+            npcs=str(ledger.fact("npcs") or ""),
+            scenarios={system: load_scenario(text) for system, text in found.items()},
+        )
+    finally:
+        ledger.close()
+
+
+def _flown_slots(ledger: Ledger) -> str:
+    """Return which slots a ledger holds, as one range for each map."""
+    slots: dict[str, list[Slot]] = {}
+    for _, map, generation, index, _ in ledger.queries.results():
+        slots.setdefault(map, []).append(Slot(generation=generation, index=index))
+    ranges = [f"{min(those).id(map)} to {max(those).id(map)}" for map, those in slots.items()]
+    return ", ".join(ranges) or "no flights"
 
 
 def check_stored(ledger: Ledger) -> None:

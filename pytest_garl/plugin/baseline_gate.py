@@ -21,7 +21,7 @@ from pytest_garl.plugin.keys import RUN, is_xdist_worker
 from pytest_garl.plugin.marker import read_marker
 from pytest_garl.plugin.options import Options
 from pytest_garl.plugin.run import Run
-from pytest_garl.plugin.target import FIRST, Target, name_of
+from pytest_garl.plugin.target import FIRST, Target
 
 GATE_REPORT = "garl.gate"
 """The user property under which a gate's sentences reach the summary, also from xdist's workers."""
@@ -124,8 +124,8 @@ class BaselineGatePlugin:
         except GarlError as error:
             raise pytest.Collector.CollectError(f"{collector.nodeid}: {error}") from error
         for map in subject.maps:
-            base = self._baseline.find(name_of(subject.system), map)
-            place = (str(collector.path), name_of(subject.system), map)
+            base = self._baseline.find(subject.system_name, map)
+            place = (str(collector.path), subject.system_name, map)
             if base is not None and place not in self._placed:
                 self._placed.add(place)
                 yield BaselineGateItem.from_parent(
@@ -139,7 +139,7 @@ class BaselineGatePlugin:
         """Refuse to begin where the command line asks for a gate and no selected test has one."""
         worker = is_xdist_worker(session.config)
         if not worker and not any(isinstance(item, BaselineGateItem) for item in session.items):
-            problem = self._nothing(session.config)
+            problem = self._nothing()
             if problem:
                 raise pytest.UsageError(problem)
 
@@ -154,17 +154,18 @@ class BaselineGatePlugin:
         if not session.config.pluginmanager.hasplugin("dsession") or self._told:
             return
         if session.exitstatus in (pytest.ExitCode.OK, pytest.ExitCode.NO_TESTS_COLLECTED):
-            self._problem = self._nothing(session.config)
+            self._problem = self._nothing()
             if self._problem:
                 session.exitstatus = pytest.ExitCode.USAGE_ERROR
 
-    def _nothing(self, config: pytest.Config) -> str:
+    def _nothing(self) -> str:
         """Return what is wrong with a session without gate; an ini key asks for none."""
-        asked = config.getoption("--garl-baseline")
+        if "baseline" not in self._options.given:
+            return ""
         wanted = ", ".join(f"{each.system} on {each.map}" for each in self._baseline.sets)
-        return asked and (
-            f"--garl-baseline={asked}: nothing to compare: it holds {wanted}, and no selected test "
-            "is marked with one of these"
+        return (
+            f"--garl-baseline={self._file}: nothing to compare: it holds {wanted}, and no selected "
+            "test is marked with one of these"
         )
 
     def pytest_report_header(self) -> str:

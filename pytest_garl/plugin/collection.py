@@ -1,23 +1,37 @@
-"""The items of a marked test: slots of a search, saved cases, a repeated scenario."""
+"""The items of a marked test: saved cases, slots of a search, or one repeated scenario."""
 
 from __future__ import annotations
 
 import dataclasses
 from collections.abc import Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import pytest
 
 from pytest_garl.errors import GarlError
-from pytest_garl.execution.ledger import Ledger
-from pytest_garl.execution.slot import Slot, slots
+from pytest_garl.execution.slot import slots
 from pytest_garl.plugin.marker import MarkerArguments, read_marker
-from pytest_garl.plugin.options import SLOT_ID, Options
-from pytest_garl.plugin.target import FIRST, Target, name_of
+from pytest_garl.plugin.options import Options, options_of
+from pytest_garl.plugin.target import FIRST, Target
 
-if TYPE_CHECKING:
-    from pytest_garl.scenarios.scenario import Scenario
+NOTHING_TO_FLY = "no --garl-budget given and no saved cases; to search: pytest --garl-budget=40"
+
+
+def parametrize(metafunc: pytest.Metafunc, marker: pytest.Mark) -> None:
+    """Make an item of each target of a marked test; one that says why if there is none.
+
+    Raises GarlError for a marker that makes no sense.
+    """
+    options = options_of(metafunc.config)
+    targets = targets_for(marker, options, metafunc.definition.originalname)
+    if targets:
+        ids = [target.name for target in targets]
+        return metafunc.parametrize("garl_slot", targets, ids=ids, indirect=True)
+    if options.repeat:
+        reason = f"--garl-repeat={options.repeat}: not of this test"
+    else:
+        reason = "no map selected" if options.budget else NOTHING_TO_FLY
+    return metafunc.parametrize("garl_slot", [reason], ids=["nothing"], indirect=True)
 
 
 def targets_for(marker: pytest.Mark, options: Options, test: str) -> list[Target]:
@@ -42,7 +56,7 @@ def _saved_targets(marked: MarkerArguments, options: Options, test: str) -> Iter
     from pytest_garl.scenarios.maps.map import map_names
 
     there = map_names(options.map_folders)
-    for entry in options.corpus.entries(name_of(marked.system)):
+    for entry in options.corpus.entries(marked.system_name):
         header = entry.header
         if header is None or header.map not in there:
             yield dataclasses.replace(marked.target("", FIRST), entry=entry)
@@ -53,18 +67,6 @@ def _saved_targets(marked: MarkerArguments, options: Options, test: str) -> Iter
         yield target
         if header.status == "fixed" and header.avoidable == "live":
             yield dataclasses.replace(target, live=True)
-
-
-def repeated(options: Options, target: Target) -> Scenario:
-    """Return the scenario that a case holds, or that ``--garl-repeat`` names."""
-    from pytest_garl.execution.job import load_scenario
-    from pytest_garl.scenarios.files import load
-
-    if target.entry is not None and target.entry.case is not None:
-        return target.entry.case.scenario
-    if target.file:
-        return load(Path(target.file), options.map_folders)
-    return load_scenario(_recorded(options, target)[name_of(target.system)])
 
 
 def _repeated_targets(marked: MarkerArguments, map: str, options: Options) -> list[Target]:
@@ -81,26 +83,7 @@ def _repeated_targets(marked: MarkerArguments, map: str, options: Options) -> li
         if map_name_in(text, source=options.repeat) != map:
             return []
         return [dataclasses.replace(marked.target(map, FIRST), file=options.repeat)]
-    match = SLOT_ID.fullmatch(options.repeat)
-    if match is None or match["map"] != map:
+    slot = options.repeated_slot
+    if slot is None or slot.map != map or marked.system_name not in slot.scenarios:
         return []
-    slot = Slot(generation=int(match["generation"]), index=int(match["slot"]))
-    target = marked.target(map, slot)
-    return [target] if name_of(marked.system) in _recorded(options, target) else []
-
-
-def _recorded(options: Options, target: Target) -> dict[str, str]:
-    path = options.folder / "ledger.sqlite"
-    if not path.is_file():
-        raise GarlError(
-            f"--garl-repeat={options.repeat}: there is no ledger at {path}; run a search first, "
-            "or give a scenario file"
-        )
-    from pytest_garl.execution.stored_ledger import check_stored
-
-    ledger = Ledger(path)
-    try:
-        check_stored(ledger)
-        return ledger.queries.scenarios(target.slot.generation, target.slot.index, target.map)
-    finally:
-        ledger.close()
+    return [marked.target(map, slot.slot)]

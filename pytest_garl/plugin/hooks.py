@@ -28,8 +28,6 @@ from pytest_garl.plugin.tally import Tally
 
 __all__ = ["garl_slot", "landing", "npcs", "scenario"]
 
-NOTHING_TO_FLY = "no --garl-budget given and no saved cases; to search: pytest --garl-budget=40"
-
 
 def pytest_addoption(parser: pytest.Parser) -> None:
     """Register options and ini keys."""
@@ -64,10 +62,10 @@ def pytest_configure(config: pytest.Config) -> None:
     if not is_enabled(config):
         return
     from pytest_garl.plugin.option_checks import check_usage
-    from pytest_garl.plugin.options import read_options
+    from pytest_garl.plugin.options import options_of
 
-    options = read_options(config)
-    check_usage(config, options)
+    options = options_of(config)
+    check_usage(options)
     if options.baseline is not None:
         from pytest_garl.plugin.baseline_gate import register
 
@@ -77,11 +75,11 @@ def pytest_configure(config: pytest.Config) -> None:
 
 
 def _begin(config: pytest.Config) -> None:
-    from pytest_garl.plugin.options import read_options
+    from pytest_garl.plugin.options import options_of
     from pytest_garl.plugin.startup import begin_run
 
     try:
-        config.stash[RUN] = begin_run(config, read_options(config))
+        config.stash[RUN] = begin_run(config, options_of(config))
     except GarlError as error:
         raise pytest.UsageError(str(error)) from error
 
@@ -96,20 +94,12 @@ def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
             f"{metafunc.definition.nodeid} uses a landing fixture without "
             "@pytest.mark.garl(system=..., maps=[...])"
         )
-    from pytest_garl.plugin.collection import targets_for
-    from pytest_garl.plugin.options import read_options
+    from pytest_garl.plugin.collection import parametrize
 
-    options = read_options(metafunc.config)
     try:
-        targets: list[Any] = list(targets_for(marker, options, metafunc.definition.originalname))
+        parametrize(metafunc, marker)
     except GarlError as error:
         raise pytest.Collector.CollectError(f"{metafunc.definition.nodeid}: {error}") from error
-    ids = [target.name for target in targets]
-    if not targets:
-        reason = f"--garl-repeat={options.repeat}: not of this test" if options.repeat else ""
-        reason = reason or (NOTHING_TO_FLY if not options.budget else "no map selected")
-        targets, ids = [reason], ["nothing"]
-    metafunc.parametrize("garl_slot", targets, ids=ids, indirect=True)
 
 
 @pytest.hookimpl(tryfirst=True)
@@ -121,8 +111,9 @@ def pytest_collection_finish(session: pytest.Session) -> None:
     name_slots(session.items)
     if is_enabled(config) and not is_xdist_worker(config):
         from pytest_garl.plugin.option_checks import check_selection
+        from pytest_garl.plugin.options import options_of
 
-        check_selection(config, session.items)
+        check_selection(options_of(config), session.items)
     if RUN not in config.stash and any(is_landing_item(item) for item in session.items):
         _begin(config)
     run = config.stash.get(RUN, None)
@@ -265,11 +256,11 @@ def pytest_sessionfinish(session: pytest.Session) -> None:
             run.pool.close()
     tally = session.config.stash.get(TALLY, None)
     if tally is not None and tally.items:
+        from pytest_garl.plugin.options import options_of
         from pytest_garl.plugin.session_status import problems
 
-        maps = session.config.getoption("--garl-map")
         try:
-            tally.problems = list(problems(tally, run, maps=maps))
+            tally.problems = list(problems(tally, run, options_of(session.config)))
         except GarlError as error:
             _lost_ledger(session, run, error)
         if tally.problems and session.exitstatus == pytest.ExitCode.OK:

@@ -30,6 +30,11 @@ class MarkerArguments:
     deterministic: bool
     files: tuple[str, ...]
 
+    @property
+    def system_name(self) -> str:
+        """The landing system's name in ledgers and cases: "module:class"."""
+        return f"{self.system.__module__}:{self.system.__qualname__}"
+
     def target(self, map: str, slot: Slot) -> Target:
         """Return what an item tests that flies a slot on a map."""
         return Target(

@@ -1,4 +1,4 @@
-"""Every command-line option and ini key, validated once into one frozen object."""
+"""The options of a session: every command-line option and ini key in one frozen object."""
 
 from __future__ import annotations
 
@@ -13,14 +13,18 @@ import pytest
 
 from pytest_garl.adversary.catalogue import policy_names
 from pytest_garl.errors import GarlError
+from pytest_garl.execution.slot import Slot
 from pytest_garl.plugin.arguments import OPTIONS, Option
 from pytest_garl.search.catalogue import default_policy, find_method, method_names
 
 if TYPE_CHECKING:
+    from pytest_garl.execution.stored_ledger import StoredSlot
     from pytest_garl.regressions.corpus import Corpus
     from pytest_garl.scenarios.genes import WeatherRange
 
 SLOT_ID = re.compile(r"(?P<map>.+)-g(?P<generation>\d{2,})-s(?P<slot>\d{2,})")
+LARGEST_POPULATION = 20
+SMALLEST_POPULATION = 8
 
 SHRINK = 12
 """Flights for each new kind of violation: enough for the barest scenario, its neighbours, the
@@ -33,6 +37,8 @@ LEAST_SHRINK = 8
 class Options:
     """What the user wants, checked."""
 
+    given: frozenset[str]
+    """Names of the options on the command line, without ``--garl-``."""
     budget: int
     seed: int
     method: str
@@ -47,6 +53,9 @@ class Options:
     weather: WeatherRange
     timeout_s: float
     repeat: str
+    """A slot or a scenario file to fly again, or empty."""
+    repeated_slot: StoredSlot | None
+    """The slot that ``repeat`` names, as the earlier search flew it."""
     duplicates: Literal["xfail", "fail"]
     npcs: str
     baseline: Path | None
@@ -89,16 +98,33 @@ class Options:
         return self.folder / ("repeat.sqlite" if self.repeat else "ledger.sqlite")
 
 
+_OPTIONS = pytest.StashKey[Options]()
+
+
+def options_of(config: pytest.Config) -> Options:
+    """Return the session's options; they are read when they are first asked for, and only then.
+
+    Raises UsageError that says what was found and what is expected.
+    """
+    if _OPTIONS not in config.stash:
+        config.stash[_OPTIONS] = read_options(config)
+    return config.stash[_OPTIONS]
+
+
 def read_options(config: pytest.Config) -> Options:
-    """Return the options; raise UsageError that says what was found and what is expected."""
+    """Return the options; for ``options_of``, which remembers them."""
     text = {option.name: _value(config, option) for option in OPTIONS}
     budget = _integer("budget", text["budget"], 1) if text["budget"] else 0
+    size = _integer("population", text["population"], 1) if text["population"] else 0
     address = os.environ.get("RAY_ADDRESS", "")
     address = "" if address == "local" else address
-    size = _integer("population", text["population"], 1) if text["population"] else 0
+    folder = config.rootpath / str(config.getini("garl_dir"))
+    repeat = _repeat(text["repeat"])
+    slot = _repeated_slot(repeat, folder / "ledger.sqlite")
     return Options(
+        given=_given(config),
         budget=budget,
-        population=min(size, budget) if size else _population(budget),
+        population=min(size, budget) if size else population(budget),
         resume=bool(config.getoption("--garl-resume")),
         seed=_seed(config, text["seed"]),
         method=_method(text["method"]),
@@ -108,21 +134,27 @@ def read_options(config: pytest.Config) -> Options:
         ray_address=address,
         weather=cast("WeatherRange", _among("weather", text["weather"], ("confined", "full"))),
         timeout_s=_number("timeout", text["timeout"], 1e6, "a positive number of seconds"),
-        repeat=_repeat(text["repeat"]),
+        repeat=repeat,
+        repeated_slot=slot,
         duplicates=cast(
             Literal["xfail", "fail"], _among("duplicates", text["duplicates"], ("xfail", "fail"))
         ),
-        npcs=_npcs(text["npcs"] or _npcs_then(config, text["repeat"]), text["method"]),
+        npcs=_npcs(text["npcs"] or (slot.npcs if slot else ""), text["method"]),
         baseline=_baseline(config),
         level=_number("level", text["level"], 1, "a number between 0 and 1"),
         shrink=_shrink(text["shrink"]),
         shrink_capped=not text["shrink"],
         xfail_strict=bool(config.getini("garl_xfail_strict")),
         cases=config.rootpath / str(config.getini("garl_cases")),
-        folder=config.rootpath / str(config.getini("garl_dir")),
+        folder=folder,
         root=config.rootpath,
         controller=controller_of(config),
     )
+
+
+def population(budget: int) -> int:
+    """Return how many scenarios are bred at a time: a tenth of the budget, 8 to 20 of them."""
+    return min(LARGEST_POPULATION, max(SMALLEST_POPULATION, budget // 10), budget)
 
 
 def controller_of(config: pytest.Config) -> str:
@@ -134,6 +166,11 @@ def controller_of(config: pytest.Config) -> str:
 def _value(config: pytest.Config, option: Option) -> str:
     given = config.getoption(f"--garl-{option.name}")
     return str(config.getini(f"garl_{option.name}") if given is None else given)
+
+
+def _given(config: pytest.Config) -> frozenset[str]:
+    names = [each.name for each in OPTIONS if config.getoption(f"--garl-{each.name}") is not None]
+    return frozenset([*names, *(["resume"] if config.getoption("--garl-resume") else [])])
 
 
 def _wrong(name: str, found: str, expected: str) -> pytest.UsageError:
@@ -151,14 +188,6 @@ def _workers(text: str, pool: str, ray_address: str) -> int | None:
         # None of Ray's workers is the pytest process.
         return _integer("workers", text, 1 if pool == "ray" else 0)
     return None if pool == "ray" and ray_address else os.cpu_count() or 1
-
-
-def _population(budget: int) -> int:
-    if not budget:
-        return 0
-    from pytest_garl.execution.slot import population
-
-    return population(budget)
 
 
 def _shrink(text: str) -> int:
@@ -217,23 +246,6 @@ def _npcs(text: str, method: str) -> str:
     return text
 
 
-def _npcs_then(config: pytest.Config, repeat: str) -> str:
-    """Return who moved objects in the search whose slot is repeated, or nothing."""
-    path = config.rootpath / str(config.getini("garl_dir")) / "ledger.sqlite"
-    if not SLOT_ID.fullmatch(repeat) or not path.is_file():
-        return ""
-    from pytest_garl.execution.ledger import Ledger
-
-    try:
-        ledger = Ledger(path)
-        try:
-            return str(ledger.fact("npcs") or "")
-        finally:
-            ledger.close()
-    except GarlError as error:
-        raise pytest.UsageError(f"--garl-repeat={repeat}: {error}") from error
-
-
 def _seed(config: pytest.Config, text: str) -> int:
     given: dict[str, Any] = getattr(config, "workerinput", {})
     if "garl_seed" in given:
@@ -249,3 +261,16 @@ def _repeat(text: str) -> str:
     if text and not SLOT_ID.fullmatch(text) and not Path(text).is_file():
         raise _wrong("repeat", text, "a slot such as court-g03-s17, or an existing scenario file")
     return text
+
+
+def _repeated_slot(repeat: str, path: Path) -> StoredSlot | None:
+    match = SLOT_ID.fullmatch(repeat)
+    if match is None:
+        return None
+    from pytest_garl.execution.stored_ledger import read_slot
+
+    slot = Slot(generation=int(match["generation"]), index=int(match["slot"]))
+    try:
+        return read_slot(path, match["map"], slot)
+    except GarlError as error:
+        raise pytest.UsageError(f"--garl-repeat={repeat}: {error}") from error

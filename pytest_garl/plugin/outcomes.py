@@ -13,7 +13,7 @@ from pytest_garl.plugin.keys import EXCUSED, FAILURE, FOUND, OWN, UNREPEATED, is
 from pytest_garl.plugin.report_edits import expect, paragraphs, tell
 from pytest_garl.plugin.run import Run, reflight_key
 from pytest_garl.plugin.suggested_commands import repeat_line
-from pytest_garl.plugin.target import FIRST, Target, name_of
+from pytest_garl.plugin.target import FIRST, Target
 from pytest_garl.verdicts.wording import headline
 
 OWN_FAILURE = "garl.own_failure"
@@ -66,7 +66,7 @@ def _explain_fault(
     if not first_with_same_signature and not run.options.repeat:
         found = repeats(run, target, fault)
         if not found.holds:
-            unrepeated = [name_of(target.system), target.map, target.name, fault.signature]
+            unrepeated = [target.system_name, target.map, target.name, fault.signature]
             report.user_properties.append((UNREPEATED, json.dumps(unrepeated)))
             return expect(report, f"did not repeat: {found.share} ({fault.signature})")
         doubts = _doubts(run, target, found)
@@ -92,7 +92,7 @@ def _explain_fault(
 def _note_own(report: pytest.TestReport, target: Target, fault: Fault) -> None:
     """Tell the summary of a property of the user's own, whatever becomes of its failure."""
     if fault.own and fault.failure:
-        told = [name_of(target.system), target.map, target.name]
+        told = [target.system_name, target.map, target.name]
         told += [fault.signature, fault.failure.message]
         report.user_properties.append((OWN_FAILURE, json.dumps(told)))
 

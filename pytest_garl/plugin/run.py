@@ -20,10 +20,9 @@ from pytest_garl.execution.pool import Pool, wait_for
 from pytest_garl.execution.reference import BUILT_IN, Reference, reference_to, simulator_sha256
 from pytest_garl.execution.slot import Slot, flight_name
 from pytest_garl.execution.sources import combined_sha256, data_files, sources_of
-from pytest_garl.plugin.collection import repeated
 from pytest_garl.plugin.keys import is_xdist_worker, target_of
 from pytest_garl.plugin.options import Options
-from pytest_garl.plugin.target import FIRST, Target, name_of
+from pytest_garl.plugin.target import FIRST, Target
 
 if TYPE_CHECKING:
     from pytest_garl.execution.job import FlightJob
@@ -224,7 +223,7 @@ class Run:
         options = self.options
         if options.repeat:
             return {}
-        system = name_of(target.system)
+        system = target.system_name
         expected = options.corpus.expected_signatures(system, target.map, accepted=True)
         return {signature: entry.path.name for signature, entry in expected.items()}
 
@@ -255,7 +254,7 @@ class Run:
 
         job = self.ledger.job(target.search)
         assert job is not None
-        name = name_of(target.system)
+        name = target.system_name
         text = self.ledger.scenario(target.search, target.slot.generation, target.slot.index)
         assert text is not None
         flown = []
@@ -321,7 +320,7 @@ class Run:
         case = target.entry.case if target.entry else None
         removed = case.scenario.removed_objects if case else ()
         check_policy(npcs, load_map(job.map, self.options.map_folders).without(removed))
-        name = name_of(target.system)
+        name = target.system_name
         slots: dict[int, list[int]] = {}
         for slot in sorted(wanted):
             slots.setdefault(slot.generation, []).append(slot.index)
@@ -376,7 +375,7 @@ class Run:
         from pytest_garl.search.method import SearchPlan
 
         if any(each.entry for each in wanted.values()) or self.options.repeat:
-            return _Repeat({slot: repeated(self.options, each) for slot, each in wanted.items()})
+            return _Repeat({slot: _repeated(self.options, each) for slot, each in wanted.items()})
         map = load_map(next(iter(wanted.values())).map, self.options.map_folders)
         plan = SearchPlan(
             map=map,
@@ -412,6 +411,18 @@ def _of_today(npcs: PolicySpec) -> PolicySpec:
 
     weights = str(dict(npcs.arguments).get("weights", ""))
     return replace(npcs, arguments=policy_spec(weights).arguments) if weights else npcs
+
+
+def _repeated(options: Options, target: Target) -> Scenario:
+    """Return the scenario that a case holds, or that ``--garl-repeat`` names."""
+    from pytest_garl.scenarios.files import load
+
+    if target.entry is not None and target.entry.case is not None:
+        return target.entry.case.scenario
+    if target.file:
+        return load(Path(target.file), options.map_folders)
+    assert options.repeated_slot is not None
+    return options.repeated_slot.scenarios[target.system_name]
 
 
 class _Repeat:

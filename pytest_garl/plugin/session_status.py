@@ -6,6 +6,7 @@ from collections import Counter
 from collections.abc import Iterator, Sequence
 
 from pytest_garl.execution.slot import Slot
+from pytest_garl.plugin.options import Options
 from pytest_garl.plugin.run import Run
 from pytest_garl.plugin.tally import Tally
 
@@ -15,8 +16,8 @@ NAMED = 5
 """So many flights are named; the rest are counted."""
 
 
-def problems(tally: Tally, run: Run | None, *, maps: str | None) -> Iterator[str]:
-    """Yield why the session fails, beside its items; ``maps`` are those of the command line."""
+def problems(tally: Tally, run: Run | None, options: Options) -> Iterator[str]:
+    """Yield why the session fails, beside its items."""
     unfounded = tally.unfounded()
     if unfounded:
         yield (
@@ -26,8 +27,7 @@ def problems(tally: Tally, run: Run | None, *, maps: str | None) -> Iterator[str
     if run is not None and run.options.searches:
         yield from _undecided(run)
         yield from _unrepeated(tally, run)
-    asked = maps or (run is not None and run.options.searches)
-    if asked and tally.items and not tally.flown:
+    if (options.searches or "map" in options.given) and tally.items and not tally.flown:
         yield f"nothing was flown, though it was asked for: {_why(tally)}"
 
 

@@ -48,6 +48,11 @@ class Target:
         return f"file-{Path(self.file).stem}" if self.file else self.slot.id(self.map)
 
     @property
+    def system_name(self) -> str:
+        """The landing system's name in ledgers and cases: "module:class"."""
+        return f"{self.system.__module__}:{self.system.__qualname__}"
+
+    @property
     def broken(self) -> str:
         """What is wrong with the case's file, if anything is."""
         return self.entry.problem if self.entry is not None else ""
@@ -65,8 +70,3 @@ class Target:
         if self.entry is not None:
             facts += [str(self.entry.path), self.live]
         return hashlib.sha256(json.dumps(facts).encode()).hexdigest()[:16]
-
-
-def name_of(system: type) -> str:
-    """Return a system's name in ledgers and cases: "module:class"."""
-    return f"{system.__module__}:{system.__qualname__}"

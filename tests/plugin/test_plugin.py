@@ -9,7 +9,8 @@ import pytest
 
 from pytest_garl.execution.job import loads
 from pytest_garl.execution.ledger import Ledger
-from pytest_garl.execution.slot import population, slots
+from pytest_garl.execution.slot import slots
+from pytest_garl.plugin.options import population
 
 SAVED = Path(__file__).parents[2] / "docs" / "tutorial" / "scenarios"
 

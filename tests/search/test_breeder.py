@@ -6,7 +6,8 @@ import pytest
 
 from pytest_garl.execution.job import load_scenario
 from pytest_garl.execution.ledger import Ledger
-from pytest_garl.execution.slot import Slot, population, slots
+from pytest_garl.execution.slot import Slot, slots
+from pytest_garl.plugin.options import population
 from pytest_garl.scenarios.genes import genome_for
 from pytest_garl.scenarios.maps.map import load_map
 from pytest_garl.search.breeder import Breeder
