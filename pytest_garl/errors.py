@@ -43,3 +43,27 @@ class PoolError(GarlError):
 
 class DispatchError(GarlError):
     """A process whose libraries compute with other instructions than all that fly do."""
+
+
+class CorpusError(GarlError):
+    """A folder of cases that cannot be read or written."""
+
+
+class SavingError(GarlError):
+    """A file that cannot be written, or a folder in which nothing can be."""
+
+
+class BaselineError(GarlError):
+    """A baseline cannot be made, written or compared with."""
+
+
+class ExperimentError(GarlError):
+    """An experiment that cannot be flown, or whose rows cannot be read."""
+
+
+class NotFiniteError(GarlError):
+    """A flight with a NaN or an infinity in it: it is written nowhere."""
+
+
+class SimulatorError(GarlError):
+    """A simulator that fails in a fresh process, with a landing system that is known to be good."""

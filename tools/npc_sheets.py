@@ -34,12 +34,12 @@ TRIES = 40
 SEED = 99
 
 
-def first_hit(map: Map, mover: str) -> tuple[Scenario, Flight] | None:
+def first_hit(map: Map, policy: str) -> tuple[Scenario, Flight] | None:
     """Return the first of the scenarios in which the object is hit, and its flight."""
     clear = {f"environment.{name}": 0.0 for name, _ in WEATHER}
     for drawn in propose(map, genome_for(map), SEED, 0, TRIES):
         scenario = drawn.replace(clear)
-        flight = fly(scenario, OpenCvLandingSystem, policy_spec(mover), map=map)
+        flight = fly(scenario, OpenCvLandingSystem, policy_spec(policy), map=map)
         if flight.outcome == "collision" and flight.contacts[-1].body_class == "dynamic":
             return scenario, flight
     return None
@@ -48,19 +48,19 @@ def first_hit(map: Map, mover: str) -> tuple[Scenario, Flight] | None:
 def main() -> None:
     """Write a picture and a table per kind of object."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--mover", default="dqn")
+    parser.add_argument("--npcs", default="dqn")
     parser.add_argument("--out", type=Path, default=Path(".garl"))
     arguments = parser.parse_args()
     cv2.setNumThreads(1)
     for kind, name in PLACES.items():
         map = dataclasses.replace(load_map(name), objects=((kind, 1),))
-        found = first_hit(map, arguments.mover)
+        found = first_hit(map, arguments.npcs)
         if found is None:
             print(f"{kind}: none of {TRIES} flights hit it")
             continue
         scenario, flight = found
         renderer = Renderer(scenario, map, Camera(), generator(scenario.seed, "sensor"))
-        target = arguments.out / f"mover-{kind}.png"
+        target = arguments.out / f"npc-{kind}.png"
         target.parent.mkdir(parents=True, exist_ok=True)
         picture = sheet(flight, renderer, 0.6)
         cv2.imwrite(str(target), cv2.cvtColor(picture, cv2.COLOR_RGB2BGR))

@@ -18,7 +18,7 @@ from pytest_garl.adversary.catalogue import WEIGHTS
 from pytest_garl.adversary.observations import ENCODINGS, on_turn
 from pytest_garl.errors import PolicyError
 from pytest_garl.files.arrays import unpack
-from pytest_garl.files.json_values import parsed
+from pytest_garl.files.json_values import parse_json
 from pytest_garl.files.reading import MEGABYTE, read_bytes
 from pytest_garl.messages import listed, shown
 from pytest_garl.simulation.npc_policy import STAY, Move, PolicySpec, Situation
@@ -112,7 +112,7 @@ def read_manifest(path: Path) -> dict[str, Any]:
         )
     file = path.with_suffix(".json")
     try:
-        manifest = parsed(read_bytes(file, error=PolicyError))
+        manifest = parse_json(read_bytes(file, error=PolicyError))
     except (PolicyError, ValueError) as error:
         raise _wrong(file, f"is no readable manifest ({error})") from error
     if not isinstance(manifest, dict):

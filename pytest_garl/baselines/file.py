@@ -8,8 +8,8 @@ from pathlib import Path
 from typing import Any
 
 from pytest_garl.baselines.pairs import FlightSummary
-from pytest_garl.errors import GarlError, ScenarioError
-from pytest_garl.files.atomic import save_text
+from pytest_garl.errors import BaselineError, GarlError, ScenarioError
+from pytest_garl.files.atomic import write_text_atomically
 from pytest_garl.files.reading import MEGABYTE, read_text
 from pytest_garl.files.toml import LARGEST, Table, finite, parse, quoted
 from pytest_garl.messages import listed, printable, shown
@@ -36,10 +36,6 @@ _KEYS = {
     "flights",
 }
 _OUTCOMES = ("landed", "collision", "not_landed", "aborted", "crashed", "inconclusive")
-
-
-class BaselineError(GarlError):
-    """A baseline cannot be made, written or compared with."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -187,7 +183,7 @@ def save(path: Path, baseline: Baseline) -> None:
             f"{path}: found {flights} flights in {len(text.encode())} bytes, expected at most "
             f"{LARGEST_BYTES}; save fewer flights"
         )
-    save_text(path, text)
+    write_text_atomically(path, text)
 
 
 def _check(baseline: Baseline, error: Callable[[str], GarlError]) -> None:

@@ -10,10 +10,10 @@ from pathlib import Path
 
 from pytest_garl.adversary.catalogue import policy_spec
 from pytest_garl.adversary.policy_check import check_policy
-from pytest_garl.baselines.file import Baseline, BaselineError, BaselineFlight, BaselineSet
+from pytest_garl.baselines.file import Baseline, BaselineFlight, BaselineSet
 from pytest_garl.baselines.gate import FlyScenarios
 from pytest_garl.baselines.pairs import summary_of
-from pytest_garl.errors import PolicyError
+from pytest_garl.errors import BaselineError, PolicyError
 from pytest_garl.execution.batch import fly_all, temporary_pool
 from pytest_garl.execution.checkout import Checkout, describe
 from pytest_garl.execution.job import FlightJob, load_scenario, loads

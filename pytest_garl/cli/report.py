@@ -9,7 +9,7 @@ from typing import Any
 import click
 
 from pytest_garl.cli.cases import FOLDER
-from pytest_garl.files.atomic import save_text
+from pytest_garl.files.atomic import write_text_atomically
 from pytest_garl.regressions.corpus import Corpus
 from pytest_garl.reports.run_report import report_of
 
@@ -39,7 +39,7 @@ def report(ledger: Path, as_json: bool, out: Path | None, folder: Path) -> None:
     if out is None:
         click.echo(text, nl=False)
     else:
-        save_text(out, text)
+        write_text_atomically(out, text)
 
 
 def _words(found: dict[str, Any]) -> str:

@@ -26,7 +26,8 @@ def fly_job(
     ``name`` is that of its record.  If the flight holds a number that is not finite, that is a
     finding, and no record is left.
     """
-    from pytest_garl.simulation.flight_file import NotFiniteError, save
+    from pytest_garl.errors import NotFiniteError
+    from pytest_garl.simulation.flight_file import save
 
     for entry in job.path:
         if entry not in sys.path:

@@ -12,7 +12,7 @@ from pytest_garl.execution.database import REMEDY
 from pytest_garl.execution.ledger_queue import Claim
 from pytest_garl.execution.reference import Reference
 from pytest_garl.execution.slot import flight_name
-from pytest_garl.files.json_values import made, parsed
+from pytest_garl.files.json_values import dataclass_from, parse_json
 from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.simulation.npc_policy import PolicySpec
 from pytest_garl.verdicts.verdict import Limits
@@ -64,7 +64,7 @@ class FlightJob:
 def loads(text: str) -> FlightJob:
     """Return the job in ``text``; raise LedgerError for a damaged one."""
     try:
-        return made(FlightJob, parsed(text))
+        return dataclass_from(FlightJob, parse_json(text))
     except ValueError as error:
         raise LedgerError(f"a job in the ledger is damaged: {error}. {REMEDY}") from error
 
@@ -80,11 +80,11 @@ def dump_scenario(scenario: Scenario) -> str:
 def load_scenario(text: str) -> Scenario:
     """Return the scenario in a line of JSON; raise LedgerError for a damaged one."""
     try:
-        values = parsed(text)
+        values = parse_json(text)
         if isinstance(values, dict):
             removed = values.pop("absent", [])
             values["removed_objects"] = removed
-        scenario = made(Scenario, values)
+        scenario = dataclass_from(Scenario, values)
     except ValueError as error:
         raise LedgerError(f"a scenario in the ledger is damaged: {error}. {REMEDY}") from error
     genes = tuple((key, float(value)) for key, value in scenario.genes)

@@ -21,7 +21,7 @@ from pytest_garl.execution.database import (
 from pytest_garl.execution.ledger_queries import LedgerQueries
 from pytest_garl.execution.ledger_queue import WorkQueue
 from pytest_garl.execution.result import FlightResult, parse_result
-from pytest_garl.files.json_values import parsed
+from pytest_garl.files.json_values import parse_json
 from pytest_garl.messages import shortened
 
 
@@ -106,7 +106,7 @@ class Ledger:
         """Return a fact about the run, or None."""
         row = self.database.execute("SELECT value FROM run WHERE key = ?", (key,)).fetchone()
         try:
-            return None if row is None else parsed(row[0])
+            return None if row is None else parse_json(row[0])
         except ValueError as error:
             raise LedgerError(f"{self.path}: the fact {key!r} is damaged: {error}") from error
 

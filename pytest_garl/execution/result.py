@@ -10,7 +10,7 @@ from typing import Any, Self
 
 from pytest_garl.errors import LedgerError
 from pytest_garl.execution.database import REMEDY
-from pytest_garl.files.json_values import made, parsed
+from pytest_garl.files.json_values import dataclass_from, parse_json
 from pytest_garl.messages import printable
 from pytest_garl.simulation.flight import Crash
 from pytest_garl.verdicts.verdict import PAPER_LIMITS, Verdict
@@ -64,7 +64,7 @@ class FlightResult:
             values = {"off_marker_m": None} | {
                 key: value for key, value in values.items() if key in _FIELDS
             }
-        return made(cls, values)
+        return dataclass_from(cls, values)
 
     def dumps(self) -> str:
         """Return the text that the ledger holds: the same bytes for equal results."""
@@ -80,7 +80,7 @@ def parse_result(text: str) -> FlightResult:
     Control characters in what a landing system said are written out.
     """
     try:
-        values = parsed(text)
+        values = parse_json(text)
         # JSON escapes all characters beyond ASCII, and control characters too.
         return FlightResult.from_json(_printable(values) if "\\u" in text else values)
     except ValueError as error:

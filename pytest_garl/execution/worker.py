@@ -10,7 +10,7 @@ from pathlib import Path
 from time import monotonic, sleep
 
 from pytest_garl import cpu_dispatch
-from pytest_garl.errors import GarlError, LandingSystemError, LedgerError
+from pytest_garl.errors import GarlError, LandingSystemError, LedgerError, SimulatorError
 from pytest_garl.execution.checkout import isolate_imports
 from pytest_garl.execution.ledger_queue import Claim, WorkQueue
 from pytest_garl.execution.processes import Parent, run_worker
@@ -152,10 +152,6 @@ class Flyer:
             raise SimulatorError(
                 f"{SIMULATOR} failed in a worker process:\n{_text(error)}"
             ) from error
-
-
-class SimulatorError(GarlError):
-    """A simulator that fails in a fresh process, with a landing system that is known to be good."""
 
 
 def _cannot_go_on(error: Exception) -> bool:

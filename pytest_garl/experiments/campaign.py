@@ -12,16 +12,16 @@ from pathlib import Path
 from typing import Protocol
 
 from pytest_garl.adversary.catalogue import policy_spec
-from pytest_garl.errors import GarlError
+from pytest_garl.errors import ExperimentError, GarlError
 from pytest_garl.execution.ledger import Ledger
 from pytest_garl.execution.ledger_queries import SearchProgress
 from pytest_garl.experiments import results as files
 from pytest_garl.experiments.avoidability import pilot
 from pytest_garl.experiments.measure import Piloted, row_of, searches_of
 from pytest_garl.experiments.pytest_run import search
-from pytest_garl.experiments.results import ExperimentError, Row
+from pytest_garl.experiments.results import Row
 from pytest_garl.experiments.spec import Experiment, Run
-from pytest_garl.files.atomic import alone
+from pytest_garl.files.atomic import locked
 from pytest_garl.scenarios.maps.map import load_map
 from pytest_garl.search.catalogue import find_method
 
@@ -115,7 +115,7 @@ def fly(experiment: Experiment, place: Place, workers: int, watch: Watch) -> Non
         folder = place.runs / run.folder
         watch.begins(run, number, total)
         # Another process that flies the same experiment is waited for here.
-        with alone(folder):
+        with locked(folder):
             if run in missing(experiment, files.read(place.rows)):
                 rows = _fly(run, folder, experiment.unavoidable, workers, watch)
                 files.append(place.rows, rows)

@@ -11,10 +11,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pytest_garl.cpu_dispatch import of_children
+from pytest_garl.errors import ExperimentError
 from pytest_garl.execution.job import FlightJob, load_scenario, loads
 from pytest_garl.execution.ledger import Ledger
 from pytest_garl.execution.ledger_queries import LedgerFlight
-from pytest_garl.experiments.results import ExperimentError, Row
+from pytest_garl.experiments.results import Row
 from pytest_garl.experiments.spec import KINDS, Run
 from pytest_garl.regressions.follow_up import done_of
 from pytest_garl.scenarios.genes import WEATHER, genome_for

@@ -13,11 +13,10 @@ from contextlib import closing, contextmanager
 from pathlib import Path
 from typing import IO
 
-from pytest_garl.errors import LedgerError
+from pytest_garl.errors import ExperimentError, LedgerError
 from pytest_garl.execution.ledger import Ledger
 from pytest_garl.execution.ledger_queries import SearchProgress
 from pytest_garl.execution.processes import end_with_parent
-from pytest_garl.experiments.results import ExperimentError
 from pytest_garl.experiments.spec import Run
 
 PROGRESS_EVERY_S = 0.5

@@ -14,7 +14,7 @@ from pytest_garl.experiments.metrics import samples
 from pytest_garl.experiments.plots import draw
 from pytest_garl.experiments.results import Row
 from pytest_garl.experiments.spec import Experiment, Grid, Run
-from pytest_garl.files.atomic import save_text
+from pytest_garl.files.atomic import write_text_atomically
 from pytest_garl.verdicts.paper_metrics import CELL_M, HEIGHT_M
 
 HOW_TO_READ = f"""\
@@ -65,7 +65,7 @@ def write(experiment: Experiment, rows: Sequence[Row], source: str, path: Path) 
             experiment.goals.remarks,
         ]
     sections += ["## How to read the tables", HOW_TO_READ]
-    return save_text(path, "\n\n".join(part for part in sections if part) + "\n")
+    return write_text_atomically(path, "\n\n".join(part for part in sections if part) + "\n")
 
 
 def _flown(experiment: Experiment, rows: Sequence[Row]) -> Iterator[str]:

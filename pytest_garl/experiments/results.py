@@ -12,8 +12,8 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import Any
 
-from pytest_garl.errors import GarlError
-from pytest_garl.files.atomic import alone, save_text
+from pytest_garl.errors import ExperimentError
+from pytest_garl.files.atomic import locked, write_text_atomically
 from pytest_garl.files.reading import MEGABYTE, read_text
 from pytest_garl.messages import listed, printable, shown
 
@@ -21,10 +21,6 @@ LARGEST_BYTES = 16 * MEGABYTE
 """Some ten thousand searches, each a row of a kilobyte."""
 SEPARATOR = "|"
 """Between signatures in a cell."""
-
-
-class ExperimentError(GarlError):
-    """An experiment that cannot be flown, or whose rows cannot be read."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -169,10 +165,10 @@ def _row(path: Path, line: int, cells: Mapping[str, str | None]) -> Row:
 
 def append(path: Path, rows: Iterable[Row]) -> None:
     """Add rows all at once; a search that another process has added meanwhile keeps its row."""
-    with alone(path.parent):
+    with locked(path.parent):
         known = read(path)
         keys = {row.key for row in known}
-        save_text(path, _dumps([*known, *(row for row in rows if row.key not in keys)]))
+        write_text_atomically(path, _dumps([*known, *(row for row in rows if row.key not in keys)]))
 
 
 def _dumps(rows: Iterable[Row]) -> str:

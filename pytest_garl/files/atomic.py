@@ -9,14 +9,10 @@ import re
 from collections.abc import Iterator
 from pathlib import Path
 
-from pytest_garl.errors import GarlError
+from pytest_garl.errors import SavingError
 
 
-class SavingError(GarlError):
-    """A file that cannot be written, or a folder in which nothing can be."""
-
-
-def save_text(path: Path, text: str) -> Path:
+def write_text_atomically(path: Path, text: str) -> Path:
     """Write a file in one piece and return its path; its folder is made where it is missing."""
     scratch = path.with_name(f".{path.name}.{os.getpid()}")
     try:
@@ -32,7 +28,7 @@ def save_text(path: Path, text: str) -> Path:
 
 
 @contextlib.contextmanager
-def alone(folder: Path) -> Iterator[None]:
+def locked(folder: Path) -> Iterator[None]:
     """Let one process at a time change the files of a folder, from reading them to writing."""
     try:
         folder.mkdir(parents=True, exist_ok=True)

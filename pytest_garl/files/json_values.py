@@ -15,7 +15,7 @@ from pytest_garl.messages import listed, shortened, shown
 T = TypeVar("T")
 
 
-def parsed(text: str | bytes) -> Any:
+def parse_json(text: str | bytes) -> Any:
     """Return the value in a JSON text; raise ValueError, briefly, for what is none."""
     try:
         return json.loads(text)
@@ -25,7 +25,7 @@ def parsed(text: str | bytes) -> Any:
         raise ValueError(f"not valid JSON: {shortened(str(error))}") from error
 
 
-def made(kind: type[T], value: Any, where: str = "") -> T:
+def dataclass_from(kind: type[T], value: Any, where: str = "") -> T:
     """Return a dataclass whose fields are plain values, as ``dataclasses.asdict`` has them.
 
     Lists become tuples.  Raises ValueError that names the field, what was found and what was
@@ -67,7 +67,7 @@ def _value(kind: Any, value: Any, where: str) -> Any:
         if not isinstance(value, dict):
             raise _wrong(where, value, "a table")
         return value
-    return made(kind, value, where)
+    return dataclass_from(kind, value, where)
 
 
 def _one_of(kinds: tuple[Any, ...], value: Any, where: str) -> Any:

@@ -8,16 +8,12 @@ import functools
 from collections.abc import Iterator
 from pathlib import Path
 
-from pytest_garl.errors import GarlError, ScenarioError
-from pytest_garl.files.atomic import alone, save_text
+from pytest_garl.errors import CorpusError, ScenarioError
+from pytest_garl.files.atomic import locked, write_text_atomically
 from pytest_garl.messages import printable
 from pytest_garl.regressions.acceptance import Acceptance, read_acceptance
 from pytest_garl.regressions.case import Case
 from pytest_garl.regressions.case_file import CaseHeader, dumps, load, load_header
-
-
-class CorpusError(GarlError):
-    """A folder of cases that cannot be read or written."""
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -115,12 +111,12 @@ class Corpus:
     def save(self, case: Case) -> Path | None:
         """Write a new case; return its file, or None if the same failure is saved already."""
         folder = self._folder_of(case.system)
-        with alone(folder):
+        with locked(folder):
             self._listed.pop(folder, None)
             if self._find(case) is not None:
                 return None
             self._listed.pop(folder, None)
-            return save_text(folder / f"{case.id}.toml", dumps(case))
+            return write_text_atomically(folder / f"{case.id}.toml", dumps(case))
 
     def save_patch(self, case: Case, patches: Path, root: Path) -> Path:
         """Write a patch that adds the case; the tree itself is left alone."""
@@ -131,7 +127,7 @@ class Corpus:
             raise CorpusError(
                 f"{self.folder}: lies outside of the project at {root}: no patch"
             ) from error
-        return save_text(patches / f"{case.id}.patch", text)
+        return write_text_atomically(patches / f"{case.id}.patch", text)
 
     def _folder_of(self, system: str) -> Path:
         return folder_of(self.folder, system)
@@ -182,8 +178,8 @@ class Corpus:
 
 def replace_file(path: Path, case: Case) -> Path:
     """Write a case in place of the one in ``path``, under the name that it should have."""
-    with alone(path.parent):
-        written = save_text(path.with_name(f"{case.id}.toml"), dumps(case))
+    with locked(path.parent):
+        written = write_text_atomically(path.with_name(f"{case.id}.toml"), dumps(case))
         if written != path:
             path.unlink(missing_ok=True)
         return written

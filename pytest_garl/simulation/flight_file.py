@@ -14,9 +14,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pytest_garl.errors import GarlError
+from pytest_garl.errors import GarlError, NotFiniteError
 from pytest_garl.files.arrays import unpack
-from pytest_garl.files.json_values import made, parsed
+from pytest_garl.files.json_values import dataclass_from, parse_json
 from pytest_garl.files.reading import MEGABYTE, read_bytes
 from pytest_garl.messages import listed
 from pytest_garl.simulation.flight import (
@@ -67,10 +67,6 @@ def parted_s(first: Flight, second: Flight) -> float:
     length = min(len(first.uav.time_s), len(second.uav.time_s))
     differ = (first.uav.position_m[:length] != second.uav.position_m[:length]).any(axis=1)
     return float(first.uav.time_s[int(np.argmax(differ)) if differ.any() else length - 1])
-
-
-class NotFiniteError(GarlError):
-    """A flight with a NaN or an infinity in it: it is written nowhere."""
 
 
 def save(flight: Flight, path: Path) -> None:
@@ -138,10 +134,11 @@ def load(path: Path) -> Flight:
             raise ValueError(
                 f"header: found {header.nbytes} bytes, expected at most {LARGEST_HEADER_BYTES}"
             )
-        values = parsed(header.tobytes())
+        values = parse_json(header.tobytes())
         # Files of flights in which no policy changed the environment do not have it.
-        told = made(_Header, {"changes": None, **values} if isinstance(values, dict) else values)
-        return _flight(told, arrays)
+        if isinstance(values, dict):
+            values = {"changes": None, **values}
+        return _flight(dataclass_from(_Header, values), arrays)
     except ValueError as error:
         raise GarlError(f"{path}: not a saved flight: {error}") from error
 

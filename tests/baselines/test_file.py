@@ -7,17 +7,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from pytest_garl.baselines.file import (
-    BaselineError,
-    BaselineFlight,
-    dumps,
-    load,
-    loads,
-    save,
-)
+from pytest_garl.baselines.file import BaselineFlight, dumps, load, loads, save
 from pytest_garl.baselines.pairs import FlightSummary
 from pytest_garl.baselines.record import BaselineSpec
-from pytest_garl.errors import ScenarioError
+from pytest_garl.errors import BaselineError, ScenarioError
 from pytest_garl.messages import printable
 from pytest_garl.scenarios.genes import WIND, genome_for, with_destinations
 from pytest_garl.scenarios.maps.map import load_map

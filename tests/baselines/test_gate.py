@@ -6,10 +6,8 @@ from pathlib import Path
 
 import pytest
 
-from pytest_garl.baselines.file import (
-    BaselineError,
-)
 from pytest_garl.baselines.gate import compare_flights, compare_sets
+from pytest_garl.errors import BaselineError
 from pytest_garl.execution.on_demand import CompletedFlight
 from pytest_garl.regressions.robustness import neighbours
 from pytest_garl.scenarios.scenario import Scenario

@@ -6,10 +6,8 @@ from pathlib import Path
 import pytest
 
 from pytest_garl.adversary.catalogue import policy_spec
-from pytest_garl.baselines.file import (
-    BaselineError,
-)
 from pytest_garl.baselines.record import BaselineSpec, baseline_from_ledger
+from pytest_garl.errors import BaselineError
 from tests.baselines.samples import LAWN, baseline_set, job, write_ledger
 
 

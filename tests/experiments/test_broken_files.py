@@ -8,8 +8,8 @@ from pathlib import Path
 
 import pytest
 
-from pytest_garl.errors import ScenarioError
-from pytest_garl.experiments.results import ExperimentError, append, read
+from pytest_garl.errors import ExperimentError, ScenarioError
+from pytest_garl.experiments.results import append, read
 from tests.experiments.samples import row
 from tests.experiments.test_spec import TEXT, plan
 

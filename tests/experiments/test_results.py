@@ -5,7 +5,8 @@ from pathlib import Path
 
 import pytest
 
-from pytest_garl.experiments.results import ExperimentError, append, read
+from pytest_garl.errors import ExperimentError
+from pytest_garl.experiments.results import append, read
 from tests.experiments.samples import PLAIN, row
 
 BARE = row(

@@ -4,9 +4,8 @@ from pathlib import Path
 
 import pytest
 
-from pytest_garl.errors import ScenarioError
+from pytest_garl.errors import ExperimentError, ScenarioError
 from pytest_garl.experiments.campaign import check
-from pytest_garl.experiments.results import ExperimentError
 from pytest_garl.experiments.spec import Experiment, read
 
 DOCS = Path(__file__).parents[2] / "docs" / "experiments"

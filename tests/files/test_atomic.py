@@ -6,19 +6,20 @@ from pathlib import Path
 
 import pytest
 
-from pytest_garl.files.atomic import SavingError, alone, save_text
+from pytest_garl.errors import SavingError
+from pytest_garl.files.atomic import locked, write_text_atomically
 
 
 def add_one(path: Path) -> None:
     for _ in range(20):
-        with alone(path.parent):
+        with locked(path.parent):
             count = int(path.read_text())
             time.sleep(0.001)
-            save_text(path, str(count + 1))
+            write_text_atomically(path, str(count + 1))
 
 
 def test_locked_writers_lose_nothing(tmp_path: Path) -> None:
-    path = save_text(tmp_path / "deep" / "count", "0")
+    path = write_text_atomically(tmp_path / "deep" / "count", "0")
     context = multiprocessing.get_context("spawn")
     processes = [context.Process(target=add_one, args=(path,)) for _ in range(2)]
     for process in processes:
@@ -30,15 +31,15 @@ def test_locked_writers_lose_nothing(tmp_path: Path) -> None:
 
 
 def test_line_ends_stay_as_they_are(tmp_path: Path) -> None:
-    assert save_text(tmp_path / "a", "ü\r\nb\n").read_bytes() == "ü\r\nb\n".encode()
+    assert write_text_atomically(tmp_path / "a", "ü\r\nb\n").read_bytes() == "ü\r\nb\n".encode()
 
 
 def test_an_unwritable_place_is_named(tmp_path: Path) -> None:
     (tmp_path / "file").touch()
     with pytest.raises(SavingError, match=r"file/a.csv: cannot be saved \(.*file"):
-        save_text(tmp_path / "file" / "a.csv", "")
+        write_text_atomically(tmp_path / "file" / "a.csv", "")
     with (
         pytest.raises(SavingError, match="file: nothing can be saved here"),
-        alone(tmp_path / "file"),
+        locked(tmp_path / "file"),
     ):
         pass

@@ -6,7 +6,7 @@ from typing import Literal
 
 import pytest
 
-from pytest_garl.files.json_values import made, parsed
+from pytest_garl.files.json_values import dataclass_from, parse_json
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -37,8 +37,8 @@ GOOD = Outer(
 
 def test_a_dataclass_survives_json_to_the_byte() -> None:
     text = json.dumps(dataclasses.asdict(GOOD))
-    assert made(Outer, parsed(text)) == GOOD
-    assert json.dumps(dataclasses.asdict(made(Outer, parsed(text)))) == text
+    assert dataclass_from(Outer, parse_json(text)) == GOOD
+    assert json.dumps(dataclasses.asdict(dataclass_from(Outer, parse_json(text)))) == text
 
 
 @pytest.mark.parametrize(
@@ -63,7 +63,7 @@ def test_a_dataclass_survives_json_to_the_byte() -> None:
 def test_a_wrong_field_is_named(change: dict[str, object], words: str) -> None:
     values = json.loads(json.dumps(dataclasses.asdict(GOOD))) | change
     with pytest.raises(ValueError, match=words) as caught:
-        made(Outer, values)
+        dataclass_from(Outer, values)
     assert len(str(caught.value)) < 300
 
 
@@ -80,5 +80,5 @@ def test_a_wrong_field_is_named(change: dict[str, object], words: str) -> None:
 )
 def test_invalid_json_is_one_short_error(text: str | bytes, words: str) -> None:
     with pytest.raises(ValueError, match=words) as caught:
-        parsed(text)
+        parse_json(text)
     assert len(str(caught.value)) < 150

@@ -33,7 +33,7 @@ import time
 from pytest_garl.files import atomic
 from pytest_garl.regressions import corpus
 
-write = atomic.save_text
+write = atomic.write_text_atomically
 
 def slowly(path, text):
     # A kill shall find it between two files, and between a file and its name.
@@ -42,7 +42,7 @@ def slowly(path, text):
     time.sleep(0.15)
     return written
 
-corpus.save_text = slowly
+corpus.write_text_atomically = slowly
 """
 PATIENCE_S = 240.0
 RANDOM, STARTING, SAVING = 30, 10, 10

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from pytest_garl.baselines import file as baselines
-from pytest_garl.errors import OptionError, ScenarioError
+from pytest_garl.errors import BaselineError, OptionError, ScenarioError
 from pytest_garl.regressions.case_file import dumps, load, load_header, loads
 from pytest_garl.scenarios.maps.map import load_map
 from pytest_garl.verdicts.verdict import Limits
@@ -128,7 +128,7 @@ def test_no_baseline_is_saved_that_could_not_be_read(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(baselines, "LARGEST_BYTES", len(BASELINE) - 1)
-    with pytest.raises(baselines.BaselineError, match=r"flights in .* bytes, expected at most"):
+    with pytest.raises(BaselineError, match=r"flights in .* bytes, expected at most"):
         baselines.save(tmp_path / "base.toml", baseline())
     (tmp_path / "base.toml").write_text(BASELINE)
     with pytest.raises(ScenarioError, match=r"bytes, expected at most .* `garl baseline save`"):

@@ -9,10 +9,11 @@ from pathlib import Path
 
 import pytest
 
+from pytest_garl.errors import CorpusError
 from pytest_garl.files import reading
 from pytest_garl.regressions.case import Status
 from pytest_garl.regressions.case_file import dumps, load
-from pytest_garl.regressions.corpus import Corpus, CorpusError, patch_of, replace_file
+from pytest_garl.regressions.corpus import Corpus, patch_of, replace_file
 from pytest_garl.scenarios.maps import map as package
 from pytest_garl.scenarios.maps.map import load_map
 from tests.regressions.test_case_file import NAMES, SYSTEM, case

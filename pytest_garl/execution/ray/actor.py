@@ -23,7 +23,7 @@ from pytest_garl.execution.reference import package_sha256
 from pytest_garl.execution.result import FlightResult, broken_result
 from pytest_garl.execution.slot import Slot, flight_name
 from pytest_garl.execution.worker_failure import WorkerExit
-from pytest_garl.files.json_values import parsed
+from pytest_garl.files.json_values import parse_json
 from pytest_garl.simulation.flight import PACKAGES, Crash
 
 _FIRST = Slot(generation=0, index=0)
@@ -101,7 +101,7 @@ class FlightActor:
         record = file.read_bytes()
         file.unlink()
         return FlightOutput(
-            result=FlightResult.from_json(parsed(self._at_home(result.dumps()))),
+            result=FlightResult.from_json(parse_json(self._at_home(result.dumps()))),
             sha256=self._ledger.sha256(search, 0, 0),
             wall_s=self._ledger.wall_s(search, 0, 0),
             record=record,
