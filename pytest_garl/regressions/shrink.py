@@ -17,7 +17,8 @@ from hypothesis import HealthCheck, Phase, Verbosity, given, seed, settings
 from hypothesis import strategies as st
 from hypothesis.database import ExampleDatabase, choices_to_bytes
 
-from pytest_garl.scenarios.genes import Genome, NuclearGene, Property, genome_like
+from pytest_garl.scenarios.extra_genes import genome_like
+from pytest_garl.scenarios.genes import Genome, NuclearGene, Property
 from pytest_garl.scenarios.maps.map import Map
 from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.scenarios.validity import repair

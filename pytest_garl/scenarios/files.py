@@ -8,7 +8,7 @@ from pytest_garl.errors import ScenarioError
 from pytest_garl.files.reading import read_text
 from pytest_garl.files.toml import Table, parse, quoted
 from pytest_garl.messages import shown
-from pytest_garl.scenarios.genes import genome_like
+from pytest_garl.scenarios.extra_genes import genome_like
 from pytest_garl.scenarios.maps.map import Map
 from pytest_garl.scenarios.scenario import Scenario
 

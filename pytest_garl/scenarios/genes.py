@@ -126,7 +126,8 @@ def _scalar(composite: str, name: str, high: float, nominal: float, meaning: str
     )
 
 
-def _place(prefix: str, name: str, meaning: str) -> NuclearGene:
+def place_gene(prefix: str, name: str, meaning: str) -> NuclearGene:
+    """Return a gene of two properties x and y from -1 to 1, which crossover never parts."""
     return NuclearGene(
         name=name,
         properties=tuple(
@@ -158,16 +159,6 @@ SUN = "environment.sun_position"
 ENVIRONMENT = (*(f"environment.{name}" for name, _ in WEATHER), SUN)
 """Keys of the environment's properties; none is below 0 or above 1."""
 
-WIND = CompositeGene(
-    name="wind", genes=(_place("wind", "wind", "wind as a share of 10 m/s, towards"),)
-)
-GPS_ERROR = CompositeGene(
-    name="gps_error",
-    genes=(_place("gps_error", "gps_error", "error of the told coordinate, share of 2.5 m"),),
-)
-EXTRAS = {"wind": WIND, "gps_error": GPS_ERROR}
-"""Genes that exist but are off by default; so are destinations (``with_destinations``)."""
-
 
 def genome_for(
     map: Map, *, weather: WeatherRange = "confined", extras: Iterable[CompositeGene] = ()
@@ -189,7 +180,7 @@ def genome_for(
     )
     marker = CompositeGene(
         name="marker",
-        genes=(_place("marker", "position", "place of the marker in its disc of 7.5 m"),),
+        genes=(place_gene("marker", "position", "place of the marker in its disc of 7.5 m"),),
     )
     objects = CompositeGene(
         name="objects", genes=tuple(_object_gene(name) for name, _ in map.object_names)
@@ -210,19 +201,6 @@ def with_destinations(genome: Genome) -> Genome:
         for each in genome.composites
     )
     return Genome(composites=tuple(composites))
-
-
-def genome_like(keys: Iterable[str], map: Map) -> Genome:
-    """Return the genome, weather in its full range, of scenarios that have these genes.
-
-    Whatever is not there by default is part of it if one of the keys is.
-    """
-    keys = tuple(keys)
-    heads = {key.partition(".")[0] for key in keys}
-    extras = [gene for name, gene in EXTRAS.items() if name in heads]
-    genome = genome_for(map, weather="full", extras=extras)
-    bound = any(".destination_" in key for key in keys)
-    return with_destinations(genome) if bound else genome
 
 
 def _corner(name: str, end: str) -> tuple[Property, ...]:

@@ -1,4 +1,4 @@
-"""From genes to metres: where the marker lies, where objects start, what the wind is."""
+"""From genes to metres: where the marker lies, where objects start and go to."""
 
 from __future__ import annotations
 
@@ -13,10 +13,6 @@ MARKER_RADIUS_M = 7.5
 TARGET_MARKER_ID = 0
 """Paper, section 4.2: marker of 1.5 m, id 0, up to 7.5 m off the told coordinate."""
 MARKER_DICTIONARY = "DICT_5X5_50"
-TOP_WIND_MPS = 10.0
-"""The DJI Matrice 100's rated wind resistance."""
-TOP_GPS_ERROR_M = 2.5
-"""Horizontal accuracy (CEP) that u-blox states for its M8 receivers; here a bound per axis."""
 
 
 def square_to_disc(x: float, y: float) -> tuple[float, float]:
@@ -99,19 +95,3 @@ def object_speed_mps(scenario: Scenario, map: Map, name: str) -> float:
     """How fast an object may move: its velocity gene times its type's top speed."""
     kind = dict(map.object_names)[name]
     return scenario[f"{name}.velocity"] * OBJECT_TYPES[kind].top_speed_mps
-
-
-def wind_mps(scenario: Scenario) -> tuple[float, float]:
-    """Wind velocity (x, y); none unless the genome has the wind gene."""
-    return (
-        scenario.get("wind.x", 0.0) * TOP_WIND_MPS,
-        scenario.get("wind.y", 0.0) * TOP_WIND_MPS,
-    )
-
-
-def gps_error_m(scenario: Scenario) -> tuple[float, float]:
-    """Error of the coordinate that the mission tells; none unless the genome has the gene."""
-    return (
-        scenario.get("gps_error.x", 0.0) * TOP_GPS_ERROR_M,
-        scenario.get("gps_error.y", 0.0) * TOP_GPS_ERROR_M,
-    )

@@ -8,8 +8,9 @@ from typing import Any
 
 from pytest_garl.landing_system import Abort, Command, Land, VehicleState
 from pytest_garl.scenarios.bodies import rotate
+from pytest_garl.scenarios.extra_genes import wind_mps
 from pytest_garl.scenarios.maps.map import Map
-from pytest_garl.scenarios.placement import marker_position_m, wind_mps
+from pytest_garl.scenarios.placement import marker_position_m
 from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.simulation.camera.frame import blank_frame
 from pytest_garl.simulation.camera.projection import eye_under

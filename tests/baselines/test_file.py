@@ -12,7 +12,8 @@ from pytest_garl.baselines.pairs import FlightSummary
 from pytest_garl.baselines.record import BaselineSpec
 from pytest_garl.errors import BaselineError, ScenarioError
 from pytest_garl.messages import printable
-from pytest_garl.scenarios.genes import WIND, genome_for, with_destinations
+from pytest_garl.scenarios.extra_genes import WIND
+from pytest_garl.scenarios.genes import genome_for, with_destinations
 from pytest_garl.scenarios.maps.map import load_map
 from pytest_garl.search.methods.random import propose
 from tests.baselines.samples import COURT, DOG, LANDED, LAWN, baseline, baseline_set

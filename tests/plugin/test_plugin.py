@@ -346,7 +346,7 @@ def test_a_policy_of_ones_own_that_answers_nonsense_ends_the_run_before_a_flight
 @pytest.mark.parametrize(
     ("system", "maps", "words"),
     [
-        ("Good", "['moon']", "*unknown map 'moon'; expected one of court, lawn*"),
+        ("Good", "['moon']", "*unknown map 'moon'; expected one of court, *lawn*"),
         ("NoStep", "['lawn']", "*NoStep has no method 'step'*"),
         ("Good()", "['lawn']", "*expected a class*"),
         ("(lambda: type('Local', (Good,), {}))()", "['lawn'], limits=dict(mass=1)", "*mass*"),

@@ -9,8 +9,9 @@ import pytest
 
 from pytest_garl.errors import ScenarioError
 from pytest_garl.scenarios.chromosome import decode
+from pytest_garl.scenarios.extra_genes import EXTRAS
 from pytest_garl.scenarios.files import dumps, load, loads
-from pytest_garl.scenarios.genes import EXTRAS, genome_for, with_destinations
+from pytest_garl.scenarios.genes import genome_for, with_destinations
 from pytest_garl.scenarios.maps.map import load_map
 from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.scenarios.validity import problems, repair

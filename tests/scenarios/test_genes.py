@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from pytest_garl.scenarios.genes import EXTRAS, genome_for, genome_like, with_destinations
+from pytest_garl.scenarios.extra_genes import EXTRAS, genome_like
+from pytest_garl.scenarios.genes import genome_for, with_destinations
 from pytest_garl.scenarios.maps.map import load_map
 
 COURT = load_map("court")

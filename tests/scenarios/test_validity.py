@@ -9,14 +9,14 @@ from hypothesis import strategies as st
 from pytest_garl.scenarios.chromosome import decode
 from pytest_garl.scenarios.files import dumps, loads
 from pytest_garl.scenarios.genes import genome_for
-from pytest_garl.scenarios.maps.map import load_map
+from pytest_garl.scenarios.maps.map import load_map, map_names
 from pytest_garl.scenarios.strategies import scenarios
 from pytest_garl.scenarios.validity import problems, repair
 
 COURT = load_map("court")
 
 
-@pytest.mark.parametrize("map", ["court", "lawn"])
+@pytest.mark.parametrize("map", map_names())
 @given(data=st.data())
 @settings(max_examples=60, deadline=None)
 def test_every_drawn_scenario_is_valid_and_survives_its_file(map: str, data: st.DataObject) -> None:

@@ -3,13 +3,9 @@
 from __future__ import annotations
 
 from pytest_garl.landing_system import Airframe, Mission
+from pytest_garl.scenarios.extra_genes import gps_error_m
 from pytest_garl.scenarios.maps.map import Map
-from pytest_garl.scenarios.placement import (
-    MARKER_DICTIONARY,
-    MARKER_SIDE_M,
-    TARGET_MARKER_ID,
-    gps_error_m,
-)
+from pytest_garl.scenarios.placement import MARKER_DICTIONARY, MARKER_SIDE_M, TARGET_MARKER_ID
 from pytest_garl.scenarios.scenario import Scenario
 
 SEARCH_ALTITUDE_M = 10.0

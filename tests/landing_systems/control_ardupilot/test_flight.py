@@ -22,7 +22,8 @@ from pytest_garl import (
 )
 from pytest_garl.adversary.catalogue import policy_spec
 from pytest_garl.scenarios.chromosome import decode
-from pytest_garl.scenarios.genes import WIND, genome_for
+from pytest_garl.scenarios.extra_genes import WIND
+from pytest_garl.scenarios.genes import genome_for
 from pytest_garl.scenarios.maps.map import load_map
 from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.scenarios.validity import repair

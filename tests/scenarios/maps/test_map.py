@@ -39,9 +39,9 @@ def test_a_users_map_is_found_by_name(tmp_path: Path) -> None:
     text = (Path(maps.__file__).parent / "lawn.toml").read_text()
     (tmp_path / "garden.toml").write_text(text)
     assert load_map("garden", [tmp_path]).name == "garden"
-    assert map_names([tmp_path]) == ("court", "garden", "lawn")
+    assert map_names([tmp_path]) == tuple(sorted({*map_names(), "garden"}))
 
 
 def test_an_unknown_map_lists_the_known() -> None:
-    with pytest.raises(ScenarioError, match="unknown map 'moon'; expected one of court, lawn"):
+    with pytest.raises(ScenarioError, match=r"unknown map 'moon'; expected one of court, .*lawn"):
         load_map("moon")

@@ -13,7 +13,7 @@ import pytest
 from pytest_garl.landing_system import Camera
 from pytest_garl.scenarios.chromosome import decode
 from pytest_garl.scenarios.genes import genome_for
-from pytest_garl.scenarios.maps.map import load_map
+from pytest_garl.scenarios.maps.map import load_map, map_names
 from pytest_garl.scenarios.object_types import OBJECT_TYPES
 from pytest_garl.scenarios.placement import marker_position_m
 from pytest_garl.scenarios.validity import discs_of, repair
@@ -75,7 +75,7 @@ def test_fog_hides_more_the_farther_the_camera() -> None:
 
 
 @pytest.mark.parametrize("height", [2.5, 10.0])
-@pytest.mark.parametrize("name", ["court", "lawn"])
+@pytest.mark.parametrize("name", map_names())
 def test_the_marker_can_be_read_in_clear_weather(name: str, height: float) -> None:
     made, _ = renderer(name)
     x, y = made.marker_m

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from pytest_garl.scenarios.genes import genome_for
-from pytest_garl.scenarios.maps.map import load_map
+from pytest_garl.scenarios.maps.map import load_map, map_names
 from pytest_garl.search.methods.random import propose
 from pytest_garl.simulation.fly import fly
 from pytest_garl.simulation.system_under_test.reference_pilot import ReferencePilot
@@ -13,7 +13,7 @@ from tests.support.flights import STAND
 
 
 @pytest.mark.sim
-@pytest.mark.parametrize("name", ["court", "lawn"])
+@pytest.mark.parametrize("name", map_names())
 def test_the_reference_pilot_lands_where_it_can_be_done(name: str) -> None:
     map = load_map(name)
     landed = 0
