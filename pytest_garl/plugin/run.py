@@ -33,7 +33,7 @@ if TYPE_CHECKING:
     from pytest_garl.regressions.forecast import RemainingWork
     from pytest_garl.scenarios.scenario import Scenario
     from pytest_garl.search.breeder import Breeder
-    from pytest_garl.search.method import Flown, Method
+    from pytest_garl.search.method import Method
     from pytest_garl.simulation.npc_policy import PolicySpec
 
 SELECTED = "selected flights"
@@ -372,10 +372,13 @@ class Run:
         from pytest_garl.scenarios.genes import genome_for
         from pytest_garl.scenarios.maps.map import load_map
         from pytest_garl.search.catalogue import make_method
+        from pytest_garl.search.fixed import FixedScenarios
         from pytest_garl.search.method import SearchPlan
 
         if any(each.entry for each in wanted.values()) or self.options.repeat:
-            return _Repeat({slot: _repeated(self.options, each) for slot, each in wanted.items()})
+            return FixedScenarios(
+                {slot: _repeated(self.options, each) for slot, each in wanted.items()}
+            )
         map = load_map(next(iter(wanted.values())).map, self.options.map_folders)
         plan = SearchPlan(
             map=map,
@@ -423,25 +426,6 @@ def _repeated(options: Options, target: Target) -> Scenario:
         return load(Path(target.file), options.map_folders)
     assert options.repeated_slot is not None
     return options.repeated_slot.scenarios[target.system_name]
-
-
-class _Repeat:
-    """Proposes the one scenario that is repeated, or that a case holds, in its slot."""
-
-    learns = False
-
-    def __init__(self, scenarios: Mapping[Slot, Scenario]) -> None:
-        self._scenarios, self._generation = scenarios, -1
-
-    def ask(self) -> Sequence[Scenario]:
-        self._generation += 1
-        first = next(iter(self._scenarios.values()))
-        size = 1 + max(slot.index for slot in self._scenarios)
-        slots = [Slot(generation=self._generation, index=index) for index in range(size)]
-        return [self._scenarios.get(slot, first) for slot in slots]
-
-    def tell(self, flown: Sequence[Flown]) -> Sequence[tuple[float, ...]]:
-        return ()
 
 
 def _path() -> list[str]:
