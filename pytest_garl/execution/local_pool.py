@@ -1,4 +1,4 @@
-"""The local pool: flies on this machine, in worker processes or inside this one."""
+"""The local pool: flies on this machine, in worker processes or in this process."""
 
 from __future__ import annotations
 
@@ -19,10 +19,10 @@ from pytest_garl.execution.worker_failure import WorkerExit, retry_or_record
 
 
 def local_pool(queue: WorkQueue, workers: int, checkout: Checkout | None = None) -> Pool:
-    """Return a pool of so many children, or one that flies in this process where it is none.
+    """Return a pool of so many worker processes; with 0 it flies in this process.
 
-    Where this process computes otherwise than children do, it takes one child instead of none.
-    With a ``checkout`` they see the modules of that landing stack and of no other.
+    If this process would compute other bytes than a worker, 0 means one worker.  With a
+    ``checkout`` the workers import the landing system from that folder alone.
     """
     if workers == 0 and cpu_dispatch.pin():
         return InProcessPool(queue)
@@ -32,7 +32,7 @@ def local_pool(queue: WorkQueue, workers: int, checkout: Checkout | None = None)
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FlightWorkers:
-    """Children that claim, fly and record slot after slot."""
+    """Workers that claim, fly and record slot after slot."""
 
     max_workers: int
     folders: tuple[str, ...] = ()
@@ -41,11 +41,11 @@ class FlightWorkers:
     """Decides what the exit of a worker means for the slot that it flew."""
 
     def command(self, ledger: Path) -> Sequence[str]:
-        """Return the module that a child runs, and its arguments."""
+        """Return the module that a worker runs, and its arguments."""
         return ["pytest_garl.execution.worker", str(ledger), *self.folders]
 
     def handle_exit(self, queue: WorkQueue, pid: int, ended: WorkerExit) -> bool:
-        """Settle what a child had in flight; return whether it was flying at all."""
+        """Decide on the slot that a worker had claimed; return whether it had claimed one."""
         claim = queue.claim_of(pid)
         if claim is None:
             return False
@@ -73,4 +73,4 @@ class InProcessPool:
         self._queue.record(claim, result, sha256, wall_s)
 
     def close(self) -> None:
-        """Nothing flies between two turns."""
+        """Do nothing: no flight is under way between two turns."""

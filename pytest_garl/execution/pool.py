@@ -1,4 +1,4 @@
-"""What flies the slots of a ledger, and how one waits for it."""
+"""Pools: the protocol of all that fly a ledger's slots, and waiting for a slot's result."""
 
 from __future__ import annotations
 
@@ -13,15 +13,15 @@ from pytest_garl.execution.slot import Slot
 class Pool(Protocol):
     """Flies the slots of one ledger; pools of several processes may share it.
 
-    Whatever flies claims its slots from the ledger and records them there, so that a pool has
-    nothing to return.
+    A pool takes slots from the ledger's queue and records the results there, so its methods return
+    nothing.
     """
 
     def turn(self) -> None:
-        """Let the flying go on for a moment; raise GarlError where it cannot go on."""
+        """Continue the flights for a moment; raise GarlError if they cannot go on."""
 
     def close(self) -> None:
-        """End whatever flies, leave nothing running, and give back what was in flight."""
+        """End all flights and processes, and give back the slots in flight."""
 
 
 def wait_for(

@@ -1,4 +1,4 @@
-"""A flying worker process: claim, note in flight, fly, record, until the parent is gone."""
+"""A worker: claims a slot, flies it and records the result, until its parent process ends."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from pytest_garl import cpu_dispatch
 from pytest_garl.errors import GarlError, LandingSystemError, LedgerError, SimulatorError
 from pytest_garl.execution.checkout import isolate_imports
 from pytest_garl.execution.ledger_queue import Claim, WorkQueue
-from pytest_garl.execution.processes import Parent, run_worker
+from pytest_garl.execution.processes import Parent, failure_text, run_worker
 from pytest_garl.execution.result import FlightResult
 from pytest_garl.execution.slot import flight_name
 from pytest_garl.execution.supervisor import FlightMonitor, supervise
@@ -24,33 +24,35 @@ from pytest_garl.simulation.system_under_test.texts import (
     told,
 )
 
-IDLE_S = 0.02
-ALONE_FACTOR = 3.0
+CLAIM_EVERY_S = 0.02
+"""Time between two attempts to claim a slot."""
+RETRY_LIMIT_FACTOR = 3.0
+"""A flight that is repeated alone gets so many times the limit of a call."""
 _TRUSTED = "pytest_garl."
-"""Pilots of this package leave their process as it was."""
+"""Landing systems of this package leave their process as it was."""
 RESTART_S = 1.0
-"""How long a child that has flown leaves a slot to a fresh one before it makes way for another."""
+"""How long a used worker waits for a fresh one to take a slot, before it ends to make room."""
 SIMULATOR = "the simulator"
 
 
 def main(parent: Parent, path: str, *checkouts: str) -> None:
-    """Fly until the parent process is gone; with checkouts, see only the first of them."""
+    """Fly until the parent process ends; with checkouts, import from the first of them alone."""
     owner = getpid()
 
     def fly(monitor: FlightMonitor) -> None:
         if checkouts:
             isolate_imports(checkouts)
-        Flyer(Path(path), owner, monitor).run()
+        Worker(Path(path), owner, monitor).run()
 
     supervise(parent, fly, SIMULATOR)
 
 
-class Flyer:
-    """Claims, flies and records slot after slot, under the name of the supervisor ``owner``.
+class Worker:
+    """Claims, flies and records slot after slot, with the process id of its supervisor ``owner``.
 
-    It ends where a fresh process shall go on: after a flight that left something behind, and where
-    another landing system is to be flown.  What one replaces in its process (``numpy.zeros``), or
-    leaves to happen later, must bend the flights of no other.
+    It ends if a fresh process must continue: after a flight that changed the process, and before
+    another landing system flies.  If a landing system replaces ``numpy.zeros`` or leaves a thread
+    behind, no other system's flights may change.
     """
 
     def __init__(self, path: Path, owner: int, monitor: FlightMonitor) -> None:
@@ -60,7 +62,7 @@ class Flyer:
         self._idle_s = 0.0
 
     def run(self) -> None:
-        """Fly until the supervisor is gone, or until a fresh process shall go on."""
+        """Fly until the supervisor ends, or until a fresh process must continue."""
         import cv2
 
         from pytest_garl.execution.process_state import ProcessState
@@ -75,29 +77,29 @@ class Flyer:
                     queue.record(claim, result, sha256, wall_s)
                     queue.count("idle_s", self._idle_s)
             except Exception as error:
-                if _cannot_go_on(error) and not state.limited():
+                if _is_permanent(error) and not state.limited():
                     raise
-                self._monitor.report(failure=_described(error))
+                self._monitor.report(failure=_failure(error))
                 break
             if state.changed():
                 break
 
     def _next(self) -> Claim | None:
-        """Wait for a slot and return it; None where a fresh process shall go on, or none at all.
+        """Wait for a slot and return it; None if this process must end.
 
-        The ledger is closed in between: a landing system may close all files, and what is written
-        to one of them then would go anywhere.
+        The ledger is closed during a flight: a landing system may close all files and open others,
+        and a write to the ledger would then go into one of those.
         """
         try:
             with closing(WorkQueue.open(self._path, self._owner)) as queue:
-                return self._claimed(queue)
+                return self._claim(queue)
         except GarlError:
             if not self._system:
                 raise
-            # What flew here may be the reason; otherwise a fresh process will say the same.
+            # The landing system may be the reason. If not, a fresh process meets the same error.
             return None
 
-    def _claimed(self, queue: WorkQueue) -> Claim | None:
+    def _claim(self, queue: WorkQueue) -> Claim | None:
         idle_since = monotonic()
         while getppid() == self._owner:
             claim = queue.claim(flown=self._system)
@@ -108,7 +110,7 @@ class Flyer:
                 break
             if self._system and self._idle_s > RESTART_S and queue.alone_waits():
                 break
-            sleep(IDLE_S)
+            sleep(CLAIM_EVERY_S)
         return None
 
     def _fly(self, claim: Claim) -> tuple[FlightResult, str, float]:
@@ -119,7 +121,7 @@ class Flyer:
         if not job.system.module.startswith(_TRUSTED):
             self._system = job.system.name
         name = flight_name(claim.search, claim.generation, claim.slot, job.map)
-        limit_s = job.timeout_s * (ALONE_FACTOR if claim.after else 1.0)
+        limit_s = job.timeout_s * (RETRY_LIMIT_FACTOR if claim.after else 1.0)
         if "failed" in claim.after:
             self._prove_simulator(claim)
         try:
@@ -127,16 +129,16 @@ class Flyer:
             self._monitor.flight_begins(limit_s)
             return fly_job(job, scenario, name, self._monitor)
         except OSError as error:
-            # The landing system's own are part of its flight; this one is of the record.
+            # Errors of the landing system are part of its flight; this one is of the record.
             raise LedgerError(f"{job.flights}: {error.strerror or error}") from error
         finally:
             if getpid() != self._me:
-                # The landing system has forked: only one of the two flies on.
+                # The landing system has forked: the copy must not continue the flight.
                 _exit(0)
             self._monitor.flight_ends()
 
     def _prove_simulator(self, claim: Claim) -> None:
-        """Fly what failed with the reference pilot; raise GarlError if that fails as well."""
+        """Fly the scenario with the reference pilot; raise GarlError if that fails too."""
         from pytest_garl.execution.flight import fly_job
         from pytest_garl.execution.job import load_scenario, loads
         from pytest_garl.execution.reference import reference_to
@@ -149,17 +151,15 @@ class Flyer:
         except GarlError:
             raise
         except Exception as error:
-            raise SimulatorError(
-                f"{SIMULATOR} failed in a worker process:\n{_text(error)}"
-            ) from error
+            raise SimulatorError(failure_text(error, SIMULATOR)) from error
 
 
-def _cannot_go_on(error: Exception) -> bool:
-    """Whether an error is none of the landing system's doing, if it left files and limits alone."""
+def _is_permanent(error: Exception) -> bool:
+    """Whether an error occurs in any process: one of pytest-garl, not of the landing system."""
     return isinstance(error, GarlError) and not isinstance(error, LandingSystemError)
 
 
-def _described(error: Exception) -> dict[str, str]:
+def _failure(error: Exception) -> dict[str, str]:
     kind = name_of(type(error))
     return {
         "error": kind,

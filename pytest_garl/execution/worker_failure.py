@@ -1,9 +1,9 @@
-"""What it means when a flying process ends in a flight: a finding, or once more alone.
+"""What follows if a worker ends during a flight: a violation, or a second flight.
 
-The machine ends processes too: it has no memory left, or it is so slow that a call takes too long.
-So a process that was killed, and a call that took too long, are flown once more, alone and with
-more time, and are a finding if it happens again.  What ends a process in any other way is the
-landing system, at the first time.
+A busy machine may also end a worker: memory runs out, or a call takes too long.  So if a worker was
+killed or a call took too long, the slot is flown once more, with no other flight beside it and with
+a longer limit.  If the same happens again, it is a violation.  If a worker ends in any other way,
+the landing system ended it, and that is a violation at once.
 """
 
 from __future__ import annotations
@@ -19,16 +19,17 @@ from pytest_garl.scenarios.maps.map import load_map
 from pytest_garl.simulation.flight import Crash
 
 ATTEMPTS = 3
-"""A flight that hangs, is killed and makes the simulator fail, each once, is left undecided."""
+"""If a slot hangs, is killed and makes the simulator fail, once each, it stays inconclusive."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class WorkerExit:
-    """How a flying process ended: its exit status (a signal's negative), its last stacks.
+    """How a worker ended.
 
-    ``hung`` says what took too long, as the beginning of a sentence; ``stacks`` where that was;
-    ``stderr`` is what was said on stderr; ``failure`` is the error of the simulator, with type,
-    message and traceback; ``watched`` is false where its supervisor did not live to tell.
+    ``status`` is the exit status of the flying process, negative for a signal.  ``hung`` says what
+    took too long, as the beginning of a sentence, and ``stacks`` are the stacks of that moment.
+    ``stderr`` is the end of its stderr.  ``failure`` is the type, message and traceback of an error
+    of the simulator.  ``watched`` is false if the supervisor ended without a report.
     """
 
     status: int
@@ -40,7 +41,7 @@ class WorkerExit:
 
     @property
     def cause(self) -> str:
-        """One of "hung", "failed", "killed" and "died"; the last is the landing system's doing."""
+        """One of "hung", "failed", "killed" and "died"; only the landing system causes the last."""
         if self.hung:
             return "hung"
         if self.failure:
@@ -49,31 +50,31 @@ class WorkerExit:
 
 
 def retry_or_record(queue: WorkQueue, claim: Claim, ended: WorkerExit) -> None:
-    """Decide what a ended means for the slot that was in flight."""
+    """Hand a worker's slot out once more, or record a violation or an inconclusive flight."""
     earlier = claim.after.split()
     if ended.cause == "died" or ended.cause in earlier or len(earlier) + 1 == ATTEMPTS:
-        again = ended.cause in earlier
-        undecided = ended.cause != "died" and not again
-        queue.record(claim, _result(claim, ended, again, undecided), "", 0.0)
+        repeated = ended.cause in earlier
+        inconclusive = ended.cause != "died" and not repeated
+        queue.record(claim, _result(claim, ended, repeated, inconclusive), "", 0.0)
     else:
         queue.fly_alone(claim, " ".join([*earlier, ended.cause]))
         queue.count("retried")
 
 
-def _result(claim: Claim, ended: WorkerExit, again: bool, undecided: bool) -> FlightResult:
+def _result(claim: Claim, ended: WorkerExit, repeated: bool, inconclusive: bool) -> FlightResult:
     job = loads(claim.job)
     diagonal = load_map(job.map, tuple(Path(folder) for folder in job.map_folders)).diagonal_m
     crash = _crash(ended)
-    if undecided:
+    if inconclusive:
         how = f"each of {ATTEMPTS} flights ended its process in a different way"
         crash = replace(crash, message=f"{how}, at last: {crash.message}")
-    elif again:
+    elif repeated:
         crash = replace(crash, message=f"{crash.message}, twice")
-    return broken_result(crash, diagonal, inconclusive=undecided)
+    return broken_result(crash, diagonal, inconclusive=inconclusive)
 
 
 def _crash(ended: WorkerExit) -> Crash:
-    """Return what ended a flight."""
+    """Return the exit as the crash of a flight."""
     if ended.hung:
         return Crash(
             kind="hung", error="Timeout", message=ended.hung, where="", traceback=ended.stacks

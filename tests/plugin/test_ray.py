@@ -101,7 +101,7 @@ def below(pid: int) -> list[int]:
     return children + [each for child in children for each in below(child)]
 
 
-def pilots(pids: list[int]) -> list[int]:
+def actors(pids: list[int]) -> list[int]:
     """Return those that are Ray workers with a pilot."""
     found = []
     for pid in pids:
@@ -179,7 +179,7 @@ class TestOnACluster:
         process = start(pytester, *ON_RAY)
         wait_for(ledger, 5, process, PATIENCE_S)
         workers = [pid for (pid,) in query(ledger, "SELECT pid FROM worker")]
-        prey = workers if victim == "driver" else pilots(below(cluster))
+        prey = workers if victim == "driver" else actors(below(cluster))
         os.kill(random.Random(victim).choice(prey), signal.SIGKILL)
         output, _ = process.communicate(timeout=PATIENCE_S)
         assert process.returncode in (0, 1), output
@@ -209,7 +209,7 @@ class TestOnAClusterOfItsOwn:
         process = start(pytester, *ON_RAY)
         wait_for(ledger, 5, process, PATIENCE_S)
         started = below(process.pid)
-        assert len(pilots(started)) == 2
+        assert len(actors(started)) == 2
         process.send_signal(end)
         output, _ = process.communicate(timeout=PATIENCE_S)
         assert "2 workers of Ray, started here" in output

@@ -1,4 +1,4 @@
-"""A pilot: flies single slots on whatever machine it is put, in a worker process of its own."""
+"""The actor that flies single slots on a node of a Ray cluster, in a worker process of its own."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from pytest_garl.execution.ledger_queue import Claim, WorkQueue
 from pytest_garl.execution.local_pool import FlightWorkers
 from pytest_garl.execution.pool import wait_for
 from pytest_garl.execution.process_pool import ProcessPool
-from pytest_garl.execution.ray.path_mapping import Relocation
+from pytest_garl.execution.ray.path_mapping import PathMapping
 from pytest_garl.execution.reference import package_sha256
 from pytest_garl.execution.result import FlightResult, broken_result
 from pytest_garl.execution.slot import Slot, flight_name
@@ -30,12 +30,12 @@ _FIRST = Slot(generation=0, index=0)
 _NO_RESULT = broken_result(
     Crash(kind="died", error="", message="", where="", traceback=""), diagonal_m=0.0
 )
-"""Stands in the private ledger for a flight whose process ended; nobody reads it."""
+"""The result in the actor's own ledger for a flight whose worker ended; nobody reads it."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FlightOutput:
-    """A flight that was flown: what the ledger records of it, and the bytes of its record."""
+    """What a flight gave: the values for the ledger, and the bytes of its record."""
 
     result: FlightResult
     sha256: str
@@ -45,43 +45,44 @@ class FlightOutput:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ActorWorkspace:
-    """Where pilots work, each in a folder of its own below ``scratch``.
+    """The folders of actors; each has one of its own below ``scratch``.
 
-    Where ``home`` is set, Ray has put a copy of it into the working directory, in which pilots
-    leave nothing that Ray does not remove with it; ``inside`` is the folder in which pytest runs.
+    ``project`` is the project's folder where pytest runs.  If it is set, Ray has copied the project
+    into the actor's working directory, and removes that in the end.  ``working_dir`` is the folder
+    in which pytest runs, below the project.
     """
 
     scratch: str = "."
-    home: str = ""
-    inside: str = "."
+    project: str = ""
+    working_dir: str = "."
 
 
 class FlightActor:
-    """Flies what it is told, one slot after the other.
+    """Flies one slot after the other.
 
-    The flying is done by a local pool of one child with a ledger of its own, so that a landing
-    system that dies or hangs takes nothing else with it, and its ended reads as it does locally.
-    What it means is decided by who asked.
+    A local pool of one worker with a ledger of its own flies, so a landing system that dies or
+    hangs ends that worker alone, and its exit reads as on the local pool.  The caller decides what
+    follows from the exit.
     """
 
-    def __init__(self, base: ActorWorkspace) -> None:
-        here = Path.cwd()
-        self._relocation = Relocation(home=base.home, here=str(here)) if base.home else None
-        self._folder = Path(tempfile.mkdtemp(prefix=".garl-pilot-", dir=here / base.scratch))
-        os.chdir(here / base.inside)
+    def __init__(self, workspace: ActorWorkspace) -> None:
+        here, project = Path.cwd(), workspace.project
+        self._paths = PathMapping(local=project, remote=str(here)) if project else None
+        self._folder = Path(tempfile.mkdtemp(prefix=".garl-actor-", dir=here / workspace.scratch))
+        os.chdir(here / workspace.working_dir)
         self._ledger = Ledger.create(self._folder / "ledger.sqlite", {})
         self._pool = ProcessPool(
-            self._ledger.queue, FlightWorkers(max_workers=1, on_exit=self._note)
+            self._ledger.queue, FlightWorkers(max_workers=1, on_exit=self._note_exit)
         )
         self._flown = 0
         self._ended: WorkerExit | None = None
 
-    def about(self) -> tuple[str, dict[str, str]]:
-        """Return the machine's name, and the versions of what decides on a flight's bytes."""
+    def node_and_versions(self) -> tuple[str, dict[str, str]]:
+        """Return the node's name, and the versions of all that decides on a flight's bytes."""
         return platform.node(), versions()
 
     def fly(self, claim: Claim) -> FlightOutput | WorkerExit:
-        """Fly a slot once; return what it came to, or how its process ended."""
+        """Fly a slot once; return its output, or how its worker ended."""
         self._flown += 1
         search, flights = str(self._flown), self._folder / "flights"
         job = dataclasses.replace(self._job(claim.job), flights=str(flights))
@@ -93,40 +94,40 @@ class FlightActor:
             error, message, text = ended.failure or ("", "", "")
             return dataclasses.replace(
                 ended,
-                stacks=self._at_home(ended.stacks),
-                stderr=self._at_home(ended.stderr),
-                failure=(error, self._at_home(message), self._at_home(text)) if error else None,
+                stacks=self._to_local(ended.stacks),
+                stderr=self._to_local(ended.stderr),
+                failure=(error, self._to_local(message), self._to_local(text)) if error else None,
             )
         file = flights / f"{flight_name(search, 0, 0, job.map)}.npz"
         record = file.read_bytes()
         file.unlink()
         return FlightOutput(
-            result=FlightResult.from_json(parse_json(self._at_home(result.dumps()))),
+            result=FlightResult.from_json(parse_json(self._to_local(result.dumps()))),
             sha256=self._ledger.sha256(search, 0, 0),
             wall_s=self._ledger.wall_s(search, 0, 0),
             record=record,
         )
 
     def close(self) -> None:
-        """End the child and leave nothing behind."""
+        """End the worker and remove the folder."""
         self._pool.close()
         self._ledger.close()
         shutil.rmtree(self._folder, ignore_errors=True)
 
     def _job(self, text: str) -> FlightJob:
-        return self._relocation.job(text) if self._relocation else loads(text)
+        return self._paths.job(text) if self._paths else loads(text)
 
-    def _at_home(self, text: str) -> str:
-        return self._relocation.to_local(text) if self._relocation else text
+    def _to_local(self, text: str) -> str:
+        return self._paths.to_local(text) if self._paths else text
 
-    def _note(self, queue: WorkQueue, claim: Claim, ended: WorkerExit) -> None:
-        """Remember a ended and take the slot out of the queue: it is flown once."""
+    def _note_exit(self, queue: WorkQueue, claim: Claim, ended: WorkerExit) -> None:
+        """Keep an exit, and take the slot out of the queue: it is flown once."""
         self._ended = ended
         queue.record(claim, _NO_RESULT, "", 0.0)
 
 
 def versions() -> dict[str, str]:
-    """Return the installed versions of what decides on a flight's bytes, and our sources' hash."""
+    """Return the versions of all that decides on a flight's bytes, and the hash of the sources."""
     found = {
         "sources of pytest-garl": package_sha256()[:12],
         "CPU dispatch": cpu_dispatch.expected(),

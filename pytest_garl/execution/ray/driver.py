@@ -1,6 +1,6 @@
-"""Ray's driver, a child process of pytest: connects to a cluster and has it fly the ledger's slots.
+"""The driver of Ray: a child process of pytest that has a cluster fly the ledger's slots.
 
-The only module that imports Ray, and not before it runs.
+It is the only module that imports Ray, and it does so when it runs.
 """
 
 from __future__ import annotations
@@ -26,37 +26,40 @@ from pytest_garl.execution.processes import Parent, any_command_contains, run_wo
 from pytest_garl.execution.ray.actor import ActorWorkspace
 from pytest_garl.execution.ray.scheduler import RayScheduler
 
-PATIENCE_S = 180.0
-"""How long Ray may take to connect, with the upload of the project; alone it goes on for ever."""
-PARTING_S = 10.0
+CONNECT_S = 180.0
+"""How long Ray may take to connect and to upload the project; Ray itself has no limit."""
+CLUSTER_SHUTDOWN_S = 10.0
 """How long the processes of a cluster started here may take to end."""
 STORE_BYTES = 128 * 2**20
-"""Object store of a cluster started here: records of flights, some 100 kB each, pass through it."""
+"""Object store of a cluster started here: it holds records of flights, about 100 kB each."""
 
 
 def main(parent: Parent, ledger: str, root: str, workers: str) -> None:
-    """Fly until the parent process is gone; ``workers`` is 0 for all CPUs of the cluster."""
-    # Until Ray sets a handler of its own, which does the same.
+    """Fly until the parent process ends; ``workers`` is 0 for all CPUs of the cluster."""
+    # Ray sets a handler that does the same when it is connected.
     signal.signal(signal.SIGTERM, lambda number, _: sys.exit(number))
     path = Path(ledger)
     address = os.environ.get("RAY_ADDRESS") or "local"
-    there = own(int(workers)) if address == "local" else joined(address, Path(root), path.parent)
-    with there as (ray, base, cpus):
-        fleet = RayScheduler(ray, WorkQueue.open(path), base, int(workers) or cpus)
+    if address == "local":
+        cluster = own_cluster(int(workers))
+    else:
+        cluster = joined_cluster(address, Path(root), path.parent)
+    with cluster as (ray, workspace, cpus):
+        scheduler = RayScheduler(ray, WorkQueue.open(path), workspace, int(workers) or cpus)
         try:
             while parent.lives():
-                fleet.turn()
+                scheduler.turn()
         finally:
-            fleet.close()
+            scheduler.close()
 
 
 @contextmanager
-def own(workers: int) -> Iterator[tuple[Any, ActorWorkspace, int]]:
+def own_cluster(workers: int) -> Iterator[tuple[Any, ActorWorkspace, int]]:
     """Start a cluster on this machine that ends with the block.
 
-    Gives Ray, where pilots work and for how many there are CPUs; raises PoolError.
+    Yields Ray, the actors' folders and the number of CPUs; raises PoolError.
     """
-    # A cluster listens on the network; with a token it obeys nobody else.
+    # A cluster listens on the network; the token keeps other clients out.
     os.environ.setdefault("RAY_AUTH_MODE", "token")
     os.environ.setdefault("RAY_AUTH_TOKEN", secrets.token_hex(32))
     cpus = workers or os.cpu_count() or 1
@@ -69,7 +72,7 @@ def own(workers: int) -> Iterator[tuple[Any, ActorWorkspace, int]]:
             include_dashboard=False,
             object_store_memory=STORE_BYTES,
             _temp_dir=folder,
-            # Short of memory the kernel ends what needs most, the flight, as it does without Ray.
+            # If memory is short, the kernel ends the largest process, the flight, as without Ray.
             _system_config={"memory_monitor_refresh_ms": 0},
         ) as ray:
             yield ray, ActorWorkspace(scratch=folder), cpus
@@ -78,37 +81,39 @@ def own(workers: int) -> Iterator[tuple[Any, ActorWorkspace, int]]:
 
 
 def _remove(folder: str) -> None:
-    """Remove a cluster's folder when nobody writes there any more.
+    """Remove a cluster's folder when no process writes there any more.
 
-    Its processes have it in their command lines, as has a child that was flying: that one ends when
-    it notices that its pilot is gone, and would make the folder again to put its record there.
+    The command lines of the cluster's processes contain the folder, and so does that of a worker in
+    flight.  A worker ends soon after its actor, but would create the folder again for its record.
     """
-    until = time.monotonic() + PARTING_S
+    until = time.monotonic() + CLUSTER_SHUTDOWN_S
     while any_command_contains(folder) and time.monotonic() < until:
         time.sleep(0.05)
     shutil.rmtree(folder, ignore_errors=True)
 
 
 @contextmanager
-def joined(address: str, root: Path, folder: Path) -> Iterator[tuple[Any, ActorWorkspace, int]]:
+def joined_cluster(
+    address: str, root: Path, folder: Path
+) -> Iterator[tuple[Any, ActorWorkspace, int]]:
     """Join a cluster for as long as the block lasts, and give it a copy of the project at ``root``.
 
-    What git ignores is not copied, nor is ``folder``, where the flights are.
+    Files that git ignores are not copied, nor is ``folder``, which holds the flights.
     """
     root, folder, here = root.resolve(), folder.resolve(), Path.cwd()
     excludes = [f"/{folder.relative_to(root)}"] if folder.is_relative_to(root) else []
-    inside = str(here.relative_to(root)) if here.is_relative_to(root) else "."
+    working_dir = str(here.relative_to(root)) if here.is_relative_to(root) else "."
     copied = {"working_dir": str(root), "excludes": excludes}
     with _connected(address, runtime_env=copied) as ray:
         cpus = int(ray.cluster_resources().get("CPU", 1))
-        yield ray, ActorWorkspace(home=str(root), inside=inside), cpus
+        yield ray, ActorWorkspace(project=str(root), working_dir=working_dir), cpus
 
 
 @contextmanager
 def _connected(address: str, **options: Any) -> Iterator[Any]:
-    late = threading.Timer(PATIENCE_S, _give_up, (address,))
-    late.daemon = True
-    late.start()
+    timer = threading.Timer(CONNECT_S, _give_up, (address,))
+    timer.daemon = True
+    timer.start()
     import ray
 
     try:
@@ -116,7 +121,7 @@ def _connected(address: str, **options: Any) -> Iterator[Any]:
     except (OSError, RuntimeError, ValueError, ray.exceptions.RayError) as error:
         raise PoolError(unreachable(address, str(error))) from error
     finally:
-        late.cancel()
+        timer.cancel()
     try:
         yield ray
     finally:
@@ -124,7 +129,7 @@ def _connected(address: str, **options: Any) -> Iterator[Any]:
 
 
 def unreachable(address: str, reason: str) -> str:
-    """Return why there is no cluster, and what one can do."""
+    """Return why there is no cluster, and what to do."""
     if address == "local":
         return f"Ray cannot start a cluster on this machine: {reason.strip()}"
     return (
@@ -136,8 +141,8 @@ def unreachable(address: str, reason: str) -> str:
 
 
 def _give_up(address: str) -> None:
-    """End the process from a thread: the call of Ray does not come back."""
-    reason = unreachable(address, f"no cluster after {PATIENCE_S:g} s")
+    """End the process from a thread: the call of Ray does not return."""
+    reason = unreachable(address, f"no cluster after {CONNECT_S:g} s")
     Parent.of_this_process().report(cannot_go_on=reason)
     os._exit(1)
 

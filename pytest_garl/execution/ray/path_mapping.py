@@ -1,4 +1,4 @@
-"""A project's paths on another machine, where a copy of it lies in another folder."""
+"""Paths of a project on a node of the cluster, where its copy lies in another folder."""
 
 from __future__ import annotations
 
@@ -12,29 +12,29 @@ from pytest_garl.execution.reference import Reference
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Relocation:
-    """Two folders that hold the same project: ``home`` where pytest runs, ``here`` its copy."""
+class PathMapping:
+    """Two folders with the same project: ``local`` where pytest runs, ``remote`` on this node."""
 
-    home: str
-    here: str
+    local: str
+    remote: str
 
     def job(self, text: str) -> FlightJob:
-        """Return the job in ``text`` as it reads here.
+        """Return the job in ``text`` with the paths of this node.
 
-        What lies outside the project was not copied: it is imported by name, wherever this machine
-        has it installed.
+        Ray copies the project alone.  Landing systems and simulators from elsewhere are imported by
+        name, from where this node has them installed.
         """
-        job = loads(_moved(text, _quoted(self.home), _quoted(self.here)))
+        job = loads(_replace_folder(text, _quoted(self.local), _quoted(self.remote)))
         return dataclasses.replace(
             job, system=self._by_name(job.system), simulator=self._by_name(job.simulator)
         )
 
     def to_local(self, text: str) -> str:
-        """Return a text such as a traceback with the paths that it would have at home."""
-        return _moved(text, self.here, self.home)
+        """Return a text, such as a traceback, with the paths of the machine where pytest runs."""
+        return _replace_folder(text, self.remote, self.local)
 
     def _by_name(self, reference: Reference) -> Reference:
-        if reference.file.startswith(f"{self.here}/"):
+        if reference.file.startswith(f"{self.remote}/"):
             return reference
         return dataclasses.replace(reference, file="")
 
@@ -43,6 +43,6 @@ def _quoted(path: str) -> str:
     return json.dumps(path)[1:-1]
 
 
-def _moved(text: str, old: str, new: str) -> str:
-    """Replace a folder wherever it is a whole path or the beginning of one."""
+def _replace_folder(text: str, old: str, new: str) -> str:
+    """Replace a folder if it is a whole path or the beginning of one."""
     return re.sub(rf"(?<![\w.-]){re.escape(old)}(?![^/\"'\s])", lambda _: new, text)

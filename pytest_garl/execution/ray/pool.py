@@ -1,4 +1,4 @@
-"""The Ray pool: flies on a Ray cluster, by way of one child process that speaks with it."""
+"""The Ray pool: flies on a Ray cluster; one child process, the driver, is connected to it."""
 
 from __future__ import annotations
 
@@ -17,24 +17,25 @@ from pytest_garl.execution.worker_failure import WorkerExit
 
 INSTALL = "pip install 'pytest-garl[ray]'"
 REACH_S = 5.0
+"""How long the head of a cluster may take to accept a connection."""
 
 
 def ray_pool(queue: WorkQueue, workers: int | None, root: Path) -> Pool:
     """Return a pool of ``workers`` flights at a time; None: as many as the cluster has CPUs.
 
-    The cluster is that of RAY_ADDRESS, which gets a copy of the project at ``root``, or else one on
-    this machine that begins and ends with the pool.
+    If RAY_ADDRESS is set, it names the cluster, which gets a copy of the project at ``root``.  If
+    not, the pool starts a cluster on this machine and ends it.
     """
-    return ProcessPool(queue, Driver(workers=workers, root=root))
+    return ProcessPool(queue, RayDriver(workers=workers, root=root))
 
 
 def check_ray(address: str) -> None:
-    """Raise PoolError where Ray is not installed, or where nobody answers at ``address``."""
+    """Raise PoolError if Ray is not installed, or if nothing answers at ``address``."""
     if importlib.util.find_spec("ray") is None:
         raise PoolError(f"Ray is not installed; {INSTALL}, or fly with --garl-pool=local")
     place = re.fullmatch(r"(?P<host>[^/]+):(?P<port>\d+)", address)
     if place is None:
-        # "auto" and ray://… are for Ray to find.
+        # Ray itself resolves "auto" and ray://…
         return
     try:
         socket.create_connection((place["host"], int(place["port"])), REACH_S).close()
@@ -47,24 +48,25 @@ def check_ray(address: str) -> None:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Driver:
-    """One child for all pytest processes of a run: it claims slots and has the cluster fly them.
+class RayDriver:
+    """The driver of Ray, one process for all pytest processes of a run.
 
-    So Ray's threads, signal handlers and warnings stay out of the pytest process.
+    It claims slots and has the cluster fly them.  Ray's threads, signal handlers and warnings stay
+    in it, outside pytest's process.
     """
 
     workers: int | None
     root: Path
     shutdown_s: float = 30.0
-    """To end a cluster takes a second or two, and more on a busy machine."""
+    """The end of a cluster takes a second or two, and more on a busy machine."""
 
     @property
     def max_workers(self) -> int:
-        """One, however many fly: the limit of flights is the driver's."""
+        """One driver; it limits the number of flights itself."""
         return 1
 
     def command(self, ledger: Path) -> Sequence[str]:
-        """Return the module that the child runs, and its arguments."""
+        """Return the module that the driver runs, and its arguments."""
         return [
             "pytest_garl.execution.ray.driver",
             str(ledger),
@@ -73,6 +75,6 @@ class Driver:
         ]
 
     def handle_exit(self, queue: WorkQueue, pid: int, ended: WorkerExit) -> bool:
-        """Give back all slots: nothing flies in the driver, so its death says nothing of them."""
+        """Give back all slots: no landing system runs in the driver, so none ended it."""
         queue.release(pid)
         return False

@@ -1,4 +1,4 @@
-"""Pilots on a Ray cluster: given slots of a ledger to fly, and their flights recorded."""
+"""The scheduler: hands a ledger's slots to actors on a Ray cluster, and records their flights."""
 
 from __future__ import annotations
 
@@ -13,131 +13,138 @@ from pytest_garl.errors import LedgerError, PoolError
 from pytest_garl.execution.job import loads, record_file
 from pytest_garl.execution.ledger_queue import Claim, WorkQueue
 from pytest_garl.execution.ray.actor import ActorWorkspace, FlightActor, FlightOutput, versions
-from pytest_garl.execution.worker import IDLE_S
 from pytest_garl.execution.worker_failure import WorkerExit, retry_or_record
 
-MOST_LOSSES = 3
-"""Workers of Ray that may be lost with the same slot, or one after the other before they fly."""
-PARTING_S = 2.0
+WAIT_S = 0.02
+"""How long one turn waits for actors."""
+MAX_LOST_ACTORS = 3
+"""If more actors than this are lost with the same slot, or one after the other before they fly, the
+run ends."""
+SHUTDOWN_S = 2.0
+"""How long idle actors may take to clean up in the end."""
 
 
 class RayScheduler:
-    """Pilots on a connected cluster, never more than ``size`` nor than there is to fly.
+    """Has actors on a connected cluster fly the slots of a queue.
 
-    ``ray`` is the module, which a process that does not fly by it shall not have to import.
+    There are never more actors than ``size``, nor more than slots.  ``ray`` is the module: it is
+    passed so that only a process that uses Ray imports it.
     """
 
-    def __init__(self, ray: Any, queue: WorkQueue, base: ActorWorkspace, size: int) -> None:
-        self._ray, self._queue, self._base, self._size = ray, queue, base, size
-        # One CPU is one flight: it flies on one thread.
-        self._hire = ray.remote(num_cpus=1)(FlightActor)
-        self._arriving: dict[Any, Any] = {}
-        """Pilots by what will tell about them."""
+    def __init__(self, ray: Any, queue: WorkQueue, workspace: ActorWorkspace, size: int) -> None:
+        self._ray, self._queue, self._workspace, self._size = ray, queue, workspace, size
+        # A flight runs on one thread, so it needs one CPU.
+        self._actor_class = ray.remote(num_cpus=1)(FlightActor)
+        self._starting: dict[Any, Any] = {}
+        """Actors that start, by the reference of their node and versions."""
         self._flying: dict[Any, tuple[Any, Claim]] = {}
-        """Pilots and what they fly by what will come of it."""
+        """Actors that fly and their claims, by the reference of the output."""
         self._idle: list[tuple[Any, float, str]] = []
-        """Pilots, since when they wait, and the landing system that each flew last."""
-        self._lost: Counter[tuple[str, int, int]] = Counter()
-        self._lost_on_arrival = 0
+        """Actors without a slot, the time since then, and the landing system each flew last."""
+        self._lost_with_slot: Counter[tuple[str, int, int]] = Counter()
+        self._lost_at_start = 0
 
     def turn(self) -> None:
-        """Hand out slots, and take in what was flown.
+        """Hand out slots and record finished flights.
 
-        Raises PoolError where the cluster cannot fly, LedgerError where it cannot be recorded.
+        Raises PoolError if the cluster cannot fly, and LedgerError if a flight cannot be recorded.
         """
-        self._grow()
+        self._start_actors()
         self._hand_out()
-        pending = [*self._arriving, *self._flying]
+        pending = [*self._starting, *self._flying]
         if not pending:
-            time.sleep(IDLE_S)
+            time.sleep(WAIT_S)
             return
-        ready, _ = self._ray.wait(pending, timeout=IDLE_S)
+        ready, _ = self._ray.wait(pending, timeout=WAIT_S)
         for ref in ready:
-            if ref in self._arriving:
-                self._greet(ref, self._arriving.pop(ref))
+            if ref in self._starting:
+                self._check_versions(ref, self._starting.pop(ref))
             else:
-                self._take_in(ref, *self._flying.pop(ref))
+                self._record(ref, *self._flying.pop(ref))
 
     def close(self) -> None:
-        """Let the pilots that do not fly leave nothing behind; the others end with the cluster."""
-        leaving = [pilot.close.remote() for pilot, *_ in self._idle]
+        """Have idle actors remove their folders; the others end with the cluster."""
+        closing = [actor.close.remote() for actor, *_ in self._idle]
         with contextlib.suppress(self._ray.exceptions.RayError):
-            self._ray.get(leaving, timeout=PARTING_S)
+            self._ray.get(closing, timeout=SHUTDOWN_S)
 
-    def _grow(self) -> None:
-        """Hire pilots while there is more to fly than pilots who could."""
-        free = len(self._arriving) + len(self._idle)
+    def _start_actors(self) -> None:
+        """Start an actor for each slot that waits without one."""
+        free = len(self._starting) + len(self._idle)
         room = self._size - free - len(self._flying)
         for _ in range(min(room, self._queue.waiting() - free)):
-            pilot = self._hire.remote(self._base)
-            self._arriving[pilot.about.remote()] = pilot
+            self._start_actor()
 
-    def _greet(self, ref: Any, pilot: Any) -> None:
-        """Take in a pilot that would fly the same as here."""
+    def _start_actor(self) -> None:
+        actor = self._actor_class.remote(self._workspace)
+        self._starting[actor.node_and_versions.remote()] = actor
+
+    def _check_versions(self, ref: Any, actor: Any) -> None:
+        """Give slots to an actor that has started if it would fly the same bytes as here."""
         try:
             node, theirs = self._ray.get(ref)
         except self._ray.exceptions.RayError as error:
-            self._lost_on_arrival += 1
-            if self._lost_on_arrival > MOST_LOSSES:
+            self._lost_at_start += 1
+            if self._lost_at_start > MAX_LOST_ACTORS:
                 raise PoolError(
-                    f"workers of Ray die before they fly: {error}\nEvery node needs the same "
+                    f"workers of Ray end before they fly: {error}\nEvery node needs the same "
                     "pytest-garl as here, and what the landing system needs"
                 ) from error
             return
-        differing = unlike(versions(), theirs)
+        differing = different_versions(versions(), theirs)
         if differing:
             raise PoolError(
                 f"Ray's node {node} would not fly the same: it has {differing}. Install the same "
                 "versions on every node, of CPUs that all have AVX2 or all lack it"
             )
-        self._lost_on_arrival = 0
-        self._rest(pilot)
+        self._lost_at_start = 0
+        self._add_idle(actor)
 
-    def _rest(self, pilot: Any, flown: str = "") -> None:
-        self._idle.append((pilot, time.monotonic(), flown))
+    def _add_idle(self, actor: Any, flown: str = "") -> None:
+        self._idle.append((actor, time.monotonic(), flown))
 
     def _hand_out(self) -> None:
         while self._idle:
-            pilot, since, flown = self._idle[-1]
-            # A pilot's child flies one landing system; for another it starts anew.
+            actor, since, flown = self._idle[-1]
+            # The worker of an actor flies one landing system; another one needs a new worker.
             claim = self._queue.claim(flown=flown) or self._queue.claim()
             if claim is None:
                 return
             self._idle.pop()
             self._queue.count("idle_s", time.monotonic() - since)
             record_file(loads(claim.job), claim).unlink(missing_ok=True)
-            self._flying[pilot.fly.remote(claim)] = pilot, claim
+            self._flying[actor.fly.remote(claim)] = actor, claim
 
-    def _take_in(self, ref: Any, pilot: Any, claim: Claim) -> None:
+    def _record(self, ref: Any, actor: Any, claim: Claim) -> None:
         try:
-            flight: FlightOutput | WorkerExit = self._ray.get(ref)
+            found: FlightOutput | WorkerExit = self._ray.get(ref)
         except self._ray.exceptions.RayTaskError as error:
             raise PoolError(f"on a node of Ray: {error.cause}") from error
         except self._ray.exceptions.RayError as error:
-            self._lose(claim, error)
+            self._give_back(claim, error)
             return
-        if isinstance(flight, WorkerExit):
-            retry_or_record(self._queue, claim, flight)
+        if isinstance(found, WorkerExit):
+            retry_or_record(self._queue, claim, found)
         else:
-            _keep(flight, claim)
-            self._queue.record(claim, flight.result, flight.sha256, flight.wall_s)
-        self._rest(pilot, loads(claim.job).system.name)
+            _write_record(found, claim)
+            self._queue.record(claim, found.result, found.sha256, found.wall_s)
+        self._add_idle(actor, loads(claim.job).system.name)
 
-    def _lose(self, claim: Claim, error: Exception) -> None:
-        """Give back a slot whose pilot is gone: Ray's worker was killed, or its node is lost.
+    def _give_back(self, claim: Claim, error: Exception) -> None:
+        """Give back the slot of a lost actor: Ray's worker was killed, or its node is lost.
 
-        The landing system flies in a child of the worker, so that this is none of its doing.
+        The landing system flies in a process below Ray's worker, so it did not end the actor.
         """
         slot = claim.search, claim.generation, claim.slot
-        self._lost[slot] += 1
-        if self._lost[slot] > MOST_LOSSES:
-            times = self._lost[slot]
+        self._lost_with_slot[slot] += 1
+        if self._lost_with_slot[slot] > MAX_LOST_ACTORS:
+            times = self._lost_with_slot[slot]
             raise PoolError(f"Ray lost the worker that flew the same slot {times} times: {error}")
         self._queue.give_back(claim)
 
 
-def unlike(ours: Mapping[str, str], theirs: Mapping[str, str]) -> str:
-    """Return in words what is installed in another version there than here."""
+def different_versions(ours: Mapping[str, str], theirs: Mapping[str, str]) -> str:
+    """Return which packages have another version there than here, as text."""
     return ", ".join(
         f"{name} {theirs.get(name, 'missing')} (here {version})"
         for name, version in ours.items()
@@ -145,8 +152,8 @@ def unlike(ours: Mapping[str, str], theirs: Mapping[str, str]) -> str:
     )
 
 
-def _keep(flight: FlightOutput, claim: Claim) -> None:
-    """Write a flight's record where the job wants it, whole or not at all."""
+def _write_record(flight: FlightOutput, claim: Claim) -> None:
+    """Write a flight's record into the job's folder, whole or not at all."""
     path = record_file(loads(claim.job), claim)
     scratch = path.with_name(f".{path.name}.{os.getpid()}")
     try:

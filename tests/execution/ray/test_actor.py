@@ -35,69 +35,67 @@ def claim(system: type, after: str = "", timeout_s: float = 10.0) -> Claim:
 
 
 @pytest.fixture
-def pilot(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[FlightActor]:
+def actor(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[FlightActor]:
     monkeypatch.chdir(Path(__file__).parents[2])
-    pilot = FlightActor(ActorWorkspace(scratch=str(tmp_path)))
-    yield pilot
-    pilot.close()
-    assert not list(tmp_path.glob(".garl-pilot-*"))
+    actor = FlightActor(ActorWorkspace(scratch=str(tmp_path)))
+    yield actor
+    actor.close()
+    assert not list(tmp_path.glob(".garl-actor-*"))
 
 
-def test_a_pilot_flies_what_a_child_of_the_local_pool_would(
-    pilot: FlightActor, tmp_path: Path
-) -> None:
+def test_actor_flies_the_same_bytes_as_a_local_worker(actor: FlightActor, tmp_path: Path) -> None:
     job = job_of(Good, tmp_path / "local")
     local, sha256, _ = fly_job(job, scenario(0.2), "flight", None)
-    found = pilot.fly(claim(Good))
+    found = actor.fly(claim(Good))
     assert isinstance(found, FlightOutput)
     assert (found.result, found.sha256) == (json.loads(json.dumps(local)), sha256)
     (tmp_path / "came.npz").write_bytes(found.record)
     assert load(tmp_path / "came.npz").sha256 == load(tmp_path / "local" / "flight.npz").sha256
 
 
-def test_a_pilot_outlives_what_it_flies(pilot: FlightActor) -> None:
-    ended = pilot.fly(claim(Exits))
+def test_actor_survives_the_end_of_its_worker(actor: FlightActor) -> None:
+    ended = actor.fly(claim(Exits))
     assert ended == WorkerExit(status=3, stderr="no fuel\n")
-    assert isinstance(pilot.fly(claim(Good)), FlightOutput)
+    assert isinstance(actor.fly(claim(Good)), FlightOutput)
 
 
-def test_a_traceback_on_stderr_is_the_landing_systems_own(pilot: FlightActor) -> None:
-    ended = pilot.fly(claim(Reports))
+def test_traceback_on_stderr_belongs_to_the_landing_system(actor: FlightActor) -> None:
+    ended = actor.fly(claim(Reports))
     assert isinstance(ended, WorkerExit)
     assert (ended.status, ended.cause) == (1, "died")
 
 
-def test_a_simulator_that_fails_is_no_death_of_the_landing_system(pilot: FlightActor) -> None:
+def test_failure_of_the_simulator_is_no_failure_of_the_landing_system(actor: FlightActor) -> None:
     job = loads(claim(Good).job)
     broken = dataclasses.replace(job, simulator=reference_to(scenario))
-    first = pilot.fly(dataclasses.replace(claim(Good), job=broken.dumps()))
+    first = actor.fly(dataclasses.replace(claim(Good), job=broken.dumps()))
     assert isinstance(first, WorkerExit)
     assert first.cause == "failed"
     again = dataclasses.replace(claim(Good, after="failed"), job=broken.dumps())
     with pytest.raises(PoolError, match=r"^the simulator failed in a worker process:\nTraceback"):
-        pilot.fly(again)
+        actor.fly(again)
 
 
-def test_a_call_that_hangs_is_told_from_a_death(pilot: FlightActor) -> None:
-    ended = pilot.fly(claim(Sleeps, timeout_s=0.3))
+def test_call_that_hangs_is_reported_with_its_stacks(actor: FlightActor) -> None:
+    ended = actor.fly(claim(Sleeps, timeout_s=0.3))
     assert isinstance(ended, WorkerExit)
     assert ended.hung == "one call took longer than 0.3 s of wall time"
     assert "in step" in ended.stacks
 
 
-def test_a_flight_that_hung_before_has_three_times_the_time_and_counts(pilot: FlightActor) -> None:
-    """A machine that is slow once changes nothing that the search learns from."""
-    found, calm = pilot.fly(claim(Slow, after="hung", timeout_s=1.0)), pilot.fly(claim(Slow))
+def test_flight_that_hung_before_gets_three_times_the_limit(actor: FlightActor) -> None:
+    """If a machine is slow once, the search learns the same."""
+    found, calm = actor.fly(claim(Slow, after="hung", timeout_s=1.0)), actor.fly(claim(Slow))
     assert isinstance(found, FlightOutput)
     assert isinstance(calm, FlightOutput)
     assert (found.result, found.sha256) == (calm.result, calm.sha256)
 
 
-def test_a_system_that_says_much_is_not_taken_for_one_that_hangs(pilot: FlightActor) -> None:
-    assert all(isinstance(pilot.fly(claim(Loud, timeout_s=5.0)), FlightOutput) for _ in range(3))
+def test_system_that_writes_much_does_not_hang(actor: FlightActor) -> None:
+    assert all(isinstance(actor.fly(claim(Loud, timeout_s=5.0)), FlightOutput) for _ in range(3))
 
 
-def test_a_pilot_in_a_copy_of_the_project_tells_of_home(
+def test_actor_in_a_copy_of_the_project_reports_local_paths(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     home, copy = tmp_path / "home", tmp_path / "copy"
@@ -113,12 +111,12 @@ def test_a_pilot_in_a_copy_of_the_project_tells_of_home(
         path=(str(home),),
     )
     monkeypatch.chdir(copy)
-    pilot = FlightActor(ActorWorkspace(home=str(home), inside="inside"))
-    assert list(copy.glob(".garl-pilot-*"))
+    actor = FlightActor(ActorWorkspace(project=str(home), working_dir="inside"))
+    assert list(copy.glob(".garl-actor-*"))
     try:
-        found = pilot.fly(dataclasses.replace(claim(Good), job=job.dumps()))
+        found = actor.fly(dataclasses.replace(claim(Good), job=job.dumps()))
     finally:
-        pilot.close()
+        actor.close()
     assert Path.cwd() == copy / "inside"
     assert isinstance(found, FlightOutput)
     assert found.result.crash is not None

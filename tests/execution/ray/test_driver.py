@@ -17,7 +17,7 @@ from pytest_garl.execution.ray.pool import check_ray
 
 
 class Ray(types.ModuleType):
-    """What connecting needs of Ray; remembers how it was done."""
+    """The part of Ray that connects; keeps the arguments of each call."""
 
     exceptions = types.SimpleNamespace(RayError=type("RayError", (Exception,), {}))
 
@@ -51,13 +51,20 @@ def use(ray: Ray, monkeypatch: pytest.MonkeyPatch) -> Ray:
     return ray
 
 
-def test_a_cluster_that_is_joined_gets_the_project_without_its_flights(
+def test_joined_cluster_gets_the_project_without_its_flights(
     ray: Ray, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     (tmp_path / "landing" / "tests").mkdir(parents=True)
     monkeypatch.chdir(tmp_path / "landing" / "tests")
-    with ray_driver.joined("head:6379", tmp_path, tmp_path / "runs" / ".garl") as (_, base, cpus):
-        assert (base, cpus) == (ActorWorkspace(home=str(tmp_path), inside="landing/tests"), 6)
+    with ray_driver.joined_cluster("head:6379", tmp_path, tmp_path / "runs" / ".garl") as (
+        _,
+        workspace,
+        cpus,
+    ):
+        assert (workspace, cpus) == (
+            ActorWorkspace(project=str(tmp_path), working_dir="landing/tests"),
+            6,
+        )
     assert ray.connections == [True, False]
     assert ray.given["address"] == "head:6379"
     assert ray.given["runtime_env"] == {
@@ -66,26 +73,30 @@ def test_a_cluster_that_is_joined_gets_the_project_without_its_flights(
     }
 
 
-def test_pytest_may_run_and_fly_outside_of_the_project(
+def test_pytest_may_run_and_fly_outside_the_project(
     ray: Ray, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(tmp_path)
-    with ray_driver.joined("head:6379", tmp_path / "project", tmp_path) as (_, base, _):
-        assert base.inside == "."
+    with ray_driver.joined_cluster("head:6379", tmp_path / "project", tmp_path) as (
+        _,
+        workspace,
+        _,
+    ):
+        assert workspace.working_dir == "."
     assert ray.given["runtime_env"]["excludes"] == []
 
 
-def test_a_cluster_started_here_obeys_nobody_else_and_leaves_nothing(
+def test_own_cluster_has_a_token_and_leaves_nothing(
     ray: Ray, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv("RAY_TMPDIR", str(tmp_path))
     for name in ("RAY_AUTH_MODE", "RAY_AUTH_TOKEN"):
-        # Set here to be taken away again after the test.
+        # Set first, so that monkeypatch removes it after the test.
         monkeypatch.setenv(name, "")
         monkeypatch.delenv(name)
-    with ray_driver.own(3) as (_, base, cpus):
+    with ray_driver.own_cluster(3) as (_, workspace, cpus):
         assert cpus == ray.given["num_cpus"] == 3
-        assert [str(path) for path in tmp_path.iterdir()] == [base.scratch]
+        assert [str(path) for path in tmp_path.iterdir()] == [workspace.scratch]
         assert len(os.environ["RAY_AUTH_TOKEN"]) == 64
     assert ray.given["address"] == "local"
     assert not list(tmp_path.iterdir())
@@ -99,11 +110,11 @@ def test_a_cluster_started_here_obeys_nobody_else_and_leaves_nothing(
         Ray.exceptions.RayError("wrong token"),
     ],
 )
-def test_a_cluster_that_refuses_is_told_with_what_it_wants(
+def test_error_of_a_cluster_names_the_expected_versions_and_token(
     error: Exception, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     use(Ray(error), monkeypatch)
-    joined = ray_driver.joined("10.0.0.1:6379", tmp_path, tmp_path)
+    joined = ray_driver.joined_cluster("10.0.0.1:6379", tmp_path, tmp_path)
     with pytest.raises(PoolError) as found, joined:
         pass
     assert f"RAY_ADDRESS=10.0.0.1:6379: {error}" in str(found.value)
@@ -111,19 +122,19 @@ def test_a_cluster_that_refuses_is_told_with_what_it_wants(
     assert "same RAY_AUTH_MODE and token" in str(found.value)
 
 
-def test_a_cluster_that_cannot_be_started_here_is_one_clear_error_and_no_litter(
+def test_failed_start_of_a_cluster_raises_one_error_and_leaves_no_files(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv("RAY_TMPDIR", str(tmp_path))
     for name in ("RAY_AUTH_MODE", "RAY_AUTH_TOKEN"):
         monkeypatch.setenv(name, "given")
     use(Ray(OSError("timed out during startup")), monkeypatch)
-    with pytest.raises(PoolError, match="on this machine: timed out"), ray_driver.own(1):
+    with pytest.raises(PoolError, match="on this machine: timed out"), ray_driver.own_cluster(1):
         pass
     assert not list(tmp_path.iterdir())
 
 
-def test_the_folder_goes_when_the_last_process_that_writes_there_is_gone(tmp_path: Path) -> None:
+def test_folder_is_removed_after_the_last_process_that_writes_there(tmp_path: Path) -> None:
     folder = tmp_path / "garl-ray-1"
     folder.mkdir()
     writes = (
@@ -140,12 +151,12 @@ def test_the_folder_goes_when_the_last_process_that_writes_there_is_gone(tmp_pat
     assert not folder.exists()
 
 
-def test_a_connection_that_never_comes_ends_the_driver() -> None:
+def test_driver_ends_if_no_connection_is_made() -> None:
     code = (
         "import sys, time, types\n"
         "sys.modules['ray'] = types.SimpleNamespace(init=lambda *given, **more: time.sleep(60))\n"
         "from pytest_garl.execution.ray import driver as ray_driver\n"
-        "ray_driver.PATIENCE_S = 0.1\n"
+        "ray_driver.CONNECT_S = 0.1\n"
         "ray_driver.version = lambda name: '2.60.0'\n"
         "with ray_driver._connected('head:6379'): pass\n"
     )
@@ -159,7 +170,7 @@ def test_a_connection_that_never_comes_ends_the_driver() -> None:
     os.close(report)
 
 
-def test_only_an_address_with_a_port_is_tried(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_check_connects_only_to_an_address_with_a_port(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("importlib.util.find_spec", lambda name: object())
     for address in ("", "auto", "ray://head:10001"):
         check_ray(address)
@@ -167,7 +178,7 @@ def test_only_an_address_with_a_port_is_tried(monkeypatch: pytest.MonkeyPatch) -
         check_ray("head:99999999")
 
 
-def test_the_process_of_pytest_never_imports_ray() -> None:
+def test_pytest_process_never_imports_ray() -> None:
     code = (
         "import sys\n"
         "import pytest_garl.plugin.startup, pytest_garl.execution.ray.scheduler\n"

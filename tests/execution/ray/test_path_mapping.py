@@ -5,15 +5,15 @@ from pathlib import Path
 
 import pytest
 
-from pytest_garl.execution.ray.path_mapping import Relocation
+from pytest_garl.execution.ray.path_mapping import PathMapping
 from pytest_garl.execution.reference import Reference
 from pytest_garl.simulation.npc_policy import PolicySpec
 from tests.execution.flying import Good, job_of
 
-MOVED = Relocation(home="/home/ann/stack", here="/tmp/ray/_ray_pkg_1f")
+PATHS = PathMapping(local="/home/ann/stack", remote="/tmp/ray/_ray_pkg_1f")
 
 
-def test_a_job_reads_as_in_the_copy() -> None:
+def test_job_gets_the_paths_of_the_copy() -> None:
     job = dataclasses.replace(
         job_of(Good, Path("/home/ann/stack/.garl/flights")),
         system=Reference(module="mine", file="/home/ann/stack/src/mine.py", qualname="Mine"),
@@ -23,26 +23,26 @@ def test_a_job_reads_as_in_the_copy() -> None:
         ),
         path=("/home/ann/stack", "/usr/lib/python3.11", "/srv/home/ann/stack", "/home/ann/stack2"),
     )
-    found = MOVED.job(job.dumps())
+    found = PATHS.job(job.dumps())
     assert found.system.file == "/tmp/ray/_ray_pkg_1f/src/mine.py"
     assert found.map_folders == ("/tmp/ray/_ray_pkg_1f/scenarios/maps",)
     assert dict(found.npcs.arguments) == {"weights": "/tmp/ray/_ray_pkg_1f/a.npz"}
-    # Only whole paths below the project are meant.
+    # Only whole paths below the project change.
     assert found.path == ("/tmp/ray/_ray_pkg_1f", *job.path[1:])
 
 
-def test_what_was_not_copied_is_imported_by_name() -> None:
+def test_files_outside_the_project_are_imported_by_name() -> None:
     job = job_of(Good, Path("flights"))
     assert job.system.file
-    found = MOVED.job(job.dumps())
+    found = PATHS.job(job.dumps())
     assert found.system == dataclasses.replace(job.system, file="")
     assert found.simulator == dataclasses.replace(job.simulator, file="")
 
 
-def test_a_folder_with_any_name_is_found() -> None:
+def test_folder_may_have_any_name() -> None:
     home = '/home/jörg/a "b" (c)+'
     job = dataclasses.replace(job_of(Good, Path("flights")), path=(home, f"{home}/src"))
-    moved = Relocation(home=home, here="/a\\b")
+    moved = PathMapping(local=home, remote="/a\\b")
     assert moved.job(job.dumps()).path == ("/a\\b", "/a\\b/src")
 
 
@@ -58,4 +58,4 @@ def test_a_folder_with_any_name_is_found() -> None:
     ],
 )
 def test_a_traceback_reads_as_at_home(here: str, home: str) -> None:
-    assert MOVED.to_local(here) == home
+    assert PATHS.to_local(here) == home

@@ -12,7 +12,7 @@ from pytest_garl.execution.job import dump_scenario
 from pytest_garl.execution.ledger import Ledger
 from pytest_garl.execution.ledger_queue import Claim
 from pytest_garl.execution.ray.actor import ActorWorkspace, FlightOutput, versions
-from pytest_garl.execution.ray.scheduler import RayScheduler, unlike
+from pytest_garl.execution.ray.scheduler import RayScheduler, different_versions
 from pytest_garl.execution.worker_failure import WorkerExit
 from tests.execution.flying import Good, job_of, scenario
 from tests.support.results import flight_result
@@ -36,9 +36,9 @@ class WorkerLostError(RayError):
 
 
 class FakeRay:
-    """Ray as far as a fleet uses it: a call is answered at once, or when it is waited for.
+    """Ray as far as the scheduler uses it: a call is answered at once, or when it is waited for.
 
-    ``fly`` and ``about`` say what pilots answer; an exception is raised where it is got.
+    ``fly`` and ``node_and_versions`` give the answers of actors; ``get`` raises an exception.
     """
 
     exceptions = type("exceptions", (), {"RayError": RayError, "RayTaskError": RayTaskError})
@@ -46,23 +46,23 @@ class FakeRay:
     def __init__(
         self,
         fly: Callable[[Claim], object] = lambda claim: LANDED,
-        about: Callable[[], object] = lambda: ("node", versions()),
+        node_and_versions: Callable[[], object] = lambda: ("node", versions()),
     ) -> None:
         self._answers: dict[str, Callable[..., object]] = {
             "fly": fly,
-            "about": about,
+            "node_and_versions": node_and_versions,
             "close": lambda: None,
         }
         self._refs: dict[int, object] = {}
-        self.hired = self.closed = 0
+        self.started = self.closed = 0
         self.most = 0
 
     def remote(self, *, num_cpus: int) -> Callable[[type], Any]:
         assert num_cpus == 1
-        return lambda pilot: type("Hire", (), {"remote": staticmethod(self._hire)})
+        return lambda actor: type("ActorClass", (), {"remote": staticmethod(self._start)})
 
-    def _hire(self, base: ActorWorkspace) -> Any:
-        self.hired += 1
+    def _start(self, workspace: ActorWorkspace) -> Any:
+        self.started += 1
         return type("Actor", (), {name: self._method(name) for name in self._answers})
 
     def _method(self, name: str) -> Any:
@@ -97,15 +97,15 @@ def ledger(tmp_path: Path) -> Ledger:
 
 
 def fly(ray: FakeRay, ledger: Ledger, size: int = 2) -> RayScheduler:
-    fleet = RayScheduler(ray, ledger.queue, ActorWorkspace(), size)
+    scheduler = RayScheduler(ray, ledger.queue, ActorWorkspace(), size)
     for _ in range(100):
         if not ledger.unflown("search", 0):
             break
-        fleet.turn()
-    return fleet
+        scheduler.turn()
+    return scheduler
 
 
-def test_all_is_flown_and_recorded_with_the_records_where_the_job_wants_them(
+def test_scheduler_flies_all_slots_and_writes_records_into_the_jobs_folder(
     ledger: Ledger, tmp_path: Path
 ) -> None:
     ray = FakeRay()
@@ -115,51 +115,51 @@ def test_all_is_flown_and_recorded_with_the_records_where_the_job_wants_them(
     assert ledger.queries.meters()["flying_s"] == 4.5
     files = {path.name: path.read_bytes() for path in (tmp_path / "flights").iterdir()}
     assert files == {f"search-lawn-g00-s0{index}.npz": b"record" for index in range(3)}
-    assert (ray.hired, ray.most, ray.closed) == (2, 2, 2)
+    assert (ray.started, ray.most, ray.closed) == (2, 2, 2)
 
 
-def test_no_more_pilots_are_hired_than_there_is_to_fly(ledger: Ledger) -> None:
+def test_scheduler_starts_no_more_actors_than_slots(ledger: Ledger) -> None:
     ray = FakeRay()
     fly(ray, ledger, size=500)
-    assert ray.hired == 3
+    assert ray.started == 3
 
 
-def test_a_lost_worker_loses_nothing_and_says_nothing_of_the_system(ledger: Ledger) -> None:
+def test_slot_of_a_lost_actor_is_flown_by_another(ledger: Ledger) -> None:
     losses = itertools.chain([WorkerLostError("killed")] * 2, itertools.repeat(LANDED))
     ray = FakeRay(fly=lambda claim: next(losses))
     fly(ray, ledger)
     assert [result for _, result in ledger.generation("search", 0)] == [LANDED.result] * 3
     assert "retried" not in ledger.queries.meters()
-    assert ray.hired == 4
+    assert ray.started == 4
 
 
-def test_one_slot_that_costs_worker_after_worker_ends_the_run(ledger: Ledger) -> None:
+def test_slot_that_loses_actor_after_actor_ends_the_run(ledger: Ledger) -> None:
     ray = FakeRay(fly=lambda claim: WorkerLostError("out of memory") if claim.slot == 1 else LANDED)
     with pytest.raises(PoolError, match="the same slot 4 times: out of memory"):
         fly(ray, ledger)
     assert ledger.unflown("search", 0) == 1
 
 
-def test_workers_that_cannot_begin_end_the_run(ledger: Ledger) -> None:
-    ray = FakeRay(about=lambda: WorkerLostError("No module named 'pytest_garl'"))
-    with pytest.raises(PoolError, match=r"die before they fly: No module named 'pytest_garl'\n"):
+def test_actors_that_cannot_start_end_the_run(ledger: Ledger) -> None:
+    ray = FakeRay(node_and_versions=lambda: WorkerLostError("No module named 'pytest_garl'"))
+    with pytest.raises(PoolError, match=r"end before they fly: No module named 'pytest_garl'\n"):
         fly(ray, ledger, size=1)
-    assert ray.hired == 4
+    assert ray.started == 4
 
 
-def test_a_node_with_other_versions_ends_the_run_before_a_flight(ledger: Ledger) -> None:
-    ray = FakeRay(about=lambda: ("far-1", versions() | {"numpy": "1.0"}))
+def test_node_with_other_versions_ends_the_run_before_a_flight(ledger: Ledger) -> None:
+    ray = FakeRay(node_and_versions=lambda: ("far-1", versions() | {"numpy": "1.0"}))
     with pytest.raises(PoolError, match=r"node far-1 would not fly the same: it has numpy 1\.0 \("):
         fly(ray, ledger)
     assert ledger.unflown("search", 0) == 3
 
 
-def test_versions_differ_also_where_there_is_none() -> None:
-    assert unlike({"a": "1", "b": "2"}, {"a": "1"}) == "b missing (here 2)"
-    assert unlike({"a": "1"}, {"a": "1", "c": "3"}) == ""
+def test_missing_package_counts_as_another_version() -> None:
+    assert different_versions({"a": "1", "b": "2"}, {"a": "1"}) == "b missing (here 2)"
+    assert different_versions({"a": "1"}, {"a": "1", "c": "3"}) == ""
 
 
-def test_a_death_is_settled_as_in_the_local_pool(ledger: Ledger) -> None:
+def test_worker_exit_is_handled_as_in_the_local_pool(ledger: Ledger) -> None:
     claims: list[Claim] = []
 
     def die(claim: Claim) -> object:
@@ -174,13 +174,13 @@ def test_a_death_is_settled_as_in_the_local_pool(ledger: Ledger) -> None:
     assert ledger.queries.meters()["retried"] == 1
 
 
-def test_a_slot_to_fly_alone_is_flown_even_if_its_worker_is_lost(ledger: Ledger) -> None:
+def test_slot_to_fly_alone_is_flown_even_if_its_actor_is_lost(ledger: Ledger) -> None:
     answers = iter([LANDED, LANDED, KILLED, WorkerLostError("killed"), LANDED])
     fly(FakeRay(fly=lambda claim: next(answers)), ledger, size=1)
     assert ledger.unflown("search", 0) == 0
 
 
-def test_what_fails_on_a_node_is_told_without_ray_around_it(ledger: Ledger) -> None:
+def test_error_on_a_node_is_raised_without_rays_wrapper(ledger: Ledger) -> None:
     ray = FakeRay(fly=lambda claim: RayTaskError(PoolError("the simulator failed")))
     with pytest.raises(PoolError, match=r"^on a node of Ray: the simulator failed$"):
         fly(ray, ledger)
