@@ -111,7 +111,7 @@ class Airframe:
     ``latency_s`` is the delay between an image and the command that it leads to.
     ``control_rate_hz`` is how often ``control`` is asked for motor thrusts; ``None``
     means that the simulator's own simple flight control follows the commands.  The
-    mass and size are those of the DJI Matrice 100 (see ``simulation/vehicle.py``).  Raises
+    mass and size are those of the DJI Matrice 100 (see ``simulation/physics/vehicle.py``).  Raises
     LandingSystemError for a mass outside 0.1 to 100 kg, a size outside 0.1 to 5 m, a
     latency outside 0 to 5 s, a control rate outside 1 to 240 Hz.
     """

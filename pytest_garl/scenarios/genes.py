@@ -153,7 +153,7 @@ WEATHER = (
     ("road_leaf", "share of the ground under leaves"),
     ("road_snow", "share of the ground under snow"),
 )
-"""The paper's eight weather genes; ``simulation/weather.py`` gives them their meaning."""
+"""The paper's eight weather genes; ``simulation/camera/weather.py`` gives them their meaning."""
 
 SUN = "environment.sun_position"
 ENVIRONMENT = (*(f"environment.{name}" for name, _ in WEATHER), SUN)

@@ -49,7 +49,7 @@ class Scenario:
         return dataclasses.replace(self, genes=genes)
 
     def without(self, *names: str) -> Scenario:
-        """Return a copy in which these objects stay at home."""
+        """Return a copy without these objects."""
         for name in names:
             self[f"{name}.velocity"]
         genes = tuple(pair for pair in self.genes if pair[0].partition(".")[0] not in names)

@@ -85,7 +85,7 @@ class Map:
         return tuple(pair for pair in self.all_objects if pair[0] not in self.removed_objects)
 
     def without(self, removed: Iterable[str]) -> Map:
-        """Return the map with these objects at home; raise ScenarioError for unknown ones."""
+        """Return the map without these objects; raise ScenarioError for unknown ones."""
         names = tuple(sorted(removed))
         known = [name for name, _ in self.all_objects]
         unknown = [name for name in names if name not in known]

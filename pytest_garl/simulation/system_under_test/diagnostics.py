@@ -28,7 +28,7 @@ MOST_POINTS = 1_000
 POINTS_KEPT = 100
 """A flight has 1,200 frames at the default rate, and its record keeps the path of each."""
 MOST_BYTES = 24_000_000
-"""Of all diagnostics of a flight: a record of 32 MB is not loaded again (``record.py``)."""
+"""Of all diagnostics of a flight: a record of 32 MB is not loaded again (``flight_file.py``)."""
 FULL_SHARE = 0.25
 """Of these bytes, for paths, corners and notes too; the rest is for what verdicts need."""
 _NUMBER_BYTES, _KEYS_BYTES = 26, 80
