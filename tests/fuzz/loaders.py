@@ -39,7 +39,7 @@ from tests.baselines import samples as baseline_samples
 from tests.execution.flying import Good, job_of, scenario
 from tests.experiments.samples import row
 from tests.experiments.test_spec import TEXT as PLAN
-from tests.fuzz import mutations
+from tests.fuzz import binary_mutations, mutations
 from tests.regressions import test_case_file as test_files
 
 Change = Callable[[random.Random], None]
@@ -129,7 +129,7 @@ def _weights(folder: Path, *, stamp: bool = True) -> Path:
 
 def _prepare_weights(folder: Path, rng: random.Random) -> Path:
     path = _weights(folder)
-    path.write_bytes(mutations.archive_changed(path.read_bytes(), rng))
+    path.write_bytes(binary_mutations.archive_changed(path.read_bytes(), rng))
     manifest = json.loads(path.with_suffix(".json").read_text())
     manifest["sha256"] = hashlib.sha256(path.read_bytes()).hexdigest()
     path.with_suffix(".json").write_text(json.dumps(manifest))
@@ -156,7 +156,7 @@ def _prepare_record(folder: Path, rng: random.Random) -> Path:
         vars(_prepare_record)["sample"] = path.read_bytes()
     content: bytes = vars(_prepare_record)["sample"]
     if rng.random() < 0.5:
-        path.write_bytes(mutations.archive_changed(content, rng))
+        path.write_bytes(binary_mutations.archive_changed(content, rng))
         return path
     with np.load(io.BytesIO(content)) as saved:
         arrays: dict[str, Any] = dict(saved)
@@ -178,7 +178,7 @@ def _prepare_ledger(folder: Path, rng: random.Random) -> Path:
         _write_ledger(path)
         vars(_prepare_ledger)["sample"] = path.read_bytes()
     path.write_bytes(vars(_prepare_ledger)["sample"])
-    mutations.database_changed(path, rng)
+    binary_mutations.database_changed(path, rng)
     return path
 
 
