@@ -12,7 +12,7 @@ from types import MappingProxyType
 import numpy as np
 from numpy.typing import NDArray
 
-from pytest_garl.scenarios.genes import CONFINED_WEATHER, ENVIRONMENT, SUN
+from pytest_garl.scenarios.genes import CONFINED_WEATHER, SUN
 from pytest_garl.simulation.npc_policy import DECISION_STEP_S, STAY, Move, Situation
 
 State = NDArray[np.float32]
@@ -33,6 +33,18 @@ BODY_SCALE_M = 3.0
 """What each kind of number is divided by, so that all are of the order of one."""
 LIMIT = 10.0
 """No number is beyond this, however large the map."""
+CONDITIONS = (
+    "environment.dust",
+    "environment.fog",
+    "environment.rain",
+    "environment.snow",
+    "environment.road_wetness",
+    "environment.maple_leaf",
+    "environment.road_leaf",
+    "environment.road_snow",
+    SUN,
+)
+"""The paper's nine genes of the environment; weights depend on their number and order."""
 CONDITION_STEP = 0.01
 """What the paper's online rival alters a condition by at a time."""
 
@@ -112,7 +124,7 @@ def online(situation: Situation) -> State:
     Weather is a share of the confined range, which the policy never leaves.
     """
     scenario = situation.scenario
-    conditions = [scenario[key] / _range(key) for key in ENVIRONMENT]
+    conditions = [scenario[key] / _range(key) for key in CONDITIONS]
     return _vector((*_places(situation), *conditions, scenario["marker.x"], scenario["marker.y"]))
 
 
@@ -123,7 +135,7 @@ def online_moves(situation: Situation) -> tuple[Move, ...]:
     raised beyond the confined range: the policy knows no other.
     """
     changes = []
-    for key in ENVIRONMENT:
+    for key in CONDITIONS:
         value = situation.scenario[key]
         up = max(0.0, min(CONDITION_STEP, _range(key) - value))
         changes += [(key, up), (key, -min(CONDITION_STEP, value))]
@@ -174,10 +186,10 @@ ENCODINGS: Mapping[str, Encoding] = MappingProxyType(
         "relative": Encoding(size=10, state=relative, moves=relative_moves),
         "fellow": Encoding(size=12, state=fellow, moves=relative_moves),
         "online": Encoding(
-            size=4 + len(ENVIRONMENT) + 2,
+            size=4 + len(CONDITIONS) + 2,
             state=online,
             moves=online_moves,
-            actions=len(ACTIONS) + 2 * len(ENVIRONMENT),
+            actions=len(ACTIONS) + 2 * len(CONDITIONS),
             in_turn=True,
         ),
     }

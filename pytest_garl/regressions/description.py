@@ -16,14 +16,7 @@ from pytest_garl.scenarios.placement import (
     object_start_m,
 )
 from pytest_garl.scenarios.scenario import Scenario
-from pytest_garl.simulation.camera.weather import (
-    DUST_VISIBILITY_M,
-    FOG_VISIBILITY_M,
-    LEAVES_PER_M3,
-    RAIN_MMPH,
-    SNOW_MMPH,
-    sun_elevation_deg,
-)
+from pytest_garl.simulation.camera.weather import in_units
 from pytest_garl.simulation.flight import Contact, Flight, ObjectRecord
 from pytest_garl.simulation.physics.vehicle import up_m
 from pytest_garl.verdicts.verdict import Verdict
@@ -81,32 +74,11 @@ def _article(word: str) -> str:
     return "An" if word[0] in "aeiou" else "A"
 
 
-def _in_units(key: str, value: float) -> str:
-    """Return what an environment gene means, in physical units."""
-    name = key.partition(".")[2]
-    if name == "sun_position":
-        return f"sun at an elevation of {sun_elevation_deg(value):.0f} degrees"
-    if name in ("fog", "dust"):
-        nearest_m = FOG_VISIBILITY_M if name == "fog" else DUST_VISIBILITY_M
-        return f"{name}, visibility {nearest_m / value:.0f} m"
-    if name in ("rain", "snow"):
-        most = RAIN_MMPH if name == "rain" else SNOW_MMPH
-        return f"falling {name}, {most * value:.1f} mm/h"
-    if name == "maple_leaf":
-        return f"falling leaves, {LEAVES_PER_M3 * value:.2f} per cubic metre"
-    what = {
-        "road_wetness": "as wet as it gets",
-        "road_leaf": "of the ground under leaves",
-        "road_snow": "of the ground under snow",
-    }
-    return f"{100 * value:.0f} % {what[name]}"
-
-
 def meanings(scenario: Scenario, map_folders: tuple[Path, ...]) -> list[tuple[str, str, str]]:
     """Return what is off nominal as (gene, value, meaning in physical units)."""
     map = load_map(scenario.map, map_folders)
     rows = [
-        (item.key, f"{scenario[item.key]:.3g}", _in_units(item.key, scenario[item.key]))
+        (item.key, f"{scenario[item.key]:.3g}", in_units(item.key, scenario[item.key]))
         for item in genome_of(scenario, map).properties
         if item.key.startswith("environment.") and scenario[item.key] != item.nominal
     ]

@@ -6,6 +6,7 @@ import itertools
 import math
 from dataclasses import dataclass
 
+from pytest_garl.scenarios.genes import ENVIRONMENT
 from pytest_garl.scenarios.scenario import Scenario
 
 KOSCHMIEDER = 3.912
@@ -65,7 +66,7 @@ class Conditions:
 
 def conditions_of(scenario: Scenario) -> Conditions:
     """Return what the environment genes of a scenario mean."""
-    gene = {name: scenario[f"environment.{name}"] for name in _GENES}
+    gene = {key.partition(".")[2]: scenario[key] for key in ENVIRONMENT}
     fog = gene["fog"] * KOSCHMIEDER / FOG_VISIBILITY_M
     dust = gene["dust"] * KOSCHMIEDER / DUST_VISIBILITY_M
     rain, snow = gene["rain"] * RAIN_MMPH, gene["snow"] * SNOW_MMPH
@@ -96,17 +97,25 @@ def conditions_of(scenario: Scenario) -> Conditions:
     )
 
 
-_GENES = (
-    "dust",
-    "fog",
-    "rain",
-    "snow",
-    "road_wetness",
-    "maple_leaf",
-    "road_leaf",
-    "road_snow",
-    "sun_position",
-)
+def in_units(key: str, value: float) -> str:
+    """Return the meaning of a value of an environment gene, in physical units."""
+    name = key.partition(".")[2]
+    if name == "sun_position":
+        return f"sun at an elevation of {sun_elevation_deg(value):.0f} degrees"
+    if name in ("fog", "dust"):
+        nearest_m = FOG_VISIBILITY_M if name == "fog" else DUST_VISIBILITY_M
+        return f"{name}, visibility {nearest_m / value:.0f} m"
+    if name in ("rain", "snow"):
+        most = RAIN_MMPH if name == "rain" else SNOW_MMPH
+        return f"falling {name}, {most * value:.1f} mm/h"
+    if name == "maple_leaf":
+        return f"falling leaves, {LEAVES_PER_M3 * value:.2f} per cubic metre"
+    what = {
+        "road_wetness": "as wet as it gets",
+        "road_leaf": "of the ground under leaves",
+        "road_snow": "of the ground under snow",
+    }
+    return f"{100 * value:.0f} % {what[name]}"
 
 
 def sun_elevation_deg(position: float) -> float:

@@ -12,7 +12,7 @@ import pytest
 
 from pytest_garl.landing_system import Camera
 from pytest_garl.scenarios.chromosome import decode
-from pytest_garl.scenarios.genes import genome_for
+from pytest_garl.scenarios.genes import WEATHER, genome_for
 from pytest_garl.scenarios.maps.map import load_map, map_names
 from pytest_garl.scenarios.object_types import OBJECT_TYPES
 from pytest_garl.scenarios.placement import marker_position_m
@@ -50,10 +50,7 @@ def picture(seed: int = 0, height: float = 6.0, **genes: float) -> Frame:
     return made.render((x, y, height), LEVEL, 1.0, poses(x, y))
 
 
-@pytest.mark.parametrize(
-    "gene",
-    ["dust", "fog", "rain", "snow", "road_wetness", "maple_leaf", "road_leaf", "road_snow"],
-)
+@pytest.mark.parametrize("gene", [name for name, _ in WEATHER])
 @pytest.mark.parametrize("value", [0.15, 1.0])
 def test_every_weather_gene_moves_the_picture(gene: str, value: float) -> None:
     clear, noisy = picture(), picture(seed=0, **{gene: value})
