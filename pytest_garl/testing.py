@@ -14,9 +14,9 @@ from typing import Any, NamedTuple
 from pytest_garl import cpu_dispatch
 from pytest_garl.adversary.catalogue import policy_spec
 from pytest_garl.errors import LandingSystemError
-from pytest_garl.execution.metering import Meter, OutOfTimeError
+from pytest_garl.execution.metering import CallMeter, OutOfTimeError
 from pytest_garl.execution.reference import check_system
-from pytest_garl.execution.separate_process import ask_apart
+from pytest_garl.execution.separate_process import call_in_separate_process
 from pytest_garl.landing_system import Mission, Observation, airframe_of
 from pytest_garl.scenarios.chromosome import decode
 from pytest_garl.scenarios.genes import genome_for
@@ -83,7 +83,7 @@ def check_landing_system(
     120 s).  ``deterministic=False`` turns a difference between equal flights into a warning.
     ``limit_s`` is the computing time (CPU) for all flights; a slow system is compared over shorter
     ones.  A call that takes 30 s is taken for hanging.  Where NumPy was loaded earlier, and
-    computes by other instructions than a search flies by, all this happens in a worker process.
+    computes by other instructions than a search flies by, all this happens in a separate process.
     """
     check_system(system)
     _check_airframe(system)
@@ -92,7 +92,7 @@ def check_landing_system(
     if not cpu_dispatch.pin():
         # NumPy was loaded earlier, and computes by other instructions than a search flies by.
         asked = {"seconds": seconds, "map": map, "deterministic": deterministic, "limit_s": limit_s}
-        told = ask_apart("pytest_garl.testing:_check_as_values", system, asked)
+        told = call_in_separate_process("pytest_garl.testing:_check_as_values", system, asked)
         return Check(**{**told, "flights": (*told["flights"],), "warnings": (*told["warnings"],)})
     return _Checker(system, map, seconds, deterministic, limit_s).run()
 
@@ -117,7 +117,7 @@ class _Checker:
         self._whole = seconds is None or seconds >= PAPER_LIMITS.time_s
         self._map = load_map(map, (Path.cwd() / "scenarios" / "maps",))
         self._calm, self._drawn = _scenarios(self._map)
-        self._meter = Meter(limit_s)
+        self._meter = CallMeter(limit_s)
         self._limit_s = limit_s
         self._warnings: list[str] = []
 

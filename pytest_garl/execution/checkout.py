@@ -1,4 +1,4 @@
-"""One checkout of a landing stack among several: a process that sees its modules and no other's."""
+"""Checkouts of a landing stack: a process imports the modules of one, and never of the others."""
 
 from __future__ import annotations
 
@@ -20,22 +20,22 @@ from pytest_garl.execution.sources import sources_sha256
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Checkout:
-    """A folder that holds a landing stack; ``others`` are those of which nothing may be seen."""
+    """A folder with a landing stack; nothing may be imported from the folders ``others``."""
 
     folder: Path
     others: tuple[Path, ...] = ()
 
     @property
     def arguments(self) -> tuple[str, ...]:
-        """The folders as arguments of a process that calls :func:`isolate_imports`."""
+        """The folders as arguments for a process that calls :func:`isolate_imports`."""
         return tuple(str(each.resolve()) for each in (self.folder, *self.others))
 
 
 def isolate_imports(folders: Sequence[str]) -> None:
-    """Import from the first folder before all else, and never from the others.
+    """Have imports search the first folder first, and never the others.
 
-    The working directory is hidden as well: ``python -m`` puts it first, and it may be another
-    checkout.  This package has been imported by then and keeps its place.
+    The working directory is left out too: ``python -m`` puts it first, and it may be another
+    checkout.  This package is imported before, and stays where it is.
     """
     folder, *others = (Path(each) for each in folders)
     hidden = {place for other in (folder, Path.cwd(), *others) for place in _places(other)}
@@ -44,15 +44,15 @@ def isolate_imports(folders: Sequence[str]) -> None:
 
 
 def _places(folder: Path) -> tuple[Path, Path]:
-    """Return where a checkout's packages may lie."""
+    """Return the folders of a checkout that may hold packages."""
     return folder.resolve(), (folder / "src").resolve()
 
 
 def describe(checkout: Checkout, system: str) -> tuple[Reference, str]:
     """Return where a checkout defines a landing system ("module:class"), and its sources' hash.
 
-    It is imported by a process of its own, so that this one stays free of all checkouts.  Raises
-    LandingSystemError where that fails, or where what is found is no landing system.
+    A process of its own imports it, so that this one imports from no checkout.  Raises
+    LandingSystemError if the import fails, or if it finds no landing system.
     """
     command = [sys.executable, "-m", __name__, system, *checkout.arguments]
     done = subprocess.run(command, capture_output=True, text=True, check=False)
@@ -73,7 +73,7 @@ def describe(checkout: Checkout, system: str) -> tuple[Reference, str]:
 
 
 def main(system: str, folders: Sequence[str]) -> None:
-    """Import a system and write what :func:`describe` wants to know."""
+    """Import a system and print the facts that :func:`describe` returns."""
     isolate_imports(folders)
     try:
         found = system_named(system)

@@ -1,4 +1,4 @@
-"""Measures the calls of a landing system that is flown in this process, and ends one that hangs."""
+"""Measures calls of a landing system that flies in this process, and interrupts one that hangs."""
 
 from __future__ import annotations
 
@@ -10,44 +10,44 @@ from time import process_time
 from types import FrameType
 
 HUNG_S = 30.0
-"""Wall time of one call after which it is taken for hanging: what a search allows it on its own."""
+"""A call hangs if it takes more wall time: a search allows so much if the slot flies alone."""
 
 
 class OutOfTimeError(Exception):
-    """The computing time for all flights is used up."""
+    """The CPU time for all flights is used up."""
 
 
 class HungError(BaseException):
     """One call of a landing system took too long; `except Exception` does not catch it."""
 
 
-class Meter:
-    """A guard of the landing system's calls: CPU time in all, of the slowest, and on average."""
+class CallMeter:
+    """Measures the CPU time of calls, of the slowest and on average, and limits their sum."""
 
     def __init__(self, limit_s: float) -> None:
         self._ends_at_s = process_time() + limit_s
         self._began_s = 0.0
         self._calls, self._total_s = 0, 0.0
-        self._rings = False
+        self._interrupts = False
         self.slowest_s = 0.0
 
     @property
     def mean_s(self) -> float:
-        """CPU time of a call."""
+        """Mean CPU time of a call."""
         return self._total_s / max(1, self._calls)
 
     def step_begins(self) -> None:
-        """Start the clocks; raise OutOfTimeError where there is no time left."""
+        """Start the clocks; raise OutOfTimeError if no time is left."""
         self._began_s = process_time()
         if self._began_s > self._ends_at_s:
             raise OutOfTimeError
-        if self._rings:
-            # Again and again: a system may catch whatever it is interrupted by.
+        if self._interrupts:
+            # Repeated every second: a system may catch the first interruption.
             signal.setitimer(signal.ITIMER_REAL, HUNG_S, 1.0)
 
     def step_ends(self) -> None:
         """Stop the clocks."""
-        if self._rings:
+        if self._interrupts:
             signal.setitimer(signal.ITIMER_REAL, 0)
         taken = process_time() - self._began_s
         self._calls += 1
@@ -56,7 +56,7 @@ class Meter:
 
     @contextmanager
     def timed(self) -> Iterator[None]:
-        """Interrupt calls that hang, in the main thread, unless the alarm is somebody's."""
+        """Interrupt calls that hang, if this is the main thread and SIGALRM has no handler."""
         if (
             threading.current_thread() is not threading.main_thread()
             or signal.getsignal(signal.SIGALRM) is not signal.SIG_DFL
@@ -64,11 +64,11 @@ class Meter:
             yield
             return
         signal.signal(signal.SIGALRM, _interrupt)
-        self._rings = True
+        self._interrupts = True
         try:
             yield
         finally:
-            self._rings = False
+            self._interrupts = False
             signal.setitimer(signal.ITIMER_REAL, 0)
             signal.signal(signal.SIGALRM, signal.SIG_DFL)
 

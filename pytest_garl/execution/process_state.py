@@ -1,4 +1,4 @@
-"""What a flight may have changed in its process, so that the next one would fly otherwise."""
+"""Detects changes that a landing system made to its process and that alter later flights."""
 
 from __future__ import annotations
 
@@ -29,13 +29,13 @@ FLYING = (
     "simulation.system_under_test.reference_pilot",
     "verdicts.judge",
 )
-"""What a flight imports, with all that these import."""
+"""Modules that a flight imports; they import the rest."""
 SHARED = {"cv2", "json", "math", "numpy", "os", "pathlib", "pybullet", "random", "struct", "time"}
-"""Packages of others with which the simulator computes."""
+"""Foreign packages with which the simulator computes."""
 MOST_THREADS = 8
 MOST_FILES = 64
 MOST_BYTES = 2**30
-"""What flights may leave of threads, open files and memory before their process is replaced."""
+"""If flights leave more threads, open files or bytes of memory, their process is replaced."""
 _LIMITED = (
     resource.RLIMIT_NOFILE,
     resource.RLIMIT_FSIZE,
@@ -48,48 +48,48 @@ _GONE = object()
 class ProcessState:
     """The process before its first flight: all functions and settings that flights share.
 
-    A module that sets attributes of its own when it is first used, as NumPy does, has changed
-    nothing; one of whose functions is another than before has.
+    A new attribute of a module is no change, since NumPy sets some at first use.  A function that
+    was replaced is a change.
     """
 
     def __init__(self) -> None:
         for name in FLYING:
             importlib.import_module(f"{OURS}.{name}")
-        self._spaces = [(space, dict(values)) for space, values in _namespaces()]
-        self._facts = _facts()
+        self._namespaces = [(space, dict(values)) for space, values in _namespaces()]
+        self._settings = _settings()
         self._files, self._bytes = _open_files(), 0
 
     def limited(self) -> bool:
-        """Whether a landing system has changed or used up what this process may use."""
-        return self._facts["limits"] != _limits() or not _can_open()
+        """Whether a landing system has changed or used up this process's resource limits."""
+        return self._settings["limits"] != _limits() or not _can_open()
 
     def changed(self) -> bool:
-        """Whether the next flight had better be another process's."""
+        """Whether the next flight needs a fresh process."""
         try:
             return self._differs()
-        except Exception:  # noqa: BLE001 (what is asked here may be what was replaced)
+        except Exception:  # noqa: BLE001 (a function called here may be one that was replaced)
             return True
 
     def _differs(self) -> bool:
         peak = 1024 * resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
         self._bytes = self._bytes or peak
         return (
-            _left_processes()
-            or self._facts != _facts()
+            _has_live_children()
+            or self._settings != _settings()
             or threading.active_count() > MOST_THREADS
             or _open_files() > self._files + MOST_FILES
             or peak > self._bytes + MOST_BYTES
             or any(
                 space.get(name, _GONE) is not value
-                for space, values in self._spaces
+                for space, values in self._namespaces
                 for name, value in values.items()
             )
         )
 
 
 def _namespaces() -> Iterator[tuple[Any, dict[str, Any]]]:
-    """Yield namespaces, with those of their names that must stay what they are."""
-    modules = {name: module for name, module in sys.modules.items() if _watched(name)}
+    """Yield namespaces, each with the names that must keep their values."""
+    modules = {name: module for name, module in sys.modules.items() if _is_checked(name)}
     yield sys.modules, dict(modules)
     yield vars(builtins), _functions(builtins)
     for name, module in modules.items():
@@ -102,7 +102,7 @@ def _namespaces() -> Iterator[tuple[Any, dict[str, Any]]]:
                 yield vars(value), dict(vars(value))
 
 
-def _watched(name: str) -> bool:
+def _is_checked(name: str) -> bool:
     return name.partition(".")[0] in SHARED | {OURS} and isinstance(sys.modules[name], ModuleType)
 
 
@@ -110,7 +110,7 @@ def _functions(module: ModuleType) -> dict[str, Any]:
     return {name: value for name, value in vars(module).items() if callable(value)}
 
 
-def _facts() -> dict[str, Any]:
+def _settings() -> dict[str, Any]:
     """Return the settings that all flights of a process share."""
     import cv2
     import numpy as np
@@ -121,7 +121,7 @@ def _facts() -> dict[str, Any]:
         "standard files": [_identity(number) for number in range(3)],
         "NumPy": (np.geterr(), np.geterrcall()),
         "OpenCV": (cv2.getNumThreads(), cv2.useOptimized()),
-        # Imports add filters that hide warnings, and change nothing.
+        # Imports add filters that hide warnings; these change no flight.
         "warnings": [each for each in warnings.filters if each[0] == "error"],
         "locale": locale.setlocale(locale.LC_ALL),
         "tracing": (sys.gettrace(), sys.getprofile()),
@@ -140,12 +140,12 @@ def _folder() -> str:
 
 
 def _limits() -> list[tuple[int, int]]:
-    """Return what this process may use of the machine."""
+    """Return the resource limits of this process."""
     return [resource.getrlimit(name) for name in _LIMITED]
 
 
 def _identity(number: int) -> tuple[int, int]:
-    """Return which file a descriptor stands for."""
+    """Return the device and inode of a descriptor's file."""
     try:
         status = os.fstat(number)
     except OSError:
@@ -168,8 +168,8 @@ def _can_open() -> bool:
     return True
 
 
-def _left_processes() -> bool:
-    """Whether a process that flights have started lives on; those that have ended are let go."""
+def _has_live_children() -> bool:
+    """Whether a process that flights have started still lives; reap those that have ended."""
     try:
         while os.waitpid(-1, os.WNOHANG)[0]:
             pass

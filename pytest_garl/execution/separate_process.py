@@ -1,4 +1,4 @@
-"""Ask something of a landing system in a fresh process, which flies as all flying processes do."""
+"""Call a function with a landing system in a fresh process, which computes as a worker does."""
 
 from __future__ import annotations
 
@@ -20,10 +20,12 @@ from pytest_garl.execution.processes import end_with_parent, ignore_ctrl_c
 from pytest_garl.execution.reference import Reference, reference_to
 
 
-def ask_apart(function: str, system: type, options: Mapping[str, Any]) -> dict[str, Any]:
-    """Return what "module:function" answers about a class, both of them JSON's kinds of values.
+def call_in_separate_process(
+    function: str, system: type, options: Mapping[str, Any]
+) -> dict[str, Any]:
+    """Return the JSON values that "module:function" returns for a class and JSON options.
 
-    Raises LandingSystemError with the text of whatever error of ours it raised there.
+    Raises LandingSystemError with the text of an error of pytest-garl that the function raises.
     """
     where = reference_to(system)
     if not where.file:
@@ -35,38 +37,38 @@ def ask_apart(function: str, system: type, options: Mapping[str, Any]) -> dict[s
         # The script is only imported there, not run once more.
         where = replace(where, module="__mp_main__")
     with tempfile.TemporaryDirectory(prefix="garl-") as folder:
-        question, answer = Path(folder) / "question.json", Path(folder) / "answer.json"
-        asked = {"function": function, "system": asdict(where), "options": dict(options)}
-        question.write_text(json.dumps({**asked, "path": [entry for entry in sys.path if entry]}))
+        call_file, result_file = Path(folder) / "call.json", Path(folder) / "result.json"
+        call = {"function": function, "system": asdict(where), "options": dict(options)}
+        call_file.write_text(json.dumps({**call, "path": [entry for entry in sys.path if entry]}))
         done = subprocess.run(
-            [sys.executable, "-m", __name__, str(os.getpid()), str(question), str(answer)],
+            [sys.executable, "-m", __name__, str(os.getpid()), str(call_file), str(result_file)],
             env={**os.environ, **cpu_dispatch.environment()},
             check=False,
         )
-        if not answer.is_file():
+        if not result_file.is_file():
             raise LandingSystemError(
                 f"{system.__name__}: the process in which it was flown ended with status "
                 f"{done.returncode}"
             )
-        told: dict[str, Any] = json.loads(answer.read_text())
-    if "error" in told:
-        raise LandingSystemError(told["error"])
-    return told
+        result: dict[str, Any] = json.loads(result_file.read_text())
+    if "error" in result:
+        raise LandingSystemError(result["error"])
+    return result
 
 
-def main(parent: str, question: str, answer: str) -> None:
-    """Answer a question that stands in one file, in another, while the parent lives."""
+def main(parent: str, call_file: str, result_file: str) -> None:
+    """Read a call from one file and write its result to another; end if the parent ends."""
     ignore_ctrl_c()
     end_with_parent(int(parent), signal.SIGKILL)
-    asked = json.loads(Path(question).read_text())
-    sys.path.extend(entry for entry in asked["path"] if entry not in sys.path)
-    module, _, name = asked["function"].partition(":")
+    call = json.loads(Path(call_file).read_text())
+    sys.path.extend(entry for entry in call["path"] if entry not in sys.path)
+    module, _, name = call["function"].partition(":")
     function = getattr(importlib.import_module(module), name)
     try:
-        told = function(Reference(**asked["system"]).load(), **asked["options"])
+        result = function(Reference(**call["system"]).load(), **call["options"])
     except GarlError as error:
-        told = {"error": str(error)}
-    Path(answer).write_text(json.dumps(told))
+        result = {"error": str(error)}
+    Path(result_file).write_text(json.dumps(result))
 
 
 if __name__ == "__main__":

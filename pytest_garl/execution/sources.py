@@ -1,8 +1,8 @@
-"""What a landing system consists of: the project's modules that it imports, and its data files.
+"""The sources of a landing system: the project's modules that it imports, and its data files.
 
-Imports are read from the source, not from what happens to be loaded: an import inside a function
-counts before it runs, and what others imported does not count.  A module whose name is only known
-at run time is not found this way; the marker's ``files`` can name it.
+Imports are read from the source code, not from the loaded modules.  So an import inside a function
+counts before it runs, and imports of other code do not count.  A module whose name is only known at
+run time is not found; the marker's ``files`` can name it.
 """
 
 from __future__ import annotations
@@ -23,12 +23,12 @@ _HERE = Path(__file__).resolve().parents[1]
 
 
 def sources_sha256(system: Any, files: Mapping[str, Path] | None = None) -> str:
-    """Hash the modules of the project that a landing system imports, and data files."""
+    """Hash the project's modules that a landing system imports, and data files."""
     return combined_sha256(sources_of(system, files))
 
 
 def combined_sha256(sources: Iterable[tuple[str, str]]) -> str:
-    """Return one hash for many."""
+    """Return one hash of many names and hashes."""
     digest = hashlib.sha256()
     for name, sha256 in sources:
         digest.update(f"{name}\0{sha256}\n".encode())
@@ -36,9 +36,9 @@ def combined_sha256(sources: Iterable[tuple[str, str]]) -> str:
 
 
 def sources_of(thing: Any, files: Mapping[str, Path] | None = None) -> tuple[tuple[str, str], ...]:
-    """Return what a class or function consists of: names of files, with their hashes.
+    """Return the sources of a class or function: names of files with their hashes.
 
-    The name of a module's file is below the folder from which it is imported.
+    The name of a module's file is relative to the folder from which it is imported.
     """
     found = {module.label: module.file for module in _modules(thing)}
     found.update(files or {})
@@ -46,9 +46,9 @@ def sources_of(thing: Any, files: Mapping[str, Path] | None = None) -> tuple[tup
 
 
 def data_files(paths: Sequence[str], root: Path) -> dict[str, Path]:
-    """Return the files that paths below ``root`` mean, by name; a folder means all in it.
+    """Return the files at paths below ``root`` by name; a folder stands for all files in it.
 
-    Raises FileNotFoundError for a path that is not there, with this path as its message.
+    Raises FileNotFoundError, with the path as its message, if there is no such path.
     """
     found: dict[str, Path] = {}
     for path in paths:
@@ -80,7 +80,7 @@ class _Module:
     name: str
     file: Path
     places: tuple[str, ...]
-    """Where its submodules lie, of a package."""
+    """Folders of the submodules if this is a package."""
     package: bool
 
     @property
@@ -89,7 +89,7 @@ class _Module:
         return f"{path}/{self.file.name}" if self.package else f"{path}{self.file.suffix}"
 
     def imports(self) -> frozenset[str]:
-        """Return the names that it might import, of modules or of what is in them."""
+        """Return the names that it imports, of modules or of objects in modules."""
         if self.file.suffix != ".py":
             return frozenset()
         base = self.name if self.package else self.name.rpartition(".")[0]
@@ -97,13 +97,13 @@ class _Module:
 
 
 def _modules(thing: Any) -> list[_Module]:
-    """Return the module in which something is defined, and the project's modules that it needs."""
+    """Return the module that defines ``thing``, and the project's modules that it imports."""
     first = _defining(thing)
     found = {first.name: first} if first else {}
     left = list(found.values())
     while left:
         module = left.pop()
-        # A package is run before each of its modules.
+        # A package is imported before its modules.
         for name in {*module.imports(), *_parents(module.name)}:
             other = None if name in found else _find(name)
             if other is not None and _of_the_project(other.file):
@@ -113,7 +113,7 @@ def _modules(thing: Any) -> list[_Module]:
 
 
 def _defining(thing: Any) -> _Module | None:
-    """Return the module of a class or function, in whichever way it was loaded."""
+    """Return the module of a class or function, however it was loaded."""
     try:
         file = Path(inspect.getfile(thing)).resolve()
     except (TypeError, OSError):
@@ -125,7 +125,7 @@ def _defining(thing: Any) -> _Module | None:
 
 @functools.lru_cache(maxsize=1024)
 def _imports(source: bytes, package: str) -> frozenset[str]:
-    """Return what a source imports, at its top level or anywhere else."""
+    """Return the names that a source imports, at its top level or in a function."""
     try:
         tree = ast.parse(source)
     except (SyntaxError, ValueError):
@@ -150,7 +150,7 @@ def _parents(name: str) -> Iterator[str]:
 
 
 def _find(name: str) -> _Module | None:
-    """Return where a module lies, without importing it; None for what is no file."""
+    """Return a module without importing it; None if it has no file."""
     if not name or name.partition(".")[0] in sys.stdlib_module_names:
         return None
     loaded = sys.modules.get(name)
@@ -182,7 +182,7 @@ def _spec(name: str) -> Any:
 
 
 def _of_the_project(file: Path) -> bool:
-    """Whether a file is the user's own: not Python's, not installed, not this package's."""
+    """Whether a file is the user's own: not Python's, not installed, not of this package."""
     installed = {"site-packages", "dist-packages"}
     return not installed & {*file.parts} and not any(
         file.is_relative_to(folder) for folder in _not_of_the_project()
