@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from typing import TYPE_CHECKING, NoReturn
 
 import pytest
@@ -90,21 +91,25 @@ def landing(request: pytest.FixtureRequest, garl_slot: Target, npcs: PolicySpec)
 
 
 def end_unjudged(item: pytest.Item) -> None:
-    """End a test whose flight no assertion can judge.
-
-    The first test of the slot that runs tells of it and fails; the others skip.  A test that is
-    expected to fail anyway tells nobody.  What a search could not decide is counted for all its
-    flights together; of a saved case, or where one flight is repeated, it is a failure.
-    """
+    """Fail or skip a test whose flight no assertion can judge; ``outcomes`` decides which."""
     landing = item.stash.get(LANDING, None)
     target = target_of(item)
     if landing is None or target is None or not landing.unjudged:
         return
+    from pytest_garl.plugin.outcomes import Need, UnjudgedFlight, resolve
+
     run = item.config.stash[RUN]
-    one = target.entry is not None or bool(run.options.repeat)
-    if landing.inconclusive and not one:
-        pytest.skip(landing.unjudged)
-    if item.get_closest_marker("xfail") is None and not run.reports_first(target, item.nodeid):
+
+    def claim(_: Need, facts: UnjudgedFlight) -> UnjudgedFlight:
+        return dataclasses.replace(facts, first=run.claims.claim_slot(target, item.nodeid))
+
+    facts = UnjudgedFlight(
+        inconclusive=landing.inconclusive,
+        alone=target.entry is not None or bool(run.options.repeat),
+        expects_failure=item.get_closest_marker("xfail") is not None,
+    )
+    decision, _ = resolve(facts, claim)
+    if decision.outcome == "skipped":
         pytest.skip(landing.unjudged)
     pytest.fail(landing.complaint, pytrace=False)
 

@@ -160,12 +160,12 @@ def pytest_runtest_makereport(
     target = target_of(item)
     run = item.config.stash.get(RUN, None)
     if target is not None and run is not None and (report.when == "call" or report.skipped):
-        from pytest_garl.plugin.outcomes import explain
+        from pytest_garl.plugin.item_report import report_item
 
         try:
             if report.when == "call":
-                explain(report, item, run, target, call.excinfo.value if call.excinfo else None)
-            run.note_ran(item.nodeid)
+                report_item(report, item, run, target, call.excinfo.value if call.excinfo else None)
+            run.claims.note_ran(item.nodeid)
         except GarlError as error:
             # Without a ledger no other item would fare better.
             report.outcome, report.longrepr = "failed", f"garl: {error}"

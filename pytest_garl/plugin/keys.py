@@ -37,6 +37,14 @@ EXCUSED = "garl.excused"
 """The user property of an item that is excused, with what another item tells of."""
 UNREPEATED = "garl.unrepeated"
 """The user property of a violation that did not show when it was flown again."""
+OWN_FAILURE = "garl.own_failure"
+"""The user property that tells the summary of a failed assertion about the user's own property."""
+CASE = "garl.case"
+"""The user property that names the file of a case that fails."""
+MAYBE_FIXED = "garl.maybe_fixed"
+"""The user property that names the file of an open case that passes."""
+STALE = "garl.stale"
+"""The user property that names the file of an open case that passes without proof, and why."""
 
 
 def is_xdist_worker(config: pytest.Config) -> bool:

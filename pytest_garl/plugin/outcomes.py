@@ -1,158 +1,245 @@
-"""What a failing item says: what happened, where and when, and how to see it again."""
+"""Decide the outcome of a landing item after its flight: pass, fail, xfail or skip, and why.
+
+``decide`` is a pure function from facts to a decision.  Some facts cost a flight or an entry in the
+ledger: as long as such a fact is None, ``decide`` returns a ``Need`` instead, and ``resolve`` asks
+for the fact.  ``item_report.py`` gathers the facts and applies the decision, ``report_text.py``
+writes the text, and ``session_status.py`` decides the exit status of the session.
+"""
 
 from __future__ import annotations
 
-import json
+from collections.abc import Callable
+from dataclasses import dataclass
+from enum import Enum
+from typing import Literal, TypeVar
 
-import pytest
+from pytest_garl.regressions.case import Status
 
-from pytest_garl.execution.result import FlightResult
-from pytest_garl.plugin.case_outcomes import explain_failing, explain_passing
-from pytest_garl.plugin.faults import Fault, Repeats, fault_of, repeats, told_by, write_down
-from pytest_garl.plugin.keys import EXCUSED, FAILURE, FOUND, OWN, UNREPEATED, is_xdist_worker
-from pytest_garl.plugin.report_edits import expect, paragraphs, tell
-from pytest_garl.plugin.run import Run, reflight_key
-from pytest_garl.plugin.suggested_commands import repeat_line
-from pytest_garl.plugin.target import FIRST, Target
-from pytest_garl.verdicts.wording import headline
+Outcome = Literal["passed", "failed", "xfailed", "skipped"]
 
-OWN_FAILURE = "garl.own_failure"
-"""The user property by which the summary learns of a test's own assertion that failed."""
+LEAST_FAILURES = 2
+"""A violation repeats if at least this many of a slot's flights show it."""
 
 
-def explain(
-    report: pytest.TestReport,
-    item: pytest.Item,
-    run: Run,
-    target: Target,
-    error: BaseException | None,
-) -> None:
-    """Add the story to a failing report; turn what is known, or told already, into an xfail."""
-    result = run.ledger.result(target.search, target.slot.generation, target.slot.index)
-    if result is None or not isinstance(item, pytest.Function):
-        return
-    case = target.entry.case if target.entry is not None else None
-    if report.failed and error is not None:
-        fault = fault_of(item, target, result, error)
-        again = repeat_line(item, target)
-        if fault is None:
-            lines = [f"The test itself raised {type(error).__name__}; that violates no property."]
-            report.sections.append(("garl: what happened", "\n".join([*lines, again])))
-        elif result.inconclusive:
-            tell(report, [again], result.undecided, again)
-        elif case is not None:
-            explain_failing(report, item, run, target, case, fault, result)
-        else:
-            _explain_fault(report, item, run, target, fault, result)
-    elif report.passed and case is not None:
-        explain_passing(report, item, run, target, case, result)
+class Reason(Enum):
+    """Why an item has its outcome."""
+
+    TEST_ERROR = "the test raised something else than a failed assertion"
+    INCONCLUSIVE = "the flight was not decided"
+    CRASH = "no assertion can judge the flight: the system crashed or gave up"
+    REPORTED_ELSEWHERE = "another test of the slot reports the flight"
+    VIOLATION = "the search found a violation"
+    EXPECTED = "a known case has the same signature"
+    DUPLICATE = "an item of an earlier slot reports the same violation"
+    NOT_REPEATED = "the violation did not show again"
+    EDGE = "not all neighbours of the case fail, so it gates nothing"
+    KNOWN_CASE = "the case is open and known"
+    UNAVOIDABLE_CASE = "the case is known, and not even the reference pilot avoids it"
+    NEW_CASE = "the case is neither committed nor accepted"
+    FAILS_AGAIN = "the case was fixed"
+    FAILS_DIFFERENTLY = "the case has another signature"
+    PASSES = "the test passes"
+    MAYBE_FIXED = "the case is open and passes"
+    STALE = "the case is open and passes, which proves nothing"
 
 
-def _explain_fault(
-    report: pytest.TestReport,
-    item: pytest.Function,
-    run: Run,
-    target: Target,
-    fault: Fault,
-    result: FlightResult,
-) -> None:
-    """Report what a search found, unless it is known, was told already, or does not repeat."""
-    _note_own(report, target, fault)
-    known = run.expected_signatures(target).get(fault.signature)
-    if known is not None:
-        return expect(report, f"known: {fault.signature} ({known})")
-    first_with_same_signature = told_by(run, target, fault, item.nodeid)
-    doubts: list[str] = []
-    if not first_with_same_signature and not run.options.repeat:
-        found = repeats(run, target, fault)
-        if not found.holds:
-            unrepeated = [target.system_name, target.map, target.name, fault.signature]
-            report.user_properties.append((UNREPEATED, json.dumps(unrepeated)))
-            return expect(report, f"did not repeat: {found.share} ({fault.signature})")
-        doubts = _doubts(run, target, found)
-        first_with_same_signature = write_down(run, target, fault, item.nodeid)
-    if first_with_same_signature and run.options.duplicates == "xfail":
-        report.user_properties.append((EXCUSED, fault.key(target.search)))
-        return expect(report, f"same violation as {first_with_same_signature} ({fault.signature})")
-    report.user_properties.append((FAILURE, fault.key(target.search)))
-    _note_test(report, item, run, target, fault)
-    lines = [f"{fault.signature}: a property of your own" if fault.own else fault.signature]
-    if fault.own and not fault.user_assertion.runs_on_any_flight:
-        lines.append("It is not saved: its test takes more than landing and scenario.")
-    elif fault.own and result.verdict.primary is not None:
-        lines.append("It is saved only if it fails in a flight that violates nothing else, too.")
-    story = result.verdict.story
-    told = [*_unusual(item.config, run, target), *doubts]
-    what = fault.failure.message if fault.own and fault.failure else headline(story)
-    again = repeat_line(item, target)
-    lines += [*paragraphs(told if fault.own else [story, *told], item), again]
-    return tell(report, lines, what, again)
+class Need(Enum):
+    """A fact that a decision needs next."""
+
+    EARLIER = "the slot of another item that reports the same failure"
+    REFLIGHTS = "more flights of the same slot"
+    CLAIM = "whether this item is the first to report this"
 
 
-def _note_own(report: pytest.TestReport, target: Target, fault: Fault) -> None:
-    """Tell the summary of a property of the user's own, whatever becomes of its failure."""
-    if fault.own and fault.failure:
-        told = [target.system_name, target.map, target.name]
-        told += [fault.signature, fault.failure.message]
-        report.user_properties.append((OWN_FAILURE, json.dumps(told)))
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Decision:
+    """The outcome of an item, and why."""
+
+    outcome: Outcome
+    reason: Reason
 
 
-def _note_test(
-    report: pytest.TestReport, item: pytest.Item, run: Run, target: Target, fault: Fault
-) -> None:
-    """Remember which test found a violation: it judges the case that is saved."""
-    if fault.own and not fault.user_assertion.runs_on_any_flight:
-        return
-    worker = is_xdist_worker(item.config)
-    if fault.own:
-        run.user_assertions[target.search, fault.signature] = fault.user_assertion
-        if worker:
-            report.user_properties.append((OWN, fault.signature))
-    run.note_finding_test(target.search, fault.signature, item.nodeid)
-    if worker:
-        report.user_properties.append((FOUND, f"{target.search} {fault.signature}"))
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Reflights:
+    """How many flights of a slot show a failure; ``same`` if two are equal to the byte."""
+
+    failed: int
+    flown: int
+    same: bool = False
+
+    @property
+    def confirm(self) -> bool:
+        """Whether the failure repeats; a single flight counts where no other can be asked."""
+        return self.flown == 1 or self.failed >= LEAST_FAILURES
 
 
-def _doubts(run: Run, target: Target, found: Repeats) -> list[str]:
-    """Return what is doubtful about a violation that shows again."""
-    if found.same or found.flown == 1:
-        return []
-    told = [f"FLAKY: {found.share}" if found.failed < found.flown else f"{found.share}, each time"]
-    if target.deterministic:
-        told.append(
-            "Nondeterministic landing system: the same flight again came to other trajectories"
-            f"{_parting(run, target)}. Seed its generators in reset(mission) and read no clock, or "
-            "mark it deterministic=False; what is found cannot be gated otherwise."
-        )
-    return told
+@dataclass(frozen=True, slots=True, kw_only=True)
+class CaseState:
+    """What a saved case says of itself."""
+
+    signature: str
+    status: Status
+    edge: bool
+    accepted: bool = False
+    """Whether the case is known: committed, or accepted by a user."""
 
 
-def _parting(run: Run, target: Target) -> str:
-    """Say when two flights of a slot part, where both were recorded."""
-    from pytest_garl.execution.slot import flight_name
-    from pytest_garl.simulation.flight_file import load, parted_s
+@dataclass(frozen=True, slots=True, kw_only=True)
+class FailedItem:
+    """Facts about an item whose test failed.
 
-    slot = target.slot
-    names = (
-        flight_name(target.search, slot.generation, slot.index, target.map),
-        flight_name(reflight_key(target, 0), FIRST.generation, FIRST.index, target.map),
-    )
-    files = [run.options.folder / "flights" / f"{name}.npz" for name in names]
-    if not all(file.exists() for file in files):
-        return ""
-    first, second = (load(file) for file in files)
-    return f", from {parted_s(first, second):.2f} s on"
+    ``signature`` is empty if the test raised something else than a failed assertion.
+    """
+
+    signature: str
+    user_property: bool = False
+    """Whether the assertion is about a property of the user's own."""
+    crashed: bool = False
+    """Whether the landing system raised, died, hung or broke the simulator."""
+    inconclusive: bool = False
+    case: CaseState | None = None
+    expected_by: str = ""
+    """File of a known case with the same signature."""
+    repeating: bool = False
+    """Whether the session repeats one scenario."""
+    duplicates: str = "xfail"
+    """Value of ``--garl-duplicates``."""
+    earlier: str | None = None
+    """The slot of another item that reports the same failure; empty if there is none."""
+    reflights: Reflights | None = None
+    claimed: bool = False
+    """Whether the ledger says that this item reports the failure, or which other one does."""
 
 
-def _unusual(config: pytest.Config, run: Run, target: Target) -> list[str]:
-    """Return with ``-v`` what the scenario holds, in physical units."""
-    if config.get_verbosity() < 1:
-        return []
-    from pytest_garl.regressions.description import meanings
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PassedCase:
+    """Facts about a saved case whose test passed."""
 
-    scenario = run.scenario(target)
-    words = [
-        meaning if what.startswith("environment.") else f"{what} {meaning}"
-        for what, _, meaning in meanings(scenario, run.options.map_folders)
-    ]
-    return [f"Scenario (seed {scenario.seed}): {'; '.join(words)}"]
+    case: CaseState
+    violates: bool
+    """Whether the flight violates a built-in property, though this test passed."""
+    unproven: bool = False
+    """Whether something else than the landing system changed, so that passing proves nothing."""
+    strict: bool = False
+    """Value of ``garl_xfail_strict``."""
+    first: bool | None = None
+    """Whether this is the first test that reports the slot."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class UnjudgedFlight:
+    """Facts about a flight that no assertion can judge, before the test's body runs."""
+
+    inconclusive: bool
+    alone: bool
+    """Whether the slot is a saved case or repeated, and not one of a search's many."""
+    expects_failure: bool
+    """Whether the test is marked xfail."""
+    first: bool | None = None
+    """Whether this is the first test that reports the slot."""
+
+
+Facts = FailedItem | PassedCase | UnjudgedFlight
+F = TypeVar("F", FailedItem, PassedCase, UnjudgedFlight)
+
+
+def resolve(facts: F, gather: Callable[[Need, F], F]) -> tuple[Decision, F]:
+    """Return the decision and the facts behind it; ``gather`` adds a fact that is needed."""
+    decided = decide(facts)
+    while isinstance(decided, Need):
+        facts = gather(decided, facts)
+        decided = decide(facts)
+    return decided, facts
+
+
+def decide(facts: Facts) -> Decision | Need:
+    """Return what becomes of an item, or the fact that must be known first."""
+    match facts:
+        case UnjudgedFlight():
+            return _unjudged_flight(facts)
+        case PassedCase():
+            return _passed_case(facts)
+        case FailedItem(inconclusive=True):
+            return _fail(Reason.INCONCLUSIVE)
+        case FailedItem(signature=""):
+            return _fail(Reason.TEST_ERROR)
+        case FailedItem(case=CaseState() as case):
+            return _failed_case(facts, case)
+    return _failed_search(facts)
+
+
+def _unjudged_flight(facts: UnjudgedFlight) -> Decision | Need:
+    """Let one test of the slot fail and the others skip.
+
+    What a search could not decide is counted for all its flights together.  A test that is expected
+    to fail reports nothing, so another one must.
+    """
+    if facts.inconclusive and not facts.alone:
+        return Decision(outcome="skipped", reason=Reason.INCONCLUSIVE)
+    if not facts.expects_failure:
+        if facts.first is None:
+            return Need.CLAIM
+        if not facts.first:
+            return Decision(outcome="skipped", reason=Reason.REPORTED_ELSEWHERE)
+    return _fail(Reason.INCONCLUSIVE if facts.inconclusive else Reason.CRASH)
+
+
+def _failed_search(facts: FailedItem) -> Decision | Need:
+    """Report each violation of a search once, if it repeats and no known case has it."""
+    if facts.expected_by:
+        return _xfail(Reason.EXPECTED)
+    if facts.repeating:
+        return _fail(Reason.VIOLATION)
+    if facts.earlier is None:
+        return Need.EARLIER
+    if not facts.earlier:
+        if facts.reflights is None:
+            return Need.REFLIGHTS
+        if not facts.reflights.confirm:
+            return _xfail(Reason.NOT_REPEATED)
+        if not facts.claimed:
+            return Need.CLAIM
+    if facts.earlier and facts.duplicates == "xfail":
+        return _xfail(Reason.DUPLICATE)
+    return _fail(Reason.VIOLATION)
+
+
+def _failed_case(facts: FailedItem, case: CaseState) -> Decision:
+    """Let a known open case fail as it did before, and a fixed one not at all."""
+    same = facts.signature == case.signature
+    # An unavoidable failure may show in any way; that excuses nothing that the case is not about.
+    excused = same or not (facts.user_property or facts.crashed)
+    if case.edge and excused:
+        return _xfail(Reason.EDGE)
+    open_as_saved = case.status == "open" and same
+    unavoidable = case.status == "unavoidable" and excused
+    if (open_as_saved or unavoidable) and case.accepted:
+        return _xfail(Reason.KNOWN_CASE if open_as_saved else Reason.UNAVOIDABLE_CASE)
+    if facts.user_property and not same and facts.expected_by:
+        return _xfail(Reason.EXPECTED)
+    if open_as_saved or unavoidable:
+        return _fail(Reason.NEW_CASE)
+    return _fail(Reason.FAILS_AGAIN if case.status == "fixed" else Reason.FAILS_DIFFERENTLY)
+
+
+def _passed_case(facts: PassedCase) -> Decision | Need:
+    """Note that an open case passes; with ``garl_xfail_strict`` fail its first test."""
+    if facts.case.edge:
+        return _xfail(Reason.EDGE)
+    if facts.case.status != "open" or facts.violates:
+        return Decision(outcome="passed", reason=Reason.PASSES)
+    reason = Reason.STALE if facts.unproven else Reason.MAYBE_FIXED
+    if facts.strict:
+        if facts.first is None:
+            return Need.CLAIM
+        if facts.first:
+            return _fail(reason)
+    return Decision(outcome="passed", reason=reason)
+
+
+def _fail(reason: Reason) -> Decision:
+    return Decision(outcome="failed", reason=reason)
+
+
+def _xfail(reason: Reason) -> Decision:
+    return Decision(outcome="xfailed", reason=reason)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import hashlib
 import os
 import sys
@@ -22,6 +23,7 @@ from pytest_garl.execution.slot import Slot, flight_name
 from pytest_garl.execution.sources import combined_sha256, data_files, sources_of
 from pytest_garl.plugin.keys import is_xdist_worker, target_of
 from pytest_garl.plugin.options import Options
+from pytest_garl.plugin.report_claims import ReportClaims
 from pytest_garl.plugin.target import FIRST, Target
 
 if TYPE_CHECKING:
@@ -157,18 +159,10 @@ class Run:
         if not self.options.searches and self.options.controller == str(os.getpid()):
             self.ledger.remove()
 
-    def reports_first(self, target: Target, nodeid: str) -> bool:
-        """Whether a test is the first that tells of a slot, in whichever process it runs."""
-        key = f"told slot {target.search} {target.slot.id(target.map)}"
-        return bool(self.ledger.first_fact(key, nodeid) == nodeid)
-
-    def note_ran(self, nodeid: str) -> None:
-        """Write down that a test has run; what it told of is in the ledger by then."""
-        self.ledger.note_fact(f"told ran {nodeid}", value=True)
-
-    def has_run(self, nodeid: str) -> bool:
-        """Whether a test has run, in whichever process."""
-        return bool(self.ledger.fact(f"told ran {nodeid}"))
+    @functools.cached_property
+    def claims(self) -> ReportClaims:
+        """Which item of which process reports what."""
+        return ReportClaims(ledger=self.ledger)
 
     def fly(self, target: Target, npcs: PolicySpec) -> FlightResult:
         """Return the slot's result after it and all lower selected slots are flown."""

@@ -9,9 +9,8 @@ from typing import Any
 import pytest
 
 from pytest_garl import cpu_dispatch
-from pytest_garl.plugin.case_outcomes import CASE, MAYBE_FIXED, STALE
 from pytest_garl.plugin.github_summary import write_summary
-from pytest_garl.plugin.outcomes import OWN_FAILURE
+from pytest_garl.plugin.keys import CASE, MAYBE_FIXED, OWN_FAILURE, STALE
 from pytest_garl.plugin.progress import duration
 from pytest_garl.plugin.run import Run
 from pytest_garl.plugin.save_cases import told

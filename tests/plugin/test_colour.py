@@ -370,7 +370,9 @@ def test_an_own_property_that_fails_only_in_collisions_is_told_and_not_saved(
     search = ("--garl-budget=12", "--garl-workers=0", "--garl-shrink=10")
     result = run(pytester, *search)
     assert result.parseoutcomes()["failed"] == 2
-    result.stdout.fnmatch_lines(["It is saved only if it fails in a flight that violates nothing*"])
+    result.stdout.fnmatch_lines(
+        ["It is saved only if it also fails in a flight that violates nothing*"]
+    )
     assert result.ret == pytest.ExitCode.TESTS_FAILED
     files = (pytester.path / "scenarios" / "regressions" / "systems").glob("*.toml")
     assert not any("-own-" in path.name for path in files)

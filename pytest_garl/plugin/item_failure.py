@@ -1,0 +1,148 @@
+"""The failure of an item: what it is about, and which other flights and items show the same."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import pytest
+
+from pytest_garl.execution.on_demand import CompletedFlight
+from pytest_garl.execution.result import FlightResult
+from pytest_garl.plugin.failed_statement import failure_of
+from pytest_garl.plugin.keys import LANDING
+from pytest_garl.plugin.outcomes import Reflights
+from pytest_garl.plugin.run import Run, reflight_key, test_of
+from pytest_garl.plugin.target import FIRST, Target
+from pytest_garl.plugin.user_assertions import ItemAssertion
+from pytest_garl.regressions.user_failure import UserFailure
+
+REFLIGHTS = 4
+"""A violation of a system that need not be deterministic is flown so many times more."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ItemFailure:
+    """A built-in violation that an item shows, or a failed assertion about the user's own property.
+
+    ``failed_assertion`` is None if the flight let no assertion judge it.
+    """
+
+    signature: str
+    test: str
+    failed_assertion: UserFailure | None
+    user_property: bool
+    assertion: ItemAssertion
+
+    @property
+    def savable(self) -> bool:
+        """Whether a case of it can be judged: its test can run on other flights."""
+        return not self.user_property or self.assertion.runs_on_any_flight
+
+    def key(self, search: str) -> str:
+        """Return a key that is the same for all items of a search that show the same failure."""
+        if self.failed_assertion is None:
+            return f"{search} {self.signature}"
+        return f"{search} {self.signature} {self.test} {self.failed_assertion.assertion}"
+
+    def shows_in(self, run: Run, target: Target, flight: CompletedFlight) -> bool:
+        """Return whether the same assertion fails for the same reason in another flight."""
+        if not self.user_property and flight.signature != self.signature:
+            return False
+        if self.failed_assertion is None:
+            return True
+        if not self.assertion.runs_on_any_flight:
+            return False
+        found = self.assertion.failure(flight.result, flight.record, run.scenario(target))
+        if found is None or found.assertion != self.failed_assertion.assertion:
+            return False
+        return found.is_about(flight.result.verdict.primary) is not self.user_property
+
+    def repeats_in(self, run: Run, target: Target, flight: CompletedFlight) -> bool:
+        """Return whether a reflight of the slot has the same violation."""
+        if self.user_property:
+            return self.shows_in(run, target, flight)
+        return flight.signature == self.signature
+
+
+def failure_of_item(
+    item: pytest.Function, target: Target, result: FlightResult, error: BaseException
+) -> ItemFailure | None:
+    """Return what an item's failure is about, or None if the test itself has an error."""
+    assertion, test = ItemAssertion(item, target), test_of(item)
+    landing = item.stash[LANDING]
+    failed: UserFailure | None = None
+    user_property = False
+    if not landing.unjudged:
+        failed = failure_of(item.originalname, item.obj, error, landing.reads)
+        if failed is None:
+            return None
+        user_property = not failed.is_about(result.verdict.primary)
+    return ItemFailure(
+        signature=failed.signature if failed and user_property else result.signature,
+        test=test,
+        failed_assertion=failed,
+        user_property=user_property,
+        assertion=assertion,
+    )
+
+
+def first_with_same_signature(run: Run, target: Target, failure: ItemFailure, nodeid: str) -> str:
+    """Return the slot of another item that reports the same failure, or nothing.
+
+    An item of a lower slot that has not run yet, in this process or another, counts if it can only
+    fail; ``session_status`` checks in the end that it did.
+    """
+    slot = run.claims.reporting_slot(failure.key(target.search), nodeid)
+    if slot:
+        return slot
+    for other in run.lower_targets(target):
+        waiting = [
+            item
+            for item in run.items[other.search][other.slot]
+            if item.shows
+            and (failure.failed_assertion is None or item.test == failure.test)
+            and not run.claims.has_run(item.nodeid)
+        ]
+        shows = waiting and failure.shows_in(run, other, _flight(run, other))
+        if shows and refly(run, other, failure).confirm:
+            return other.name
+    return ""
+
+
+def refly(run: Run, target: Target, failure: ItemFailure) -> Reflights:
+    """Fly a slot once more; fly it some times more if the system need not be, or is not, the same.
+
+    A system that is deterministic and flies the same bytes again needs no further flight.
+    """
+    if target.deterministic:
+        (once,) = run.refly(target, 1)
+        if once.sha256 == run.trajectory_sha256(target):
+            return Reflights(failed=2, flown=2, same=True)
+    if failure.user_property and not failure.assertion.runs_on_any_flight:
+        # The test takes what no other flight can give it.
+        return Reflights(failed=1, flown=1)
+    flown = run.refly(target, REFLIGHTS)
+    failed = 1 + sum(failure.repeats_in(run, target, flight) for flight in flown)
+    return Reflights(failed=failed, flown=1 + REFLIGHTS)
+
+
+def _flight(run: Run, target: Target) -> CompletedFlight:
+    sha256 = run.trajectory_sha256(target)
+    return CompletedFlight(result=run.result(target), sha256=sha256, record=run.record(target))
+
+
+def divergence_s(run: Run, target: Target) -> float | None:
+    """Return when a slot's flight and its first reflight part; None if one was not recorded."""
+    from pytest_garl.execution.slot import flight_name
+    from pytest_garl.simulation.flight_file import load, parted_s
+
+    slot = target.slot
+    names = (
+        flight_name(target.search, slot.generation, slot.index, target.map),
+        flight_name(reflight_key(target, 0), FIRST.generation, FIRST.index, target.map),
+    )
+    files = [run.options.folder / "flights" / f"{name}.npz" for name in names]
+    if not all(file.exists() for file in files):
+        return None
+    first, second = (load(file) for file in files)
+    return parted_s(first, second)

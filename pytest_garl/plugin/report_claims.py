@@ -1,0 +1,45 @@
+"""Which item reports what: all processes of a session agree on it through the ledger.
+
+``Ledger`` drops these facts when a run is resumed, because its tests run again.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from pytest_garl.execution.ledger import Ledger
+from pytest_garl.plugin.target import Target
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ReportClaims:
+    """Lets an item claim a slot or a failure, and notes which items have run."""
+
+    ledger: Ledger
+
+    def claim_slot(self, target: Target, nodeid: str) -> bool:
+        """Return whether an item is the first that reports its slot."""
+        key = f"told slot {target.search} {target.slot.id(target.map)}"
+        return bool(self.ledger.first_fact(key, nodeid) == nodeid)
+
+    def claim_failure(self, key: str, slot: str, nodeid: str) -> str:
+        """Claim a failure for an item; return the slot of another that was faster, or nothing."""
+        first_slot, first_nodeid = self.ledger.first_fact(_failure(key), [slot, nodeid])
+        return "" if first_nodeid == nodeid else str(first_slot)
+
+    def reporting_slot(self, key: str, nodeid: str) -> str:
+        """Return the slot of another item that reports a failure, or nothing."""
+        first = self.ledger.fact(_failure(key))
+        return str(first[0]) if first is not None and first[1] != nodeid else ""
+
+    def note_ran(self, nodeid: str) -> None:
+        """Note that a test has run; its claims are in the ledger by then."""
+        self.ledger.note_fact(f"told ran {nodeid}", value=True)
+
+    def has_run(self, nodeid: str) -> bool:
+        """Return whether a test has run in any process."""
+        return bool(self.ledger.fact(f"told ran {nodeid}"))
+
+
+def _failure(key: str) -> str:
+    return f"told failure {key}"
