@@ -11,6 +11,7 @@ from __future__ import annotations
 import argparse
 import dataclasses
 import functools
+import math
 import os
 from concurrent.futures import ProcessPoolExecutor
 from pathlib import Path
@@ -22,8 +23,16 @@ from rich.progress import Progress
 
 from pytest_garl import cpu_dispatch
 from pytest_garl.adversary.catalogue import WEIGHTS, policy_spec
-from pytest_garl.adversary.learned import save
-from pytest_garl.adversary.observations import ENCODINGS
+from pytest_garl.adversary.learned import Network, save
+from pytest_garl.adversary.observations import (
+    LIMIT,
+    PLACE_SCALE_M,
+    Encoding,
+    State,
+    in_own_frame,
+    relative,
+    relative_moves,
+)
 from pytest_garl.adversary.training import rewards
 from pytest_garl.adversary.training.dqn import Experience, Learner, Training
 from pytest_garl.adversary.training.episode import Episode, draw_episode
@@ -36,6 +45,7 @@ from pytest_garl.scenarios.genes import WEATHER, genome_for
 from pytest_garl.scenarios.maps.map import Map, load_map
 from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.search.methods.random import propose
+from pytest_garl.simulation.npc_policy import Move, PolicySpec, Situation
 from studies.adversary import CHUNK, MAPS, SYSTEMS
 from studies.rows import append, read, share
 
@@ -47,10 +57,54 @@ COUNTS = (1, 2, 3)
 FIELDS = ("mover", "objects", "system", "map", "chunk", "flights", "collided", "blocked")
 
 
+def fellow(situation: Situation) -> State:
+    """Return the relative state and where the nearest fellow is, (12,).
+
+    Fellow - object in the object's frame; one 20 m behind if there is none.
+    """
+    x, y, _ = situation.self.position_m
+    near = min(
+        (other.position_m for other in situation.others),
+        key=lambda place: math.dist(place[:2], (x, y)),
+        default=None,
+    )
+    ahead, aside = in_own_frame(situation, near[0] - x, near[1] - y) if near else (-20.0, 0.0)
+    offset = np.array([ahead / PLACE_SCALE_M, aside / PLACE_SCALE_M], dtype=np.float32)
+    return np.concatenate([relative(situation), np.clip(offset, -LIMIT, LIMIT)])
+
+
+ENCODING = Encoding(size=12, state=fellow, moves=relative_moves)
+
+
+class Together:
+    """The policy of objects that were trained together."""
+
+    def reset(self, situation: Situation, rng: np.random.Generator) -> None:
+        """Load the weights."""
+        self._network = _network()
+
+    def decide(self, situation: Situation) -> Move:
+        """Return the best action."""
+        values = self._network.values(ENCODING.state(situation))
+        return ENCODING.moves(situation)[int(np.argmax(values))]
+
+
+@functools.cache
+def _network() -> Network:
+    with np.load(TOGETHER) as arrays:
+        layers = [
+            (
+                arrays[f"weight_{index}"].astype(np.float64),
+                arrays[f"bias_{index}"].astype(np.float64),
+            )
+            for index in range(len(arrays) // 2)
+        ]
+    return Network(state="fellow", layers=tuple(layers))
+
+
 def warm_learner(training: Training) -> Learner:
     """Return a learner that begins as the shipped policy and is blind to fellows."""
-    encoding = ENCODINGS["fellow"]
-    learner = Learner(encoding.size, 5, training)
+    learner = Learner(ENCODING.size, 5, training)
     with np.load(WEIGHTS / "dqn.npz") as arrays, torch.no_grad():
         linear = [layer for layer in learner.network if isinstance(layer, torch.nn.Linear)]
         for index, layer in enumerate(linear):
@@ -65,7 +119,7 @@ def warm_learner(training: Training) -> Learner:
 def train_together(training: Training, count: int) -> Learner:
     """Train objects that share weights, one episode after the other."""
     torch.set_num_threads(1)
-    learner, encoding = warm_learner(training), ENCODINGS["fellow"]
+    learner = warm_learner(training)
     maps = [load_map(name) for name in MAPS]
     with Progress() as bar:
         task = bar.add_task("together", total=training.episodes)
@@ -80,20 +134,20 @@ def train_together(training: Training, count: int) -> Learner:
             experiences = [Experience(learner) for _ in kinds]
             epsilon = max(training.epsilon_least, training.epsilon * training.epsilon_decay**number)
             while episode.outcome is None:
-                _decide(episode, learner, experiences, encoding, epsilon)
+                _decide(episode, learner, experiences, epsilon)
             episode.close()
             bar.update(task, completed=number + 1)
     return learner
 
 
 def _decide(
-    episode: Episode, learner: Learner, experiences: list[Experience], encoding: Any, epsilon: float
+    episode: Episode, learner: Learner, experiences: list[Experience], epsilon: float
 ) -> None:
     before = episode.situations
-    states = np.stack([encoding.state(situation) for situation in before])
+    states = np.stack([ENCODING.state(situation) for situation in before])
     actions = learner.act(states, epsilon)
     episode.step(
-        [encoding.moves(seen)[int(action)] for seen, action in zip(before, actions, strict=True)]
+        [ENCODING.moves(seen)[int(action)] for seen, action in zip(before, actions, strict=True)]
     )
     after = episode.situations
     collided, cut = episode.hit is not None, episode.outcome == "not_landed"
@@ -110,7 +164,7 @@ def _decide(
             states[index],
             int(actions[index]),
             reward,
-            encoding.state(after[index]),
+            ENCODING.state(after[index]),
             ended=ended,
             cut=cut,
         )
@@ -142,7 +196,9 @@ def fly_one(job: tuple[Scenario, Map, str, str]) -> tuple[bool, bool]:
     cv2.setNumThreads(1)
     scenario, map, mover, system = job
     made: Any = {"opencv": OpenCvLandingSystem, "avoiding": AvoidingLandingSystem}[system]
-    spec = policy_spec("dqn" if mover == "copies" else str(TOGETHER))
+    spec = PolicySpec(name="together", factory="studies.team:Together")
+    if mover == "copies":
+        spec = policy_spec("dqn")
     flight = fly(scenario, made, spec, map=map)
     hit = flight.outcome == "collision" and flight.contacts[-1].body_class == "dynamic"
     return hit, flight.outcome in ("aborted", "not_landed")

@@ -83,8 +83,8 @@ def relative(situation: Situation) -> State:
     ox, oy, _ = situation.self.position_m
     ux, uy, height = situation.uav_position_m
     mx, my = situation.marker_position_m
-    ahead, aside = _turn(situation, ux - mx, uy - my)
-    forward, sideways = _turn(situation, *situation.self.velocity_mps)
+    ahead, aside = in_own_frame(situation, ux - mx, uy - my)
+    forward, sideways = in_own_frame(situation, *situation.self.velocity_mps)
     return _vector(
         (
             math.dist((ox, oy), (ux, uy)) / PLACE_SCALE_M,
@@ -97,22 +97,6 @@ def relative(situation: Situation) -> State:
             sideways / SPEED_SCALE_MPS,
         )
     )
-
-
-def fellow(situation: Situation) -> State:
-    """Return the relative state and where the nearest fellow is, (12,).
-
-    Fellow - object in the object's frame; one 20 m behind where there is none.
-    """
-    x, y, _ = situation.self.position_m
-    near = min(
-        (other.position_m for other in situation.others),
-        key=lambda place: math.dist(place[:2], (x, y)),
-        default=None,
-    )
-    ahead, aside = _turn(situation, near[0] - x, near[1] - y) if near else (-20.0, 0.0)
-    offset = _vector((ahead / PLACE_SCALE_M, aside / PLACE_SCALE_M))
-    return np.concatenate([relative(situation), offset])
 
 
 def online(situation: Situation) -> State:
@@ -184,7 +168,6 @@ ENCODINGS: Mapping[str, Encoding] = MappingProxyType(
         "paper": Encoding(size=4, state=paper, moves=compass_moves),
         "extended": Encoding(size=9, state=extended, moves=compass_moves),
         "relative": Encoding(size=10, state=relative, moves=relative_moves),
-        "fellow": Encoding(size=12, state=fellow, moves=relative_moves),
         "online": Encoding(
             size=4 + len(CONDITIONS) + 2,
             state=online,
@@ -205,7 +188,8 @@ def _heading(situation: Situation) -> tuple[float, float]:
     return ((ux - ox) / length, (uy - oy) / length) if length > 0 else (1.0, 0.0)
 
 
-def _turn(situation: Situation, x: float, y: float) -> tuple[float, float]:
+def in_own_frame(situation: Situation, x: float, y: float) -> tuple[float, float]:
+    """Return a vector in the object's frame, whose x axis points to the UAV's column."""
     cos, sin = _heading(situation)
     return cos * x + sin * y, cos * y - sin * x
 

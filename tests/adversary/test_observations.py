@@ -25,9 +25,8 @@ def test_the_extended_state_adds_what_timing_needs() -> None:
     )
 
 
-@pytest.mark.parametrize("name", ["relative", "fellow"])
-def test_a_relative_state_is_the_same_from_all_sides(name: str) -> None:
-    encoding = ENCODINGS[name]
+def test_the_relative_state_is_the_same_from_all_sides() -> None:
+    encoding = ENCODINGS["relative"]
 
     def turned(angle: float) -> tuple[np.ndarray, list[tuple[float, float]]]:
         def at(x: float, y: float) -> tuple[float, float]:
@@ -63,12 +62,6 @@ def test_ahead_is_towards_the_uavs_column() -> None:
     ahead = ENCODINGS["relative"].moves(seen)[3]
     assert (ahead.x, ahead.y) == pytest.approx((-0.6, -0.8))
     assert ENCODINGS["paper"].moves(seen) == ACTIONS
-
-
-def test_alone_the_fellow_is_far_away() -> None:
-    assert ENCODINGS["fellow"].state(situation(being((4.0, 3.0))))[-2:] == pytest.approx(
-        [-2.0, 0.0]
-    )
 
 
 def conditions(**genes: float) -> Scenario:
