@@ -1,0 +1,3 @@
+from tests.support.films import film
+
+__all__ = ["film"]

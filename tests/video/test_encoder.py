@@ -1,0 +1,90 @@
+"""The encoder writes what browsers play, and explains what it cannot write."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import cv2
+import imageio_ffmpeg
+import numpy as np
+import pytest
+
+from pytest_garl.errors import GarlError
+from pytest_garl.video import save_video, write
+from pytest_garl.video.drawing import Image
+from tests.support.films import FLOWN_S, LAWN, SCENARIO, Film, Hovers
+
+
+def test_browsers_play_the_file_at_the_flights_own_speed(film: Film, tmp_path: Path) -> None:
+    path = tmp_path / "new" / "flight.mp4"
+    save_video(path, film.flight, SCENARIO, LAWN, Hovers.airframe.camera, "II:lost:descent")
+    assert list(path.parent.iterdir()) == [path]
+    meta = described(path)
+    assert (meta["codec"], meta["size"], meta["fps"]) == ("h264", (1024, 656), 10.0)
+    assert meta["pix_fmt"].startswith("yuv420p")
+    assert meta["duration"] == pytest.approx(FLOWN_S + 2.0, abs=0.05)
+    content = path.read_bytes()
+    assert content.index(b"moov") < content.index(b"mdat"), "plays only when wholly loaded"
+    assert len(content) < 3e6 / 60 * meta["duration"]
+    shown = list(decoded(path))
+    assert len(shown) == len(film.pictures)
+    for index in (0, 10, 29, 40):
+        assert np.abs(shown[index].astype(int) - film.pictures[index]).mean() < 6
+    assert np.abs(shown[5].astype(int) - shown[25]).mean() > 1
+
+
+def described(path: Path) -> dict[str, Any]:
+    reader = imageio_ffmpeg.read_frames(path)
+    meta: dict[str, Any] = next(reader)
+    reader.close()
+    return meta
+
+
+def decoded(path: Path) -> Iterator[Image]:
+    video = cv2.VideoCapture(str(path))
+    while True:
+        there, picture = video.read()
+        if not there:
+            break
+        yield np.asarray(cv2.cvtColor(picture, cv2.COLOR_BGR2RGB), np.uint8)
+    video.release()
+
+
+def test_without_the_encoder_the_error_names_the_extra(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setitem(sys.modules, "imageio_ffmpeg", None)
+    with pytest.raises(GarlError, match=r"pip install 'pytest-garl\[video\]'"):
+        write([np.zeros((16, 16, 3), np.uint8)], tmp_path / "a.mp4", 10.0)
+
+
+def test_an_encoder_that_fails_is_quoted_and_leaves_nothing(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    broken = tmp_path / "ffmpeg"
+    broken.write_text("#!/bin/sh\necho 'Unknown encoder' >&2\nexit 3\n")
+    broken.chmod(0o755)
+    monkeypatch.setattr(imageio_ffmpeg, "get_ffmpeg_exe", lambda: str(broken))
+    pictures = [np.zeros((656, 1024, 3), np.uint8)] * 5
+    with pytest.raises(GarlError, match=r"exit status 3\): Unknown encoder"):
+        write(pictures, tmp_path / "films" / "a.mp4", 10.0)
+    assert not list((tmp_path / "films").iterdir())
+
+
+@pytest.mark.parametrize(
+    ("shapes", "words"),
+    [
+        ([], "at least one picture"),
+        ([(15, 16, 3)], "16x15 pixels"),
+        ([(16, 16, 3), (16, 32, 3)], "a film has one size"),
+    ],
+)
+def test_pictures_that_make_no_film_are_refused(
+    tmp_path: Path, shapes: list[tuple[int, ...]], words: str
+) -> None:
+    with pytest.raises(GarlError, match=words):
+        write((np.zeros(shape, np.uint8) for shape in shapes), tmp_path / "a.mp4", 10.0)
+    assert not list(tmp_path.iterdir())
