@@ -17,7 +17,7 @@ from pathlib import Path
 
 from pytest_garl.execution.job import load_scenario, loads
 from pytest_garl.execution.ledger import Ledger
-from pytest_garl.experiments.measure import HASH
+from pytest_garl.experiments.measure import HASH_DIGITS
 from pytest_garl.experiments.results import SEPARATOR
 from pytest_garl.experiments.results import read as rows_of
 from pytest_garl.scenarios.genes import genome_for
@@ -74,7 +74,7 @@ def main() -> None:
     for path in sorted(folder.glob("*/ledger.sqlite")):
         with closing(Ledger(path)) as ledger:
             for search, text in ledger.searches():
-                row = rows.get(ledger.queries.result_hash(search)[:HASH])
+                row = rows.get(ledger.queries.result_hash(search)[:HASH_DIGITS])
                 if row is None:
                     continue
                 lines[row.result_hash] = {

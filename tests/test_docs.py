@@ -26,12 +26,12 @@ def test_every_command_of_the_cases_page_exists() -> None:
 
 
 def test_the_page_of_experiments_tells_every_column_and_every_key() -> None:
-    from pytest_garl.experiments.results import Row
+    from pytest_garl.experiments.results import ResultRow
     from pytest_garl.experiments.spec import TOP_KEYS
 
     text = (DOCS / "experiments" / "README.md").read_text()
     types = {f"type_{kind}" for kind in ("ii", "iii", "iv")}
-    columns = {field.name for field in dataclasses.fields(Row)} - types
+    columns = {field.name for field in dataclasses.fields(ResultRow)} - types
     assert [name for name in columns if f"`{name}`" not in text] == []
     told = {name.strip("[]") for name in re.findall(r"`([a-z_\[\]]+)`", text)}
     assert told >= TOP_KEYS

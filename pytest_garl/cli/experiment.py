@@ -14,12 +14,12 @@ from rich.text import Text
 
 if TYPE_CHECKING:
     from pytest_garl.execution.ledger_queries import SearchProgress
-    from pytest_garl.experiments.results import Row
-    from pytest_garl.experiments.spec import Run
+    from pytest_garl.experiments.results import ResultRow
+    from pytest_garl.experiments.spec import ExperimentRun
 
 INTERRUPTED = 130
 """Exit status after Ctrl-C, as shells have it: 128 and the signal's number."""
-PILOTS = "the reference pilot flies what violated"
+REFERENCE_FLIGHTS = "the reference pilot flies violating scenarios"
 _FOLDER = click.Path(path_type=Path, file_okay=False)
 
 
@@ -54,27 +54,28 @@ def experiment(file: Path, report: bool, out: Path | None, folder: Path, workers
     Each finished run is added at once. If you interrupt it, the same command continues.
     """
     from pytest_garl.experiments import results as rows
-    from pytest_garl.experiments.campaign import Place, fly
+    from pytest_garl.experiments.campaign import CampaignFolders, fly_experiment
     from pytest_garl.experiments.report import write
     from pytest_garl.experiments.spec import read
 
-    asked = read(file)
-    found = out / asked.rows.name if out else asked.rows
+    spec = read(file)
+    rows_file = out / spec.rows.name if out else spec.rows
     if report:
-        path = out / asked.report.name if out else asked.report
-        click.echo(f"wrote {write(asked, rows.read(found), found.name, path)}")
+        path = out / spec.report.name if out else spec.report
+        click.echo(f"wrote {write(spec, rows.read(rows_file), rows_file.name, path)}")
         return
     try:
-        with _Shown() as shown:
-            fly(asked, Place(rows=found, runs=folder, root=Path.cwd()), workers, shown)
+        with _ProgressDisplay() as display:
+            folders = CampaignFolders(rows=rows_file, runs=folder, root=Path.cwd())
+            fly_experiment(spec, folders, workers, display)
     except KeyboardInterrupt:
-        click.echo("interrupted; what is flown is kept, the same command goes on", err=True)
+        click.echo("interrupted; finished flights are kept, the same command continues", err=True)
         raise SystemExit(INTERRUPTED) from None
-    click.echo(f"all {len(asked.runs)} runs are in {found}; the report: the same with --report")
+    click.echo(f"all {len(spec.runs)} runs are in {rows_file}; add --report to write the report")
 
 
-class _Shown:
-    """A line per run, and on a terminal a bar that shows how far the one under way is."""
+class _ProgressDisplay:
+    """Prints a line per run, and shows a progress bar of the current run on a terminal."""
 
     def __init__(self) -> None:
         self._bar = Progress(
@@ -83,14 +84,14 @@ class _Shown:
             MofNCompleteColumn(),
             TimeRemainingColumn(),
             console=Console(highlight=False),
-            # The bar is drawn when something is told: a thread beside would be forked with.
+            # Without a refreshing thread: processes are forked from this one.
             auto_refresh=False,
             transient=True,
         )
-        self._tell = self._bar.console.print
+        self._print = self._bar.console.print
         self._task = self._bar.add_task("", total=None, visible=False)
 
-    def __enter__(self) -> _Shown:
+    def __enter__(self) -> _ProgressDisplay:
         if self._bar.console.is_terminal:
             self._bar.start()
         return self
@@ -99,24 +100,24 @@ class _Shown:
         if self._bar.console.is_terminal:
             self._bar.stop()
 
-    def begins(self, run: Run, number: int, total: int) -> None:
-        self._tell(Text(f"run {number} of {total}: {run.title}"))
+    def on_run_begin(self, run: ExperimentRun, number: int, total: int) -> None:
+        self._print(Text(f"run {number} of {total}: {run.title}"))
         wanted = run.budget * len(run.maps)
         self._bar.reset(self._task, total=wanted, description="flying", visible=True)
 
-    def flies(self, searches: Sequence[SearchProgress]) -> None:
+    def on_flights(self, searches: Sequence[SearchProgress]) -> None:
         self._bar.update(self._task, completed=sum(each.flown for each in searches))
         self._bar.refresh()
 
-    def pilots(self) -> None:
-        if self._bar.tasks[0].description != PILOTS:
-            self._bar.update(self._task, description=PILOTS)
+    def on_reference_flights(self) -> None:
+        if self._bar.tasks[0].description != REFERENCE_FLIGHTS:
+            self._bar.update(self._task, description=REFERENCE_FLIGHTS)
             self._bar.refresh()
 
-    def ended(self, rows: Sequence[Row]) -> None:
+    def on_run_end(self, rows: Sequence[ResultRow]) -> None:
         for row in rows:
             top10 = row.top10 or "not reached"
-            self._tell(
+            self._print(
                 Text(
                     f"    {row.map}: {row.violations} of {row.budget} violate, "
                     f"{len(row.signatures)} signatures, Top-10 {top10}"

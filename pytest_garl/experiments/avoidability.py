@@ -1,4 +1,4 @@
-"""Which violations nobody could have avoided: the reference pilot flies them too."""
+"""Count the violations of an experiment that the reference pilot cannot avoid either."""
 
 from __future__ import annotations
 
@@ -19,43 +19,43 @@ from pytest_garl.execution.ledger_queries import LedgerFlight
 from pytest_garl.execution.local_pool import local_pool
 from pytest_garl.execution.on_demand import FlyFunction, OnDemandFlights
 from pytest_garl.execution.reference import reference_to
-from pytest_garl.experiments.measure import Piloted, Search
+from pytest_garl.experiments.measure import AvoidabilityCounts, FinishedSearch
 from pytest_garl.regressions.follow_up import done_of
 from pytest_garl.regressions.new_case import recorded_behaviour
 from pytest_garl.simulation.system_under_test.reference_pilot import ReferencePilot
 
 
-def pilot(
-    searches: Sequence[Search],
+def count_unavoidable(
+    searches: Sequence[FinishedSearch],
     path: Path,
     *,
     limit: int,
     seed: int,
     workers: int,
-    tick: Callable[[], None],
-) -> tuple[Piloted, ...]:
+    on_wait: Callable[[], None],
+) -> tuple[AvoidabilityCounts, ...]:
     """Let the reference pilot fly at most ``limit`` violating scenarios of each search.
 
-    It knows where everything is, and the objects repeat what they did, to the environment as
-    well.  What it flies is drawn by ``seed``, so that its share stands for all violations.  The
-    flights stand in a ledger of their own at ``path``, so that they count nowhere else;
-    interrupted, it goes on from there.
+    The pilot knows the positions of all bodies; the NPCs repeat their recorded moves and changes of
+    the environment.  The scenarios are drawn by ``seed``, so their share is an estimate for all
+    violations.  The flights have their own ledger at ``path``, so they count nowhere else; an
+    interrupted call goes on from there.
     """
     drawn = {search.key: _drawn(search.violating, limit, seed) for search in searches}
     flights = {
         f"pilot {search.key} {flight.generation} {flight.slot}": functools.partial(
-            _avoided, search, flight
+            _avoids, search, flight
         )
         for search in searches
         for flight in drawn[search.key]
     }
     with closing(_opened(path)) as ledger, closing(local_pool(ledger.queue, workers)) as pool:
-        avoided = OnDemandFlights(ledger, pool, tick).run(flights)
+        avoided = OnDemandFlights(ledger, pool, on_wait).run(flights)
     return tuple(
-        Piloted(
+        AvoidabilityCounts(
             tried=len(drawn[search.key]),
             unavoidable=sum(
-                not lands for name, lands in avoided.items() if f" {search.key} " in name
+                not avoids for name, avoids in avoided.items() if f" {search.key} " in name
             ),
         )
         for search in searches
@@ -74,8 +74,8 @@ def _opened(path: Path) -> Ledger:
     return Ledger.create(path, {})
 
 
-def _avoided(search: Search, flight: LedgerFlight, fly: FlyFunction) -> bool:
-    """Whether the reference pilot comes through without a violation."""
+def _avoids(search: FinishedSearch, flight: LedgerFlight, fly: FlyFunction) -> bool:
+    """Return whether the reference pilot flies the scenario without a violation."""
     scenario, done = load_scenario(flight.scenario), done_of(flight, search.job)
     behaviour = recorded_behaviour(done, scenario, search.map)
     npcs = recorded_spec(dict(behaviour.moves), dict(behaviour.changes))

@@ -1,4 +1,4 @@
-"""Flies what an experiment's CSV lacks, run by run; interrupted at any time, it goes on."""
+"""Fly the runs that an experiment's CSV lacks; an interrupted campaign can be continued."""
 
 from __future__ import annotations
 
@@ -15,47 +15,44 @@ from pytest_garl.adversary.catalogue import policy_spec
 from pytest_garl.errors import ExperimentError, GarlError
 from pytest_garl.execution.ledger import Ledger
 from pytest_garl.execution.ledger_queries import SearchProgress
-from pytest_garl.experiments import results as files
-from pytest_garl.experiments.avoidability import pilot
-from pytest_garl.experiments.measure import Piloted, row_of, searches_of
-from pytest_garl.experiments.pytest_run import search
-from pytest_garl.experiments.results import Row
-from pytest_garl.experiments.spec import Experiment, Run
+from pytest_garl.experiments import results
+from pytest_garl.experiments.avoidability import count_unavoidable
+from pytest_garl.experiments.measure import AvoidabilityCounts, finished_searches, result_row
+from pytest_garl.experiments.pytest_run import run_pytest
+from pytest_garl.experiments.results import ResultRow
+from pytest_garl.experiments.spec import Experiment, ExperimentRun
 from pytest_garl.files.atomic import locked
 from pytest_garl.scenarios.maps.map import load_map
 from pytest_garl.search.catalogue import find_method
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Place:
-    """Where an experiment's files go: finished rows, and the runs' ledgers.
-
-    ``root`` is where pytest is run.
-    """
+class CampaignFolders:
+    """The CSV file of the rows, the folder of the runs' ledgers and the folder to run pytest in."""
 
     rows: Path
     runs: Path
     root: Path
 
 
-class Watch(Protocol):
-    """Is told how far a campaign is."""
+class CampaignObserver(Protocol):
+    """Receives the progress of a campaign."""
 
-    def begins(self, run: Run, number: int, total: int) -> None:
-        """Note that a run begins, the ``number``-th of all ``total``, those flown before too."""
+    def on_run_begin(self, run: ExperimentRun, number: int, total: int) -> None:
+        """Take note of a new run: ``number`` of ``total``, earlier finished runs included."""
 
-    def flies(self, searches: Sequence[SearchProgress]) -> None:
-        """Note how far the run is; called often."""
+    def on_flights(self, searches: Sequence[SearchProgress]) -> None:
+        """Take note of the progress of a run; called often."""
 
-    def pilots(self) -> None:
-        """Note that the reference pilot flies what violated; called often."""
+    def on_reference_flights(self) -> None:
+        """Take note that the reference pilot flies violating scenarios; called often."""
 
-    def ended(self, rows: Sequence[Row]) -> None:
-        """Note that a run's rows are saved."""
+    def on_run_end(self, rows: Sequence[ResultRow]) -> None:
+        """Take note of the saved rows of a run."""
 
 
-def missing(experiment: Experiment, known: Sequence[Row]) -> tuple[Run, ...]:
-    """Return the runs, or those maps of them, that have no row."""
+def missing_runs(experiment: Experiment, known: Sequence[ResultRow]) -> tuple[ExperimentRun, ...]:
+    """Return the runs without a row, each with only the maps without a row."""
     keys = {row.key for row in known}
     found = []
     for run in experiment.runs:
@@ -69,18 +66,18 @@ def missing(experiment: Experiment, known: Sequence[Row]) -> tuple[Run, ...]:
     return tuple(found)
 
 
-def check(experiment: Experiment, root: Path) -> None:
-    """Raise ExperimentError for what the file names and cannot be flown."""
+def check_experiment(experiment: Experiment, root: Path) -> None:
+    """Raise ExperimentError for tests, maps, methods and policies that do not exist."""
     for name, tests in experiment.systems.items():
         if not (root / tests.partition("::")[0]).exists():
             raise ExperimentError(
-                f"{experiment.file}: key 'systems.{name}': found {tests!r}, expected tests as "
-                f"pytest is given them, below {root}"
+                f"{experiment.file}: key 'systems.{name}': found {tests!r}, expected tests below "
+                f"{root}, as arguments of pytest"
             )
     for run in experiment.runs:
         for key, what, find in (
             ("maps", run.maps, functools.partial(load_map, search_path=(_maps(root),))),
-            ("methods", (run.search,), _known_method),
+            ("methods", (run.search_method,), _known_method),
             ("methods", (run.npcs,) if run.npcs else (), policy_spec),
         ):
             for each in what:
@@ -95,7 +92,7 @@ def _found(experiment: Experiment, key: str, name: str, find: Callable[[str], ob
 
 
 def _known_method(name: str) -> None:
-    # One's own, "module:factory", is found by pytest, which knows from where to import.
+    # pytest finds a user's "module:factory": only pytest knows where to import from.
     if ":" not in name:
         find_method(name)
 
@@ -104,44 +101,52 @@ def _maps(root: Path) -> Path:
     return root / "scenarios" / "maps"
 
 
-def fly(experiment: Experiment, place: Place, workers: int, watch: Watch) -> None:
-    """Fly all that is missing; each run's rows are saved as soon as it is finished."""
-    check(experiment, place.root)
+def fly_experiment(
+    experiment: Experiment, folders: CampaignFolders, workers: int, observer: CampaignObserver
+) -> None:
+    """Fly all missing runs; the rows of a run are saved as soon as it is finished."""
+    check_experiment(experiment, folders.root)
     total = len(experiment.runs)
-    left = missing(experiment, files.read(place.rows))
+    left = missing_runs(experiment, results.read(folders.rows))
     for run in {*experiment.runs} - {*left}:
-        _tidy(place.runs / run.folder)
+        _tidy(folders.runs / run.folder)
     for number, run in enumerate(left, start=total - len(left) + 1):
-        folder = place.runs / run.folder
-        watch.begins(run, number, total)
-        # Another process that flies the same experiment is waited for here.
+        folder = folders.runs / run.folder
+        observer.on_run_begin(run, number, total)
+        # Wait for another process that flies the same run.
         with locked(folder):
-            if run in missing(experiment, files.read(place.rows)):
-                rows = _fly(run, folder, experiment.unavoidable, workers, watch)
-                files.append(place.rows, rows)
-                watch.ended(rows)
+            if run in missing_runs(experiment, results.read(folders.rows)):
+                rows = _fly_run(run, folder, experiment.unavoidable, workers, observer)
+                results.append(folders.rows, rows)
+                observer.on_run_end(rows)
             _tidy(folder)
 
 
 def _tidy(folder: Path) -> None:
-    """Of flights only the figures are kept, and the ledger, from which each can be repeated."""
+    """Delete the records of flights; the ledger is kept, so that each flight can be repeated."""
     shutil.rmtree(folder / "flights", ignore_errors=True)
 
 
-def _fly(run: Run, folder: Path, pilots: int, workers: int, watch: Watch) -> list[Row]:
-    with closing(Ledger(search(run, folder, workers, watch.flies))) as ledger:
-        searches = searches_of(run, ledger)
-        piloted: Sequence[Piloted | None] = [None] * len(searches)
-        if pilots:
-            piloted = pilot(
+def _fly_run(
+    run: ExperimentRun,
+    folder: Path,
+    most_reference_flights: int,
+    workers: int,
+    observer: CampaignObserver,
+) -> list[ResultRow]:
+    with closing(Ledger(run_pytest(run, folder, workers, observer.on_flights))) as ledger:
+        searches = finished_searches(run, ledger)
+        avoidability: Sequence[AvoidabilityCounts | None] = [None] * len(searches)
+        if most_reference_flights:
+            avoidability = count_unavoidable(
                 searches,
                 folder / "pilot.sqlite",
-                limit=pilots,
+                limit=most_reference_flights,
                 seed=run.seed,
                 workers=workers,
-                tick=watch.pilots,
+                on_wait=observer.on_reference_flights,
             )
         return [
-            row_of(run, each, ledger, piloted=tried, workers=workers)
-            for each, tried in zip(searches, piloted, strict=True)
+            result_row(run, each, ledger, avoidability=counts, workers=workers)
+            for each, counts in zip(searches, avoidability, strict=True)
         ]

@@ -1,4 +1,4 @@
-"""Whether a method is as much better than chance and its rivals as it is meant to be."""
+"""Goals: by how much a method should be better than random search and its rivals."""
 
 from __future__ import annotations
 
@@ -12,38 +12,38 @@ from pytest_garl.experiments.metrics import (
     SIGNATURES,
     TOP10,
     VIOLATIONS,
-    Figure,
-    Sample,
-    sample,
+    MethodSearches,
+    Metric,
+    searches_of_method,
 )
-from pytest_garl.experiments.results import Row
+from pytest_garl.experiments.results import ResultRow
 from pytest_garl.experiments.spec import Experiment, Goals
 from pytest_garl.experiments.tables import NOT_RUN, markdown
 
-Verdict = Literal["met", "missed", "not run"]
+GoalStatus = Literal["met", "missed", "not run"]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Goal:
-    """A wish: a figure at least ``factor`` times chance's, or better than every baseline's.
+    """A metric should be ``factor`` times that of random search, or better than all baselines'.
 
-    ``factor`` None: strictly better than all baselines.  Where less is better it is the share of
-    chance's figure that may not be exceeded.
+    If ``factor`` is None, the metric should be strictly better than that of every baseline.  If
+    ``less`` is true, less is better, and ``factor`` is the largest allowed ratio.
     """
 
-    figure: Figure
+    metric: Metric
     factor: float | None = None
     less: bool = False
 
     @property
-    def wish(self) -> str:
-        """The wish in words, after the figure's title."""
+    def text(self) -> str:
+        """The goal in words, to follow the metric's title."""
         if self.factor is None:
             return "below every baseline" if self.less else "above every baseline"
         return f"at {'most' if self.less else 'least'} {self.factor:g} × chance"
 
     def holds(self, own: float, other: float) -> bool:
-        """Whether a mean is as much better than another's as is wished."""
+        """Whether the method's mean reaches the goal, given another method's."""
         if self.factor is None:
             return own < other if self.less else own > other
         wanted = self.factor * other
@@ -51,43 +51,45 @@ class Goal:
 
 
 GOALS = (
-    Goal(figure=VIOLATIONS, factor=2.0),
-    Goal(figure=VIOLATIONS),
-    Goal(figure=TOP10, factor=0.5, less=True),
-    Goal(figure=TOP10, less=True),
-    Goal(figure=DISTANCE, factor=1.2),
-    Goal(figure=COVERAGE, factor=2.0),
-    Goal(figure=SIGNATURES),
+    Goal(metric=VIOLATIONS, factor=2.0),
+    Goal(metric=VIOLATIONS),
+    Goal(metric=TOP10, factor=0.5, less=True),
+    Goal(metric=TOP10, less=True),
+    Goal(metric=DISTANCE, factor=1.2),
+    Goal(metric=COVERAGE, factor=2.0),
+    Goal(metric=SIGNATURES),
 )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Judged:
-    """What became of a goal on a map, with the figures."""
+class GoalResult:
+    """A goal on one map: whether it is met, with the means of the method and of the others."""
 
     goal: Goal
     map: str
-    verdict: Verdict
+    status: GoalStatus
     own: str
     others: str
 
 
-def judged(experiment: Experiment, goals: Goals, rows: Sequence[Row]) -> list[Judged]:
-    """Return all goals on all maps.
+def goal_results(
+    experiment: Experiment, goals: Goals, rows: Sequence[ResultRow]
+) -> list[GoalResult]:
+    """Return the results of all goals on all maps.
 
-    Methods are compared by their means over the seeds that both have flown.  One rival that is not
-    beaten is enough to miss; a rival that was not run leaves open what would else be met.
+    Two methods are compared by their means over the seeds that both have flown.  A goal is missed
+    if one rival is not beaten.  If all rivals are beaten but one was not run, the goal is open.
     """
 
-    def of(map: str, method: str) -> Sample:
-        return sample(experiment, rows, goals.seeds, goals.system, map, method)
+    def searches(map: str, method: str) -> MethodSearches:
+        return searches_of_method(experiment, rows, goals.seeds, goals.system, map, method)
 
     return [
-        _judge(
+        _goal_result(
             goal,
-            of(map, goals.method),
+            searches(map, goals.method),
             [
-                of(map, method)
+                searches(map, method)
                 for method in ((goals.random,) if goal.factor is not None else goals.baselines)
             ],
         )
@@ -96,55 +98,55 @@ def judged(experiment: Experiment, goals: Goals, rows: Sequence[Row]) -> list[Ju
     ]
 
 
-def _judge(goal: Goal, own: Sample, others: Sequence[Sample]) -> Judged:
-    answers: list[bool | None] = []
-    words = []
+def _goal_result(goal: Goal, own: MethodSearches, others: Sequence[MethodSearches]) -> GoalResult:
+    reached: list[bool | None] = []
+    texts = []
     for other in others:
         common = sorted({*own.seeds} & {*other.seeds})
         if not common:
-            answers.append(None)
-            words.append(f"{other.method} {NOT_RUN}")
+            reached.append(None)
+            texts.append(f"{other.method} {NOT_RUN}")
             continue
-        theirs = other.mean(goal.figure, common)
-        answers.append(goal.holds(own.mean(goal.figure, common), theirs))
-        text = f"{other.method} {mean_text(other, goal.figure, common)}"
+        theirs = other.mean(goal.metric, common)
+        reached.append(goal.holds(own.mean(goal.metric, common), theirs))
+        text = f"{other.method} {mean_text(other, goal.metric, common)}"
         if common != sorted(own.seeds):
-            text += f" (to {mean_text(own, goal.figure, common)})"
-        words.append(text)
-    verdict: Verdict = "met"
-    if False in answers:
-        verdict = "missed"
-    elif None in answers:
-        verdict = "not run"
-    return Judged(
+            text += f" (to {mean_text(own, goal.metric, common)})"
+        texts.append(text)
+    status: GoalStatus = "met"
+    if False in reached:
+        status = "missed"
+    elif None in reached:
+        status = "not run"
+    return GoalResult(
         goal=goal,
         map=own.map,
-        verdict=verdict,
-        own=mean_text(own, goal.figure, own.seeds) if own.rows else NOT_RUN,
-        others=", ".join(words),
+        status=status,
+        own=mean_text(own, goal.metric, own.seeds) if own.rows else NOT_RUN,
+        others=", ".join(texts),
     )
 
 
-def mean_text(each: Sample, figure: Figure, seeds: Sequence[int]) -> str:
-    """Return a mean; with "≥" where a search never had its tenth violation."""
-    open_ended = figure is TOP10 and any(
-        row.top10 is None for row in each.rows if row.seed in seeds
+def mean_text(searches: MethodSearches, metric: Metric, seeds: Sequence[int]) -> str:
+    """Return a mean, with "≥" if a search found fewer than ten violations."""
+    open_ended = metric is TOP10 and any(
+        row.top10 is None for row in searches.rows if row.seed in seeds
     )
-    return f"{'≥ ' * open_ended}{each.mean(figure, seeds):.{figure.digits}f}"
+    return f"{'≥ ' * open_ended}{searches.mean(metric, seeds):.{metric.digits}f}"
 
 
-def table(found: Sequence[Judged], method: str) -> str:
+def table(results: Sequence[GoalResult], method: str) -> str:
     """Return the goals as a Markdown table."""
     header = ("map", "figure", "wanted", "", method, "others")
     lines = [
         [
             each.map,
-            each.goal.figure.title,
-            each.goal.wish,
-            f"**{each.verdict}**",
+            each.goal.metric.title,
+            each.goal.text,
+            f"**{each.status}**",
             each.own,
             each.others,
         ]
-        for each in found
+        for each in results
     ]
     return markdown(header, lines)

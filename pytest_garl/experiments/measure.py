@@ -1,4 +1,4 @@
-"""The figures of a finished search, from its ledger and the records of its flights."""
+"""Measure a finished search: its row, from the ledger and the records of the flights."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,8 +16,8 @@ from pytest_garl.errors import ExperimentError
 from pytest_garl.execution.job import FlightJob, load_scenario, loads
 from pytest_garl.execution.ledger import Ledger
 from pytest_garl.execution.ledger_queries import LedgerFlight
-from pytest_garl.experiments.results import Row
-from pytest_garl.experiments.spec import KINDS, Run
+from pytest_garl.experiments.results import ResultRow
+from pytest_garl.experiments.spec import PAPER_TYPES, ExperimentRun
 from pytest_garl.regressions.follow_up import done_of
 from pytest_garl.scenarios.genes import WEATHER, genome_for
 from pytest_garl.scenarios.maps.map import Map, load_map
@@ -25,13 +26,13 @@ from pytest_garl.simulation.flight_file import load
 from pytest_garl.verdicts.paper_metrics import empty_cells, mark_visited, mean_distance, top_k
 from pytest_garl.verdicts.verdict import Verdict
 
-HASH = 12
-"""Digits of a hash that a row keeps."""
+HASH_DIGITS = 12
+"""Number of digits of a hash in a row."""
 FACT_VERSION, FACT_SOURCES = "version", "sources of pytest-garl"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Search:
+class FinishedSearch:
     """A finished search: its key in the ledger, its job, its flights in slot order."""
 
     key: str
@@ -40,17 +41,17 @@ class Search:
 
     @property
     def map(self) -> Map:
-        """Where it flew."""
+        """The map that was flown."""
         return load_map(self.job.map, tuple(Path(each) for each in self.job.map_folders))
 
     @property
     def verdicts(self) -> tuple[Verdict, ...]:
-        """What the flights came to."""
+        """The verdicts of the flights."""
         return tuple(flight.result.verdict for flight in self.flights)
 
     @property
     def violating(self) -> tuple[LedgerFlight, ...]:
-        """The flights that violated as the paper defines it."""
+        """The flights that are violations by the paper's definition."""
         return tuple(
             flight
             for flight, verdict in zip(self.flights, self.verdicts, strict=True)
@@ -59,16 +60,16 @@ class Search:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Piloted:
-    """How many violations the reference pilot tried to avoid, and how many it could not."""
+class AvoidabilityCounts:
+    """Violations that the reference pilot tried to avoid, and those that it could not avoid."""
 
     tried: int
     unavoidable: int
 
 
-def searches_of(run: Run, ledger: Ledger) -> tuple[Search, ...]:
-    """Return the run's search on each of its maps; raise ExperimentError for one not finished."""
-    found: dict[str, Search] = {}
+def finished_searches(run: ExperimentRun, ledger: Ledger) -> tuple[FinishedSearch, ...]:
+    """Return the search of a run on each map; raise ExperimentError if one is not finished."""
+    found: dict[str, FinishedSearch] = {}
     for key, text in ledger.searches():
         job = loads(text)
         if job.map in found:
@@ -76,7 +77,7 @@ def searches_of(run: Run, ledger: Ledger) -> tuple[Search, ...]:
                 f"{run.tests}: found more than one landing system with tests on {job.map}, "
                 "expected one; name a file, or one of its tests, that has one"
             )
-        found[job.map] = Search(key=key, job=job, flights=tuple(ledger.queries.flown(key)))
+        found[job.map] = FinishedSearch(key=key, job=job, flights=tuple(ledger.queries.flown(key)))
     for map in run.maps:
         flown = len(found[map].flights) if map in found else 0
         if flown != run.budget:
@@ -87,62 +88,92 @@ def searches_of(run: Run, ledger: Ledger) -> tuple[Search, ...]:
     return tuple(found[map] for map in run.maps)
 
 
-def row_of(
-    run: Run, search: Search, ledger: Ledger, *, piloted: Piloted | None, workers: int
-) -> Row:
-    """Return the figures of one search of a run."""
-    job, verdicts = search.job, search.verdicts
-    kinds = Counter((each.violation_type or "").rstrip("?") for each in verdicts if each.violation)
-    scenarios = [load_scenario(flight.scenario) for flight in search.flights]
-    weather_of, genes = chromosomes(scenarios, search.map, str(ledger.fact("weather")))
-    violating = np.array([each.paper_violation for each in verdicts])
-    cells = covered(search)
-    flying_s = ledger.queries.flying_s(search.key)
-    all_s = sum(ledger.queries.flying_s(key) for key, _ in ledger.searches())
-    return Row(
+def result_row(
+    run: ExperimentRun,
+    search: FinishedSearch,
+    ledger: Ledger,
+    *,
+    avoidability: AvoidabilityCounts | None,
+    workers: int,
+) -> ResultRow:
+    """Return the row of one search of a run."""
+    return ResultRow(
         system=run.system,
-        map=job.map,
+        map=search.job.map,
         method=run.method,
         seed=run.seed,
         budget=run.budget,
-        violations=int(violating.sum()),
-        **{f"type_{kind.lower()}": kinds[kind] for kind in KINDS},
-        late=kinds["late"],
-        off=kinds["off"],
-        hard=kinds["hard"],
-        aborted=sum(each.outcome == "aborted" for each in verdicts),
-        inconclusive=sum(each.result.inconclusive for each in search.flights),
-        unavoidable=piloted.unavoidable if piloted else None,
-        piloted=piloted.tried if piloted else None,
-        top10=top_k(verdicts),
-        signatures=tuple(sorted({each.signature for each in verdicts if each.paper_violation})),
-        parameter_distance=mean_distance(genes),
-        weather_distance=mean_distance(weather_of),
-        violating_distance=mean_distance(genes[violating]) if violating.any() else None,
-        covered=int(cells.sum()),
-        cells=cells.size,
-        flying_s=flying_s,
-        idle_s=ledger.queries.meters().get("idle_s", 0.0) * flying_s / all_s if all_s else 0.0,
+        unavoidable=avoidability.unavoidable if avoidability else None,
+        piloted=avoidability.tried if avoidability else None,
         workers=workers,
-        landing_system=job.system.name,
-        landing_system_sha256=job.system_sha256[:HASH],
-        map_sha256=job.map_sha256[:HASH],
-        policy=job.npcs.name,
-        policy_sha256=job.npcs.sha256[:HASH],
-        version=str(ledger.fact(FACT_VERSION)),
-        package_sha256=str(ledger.fact(FACT_SOURCES)),
         machine=of_children(),
-        result_hash=ledger.queries.result_hash(search.key)[:HASH],
+        result_hash=ledger.queries.result_hash(search.key)[:HASH_DIGITS],
+        **_violations(search),
+        **_diversity(search, str(ledger.fact("weather"))),
+        **_durations(search, ledger),
+        **_versions(search.job, ledger),
     )
+
+
+def _violations(search: FinishedSearch) -> dict[str, Any]:
+    """Return the columns that count outcomes and violations."""
+    verdicts = search.verdicts
+    paper = [verdict for verdict in verdicts if verdict.paper_violation]
+    types = Counter((each.violation_type or "").rstrip("?") for each in verdicts if each.violation)
+    return {
+        "violations": len(paper),
+        **{f"type_{name.lower()}": types[name] for name in PAPER_TYPES},
+        **{name: types[name] for name in ("late", "off", "hard")},
+        "aborted": sum(verdict.outcome == "aborted" for verdict in verdicts),
+        "inconclusive": sum(flight.result.inconclusive for flight in search.flights),
+        "top10": top_k(verdicts),
+        "signatures": tuple(sorted({verdict.signature for verdict in paper})),
+    }
+
+
+def _diversity(search: FinishedSearch, weather: str) -> dict[str, Any]:
+    """Return the columns of distances between scenarios and of coverage."""
+    scenarios = [load_scenario(flight.scenario) for flight in search.flights]
+    raw_weather, genes = chromosomes(scenarios, search.map, weather)
+    violating = np.array([verdict.paper_violation for verdict in search.verdicts])
+    cells = covered_cells(search)
+    return {
+        "parameter_distance": mean_distance(genes),
+        "weather_distance": mean_distance(raw_weather),
+        "violating_distance": mean_distance(genes[violating]) if violating.any() else None,
+        "covered": int(cells.sum()),
+        "cells": cells.size,
+    }
+
+
+def _durations(search: FinishedSearch, ledger: Ledger) -> dict[str, Any]:
+    """Return the columns of flying and idle time; idle time is shared in proportion to flying."""
+    flying_s = ledger.queries.flying_s(search.key)
+    all_s = sum(ledger.queries.flying_s(key) for key, _ in ledger.searches())
+    idle_s = ledger.queries.meters().get("idle_s", 0.0)
+    return {"flying_s": flying_s, "idle_s": idle_s * flying_s / all_s if all_s else 0.0}
+
+
+def _versions(job: FlightJob, ledger: Ledger) -> dict[str, Any]:
+    """Return the columns that identify the code, the map and the NPC policy."""
+    return {
+        "landing_system": job.system.name,
+        "landing_system_sha256": job.system_sha256[:HASH_DIGITS],
+        "map_sha256": job.map_sha256[:HASH_DIGITS],
+        "policy": job.npcs.name,
+        "policy_sha256": job.npcs.sha256[:HASH_DIGITS],
+        "version": str(ledger.fact(FACT_VERSION)),
+        "package_sha256": str(ledger.fact(FACT_SOURCES)),
+    }
 
 
 def chromosomes(
     scenarios: Sequence[Scenario], map: Map, weather: str
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return the scenarios' weather as it is, (n, 8), and their normalised genes, (n, d).
+    """Return the scenarios' weather genes, (n, 8), and their normalised genes, (n, d).
 
-    The genes are those that every method breeds, so that distances can be compared: where objects
-    are bound for, which only ``ga`` and ``offline-rl`` have as genes, is left out.
+    The genes are those that every method has, so that distances are comparable.  The destinations
+    of NPCs, which are genes of ``ga`` and ``offline-rl`` alone, are left out.
     """
     genome = genome_for(map, weather="full" if weather == "full" else "confined")
     raw = [[each[f"environment.{name}"] for name, _ in WEATHER] for each in scenarios]
@@ -150,8 +181,8 @@ def chromosomes(
     return np.array(raw), genome.normalise(np.array(whole))
 
 
-def covered(search: Search) -> NDArray[np.bool_]:
-    """Return which cells of the map's volume the violating flights passed through."""
+def covered_cells(search: FinishedSearch) -> NDArray[np.bool_]:
+    """Return the cells of the map's volume, True where a violating flight passed through."""
     bounds_m = search.map.bounds_m
     cells = empty_cells(bounds_m)
     for flight in search.violating:

@@ -1,4 +1,4 @@
-"""Pictures of an experiment: box plots over the seeds, one panel for a figure on a map."""
+"""Pictures of an experiment: box plots over the seeds, one panel for a metric on a map."""
 
 from __future__ import annotations
 
@@ -10,53 +10,53 @@ from typing import TYPE_CHECKING
 from pytest_garl.experiments.metrics import (
     COVERAGE,
     DISTANCE,
-    FIGURES,
+    METRICS,
     TOP10,
     VIOLATIONS,
-    Figure,
-    Sample,
-    published,
-    samples,
+    MethodSearches,
+    Metric,
+    published_for,
+    searches_in_grid,
 )
-from pytest_garl.experiments.results import Row
+from pytest_garl.experiments.results import ResultRow
 from pytest_garl.experiments.spec import Experiment, Grid
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
-    from matplotlib.figure import Figure as Canvas
+    from matplotlib.figure import Figure
 
-LEAST_FOR_A_BOX = 3
-"""Fewer searches are shown as points alone."""
+SEARCHES_FOR_A_BOX = 3
+"""With fewer searches a line shows points alone."""
 COLOUR, PAPER = "#1f77b4", "#d95f02"
 COLOURS = 64
-"""So many colours has a picture."""
+"""Number of colours of a picture."""
 
 
-def draw(experiment: Experiment, grid: Grid, rows: Sequence[Row], path: Path) -> bool:
-    """Draw a grid into a PNG file, the same bytes for the same rows; False if nothing was run."""
-    from matplotlib.figure import Figure as Canvas
+def draw(experiment: Experiment, grid: Grid, rows: Sequence[ResultRow], path: Path) -> bool:
+    """Draw a grid into a PNG file, equal bytes for equal rows; return False if there is no row."""
+    from matplotlib.figure import Figure
 
-    found = samples(experiment, grid, rows)
+    found = searches_in_grid(experiment, grid, rows)
     if not any(each.rows for each in found):
         return False
     lines = len(grid.systems) * len(grid.methods)
-    size = (8.0, len(FIGURES) * (0.75 + 0.19 * lines))
-    canvas = Canvas(figsize=size, dpi=100, layout="constrained")
-    panels = canvas.subplots(len(FIGURES), len(grid.maps), squeeze=False, sharey=True)
+    size = (8.0, len(METRICS) * (0.75 + 0.19 * lines))
+    figure = Figure(figsize=size, dpi=100, layout="constrained")
+    panels = figure.subplots(len(METRICS), len(grid.maps), squeeze=False, sharey=True)
     for column, map in enumerate(grid.maps):
         here = [each for each in found if each.map == map]
-        for axes, figure in zip(panels[:, column], FIGURES, strict=True):
-            _panel(axes, experiment, grid, here, figure)
-    _save(canvas, path)
+        for axes, metric in zip(panels[:, column], METRICS, strict=True):
+            _panel(axes, experiment, grid, here, metric)
+    _save(figure, path)
     return True
 
 
-def _save(canvas: Canvas, path: Path) -> None:
-    """Write the picture with few colours: a quarter of the bytes."""
+def _save(figure: Figure, path: Path) -> None:
+    """Write the picture with few colours, which takes a quarter of the bytes."""
     from PIL import Image
 
     buffer = io.BytesIO()
-    canvas.savefig(buffer, format="png")
+    figure.savefig(buffer, format="png")
     path.parent.mkdir(parents=True, exist_ok=True)
     with Image.open(buffer) as image:
         few = image.convert("RGB").quantize(COLOURS, dither=Image.Dither.NONE)
@@ -64,11 +64,11 @@ def _save(canvas: Canvas, path: Path) -> None:
 
 
 def _panel(
-    axes: Axes, experiment: Experiment, grid: Grid, found: Sequence[Sample], figure: Figure
+    axes: Axes, experiment: Experiment, grid: Grid, found: Sequence[MethodSearches], metric: Metric
 ) -> None:
     for place, each in enumerate(found):
-        values = each.values(figure)
-        if len(values) >= LEAST_FOR_A_BOX:
+        values = each.values(metric)
+        if len(values) >= SEARCHES_FOR_A_BOX:
             axes.boxplot(
                 [values],
                 positions=[place],
@@ -79,7 +79,7 @@ def _panel(
                 medianprops={"color": COLOUR},
             )
         if values:
-            # Whole, and above the axis, where a figure is 0.
+            # Not clipped, and above the axis, for values of 0.
             axes.plot(
                 values,
                 [place] * len(values),
@@ -89,28 +89,28 @@ def _panel(
                 clip_on=False,
                 zorder=3,
             )
-        theirs = _published(experiment, each, figure)
+        theirs = _published_value(experiment, each, metric)
         if theirs is not None:
             axes.plot([theirs], [place], "x", color=PAPER, markersize=5, zorder=3)
     single = len(grid.systems) == 1
     names = [each.method if single else f"{each.system} {each.method}" for each in found]
     axes.set_yticks(range(len(found)), names, fontsize="x-small")
     axes.set_ylim(len(found) - 0.4, -0.6)
-    if figure is not DISTANCE:
-        # The margin at the far end is a share of what is shown, zero included.
+    if metric is not DISTANCE:
+        # The margin at the far end is a share of the range from zero.
         axes.update_datalim([(0.0, 0.0)], updatey=False)
         axes.autoscale_view(scaley=False)
         axes.set_xlim(left=0)
     axes.tick_params(axis="x", labelsize="x-small")
-    axes.set_title(f"{figure.title}, {found[0].map}", loc="left", fontsize="small")
+    axes.set_title(f"{metric.title}, {found[0].map}", loc="left", fontsize="small")
     axes.grid(axis="x", alpha=0.3)
 
 
-def _published(experiment: Experiment, each: Sample, figure: Figure) -> float | None:
-    """Return what others published for a panel, where it measures the same."""
-    theirs = published(experiment, each)
+def _published_value(experiment: Experiment, each: MethodSearches, metric: Metric) -> float | None:
+    """Return the published value of a metric; None if there is none of the same definition."""
+    theirs = published_for(experiment, each)
     if theirs is None:
         return None
-    if figure is TOP10:
+    if metric is TOP10:
         return theirs.top10 or None
-    return {VIOLATIONS.title: theirs.violations, COVERAGE.title: theirs.coverage}.get(figure.title)
+    return {VIOLATIONS.title: theirs.violations, COVERAGE.title: theirs.coverage}.get(metric.title)

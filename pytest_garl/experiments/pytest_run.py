@@ -17,29 +17,33 @@ from pytest_garl.errors import ExperimentError, LedgerError
 from pytest_garl.execution.ledger import Ledger
 from pytest_garl.execution.ledger_queries import SearchProgress
 from pytest_garl.execution.processes import end_with_parent
-from pytest_garl.experiments.spec import Run
+from pytest_garl.experiments.spec import ExperimentRun
 
 PROGRESS_EVERY_S = 0.5
 """Time between two looks at the ledger of a running session."""
 LAST_LINES = 15
-"""So much of a failed session's output is shown."""
+"""Number of lines of a failed session's output in the error."""
 _SEARCHED = (0, 1)
-"""Exit statuses of a session that went to its end: violations are failing tests."""
+"""Exit statuses of a completed session: 1 means failing tests, that is, violations."""
 
 
-def search(
-    run: Run, folder: Path, workers: int, tick: Callable[[Sequence[SearchProgress]], None]
+def run_pytest(
+    run: ExperimentRun,
+    folder: Path,
+    workers: int,
+    on_progress: Callable[[Sequence[SearchProgress]], None],
 ) -> Path:
-    """Fly a run's searches, or go on with them; return the ledger.
+    """Fly the searches of a run, or continue them; return the path of the ledger.
 
-    ``folder`` takes the ledger, the flights and the session's output; ``tick`` is told how far it
-    is.  Interrupted, the session ends in order before the KeyboardInterrupt goes on.
+    ``folder`` takes the ledger, the flights and the session's output.  ``on_progress`` is called
+    with the progress of the searches.  After a KeyboardInterrupt the session ends in order before
+    the exception is raised again.
     """
     ledger, log = folder / "ledger.sqlite", folder / "pytest.log"
     folder.mkdir(parents=True, exist_ok=True)
     with log.open("wb") as output, _session(_command(run, folder, workers), output) as session:
         while session.poll() is None:
-            tick(_progress(ledger))
+            on_progress(_progress(ledger))
             with contextlib.suppress(subprocess.TimeoutExpired):
                 session.wait(PROGRESS_EVERY_S)
     if session.returncode not in _SEARCHED:
@@ -50,7 +54,7 @@ def search(
                     f"{run.title}: pytest ended with status {session.returncode}; its output is in "
                     f"{log} and ends with:",
                     *(f"    {line}" for line in lines[-LAST_LINES:]),
-                    "Mend that, and the same command goes on. Where something has changed since "
+                    "Fix that and run the same command to continue. If something has changed since "
                     f"the run began, remove {folder} to fly it anew.",
                 ]
             )
@@ -58,11 +62,11 @@ def search(
     return ledger
 
 
-def _command(run: Run, folder: Path, workers: int) -> list[str]:
+def _command(run: ExperimentRun, folder: Path, workers: int) -> list[str]:
     words = [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", "--tb=no", "-r", ""]
     words += [
         f"--garl-budget={run.budget}",
-        f"--garl-method={run.search}",
+        f"--garl-method={run.search_method}",
         f"--garl-seed={run.seed}",
         f"--garl-map={','.join(run.maps)}",
         f"--garl-workers={workers}",
@@ -70,13 +74,13 @@ def _command(run: Run, folder: Path, workers: int) -> list[str]:
         "-o",
         f"garl_dir={folder.resolve()}",
         "-o",
-        # Saved cases are none of the experiment's flights.
+        # Saved cases do not belong to the experiment.
         f"garl_cases={folder.resolve() / 'no-cases'}",
         run.tests,
     ]
     if run.npcs:
         words.append(f"--garl-npcs={run.npcs}")
-    return [*words, "--garl-resume"] if _begun(folder / "ledger.sqlite") else words
+    return [*words, "--garl-resume"] if _has_ledger(folder / "ledger.sqlite") else words
 
 
 @contextmanager
@@ -86,7 +90,7 @@ def _session(command: Sequence[str], output: IO[bytes]) -> Iterator[subprocess.P
         stdin=subprocess.DEVNULL,
         stdout=output,
         stderr=subprocess.STDOUT,
-        # Ctrl-C is passed on once, below, and not by the terminal as well.
+        # The terminal must not send Ctrl-C too: it is passed on once, below.
         start_new_session=True,
         preexec_fn=functools.partial(end_with_parent, os.getpid()),
     )
@@ -102,8 +106,8 @@ def _session(command: Sequence[str], output: IO[bytes]) -> Iterator[subprocess.P
             session.wait()
 
 
-def _begun(ledger: Path) -> bool:
-    """Whether there is a ledger to go on with; one that was killed while it was made is none."""
+def _has_ledger(ledger: Path) -> bool:
+    """Return whether there is a ledger to continue; an incomplete one does not count."""
     if not ledger.is_file():
         return False
     with contextlib.suppress(LedgerError), closing(Ledger(ledger)) as opened:
@@ -112,7 +116,7 @@ def _begun(ledger: Path) -> bool:
 
 
 def _progress(ledger: Path) -> Sequence[SearchProgress]:
-    """Return how far the searches are; nothing while the ledger is being made."""
+    """Return the progress of the searches; empty until the ledger exists."""
     if ledger.is_file():
         with contextlib.suppress(LedgerError), closing(Ledger(ledger)) as opened:
             return opened.queries.progress()

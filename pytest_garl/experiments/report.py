@@ -1,4 +1,4 @@
-"""The report of an experiment: one Markdown file, made from its TOML file and rows alone."""
+"""The report of an experiment: one Markdown file, written from its TOML file and rows alone."""
 
 from __future__ import annotations
 
@@ -9,11 +9,11 @@ from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 
 from pytest_garl.experiments import goals, tables
-from pytest_garl.experiments.campaign import missing
-from pytest_garl.experiments.metrics import samples
+from pytest_garl.experiments.campaign import missing_runs
+from pytest_garl.experiments.metrics import searches_in_grid
 from pytest_garl.experiments.plots import draw
-from pytest_garl.experiments.results import Row
-from pytest_garl.experiments.spec import Experiment, Grid, Run
+from pytest_garl.experiments.results import ResultRow
+from pytest_garl.experiments.spec import Experiment, ExperimentRun, Grid
 from pytest_garl.files.atomic import write_text_atomically
 from pytest_garl.verdicts.paper_metrics import CELL_M, HEIGHT_M
 
@@ -43,7 +43,7 @@ HOW_TO_READ = f"""\
   cannot come below 0.10."""
 
 
-def write(experiment: Experiment, rows: Sequence[Row], source: str, path: Path) -> Path:
+def write(experiment: Experiment, rows: Sequence[ResultRow], source: str, path: Path) -> Path:
     """Write the report to ``path``, and pictures beside it; ``source`` names the rows' file."""
     sections = [
         f"# {experiment.title}",
@@ -56,7 +56,7 @@ def write(experiment: Experiment, rows: Sequence[Row], source: str, path: Path) 
     for grid in experiment.grids:
         sections += _grid(experiment, grid, rows, path)
     if experiment.goals is not None:
-        found = goals.judged(experiment, experiment.goals, rows)
+        found = goals.goal_results(experiment, experiment.goals, rows)
         sections += [
             f"## Goals of {experiment.goals.method} on {experiment.goals.system}",
             "Means over seeds. Two methods are compared on the seeds that both have flown;\n"
@@ -68,16 +68,16 @@ def write(experiment: Experiment, rows: Sequence[Row], source: str, path: Path) 
     return write_text_atomically(path, "\n\n".join(part for part in sections if part) + "\n")
 
 
-def _flown(experiment: Experiment, rows: Sequence[Row]) -> Iterator[str]:
+def _flown(experiment: Experiment, rows: Sequence[ResultRow]) -> Iterator[str]:
     own = [
         row
         for grid in experiment.grids
-        for each in samples(experiment, grid, rows)
+        for each in searches_in_grid(experiment, grid, rows)
         for row in each.rows
     ]
     lines = []
     for grid in experiment.grids:
-        found = samples(experiment, grid, rows)
+        found = searches_in_grid(experiment, grid, rows)
         flown, wanted = sum(len(each.rows) for each in found), len(found) * len(grid.seeds)
         seeds = ", ".join(str(seed) for seed in grid.seeds)
         lines.append(
@@ -86,7 +86,7 @@ def _flown(experiment: Experiment, rows: Sequence[Row]) -> Iterator[str]:
             f"seeds {seeds}"
         )
     yield "\n".join(lines)
-    left = missing(experiment, rows)
+    left = missing_runs(experiment, rows)
     if left:
         yield "Not run:\n\n" + "\n".join(_left(left))
     unique = {row.key: row for row in own}.values()
@@ -96,7 +96,7 @@ def _flown(experiment: Experiment, rows: Sequence[Row]) -> Iterator[str]:
         yield "**These searches are of more than one state of pytest-garl.**"
 
 
-def _left(runs: Iterable[Run]) -> Iterator[str]:
+def _left(runs: Iterable[ExperimentRun]) -> Iterator[str]:
     groups: dict[tuple[str, str, tuple[str, ...]], list[str]] = {}
     for run in runs:
         groups.setdefault((run.system, run.method, run.maps), []).append(str(run.seed))
@@ -104,8 +104,8 @@ def _left(runs: Iterable[Run]) -> Iterator[str]:
         yield f"- {system}, {method}, on {' and '.join(maps)}: seed {', '.join(seeds)}"
 
 
-def _identity(rows: Iterable[Row]) -> Iterator[str]:
-    """Say which code and machines the rows are of, so that a mixture shows."""
+def _identity(rows: Iterable[ResultRow]) -> Iterator[str]:
+    """Yield the code, machines and settings of the rows, so that a mixture is visible."""
     facts = [
         Counter(f"pytest-garl {row.version}, sources {row.package_sha256}" for row in rows),
         Counter(f"{row.machine}, {row.workers} workers" for row in rows),
@@ -121,11 +121,11 @@ def _identity(rows: Iterable[Row]) -> Iterator[str]:
             yield f"- {text} ({count} search{'es' * (count > 1)})"
 
 
-def _policy(row: Row) -> str:
+def _policy(row: ResultRow) -> str:
     return f"{row.policy} {row.policy_sha256}".strip()
 
 
-def _grid(experiment: Experiment, grid: Grid, rows: Sequence[Row], path: Path) -> list[str]:
+def _grid(experiment: Experiment, grid: Grid, rows: Sequence[ResultRow], path: Path) -> list[str]:
     slug = re.sub(r"[^a-z0-9]+", "-", f"{experiment.file.stem}-{grid.name}".lower())
     picture = path.parent / "pictures" / f"{slug}.png"
     drawn = draw(experiment, grid, rows, picture)
@@ -134,9 +134,9 @@ def _grid(experiment: Experiment, grid: Grid, rows: Sequence[Row], path: Path) -
         f"## {grid.title}",
         grid.text,
         tables.effect(experiment, grid, rows),
-        tables.spread(experiment, grid, rows),
+        tables.diversity(experiment, grid, rows),
         "Types of violations, as shares of those of a type I to V:",
-        tables.kinds(experiment, grid, rows),
+        tables.violation_types(experiment, grid, rows),
         f"![{grid.title}]({os.path.relpath(picture, path.parent)})" if drawn else "",
         "Points are searches, boxes reach over quartiles and whiskers over all; × is the paper's."
         if drawn

@@ -1,4 +1,4 @@
-"""Finished searches as rows of a CSV file that grows over days and is committed."""
+"""Finished searches as rows of a CSV file, which grows over days and is committed."""
 
 from __future__ import annotations
 
@@ -18,17 +18,17 @@ from pytest_garl.files.reading import MEGABYTE, read_text
 from pytest_garl.messages import listed, printable, shown
 
 LARGEST_BYTES = 16 * MEGABYTE
-"""Some ten thousand searches, each a row of a kilobyte."""
+"""About ten thousand searches, each a row of a kilobyte."""
 SEPARATOR = "|"
-"""Between signatures in a cell."""
+"""Separates signatures in a cell."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Row:
-    """What one search came to: a system on a map, a method, a seed, a budget.
+class ResultRow:
+    """The results of one search: a system on a map, a method, a seed, a budget.
 
-    ``docs/experiments/README.md`` tells what each column means; None stands for what does not
-    exist, such as a tenth violation where nine were found.
+    ``docs/experiments/README.md`` explains each column.  None stands for a value that does not
+    exist, such as a tenth violation after only nine.
     """
 
     system: str
@@ -71,7 +71,7 @@ class Row:
 
     @property
     def key(self) -> tuple[str, str, str, int, int]:
-        """What is flown once: system, map, method, seed, budget."""
+        """The identity of a search: system, map, method, seed, budget."""
         return self.system, self.map, self.method, self.seed, self.budget
 
     @property
@@ -112,11 +112,11 @@ _READERS: Mapping[str, Callable[[str], Any]] = MappingProxyType(
     }
 )
 _EXPECTED = {"int": "a whole number from 0", "float": "a number"}
-_FIELDS = {field.name: str(field.type) for field in dataclasses.fields(Row)}
+_FIELDS = {field.name: str(field.type) for field in dataclasses.fields(ResultRow)}
 
 
-def read(path: Path) -> tuple[Row, ...]:
-    """Return the rows in a file, none where there is no file.
+def read(path: Path) -> tuple[ResultRow, ...]:
+    """Return the rows in a file; none if there is no file.
 
     Raises ExperimentError that names file, line and column.
     """
@@ -139,12 +139,12 @@ def _check_columns(path: Path, found: Sequence[str]) -> None:
         wrong = {*found} ^ {*_FIELDS}
         raise ExperimentError(
             f"{path}: found other columns than expected"
-            f"{': ' + listed(sorted(wrong)) if wrong else ', in another order'}. Were its rows "
-            "written by another version of pytest-garl? Keep them under another name"
+            f"{': ' + listed(sorted(wrong)) if wrong else ', in another order'}. If another "
+            "version of pytest-garl wrote the rows, keep them under another name"
         )
 
 
-def _row(path: Path, line: int, cells: Mapping[str, str | None]) -> Row:
+def _row(path: Path, line: int, cells: Mapping[str, str | None]) -> ResultRow:
     values = {}
     for name, kind in _FIELDS.items():
         cell = cells[name]
@@ -160,18 +160,18 @@ def _row(path: Path, line: int, cells: Mapping[str, str | None]) -> Row:
             raise ExperimentError(
                 f"{path}, line {line}: column {name!r}: found {shown(cell)}, expected {expected}"
             ) from error
-    return Row(**values)
+    return ResultRow(**values)
 
 
-def append(path: Path, rows: Iterable[Row]) -> None:
-    """Add rows all at once; a search that another process has added meanwhile keeps its row."""
+def append(path: Path, rows: Iterable[ResultRow]) -> None:
+    """Add rows at once; a row that another process has added meanwhile is kept."""
     with locked(path.parent):
         known = read(path)
         keys = {row.key for row in known}
         write_text_atomically(path, _dumps([*known, *(row for row in rows if row.key not in keys)]))
 
 
-def _dumps(rows: Iterable[Row]) -> str:
+def _dumps(rows: Iterable[ResultRow]) -> str:
     file = io.StringIO(newline="")
     writer = csv.writer(file, lineterminator="\n")
     writer.writerow(_FIELDS)

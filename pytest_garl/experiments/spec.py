@@ -1,4 +1,4 @@
-"""What an experiment flies and reports: one TOML file, read strictly."""
+"""The specification of an experiment: its searches and its report, from one TOML file."""
 
 from __future__ import annotations
 
@@ -17,10 +17,10 @@ NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9 ._-]*")
 _MOST_GRIDS = 100
 _MOST_SEARCHES = 10_000
 _MOST_FLIGHTS = 1_000_000
-"""Of a search: more than a year of flying."""
+"""Largest budget of a search: more than a year of flying."""
 WITH = " with "
-"""Between a search and who steers its objects."""
-KINDS = ("I", "II", "III", "IV", "V")
+"""Separates a search method and an NPC policy."""
+PAPER_TYPES = ("I", "II", "III", "IV", "V")
 TOP_KEYS = frozenset(
     {
         "title",
@@ -40,11 +40,11 @@ TOP_KEYS = frozenset(
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Run:
+class ExperimentRun:
     """One pytest session: a method's searches on all maps, from one seed.
 
-    ``system`` is the name in tables and rows, ``tests`` what pytest is given.  ``method`` is a
-    search, or "search with policy" where its objects are steered by another than its own.
+    ``system`` is the name in tables and rows, ``tests`` the argument of pytest.  ``method`` is a
+    search method, or "method with policy" if another NPC policy replaces the method's own.
     """
 
     system: str
@@ -55,24 +55,24 @@ class Run:
     budget: int
 
     @property
-    def search(self) -> str:
-        """The search method alone."""
+    def search_method(self) -> str:
+        """The search method without the NPC policy."""
         return self.method.partition(WITH)[0]
 
     @property
     def npcs(self) -> str:
-        """Who steers the objects; empty: as the search has it."""
+        """The NPC policy; empty for the method's own."""
         return self.method.partition(WITH)[2]
 
     @property
     def title(self) -> str:
-        """The run in words."""
+        """The run in one line."""
         where = " and ".join(self.maps)
         return f"{self.system}, {self.method}, seed {self.seed}, {self.budget} flights on {where}"
 
     @property
     def folder(self) -> str:
-        """Name of the folder of its ledger; runs that differ have different ones."""
+        """The name of the folder of its ledger; different runs have different names."""
         words = (self.system, self.method, f"seed{self.seed}", str(self.budget), *self.maps)
         digest = hashlib.sha256(repr((self.tests, *words)).encode()).hexdigest()[:6]
         return re.sub(r"[^A-Za-z0-9]+", "-", "-".join((*words, digest)))
@@ -80,9 +80,9 @@ class Run:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Grid:
-    """A part of the report with a table of its own: systems × maps × methods × seeds.
+    """A section of the report with its own tables: systems × maps × methods × seeds.
 
-    ``text`` and ``remarks`` are Markdown: what is asked, and what came of it.
+    ``text`` and ``remarks`` are Markdown: the question before the tables, the answer after them.
     """
 
     name: str
@@ -97,10 +97,10 @@ class Grid:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Published:
-    """Figures that others published for a system on a map, shown beside those of ``methods``.
+    """Published figures for a system on a map, shown beside those of ``methods``.
 
-    Shares are in percent; ``kinds`` are the types I to V as shares of the violations;
-    ``top10`` is 0 where fewer than ten were found.  None: not published.
+    Shares are in percent.  ``kinds`` holds the types I to V as shares of the violations.
+    ``top10`` is 0 if fewer than ten violations were found.  None means not published.
     """
 
     system: str
@@ -116,7 +116,7 @@ class Published:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Goals:
-    """Whose figures are held against whose: a method, chance, and all baselines."""
+    """The methods that goals compare: ``method`` with random search and with the baselines."""
 
     system: str
     method: str
@@ -129,10 +129,10 @@ class Goals:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Experiment:
-    """An experiment as its file says.
+    """An experiment, as specified in its file.
 
-    ``unavoidable`` bounds the reference pilot's flights per run and map.  ``training_h`` is what
-    the training of a method's policy took, in hours, before any search.
+    ``unavoidable`` is the largest number of flights of the reference pilot per run and map.
+    ``training_h`` is the time of training a method's policy, in hours, before any search.
     """
 
     file: Path
@@ -149,8 +149,8 @@ class Experiment:
     published: tuple[Published, ...]
 
     @property
-    def runs(self) -> tuple[Run, ...]:
-        """All runs, each once: every grid's first seeds first, else in the file's order."""
+    def runs(self) -> tuple[ExperimentRun, ...]:
+        """All runs, each once: the first seed of every grid first, else in the file's order."""
         found: dict[tuple[str, str, int], tuple[str, ...]] = {}
         for turn in range(max(len(grid.seeds) for grid in self.grids)):
             for grid in self.grids:
@@ -160,7 +160,7 @@ class Experiment:
                             key = (system, method, seed)
                             found[key] = tuple(dict.fromkeys((*found.get(key, ()), *grid.maps)))
         return tuple(
-            Run(
+            ExperimentRun(
                 system=system,
                 tests=self.systems[system],
                 maps=maps,
@@ -183,7 +183,7 @@ def read(file: Path) -> Experiment:
         raise top.error("grids", "missing; expected at least one [[grids]] with methods to fly")
     twice = {grid.name for grid in grids if sum(grid.name == each.name for each in grids) > 1}
     if twice:
-        raise top.error("grids", f"found {listed(sorted(twice))} twice, expected other names")
+        raise top.error("grids", f"found {listed(sorted(twice))} twice, expected each name once")
     searches = sum(
         len(each.systems) * len(each.maps) * len(each.methods) * len(each.seeds) for each in grids
     )
@@ -232,7 +232,7 @@ def _grid(top: Table, table: Table, systems: Collection[str]) -> Grid:
 
 
 def _some(table: Table, key: str, among: Collection[str] = ()) -> tuple[str, ...]:
-    """Return a list of strings that is not empty and says nothing twice."""
+    """Return a list of names that is not empty and has no name twice."""
     found = table.texts(key)
     if not found or len(set(found)) < len(found):
         raise table.error(key, f"found {shown(list(found))}, expected names, each once")
@@ -279,6 +279,6 @@ def _published(table: Table, systems: Collection[str]) -> Published:
         map=table.text("map"),
         methods=_some(table, "methods"),
         top10=table.integer("top10") if "top10" in table.values else None,
-        kinds=table.numbers("kinds", len(KINDS)) if "kinds" in table.values else None,
+        kinds=table.numbers("kinds", len(PAPER_TYPES)) if "kinds" in table.values else None,
         **values,
     )

@@ -2,20 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 
 from pytest_garl.experiments.metrics import (
     COVERAGE,
     DISTANCE,
-    FIGURES,
+    METRICS,
     SIGNATURES,
-    Figure,
-    Sample,
-    published,
-    samples,
+    MethodSearches,
+    Metric,
+    published_for,
+    searches_in_grid,
 )
-from pytest_garl.experiments.results import Row
-from pytest_garl.experiments.spec import KINDS, Experiment, Grid
+from pytest_garl.experiments.results import ResultRow
+from pytest_garl.experiments.spec import PAPER_TYPES, Experiment, Grid
 from pytest_garl.verdicts.statistics import mann_whitney, share_interval, vargha_delaney
 
 NONE = "–"
@@ -34,12 +34,24 @@ def interval(count: int, total: int) -> str:
     return f"{100 * count / total:.1f} [{100 * low:.1f}, {100 * high:.1f}]"
 
 
-def effect(experiment: Experiment, grid: Grid, rows: Sequence[Row]) -> str:
-    """Return how often methods violate, how soon, and what it costs."""
+def _table(
+    header: Sequence[str],
+    cells_of: Callable[[Experiment, MethodSearches], Sequence[str]],
+    experiment: Experiment,
+    grid: Grid,
+    rows: Sequence[ResultRow],
+) -> str:
+    """Return a table with a line per map, system and method of a grid."""
+    lines = [
+        [each.map, each.system, each.method, *cells_of(experiment, each)]
+        for each in searches_in_grid(experiment, grid, rows)
+    ]
+    return markdown(("map", "system", "method", *header), lines)
+
+
+def effect(experiment: Experiment, grid: Grid, rows: Sequence[ResultRow]) -> str:
+    """Return the table of effect: how often methods find violations, how soon, at what cost."""
     header = (
-        "map",
-        "system",
-        "method",
         "seeds",
         "violations, %",
         "paper",
@@ -51,49 +63,42 @@ def effect(experiment: Experiment, grid: Grid, rows: Sequence[Row]) -> str:
         "hours",
         "paper",
     )
-    lines = [
-        [each.map, each.system, each.method, *_effect(experiment, each)]
-        for each in samples(experiment, grid, rows)
-    ]
-    return markdown(header, lines)
+    return _table(header, _effect_cells, experiment, grid, rows)
 
 
-def _effect(experiment: Experiment, each: Sample) -> list[str]:
-    paper = published(experiment, each)
+def _effect_cells(experiment: Experiment, searches: MethodSearches) -> list[str]:
+    paper = published_for(experiment, searches)
     theirs = [NONE, NONE, NONE]
     if paper is not None:
         top10 = "cannot find" if paper.top10 == 0 else _number(paper.top10, 0)
         theirs = [_number(paper.violations, 2), top10, _number(paper.hours, 0)]
-    if not each.rows:
+    if not searches.rows:
         return [NOT_RUN, NONE, theirs[0], *[NONE] * 4, theirs[1], NONE, theirs[2]]
-    flights = each.total(lambda row: row.budget)
-    training = experiment.training_h.get(each.method, 0.0)
+    flights = searches.total(lambda row: row.budget)
+    training = experiment.training_h.get(searches.method, 0.0)
     return [
-        _numbers(each.seeds),
-        interval(each.total(lambda row: row.violations), flights),
+        _numbers(searches.seeds),
+        interval(searches.total(lambda row: row.violations), flights),
         theirs[0],
-        _share(each.total(lambda row: row.late), flights),
-        _share(each.total(lambda row: row.aborted), flights),
-        _unavoidable(each),
-        ", ".join(NONE if row.top10 is None else str(row.top10) for row in each.rows),
+        _share(searches.total(lambda row: row.late), flights),
+        _share(searches.total(lambda row: row.aborted), flights),
+        _unavoidable(searches),
+        ", ".join(NONE if row.top10 is None else str(row.top10) for row in searches.rows),
         theirs[1],
-        f"{each.hours:.2f}" + (f" + {training:.2f}" if training else ""),
+        f"{searches.hours:.2f}" + (f" + {training:.2f}" if training else ""),
         theirs[2],
     ]
 
 
-def _unavoidable(each: Sample) -> str:
-    tried = each.total(lambda row: row.piloted or 0)
-    found = each.total(lambda row: row.unavoidable or 0)
+def _unavoidable(searches: MethodSearches) -> str:
+    tried = searches.total(lambda row: row.piloted or 0)
+    found = searches.total(lambda row: row.unavoidable or 0)
     return f"{interval(found, tried)} of {tried}" if tried else NONE
 
 
-def spread(experiment: Experiment, grid: Grid, rows: Sequence[Row]) -> str:
-    """Return how different the scenarios, the trajectories and the violations are."""
+def diversity(experiment: Experiment, grid: Grid, rows: Sequence[ResultRow]) -> str:
+    """Return the table of diversity: of scenarios, of trajectories and of violations."""
     header = (
-        "map",
-        "system",
-        "method",
         "parameter distance",
         "of violating ones",
         "of weather alone",
@@ -102,44 +107,39 @@ def spread(experiment: Experiment, grid: Grid, rows: Sequence[Row]) -> str:
         "paper",
         "signatures",
     )
-    lines = [
-        [each.map, each.system, each.method, *_spread(experiment, each)]
-        for each in samples(experiment, grid, rows)
-    ]
-    return markdown(header, lines)
+    return _table(header, _diversity_cells, experiment, grid, rows)
 
 
-def _spread(experiment: Experiment, each: Sample) -> list[str]:
-    paper = published(experiment, each)
+def _diversity_cells(experiment: Experiment, searches: MethodSearches) -> list[str]:
+    paper = published_for(experiment, searches)
     distance = _number(paper.distance if paper else None, 2)
     coverage = _number(paper.coverage if paper else None, 2)
-    if not each.rows:
+    if not searches.rows:
         return [NOT_RUN, NONE, NONE, distance, NONE, coverage, NONE]
-    violating = [row.violating_distance for row in each.rows if row.violating_distance is not None]
-    weather = [row.weather_distance for row in each.rows]
+    violating = [
+        row.violating_distance for row in searches.rows if row.violating_distance is not None
+    ]
+    weather = [row.weather_distance for row in searches.rows]
     return [
-        f"{each.mean(DISTANCE):.2f}",
+        f"{searches.mean(DISTANCE):.2f}",
         f"{sum(violating) / len(violating):.2f}" if violating else NONE,
         f"{sum(weather) / len(weather):.3f}",
         distance,
-        f"{each.mean(COVERAGE):.2f}",
+        f"{searches.mean(COVERAGE):.2f}",
         coverage,
-        _signatures(each),
+        _signatures(searches),
     ]
 
 
-def _signatures(each: Sample) -> str:
-    counts = [int(count) for count in each.values(SIGNATURES)]
-    return _numbers(counts) + (f" ({each.all_signatures} in all)" if len(counts) > 1 else "")
+def _signatures(searches: MethodSearches) -> str:
+    counts = [int(count) for count in searches.values(SIGNATURES)]
+    return _numbers(counts) + (f" ({searches.all_signatures} in all)" if len(counts) > 1 else "")
 
 
-def kinds(experiment: Experiment, grid: Grid, rows: Sequence[Row]) -> str:
-    """Return the types of the violations, as shares of the types I to V, and what is none."""
+def violation_types(experiment: Experiment, grid: Grid, rows: Sequence[ResultRow]) -> str:
+    """Return the table of violation types: shares of the types I to V, and counts of the others."""
     header = (
-        "map",
-        "system",
-        "method",
-        f"{' / '.join(KINDS)}, %",
+        f"{' / '.join(PAPER_TYPES)}, %",
         "paper",
         "of",
         "late",
@@ -147,26 +147,22 @@ def kinds(experiment: Experiment, grid: Grid, rows: Sequence[Row]) -> str:
         "hard",
         "inconclusive",
     )
-    lines = [
-        [each.map, each.system, each.method, *_kinds(experiment, each)]
-        for each in samples(experiment, grid, rows)
-    ]
-    return markdown(header, lines)
+    return _table(header, _violation_type_cells, experiment, grid, rows)
 
 
-def _kinds(experiment: Experiment, each: Sample) -> list[str]:
-    paper = published(experiment, each)
+def _violation_type_cells(experiment: Experiment, searches: MethodSearches) -> list[str]:
+    paper = published_for(experiment, searches)
     theirs = " / ".join(f"{kind:g}" for kind in paper.kinds) if paper and paper.kinds else NONE
-    if not each.rows:
+    if not searches.rows:
         return [NOT_RUN, theirs, *[NONE] * 5]
-    counts = [sum(row.kinds[index] for row in each.rows) for index in range(len(KINDS))]
+    counts = [sum(row.kinds[index] for row in searches.rows) for index in range(len(PAPER_TYPES))]
     total = sum(counts)
     return [
         " / ".join(f"{100 * count / total:.0f}" for count in counts) if total else NONE,
         theirs,
         str(total),
         *(
-            str(each.total(of))
+            str(searches.total(of))
             for of in (
                 lambda row: row.late,
                 lambda row: row.off,
@@ -177,9 +173,9 @@ def _kinds(experiment: Experiment, each: Sample) -> list[str]:
     ]
 
 
-def comparison(experiment: Experiment, grid: Grid, rows: Sequence[Row]) -> str:
-    """Return the first method against each other: U, p and A12; empty below two seeds of each."""
-    found = samples(experiment, grid, rows)
+def comparison(experiment: Experiment, grid: Grid, rows: Sequence[ResultRow]) -> str:
+    """Return U, p and A12 of the first method against each other; empty below two seeds of each."""
+    found = searches_in_grid(experiment, grid, rows)
     lines = []
     for one in found:
         if one.method != grid.methods[0] or len(one.rows) < 2:
@@ -189,16 +185,16 @@ def comparison(experiment: Experiment, grid: Grid, rows: Sequence[Row]) -> str:
                 continue
             if len(other.rows) >= 2:
                 seeds = f"{len(one.rows)}, {len(other.rows)}"
-                cells = [_compared(one, other, figure) for figure in FIGURES]
+                cells = [_compared(one, other, metric) for metric in METRICS]
                 lines.append([one.map, one.system, other.method, seeds, *cells])
     if not lines:
         return ""
     header = ("map", "system", f"{grid.methods[0]} against", "seeds")
-    return markdown((*header, *(figure.title for figure in FIGURES)), lines)
+    return markdown((*header, *(metric.title for metric in METRICS)), lines)
 
 
-def _compared(one: Sample, other: Sample, figure: Figure) -> str:
-    first, second = one.values(figure), other.values(figure)
+def _compared(one: MethodSearches, other: MethodSearches, metric: Metric) -> str:
+    first, second = one.values(metric), other.values(metric)
     u, p = mann_whitney(first, second)
     return f"U {u:g}, p {p:.2f}, A12 {vargha_delaney(first, second):.2f}"
 

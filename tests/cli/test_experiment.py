@@ -15,7 +15,7 @@ import pytest_garl
 from pytest_garl.cli import main
 from pytest_garl.execution.job import load_scenario
 from pytest_garl.execution.ledger import Ledger
-from pytest_garl.experiments.results import Row, read
+from pytest_garl.experiments.results import ResultRow, read
 from pytest_garl.experiments.spec import read as plan
 from pytest_garl.scenarios.chromosome import encode
 from pytest_garl.scenarios.genes import genome_for
@@ -58,7 +58,7 @@ def change(project: Path, before: str, after: str) -> None:
     (project / "toy.toml").write_text(TEXT.replace(before, after))
 
 
-def lasting(rows: tuple[Row, ...]) -> list[tuple[object, ...]]:
+def lasting(rows: tuple[ResultRow, ...]) -> list[tuple[object, ...]]:
     """Return what of the rows does not depend on the time that flights took."""
     return [
         (*row.key, row.violations, row.top10, row.covered, row.unavoidable, row.result_hash)
@@ -94,7 +94,7 @@ def test_each_run_is_flown_once_and_reported_from_its_rows_alone(project: Path) 
     assert "RQ2: 0 of 8 searches" in (project / "toy.md").read_text()
 
 
-def test_the_figures_are_those_of_the_ledger(project: Path) -> None:
+def test_rows_hold_the_figures_of_the_ledger(project: Path) -> None:
     change(project, 'methods = ["garl", "random"]', 'methods = ["garl"]')
     text = (project / "toy.toml").read_text().replace("unavoidable = 0", "unavoidable = 2")
     (project / "toy.toml").write_text(text)
@@ -149,7 +149,9 @@ def test_the_figures_are_those_of_the_ledger(project: Path) -> None:
         ("budget = 12", "budget = 1.5", "toy.toml: key 'budget': found 1.5, expected a whole"),
     ],
 )
-def test_what_cannot_be_flown_is_told(project: Path, before: str, after: str, words: str) -> None:
+def test_an_experiment_that_cannot_be_flown_is_refused(
+    project: Path, before: str, after: str, words: str
+) -> None:
     change(project, before, after)
     result = garl("--workers=1")
     assert result.exit_code == 1
@@ -158,7 +160,7 @@ def test_what_cannot_be_flown_is_told(project: Path, before: str, after: str, wo
         assert "--garl-method: search method 'nowhere:Luck'" in result.output
 
 
-def test_tests_that_do_not_name_the_map_are_told(project: Path) -> None:
+def test_tests_that_do_not_name_the_map_are_refused(project: Path) -> None:
     write_project(project, maps="['court']")
     change(project, "budget = 12", "budget = 1")
     result = garl("--workers=1")
@@ -168,7 +170,7 @@ def test_tests_that_do_not_name_the_map_are_told(project: Path) -> None:
     assert not (project / "toy.csv").exists()
 
 
-def test_two_landing_systems_in_one_place_are_told(project: Path) -> None:
+def test_two_landing_systems_in_one_run_are_refused(project: Path) -> None:
     change(project, '"test_it.py"', '"."')
     text = (project / "toy.toml").read_text().replace("budget = 12", "budget = 1")
     (project / "toy.toml").write_text(text)
@@ -215,14 +217,14 @@ def flown(ledger: Path) -> int:
 
 
 @pytest.mark.long
-def test_a_run_that_was_stopped_and_killed_goes_on(slow: Path) -> None:
+def test_an_interrupted_or_killed_run_continues(slow: Path) -> None:
     assert garl("--workers=2", "--out=undisturbed", "--folder=undisturbed").exit_code == 0
     stopped = start()
     ledger = wait_for_flights(slow, 3, stopped)
     stopped.send_signal(signal.SIGINT)
     _, complaint = stopped.communicate(timeout=60)
     assert stopped.returncode == 130
-    assert "interrupted; what is flown is kept, the same command goes on" in complaint
+    assert "interrupted; finished flights are kept, the same command continues" in complaint
     assert 3 <= flown(ledger) < 20
     killed = start()
     wait_for_flights(slow, flown(ledger) + 2, killed)
@@ -244,7 +246,7 @@ def test_a_run_that_was_stopped_and_killed_goes_on(slow: Path) -> None:
     assert lasting(read(slow / "toy.csv")) == lasting(expected)
 
 
-def test_a_run_that_another_code_began_is_told(slow: Path) -> None:
+def test_a_run_of_changed_code_is_refused(slow: Path) -> None:
     process = start()
     wait_for_flights(slow, 1, process)
     process.send_signal(signal.SIGINT)

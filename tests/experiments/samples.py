@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from pytest_garl.experiments.results import Row
+from pytest_garl.experiments.results import ResultRow
 
 PLAIN: dict[str, Any] = {
     "system": "Lander",
@@ -47,5 +47,5 @@ PLAIN: dict[str, Any] = {
 }
 
 
-def row(**values: Any) -> Row:
-    return Row(**{**PLAIN, **values})
+def row(**values: Any) -> ResultRow:
+    return ResultRow(**{**PLAIN, **values})

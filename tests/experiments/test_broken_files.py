@@ -31,7 +31,7 @@ from tests.experiments.test_spec import TEXT, plan
         ),
     ],
 )
-def test_a_strange_experiment_is_one_short_error(
+def test_a_damaged_experiment_file_is_one_short_error(
     tmp_path: Path, old: str, new: str, words: str
 ) -> None:
     assert old in TEXT
@@ -41,7 +41,7 @@ def test_a_strange_experiment_is_one_short_error(
     assert len(str(caught.value)) < 600
 
 
-def test_an_experiment_in_a_pipe_is_refused(tmp_path: Path) -> None:
+def test_an_experiment_file_that_is_a_pipe_is_refused(tmp_path: Path) -> None:
     from pytest_garl.experiments.spec import read as read_plan
 
     os.mkfifo(tmp_path / "mine.toml")
@@ -56,7 +56,7 @@ def file(tmp_path: Path) -> Path:
 
 
 @pytest.mark.parametrize("line", [0, 1])
-def test_a_cell_larger_than_the_reader_takes_is_told(file: Path, line: int) -> None:
+def test_a_cell_too_large_for_the_reader_is_refused(file: Path, line: int) -> None:
     lines = file.read_text().splitlines()
     lines[line] = "x" * (csv.field_size_limit() + 1) + lines[line]
     file.write_text("\n".join(lines))
@@ -73,7 +73,7 @@ def test_a_cell_larger_than_the_reader_takes_is_told(file: Path, line: int) -> N
         ("system", "x" * 100_000, "found other columns than expected: "),
     ],
 )
-def test_a_strange_cell_is_one_short_error(file: Path, old: str, new: str, words: str) -> None:
+def test_a_damaged_cell_is_one_short_error(file: Path, old: str, new: str, words: str) -> None:
     text = file.read_text()
     assert old in text
     file.write_text(text.replace(old, new, 1))
@@ -82,13 +82,13 @@ def test_a_strange_cell_is_one_short_error(file: Path, old: str, new: str, words
     assert len(str(caught.value)) < 1100
 
 
-def test_escape_sequences_in_a_row_are_written_out(file: Path) -> None:
+def test_escape_sequences_in_a_row_are_made_visible(file: Path) -> None:
     file.write_text(file.read_text().replace("Lander", "L\x1b[2Jander", 1))
     assert read(file)[0].system == "L\\x1b[2Jander"
 
 
 @pytest.mark.parametrize(("target", "words"), [("gone", "No such file"), ("rows.csv", "Too many")])
-def test_rows_behind_a_bad_link_are_not_none(tmp_path: Path, target: str, words: str) -> None:
+def test_a_broken_link_to_rows_is_refused(tmp_path: Path, target: str, words: str) -> None:
     (tmp_path / "rows.csv").symlink_to(target)
     with pytest.raises(ExperimentError, match=f"rows.csv: cannot be read: {words}"):
         read(tmp_path / "rows.csv")

@@ -12,7 +12,7 @@ MAP = load_map("lawn")
 
 
 @pytest.mark.parametrize("weather", ["confined", "full"])
-def test_where_objects_are_bound_for_counts_in_no_distance(weather: str) -> None:
+def test_distances_leave_out_the_destinations_of_npcs(weather: str) -> None:
     genome = genome_for(MAP, weather="full" if weather == "full" else "confined")
     bound = propose(MAP, with_destinations(genome), 3, 0, 5)
     raw, genes = chromosomes(bound, MAP, weather)

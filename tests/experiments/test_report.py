@@ -6,7 +6,7 @@ import pytest
 
 from pytest_garl.experiments import goals
 from pytest_garl.experiments.report import write
-from pytest_garl.experiments.results import Row
+from pytest_garl.experiments.results import ResultRow
 from pytest_garl.experiments.spec import Experiment, read
 from tests.experiments.samples import row
 
@@ -83,13 +83,13 @@ def experiment(tmp_path: Path) -> Experiment:
     return read(tmp_path / "mine.toml")
 
 
-def report(experiment: Experiment, rows: tuple[Row, ...]) -> str:
+def report(experiment: Experiment, rows: tuple[ResultRow, ...]) -> str:
     path = experiment.file.parent / "out" / "mine.md"
     assert write(experiment, rows, "mine.csv", path) == path
     return path.read_text()
 
 
-def test_ours_and_the_papers_stand_side_by_side(experiment: Experiment) -> None:
+def test_tables_show_measured_and_published_figures(experiment: Experiment) -> None:
     text = report(experiment, GARL + RANDOM)
     # 24 of 80 violate; the pilot tried 8 and failed in 2; 7,200 s on two workers are an hour.
     assert (
@@ -115,7 +115,7 @@ def test_methods_are_compared_over_seeds(experiment: Experiment) -> None:
     assert "garl against" not in report(experiment, GARL[:1] + RANDOM)
 
 
-def test_it_says_what_was_flown_and_what_was_not(experiment: Experiment) -> None:
+def test_the_report_lists_flown_and_missing_runs(experiment: Experiment) -> None:
     text = report(experiment, GARL + RANDOM[:1] + (row(seed=7), row(budget=400)))
     assert (
         "- RQ2: 3 of 6 searches of 40 flights: Lander on court by garl, random, ga; seeds 0, 1"
@@ -131,7 +131,7 @@ def test_it_says_what_was_flown_and_what_was_not(experiment: Experiment) -> None
     )
 
 
-def test_remarks_outlive_a_new_report(experiment: Experiment) -> None:
+def test_a_new_report_keeps_remarks(experiment: Experiment) -> None:
     for rows in (GARL, GARL + RANDOM):
         text = report(experiment, rows)
         places = [
@@ -153,7 +153,7 @@ def test_equal_rows_make_equal_bytes(experiment: Experiment) -> None:
     assert "![Methods](pictures/mine-rq2.png)" in first
 
 
-def test_without_rows_all_is_not_run(experiment: Experiment) -> None:
+def test_a_report_without_rows_says_not_run(experiment: Experiment) -> None:
     text = report(experiment, ())
     assert "RQ2: 0 of 6 searches" in text
     assert text.count("**not run**") == len(goals.GOALS)
@@ -161,11 +161,11 @@ def test_without_rows_all_is_not_run(experiment: Experiment) -> None:
     assert not (experiment.file.parent / "out" / "pictures").exists()
 
 
-def verdicts(experiment: Experiment, rows: tuple[Row, ...]) -> list[tuple[str, str]]:
+def verdicts(experiment: Experiment, rows: tuple[ResultRow, ...]) -> list[tuple[str, str]]:
     assert experiment.goals is not None
     return [
-        (f"{each.goal.figure.title} {each.goal.wish}", each.verdict)
-        for each in goals.judged(experiment, experiment.goals, rows)
+        (f"{each.goal.metric.title} {each.goal.text}", each.status)
+        for each in goals.goal_results(experiment, experiment.goals, rows)
     ]
 
 
@@ -185,7 +185,7 @@ def test_goals_are_met_missed_or_open(experiment: Experiment) -> None:
     ]
 
 
-def test_a_rival_as_good_is_a_goal_missed(experiment: Experiment) -> None:
+def test_a_goal_is_missed_if_a_rival_is_equal(experiment: Experiment) -> None:
     equal = tuple(row(method="ga", seed=each.seed, violations=12, top10=25) for each in GARL)
     found = dict(verdicts(experiment, GARL + RANDOM + equal))
     assert found["violations, % above every baseline"] == "missed"
@@ -198,7 +198,7 @@ def test_a_rival_as_good_is_a_goal_missed(experiment: Experiment) -> None:
     ) in text
 
 
-def test_methods_are_compared_on_the_seeds_that_both_have(experiment: Experiment) -> None:
+def test_goals_compare_the_seeds_that_both_methods_have(experiment: Experiment) -> None:
     # Alone with seed 1, chance has 15 %, garl 35 %; over all seeds garl has but 30 %.
     found = dict(verdicts(experiment, (*GARL, row(method="random", seed=1, violations=7))))
     assert found["violations, % at least 2 × chance"] == "met"

@@ -19,7 +19,7 @@ def add(path: Path, seeds: range) -> None:
         append(path, [row(seed=seed, map=map) for map in ("court", "lawn")])
 
 
-def test_what_is_appended_is_read_again(tmp_path: Path) -> None:
+def test_read_returns_appended_rows(tmp_path: Path) -> None:
     path = tmp_path / "new" / "rows.csv"
     assert read(path) == ()
     append(path, [row()])
@@ -38,7 +38,7 @@ def test_a_search_has_one_row(tmp_path: Path) -> None:
     assert read(path) == (row(), BARE)
 
 
-def test_processes_that_append_at_once_lose_nothing(tmp_path: Path) -> None:
+def test_simultaneous_appends_lose_no_row(tmp_path: Path) -> None:
     path = tmp_path / "rows.csv"
     context = multiprocessing.get_context("spawn")
     processes = [
@@ -71,7 +71,7 @@ def test_processes_that_append_at_once_lose_nothing(tmp_path: Path) -> None:
         (",40,10,", ',40,"10"0,', "line 2: not valid CSV"),
     ],
 )
-def test_a_broken_file_names_line_and_column(
+def test_the_error_of_a_broken_file_names_line_and_column(
     tmp_path: Path, before: str, after: str, words: str
 ) -> None:
     path = tmp_path / "rows.csv"
@@ -83,7 +83,7 @@ def test_a_broken_file_names_line_and_column(
     assert str(path) in str(caught.value)
 
 
-def test_bytes_that_are_no_text_are_told(tmp_path: Path) -> None:
+def test_a_file_that_is_no_text_is_refused(tmp_path: Path) -> None:
     (tmp_path / "rows.csv").write_bytes(b"\xff\xfe")
     with pytest.raises(ExperimentError, match="cannot be read"):
         read(tmp_path / "rows.csv")

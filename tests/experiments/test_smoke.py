@@ -12,7 +12,7 @@ ROOT = Path(__file__).parents[2]
 PLAN = "docs/experiments/smoke.toml"
 
 
-def test_make_runs_what_is_tested_here() -> None:
+def test_make_runs_the_experiment_tested_here() -> None:
     recipe = (ROOT / "Makefile").read_text().partition("\nexperiment-smoke:")[2]
     assert recipe.partition("\n\n")[0].count(f"garl experiment {PLAN} --out=$(SMOKE)") == 2
 

@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from pytest_garl.errors import ExperimentError, ScenarioError
-from pytest_garl.experiments.campaign import check
+from pytest_garl.experiments.campaign import check_experiment
 from pytest_garl.experiments.spec import Experiment, read
 
 DOCS = Path(__file__).parents[2] / "docs" / "experiments"
@@ -71,11 +71,11 @@ def test_every_run_is_flown_once_first_seeds_first(tmp_path: Path) -> None:
     assert found[0].tests == "test_one.py"
 
 
-def test_objects_may_be_steered_by_another_policy_than_the_searchs_own(tmp_path: Path) -> None:
+def test_a_method_may_name_another_npc_policy(tmp_path: Path) -> None:
     found = plan(
         tmp_path, TEXT.replace('"garl", "ga"', '"garl", "ga", "random with dqn-paper"')
     ).runs
-    assert [(run.search, run.npcs) for run in found if run.seed == 4] == [
+    assert [(run.search_method, run.npcs) for run in found if run.seed == 4] == [
         ("garl", ""),
         ("ga", ""),
         ("random", "dqn-paper"),
@@ -90,19 +90,19 @@ def test_objects_may_be_steered_by_another_policy_than_the_searchs_own(tmp_path:
         ("garl with dnq", "unknown NPC policy 'dnq'; expected one of"),
     ],
 )
-def test_an_unknown_search_or_policy_is_found_before_anything_flies(
+def test_unknown_methods_and_policies_are_refused_before_any_flight(
     tmp_path: Path, method: str, words: str
 ) -> None:
     for name in ("test_one.py", "test_two.py"):
         (tmp_path / name).touch()
     found = plan(tmp_path, TEXT.replace('"garl", "ga"', f'"garl", "ga", "{method}"'))
     with pytest.raises(ExperimentError) as caught:
-        check(found, tmp_path)
+        check_experiment(found, tmp_path)
     assert "key 'methods'" in str(caught.value)
     assert words in str(caught.value)
 
 
-def test_runs_that_differ_have_folders_of_their_own(tmp_path: Path) -> None:
+def test_different_runs_have_different_folders(tmp_path: Path) -> None:
     (tmp_path / "a").mkdir()
     (tmp_path / "b").mkdir()
     one = plan(tmp_path / "a").runs
@@ -111,14 +111,14 @@ def test_runs_that_differ_have_folders_of_their_own(tmp_path: Path) -> None:
     assert len({run.folder for run in (*one, *other)}) == len(one) + 2
 
 
-def test_files_lie_beside_the_plan(tmp_path: Path) -> None:
+def test_rows_and_report_lie_beside_the_spec(tmp_path: Path) -> None:
     found = plan(tmp_path)
     assert found.rows == tmp_path / "mine.csv"
     assert found.report == tmp_path / "mine.md"
     assert plan(tmp_path, 'report = "../r.md"\n' + TEXT).report == tmp_path.parent / "r.md"
 
 
-def test_what_is_not_said_is_left_out(tmp_path: Path) -> None:
+def test_missing_keys_have_defaults(tmp_path: Path) -> None:
     found = plan(tmp_path)
     assert found.unavoidable == 0
     assert found.training_h == {"garl": 0.5}
@@ -151,7 +151,7 @@ def test_what_is_not_said_is_left_out(tmp_path: Path) -> None:
         ('["garl", "random"]', '["garl", "garl"]', "'grids[0].methods': found ['garl', 'garl']"),
         ('"test_one.py"', "1", "'systems.One': found 1, expected a string"),
         ("One =", '"a/b" =', "'systems.a/b': expected a name of letters, digits"),
-        ('name = "RQ2"', 'name = "RQ1"', "'grids': found RQ1 twice, expected other names"),
+        ('name = "RQ2"', 'name = "RQ1"', "'grids': found RQ1 twice, expected each name once"),
         ('grid = "RQ2"', 'grid = "RQ3"', "'goals.grid': found 'RQ3', expected one of RQ1, RQ2"),
         ('random = "ga"', 'random = "x"', "'goals.random': found 'x', expected one of ga, garl"),
         ('system = "Two"\nmethod', 'system = "One"\nmethod', "'goals.system': found 'One'"),
@@ -160,7 +160,7 @@ def test_what_is_not_said_is_left_out(tmp_path: Path) -> None:
         ('title = "Mine"', "title = ", "not valid TOML"),
     ],
 )
-def test_a_bad_file_names_key_found_and_expected(
+def test_the_error_of_a_bad_file_names_key_found_and_expected(
     tmp_path: Path, before: str, after: str, words: str
 ) -> None:
     assert before in TEXT
@@ -170,12 +170,12 @@ def test_a_bad_file_names_key_found_and_expected(
     assert str(tmp_path / "mine.toml") in str(caught.value)
 
 
-def test_without_grids_there_is_nothing_to_fly(tmp_path: Path) -> None:
+def test_a_spec_without_grids_is_refused(tmp_path: Path) -> None:
     with pytest.raises(ScenarioError, match="'grids': missing; expected at least one"):
         plan(tmp_path, TEXT.partition("[[grids]]")[0])
 
 
-def test_the_campaign_asks_the_papers_questions() -> None:
+def test_the_shipped_experiment_asks_the_papers_questions() -> None:
     found = read(DOCS / "rq.toml")
     first, second, third = found.grids
     assert [len(first.systems), len(first.maps), first.methods] == [3, 2, ("garl", "garl-paper")]
