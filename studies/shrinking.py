@@ -23,7 +23,8 @@ from pytest_garl.execution.job import FlightJob, load_scenario, loads
 from pytest_garl.execution.ledger import Ledger
 from pytest_garl.execution.ledger_queries import LedgerFlight
 from pytest_garl.execution.local_pool import local_pool
-from pytest_garl.execution.on_demand import CompletedFlight, FlyFunction, OnDemandFlights
+from pytest_garl.execution.on_demand import FlyFunction, OnDemandFlights
+from pytest_garl.execution.result import CompletedFlight
 from pytest_garl.regressions.new_case import find_colliding_object
 from pytest_garl.regressions.shrink import (
     by_hypothesis,
@@ -80,19 +81,19 @@ def violations(ledger: Ledger, count: int) -> list[Violation]:
     """Return violations, one of each kind, then a second of each, until there are enough."""
     kinds: defaultdict[tuple[str, str], list[LedgerFlight]] = defaultdict(list)
     for row in ledger.queries.violating():
-        kinds[row.search, row.signature].append(row)
+        kinds[row.flight.search, row.signature].append(row)
     turns = itertools.zip_longest(*kinds.values())
     rows = [row for turn in turns for row in turn if row is not None]
     return [_violation(ledger, row) for row in rows[:count]]
 
 
 def _violation(ledger: Ledger, row: LedgerFlight) -> Violation:
-    text = ledger.job(row.search)
+    text = ledger.job(row.flight.search)
     assert text is not None
     done = CompletedFlight(result=row.result, sha256=row.sha256, record=Path())
     return Violation(
         job=loads(text),
-        slot=f"g{row.generation:02d}-s{row.slot:02d}",
+        slot=f"g{row.flight.slot.generation:02d}-s{row.flight.slot.index:02d}",
         signature=row.signature,
         scenario=load_scenario(row.scenario),
         colliding_object=find_colliding_object(done),

@@ -18,8 +18,8 @@ from pytest_garl.execution.batch import fly_all, temporary_pool
 from pytest_garl.execution.checkout import Checkout, describe
 from pytest_garl.execution.job import FlightJob, load_scenario, loads
 from pytest_garl.execution.ledger import Ledger
-from pytest_garl.execution.on_demand import CompletedFlight
 from pytest_garl.execution.reference import BUILT_IN, Reference
+from pytest_garl.execution.result import CompletedFlight
 from pytest_garl.execution.stored_ledger import check_stored
 from pytest_garl.scenarios.genes import WeatherRange, genome_for
 from pytest_garl.scenarios.maps.map import Map, load_map

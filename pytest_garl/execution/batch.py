@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-import hashlib
 import json
 import tempfile
 from collections.abc import Callable, Iterator, Sequence
@@ -12,12 +11,13 @@ from pathlib import Path
 
 from pytest_garl.errors import LedgerError
 from pytest_garl.execution.checkout import Checkout
+from pytest_garl.execution.flight_id import FlightId, search_key
 from pytest_garl.execution.job import FlightJob, dump_scenario, loads
 from pytest_garl.execution.ledger import Ledger
 from pytest_garl.execution.local_pool import local_pool
-from pytest_garl.execution.on_demand import CompletedFlight
 from pytest_garl.execution.pool import Pool, wait_for
-from pytest_garl.execution.slot import Slot, flight_name
+from pytest_garl.execution.result import CompletedFlight
+from pytest_garl.execution.slot import Slot
 from pytest_garl.scenarios.scenario import Scenario
 
 
@@ -26,7 +26,7 @@ def fly_all(
     pool: Pool,
     job: FlightJob,
     scenarios: Sequence[Scenario],
-    tick: Callable[[], None] = lambda: None,
+    on_wait: Callable[[], None] = lambda: None,
 ) -> Iterator[CompletedFlight]:
     """Yield what each scenario came to, in order; all are handed out before the first is awaited.
 
@@ -35,7 +35,7 @@ def fly_all(
     system = job.system.name
     texts = {index: dump_scenario(scenario) for index, scenario in enumerate(scenarios)}
     facts = [system, job.map, job.npcs.name, dataclasses.asdict(job.limits), *texts.values()]
-    search = hashlib.sha256(json.dumps(facts).encode()).hexdigest()[:16]
+    search = search_key(json.dumps(facts))
     ledger.add_search(search, system, job.map, len(texts), job.dumps(), "case")
     known = ledger.job(search)
     differing = job.differences(loads(known)) if known else ()
@@ -46,10 +46,10 @@ def fly_all(
         )
     ledger.add_slots(search, 0, texts)
     for index in texts:
+        flight = FlightId(search=search, map=job.map, slot=Slot(generation=0, index=index))
+        result = wait_for(ledger, pool, flight, on_wait)
         yield CompletedFlight(
-            result=wait_for(ledger, pool, search, Slot(generation=0, index=index), tick),
-            sha256=ledger.sha256(search, 0, index),
-            record=Path(job.flights) / f"{flight_name(search, 0, index, job.map)}.npz",
+            result=result, sha256=ledger.sha256(flight), record=job.record(flight)
         )
 
 

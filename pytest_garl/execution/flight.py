@@ -6,6 +6,7 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from pytest_garl.execution.flight_id import FlightId
 from pytest_garl.execution.job import FlightJob
 from pytest_garl.execution.result import FlightResult, broken_result
 from pytest_garl.scenarios.maps.map import load_map
@@ -19,21 +20,23 @@ if TYPE_CHECKING:
 
 
 def fly_job(
-    job: FlightJob, scenario: Scenario, name: str, guard: Any
+    job: FlightJob, scenario: Scenario, flight: FlightId, guard: Any
 ) -> tuple[FlightResult, str, float]:
     """Fly, judge and save a flight; return its result, its trajectory's hash, its wall time.
 
-    ``name`` is that of its record.  If the flight holds a number that is not finite, that is a
-    finding, and no record is left.
+    The record of an earlier attempt is removed first.  If the flight holds a number that is not
+    finite, that is a finding, and no record is left.
     """
     from pytest_garl.errors import NotFiniteError
     from pytest_garl.simulation.flight_file import save
 
+    record = job.record(flight)
+    record.unlink(missing_ok=True)
     for entry in job.path:
         if entry not in sys.path:
             sys.path.append(entry)
     map = load_map(job.map, tuple(Path(folder) for folder in job.map_folders))
-    flight = job.simulator.load()(
+    flown = job.simulator.load()(
         scenario,
         job.system.load(),
         job.npcs,
@@ -42,13 +45,13 @@ def fly_job(
         guard=guard,
     )
     try:
-        save(flight, Path(job.flights) / f"{name}.npz")
+        save(flown, record)
     except NotFiniteError as error:
         crash = Crash(
             kind="nonsense", error="NotFinite", message=str(error), where="", traceback=""
         )
-        return broken_result(crash, map.diagonal_m), "", flight.wall_s
-    return judged(flight, job.limits), flight.sha256, flight.wall_s
+        return broken_result(crash, map.diagonal_m), "", flown.wall_s
+    return judged(flown, job.limits), flown.sha256, flown.wall_s
 
 
 def judged(flight: Flight, limits: Limits) -> FlightResult:

@@ -9,9 +9,8 @@ from pathlib import Path
 
 from pytest_garl.errors import LedgerError
 from pytest_garl.execution.database import REMEDY
-from pytest_garl.execution.ledger_queue import Claim
+from pytest_garl.execution.flight_id import FlightId
 from pytest_garl.execution.reference import Reference
-from pytest_garl.execution.slot import flight_name
 from pytest_garl.files.json_values import dataclass_from, parse_json
 from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.simulation.npc_policy import PolicySpec
@@ -56,6 +55,10 @@ class FlightJob:
         facts = {key: each for key, each in dataclasses.asdict(self).items() if key not in _PLACES}
         return json.dumps(facts, sort_keys=True)
 
+    def record(self, flight: FlightId) -> Path:
+        """Return the file of the record of one of its flights."""
+        return flight.record(Path(self.flights))
+
     def dumps(self) -> str:
         """Return it as JSON."""
         return json.dumps(dataclasses.asdict(self), sort_keys=True)
@@ -89,9 +92,3 @@ def load_scenario(text: str) -> Scenario:
         raise LedgerError(f"a scenario in the ledger is damaged: {error}. {REMEDY}") from error
     genes = tuple((key, float(value)) for key, value in scenario.genes)
     return dataclasses.replace(scenario, genes=genes)
-
-
-def record_file(job: FlightJob, claim: Claim) -> Path:
-    """Return where the record of a claimed slot's flight goes."""
-    name = flight_name(claim.search, claim.generation, claim.slot, job.map)
-    return Path(job.flights) / f"{name}.npz"

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from pytest_garl.execution.database import Database, SearchKind
+from pytest_garl.execution.flight_id import FlightId
 from pytest_garl.execution.result import FlightResult, parse_result
 from pytest_garl.execution.slot import Slot
 
@@ -30,9 +31,7 @@ class SearchProgress:
 class LedgerFlight:
     """A flown slot."""
 
-    search: str
-    generation: int
-    slot: int
+    flight: FlightId
     scenario: str
     result: FlightResult
     sha256: str
@@ -82,16 +81,16 @@ class LedgerQueries:
 
     def _rows(self, condition: str, *values: str) -> list[LedgerFlight]:
         rows = self._database.execute(
-            "SELECT search, generation, slot, scenario, result, sha256 FROM slot "
+            "SELECT search, generation, slot, scenario, result, sha256, map FROM slot "
             "JOIN search ON search.id = slot.search WHERE kind = 'search' AND state = 'flown' "
             f"AND {condition} ORDER BY system, map, generation, slot",
             values,
         )
         return [
             LedgerFlight(
-                search=row[0],
-                generation=row[1],
-                slot=row[2],
+                flight=FlightId(
+                    search=row[0], map=row[6], slot=Slot(generation=row[1], index=row[2])
+                ),
                 scenario=row[3],
                 result=parse_result(row[4]),
                 sha256=row[5] or "",

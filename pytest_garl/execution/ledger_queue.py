@@ -9,8 +9,10 @@ from time import monotonic
 from typing import Any
 
 from pytest_garl.execution.database import Database
+from pytest_garl.execution.flight_id import FlightId
 from pytest_garl.execution.processes import alive
 from pytest_garl.execution.result import FlightResult
+from pytest_garl.execution.slot import Slot
 
 _METERS = {"search": "flights", "case": "cases", "on_demand": "on_demand"}
 _NEXT, _NEXT_OF_SYSTEM = (
@@ -31,9 +33,7 @@ class Claim:
     then it is flown once more, alone.  ``attempt`` counts from 1.
     """
 
-    search: str
-    generation: int
-    slot: int
+    flight: FlightId
     scenario: str
     job: str
     after: str
@@ -84,13 +84,11 @@ class WorkQueue:
                 "WHERE search = ? AND generation = ? AND slot = ?",
                 (self._pid, None if lease_s is None else monotonic() + lease_s, *row[:3]),
             )
-            job = self._database.execute("SELECT job FROM search WHERE id = ?", row[:1]).fetchone()[
-                0
-            ]
+            job, map = self._database.execute(
+                "SELECT job, map FROM search WHERE id = ?", row[:1]
+            ).fetchone()
         return Claim(
-            search=row[0],
-            generation=row[1],
-            slot=row[2],
+            flight=FlightId(search=row[0], map=map, slot=Slot(generation=row[1], index=row[2])),
             scenario=row[3],
             job=job,
             after=row[4],
@@ -128,11 +126,11 @@ class WorkQueue:
                 "UPDATE slot SET state = 'flown', pid = NULL, lease = NULL, "
                 "result = ?, sha256 = ?, wall_s = ? "
                 "WHERE search = ? AND generation = ? AND slot = ? AND state = 'claimed'",
-                (text, sha256, wall_s, claim.search, claim.generation, claim.slot),
+                (text, sha256, wall_s, *claim.flight.key),
             )
             if done.rowcount:
                 kind = self._database.execute(
-                    "SELECT kind FROM search WHERE id = ?", (claim.search,)
+                    "SELECT kind FROM search WHERE id = ?", (claim.flight.search,)
                 ).fetchone()[0]
                 self.count(_METERS[kind])
                 self.count("flying_s", wall_s)
@@ -140,16 +138,14 @@ class WorkQueue:
     def claim_of(self, pid: int) -> Claim | None:
         """Return the slot that a process has in flight; it may be gone by then."""
         row = self._database.execute(
-            "SELECT s.search, generation, slot, scenario, job, after, attempts FROM slot s "
+            "SELECT s.search, generation, slot, scenario, job, after, attempts, map FROM slot s "
             "JOIN search ON search.id = s.search WHERE pid = ? AND state = 'claimed'",
             (pid,),
         ).fetchone()
         if row is None:
             return None
         return Claim(
-            search=row[0],
-            generation=row[1],
-            slot=row[2],
+            flight=FlightId(search=row[0], map=row[7], slot=Slot(generation=row[1], index=row[2])),
             scenario=row[3],
             job=row[4],
             after=row[5],
@@ -177,7 +173,7 @@ class WorkQueue:
         self._database.execute(
             "UPDATE slot SET state = 'waiting', pid = NULL, lease = NULL, attempts = ?, after = ? "
             "WHERE search = ? AND generation = ? AND slot = ? AND state = 'claimed' AND pid = ?",
-            (attempts, after, claim.search, claim.generation, claim.slot, claim.pid),
+            (attempts, after, *claim.flight.key, claim.pid),
         )
 
     def reset(self) -> None:

@@ -10,11 +10,10 @@ from pathlib import Path
 from pytest_garl import cpu_dispatch
 from pytest_garl.execution.checkout import Checkout
 from pytest_garl.execution.flight import fly_job
-from pytest_garl.execution.job import load_scenario, loads, record_file
+from pytest_garl.execution.job import load_scenario, loads
 from pytest_garl.execution.ledger_queue import Claim, WorkQueue
 from pytest_garl.execution.pool import Pool
 from pytest_garl.execution.process_pool import TURN_S, ProcessPool
-from pytest_garl.execution.slot import flight_name
 from pytest_garl.execution.worker_failure import WorkerExit, retry_or_record
 
 
@@ -66,11 +65,8 @@ class InProcessPool:
             self._queue.release_dead()
             time.sleep(TURN_S)
             return
-        job = loads(claim.job)
-        slot_id = flight_name(claim.search, claim.generation, claim.slot, job.map)
-        record_file(job, claim).unlink(missing_ok=True)
-        result, sha256, wall_s = fly_job(job, load_scenario(claim.scenario), slot_id, None)
-        self._queue.record(claim, result, sha256, wall_s)
+        scenario = load_scenario(claim.scenario)
+        self._queue.record(claim, *fly_job(loads(claim.job), scenario, claim.flight, None))
 
     def close(self) -> None:
         """Do nothing: no flight is under way between two turns."""

@@ -10,7 +10,6 @@ same questions and finds the answers in the ledger.
 
 from __future__ import annotations
 
-import hashlib
 import queue
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
@@ -18,28 +17,14 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Protocol, TypeVar
 
+from pytest_garl.execution.flight_id import FlightId, search_key
 from pytest_garl.execution.job import FlightJob, dump_scenario
 from pytest_garl.execution.ledger import Ledger
 from pytest_garl.execution.pool import Pool
-from pytest_garl.execution.result import FlightResult
-from pytest_garl.execution.slot import flight_name
+from pytest_garl.execution.result import CompletedFlight
 from pytest_garl.scenarios.scenario import Scenario
 
 T = TypeVar("T")
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class CompletedFlight:
-    """A flight that was asked for: its result, its trajectory's hash, where its record is."""
-
-    result: FlightResult
-    sha256: str
-    record: Path
-
-    @property
-    def signature(self) -> str:
-        """The violation's signature, empty for a flight without violation."""
-        return self.result.signature
 
 
 class FlyFunction(Protocol):
@@ -60,8 +45,7 @@ class _Procedure:
     name: str
     asked: queue.SimpleQueue[tuple[FlightJob, Scenario] | None]
     answers: queue.SimpleQueue[CompletedFlight | None]
-    job: FlightJob | None = None
-    search: str = ""
+    awaited: tuple[FlightId, Path] | None = None
     flown: int = 0
 
     def fly(self, job: FlightJob, scenario: Scenario) -> CompletedFlight:
@@ -114,11 +98,11 @@ class OnDemandFlights:
     def _advance(self, procedure: _Procedure) -> bool:
         """Take a function as far as it goes without a flight; return whether it is done."""
         while True:
-            if procedure.job is not None:
-                done = self._done(procedure.job, procedure.search)
+            if procedure.awaited is not None:
+                done = self._ledger.completed(*procedure.awaited)
                 if done is None:
                     return False
-                procedure.job = None
+                procedure.awaited = None
                 procedure.answers.put(done)
             wanted = procedure.asked.get()
             if wanted is None:
@@ -129,21 +113,10 @@ class OnDemandFlights:
         text = dump_scenario(scenario)
         # What is asked belongs to the key: resumed with another budget, a function asks otherwise.
         key = f"errand {procedure.name} {procedure.flown} {job.flown_facts()} {text}"
-        procedure.job, procedure.search = job, hashlib.sha256(key.encode()).hexdigest()[:16]
+        flight = FlightId(search=search_key(key), map=job.map)
+        procedure.awaited = flight, Path(job.flights)
         procedure.flown += 1
-        name = job.system.name
-        self._ledger.add_search(procedure.search, name, job.map, 1, job.dumps(), "on_demand")
-        self._ledger.add_slots(procedure.search, 0, {0: text})
-
-    def _done(self, job: FlightJob, search: str) -> CompletedFlight | None:
-        result = self._ledger.result(search, 0, 0)
-        if result is None:
-            return None
-        return CompletedFlight(
-            result=result,
-            sha256=self._ledger.sha256(search, 0, 0),
-            record=Path(job.flights) / f"{flight_name(search, 0, 0, job.map)}.npz",
-        )
+        self._ledger.add_flight(flight, job.system.name, job.dumps(), text)
 
 
 def _begin(

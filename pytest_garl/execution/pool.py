@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Protocol
 
+from pytest_garl.execution.flight_id import FlightId
 from pytest_garl.execution.ledger import Ledger
 from pytest_garl.execution.result import FlightResult
-from pytest_garl.execution.slot import Slot
 
 
 class Pool(Protocol):
@@ -25,11 +25,11 @@ class Pool(Protocol):
 
 
 def wait_for(
-    ledger: Ledger, pool: Pool, search: str, slot: Slot, tick: Callable[[], None]
+    ledger: Ledger, pool: Pool, flight: FlightId, on_wait: Callable[[], None]
 ) -> FlightResult:
-    """Return a slot's result when it is flown; ``tick`` is called before and while waiting."""
-    tick()
-    while (result := ledger.result(search, slot.generation, slot.index)) is None:
+    """Return a flight's result when it is flown; ``on_wait`` is called before and while waiting."""
+    on_wait()
+    while (result := ledger.result(flight)) is None:
         pool.turn()
-        tick()
+        on_wait()
     return result

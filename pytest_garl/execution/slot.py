@@ -20,8 +20,3 @@ class Slot:
 def slots(budget: int, size: int) -> tuple[Slot, ...]:
     """Return exactly ``budget`` slots in generations of ``size``; the last may be shorter."""
     return tuple(Slot(generation=n // size, index=n % size) for n in range(budget))
-
-
-def flight_name(search: str, generation: int, index: int, map: str) -> str:
-    """Return the name of a flight's record in the folder of flights, without ending."""
-    return f"{search[:8]}-{Slot(generation=generation, index=index).id(map)}"

@@ -15,7 +15,6 @@ from pytest_garl.execution.checkout import isolate_imports
 from pytest_garl.execution.ledger_queue import Claim, WorkQueue
 from pytest_garl.execution.processes import Parent, failure_text, run_worker
 from pytest_garl.execution.result import FlightResult
-from pytest_garl.execution.slot import flight_name
 from pytest_garl.execution.supervisor import FlightMonitor, supervise
 from pytest_garl.simulation.system_under_test.texts import (
     MESSAGE_CHARS,
@@ -115,19 +114,17 @@ class Worker:
 
     def _fly(self, claim: Claim) -> tuple[FlightResult, str, float]:
         from pytest_garl.execution.flight import fly_job
-        from pytest_garl.execution.job import load_scenario, loads, record_file
+        from pytest_garl.execution.job import load_scenario, loads
 
         job, scenario = loads(claim.job), load_scenario(claim.scenario)
         if not job.system.module.startswith(_TRUSTED):
             self._system = job.system.name
-        name = flight_name(claim.search, claim.generation, claim.slot, job.map)
         limit_s = job.timeout_s * (RETRY_LIMIT_FACTOR if claim.after else 1.0)
         if "failed" in claim.after:
             self._prove_simulator(claim)
         try:
-            record_file(job, claim).unlink(missing_ok=True)
             self._monitor.flight_begins(limit_s)
-            return fly_job(job, scenario, name, self._monitor)
+            return fly_job(job, scenario, claim.flight, self._monitor)
         except OSError as error:
             # Errors of the landing system are part of its flight; this one is of the record.
             raise LedgerError(f"{job.flights}: {error.strerror or error}") from error
@@ -145,9 +142,8 @@ class Worker:
         from pytest_garl.simulation.system_under_test.reference_pilot import ReferencePilot
 
         job = dataclasses.replace(loads(claim.job), system=reference_to(ReferencePilot))
-        name = flight_name(claim.search, claim.generation, claim.slot, job.map)
         try:
-            fly_job(job, load_scenario(claim.scenario), name, None)
+            fly_job(job, load_scenario(claim.scenario), claim.flight, None)
         except GarlError:
             raise
         except Exception as error:

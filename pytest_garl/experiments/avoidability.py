@@ -43,9 +43,7 @@ def count_unavoidable(
     """
     drawn = {search.key: _drawn(search.violating, limit, seed) for search in searches}
     flights = {
-        f"pilot {search.key} {flight.generation} {flight.slot}": functools.partial(
-            _avoids, search, flight
-        )
+        "pilot {} {} {}".format(*flight.flight.key): functools.partial(_avoids, search, flight)
         for search in searches
         for flight in drawn[search.key]
     }

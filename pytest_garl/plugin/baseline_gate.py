@@ -16,12 +16,13 @@ from pytest_garl.baselines.file import Baseline, BaselineSet, load
 from pytest_garl.baselines.gate import compare_flights
 from pytest_garl.baselines.pairs import PairResult
 from pytest_garl.errors import GarlError
+from pytest_garl.execution.flight_id import FIRST
 from pytest_garl.plugin.fixtures import abort_session
 from pytest_garl.plugin.keys import RUN, is_xdist_worker
 from pytest_garl.plugin.marker import read_marker
 from pytest_garl.plugin.options import Options
 from pytest_garl.plugin.run import Run
-from pytest_garl.plugin.target import FIRST, Target
+from pytest_garl.plugin.target import Target
 
 GATE_REPORT = "garl.gate"
 """The user property under which a gate's sentences reach the summary, also from xdist's workers."""

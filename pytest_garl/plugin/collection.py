@@ -9,10 +9,11 @@ from pathlib import Path
 import pytest
 
 from pytest_garl.errors import GarlError
+from pytest_garl.execution.flight_id import FIRST
 from pytest_garl.execution.slot import slots
 from pytest_garl.plugin.marker import MarkerArguments, read_marker
 from pytest_garl.plugin.options import Options, options_of
-from pytest_garl.plugin.target import FIRST, Target
+from pytest_garl.plugin.target import Target
 
 NOTHING_TO_FLY = "no --garl-budget given and no saved cases; to search: pytest --garl-budget=40"
 

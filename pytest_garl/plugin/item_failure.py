@@ -6,13 +6,12 @@ from dataclasses import dataclass
 
 import pytest
 
-from pytest_garl.execution.on_demand import CompletedFlight
-from pytest_garl.execution.result import FlightResult
+from pytest_garl.execution.result import CompletedFlight, FlightResult
 from pytest_garl.plugin.failed_statement import failure_of
 from pytest_garl.plugin.keys import LANDING
 from pytest_garl.plugin.outcomes import Reflights
-from pytest_garl.plugin.run import Run, reflight_key, test_of
-from pytest_garl.plugin.target import FIRST, Target
+from pytest_garl.plugin.run import Run, test_of
+from pytest_garl.plugin.target import Target
 from pytest_garl.plugin.user_assertions import ItemAssertion
 from pytest_garl.regressions.user_failure import UserFailure
 
@@ -133,15 +132,9 @@ def _flight(run: Run, target: Target) -> CompletedFlight:
 
 def divergence_s(run: Run, target: Target) -> float | None:
     """Return when a slot's flight and its first reflight part; None if one was not recorded."""
-    from pytest_garl.execution.slot import flight_name
     from pytest_garl.simulation.flight_file import load, parted_s
 
-    slot = target.slot
-    names = (
-        flight_name(target.search, slot.generation, slot.index, target.map),
-        flight_name(reflight_key(target, 0), FIRST.generation, FIRST.index, target.map),
-    )
-    files = [run.options.folder / "flights" / f"{name}.npz" for name in names]
+    files = [flight.record(run.flights) for flight in (target.flight, target.reflight(0))]
     if not all(file.exists() for file in files):
         return None
     first, second = (load(file) for file in files)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import functools
-import hashlib
 import os
 import sys
 from collections.abc import Callable, Mapping, Sequence
@@ -16,20 +15,20 @@ import pytest
 from pytest_garl.adversary.catalogue import policy_names
 from pytest_garl.errors import LedgerError
 from pytest_garl.execution.database import SearchKind
+from pytest_garl.execution.flight_id import FlightId
 from pytest_garl.execution.ledger import Ledger
 from pytest_garl.execution.pool import Pool, wait_for
 from pytest_garl.execution.reference import BUILT_IN, Reference, reference_to, simulator_sha256
-from pytest_garl.execution.slot import Slot, flight_name
+from pytest_garl.execution.slot import Slot
 from pytest_garl.execution.sources import combined_sha256, data_files, sources_of
 from pytest_garl.plugin.keys import is_xdist_worker, target_of
 from pytest_garl.plugin.options import Options
 from pytest_garl.plugin.report_claims import ReportClaims
-from pytest_garl.plugin.target import FIRST, Target
+from pytest_garl.plugin.target import Target
 
 if TYPE_CHECKING:
     from pytest_garl.execution.job import FlightJob
-    from pytest_garl.execution.on_demand import CompletedFlight
-    from pytest_garl.execution.result import FlightResult
+    from pytest_garl.execution.result import CompletedFlight, FlightResult
     from pytest_garl.plugin.user_assertions import ItemAssertion
     from pytest_garl.regressions.follow_up import InvestigatedSignature
     from pytest_garl.regressions.forecast import RemainingWork
@@ -93,7 +92,7 @@ class Run:
     items: dict[str, dict[Slot, list[Selected]]] = field(default_factory=dict)
     targets: dict[str, dict[Slot, Target]] = field(default_factory=dict)
     breeders: dict[str, Breeder] = field(default_factory=dict)
-    results: dict[tuple[str, Slot], FlightResult] = field(default_factory=dict)
+    results: dict[FlightId, FlightResult] = field(default_factory=dict)
     pursued: tuple[InvestigatedSignature, ...] = ()
     """What became of new signatures after the search."""
     rest: RemainingWork | None = None
@@ -167,23 +166,25 @@ class Run:
     def fly(self, target: Target, npcs: PolicySpec) -> FlightResult:
         """Return the slot's result after it and all lower selected slots are flown."""
         self._register(target, npcs)
-        search = target.search
         try:
-            for slot in self._lower(search, target.slot):
-                self._wait(search, slot)
-            return self._wait(search, target.slot)
+            for lower in self.lower_targets(target):
+                self._wait(lower.flight)
+            return self._wait(target.flight)
         finally:
             self.on_wait_end()
 
+    @property
+    def flights(self) -> Path:
+        """The folder of the flights' records."""
+        return self.options.folder / "flights"
+
     def record(self, target: Target) -> Path:
         """Return where the record of a slot's flight lies."""
-        slot = target.slot
-        name = flight_name(target.search, slot.generation, slot.index, target.map)
-        return self.options.folder / "flights" / f"{name}.npz"
+        return target.flight.record(self.flights)
 
     def trajectory_sha256(self, target: Target) -> str:
         """Return the hash of a slot's flight."""
-        return self.ledger.sha256(target.search, target.slot.generation, target.slot.index)
+        return self.ledger.sha256(target.flight)
 
     def unproven(self, target: Target) -> tuple[str, ...]:
         """Return why it proves nothing that a case passes; nothing if the system was repaired."""
@@ -204,8 +205,7 @@ class Run:
         """Return what a slot flies."""
         from pytest_garl.execution.job import load_scenario
 
-        slot = target.slot
-        text = self.ledger.scenario(target.search, slot.generation, slot.index)
+        text = self.ledger.scenario(target.flight)
         assert text is not None
         return load_scenario(text)
 
@@ -235,33 +235,29 @@ class Run:
 
     def lower_targets(self, target: Target) -> list[Target]:
         """Return what the selected tests of lower slots of a search test."""
-        search = target.search
-        return [self.targets[search][slot] for slot in self._lower(search, target.slot)]
+        targets = self.targets[target.search]
+        return [targets[slot] for slot in sorted(targets) if slot < target.slot]
 
     def result(self, target: Target) -> FlightResult:
         """Return what a slot came to that is flown, or will be."""
-        return self._wait(target.search, target.slot)
+        return self._wait(target.flight)
 
     def refly(self, target: Target, count: int) -> list[CompletedFlight]:
         """Fly a flown slot ``count`` times more."""
-        from pytest_garl.execution.on_demand import CompletedFlight
+        from pytest_garl.execution.result import CompletedFlight
 
         job = self.ledger.job(target.search)
         assert job is not None
-        name = target.system_name
-        text = self.ledger.scenario(target.search, target.slot.generation, target.slot.index)
+        text = self.ledger.scenario(target.flight)
         assert text is not None
         flown = []
         for index in range(count):
-            errand = reflight_key(target, index)
-            self.ledger.add_search(errand, name, target.map, 1, job, "on_demand")
-            self.ledger.add_slots(errand, 0, {0: text})
-            result = self._wait(errand, FIRST)
-            record = (
-                self.options.folder / "flights" / f"{flight_name(errand, 0, 0, target.map)}.npz"
+            flight = target.reflight(index)
+            self.ledger.add_flight(flight, target.system_name, job, text)
+            result, sha256 = self._wait(flight), self.ledger.sha256(flight)
+            flown.append(
+                CompletedFlight(result=result, sha256=sha256, record=flight.record(self.flights))
             )
-            sha256 = self.ledger.sha256(errand, 0, 0)
-            flown.append(CompletedFlight(result=result, sha256=sha256, record=record))
         return flown
 
     def fly_all(
@@ -276,15 +272,12 @@ class Run:
         finally:
             self.on_wait_end()
 
-    def _lower(self, search: str, below: Slot) -> list[Slot]:
-        return [slot for slot in sorted(self.items[search]) if slot < below]
-
-    def _wait(self, search: str, slot: Slot) -> FlightResult:
-        """Return a slot's result; what is flown never changes and is asked for once."""
-        known = self.results.get((search, slot))
+    def _wait(self, flight: FlightId) -> FlightResult:
+        """Return a flight's result; it never changes, and is asked for once."""
+        known = self.results.get(flight)
         if known is None:
-            known = wait_for(self.ledger, self.pool, search, slot, self._advance)
-            self.results[search, slot] = known
+            known = wait_for(self.ledger, self.pool, flight, self._advance)
+            self.results[flight] = known
         return known
 
     def _advance(self) -> None:
@@ -355,7 +348,7 @@ class Run:
             limits=target.limits,
             timeout_s=self.options.timeout_s,
             path=tuple(_path()),
-            flights=str(self.options.folder / "flights"),
+            flights=str(self.flights),
             sources=tuple(sorted({*sources, *own})),
         )
 
@@ -381,12 +374,6 @@ class Run:
             population=self.options.population,
         )
         return make_method(self.options.method, plan)
-
-
-def reflight_key(target: Target, index: int) -> str:
-    """Return the ledger's key of a slot's flight once more."""
-    text = f"again {target.search} {target.slot.id(target.map)} {index}"
-    return hashlib.sha256(text.encode()).hexdigest()[:16]
 
 
 def _steered(target: Target, npcs: PolicySpec) -> PolicySpec:

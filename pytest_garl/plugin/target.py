@@ -4,21 +4,18 @@ from __future__ import annotations
 
 import dataclasses
 import functools
-import hashlib
 import json
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from pytest_garl.execution.flight_id import FlightId, search_key
 from pytest_garl.execution.reference import reference_to
 from pytest_garl.execution.slot import Slot
 
 if TYPE_CHECKING:
     from pytest_garl.regressions.corpus import CorpusEntry
     from pytest_garl.verdicts.verdict import Limits
-
-FIRST = Slot(generation=0, index=0)
-"""The one slot of what is no search."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -69,4 +66,14 @@ class Target:
         ]
         if self.entry is not None:
             facts += [str(self.entry.path), self.live]
-        return hashlib.sha256(json.dumps(facts).encode()).hexdigest()[:16]
+        return search_key(json.dumps(facts))
+
+    @property
+    def flight(self) -> FlightId:
+        """The flight that the item judges."""
+        return FlightId(search=self.search, map=self.map, slot=self.slot)
+
+    def reflight(self, index: int) -> FlightId:
+        """Return the flight that repeats the item's flight for the ``index``-th time."""
+        key = search_key(f"again {self.search} {self.slot.id(self.map)} {index}")
+        return FlightId(search=key, map=self.map)

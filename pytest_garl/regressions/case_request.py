@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from pytest_garl.execution.job import FlightJob
-from pytest_garl.execution.on_demand import CompletedFlight
+from pytest_garl.execution.result import CompletedFlight
 from pytest_garl.regressions.case import Case, RecordedBehaviour
 from pytest_garl.regressions.robustness import COUNT
 from pytest_garl.regressions.shrink import complexity, genome_of

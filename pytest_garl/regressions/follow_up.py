@@ -12,9 +12,9 @@ from pathlib import Path
 from pytest_garl.execution.job import FlightJob, load_scenario, loads
 from pytest_garl.execution.ledger import Ledger
 from pytest_garl.execution.ledger_queries import LedgerFlight
-from pytest_garl.execution.on_demand import CompletedFlight, FlyFunction, OnDemandFlights
+from pytest_garl.execution.on_demand import FlyFunction, OnDemandFlights
 from pytest_garl.execution.pool import Pool
-from pytest_garl.execution.slot import flight_name
+from pytest_garl.execution.result import CompletedFlight
 from pytest_garl.regressions.case import Case
 from pytest_garl.regressions.case_request import CaseRequest, CaseResult
 from pytest_garl.regressions.corpus import Corpus
@@ -172,7 +172,7 @@ def _divided(most: Sequence[int], flights: int) -> list[int]:
 def _by_search(ledger: Ledger) -> dict[str, dict[str, list[LedgerFlight]]]:
     found: dict[str, dict[str, list[LedgerFlight]]] = {}
     for row in ledger.queries.violating():
-        found.setdefault(row.search, defaultdict(list))[row.signature].append(row)
+        found.setdefault(row.flight.search, defaultdict(list))[row.signature].append(row)
     return found
 
 
@@ -197,10 +197,7 @@ def _failures(
 
 def done_of(row: LedgerFlight, job: FlightJob) -> CompletedFlight:
     """Return a search's flight as what is flown beside it comes back."""
-    name = flight_name(row.search, row.generation, row.slot, job.map)
-    return CompletedFlight(
-        result=row.result, sha256=row.sha256, record=Path(job.flights) / f"{name}.npz"
-    )
+    return CompletedFlight(result=row.result, sha256=row.sha256, record=job.record(row.flight))
 
 
 def follow_up(

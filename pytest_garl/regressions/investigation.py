@@ -7,8 +7,9 @@ from collections.abc import Callable, Iterator, Sequence
 
 from pytest_garl.adversary.recorded import recorded_spec
 from pytest_garl.execution.job import FlightJob
-from pytest_garl.execution.on_demand import CompletedFlight, FlyFunction
+from pytest_garl.execution.on_demand import FlyFunction
 from pytest_garl.execution.reference import reference_to
+from pytest_garl.execution.result import CompletedFlight
 from pytest_garl.regressions.case import Avoidable, Case, RecordedBehaviour
 from pytest_garl.regressions.case_request import CaseRequest, CaseResult, Failure, simplest_first
 from pytest_garl.regressions.move_reduction import shorter_records

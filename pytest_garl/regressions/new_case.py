@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from pytest_garl.execution.on_demand import CompletedFlight
 from pytest_garl.execution.reference import simulator_sha256
+from pytest_garl.execution.result import CompletedFlight
 from pytest_garl.regressions.case import Avoidable, Case, Evidence, RecordedBehaviour, Violation
 from pytest_garl.regressions.case_request import (
     CaseRequest,

@@ -45,8 +45,8 @@ class Instant:
         claim = self.ledger.queue.claim()
         assert claim is not None
         if not self.handed_out:
-            self.handed_out = [text for text, _ in self.ledger.generation(claim.search, 0)]
-        self.ledger.queue.record(claim, flight_result(elapsed_s=claim.slot), "", 0.0)
+            self.handed_out = [text for text, _ in self.ledger.generation(claim.flight.search, 0)]
+        self.ledger.queue.record(claim, flight_result(elapsed_s=claim.flight.slot.index), "", 0.0)
 
     def close(self) -> None:
         pass

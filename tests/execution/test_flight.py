@@ -11,6 +11,7 @@ from typing import Any
 import pytest
 
 from pytest_garl.execution.flight import fly_job
+from pytest_garl.execution.flight_id import FlightId
 from pytest_garl.execution.reference import reference_to
 from pytest_garl.landing_system import Diagnostics
 from pytest_garl.simulation.flight import Flight, Step
@@ -54,7 +55,7 @@ def test_flight_that_is_not_finite_is_a_finding(
     simulator: Callable[..., Flight], words: str, tmp_path: Path
 ) -> None:
     job = dataclasses.replace(job_of(Good, tmp_path), simulator=reference_to(simulator))
-    result, sha256, _ = fly_job(job, scenario(), "court-g00-s00", None)
+    result, sha256, _ = fly_job(job, scenario(), FlightId(search="search", map="lawn"), None)
     assert result.outcome == "crashed"
     assert result.signature == "V:nonsense:NotFinite"
     assert f"holds a NaN or an infinity in {words}" in result.verdict.story

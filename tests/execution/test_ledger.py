@@ -9,6 +9,7 @@ import pytest
 
 from pytest_garl.errors import LedgerError
 from pytest_garl.execution.database import VERSION
+from pytest_garl.execution.flight_id import FlightId
 from pytest_garl.execution.ledger import Ledger
 from tests.execution.ledgers import FACTS, waiting_ledger
 from tests.support.results import flight_result
@@ -29,10 +30,10 @@ def test_resuming_gives_back_what_was_in_flight(tmp_path: Path) -> None:
     ledger.queue.claim()
     ledger.close()
     ledger = Ledger.resume(tmp_path / "ledger.sqlite", FACTS)
-    assert ledger.result("s", 0, 0) == flight_result()
+    assert ledger.result(FlightId(search="s", map="court")) == flight_result()
     again = ledger.queue.claim()
     assert again is not None
-    assert (again.slot, again.after) == (1, "")
+    assert (again.flight.slot.index, again.after) == (1, "")
 
 
 def test_a_new_run_keeps_the_ledger_before_it(tmp_path: Path) -> None:

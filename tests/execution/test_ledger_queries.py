@@ -38,7 +38,7 @@ def test_a_search_has_a_hash_and_a_time_of_its_own(tmp_path: Path) -> None:
         ledger.add_search("t", "systems:Good", "lawn", 1, "{}")
         ledger.add_slots("t", 0, {0: "d"})
         while claim := ledger.queue.claim():
-            result = flight_result(elapsed_s=value if claim.search == "t" else 1)
+            result = flight_result(elapsed_s=value if claim.flight.search == "t" else 1)
             ledger.queue.record(claim, result, "hash", 0.5)
         return ledger
 

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import pytest
 
+from pytest_garl.execution.flight_id import FlightId
 from pytest_garl.execution.ledger import Ledger
 from pytest_garl.execution.ledger_queue import WorkQueue
 from tests.execution.ledgers import FACTS, waiting_ledger
@@ -15,11 +16,11 @@ from tests.support.results import flight_result
 def test_a_slot_is_handed_out_once_and_recorded_once(tmp_path: Path) -> None:
     ledger = waiting_ledger(tmp_path / "ledger.sqlite")
     claims = [ledger.queue.claim() for _ in range(4)]
-    assert [claim.slot if claim else None for claim in claims] == [0, 1, 2, None]
+    assert [claim.flight.slot.index if claim else None for claim in claims] == [0, 1, 2, None]
     assert claims[0] is not None
     ledger.queue.record(claims[0], flight_result(), "hash", 0.1)
     ledger.queue.record(claims[0], flight_result(elapsed_s=2.0), "other", 0.1)
-    assert ledger.result("s", 0, 0) == flight_result()
+    assert ledger.result(FlightId(search="s", map="court")) == flight_result()
     assert ledger.queries.meters()["flights"] == 1
 
 
@@ -30,11 +31,11 @@ def test_a_claim_of_a_silent_process_lapses(tmp_path: Path) -> None:
     ledger.queue.release_dead()
     again = ledger.queue.claim()
     assert again is not None
-    assert again.slot == first.slot
+    assert again.flight == first.flight
     ledger.queue.release_dead()
     other = ledger.queue.claim(lease_s=None)
     assert other is not None
-    assert other.slot == 1
+    assert other.flight.slot.index == 1
 
 
 def test_a_claim_of_a_child_that_lives_never_lapses(tmp_path: Path) -> None:
@@ -77,13 +78,17 @@ def test_nobody_flies_beside_a_slot_that_flies_again(tmp_path: Path) -> None:
     ledger.queue.fly_alone(first, "died")
     again = ledger.queue.claim()
     assert again is not None
-    assert (again.slot, again.after, again.attempt) == (first.slot, "died", 2)
+    assert (again.flight.slot.index, again.after, again.attempt) == (
+        first.flight.slot.index,
+        "died",
+        2,
+    )
     assert ledger.queue.waiting() == 2
     assert ledger.queue.claim() is None
     ledger.queue.record(again, flight_result(), "", 0.0)
     beside = ledger.queue.claim()
     assert beside is not None
-    assert beside.slot == 1
+    assert beside.flight.slot.index == 1
 
 
 def test_a_slot_flies_again_when_the_others_have_come_down(tmp_path: Path) -> None:
@@ -96,7 +101,7 @@ def test_a_slot_flies_again_when_the_others_have_come_down(tmp_path: Path) -> No
     ledger.queue.record(other, flight_result(), "", 0.0)
     again = ledger.queue.claim()
     assert again is not None
-    assert again.slot == first.slot
+    assert again.flight == first.flight
 
 
 def test_a_run_that_is_resumed_twice_counts_no_attempt_of_what_was_in_flight(
@@ -106,7 +111,7 @@ def test_a_run_that_is_resumed_twice_counts_no_attempt_of_what_was_in_flight(
     for _ in range(2):
         claim = ledger.queue.claim()
         assert claim is not None
-        assert (claim.slot, claim.attempt) == (0, 1)
+        assert (claim.flight.slot.index, claim.attempt) == (0, 1)
         ledger.close()
         ledger = Ledger.resume(tmp_path / "ledger.sqlite", FACTS)
     again = ledger.queue.claim()
@@ -114,7 +119,7 @@ def test_a_run_that_is_resumed_twice_counts_no_attempt_of_what_was_in_flight(
     assert again.attempt == 1
     beside = ledger.queue.claim()
     assert beside is not None
-    assert beside.slot == 1
+    assert beside.flight.slot.index == 1
 
 
 def test_process_that_has_flown_gets_slots_of_its_own_system_alone(tmp_path: Path) -> None:
@@ -125,7 +130,7 @@ def test_process_that_has_flown_gets_slots_of_its_own_system_alone(tmp_path: Pat
     again = ledger.queue.claim(flown="systems:Other")
     assert first is not None
     assert again is not None
-    assert [(first.search, first.slot), (again.search, again.slot)] == [("t", 0), ("t", 1)]
+    assert [first.flight.key, again.flight.key] == [("t", 0, 0), ("t", 0, 1)]
     assert ledger.queue.claim(flown="systems:Other") is None
     assert ledger.queue.others_wait("systems:Other")
     assert not ledger.queue.others_wait("systems:Good")

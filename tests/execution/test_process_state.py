@@ -12,6 +12,7 @@ import cv2
 import numpy as np
 import pytest
 
+from pytest_garl.execution.flight_id import FlightId
 from pytest_garl.execution.process_state import ProcessState
 from pytest_garl.simulation import contacts, loop
 from tests.execution.flying import Good, job_of, scenario
@@ -31,7 +32,7 @@ def no_alarm() -> Iterator[None]:
 def test_what_flights_import_and_hide_changes_nothing(state: ProcessState, tmp_path: Path) -> None:
     from pytest_garl.execution.flight import fly_job
 
-    fly_job(job_of(Good, tmp_path), scenario(), "flight", None)
+    fly_job(job_of(Good, tmp_path), scenario(), FlightId(search="flight", map="lawn"), None)
     with warnings.catch_warnings():
         warnings.filterwarnings("ignore", "numpy.ndarray size changed")
         random.seed(7)

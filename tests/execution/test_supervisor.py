@@ -12,6 +12,7 @@ import pytest
 
 from pytest_garl.errors import PoolError
 from pytest_garl.execution.flight import fly_job
+from pytest_garl.execution.flight_id import FIRST, FlightId
 from pytest_garl.execution.job import dump_scenario
 from pytest_garl.execution.ledger import Ledger
 from pytest_garl.execution.local_pool import FlightWorkers
@@ -19,7 +20,7 @@ from pytest_garl.execution.pool import wait_for
 from pytest_garl.execution.process_pool import MAX_IDLE_EXITS, ProcessPool
 from pytest_garl.execution.reference import reference_to
 from pytest_garl.execution.result import FlightResult
-from pytest_garl.execution.slot import Slot, flight_name
+from pytest_garl.execution.slot import Slot
 from pytest_garl.execution.supervisor import LEAST_STANDSTILL_S, FlightMonitor
 from pytest_garl.simulation.flight import Crash
 from tests.execution.flying import Exits, Good, Slow, job_of, scenario
@@ -57,6 +58,10 @@ class Flown:
         return self.result.signature
 
 
+def flight_of(search: str, slot: Slot = FIRST) -> FlightId:
+    return FlightId(search=search, map="lawn", slot=slot)
+
+
 def crash_of(flown: Flown) -> Crash:
     assert flown.result.crash is not None
     return flown.result.crash
@@ -81,13 +86,13 @@ class Field:
         self.ledger.add_slots("bad", 0, {0: dump_scenario(scenario())})
         self.ledger.add_slots("good", 1, {0: dump_scenario(scenario(0.2))})
         for search, slot in (("bad", Slot(generation=0, index=0)), ("good", NEXT)):
-            wait_for(self.ledger, self.pool, search, slot, lambda: None)
-        result = self.ledger.result("bad", 0, 0)
+            wait_for(self.ledger, self.pool, flight_of(search, slot), lambda: None)
+        result = self.ledger.result(flight_of("bad"))
         assert result is not None
         return Flown(
             result=result,
-            sha256=self.ledger.sha256("bad", 0, 0),
-            neighbour=self.ledger.sha256("good", 1, 0),
+            sha256=self.ledger.sha256(flight_of("bad")),
+            neighbour=self.ledger.sha256(flight_of("good", NEXT)),
             meters=self.ledger.queries.meters(),
         )
 
@@ -108,7 +113,7 @@ def field(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Field]:
 def undisturbed(tmp_path_factory: pytest.TempPathFactory) -> str:
     """Return the hash of the good system's flight."""
     flights = tmp_path_factory.mktemp("undisturbed")
-    return fly_job(job_of(Good, flights), scenario(0.2), "flight", None)[1]
+    return fly_job(job_of(Good, flights), scenario(0.2), flight_of("flight"), None)[1]
 
 
 @pytest.mark.parametrize("system", [HoldsTheLock, StopsClocks])
@@ -145,7 +150,9 @@ def test_a_slow_flight_counts_as_if_it_had_had_more_time_at_once(
     field: Field, tmp_path: Path
 ) -> None:
     flown = field.fly(Slow, timeout_s=1.0)
-    calm, sha256, _ = fly_job(job_of(Slow, tmp_path / "calm"), scenario(), "flight", None)
+    calm, sha256, _ = fly_job(
+        job_of(Slow, tmp_path / "calm"), scenario(), flight_of("flight"), None
+    )
     assert (flown.result, flown.sha256) == (calm, sha256)
     assert flown.meters["retried"] == 1
 
@@ -161,11 +168,11 @@ def test_a_process_that_dies_once_is_a_finding(field: Field, undisturbed: str) -
 def test_a_process_that_dies_leaves_no_record_of_an_earlier_run(field: Field) -> None:
     flights = field.folder / "flights"
     flights.mkdir()
-    stale = flights / f"{flight_name('bad', 0, 0, 'lawn')}.npz"
+    stale = flight_of("bad").record(flights)
     stale.write_bytes(b"of an earlier run")
     assert field.fly(Exits).signature == "V:died:exit-status-3"
     assert not stale.exists()
-    assert (flights / f"{flight_name('good', 1, 0, 'lawn')}.npz").is_file()
+    assert (flight_of("good", NEXT).record(flights)).is_file()
 
 
 def test_a_process_that_is_killed_once_is_flown_again(field: Field) -> None:
@@ -237,7 +244,7 @@ def test_workers_that_end_between_flights_do_not_end_the_run(field: Field) -> No
     for index in range(MAX_IDLE_EXITS + 2):
         field.ledger.add_slots("one", index, {0: dump_scenario(scenario())})
         slot = Slot(generation=index, index=0)
-        wait_for(field.ledger, field.pool, "one", slot, lambda: None)
+        wait_for(field.ledger, field.pool, flight_of("one", slot), lambda: None)
         (worker,) = field.pool._workers
         os.kill(worker, signal.SIGKILL)
         while worker in field.pool._workers:
@@ -252,7 +259,7 @@ def test_workers_that_end_before_they_fly_end_the_run(field: Field) -> None:
 
     field.ledger.add_search("one", "s", "lawn", 1, "{}")
     with pytest.raises(PoolError, match="worker processes end before they fly"):
-        wait_for(field.ledger, field.pool, "one", NEXT, kill_all)
+        wait_for(field.ledger, field.pool, flight_of("one", NEXT), kill_all)
 
 
 def test_nothing_is_left_beside_the_ledger(tmp_path: Path) -> None:
@@ -270,7 +277,12 @@ def test_a_process_that_nothing_changed_flies_on(field: Field) -> None:
     field.ledger.add_search("more", job.system.name, "lawn", 4, job.dumps())
     field.ledger.add_slots("more", 2, {index: dump_scenario(scenario()) for index in range(4)})
     for index in range(4):
-        wait_for(field.ledger, field.pool, "more", Slot(generation=2, index=index), lambda: None)
+        wait_for(
+            field.ledger,
+            field.pool,
+            flight_of("more", Slot(generation=2, index=index)),
+            lambda: None,
+        )
     assert list(field.pool._workers) == [first]
 
 

@@ -4,6 +4,7 @@ from pathlib import Path
 
 import pytest
 
+from pytest_garl.execution.flight_id import FlightId
 from pytest_garl.execution.job import dump_scenario
 from pytest_garl.execution.ledger import Ledger
 from pytest_garl.execution.ledger_queue import Claim
@@ -16,6 +17,9 @@ DIED = WorkerExit(status=-11, stderr="no fuel")
 KILLED = WorkerExit(status=-9)
 BROKE = WorkerExit(status=0, failure=("TypeError", "no array", "Traceback"))
 HUNG = WorkerExit(status=-9, stacks="in step", hung="one call took longer than 30 s of wall time")
+
+
+FIRST_FLIGHT = FlightId(search="s", map="lawn")
 
 
 @pytest.fixture
@@ -34,7 +38,7 @@ def claimed(ledger: Ledger) -> Claim:
 
 
 def crash(ledger: Ledger) -> Crash:
-    result = ledger.result("s", 0, 0)
+    result = ledger.result(FIRST_FLIGHT)
     assert result is not None
     assert result.crash is not None
     return result.crash
@@ -48,20 +52,20 @@ def test_what_the_machine_may_have_done_is_flown_again_when_nobody_else_flies(
 ) -> None:
     first, other = claimed(ledger), claimed(ledger)
     retry_or_record(ledger.queue, first, ended)
-    assert ledger.result("s", 0, 0) is None
+    assert ledger.result(FIRST_FLIGHT) is None
     assert ledger.queue.claim() is None
     ledger.queue.record(other, flight_result(), "", 0.0)
     assert ledger.queue.claim(flown="m:Class") is None
     assert ledger.queue.alone_waits()
     again = claimed(ledger)
-    assert (again.slot, again.after, again.attempt) == (0, after, 2)
+    assert (again.flight.slot.index, again.after, again.attempt) == (0, after, 2)
     assert not ledger.queue.alone_waits()
     assert ledger.queries.meters()["retried"] == 1
 
 
 def test_a_process_that_ends_itself_is_a_finding_at_once(ledger: Ledger) -> None:
     retry_or_record(ledger.queue, claimed(ledger), DIED)
-    result = ledger.result("s", 0, 0)
+    result = ledger.result(FIRST_FLIGHT)
     assert result is not None
     assert result.signature == "V:died:signal-11"
     assert crash(ledger).message == "its process ended with signal 11"
@@ -89,7 +93,7 @@ def test_what_happens_again_alone_is_a_finding(
     ledger.queue.record(claimed(ledger), flight_result(), "", 0.0)
     retry_or_record(ledger.queue, first, ended)
     retry_or_record(ledger.queue, claimed(ledger), ended)
-    result = ledger.result("s", 0, 0)
+    result = ledger.result(FIRST_FLIGHT)
     assert result is not None
     assert result.signature == signature
     assert crash(ledger).message == message
@@ -103,7 +107,7 @@ def test_three_flights_that_end_each_in_another_way_leave_it_undecided(ledger: L
     third = claimed(ledger)
     assert (third.after, third.attempt) == ("hung killed", 3)
     retry_or_record(ledger.queue, third, BROKE)
-    result = ledger.result("s", 0, 0)
+    result = ledger.result(FIRST_FLIGHT)
     assert result is not None
     assert (result.outcome, result.signature) == ("inconclusive", "")
     assert result.undecided.startswith("each of 3 flights ended its process in a different way")

@@ -20,6 +20,7 @@ from pytest_garl.baselines import file as baseline
 from pytest_garl.baselines import record
 from pytest_garl.errors import GarlError
 from pytest_garl.execution.flight import fly_job
+from pytest_garl.execution.flight_id import FlightId
 from pytest_garl.execution.job import load_scenario, loads
 from pytest_garl.execution.ledger import Ledger
 from pytest_garl.execution.stored_ledger import check_stored
@@ -152,7 +153,7 @@ def _load_weights(path: Path, rng: random.Random) -> None:
 def _prepare_record(folder: Path, rng: random.Random) -> Path:
     path = folder / "flight.npz"
     if not hasattr(_prepare_record, "sample"):
-        fly_job(job_of(Good, folder), scenario(0.05), "flight", None)
+        fly_job(job_of(Good, folder), scenario(0.05), FlightId(search="flight", map="lawn"), None)
         vars(_prepare_record)["sample"] = path.read_bytes()
     content: bytes = vars(_prepare_record)["sample"]
     if rng.random() < 0.5:
@@ -190,7 +191,7 @@ def _write_ledger(path: Path) -> None:
     for _ in range(6):
         claim = ledger.queue.claim()
         assert claim is not None
-        ledger.queue.record(claim, *fly_job(job, load_scenario(claim.scenario), "one", None))
+        ledger.queue.record(claim, *fly_job(job, load_scenario(claim.scenario), claim.flight, None))
     ledger.note_objectives("s", 0, [(0.5, 1.0)] * 8)
     ledger.database.execute("PRAGMA wal_checkpoint(TRUNCATE)")
     ledger.close()

@@ -11,7 +11,7 @@ from typing import Any
 import pytest
 
 from pytest_garl.adversary.catalogue import policy_spec
-from pytest_garl.execution.on_demand import CompletedFlight
+from pytest_garl.execution.result import CompletedFlight
 from pytest_garl.plugin.run import _steered
 from pytest_garl.regressions.case import Case
 from pytest_garl.regressions.new_case import recorded_behaviour

@@ -5,7 +5,7 @@ from typing import Any
 
 import pytest
 
-from pytest_garl.execution.on_demand import CompletedFlight
+from pytest_garl.execution.result import CompletedFlight
 from pytest_garl.regressions.case_request import CaseRequest, CaseResult
 from pytest_garl.regressions.follow_up import shares
 from pytest_garl.regressions.forecast import flights_after_search, remaining_work

@@ -9,9 +9,8 @@ import pytest
 
 from pytest_garl.adversary.catalogue import policy_spec
 from pytest_garl.execution.job import FlightJob
-from pytest_garl.execution.on_demand import CompletedFlight
 from pytest_garl.execution.reference import BUILT_IN, Reference, simulator_sha256
-from pytest_garl.execution.result import FlightResult
+from pytest_garl.execution.result import CompletedFlight, FlightResult
 from pytest_garl.regressions.case import Case
 from pytest_garl.regressions.case_file import size_of
 from pytest_garl.regressions.case_request import CaseRequest

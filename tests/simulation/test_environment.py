@@ -10,7 +10,7 @@ import pytest
 from pytest_garl import Command, Mission, Observation, PositionSetpoint
 from pytest_garl.adversary.catalogue import policy_spec
 from pytest_garl.adversary.recorded import recorded_spec
-from pytest_garl.execution.on_demand import CompletedFlight
+from pytest_garl.execution.result import CompletedFlight
 from pytest_garl.landing_system import Airframe, Camera
 from pytest_garl.regressions.case import RecordedBehaviour
 from pytest_garl.regressions.new_case import recorded_behaviour

@@ -12,6 +12,7 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
 from pytest_garl import cpu_dispatch
+from pytest_garl.execution.flight_id import FlightId
 from pytest_garl.execution.job import FlightJob, loads
 from pytest_garl.execution.ledger import Ledger
 from pytest_garl.execution.ledger_queue import Claim, WorkQueue
@@ -21,12 +22,10 @@ from pytest_garl.execution.process_pool import ProcessPool
 from pytest_garl.execution.ray.path_mapping import PathMapping
 from pytest_garl.execution.reference import package_sha256
 from pytest_garl.execution.result import FlightResult, broken_result
-from pytest_garl.execution.slot import Slot, flight_name
 from pytest_garl.execution.worker_failure import WorkerExit
 from pytest_garl.files.json_values import parse_json
 from pytest_garl.simulation.flight import PACKAGES, Crash
 
-_FIRST = Slot(generation=0, index=0)
 _NO_RESULT = broken_result(
     Crash(kind="died", error="", message="", where="", traceback=""), diagonal_m=0.0
 )
@@ -84,11 +83,10 @@ class FlightActor:
     def fly(self, claim: Claim) -> FlightOutput | WorkerExit:
         """Fly a slot once; return its output, or how its worker ended."""
         self._flown += 1
-        search, flights = str(self._flown), self._folder / "flights"
-        job = dataclasses.replace(self._job(claim.job), flights=str(flights))
-        self._ledger.add_search(search, job.system.name, job.map, 1, job.dumps(), "on_demand")
-        self._ledger.add_slots(search, 0, {0: claim.scenario}, claim.after)
-        result = wait_for(self._ledger, self._pool, search, _FIRST, lambda: None)
+        job = dataclasses.replace(self._job(claim.job), flights=str(self._folder / "flights"))
+        flight = FlightId(search=str(self._flown), map=job.map)
+        self._ledger.add_flight(flight, job.system.name, job.dumps(), claim.scenario, claim.after)
+        result = wait_for(self._ledger, self._pool, flight, lambda: None)
         if self._ended is not None:
             ended, self._ended = self._ended, None
             error, message, text = ended.failure or ("", "", "")
@@ -98,13 +96,12 @@ class FlightActor:
                 stderr=self._to_local(ended.stderr),
                 failure=(error, self._to_local(message), self._to_local(text)) if error else None,
             )
-        file = flights / f"{flight_name(search, 0, 0, job.map)}.npz"
-        record = file.read_bytes()
-        file.unlink()
+        record = job.record(flight).read_bytes()
+        job.record(flight).unlink()
         return FlightOutput(
             result=FlightResult.from_json(parse_json(self._to_local(result.dumps()))),
-            sha256=self._ledger.sha256(search, 0, 0),
-            wall_s=self._ledger.wall_s(search, 0, 0),
+            sha256=self._ledger.sha256(flight),
+            wall_s=self._ledger.wall_s(flight),
             record=record,
         )
 

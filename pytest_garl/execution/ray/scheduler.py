@@ -10,7 +10,8 @@ from collections.abc import Mapping
 from typing import Any
 
 from pytest_garl.errors import LedgerError, PoolError
-from pytest_garl.execution.job import loads, record_file
+from pytest_garl.execution.flight_id import FlightId
+from pytest_garl.execution.job import loads
 from pytest_garl.execution.ledger_queue import Claim, WorkQueue
 from pytest_garl.execution.ray.actor import ActorWorkspace, FlightActor, FlightOutput, versions
 from pytest_garl.execution.worker_failure import WorkerExit, retry_or_record
@@ -41,7 +42,7 @@ class RayScheduler:
         """Actors that fly and their claims, by the reference of the output."""
         self._idle: list[tuple[Any, float, str]] = []
         """Actors without a slot, the time since then, and the landing system each flew last."""
-        self._lost_with_slot: Counter[tuple[str, int, int]] = Counter()
+        self._lost_with_slot: Counter[FlightId] = Counter()
         self._lost_at_start = 0
 
     def turn(self) -> None:
@@ -112,7 +113,7 @@ class RayScheduler:
                 return
             self._idle.pop()
             self._queue.count("idle_s", time.monotonic() - since)
-            record_file(loads(claim.job), claim).unlink(missing_ok=True)
+            loads(claim.job).record(claim.flight).unlink(missing_ok=True)
             self._flying[actor.fly.remote(claim)] = actor, claim
 
     def _record(self, ref: Any, actor: Any, claim: Claim) -> None:
@@ -135,10 +136,9 @@ class RayScheduler:
 
         The landing system flies in a process below Ray's worker, so it did not end the actor.
         """
-        slot = claim.search, claim.generation, claim.slot
-        self._lost_with_slot[slot] += 1
-        if self._lost_with_slot[slot] > MAX_LOST_ACTORS:
-            times = self._lost_with_slot[slot]
+        self._lost_with_slot[claim.flight] += 1
+        times = self._lost_with_slot[claim.flight]
+        if times > MAX_LOST_ACTORS:
             raise PoolError(f"Ray lost the worker that flew the same slot {times} times: {error}")
         self._queue.give_back(claim)
 
@@ -154,7 +154,7 @@ def different_versions(ours: Mapping[str, str], theirs: Mapping[str, str]) -> st
 
 def _write_record(flight: FlightOutput, claim: Claim) -> None:
     """Write a flight's record into the job's folder, whole or not at all."""
-    path = record_file(loads(claim.job), claim)
+    path = loads(claim.job).record(claim.flight)
     scratch = path.with_name(f".{path.name}.{os.getpid()}")
     try:
         path.parent.mkdir(parents=True, exist_ok=True)

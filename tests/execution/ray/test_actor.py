@@ -10,10 +10,12 @@ import pytest
 
 from pytest_garl.errors import PoolError
 from pytest_garl.execution.flight import fly_job
+from pytest_garl.execution.flight_id import FlightId
 from pytest_garl.execution.job import dump_scenario, loads
 from pytest_garl.execution.ledger_queue import Claim
 from pytest_garl.execution.ray.actor import ActorWorkspace, FlightActor, FlightOutput
 from pytest_garl.execution.reference import Reference, reference_to
+from pytest_garl.execution.slot import Slot
 from pytest_garl.execution.worker_failure import WorkerExit
 from pytest_garl.simulation.flight_file import load
 from tests.execution.flying import Exits, Good, Loud, Reports, Sleeps, Slow, job_of, scenario
@@ -22,9 +24,7 @@ from tests.plugin.test_plugin import write_project
 
 def claim(system: type, after: str = "", timeout_s: float = 10.0) -> Claim:
     return Claim(
-        search="0123456789",
-        generation=3,
-        slot=7,
+        flight=FlightId(search="0123456789", map="lawn", slot=Slot(generation=3, index=7)),
         scenario=dump_scenario(scenario(0.2)),
         job=job_of(system, Path("/nowhere/flights"), timeout_s).dumps(),
         after=after,
@@ -44,7 +44,7 @@ def actor(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[FlightAct
 
 def test_actor_flies_the_same_bytes_as_a_local_worker(actor: FlightActor, tmp_path: Path) -> None:
     job = job_of(Good, tmp_path / "local")
-    local, sha256, _ = fly_job(job, scenario(0.2), "flight", None)
+    local, sha256, _ = fly_job(job, scenario(0.2), FlightId(search="flight", map="lawn"), None)
     found = actor.fly(claim(Good))
     assert isinstance(found, FlightOutput)
     assert (found.result, found.sha256) == (local, sha256)

@@ -8,17 +8,23 @@ from typing import Any
 import pytest
 
 from pytest_garl.errors import PoolError
+from pytest_garl.execution.flight_id import FlightId
 from pytest_garl.execution.job import dump_scenario
 from pytest_garl.execution.ledger import Ledger
 from pytest_garl.execution.ledger_queue import Claim
 from pytest_garl.execution.ray.actor import ActorWorkspace, FlightOutput, versions
 from pytest_garl.execution.ray.scheduler import RayScheduler, different_versions
+from pytest_garl.execution.slot import Slot
 from pytest_garl.execution.worker_failure import WorkerExit
 from tests.execution.flying import Good, job_of, scenario
 from tests.support.results import flight_result
 
 LANDED = FlightOutput(result=flight_result(), sha256="hash", wall_s=1.5, record=b"record")
 KILLED = WorkerExit(status=-9)
+
+
+def flight_of(index: int) -> FlightId:
+    return FlightId(search="search", map="lawn", slot=Slot(generation=0, index=index))
 
 
 class RayError(Exception):
@@ -111,7 +117,7 @@ def test_scheduler_flies_all_slots_and_writes_records_into_the_jobs_folder(
     ray = FakeRay()
     fly(ray, ledger).close()
     assert ledger.generation("search", 0) == [(dump_scenario(scenario()), LANDED.result)] * 3
-    assert ledger.sha256("search", 0, 2) == "hash"
+    assert ledger.sha256(flight_of(2)) == "hash"
     assert ledger.queries.meters()["flying_s"] == 4.5
     files = {path.name: path.read_bytes() for path in (tmp_path / "flights").iterdir()}
     assert files == {f"search-lawn-g00-s0{index}.npz": b"record" for index in range(3)}
@@ -134,7 +140,11 @@ def test_slot_of_a_lost_actor_is_flown_by_another(ledger: Ledger) -> None:
 
 
 def test_slot_that_loses_actor_after_actor_ends_the_run(ledger: Ledger) -> None:
-    ray = FakeRay(fly=lambda claim: WorkerLostError("out of memory") if claim.slot == 1 else LANDED)
+    ray = FakeRay(
+        fly=lambda claim: (
+            WorkerLostError("out of memory") if claim.flight.slot.index == 1 else LANDED
+        )
+    )
     with pytest.raises(PoolError, match="the same slot 4 times: out of memory"):
         fly(ray, ledger)
     assert ledger.unflown("search", 0) == 1
@@ -164,13 +174,13 @@ def test_worker_exit_is_handled_as_in_the_local_pool(ledger: Ledger) -> None:
 
     def die(claim: Claim) -> object:
         claims.append(claim)
-        return KILLED if claim.slot == 0 else LANDED
+        return KILLED if claim.flight.slot.index == 0 else LANDED
 
     fly(FakeRay(fly=die), ledger)
-    result = ledger.result("search", 0, 0)
+    result = ledger.result(flight_of(0))
     assert result is not None
     assert result.signature == "V:died:signal-9"
-    assert [claim.after for claim in claims if claim.slot == 0] == ["", "killed"]
+    assert [claim.after for claim in claims if claim.flight.slot.index == 0] == ["", "killed"]
     assert ledger.queries.meters()["retried"] == 1
 
 

@@ -1,0 +1,44 @@
+"""Flights by name: the key of the search in the ledger, the slot, the record's file."""
+
+from __future__ import annotations
+
+import hashlib
+from dataclasses import dataclass
+from pathlib import Path
+
+from pytest_garl.execution.slot import Slot
+
+KEY_DIGITS = 16
+"""Hexadecimal digits of a search's key: 64 bits, so that two searches never have the same."""
+NAME_DIGITS = 8
+"""Digits of the key that a record's name repeats, to be short."""
+FIRST = Slot(generation=0, index=0)
+"""The only slot of a search that flies once."""
+
+
+def search_key(facts: str) -> str:
+    """Return the key in the ledger of the search that ``facts`` describe."""
+    return hashlib.sha256(facts.encode()).hexdigest()[:KEY_DIGITS]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class FlightId:
+    """One flight of a ledger: the key of its search, its slot there, its map."""
+
+    search: str
+    map: str
+    slot: Slot = FIRST
+
+    @property
+    def key(self) -> tuple[str, int, int]:
+        """The primary key in the ledger's table: search, generation, slot."""
+        return self.search, self.slot.generation, self.slot.index
+
+    @property
+    def name(self) -> str:
+        """The name of the flight's record, such as ``0123abcd-court-g03-s17``."""
+        return f"{self.search[:NAME_DIGITS]}-{self.slot.id(self.map)}"
+
+    def record(self, folder: Path) -> Path:
+        """Return the file of the flight's record in a folder of flights."""
+        return folder / f"{self.name}.npz"
