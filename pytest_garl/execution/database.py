@@ -1,4 +1,4 @@
-"""The SQLite file of a ledger: its tables, its connection, and errors that say what to do."""
+"""The SQLite file of a ledger: its tables, its connection, and its errors."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ REMEDY = (
     "choose another folder with the ini key garl_dir"
 )
 VERSION = 5
-"""Of the tables below; a ledger of another version is not continued."""
+"""Version of the tables below; a ledger of another version cannot be resumed."""
 SCHEMA = """
 CREATE TABLE run (key TEXT PRIMARY KEY, value TEXT NOT NULL);
 CREATE TABLE search (
@@ -36,15 +36,15 @@ CREATE TABLE worker (pid INTEGER PRIMARY KEY, owner INTEGER NOT NULL);
 CREATE TABLE meter (name TEXT PRIMARY KEY, value REAL NOT NULL);
 """
 SearchKind = Literal["search", "case", "on_demand"]
-"""What flights are for: a search's budget, saved cases, or something beside them, such as flying a
-violation once more.  Figures and the result hash are those of the searches."""
+"""What flights are for: a search's budget, saved cases, or flights on demand, such as a second
+flight of a violation.  Figures and the result hash cover the searches alone."""
 _LONGEST = 64_000_000
-"""Bytes in one value: a damaged file may say that one fills the memory."""
+"""Most bytes of one value: a damaged file may declare a value that fills the memory."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Rows:
-    """What a statement returned, and how many rows it changed."""
+    """The rows that a statement returned, and how many rows it changed."""
 
     rows: list[tuple[Any, ...]]
     rowcount: int
@@ -78,7 +78,7 @@ class Database:
             self._connection.executescript(SCHEMA)
 
     def execute(self, sql: str, values: Sequence[Any] = ()) -> Rows:
-        """Run one statement and fetch what it returns: a damaged page may show only then."""
+        """Run one statement and fetch its rows at once, since only then a damaged page shows."""
         with self._explained():
             cursor = self._connection.execute(sql, values)
             return Rows(rows=cursor.fetchall(), rowcount=cursor.rowcount)
@@ -109,12 +109,12 @@ class Database:
         try:
             yield
         except (sqlite3.Error, UnicodeDecodeError) as error:
-            # What SQLite says of a damaged file may hold bytes of it.
+            # The message of SQLite may contain bytes of a damaged file.
             raise LedgerError(f"{self.path}: {error}. {REMEDY}") from error
 
 
 def set_aside(path: Path) -> None:
-    """Keep one older ledger, whole, before a new one takes its place."""
+    """Rename an older ledger, with all that its log holds, before a new one is created."""
     with contextlib.suppress(sqlite3.Error), contextlib.closing(sqlite3.connect(path)) as old:
         old.execute("PRAGMA wal_checkpoint(TRUNCATE)")
     for suffix in ("-wal", "-shm"):

@@ -1,4 +1,4 @@
-"""The ledger of a run: what is known about it, its searches and their slots.
+"""The ledger of a run: facts about the run, its searches, their slots and the results.
 
 It is one SQLite file.  Processes that fly take slots from its queue; reports read its queries.
 """
@@ -40,7 +40,7 @@ class Ledger:
 
     @classmethod
     def create(cls, path: Path, run: Mapping[str, Any]) -> Ledger:
-        """Begin a new run; an older ledger at the same place is kept as ``previous``."""
+        """Begin a new run; an older ledger at the same path is renamed to ``...-previous``."""
         try:
             path.parent.mkdir(parents=True, exist_ok=True)
             if path.is_file():
@@ -56,9 +56,9 @@ class Ledger:
 
     @classmethod
     def resume(cls, path: Path, run: Mapping[str, Any]) -> Ledger:
-        """Continue an interrupted run; raise LedgerError if it was another one.
+        """Continue an interrupted run; raise LedgerError if it differs from ``run``.
 
-        Nobody else may be using it: slots in flight are given back.
+        No other process may be using the ledger: slots in flight are given back.
         """
         if not path.is_file():
             raise LedgerError(f"--garl-resume: there is no ledger at {path}; run without it first")
@@ -94,13 +94,13 @@ class Ledger:
         self.database.close()
 
     def remove(self) -> None:
-        """Remove the closed file and those beside it: nobody will ask for it again."""
+        """Remove the closed ledger's files; no later run needs them."""
         for suffix in ("", "-wal", "-shm"):
             self.path.with_name(self.path.name + suffix).unlink(missing_ok=True)
         self.path.with_suffix(".lock").unlink(missing_ok=True)
 
     def note_fact(self, key: str, value: Any) -> None:
-        """Write down a fact about the run."""
+        """Set a fact about the run."""
         self.database.execute("INSERT OR REPLACE INTO run VALUES (?, ?)", (key, json.dumps(value)))
 
     def fact(self, key: str) -> Any:
@@ -112,21 +112,21 @@ class Ledger:
             raise LedgerError(f"{self.path}: the fact {key!r} is damaged: {error}") from error
 
     def first_fact(self, key: str, value: Any) -> Any:
-        """Write down a fact unless there is one already; return the one that stands."""
+        """Set a fact unless it is set already; return its value."""
         self.database.execute("INSERT OR IGNORE INTO run VALUES (?, ?)", (key, json.dumps(value)))
         return self.fact(key)
 
     def add_search(
         self, search: str, system: str, map: str, wanted: int, job: str, kind: SearchKind = "search"
     ) -> None:
-        """Register a search that will fly ``wanted`` slots; once is enough."""
+        """Add a search of ``wanted`` slots, unless it is there already."""
         self.database.execute(
             "INSERT OR IGNORE INTO search VALUES (?, ?, ?, ?, ?, ?)",
             (search, system, map, wanted, job, kind),
         )
 
     def job(self, search: str) -> str | None:
-        """Return what was registered for a search, or None."""
+        """Return the job of a search, or None if there is no such search."""
         row = self.database.execute("SELECT job FROM search WHERE id = ?", (search,)).fetchone()
         return None if row is None else str(row[0])
 
@@ -140,9 +140,9 @@ class Ledger:
     def add_slots(
         self, search: str, generation: int, scenarios: Mapping[int, str], after: str = ""
     ) -> None:
-        """Hand out a generation's slots; once is enough, and twice must be the same.
+        """Add a generation's slots; raise LedgerError if they are there with other scenarios.
 
-        ``after`` is how earlier flights of them ended their processes, as in a Claim.
+        ``after`` says how earlier flights of the slots ended, as in a Claim.
         """
         with self.database.transaction():
             self.database.executemany(
@@ -169,7 +169,7 @@ class Ledger:
         return [(text, None if result is None else parse_result(result)) for text, result in rows]
 
     def unflown(self, search: str, generation: int) -> int:
-        """Return how many of a generation's slots have no result yet."""
+        """Return how many of a generation's slots have no result."""
         row = self.database.execute(
             "SELECT count(*) FROM slot WHERE search = ? AND generation = ? AND result IS NULL",
             (search, generation),
@@ -179,7 +179,7 @@ class Ledger:
     def note_objectives(
         self, search: str, generation: int, objectives: Sequence[Sequence[float]]
     ) -> None:
-        """Write down a generation's objectives, slot by slot."""
+        """Set the objectives of a generation's slots, in order."""
         with self.database.transaction():
             self.database.executemany(
                 "UPDATE slot SET objectives = ? WHERE search = ? AND generation = ? AND slot = ?",

@@ -1,4 +1,4 @@
-"""What a ledger tells about its flights: progress, results, violations, costs and the hash."""
+"""Queries on a ledger: progress, results, violations, costs, and the hash of the results."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ _ADDRESS = re.compile(r"0x[0-9a-f]+")
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SearchProgress:
-    """How far a search is: slots flown of all, and the latest generation bred."""
+    """How far a search is: slots flown, all slots, and the latest generation."""
 
     system: str
     map: str
@@ -43,7 +43,7 @@ class LedgerFlight:
 
 
 class LedgerQueries:
-    """Answers questions about a ledger's flights, and changes nothing."""
+    """Reads what a ledger holds about its flights."""
 
     def __init__(self, database: Database) -> None:
         self._database = database
@@ -109,7 +109,7 @@ class LedgerQueries:
         return parse_result(row[0]), str(row[1]), str(row[2])
 
     def scenarios(self, generation: int, slot: int, map: str) -> dict[str, str]:
-        """Return the scenario of a slot for each system that has one."""
+        """Return the scenario of a slot for each landing system."""
         rows = self._database.execute(
             "SELECT system, scenario FROM slot JOIN search ON search.id = slot.search "
             "WHERE kind = 'search' AND map = ? AND generation = ? AND slot = ?",
@@ -130,7 +130,7 @@ class LedgerQueries:
         return {name: (value, unit) for name, value, unit in rows}
 
     def violations(self) -> dict[str, int]:
-        """Return how often each type of violation was found."""
+        """Return the number of violations of each type."""
         rows = self._database.execute(
             "SELECT json_extract(result, '$.verdict.violation_type') AS type, count(*) FROM slot "
             "JOIN search ON search.id = slot.search WHERE kind = 'search' "
@@ -139,7 +139,7 @@ class LedgerQueries:
         return dict(rows.fetchall())
 
     def kinds(self) -> dict[tuple[str, str], float]:
-        """Return the mean wall time of a flight of each kind of violation: search, signature."""
+        """Return the mean wall time of violations by search and signature."""
         rows = self._database.execute(
             "SELECT search.id, json_extract(result, '$.verdict.signature') AS signature, "
             "avg(coalesce(wall_s, 0)) FROM slot JOIN search ON search.id = slot.search "
@@ -150,27 +150,27 @@ class LedgerQueries:
         return {(search, signature): float(wall_s) for search, signature, wall_s in rows}
 
     def meters(self) -> dict[str, float]:
-        """Return what the run spent so far."""
+        """Return what the run has spent, by the name of the meter."""
         return dict(
             self._database.execute("SELECT name, value FROM meter ORDER BY name").fetchall()
         )
 
     def seconds_per_flight(self) -> float | None:
-        """Return the mean wall time of a flight on one process, if any was flown."""
+        """Return the mean wall time of a flight, or None without flights."""
         row = self._database.execute(
             "SELECT avg(wall_s) FROM slot WHERE state = 'flown'"
         ).fetchone()
         return None if row[0] is None else float(row[0])
 
     def flying_s(self, search: str) -> float:
-        """Return the wall time of all flights of a search, each on one process."""
+        """Return the sum of the wall times of a search's flights."""
         row = self._database.execute(
             "SELECT coalesce(sum(wall_s), 0) FROM slot WHERE search = ?", (search,)
         ).fetchone()
         return float(row[0])
 
     def result_hash(self, search: str = "") -> str:
-        """Return a hash of all results that two equal runs share, or of one search's."""
+        """Return a hash of all results, or of one search's; two equal runs have the same hash."""
         digest = hashlib.sha256()
         rows = self._database.execute(
             "SELECT system, map, generation, slot, scenario, result, objectives, sha256 FROM slot "
@@ -184,9 +184,9 @@ class LedgerQueries:
 
 
 def _comparable(row: tuple[Any, ...]) -> str:
-    """Return a slot without what differs from run to run and means nothing.
+    """Return a slot as text, without details that differ between equal runs.
 
-    These are addresses, and where a process was when it was ended.
+    These are addresses in memory, and the stacks of a process that was ended.
     """
     *before, result, objectives, sha256 = row
     if result is not None:

@@ -1,12 +1,12 @@
-"""The queue of a ledger: hands out slots to the processes that fly, and takes their results."""
+"""The work queue of a ledger: processes claim slots in it, fly them and record the results."""
 
 from __future__ import annotations
 
 import os
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from time import monotonic
-from typing import Any
 
 from pytest_garl.execution.database import Database
 from pytest_garl.execution.flight_id import FlightId
@@ -21,16 +21,16 @@ _NEXT, _NEXT_OF_SYSTEM = (
     for condition in ("", "AND search IN (SELECT id FROM search WHERE system = ?)")
 )
 LEASE_S = 30.0
-"""So long the claim of a dead process is left to those who watched it, and that of a living one to
-it where nobody watches: its id was given to another."""
+"""How long a claim stays if only one of two processes lives: the one that claimed the slot, or the
+pool that watches it.  A process that nobody watches may be another with the same id."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Claim:
-    """One slot that the process ``pid`` shall fly, or see to it that it is flown.
+    """One slot that the process ``pid`` flies, or has another process fly.
 
-    ``after`` is how earlier flights of it ended their processes, such as "hung" or "hung killed";
-    then it is flown once more, alone.  ``attempt`` counts from 1.
+    ``after`` says how earlier flights of the slot ended their workers, such as "hung" or
+    "hung killed"; if it is set, no other slot flies meanwhile.  ``attempt`` counts from 1.
     """
 
     flight: FlightId
@@ -44,7 +44,7 @@ class Claim:
 class WorkQueue:
     """The slots that wait for a flight, and those that processes have claimed.
 
-    Slots are claimed for the process ``pid``: this one, or the one that watches it.
+    Slots are claimed for the process ``pid``: this one, or its supervisor.
     """
 
     def __init__(self, database: Database, pid: int | None = None) -> None:
@@ -54,7 +54,7 @@ class WorkQueue:
 
     @classmethod
     def open(cls, path: Path, pid: int | None = None) -> WorkQueue:
-        """Open the queue of a ledger by itself, as a flying process does."""
+        """Open the queue of the ledger at ``path`` alone, as a worker does."""
         return cls(Database(path), pid)
 
     def close(self) -> None:
@@ -62,11 +62,11 @@ class WorkQueue:
         self._database.close()
 
     def claim(self, lease_s: float | None = LEASE_S, *, flown: str = "") -> Claim | None:
-        """Take the next unflown slot; one that ended its process is handed out while nobody flies.
+        """Claim the next slot; a slot that ended a worker is claimed only while no other flies.
 
-        ``flown`` names the landing system that this process has flown: it gets slots of that one
-        alone, and none that ended a process.  ``lease_s`` is how long the claim is kept as in
-        ``release_dead``; None: while the process lives.
+        ``flown`` names the landing system that this process has flown; it then gets slots of this
+        system alone, and none that ended a worker.  ``lease_s`` is the lease of the claim, as in
+        ``release_dead``; with None the claim lasts as long as the process.
         """
         with self._database.transaction():
             flying, alone = self._database.execute(
@@ -97,7 +97,7 @@ class WorkQueue:
         )
 
     def others_wait(self, flown: str) -> bool:
-        """Return whether slots wait, but none of the system that a process has flown."""
+        """Return whether slots wait, but none of the landing system ``flown``."""
         own, others = self._database.execute(
             "SELECT coalesce(sum(system = ?), 0), coalesce(sum(system != ?), 0) "
             "FROM slot JOIN search ON search.id = slot.search WHERE state = 'waiting'",
@@ -106,7 +106,7 @@ class WorkQueue:
         return bool(others) and not own
 
     def alone_waits(self) -> bool:
-        """Return whether nobody flies and a slot waits for a fresh process to fly it alone."""
+        """Return whether no slot flies, and one waits that a fresh process must fly alone."""
         flying, waiting = self._database.execute(
             "SELECT coalesce(sum(state = 'claimed'), 0), coalesce(sum(after != ''), 0) FROM slot "
             "WHERE state IN ('claimed', 'waiting')"
@@ -114,12 +114,12 @@ class WorkQueue:
         return not flying and bool(waiting)
 
     def waiting(self) -> int:
-        """Return how many slots could be handed out."""
+        """Return how many slots wait."""
         row = self._database.execute("SELECT count(*) FROM slot WHERE state = 'waiting'").fetchone()
         return int(row[0])
 
     def record(self, claim: Claim, result: FlightResult, sha256: str, wall_s: float) -> None:
-        """Write down what a flight came to; a slot that has a result keeps it."""
+        """Record the result of a flight; a slot that has a result keeps it."""
         text = result.dumps()
         with self._database.transaction():
             done = self._database.execute(
@@ -136,7 +136,7 @@ class WorkQueue:
                 self.count("flying_s", wall_s)
 
     def claim_of(self, pid: int) -> Claim | None:
-        """Return the slot that a process has in flight; it may be gone by then."""
+        """Return the claim of a process, which may have ended; None if it has none."""
         row = self._database.execute(
             "SELECT s.search, generation, slot, scenario, job, after, attempts, map FROM slot s "
             "JOIN search ON search.id = s.search WHERE pid = ? AND state = 'claimed'",
@@ -154,7 +154,7 @@ class WorkQueue:
         )
 
     def release(self, pid: int) -> None:
-        """Give back all that a process has in flight, as if it had not been claimed."""
+        """Give back all slots of a process, as if it had not claimed them."""
         self._database.execute(
             "UPDATE slot SET state = 'waiting', pid = NULL, lease = NULL, "
             "attempts = attempts - 1 WHERE pid = ? AND state = 'claimed'",
@@ -166,7 +166,7 @@ class WorkQueue:
         self._hand_out(claim, claim.attempt - 1, claim.after)
 
     def fly_alone(self, claim: Claim, after: str) -> None:
-        """Hand out a slot once more, when nobody else flies; say how its flights ended."""
+        """Have a slot flown once more, alone; ``after`` says how its flights ended."""
         self._hand_out(claim, claim.attempt, after)
 
     def _hand_out(self, claim: Claim, attempts: int, after: str) -> None:
@@ -177,7 +177,7 @@ class WorkQueue:
         )
 
     def reset(self) -> None:
-        """Give back all slots that are claimed; nobody may be flying."""
+        """Give back all claimed slots; no process may be flying."""
         self._database.execute("DELETE FROM worker")
         self._database.execute(
             "UPDATE slot SET state = 'waiting', pid = NULL, lease = NULL, "
@@ -185,10 +185,10 @@ class WorkQueue:
         )
 
     def release_dead(self) -> None:
-        """Give back the slots of processes that are gone with those who watched them.
+        """Give back the slots of workers that have ended together with their pools.
 
-        A dead child whose pool lives is left to it for a while: it knows what the death means.
-        A living one is never silent: its supervisor ends it where it hangs.
+        If a worker has ended and its pool lives, the pool has until the end of the lease to decide
+        on the slot.  A worker that lives needs no limit: its supervisor ends it if it hangs.
         """
         rows = self._database.execute(
             "SELECT slot.pid, lease, owner FROM slot LEFT JOIN worker ON worker.pid = slot.pid "
@@ -200,24 +200,24 @@ class WorkQueue:
             if not (flies or watched) or (lapsed and not (flies and watched)):
                 self.release(pid)
 
-    def register_worker(self, limit: int, spawn: Any) -> bool:
-        """Start a child by ``spawn() -> pid`` unless ``limit`` of them live already."""
+    def register_worker(self, limit: int, spawn: Callable[[], int]) -> bool:
+        """Start a worker by ``spawn``, which returns its id, unless ``limit`` workers live."""
         with self._database.transaction():
             for pid, owner in self._database.execute("SELECT pid, owner FROM worker").fetchall():
                 if not alive(pid) and not alive(owner):
                     self._database.execute("DELETE FROM worker WHERE pid = ?", (pid,))
-            taken = self._database.execute("SELECT count(*) FROM worker").fetchone()[0]
-            if taken >= limit:
+            living = self._database.execute("SELECT count(*) FROM worker").fetchone()[0]
+            if living >= limit:
                 return False
             self._database.execute("INSERT INTO worker VALUES (?, ?)", (spawn(), os.getpid()))
         return True
 
     def unregister_worker(self, pid: int) -> None:
-        """Free a dead child's seat."""
+        """Remove a worker that has ended, so that another one may start."""
         self._database.execute("DELETE FROM worker WHERE pid = ?", (pid,))
 
     def count(self, meter: str, amount: float = 1.0) -> None:
-        """Add to a meter: what the run spent, beside its results."""
+        """Add to a meter of what the run spent."""
         self._database.execute(
             "INSERT INTO meter VALUES (?, ?) "
             "ON CONFLICT (name) DO UPDATE SET value = value + excluded.value",
@@ -225,7 +225,7 @@ class WorkQueue:
         )
 
     def flights(self) -> float:
-        """Return how many flights came to their end, whatever they were for."""
+        """Return how many flights have ended, of searches, cases and on demand."""
         row = self._database.execute(
             "SELECT coalesce(sum(value), 0) FROM meter WHERE name IN (?, ?, ?)",
             tuple(_METERS.values()),
