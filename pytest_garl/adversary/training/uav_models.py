@@ -10,17 +10,13 @@ import numpy as np
 from pytest_garl.landing_system import (
     Airframe,
     Command,
-    Land,
     Mission,
     Observation,
     PositionSetpoint,
     VelocitySetpoint,
 )
+from pytest_garl.simulation.system_under_test.descent import COLUMN_M, centring, descend
 from pytest_garl.simulation.system_under_test.ground_truth import Truth, TruthObject
-
-CENTRED_M = 0.3
-LAND_BELOW_M = 0.35
-SLOW_BELOW_M = 1.5
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -97,14 +93,10 @@ class StraightPilot:
         self._up |= z > style.cruise_m - 1.0
         if not self._up:
             return PositionSetpoint(position_m=(*self._home[:2], style.cruise_m))
-        self._there |= offset < CENTRED_M
+        self._there |= offset < COLUMN_M
         if not self._there:
             return PositionSetpoint(position_m=(*goal, style.cruise_m), speed_mps=style.speed_mps)
-        if z < LAND_BELOW_M:
-            return Land(speed_mps=0.4)
-        descent = style.descent_mps if z > SLOW_BELOW_M else 0.5 * style.descent_mps
-        climb = -descent if offset < CENTRED_M else 0.0
-        return VelocitySetpoint(velocity_mps=(*_towards(goal, (x, y)), climb))
+        return descend(goal, (x, y, z), style.descent_mps)
 
 
 class AvoidingPilot(StraightPilot):
@@ -142,7 +134,7 @@ class AvoidingPilot(StraightPilot):
             x, y, z = place
             climb = avoidance.climb_mps if z < self._style.cruise_m else 0.0
             goal = truth.marker_m if self._there else (x, y)
-            return VelocitySetpoint(velocity_mps=(*_towards(goal, (x, y)), climb))
+            return VelocitySetpoint(velocity_mps=(*centring(goal, (x, y)), climb))
         return super().step(observation)
 
     def _threatens(self, item: TruthObject, place: tuple[float, ...]) -> bool:
@@ -160,8 +152,3 @@ class AvoidingPilot(StraightPilot):
         wide = math.tan(camera.field_of_view_rad / 2)
         high = wide * camera.height_px / camera.width_px
         return dx - reach < below * high and dy - reach < below * wide
-
-
-def _towards(goal: tuple[float, float], at: tuple[float, float]) -> tuple[float, float]:
-    vx, vy = (max(-1.0, min(1.0, 1.2 * (aim - own))) for aim, own in zip(goal, at, strict=True))
-    return vx, vy

@@ -1,4 +1,7 @@
-"""A pilot that knows where everything is: it proves the world before the world judges."""
+"""A pilot that knows where everything is.
+
+It shows that a scenario can be landed in before the scenario counts against a landing system.
+"""
 
 from __future__ import annotations
 
@@ -8,24 +11,24 @@ from pytest_garl.landing_system import (
     Abort,
     Airframe,
     Command,
-    Land,
     Mission,
     Observation,
     PositionSetpoint,
     VelocitySetpoint,
 )
+from pytest_garl.simulation.system_under_test.descent import centring, descend
 from pytest_garl.simulation.system_under_test.ground_truth import Truth
 
 CRUISE_M = 10.0
 CENTRED_M = 0.10
+"""So near to the marker's centre the pilot ends its way across."""
 DESCENT_MPS = 1.0
-SLOW_BELOW_M = 1.5
 LOOK_AHEAD_S = 3.0
 CLEARANCE_M = 0.75
 """Half of the UAV and a quarter of a metre, beyond an object's own radius."""
 PATIENCE_S = 45.0
-"""So long, three times what coming down takes, it waits above a marker that is not free: who stands
-on it can keep anyone from landing, but makes nobody collide."""
+"""The pilot waits so long above a marker that is not free, three times the time to come down: an
+object on the marker keeps any UAV from landing, but makes none collide."""
 ABORT_TAKES_S = 10.0
 
 
@@ -64,18 +67,8 @@ class ReferencePilot:
             last = self._mission.time_limit_s - ABORT_TAKES_S
             if observation.time_s > min(self._arrived_s + PATIENCE_S, last):
                 return Abort()
-            return VelocitySetpoint(velocity_mps=(*self._centring(goal, x, y), 1.0))
-        if z < 0.35:
-            return Land(speed_mps=0.4)
-        rate = DESCENT_MPS if z > SLOW_BELOW_M else 0.5
-        rate = rate if offset < 0.3 else 0.0
-        return VelocitySetpoint(velocity_mps=(*self._centring(goal, x, y), -rate))
-
-    def _centring(self, goal: tuple[float, float], x: float, y: float) -> tuple[float, float]:
-        vx, vy = (
-            max(-1.0, min(1.0, 1.2 * (aim - at))) for aim, at in zip(goal, (x, y), strict=True)
-        )
-        return vx, vy
+            return VelocitySetpoint(velocity_mps=(*centring(goal, (x, y)), 1.0))
+        return descend(goal, (x, y, z), DESCENT_MPS)
 
     def _blocked(self, truth: Truth, height_m: float) -> bool:
         """Whether an object is in the column below, or will be within three seconds."""

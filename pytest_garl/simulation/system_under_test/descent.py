@@ -1,0 +1,36 @@
+"""The descent of pilots that know where the marker is.
+
+The reference pilot and the UAVs of the surrogate share it.
+"""
+
+from __future__ import annotations
+
+import math
+
+from pytest_garl.landing_system import Command, Land, VelocitySetpoint
+
+LAND_BELOW_M = 0.35
+LAND_MPS = 0.4
+SLOW_BELOW_M = 1.5
+COLUMN_M = 0.3
+"""A pilot descends only this near to the line above the marker's centre."""
+
+
+def descend(
+    marker_m: tuple[float, float], position_m: tuple[float, float, float], descent_mps: float
+) -> Command:
+    """Return the next command on the way down: at half the speed near the ground, then land."""
+    x, y, height = position_m
+    if height < LAND_BELOW_M:
+        return Land(speed_mps=LAND_MPS)
+    rate = descent_mps if height > SLOW_BELOW_M else 0.5 * descent_mps
+    climb = -rate if math.dist((x, y), marker_m) < COLUMN_M else 0.0
+    return VelocitySetpoint(velocity_mps=(*centring(marker_m, (x, y)), climb))
+
+
+def centring(marker_m: tuple[float, float], at_m: tuple[float, float]) -> tuple[float, float]:
+    """Return the velocity (x, y) towards the line above the marker, at most 1 m/s an axis."""
+    vx, vy = (
+        max(-1.0, min(1.0, 1.2 * (aim - own))) for aim, own in zip(marker_m, at_m, strict=True)
+    )
+    return vx, vy
