@@ -28,9 +28,9 @@ def fly_all(
     scenarios: Sequence[Scenario],
     on_wait: Callable[[], None] = lambda: None,
 ) -> Iterator[CompletedFlight]:
-    """Yield what each scenario came to, in order; all are handed out before the first is awaited.
+    """Yield the flight of each scenario, in order; all are handed out before the first wait.
 
-    Raises LedgerError if a resumed run flew them in another way.
+    Raises LedgerError if the ledger has them with another job.
     """
     system = job.system.name
     texts = {index: dump_scenario(scenario) for index, scenario in enumerate(scenarios)}
@@ -47,15 +47,12 @@ def fly_all(
     ledger.add_slots(search, 0, texts)
     for index in texts:
         flight = FlightId(search=search, map=job.map, slot=Slot(generation=0, index=index))
-        result = wait_for(ledger, pool, flight, on_wait)
-        yield CompletedFlight(
-            result=result, sha256=ledger.sha256(flight), record=job.record(flight)
-        )
+        yield wait_for(ledger, pool, flight, Path(job.flights), on_wait)
 
 
 @contextmanager
 def temporary_pool(workers: int, checkout: Checkout | None = None) -> Iterator[tuple[Ledger, Pool]]:
-    """Give a ledger and children for as long as the block lasts; they may see one checkout only."""
+    """Yield a ledger and its pool of workers, which end with the block and import one checkout."""
     with tempfile.TemporaryDirectory(prefix="garl-") as scratch:
         ledger = Ledger.create(Path(scratch) / "ledger.sqlite", {})
         pool = local_pool(ledger.queue, workers, checkout)

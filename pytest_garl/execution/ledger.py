@@ -192,49 +192,27 @@ class Ledger:
     def add_flight(
         self, flight: FlightId, system: str, job: str, scenario: str, after: str = ""
     ) -> None:
-        """Hand out one flight that is on demand, as a search of its own; once is enough."""
+        """Add one flight on demand, as a search of its own, unless it is there already."""
         self.add_search(flight.search, system, flight.map, 1, job, "on_demand")
         self.add_slots(flight.search, flight.slot.generation, {flight.slot.index: scenario}, after)
 
     def completed(self, flight: FlightId, folder: Path) -> CompletedFlight | None:
-        """Return a flight whose record is in a folder, or None while it has no result."""
-        result = self.result(flight)
-        if result is None:
-            return None
-        return CompletedFlight(
-            result=result, sha256=self.sha256(flight), record=flight.record(folder)
-        )
-
-    def result(self, flight: FlightId) -> FlightResult | None:
-        """Return a flown slot's result, or None."""
+        """Return a flight whose record is in a folder, or None if it has no result."""
         row = self.database.execute(
-            "SELECT result FROM slot WHERE search = ? AND generation = ? AND slot = ?",
+            "SELECT result, coalesce(sha256, '') FROM slot "
+            "WHERE search = ? AND generation = ? AND slot = ?",
             flight.key,
         ).fetchone()
         if row is None or row[0] is None:
             return None
-        return parse_result(row[0])
+        return CompletedFlight(
+            result=parse_result(row[0]), sha256=row[1], record=flight.record(folder)
+        )
 
     def scenario(self, flight: FlightId) -> str | None:
-        """Return a slot's scenario, or None where it has not been bred."""
+        """Return a slot's scenario, or None if it is not bred."""
         row = self.database.execute(
             "SELECT scenario FROM slot WHERE search = ? AND generation = ? AND slot = ?",
             flight.key,
         ).fetchone()
         return None if row is None else str(row[0])
-
-    def sha256(self, flight: FlightId) -> str:
-        """Return the trajectory's hash of a flown slot; empty where its process did not live."""
-        row = self.database.execute(
-            "SELECT sha256 FROM slot WHERE search = ? AND generation = ? AND slot = ?",
-            flight.key,
-        ).fetchone()
-        return str(row[0] or "") if row else ""
-
-    def wall_s(self, flight: FlightId) -> float:
-        """Return how long a flown slot took; 0 where its process did not live."""
-        row = self.database.execute(
-            "SELECT wall_s FROM slot WHERE search = ? AND generation = ? AND slot = ?",
-            flight.key,
-        ).fetchone()
-        return float(row[0] or 0.0) if row else 0.0

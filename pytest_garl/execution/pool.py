@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from pathlib import Path
 from typing import Protocol
 
 from pytest_garl.execution.flight_id import FlightId
 from pytest_garl.execution.ledger import Ledger
-from pytest_garl.execution.result import FlightResult
+from pytest_garl.execution.result import CompletedFlight
 
 
 class Pool(Protocol):
@@ -25,11 +26,14 @@ class Pool(Protocol):
 
 
 def wait_for(
-    ledger: Ledger, pool: Pool, flight: FlightId, on_wait: Callable[[], None]
-) -> FlightResult:
-    """Return a flight's result when it is flown; ``on_wait`` is called before and while waiting."""
+    ledger: Ledger, pool: Pool, flight: FlightId, folder: Path, on_wait: Callable[[], None]
+) -> CompletedFlight:
+    """Wait until a flight is flown and return it; its record is in a folder.
+
+    ``on_wait`` is called once before the wait, and after each turn of the pool.
+    """
     on_wait()
-    while (result := ledger.result(flight)) is None:
+    while (completed := ledger.completed(flight, folder)) is None:
         pool.turn()
         on_wait()
-    return result
+    return completed

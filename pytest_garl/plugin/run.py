@@ -92,7 +92,7 @@ class Run:
     items: dict[str, dict[Slot, list[Selected]]] = field(default_factory=dict)
     targets: dict[str, dict[Slot, Target]] = field(default_factory=dict)
     breeders: dict[str, Breeder] = field(default_factory=dict)
-    results: dict[FlightId, FlightResult] = field(default_factory=dict)
+    results: dict[FlightId, CompletedFlight] = field(default_factory=dict)
     pursued: tuple[InvestigatedSignature, ...] = ()
     """What became of new signatures after the search."""
     rest: RemainingWork | None = None
@@ -169,7 +169,7 @@ class Run:
         try:
             for lower in self.lower_targets(target):
                 self._wait(lower.flight)
-            return self._wait(target.flight)
+            return self._wait(target.flight).result
         finally:
             self.on_wait_end()
 
@@ -184,7 +184,7 @@ class Run:
 
     def trajectory_sha256(self, target: Target) -> str:
         """Return the hash of a slot's flight."""
-        return self.ledger.sha256(target.flight)
+        return self._wait(target.flight).sha256
 
     def unproven(self, target: Target) -> tuple[str, ...]:
         """Return why it proves nothing that a case passes; nothing if the system was repaired."""
@@ -239,13 +239,11 @@ class Run:
         return [targets[slot] for slot in sorted(targets) if slot < target.slot]
 
     def result(self, target: Target) -> FlightResult:
-        """Return what a slot came to that is flown, or will be."""
-        return self._wait(target.flight)
+        """Return a slot's result; wait for its flight."""
+        return self._wait(target.flight).result
 
     def refly(self, target: Target, count: int) -> list[CompletedFlight]:
         """Fly a flown slot ``count`` times more."""
-        from pytest_garl.execution.result import CompletedFlight
-
         job = self.ledger.job(target.search)
         assert job is not None
         text = self.ledger.scenario(target.flight)
@@ -254,10 +252,7 @@ class Run:
         for index in range(count):
             flight = target.reflight(index)
             self.ledger.add_flight(flight, target.system_name, job, text)
-            result, sha256 = self._wait(flight), self.ledger.sha256(flight)
-            flown.append(
-                CompletedFlight(result=result, sha256=sha256, record=flight.record(self.flights))
-            )
+            flown.append(self._wait(flight))
         return flown
 
     def fly_all(
@@ -272,11 +267,11 @@ class Run:
         finally:
             self.on_wait_end()
 
-    def _wait(self, flight: FlightId) -> FlightResult:
-        """Return a flight's result; it never changes, and is asked for once."""
+    def _wait(self, flight: FlightId) -> CompletedFlight:
+        """Return a flight; it never changes, so the ledger is read once."""
         known = self.results.get(flight)
         if known is None:
-            known = wait_for(self.ledger, self.pool, flight, self._advance)
+            known = wait_for(self.ledger, self.pool, flight, self.flights, self._advance)
             self.results[flight] = known
         return known
 

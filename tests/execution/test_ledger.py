@@ -11,7 +11,7 @@ from pytest_garl.errors import LedgerError
 from pytest_garl.execution.database import VERSION
 from pytest_garl.execution.flight_id import FlightId
 from pytest_garl.execution.ledger import Ledger
-from tests.execution.ledgers import FACTS, waiting_ledger
+from tests.execution.ledgers import FACTS, result_of, waiting_ledger
 from tests.support.results import flight_result
 
 
@@ -30,7 +30,7 @@ def test_resuming_gives_back_what_was_in_flight(tmp_path: Path) -> None:
     ledger.queue.claim()
     ledger.close()
     ledger = Ledger.resume(tmp_path / "ledger.sqlite", FACTS)
-    assert ledger.result(FlightId(search="s", map="court")) == flight_result()
+    assert result_of(ledger, FlightId(search="s", map="court")) == flight_result()
     again = ledger.queue.claim()
     assert again is not None
     assert (again.flight.slot.index, again.after) == (1, "")

@@ -9,7 +9,7 @@ import pytest
 from pytest_garl.execution.flight_id import FlightId
 from pytest_garl.execution.ledger import Ledger
 from pytest_garl.execution.ledger_queue import WorkQueue
-from tests.execution.ledgers import FACTS, waiting_ledger
+from tests.execution.ledgers import FACTS, result_of, waiting_ledger
 from tests.support.results import flight_result
 
 
@@ -20,7 +20,7 @@ def test_a_slot_is_handed_out_once_and_recorded_once(tmp_path: Path) -> None:
     assert claims[0] is not None
     ledger.queue.record(claims[0], flight_result(), "hash", 0.1)
     ledger.queue.record(claims[0], flight_result(elapsed_s=2.0), "other", 0.1)
-    assert ledger.result(FlightId(search="s", map="court")) == flight_result()
+    assert result_of(ledger, FlightId(search="s", map="court")) == flight_result()
     assert ledger.queries.meters()["flights"] == 1
 
 

@@ -24,6 +24,7 @@ from pytest_garl.execution.slot import Slot
 from pytest_garl.execution.supervisor import LEAST_STANDSTILL_S, FlightMonitor
 from pytest_garl.simulation.flight import Crash
 from tests.execution.flying import Exits, Good, Slow, job_of, scenario
+from tests.execution.ledgers import result_of, sha256_of
 from tests.execution.misbehaving import (
     ClosesFiles,
     DiesOnce,
@@ -86,13 +87,13 @@ class Field:
         self.ledger.add_slots("bad", 0, {0: dump_scenario(scenario())})
         self.ledger.add_slots("good", 1, {0: dump_scenario(scenario(0.2))})
         for search, slot in (("bad", Slot(generation=0, index=0)), ("good", NEXT)):
-            wait_for(self.ledger, self.pool, flight_of(search, slot), lambda: None)
-        result = self.ledger.result(flight_of("bad"))
+            wait_for(self.ledger, self.pool, flight_of(search, slot), flights, lambda: None)
+        result = result_of(self.ledger, flight_of("bad"))
         assert result is not None
         return Flown(
             result=result,
-            sha256=self.ledger.sha256(flight_of("bad")),
-            neighbour=self.ledger.sha256(flight_of("good", NEXT)),
+            sha256=sha256_of(self.ledger, flight_of("bad")),
+            neighbour=sha256_of(self.ledger, flight_of("good", NEXT)),
             meters=self.ledger.queries.meters(),
         )
 
@@ -244,7 +245,7 @@ def test_workers_that_end_between_flights_do_not_end_the_run(field: Field) -> No
     for index in range(MAX_IDLE_EXITS + 2):
         field.ledger.add_slots("one", index, {0: dump_scenario(scenario())})
         slot = Slot(generation=index, index=0)
-        wait_for(field.ledger, field.pool, flight_of("one", slot), lambda: None)
+        wait_for(field.ledger, field.pool, flight_of("one", slot), field.folder, lambda: None)
         (worker,) = field.pool._workers
         os.kill(worker, signal.SIGKILL)
         while worker in field.pool._workers:
@@ -259,7 +260,7 @@ def test_workers_that_end_before_they_fly_end_the_run(field: Field) -> None:
 
     field.ledger.add_search("one", "s", "lawn", 1, "{}")
     with pytest.raises(PoolError, match="worker processes end before they fly"):
-        wait_for(field.ledger, field.pool, flight_of("one", NEXT), kill_all)
+        wait_for(field.ledger, field.pool, flight_of("one", NEXT), field.folder, kill_all)
 
 
 def test_nothing_is_left_beside_the_ledger(tmp_path: Path) -> None:
@@ -281,6 +282,7 @@ def test_a_process_that_nothing_changed_flies_on(field: Field) -> None:
             field.ledger,
             field.pool,
             flight_of("more", Slot(generation=2, index=index)),
+            field.folder,
             lambda: None,
         )
     assert list(field.pool._workers) == [first]

@@ -11,6 +11,7 @@ from pytest_garl.execution.ledger_queue import Claim
 from pytest_garl.execution.worker_failure import WorkerExit, retry_or_record
 from pytest_garl.simulation.flight import Crash
 from tests.execution.flying import Good, job_of, scenario
+from tests.execution.ledgers import result_of
 from tests.support.results import flight_result
 
 DIED = WorkerExit(status=-11, stderr="no fuel")
@@ -38,7 +39,7 @@ def claimed(ledger: Ledger) -> Claim:
 
 
 def crash(ledger: Ledger) -> Crash:
-    result = ledger.result(FIRST_FLIGHT)
+    result = result_of(ledger, FIRST_FLIGHT)
     assert result is not None
     assert result.crash is not None
     return result.crash
@@ -52,7 +53,7 @@ def test_what_the_machine_may_have_done_is_flown_again_when_nobody_else_flies(
 ) -> None:
     first, other = claimed(ledger), claimed(ledger)
     retry_or_record(ledger.queue, first, ended)
-    assert ledger.result(FIRST_FLIGHT) is None
+    assert result_of(ledger, FIRST_FLIGHT) is None
     assert ledger.queue.claim() is None
     ledger.queue.record(other, flight_result(), "", 0.0)
     assert ledger.queue.claim(flown="m:Class") is None
@@ -65,7 +66,7 @@ def test_what_the_machine_may_have_done_is_flown_again_when_nobody_else_flies(
 
 def test_a_process_that_ends_itself_is_a_finding_at_once(ledger: Ledger) -> None:
     retry_or_record(ledger.queue, claimed(ledger), DIED)
-    result = ledger.result(FIRST_FLIGHT)
+    result = result_of(ledger, FIRST_FLIGHT)
     assert result is not None
     assert result.signature == "V:died:signal-11"
     assert crash(ledger).message == "its process ended with signal 11"
@@ -93,7 +94,7 @@ def test_what_happens_again_alone_is_a_finding(
     ledger.queue.record(claimed(ledger), flight_result(), "", 0.0)
     retry_or_record(ledger.queue, first, ended)
     retry_or_record(ledger.queue, claimed(ledger), ended)
-    result = ledger.result(FIRST_FLIGHT)
+    result = result_of(ledger, FIRST_FLIGHT)
     assert result is not None
     assert result.signature == signature
     assert crash(ledger).message == message
@@ -107,7 +108,7 @@ def test_three_flights_that_end_each_in_another_way_leave_it_undecided(ledger: L
     third = claimed(ledger)
     assert (third.after, third.attempt) == ("hung killed", 3)
     retry_or_record(ledger.queue, third, BROKE)
-    result = ledger.result(FIRST_FLIGHT)
+    result = result_of(ledger, FIRST_FLIGHT)
     assert result is not None
     assert (result.outcome, result.signature) == ("inconclusive", "")
     assert result.undecided.startswith("each of 3 flights ended its process in a different way")

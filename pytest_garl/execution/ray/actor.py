@@ -86,7 +86,7 @@ class FlightActor:
         job = dataclasses.replace(self._job(claim.job), flights=str(self._folder / "flights"))
         flight = FlightId(search=str(self._flown), map=job.map)
         self._ledger.add_flight(flight, job.system.name, job.dumps(), claim.scenario, claim.after)
-        result = wait_for(self._ledger, self._pool, flight, lambda: None)
+        completed = wait_for(self._ledger, self._pool, flight, Path(job.flights), lambda: None)
         if self._ended is not None:
             ended, self._ended = self._ended, None
             error, message, text = ended.failure or ("", "", "")
@@ -99,9 +99,9 @@ class FlightActor:
         record = job.record(flight).read_bytes()
         job.record(flight).unlink()
         return FlightOutput(
-            result=FlightResult.from_json(parse_json(self._to_local(result.dumps()))),
-            sha256=self._ledger.sha256(flight),
-            wall_s=self._ledger.wall_s(flight),
+            result=FlightResult.from_json(parse_json(self._to_local(completed.result.dumps()))),
+            sha256=completed.sha256,
+            wall_s=self._ledger.queries.flying_s(flight.search),
             record=record,
         )
 

@@ -17,6 +17,7 @@ from pytest_garl.execution.ray.scheduler import RayScheduler, different_versions
 from pytest_garl.execution.slot import Slot
 from pytest_garl.execution.worker_failure import WorkerExit
 from tests.execution.flying import Good, job_of, scenario
+from tests.execution.ledgers import result_of, sha256_of
 from tests.support.results import flight_result
 
 LANDED = FlightOutput(result=flight_result(), sha256="hash", wall_s=1.5, record=b"record")
@@ -117,7 +118,7 @@ def test_scheduler_flies_all_slots_and_writes_records_into_the_jobs_folder(
     ray = FakeRay()
     fly(ray, ledger).close()
     assert ledger.generation("search", 0) == [(dump_scenario(scenario()), LANDED.result)] * 3
-    assert ledger.sha256(flight_of(2)) == "hash"
+    assert sha256_of(ledger, flight_of(2)) == "hash"
     assert ledger.queries.meters()["flying_s"] == 4.5
     files = {path.name: path.read_bytes() for path in (tmp_path / "flights").iterdir()}
     assert files == {f"search-lawn-g00-s0{index}.npz": b"record" for index in range(3)}
@@ -177,7 +178,7 @@ def test_worker_exit_is_handled_as_in_the_local_pool(ledger: Ledger) -> None:
         return KILLED if claim.flight.slot.index == 0 else LANDED
 
     fly(FakeRay(fly=die), ledger)
-    result = ledger.result(flight_of(0))
+    result = result_of(ledger, flight_of(0))
     assert result is not None
     assert result.signature == "V:died:signal-9"
     assert [claim.after for claim in claims if claim.flight.slot.index == 0] == ["", "killed"]
