@@ -44,12 +44,13 @@ def actor(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[FlightAct
 
 def test_actor_flies_the_same_bytes_as_a_local_worker(actor: FlightActor, tmp_path: Path) -> None:
     job = job_of(Good, tmp_path / "local")
-    local, sha256, _ = fly_job(job, scenario(0.2), FlightId(search="flight", map="lawn"), None)
+    flight = FlightId(search="flight", map="lawn")
+    local, sha256, _ = fly_job(job, scenario(0.2), flight, None)
     found = actor.fly(claim(Good))
     assert isinstance(found, FlightOutput)
     assert (found.result, found.sha256) == (local, sha256)
     (tmp_path / "came.npz").write_bytes(found.record)
-    assert load(tmp_path / "came.npz").sha256 == load(tmp_path / "local" / "flight.npz").sha256
+    assert load(tmp_path / "came.npz").sha256 == load(job.record(flight)).sha256
 
 
 def test_actor_survives_the_end_of_its_worker(actor: FlightActor) -> None:
