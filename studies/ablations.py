@@ -1,26 +1,25 @@
-"""What the parts of ``garl`` are worth: the search without them, and with others instead.
+"""The worth of each part of ``garl``: searches without the part, or with another in its place.
 
-The system under test is a pilot that knows the marker's place, climbs away from what it could see
-below, and goes home where it has not landed after a minute: it needs no camera, so a search of 400
-flights takes a minute or two.  Objects are steered as each method has it.
-``python -m studies.ablations`` flies what ``docs/ablations.csv`` lacks; ``--report`` prints the
-table.
+The system under test is a pilot that knows the marker's position, climbs away from objects below
+and gives up after a minute.  It needs no camera, so a search of 400 flights takes a minute or two.
+``python -m studies.ablations`` flies the searches that ``docs/ablations.csv`` lacks; ``--report``
+prints the table.
 """
 
 from __future__ import annotations
 
 import argparse
 import functools
+import itertools
 import os
 from collections.abc import Callable, Sequence
-from concurrent.futures import Executor, ProcessPoolExecutor
+from concurrent.futures import Executor
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from scipy.stats import t
 
-from pytest_garl import cpu_dispatch
 from pytest_garl.adversary.catalogue import policy_spec
 from pytest_garl.adversary.training.uav_models import AvoidingPilot
 from pytest_garl.execution.flight import judged
@@ -36,23 +35,26 @@ from pytest_garl.search.methods.garl import Garl, GarlParameters
 from pytest_garl.simulation.fly import fly
 from pytest_garl.verdicts.paper_metrics import mean_distance, top_k
 from pytest_garl.verdicts.verdict import PAPER_LIMITS
-from studies.rows import append, read
+from studies.table import Key, ResultTable, Row, run_study
 
-FILE = Path("docs/ablations.csv")
 MAPS = ("court", "lawn")
 BUDGET, POPULATION = 400, 20
 PATIENCE_S = 60.0
-"""When the pilot goes home: twice as long as MM-MLS takes to land."""
-FIELDS = ("variant", "seed", "map", "budget", "violations", "top10", "signatures", "distance")
+"""The pilot gives up after this time: twice as long as MM-MLS takes to land."""
+TABLE = ResultTable(
+    file=Path("docs/ablations.csv"),
+    columns=("variant", "seed", "map", "budget", "violations", "top10", "signatures", "distance"),
+    key=("variant", "seed", "map"),
+)
 
 
 def found(result: FlightResult) -> str:
-    """Name the cell by the violation alone: near misses of all kinds share one."""
+    """Name the cell by the violation alone: all near misses share a cell."""
     return result.signature or result.outcome
 
 
 def one(result: FlightResult) -> str:
-    """Name one cell for all: what comes nearest to a violation is bred from, whatever it is."""
+    """Put all flights into one cell: the nearest to a violation is bred from."""
     return ""
 
 
@@ -82,14 +84,14 @@ VARIANTS: dict[str, Callable[[SearchPlan], Method]] = {
     "random with dqn": find_method("random"),
 }
 POLICIES = {"garl-paper": "dqn-paper", "random": "waypoint"}
-"""Who moves the objects; ``dqn`` where nothing is said."""
+"""The NPC policy of a variant; ``dqn`` for all others."""
 
 
 class Pilot(AvoidingPilot):
-    """Avoids what is below, and does not wait for ever."""
+    """Avoids objects below, and gives up after :data:`PATIENCE_S`."""
 
     def step(self, observation: Observation) -> Command:
-        """Fly, or go home."""
+        """Fly, or abort the landing."""
         return Abort() if observation.time_s > PATIENCE_S else super().step(observation)
 
 
@@ -98,10 +100,11 @@ def fly_one(scenario: Scenario, policy: str) -> FlightResult:
     return judged(fly(scenario, Pilot, policy_spec(policy)), PAPER_LIMITS)
 
 
-def search(name: str, seed: int, map: str, pool: Executor) -> dict[str, Any]:
-    """Run one search to the end of its budget."""
-    place = load_map(map)
-    plan = SearchPlan(map=place, genome=genome_for(place), seed=seed, population=POPULATION)
+def search(key: Key, pool: Executor) -> dict[str, Any]:
+    """Fly one search; return its row."""
+    name, seed, map_name = key
+    map = load_map(map_name)
+    plan = SearchPlan(map=map, genome=genome_for(map), seed=int(seed), population=POPULATION)
     flown = functools.partial(fly_one, policy=POLICIES.get(name, "dqn"))
     method, verdicts, chromosomes = VARIANTS[name](plan), [], []
     for _ in range(BUDGET // POPULATION):
@@ -113,7 +116,7 @@ def search(name: str, seed: int, map: str, pool: Executor) -> dict[str, Any]:
     return {
         "variant": name,
         "seed": seed,
-        "map": map,
+        "map": map_name,
         "budget": BUDGET,
         "violations": sum(verdict.paper_violation for verdict in verdicts),
         "top10": top_k(verdicts) or "",
@@ -122,8 +125,8 @@ def search(name: str, seed: int, map: str, pool: Executor) -> dict[str, Any]:
     }
 
 
-def report(rows: list[dict[str, str]]) -> str:
-    """Return a Markdown table: means over searches, the flights of one being no sample."""
+def report(rows: list[Row]) -> str:
+    """Return a Markdown table of means over searches; flights of one search are no sample."""
     lines = [
         "| variant | searches | violations, % | Top-10 | signatures | distance |",
         "| --- | --- | --- | --- | --- | --- |",
@@ -132,7 +135,7 @@ def report(rows: list[dict[str, str]]) -> str:
         own = [row for row in rows if row["variant"] == name]
         if not own:
             continue
-        # A search that found fewer than ten counts as one more than its budget.
+        # Top-10 of a search with fewer than ten violations counts as its budget and one more.
         figures = (
             [100 * int(row["violations"]) / int(row["budget"]) for row in own],
             [float(row["top10"] or BUDGET + 1) for row in own],
@@ -145,7 +148,7 @@ def report(rows: list[dict[str, str]]) -> str:
 
 
 def _mean(values: Sequence[float]) -> str:
-    """Return the mean with its 95 % interval (Student's t), which says something from three on."""
+    """Return the mean, from three values on with its 95 % interval (Student's t)."""
     mean = float(np.mean(values))
     if len(values) < 3:
         return f"{mean:.3g}"
@@ -155,24 +158,17 @@ def _mean(values: Sequence[float]) -> str:
 
 
 def main() -> None:
-    """Fly what is missing, or print the table."""
+    """Fly the missing searches, or print the table."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--report", action="store_true")
-    parser.add_argument("--seeds", type=int, nargs="+", default=[100, 101, 102])
+    parser.add_argument("--seeds", nargs="+", default=["100", "101", "102"])
     parser.add_argument("--variants", nargs="+", default=list(VARIANTS))
-    arguments = parser.parse_args()
-    known = read(FILE)
-    if arguments.report:
-        print(report(known))
-        return
-    done = {(row["variant"], int(row["seed"]), row["map"]) for row in known}
-    cpu_dispatch.pin()
-    with ProcessPoolExecutor(os.cpu_count()) as pool:
-        for seed in arguments.seeds:
-            for map in MAPS:
-                for name in arguments.variants:
-                    if (name, seed, map) not in done:
-                        append(FILE, FIELDS, [search(name, seed, map, pool)])
+    run_study(parser, TABLE, report, fly_searches)
+
+
+def fly_searches(arguments: argparse.Namespace) -> None:
+    """Fly the searches that the table lacks."""
+    keys = itertools.product(arguments.seeds, MAPS, arguments.variants)
+    TABLE.fly_missing(((name, seed, map) for seed, map, name in keys), search, os.cpu_count())
 
 
 if __name__ == "__main__":

@@ -1,21 +1,21 @@
-"""Who steers the objects, in full flights: collisions, blocked landings, violations.
+"""NPC policies in full flights: collisions, blocked landings, violations.
 
-``python -m studies.adversary`` flies what ``docs/adversary.csv`` lacks, fifty flights at a time
-of each mover, landing system and map, and can be stopped and started again at any time;
-``--report`` prints the table of what is there.  Scenarios are fresh random ones in clear weather,
-the same for every mover.
+``python -m studies.adversary`` flies the flights that ``docs/adversary.csv`` lacks, in chunks of
+fifty for each policy, landing system and map; it can be interrupted and started again at any time.
+``--report`` prints the table.  The scenarios are random, in clear weather, and the same for every
+policy.
 """
 
 from __future__ import annotations
 
 import argparse
+import itertools
 import os
 from collections import Counter
-from concurrent.futures import ProcessPoolExecutor
+from concurrent.futures import Executor
 from pathlib import Path
 from typing import Any
 
-from pytest_garl import cpu_dispatch
 from pytest_garl.adversary.catalogue import policy_spec
 from pytest_garl.scenarios.genes import WEATHER, genome_for
 from pytest_garl.scenarios.maps.map import load_map
@@ -23,9 +23,8 @@ from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.search.methods.random import propose
 from pytest_garl.simulation.npc_policy import PolicySpec
 from studies.oracle import oracle_spec
-from studies.rows import append, read, share
+from studies.table import Key, ResultTable, Row, run_study, share
 
-FILE = Path("docs/adversary.csv")
 SEED = 4242
 CHUNK = 50
 MOVERS = (
@@ -41,29 +40,32 @@ MOVERS = (
 SYSTEMS = ("opencv", "avoiding")
 MAPS = ("court", "lawn")
 KINDS = ("person", "dog", "bird")
-FIELDS = (
-    "mover",
-    "sha256",
-    "system",
-    "map",
-    "chunk",
-    "flights",
-    "collided",
-    *KINDS,
-    "blocked",
-    "violations",
-    "crashed",
+TABLE = ResultTable(
+    file=Path("docs/adversary.csv"),
+    columns=(
+        "mover",
+        "sha256",
+        "system",
+        "map",
+        "chunk",
+        "flights",
+        "collided",
+        *KINDS,
+        "blocked",
+        "violations",
+        "crashed",
+    ),
+    key=("mover", "sha256", "system", "map", "chunk"),
 )
-KEY = FIELDS[:5]
 
 
 def spec_of(mover: str) -> PolicySpec:
-    """Return a mover's specification."""
+    """Return the specification of an NPC policy."""
     return oracle_spec() if mover == "oracle" else policy_spec(mover)
 
 
 def sha256_of(mover: str) -> str:
-    """Return the start of the hash of a learned mover's weights; nothing for the others."""
+    """Return the start of the hash of a learned policy's weights; empty for the others."""
     return spec_of(mover).sha256[:16]
 
 
@@ -93,17 +95,14 @@ def fly_one(job: tuple[Scenario, str, str]) -> tuple[str, str, bool]:
     return flight.outcome, flight.contacts[-1].kind if hit else "", verdict.paper_violation
 
 
-def row_of(mover: str, system: str, map: str, chunk: int, pool: Any) -> dict[str, Any]:
-    """Fly one chunk."""
-    jobs = [(scenario, mover, system) for scenario in scenarios(map, chunk)]
+def row_of(key: Key, pool: Executor) -> dict[str, Any]:
+    """Fly one chunk; return its row."""
+    mover, _, system, map, chunk = key
+    jobs = [(scenario, mover, system) for scenario in scenarios(map, int(chunk))]
     ends = list(pool.map(fly_one, jobs))
     hits = Counter(kind for _, kind, _ in ends if kind)
     return {
-        "mover": mover,
-        "sha256": sha256_of(mover),
-        "system": system,
-        "map": map,
-        "chunk": chunk,
+        **dict(zip(TABLE.key, key, strict=True)),
         "flights": len(ends),
         "collided": hits.total(),
         **{kind: hits[kind] for kind in KINDS},
@@ -113,7 +112,7 @@ def row_of(mover: str, system: str, map: str, chunk: int, pool: Any) -> dict[str
     }
 
 
-def report(rows: list[dict[str, str]]) -> str:
+def report(rows: list[Row]) -> str:
     """Return a Markdown table: per system, both maps and each, a row for each mover."""
     lines = [
         "| system | map | mover | flights | collided | who (p / d / b) | blocked | violations |",
@@ -122,14 +121,14 @@ def report(rows: list[dict[str, str]]) -> str:
     for system in SYSTEMS:
         for map in ("both", *MAPS):
             for mover in MOVERS:
-                # Rows of weights that are not shipped any more count for nothing.
+                # Rows of weights other than the shipped ones are left out.
                 key = (system, mover, sha256_of(mover))
                 names = ("system", "mover", "sha256")
                 own = [row for row in rows if tuple(row[name] for name in names) == key]
                 own = [row for row in own if map in ("both", row["map"])]
                 if not own:
                     continue
-                total = {name: sum(int(row[name]) for row in own) for name in FIELDS[5:]}
+                total = {name: sum(int(row[name]) for row in own) for name in TABLE.columns[5:]}
                 cells = [
                     share(total[name], total["flights"])
                     for name in ("collided", "blocked", "violations")
@@ -143,28 +142,25 @@ def report(rows: list[dict[str, str]]) -> str:
 
 
 def main() -> None:
-    """Fly what is missing, or print the table."""
+    """Fly the missing flights, or print the table."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--report", action="store_true")
     parser.add_argument("--flights", type=int, default=150, help="per mover, system and map")
     parser.add_argument("--movers", nargs="+", default=list(MOVERS))
     parser.add_argument("--systems", nargs="+", default=list(SYSTEMS))
     parser.add_argument("--workers", type=int, default=os.cpu_count() or 1)
-    arguments = parser.parse_args()
-    known = read(FILE)
-    if arguments.report:
-        print(report(known))
-        return
-    done = {tuple(row[name] for name in KEY) for row in known}
-    cpu_dispatch.pin()
-    with ProcessPoolExecutor(arguments.workers) as pool:
-        for chunk in range(-(-arguments.flights // CHUNK)):
-            for system in arguments.systems:
-                for map in MAPS:
-                    for mover in arguments.movers:
-                        key = (mover, sha256_of(mover), system, map, str(chunk))
-                        if key not in done:
-                            append(FILE, FIELDS, [row_of(mover, system, map, chunk, pool)])
+    run_study(parser, TABLE, report, fly_chunks)
+
+
+def fly_chunks(arguments: argparse.Namespace) -> None:
+    """Fly the chunks that the table lacks."""
+    chunks = range(-(-arguments.flights // CHUNK))
+    keys = (
+        (mover, sha256_of(mover), system, map, str(chunk))
+        for chunk, system, map, mover in itertools.product(
+            chunks, arguments.systems, MAPS, arguments.movers
+        )
+    )
+    TABLE.fly_missing(keys, row_of, arguments.workers)
 
 
 if __name__ == "__main__":

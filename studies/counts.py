@@ -1,9 +1,8 @@
-"""What the remarks on an experiment count and its rows do not tell, from the ledgers that it keeps.
+"""Counts in the remarks on the experiments that the experiments' rows do not hold.
 
-``python -m studies.counts`` reads those below ``.garl/experiments`` and writes
-``docs/experiments/counts.csv``: how often each kind of violation occurred, how many flights were in
-the dark, and what became of those in which all objects but one, or all, are slow.  Searches whose
-ledger is gone keep their line.
+``python -m studies.counts`` reads the ledgers below ``.garl/experiments`` and writes
+``docs/experiments/counts.csv``: the flights of each signature, the flights in the dark, and the
+outcomes of flights in which at most one object is fast.  A search without a ledger keeps its line.
 """
 
 from __future__ import annotations
@@ -24,11 +23,11 @@ from pytest_garl.scenarios.genes import genome_for
 from pytest_garl.scenarios.maps.map import load_map
 from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.simulation.camera.weather import conditions_of
-from studies.rows import read
+from studies.table import read_csv
 
 ROWS, FILE = Path("docs/experiments/rq.csv"), Path("docs/experiments/counts.csv")
 SLOW = 0.25
-"""An object is slow whose speed lies in this lowest share of its range."""
+"""An object is slow if its speed lies in this lowest share of its range."""
 
 
 def count(ledger: Ledger, search: str, map: str) -> dict[str, int | str]:
@@ -63,13 +62,13 @@ def _slow(scenario: Scenario, speeds: Iterable[tuple[str, float, float]]) -> boo
 
 
 def main() -> None:
-    """Count what there are ledgers of."""
+    """Count the flights of all ledgers."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--folder", type=Path, default=Path(".garl/experiments"))
     folder = parser.parse_args().folder
     rows = {row.result_hash: row for row in rows_of(ROWS)}
     lines: dict[str, dict[str, int | str]] = {
-        line["result_hash"]: dict(line) for line in read(FILE) if line["result_hash"] in rows
+        line["result_hash"]: dict(line) for line in read_csv(FILE) if line["result_hash"] in rows
     }
     for path in sorted(folder.glob("*/ledger.sqlite")):
         with closing(Ledger(path)) as ledger:

@@ -19,7 +19,7 @@ from pytest_garl.baselines.comparison import LEVEL, Comparison, compare
 from pytest_garl.baselines.gate_statistics import holm_adjusted
 from pytest_garl.baselines.pairs import FlightSummary, Pair
 from pytest_garl.regressions.robustness import COUNT
-from studies.rows import read, share
+from studies.table import read_csv, share
 
 DOCS = Path(__file__).parents[1] / "docs"
 COUNTS, PAGE = DOCS / "experiments" / "counts.csv", DOCS / "gate.md"
@@ -70,7 +70,7 @@ class Stack:
 def measured(system: str, method: str) -> Stack:
     """Return a landing system in the scenarios of a method: all its rows of the counts together."""
     counts = Counter[FlightSummary]()
-    for row in read(COUNTS):
+    for row in read_csv(COUNTS):
         if (row["system"], row["method"]) == (system, method):
             counts[LANDED] += int(row["landed"])
             counts[ABORTED] += int(row["aborted"])

@@ -1,8 +1,8 @@
-"""What the shrinker's passes are worth, on violations of OpenCV-MLS that a search found.
+"""The worth of the shrinker's passes, on violations of OpenCV-MLS that a search found.
 
-``python -m studies.shrinking`` searches with the defaults of pytest-garl, takes twenty of the
-violations, kind after kind, shrinks each by both passes and by each alone, and appends to
-``docs/shrinking.csv`` what that lacks; ``--report`` prints the table.
+``python -m studies.shrinking`` searches with the defaults of pytest-garl and takes twenty
+violations, as different ones as possible.  It shrinks each by both passes and by each alone, and
+appends the rows that ``docs/shrinking.csv`` lacks; ``--report`` prints the table.
 """
 
 from __future__ import annotations
@@ -25,6 +25,8 @@ from pytest_garl.execution.ledger_queries import LedgerFlight
 from pytest_garl.execution.local_pool import local_pool
 from pytest_garl.execution.on_demand import FlyFunction, OnDemandFlights
 from pytest_garl.execution.result import CompletedFlight
+from pytest_garl.experiments.pytest_run import run_pytest
+from pytest_garl.experiments.spec import ExperimentRun
 from pytest_garl.regressions.new_case import find_colliding_object
 from pytest_garl.regressions.shrink import (
     by_hypothesis,
@@ -36,14 +38,18 @@ from pytest_garl.regressions.shrink import (
 )
 from pytest_garl.scenarios.maps.map import load_map
 from pytest_garl.scenarios.scenario import Scenario
-from studies.methods import run
-from studies.rows import append, read
+from studies.table import ResultTable, Row, run_study
 
-FILE = Path("docs/shrinking.csv")
-TESTS = "landing_systems/test_opencv_mls.py"
 COUNT = 20
-SEARCHED = 60
-"""Flights of the search on each map that the violations are taken from."""
+SEARCH = ExperimentRun(
+    system="OpenCV-MLS",
+    tests="landing_systems/test_opencv_mls.py",
+    maps=("court", "lawn"),
+    method="garl",
+    seed=0,
+    budget=60,
+)
+"""The search that finds the violations."""
 BUDGET = 40
 AT_A_TIME = 5
 PASSES: dict[str, tuple[Callable[..., None], ...]] = {
@@ -51,18 +57,22 @@ PASSES: dict[str, tuple[Callable[..., None], ...]] = {
     "reset and bisect": (reset_and_bisect,),
     "Hypothesis": (by_hypothesis,),
 }
-FIELDS = (
-    "passes",
-    "map",
-    "slot",
-    "signature",
-    "flights",
-    "objects_before",
-    "objects",
-    "genes_before",
-    "genes",
-    "distance_before",
-    "distance",
+TABLE = ResultTable(
+    file=Path("docs/shrinking.csv"),
+    columns=(
+        "passes",
+        "map",
+        "slot",
+        "signature",
+        "flights",
+        "objects_before",
+        "objects",
+        "genes_before",
+        "genes",
+        "distance_before",
+        "distance",
+    ),
+    key=("map", "slot", "passes"),
 )
 
 
@@ -140,7 +150,7 @@ def _row(violation: Violation, passes: str, fails: Callable[[Scenario], bool]) -
     }
 
 
-def report(rows: list[dict[str, str]]) -> str:
+def report(rows: list[Row]) -> str:
     """Return a Markdown table of medians."""
     lines = [
         "| passes | violations | flights | most | objects left | genes left | distance left |",
@@ -162,44 +172,46 @@ def report(rows: list[dict[str, str]]) -> str:
     return "\n".join(lines)
 
 
-def _medians(rows: list[dict[str, str]], suffix: str) -> Iterator[str]:
+def _medians(rows: list[Row], suffix: str) -> Iterator[str]:
     for name in ("objects", "genes", "distance"):
         yield f"{np.median([float(row[name + suffix]) for row in rows]):.3g}"
 
 
 def main() -> None:
-    """Shrink what is missing, or print the table."""
+    """Shrink the missing violations, or print the table."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--report", action="store_true")
     parser.add_argument("--count", type=int, default=COUNT)
     parser.add_argument("--workers", type=int, default=os.cpu_count() or 1)
-    arguments = parser.parse_args()
-    known = read(FILE)
-    if arguments.report:
-        print(report(known))
-        return
-    done = {(row["map"], row["slot"]) for row in known}
-    folder = Path(".garl/shrinking/search")
-    source = Ledger(run(folder, TESTS, [f"--garl-budget={SEARCHED}"]))
+    run_study(parser, TABLE, report, shrink_violations)
+
+
+def shrink_violations(arguments: argparse.Namespace) -> None:
+    """Search for violations, and shrink those that the table lacks."""
+    found = Ledger(run_pytest(SEARCH, Path(".garl/shrinking/search"), arguments.workers, _ignore))
+    known = {(row["map"], row["slot"]) for row in TABLE.rows()}
     wanted = [
         each
-        for each in violations(source, arguments.count)
-        if (each.job.map, each.slot) not in done
+        for each in violations(found, arguments.count)
+        if (each.job.map, each.slot) not in known
     ]
     path = Path(".garl/shrinking/ledger.sqlite")
     ledger = Ledger(path) if path.is_file() else Ledger.create(path, {})
     pool = local_pool(ledger.queue, arguments.workers)
     try:
-        # As many at a time as keep the workers busy; what is done is written down.
+        # As many at a time as keep the workers busy; their rows are saved before the next ones.
         for start in range(0, len(wanted), AT_A_TIME):
             functions = {
                 f"{each.job.map} {each.slot}": functools.partial(shrink_one, each)
                 for each in wanted[start : start + AT_A_TIME]
             }
-            found = OnDemandFlights(ledger, pool, lambda: None).run(functions)
-            append(FILE, FIELDS, itertools.chain.from_iterable(found.values()))
+            rows = OnDemandFlights(ledger, pool, lambda: None).run(functions)
+            TABLE.append(itertools.chain.from_iterable(rows.values()))
     finally:
         pool.close()
+
+
+def _ignore(progress: object) -> None:
+    """Show no progress of the search."""
 
 
 if __name__ == "__main__":

@@ -13,7 +13,6 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from benchmarks.bare_flight import Trace, fly_bare
 from landing_systems.modules.control_ardupilot import (
     ArduPilotControl,
     ArduPilotParameters,
@@ -28,6 +27,7 @@ from pytest_garl.simulation.physics.vehicle import (
     YAW_TORQUE_PER_THRUST_M,
     vehicle_model,
 )
+from tests.support.bare_flight import Trace, fly_bare
 
 PICTURE = Path(__file__).parents[1] / "docs" / "pictures" / "step-responses.png"
 SETTLED_S = 14.0

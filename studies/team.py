@@ -1,9 +1,9 @@
-"""Several objects: copies of one policy against objects that were trained together.
+"""Several objects: copies of one policy compared with objects trained together.
 
-``python -m studies.team --train`` trains two objects together: shared weights, each also
-seeing its nearest fellow, warm-started from the shipped policy, all rewarded for a
-collision of any.  Without ``--train`` both are flown, one, two and three objects at a time, as
-fifty full flights per cell and call, appended to ``docs/team.csv``; ``--report`` prints the table.
+``python -m studies.team --train`` trains two objects together.  They share weights, start with
+those of the shipped policy, see their nearest fellow and are rewarded for a collision of either.
+``python -m studies.team`` flies both policies with one, two and three objects, and appends the
+chunks of fifty flights that ``docs/team.csv`` lacks; ``--report`` prints the table.
 """
 
 from __future__ import annotations
@@ -11,9 +11,10 @@ from __future__ import annotations
 import argparse
 import dataclasses
 import functools
+import itertools
 import math
 import os
-from concurrent.futures import ProcessPoolExecutor
+from concurrent.futures import Executor
 from pathlib import Path
 from typing import Any
 
@@ -21,7 +22,6 @@ import numpy as np
 import torch
 from rich.progress import Progress
 
-from pytest_garl import cpu_dispatch
 from pytest_garl.adversary.catalogue import WEIGHTS, policy_spec
 from pytest_garl.adversary.learned import Network, save
 from pytest_garl.adversary.observations import (
@@ -47,14 +47,17 @@ from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.search.methods.random import propose
 from pytest_garl.simulation.npc_policy import Move, PolicySpec, Situation
 from studies.adversary import CHUNK, MAPS, SYSTEMS
-from studies.rows import append, read, share
+from studies.table import Key, ResultTable, Row, run_study, share
 
-FILE = Path("docs/team.csv")
 TOGETHER = Path(".garl/team/together.npz")
 KINDS = ("person", "dog", "bird")
 SEED = 5151
 COUNTS = (1, 2, 3)
-FIELDS = ("mover", "objects", "system", "map", "chunk", "flights", "collided", "blocked")
+TABLE = ResultTable(
+    file=Path("docs/team.csv"),
+    columns=("mover", "objects", "system", "map", "chunk", "flights", "collided", "blocked"),
+    key=("mover", "objects", "system", "map", "chunk"),
+)
 
 
 def fellow(situation: Situation) -> State:
@@ -204,7 +207,7 @@ def fly_one(job: tuple[Scenario, Map, str, str]) -> tuple[bool, bool]:
     return hit, flight.outcome in ("aborted", "not_landed")
 
 
-def report(rows: list[dict[str, str]]) -> str:
+def report(rows: list[Row]) -> str:
     """Return a Markdown table over both maps."""
     lines = [
         "| system | objects | mover | flights | collided | blocked |",
@@ -226,41 +229,38 @@ def report(rows: list[dict[str, str]]) -> str:
     return "\n".join(lines)
 
 
-def main() -> None:
-    """Train, fly or report."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--train", action="store_true")
-    parser.add_argument("--report", action="store_true")
-    parser.add_argument("--episodes", type=int, default=800)
-    parser.add_argument("--flights", type=int, default=300, help="per cell, both maps together")
-    arguments = parser.parse_args()
-    known = read(FILE)
-    if arguments.report:
-        print(report(known))
-        return
-    if arguments.train:
-        training = Training(episodes=arguments.episodes, epsilon=0.3)
-        save(TOGETHER, train_together(training, 2).policy("fellow"), {"policy": "together"})
-        return
-    done = {tuple(row[name] for name in FIELDS[:5]) for row in known}
-    cpu_dispatch.pin()
-    with ProcessPoolExecutor(os.cpu_count()) as pool:
-        for chunk in range(-(-arguments.flights // CHUNK // len(MAPS))):
-            for system in SYSTEMS:
-                for map in MAPS:
-                    for count in COUNTS:
-                        for mover in ("copies", "together"):
-                            key = (mover, str(count), system, map, str(chunk))
-                            if key not in done:
-                                append(FILE, FIELDS, [_row(key, pool)])
-
-
-def _row(key: tuple[str, str, str, str, str], pool: ProcessPoolExecutor) -> dict[str, Any]:
+def row_of(key: Key, pool: Executor) -> dict[str, Any]:
+    """Fly one chunk; return its row."""
     mover, count, system, map, chunk = key
     jobs = [(each, at, mover, system) for each, at in scenarios(map, int(count), int(chunk))]
     ends = list(pool.map(fly_one, jobs))
     figures = (len(ends), sum(hit for hit, _ in ends), sum(blocked for _, blocked in ends))
-    return dict(zip(FIELDS, (*key, *figures), strict=True))
+    return dict(zip(TABLE.columns, (*key, *figures), strict=True))
+
+
+def main() -> None:
+    """Train, fly or print the table."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--train", action="store_true")
+    parser.add_argument("--episodes", type=int, default=800)
+    parser.add_argument("--flights", type=int, default=300, help="per cell, both maps together")
+    run_study(parser, TABLE, report, train_or_fly)
+
+
+def train_or_fly(arguments: argparse.Namespace) -> None:
+    """Train two objects together, or fly the chunks that the table lacks."""
+    if arguments.train:
+        training = Training(episodes=arguments.episodes, epsilon=0.3)
+        save(TOGETHER, train_together(training, 2).policy("fellow"), {"policy": "together"})
+        return
+    chunks = range(-(-arguments.flights // CHUNK // len(MAPS)))
+    keys = (
+        (mover, str(count), system, map, str(chunk))
+        for chunk, system, map, count, mover in itertools.product(
+            chunks, SYSTEMS, MAPS, COUNTS, ("copies", "together")
+        )
+    )
+    TABLE.fly_missing(keys, row_of, os.cpu_count())
 
 
 if __name__ == "__main__":

@@ -175,6 +175,11 @@ def test_a_spec_without_grids_is_refused(tmp_path: Path) -> None:
         plan(tmp_path, TEXT.partition("[[grids]]")[0])
 
 
+@pytest.mark.parametrize("file", sorted(DOCS.glob("*.toml")), ids=lambda file: file.stem)
+def test_every_shipped_experiment_can_be_flown(file: Path) -> None:
+    check_experiment(read(file), DOCS.parents[1])
+
+
 def test_the_shipped_experiment_asks_the_papers_questions() -> None:
     found = read(DOCS / "rq.toml")
     first, second, third = found.grids

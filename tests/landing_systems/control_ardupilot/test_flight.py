@@ -8,7 +8,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from benchmarks.bare_flight import Trace, fly_bare
 from landing_systems.modules.control_ardupilot import ArduPilotControl, tuned, vehicle_of
 from pytest_garl import (
     Airframe,
@@ -29,6 +28,7 @@ from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.scenarios.validity import repair
 from pytest_garl.simulation.fly import fly
 from pytest_garl.simulation.system_under_test.ground_truth import Truth
+from tests.support.bare_flight import Trace, fly_bare
 
 pytestmark = pytest.mark.sim
 

@@ -1,0 +1,88 @@
+"""The table of a study: a CSV file that grows while the study runs, and its command line."""
+
+from __future__ import annotations
+
+import argparse
+import csv
+from collections.abc import Callable, Iterable, Mapping
+from concurrent.futures import Executor, ProcessPoolExecutor
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from pytest_garl import cpu_dispatch
+from pytest_garl.verdicts.statistics import share_interval
+
+Row = Mapping[str, str]
+Key = tuple[str, ...]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ResultTable:
+    """The CSV file of a study; the values in the ``key`` columns identify a row."""
+
+    file: Path
+    columns: tuple[str, ...]
+    key: tuple[str, ...]
+
+    def rows(self) -> list[Row]:
+        """Return the rows; none if there is no file."""
+        return read_csv(self.file)
+
+    def keys(self) -> set[Key]:
+        """Return the keys of all rows."""
+        return {tuple(row[name] for name in self.key) for row in self.rows()}
+
+    def append(self, rows: Iterable[Mapping[str, Any]]) -> None:
+        """Add rows at once, so that an interruption loses no finished row, and print them."""
+        new = not self.file.exists()
+        with self.file.open("a", newline="") as file:
+            writer = csv.DictWriter(file, self.columns)
+            if new:
+                writer.writeheader()
+            for row in rows:
+                writer.writerow(row)
+                print(", ".join(f"{name} {value}" for name, value in row.items()), flush=True)
+
+    def fly_missing(
+        self,
+        keys: Iterable[Key],
+        row_of: Callable[[Key, Executor], Mapping[str, Any]],
+        workers: int | None = None,
+    ) -> None:
+        """Append a row for each key without one; ``row_of`` flies in the executor's processes."""
+        known = self.keys()
+        cpu_dispatch.pin()
+        with ProcessPoolExecutor(workers) as pool:
+            for key in keys:
+                if key not in known:
+                    self.append([row_of(key, pool)])
+
+
+def read_csv(path: Path) -> list[Row]:
+    """Return the rows of a CSV file; none if there is no file."""
+    if not path.exists():
+        return []
+    with path.open(newline="") as file:
+        return list(csv.DictReader(file))
+
+
+def run_study(
+    parser: argparse.ArgumentParser,
+    table: ResultTable,
+    report: Callable[[list[Row]], str],
+    fly: Callable[[argparse.Namespace], None],
+) -> None:
+    """Parse the command line; print the report if it asks for it, else fly."""
+    parser.add_argument("--report", action="store_true", help="print the table, fly nothing")
+    arguments = parser.parse_args()
+    if arguments.report:
+        print(report(table.rows()))
+    else:
+        fly(arguments)
+
+
+def share(count: int, total: int) -> str:
+    """Return a percentage with its exact 95 % interval."""
+    low, high = share_interval(count, total)
+    return f"{100 * count / total:.1f} % [{100 * low:.1f}, {100 * high:.1f}]"
