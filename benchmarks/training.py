@@ -9,8 +9,8 @@ import argparse
 import dataclasses
 import time
 
-from pytest_garl.adversary.training.dqn import train
-from pytest_garl.adversary.training.train import PRESETS
+from pytest_garl.adversary.training.presets import PRESETS
+from pytest_garl.adversary.training.train import train
 from pytest_garl.scenarios.maps.map import load_map
 
 
@@ -20,9 +20,9 @@ def main() -> None:
     parser.add_argument("--policy", choices=list(PRESETS), default="dqn")
     parser.add_argument("--episodes", type=int, default=800)
     arguments = parser.parse_args()
-    surrogate, training = PRESETS[arguments.policy]
-    surrogate = dataclasses.replace(surrogate, maps=(load_map("court"), load_map("lawn")))
-    training = dataclasses.replace(training, episodes=arguments.episodes)
+    preset = PRESETS[arguments.policy]
+    surrogate = dataclasses.replace(preset.surrogate, maps=(load_map("court"), load_map("lawn")))
+    training = dataclasses.replace(preset.training, episodes=arguments.episodes)
     began = time.perf_counter()
     learner = train(surrogate, training)
     took = time.perf_counter() - began

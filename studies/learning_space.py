@@ -18,8 +18,9 @@ from pathlib import Path
 import numpy as np
 from rich.progress import Progress
 
-from pytest_garl.adversary.training.dqn import EpisodeRecord, train
-from pytest_garl.adversary.training.train import PRESETS
+from pytest_garl.adversary.training.dqn import EpisodeRecord
+from pytest_garl.adversary.training.presets import PRESETS
+from pytest_garl.adversary.training.train import train
 from pytest_garl.scenarios.maps.map import load_map
 
 PICTURE = Path("docs/pictures/learning-space.png")
@@ -56,13 +57,13 @@ def main() -> None:
         ("environment and object", "online-rl", arguments.full_episodes),
     )
     with Progress() as bar:
-        for name, preset, episodes in runs:
-            surrogate, training = PRESETS[preset]
+        for name, policy, episodes in runs:
+            preset = PRESETS[policy]
             task = bar.add_task(name, total=episodes)
             checkpoint = Path(f".garl/learning-space/{name.replace(' ', '-')}.pt")
             learner = train(
-                dataclasses.replace(surrogate, maps=maps),
-                dataclasses.replace(training, episodes=episodes),
+                dataclasses.replace(preset.surrogate, maps=maps),
+                dataclasses.replace(preset.training, episodes=episodes),
                 checkpoint,
                 lambda record, task=task: bar.update(task, completed=record.episode + 1),  # type: ignore[misc]
             )

@@ -34,8 +34,9 @@ from pytest_garl.adversary.observations import (
     relative_moves,
 )
 from pytest_garl.adversary.training import rewards
-from pytest_garl.adversary.training.dqn import Experience, Learner, Training
+from pytest_garl.adversary.training.dqn import Experience, Learner
 from pytest_garl.adversary.training.episode import Episode, draw_episode
+from pytest_garl.adversary.training.presets import Training
 from pytest_garl.adversary.training.uav_models import (
     AvoidanceParameters,
     AvoidingPilot,

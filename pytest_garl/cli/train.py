@@ -8,17 +8,20 @@ import os
 import sys
 from collections import deque
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, get_args
 
 import click
 
 from pytest_garl import cpu_dispatch
+from pytest_garl.adversary.catalogue import DEFAULT_POLICY
+from pytest_garl.adversary.observations import ENCODINGS
+from pytest_garl.adversary.training.presets import PRESETS, Reward, Uav
 from pytest_garl.errors import GarlError
 from pytest_garl.landing_system import Airframe, airframe_of
 from pytest_garl.scenarios.object_types import OBJECT_TYPES
 
 if TYPE_CHECKING:
-    from pytest_garl.adversary.training.train import TrainingPlan
+    from pytest_garl.adversary.training.selection import TrainingPlan
 
 RECENT = 50
 
@@ -26,12 +29,10 @@ RECENT = 50
 @click.command(epilog="Example: garl train --map=court --type=dog --out=scenarios/dogs.npz")
 @click.option(
     "--policy",
-    type=click.Choice(["dqn", "dqn-paper", "online-rl"]),
-    default="dqn",
+    type=click.Choice(list(PRESETS)),
+    default=DEFAULT_POLICY,
     show_default=True,
-    help="dqn learns to collide with a UAV that avoids what it sees. dqn-paper learns by the "
-    "paper's state and reward against a UAV that flies straight down. online-rl also learns to "
-    "change weather and light, as the paper's Online RL.",
+    help=" ".join(f"{name} learns {preset.help}." for name, preset in PRESETS.items()),
 )
 @click.option(
     "--map",
@@ -54,18 +55,18 @@ RECENT = 50
 )
 @click.option(
     "--state",
-    type=click.Choice(["paper", "extended", "relative"]),
+    type=click.Choice([name for name, each in ENCODINGS.items() if not each.in_turn]),
     help="Input of the network, instead of that of --policy: the paper's four numbers, nine with "
     "the paper's actions, or ten in the object's own frame.",
 )
 @click.option(
     "--uav",
-    type=click.Choice(["straight", "avoiding", "both"]),
+    type=click.Choice(get_args(Uav)),
     help="The UAV to learn against, instead of that of --policy.",
 )
 @click.option(
     "--reward",
-    type=click.Choice(["paper", "collision-first"]),
+    type=click.Choice(get_args(Reward)),
     help="The reward, instead of that of --policy.",
 )
 @click.option(
@@ -111,7 +112,7 @@ def train(**asked: Any) -> None:
     if asked["out"].suffix != ".npz":
         raise GarlError(f"--out: found {str(asked['out'])!r}, expected a name that ends in .npz")
     try:
-        from pytest_garl.adversary.training.train import train_best
+        from pytest_garl.adversary.training.selection import train_best
     except ImportError as error:
         raise GarlError(
             f"training needs more than flying does ({error}): pip install 'pytest-garl[train]'"
@@ -129,7 +130,7 @@ def train(**asked: Any) -> None:
 
 
 def _plan(asked: dict[str, Any]) -> TrainingPlan:
-    from pytest_garl.adversary.training.train import PRESETS, TrainingPlan
+    from pytest_garl.adversary.training.selection import TrainingPlan
     from pytest_garl.scenarios.maps.map import load_map
 
     kinds = _words(asked["kinds"])
@@ -138,17 +139,17 @@ def _plan(asked: dict[str, Any]) -> TrainingPlan:
             raise GarlError(f"--type: found {kind!r}, expected some of {', '.join(OBJECT_TYPES)}")
     given = {name: asked[name] for name in ("state", "uav", "reward") if asked[name]}
     folders = (Path.cwd() / "scenarios" / "maps",)
-    wishes, training = PRESETS[asked["policy"]]
+    preset = PRESETS[asked["policy"]]
     return TrainingPlan(
         name=asked["policy"],
         surrogate=dataclasses.replace(
-            wishes,
+            preset.surrogate,
             maps=tuple(load_map(name, folders) for name in _words(asked["maps"])),
             kinds=kinds,
             airframe=_airframe(asked["system"]),
             **given,
         ),
-        training=dataclasses.replace(training, episodes=asked["episodes"]),
+        training=dataclasses.replace(preset.training, episodes=asked["episodes"]),
         seeds=tuple(range(asked["seed"], asked["seed"] + asked["seeds"])),
         validation=asked["validation"],
         folder=asked["folder"],

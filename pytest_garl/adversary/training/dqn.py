@@ -3,54 +3,19 @@
 from __future__ import annotations
 
 import contextlib
-import dataclasses
-import functools
-import hashlib
 import itertools
-import json
-import pickle
 from collections import deque
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass
-from pathlib import Path
-from typing import Any
 
-import gymnasium
 import numpy as np
 import torch
 from numpy.typing import NDArray
 
 from pytest_garl.adversary.learned import Network
-from pytest_garl.adversary.training.surrogate import Surrogate, SurrogateEnv
-from pytest_garl.errors import GarlError
+from pytest_garl.adversary.training.presets import Training
 
 Array = NDArray[np.float32]
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Training:
-    """Every hyper-parameter; the paper's where it gives one (its supplement, table 1)."""
-
-    seed: int = 0
-    episodes: int = 800
-    hidden: tuple[int, ...] = (24, 24)
-    learning_rate: float = 1e-3
-    epsilon: float = 0.99
-    epsilon_least: float = 0.01
-    epsilon_decay: float = 0.995
-    """Per episode."""
-    discount: float = 0.99
-    batch: int = 64
-    replay: int = 50_000
-    warm_up: int = 500
-    """Decisions before the first update."""
-    target_every: int = 500
-    """Updates after which the target network is the network again."""
-    double: bool = True
-    steps: int = 3
-    """Rewards that are summed before a value is taken for the rest."""
-    environments: int = 2
-    """Episodes flown at the same time, each in a process of its own."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -167,43 +132,6 @@ class Experience:
         self._learner.remember(state, action, total, after, discount)
 
 
-def train(
-    surrogate: Surrogate,
-    training: Training,
-    checkpoint: Path | None = None,
-    report: Callable[[EpisodeRecord], None] = lambda record: None,
-    every: int = 50,
-) -> Learner:
-    """Train, telling ``report`` of each episode; return the learner.
-
-    Episodes are flown in rounds of ``environments``, each from a seed of its own, so that a
-    training that goes on from its ``checkpoint``, written about ``every`` so many episodes,
-    ends with the same weights as one that was never interrupted.
-    """
-    envs: Any = gymnasium.vector.AsyncVectorEnv(
-        [functools.partial(SurrogateEnv, surrogate)] * training.environments,
-        context="spawn",
-        autoreset_mode=gymnasium.vector.AutoresetMode.DISABLED,
-    )
-    with contextlib.closing(envs), one_thread():
-        size, actions = envs.single_observation_space.shape[0], envs.single_action_space.n
-        learner = Learner(size, int(actions), training)
-        if checkpoint and checkpoint.exists():
-            _restore(learner, checkpoint, identity(surrogate, training))
-        kept = len(learner.history)
-        while len(learner.history) < training.episodes:
-            for record in _round(envs, learner, len(learner.history)):
-                # The last round may fly more than was asked for.
-                if record.episode < training.episodes:
-                    report(record)
-                    learner.history.append(record)
-            done = len(learner.history)
-            if checkpoint and (done - kept >= every or done >= training.episodes):
-                _keep(learner, checkpoint, identity(surrogate, training))
-                kept = done
-    return learner
-
-
 @contextlib.contextmanager
 def one_thread() -> Iterator[None]:
     """Let torch compute on one thread: the cores are for flying, and sums are the same anywhere."""
@@ -213,50 +141,6 @@ def one_thread() -> Iterator[None]:
         yield
     finally:
         torch.set_num_threads(threads)
-
-
-def _round(envs: Any, learner: Learner, first: int) -> Iterator[EpisodeRecord]:
-    """Fly one episode per environment to its end, learning meanwhile."""
-    training, count = learner.training, learner.training.environments
-    decayed = training.epsilon * training.epsilon_decay**first
-    epsilon = max(training.epsilon_least, decayed)
-    seeds = np.random.SeedSequence((training.seed, first)).generate_state(count)
-    states, _ = envs.reset(seed=[int(seed) for seed in seeds])
-    experiences = [Experience(learner) for _ in range(count)]
-    flying = np.ones(count, dtype=bool)
-    totals, decisions = np.zeros(count), np.zeros(count, dtype=int)
-    collided = np.zeros(count, dtype=bool)
-    while flying.any():
-        actions = learner.act(states, epsilon)
-        envs.step_async(actions)
-        # The simulator flies in other processes: time to learn, once for each decision.
-        for _ in range(int(flying.sum())):
-            learner.update()
-        afters, rewards, ended, cut, info = envs.step_wait()
-        for index in range(count):
-            if not flying[index]:
-                continue
-            experiences[index].add(
-                states[index],
-                int(actions[index]),
-                float(rewards[index]),
-                afters[index],
-                ended=bool(ended[index]),
-                cut=bool(cut[index]),
-            )
-            totals[index] += rewards[index]
-            decisions[index] += 1
-            collided[index] = bool(info["collided"][index])
-        flying &= ~(ended | cut)
-        states = afters
-    for index in range(count):
-        yield EpisodeRecord(
-            episode=first + index,
-            reward=float(totals[index]),
-            decisions=int(decisions[index]),
-            collided=bool(collided[index]),
-            epsilon=epsilon,
-        )
 
 
 def _one_vector(network: torch.nn.Module) -> tuple[torch.nn.Parameter, torch.Tensor]:
@@ -281,74 +165,3 @@ def _mlp(size: int, hidden: tuple[int, ...], actions: int) -> torch.nn.Sequentia
     for wide, narrow in itertools.pairwise(sizes):
         layers += [torch.nn.Linear(wide, narrow), torch.nn.ReLU()]
     return torch.nn.Sequential(*layers, torch.nn.Linear(sizes[-1], actions))
-
-
-_MEMORY = ("states", "afters", "actions", "sums", "discounts")
-
-
-@functools.cache
-def sources_sha256() -> str:
-    """Return the hash of the code that a training depends on: adversary, simulation, scenarios."""
-    digest = hashlib.sha256()
-    package = Path(__file__).parents[2]
-    for folder in ("adversary", "simulation", "scenarios"):
-        for file in sorted((package / folder).rglob("*.py")):
-            name = file.relative_to(package).as_posix()
-            digest.update(name.encode() + b"\0" + file.read_bytes())
-    return digest.hexdigest()
-
-
-def identity(surrogate: Surrogate, training: Training) -> str:
-    """Return a hash of what is trained and how; another training has another."""
-    maps = [map.sha256 for map in surrogate.maps]
-    what = (sources_sha256(), dataclasses.replace(surrogate, maps=()), maps, training)
-    return hashlib.sha256(repr(what).encode()).hexdigest()
-
-
-def _keep(learner: Learner, path: Path, known: str) -> None:
-    filled = min(learner.stored, learner.training.replay)
-    path.parent.mkdir(parents=True, exist_ok=True)
-    half = path.with_suffix(".part")
-    torch.save(
-        {
-            "identity": known,
-            "network": learner.network.state_dict(),
-            "target": learner.target.state_dict(),
-            "optimiser": learner.optimiser.state_dict(),
-            "updates": learner.updates,
-            "stored": learner.stored,
-            "rng": json.dumps(learner.rng.bit_generator.state),
-            "history": json.dumps([dataclasses.astuple(record) for record in learner.history]),
-            **{name: torch.from_numpy(getattr(learner, name)[:filled]) for name in _MEMORY},
-        },
-        half,
-    )
-    half.replace(path)
-
-
-def _restore(learner: Learner, path: Path, known: str) -> None:
-    try:
-        kept = torch.load(path, weights_only=True)
-        found = kept["identity"]
-    except (OSError, EOFError, RuntimeError, LookupError, TypeError, pickle.PickleError) as error:
-        raise GarlError(
-            f"{path}: is no checkpoint that can be read ({error}); delete it"
-        ) from error
-    if found != known:
-        raise GarlError(
-            f"{path}: is the checkpoint of another training; delete it, choose another folder, "
-            "or train as before"
-        )
-    learner.network.load_state_dict(kept["network"])
-    learner.target.load_state_dict(kept["target"])
-    learner.optimiser.load_state_dict(kept["optimiser"])
-    learner.updates, learner.stored = kept["updates"], kept["stored"]
-    learner.rng.bit_generator.state = json.loads(kept["rng"])
-    for name in _MEMORY:
-        rows = kept[name].numpy()
-        getattr(learner, name)[: len(rows)] = rows
-    fields = [field.name for field in dataclasses.fields(EpisodeRecord)]
-    learner.history = [
-        EpisodeRecord(**dict(zip(fields, values, strict=True)))
-        for values in json.loads(kept["history"])
-    ]

@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import functools
-from dataclasses import dataclass, field
-from typing import Any, Literal
+from typing import Any
 
 import gymnasium
 import numpy as np
@@ -13,36 +12,15 @@ from numpy.typing import NDArray
 from pytest_garl.adversary.observations import ENCODINGS, LIMIT
 from pytest_garl.adversary.training import rewards
 from pytest_garl.adversary.training.episode import Episode, draw_episode, in_any_environment
+from pytest_garl.adversary.training.presets import Surrogate
 from pytest_garl.adversary.training.uav_models import (
     AvoidanceParameters,
     AvoidingPilot,
     FlightStyle,
     StraightPilot,
 )
-from pytest_garl.landing_system import Airframe
-from pytest_garl.scenarios.maps.map import Map
 
 Observation = NDArray[np.float32]
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Surrogate:
-    """What is trained against: maps, types, UAV, state, reward.
-
-    ``uav`` is "straight", the paper's, "avoiding", or "both", half of the episodes each.
-    ``discount`` is part of the potential-based reward.  With ``environment`` "drawn" an episode
-    begins in any weather and light of a search, with the marker anywhere, instead of clear
-    weather and a marker at a fixed place.
-    """
-
-    maps: tuple[Map, ...]
-    kinds: tuple[str, ...] = ("person", "dog", "bird")
-    uav: Literal["straight", "avoiding", "both"] = "avoiding"
-    state: str = "relative"
-    reward: Literal["collision-first", "paper"] = "collision-first"
-    discount: float = 0.99
-    environment: Literal["clear", "drawn"] = "clear"
-    airframe: Airframe = field(default_factory=Airframe)
 
 
 class SurrogateEnv(gymnasium.Env[Observation, np.int64]):

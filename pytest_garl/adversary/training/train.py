@@ -1,153 +1,103 @@
-"""Train several seeds, keep the one that does best on episodes that no training saw."""
+"""One training: episodes of the surrogate, several at a time, and a learner."""
 
 from __future__ import annotations
 
-import dataclasses
+import contextlib
 import functools
-import platform
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
-from importlib.metadata import version
+from collections.abc import Callable, Iterator
 from pathlib import Path
-from types import MappingProxyType
 from typing import Any
 
+import gymnasium
 import numpy as np
 
-from pytest_garl.adversary.learned import save
-from pytest_garl.adversary.training.dqn import (
-    EpisodeRecord,
-    Training,
-    identity,
-    sources_sha256,
-    train,
+from pytest_garl.adversary.training.checkpoint import (
+    identity_of,
+    restore_checkpoint,
+    save_checkpoint,
 )
-from pytest_garl.adversary.training.surrogate import Surrogate
-from pytest_garl.adversary.training.validation import REPORT_SEEDS_FROM, Score, validate
-
-PRESETS: Mapping[str, tuple[Surrogate, Training]] = MappingProxyType(
-    {
-        "dqn": (
-            Surrogate(maps=(), uav="avoiding", state="relative", reward="collision-first"),
-            Training(),
-        ),
-        "dqn-paper": (
-            Surrogate(maps=(), uav="straight", state="paper", reward="paper"),
-            Training(double=False, steps=1),
-        ),
-        "online-rl": (
-            Surrogate(maps=(), uav="straight", state="online", reward="paper", environment="drawn"),
-            Training(double=False, steps=1),
-        ),
-    }
-)
-"""What each shipped policy was trained on, and how; the maps are filled in."""
-PACKAGES = ("pytest-garl", "numpy", "torch", "gymnasium", "pybullet")
+from pytest_garl.adversary.training.dqn import EpisodeRecord, Experience, Learner, one_thread
+from pytest_garl.adversary.training.presets import Surrogate, Training
+from pytest_garl.adversary.training.surrogate import SurrogateEnv
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class TrainingPlan:
-    """One call of ``garl train``."""
+def train(
+    surrogate: Surrogate,
+    training: Training,
+    checkpoint: Path | None = None,
+    report: Callable[[EpisodeRecord], None] = lambda record: None,
+    every: int = 50,
+) -> Learner:
+    """Train, telling ``report`` of each episode; return the learner.
 
-    name: str
-    surrogate: Surrogate
-    training: Training
-    seeds: tuple[int, ...]
-    validation: int
-    folder: Path
-    out: Path
-    processes: int = 1
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class TrainingResult:
-    """Which seed was kept, each seed's collision rate in validation, the kept one's in others."""
-
-    best: int
-    rates: Mapping[int, float]
-    report: Score
-
-
-def train_best(
-    plan: TrainingPlan,
-    episode: Callable[[int, EpisodeRecord], None] = lambda seed, record: None,
-    validated: Callable[[int, float], None] = lambda seed, rate: None,
-) -> TrainingResult:
-    """Train every seed, validate, write the best weights, its manifest and all curves.
-
-    Interrupted, it goes on from the checkpoints in the plan's folder.
+    Episodes are flown in rounds of ``environments``, each from a seed of its own, so that a
+    training that goes on from its ``checkpoint``, written about ``every`` so many episodes,
+    ends with the same weights as one that was never interrupted.
     """
-    curves: dict[int, Sequence[EpisodeRecord]] = {}
-    networks, scores = {}, {}
-    for seed in plan.seeds:
-        training = dataclasses.replace(plan.training, seed=seed)
-        checkpoint = plan.folder / f"{plan.name}-{identity(plan.surrogate, training)[:12]}.pt"
-        learner = train(plan.surrogate, training, checkpoint, functools.partial(episode, seed))
-        curves[seed], networks[seed] = learner.history, learner.policy(plan.surrogate.state)
-        scores[seed] = validate(networks[seed], plan.surrogate, plan.validation, plan.processes)
-        validated(seed, scores[seed].rate)
-    best = max(plan.seeds, key=lambda seed: (scores[seed].rate, -seed))
-    report = validate(
-        networks[best], plan.surrogate, plan.validation, plan.processes, REPORT_SEEDS_FROM
+    envs: Any = gymnasium.vector.AsyncVectorEnv(
+        [functools.partial(SurrogateEnv, surrogate)] * training.environments,
+        context="spawn",
+        autoreset_mode=gymnasium.vector.AutoresetMode.DISABLED,
     )
-    save(plan.out, networks[best], _about(plan, best, curves[best], scores, report))
-    draw_curves(curves, plan.out.with_suffix(".png"))
-    rates = {seed: score.rate for seed, score in scores.items()}
-    return TrainingResult(best=best, rates=rates, report=report)
+    identity = identity_of(surrogate, training)
+    with contextlib.closing(envs), one_thread():
+        size, actions = envs.single_observation_space.shape[0], envs.single_action_space.n
+        learner = Learner(size, int(actions), training)
+        if checkpoint and checkpoint.exists():
+            restore_checkpoint(learner, checkpoint, identity)
+        kept = len(learner.history)
+        while len(learner.history) < training.episodes:
+            for record in _round(envs, learner, len(learner.history)):
+                # The last round may fly more than was asked for.
+                if record.episode < training.episodes:
+                    report(record)
+                    learner.history.append(record)
+            done = len(learner.history)
+            if checkpoint and (done - kept >= every or done >= training.episodes):
+                save_checkpoint(learner, checkpoint, identity)
+                kept = done
+    return learner
 
 
-def _about(
-    plan: TrainingPlan,
-    best: int,
-    curve: Sequence[EpisodeRecord],
-    scores: Mapping[int, Score],
-    report: Score,
-) -> dict[str, Any]:
-    surrogate, last = plan.surrogate, curve[-100:]
-    return {
-        "policy": plan.name,
-        "seed": best,
-        "training": {**dataclasses.asdict(plan.training), "seed": best},
-        "surrogate": {
-            "maps": {map.name: map.sha256 for map in surrogate.maps},
-            "types": list(surrogate.kinds),
-            "uav": surrogate.uav,
-            "reward": surrogate.reward,
-            "environment": surrogate.environment,
-            "airframe": dataclasses.asdict(surrogate.airframe),
-        },
-        "last_100_episodes": {
-            "reward": round(float(np.mean([record.reward for record in last])), 4),
-            "collided": round(float(np.mean([record.collided for record in last])), 4),
-        },
-        "validation": {str(seed): dataclasses.asdict(score) for seed, score in scores.items()},
-        "other_episodes": dataclasses.asdict(report),
-        "sources": sources_sha256(),
-        "versions": {
-            "python": platform.python_version(),
-            **{name: version(name) for name in PACKAGES},
-        },
-    }
-
-
-def draw_curves(curves: Mapping[int, Sequence[EpisodeRecord]], path: Path) -> None:
-    """Draw reward and collision rate over the episodes, means of fifty, one line a seed."""
-    from matplotlib.figure import Figure
-
-    figure = Figure(figsize=(9, 3.4), layout="constrained")
-    left, right = figure.subplots(1, 2)
-    for seed, curve in curves.items():
-        window = min(50, len(curve))
-        kernel = np.ones(window) / window
-        places = np.arange(window - 1, len(curve))
-        rewards = np.convolve([record.reward for record in curve], kernel, "valid")
-        hits = np.convolve([float(record.collided) for record in curve], kernel, "valid")
-        left.plot(places, rewards, label=f"seed {seed}")
-        right.plot(places, 100 * hits, label=f"seed {seed}")
-    left.set(xlabel="episode", ylabel="reward per episode (mean of 50)")
-    right.set(xlabel="episode", ylabel="collisions, % (of 50)", ylim=(0, 100))
-    for axes in (left, right):
-        axes.grid(alpha=0.3)
-    left.legend(fontsize="small")
-    path.parent.mkdir(parents=True, exist_ok=True)
-    figure.savefig(path, dpi=110, metadata={"Software": None})
+def _round(envs: Any, learner: Learner, first: int) -> Iterator[EpisodeRecord]:
+    """Fly one episode per environment to its end, learning meanwhile."""
+    training, count = learner.training, learner.training.environments
+    decayed = training.epsilon * training.epsilon_decay**first
+    epsilon = max(training.epsilon_least, decayed)
+    seeds = np.random.SeedSequence((training.seed, first)).generate_state(count)
+    states, _ = envs.reset(seed=[int(seed) for seed in seeds])
+    experiences = [Experience(learner) for _ in range(count)]
+    flying = np.ones(count, dtype=bool)
+    totals, decisions = np.zeros(count), np.zeros(count, dtype=int)
+    collided = np.zeros(count, dtype=bool)
+    while flying.any():
+        actions = learner.act(states, epsilon)
+        envs.step_async(actions)
+        # The simulator flies in other processes: time to learn, once for each decision.
+        for _ in range(int(flying.sum())):
+            learner.update()
+        afters, rewards, ended, cut, info = envs.step_wait()
+        for index in range(count):
+            if not flying[index]:
+                continue
+            experiences[index].add(
+                states[index],
+                int(actions[index]),
+                float(rewards[index]),
+                afters[index],
+                ended=bool(ended[index]),
+                cut=bool(cut[index]),
+            )
+            totals[index] += rewards[index]
+            decisions[index] += 1
+            collided[index] = bool(info["collided"][index])
+        flying &= ~(ended | cut)
+        states = afters
+    for index in range(count):
+        yield EpisodeRecord(
+            episode=first + index,
+            reward=float(totals[index]),
+            decisions=int(decisions[index]),
+            collided=bool(collided[index]),
+            epsilon=epsilon,
+        )

@@ -10,7 +10,8 @@ from typing import Any
 import numpy as np
 
 from pytest_garl.adversary.learned import Network
-from pytest_garl.adversary.training.surrogate import Surrogate, SurrogateEnv
+from pytest_garl.adversary.training.presets import Surrogate
+from pytest_garl.adversary.training.surrogate import SurrogateEnv
 
 CHOICE_SEEDS_FROM = 2_000_000_000
 """Episodes with these seeds and the following choose between trainings, whose own are hashes."""

@@ -192,7 +192,8 @@ def reward(distance_m: float, elapsed_s: float, spread: float, map: Map, genome:
 
 
 def _learner(size: int, actions: int, seed: int) -> Learner:
-    from pytest_garl.adversary.training.dqn import Learner, Training
+    from pytest_garl.adversary.training.dqn import Learner
+    from pytest_garl.adversary.training.presets import Training
 
     training = Training(
         seed=seed, batch=BATCH, warm_up=BATCH, target_every=TARGET_EVERY, double=False, steps=1

@@ -1,0 +1,97 @@
+"""What can be trained against what: the settings of ``garl train``, without PyTorch."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from types import MappingProxyType
+from typing import Literal
+
+from pytest_garl.landing_system import Airframe
+from pytest_garl.scenarios.maps.map import Map
+
+Uav = Literal["straight", "avoiding", "both"]
+Reward = Literal["collision-first", "paper"]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Training:
+    """Every hyper-parameter; the paper's where it gives one (its supplement, table 1)."""
+
+    seed: int = 0
+    episodes: int = 800
+    hidden: tuple[int, ...] = (24, 24)
+    learning_rate: float = 1e-3
+    epsilon: float = 0.99
+    epsilon_least: float = 0.01
+    epsilon_decay: float = 0.995
+    """Per episode."""
+    discount: float = 0.99
+    batch: int = 64
+    replay: int = 50_000
+    warm_up: int = 500
+    """Decisions before the first update."""
+    target_every: int = 500
+    """Updates after which the target network is the network again."""
+    double: bool = True
+    steps: int = 3
+    """Rewards that are summed before a value is taken for the rest."""
+    environments: int = 2
+    """Episodes flown at the same time, each in a process of its own."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Surrogate:
+    """What is trained against: maps, types, UAV, state, reward.
+
+    ``uav`` is "straight", the paper's, "avoiding", or "both", half of the episodes each.
+    ``discount`` is part of the potential-based reward.  With ``environment`` "drawn" an episode
+    begins in any weather and light of a search, with the marker anywhere, instead of clear
+    weather and a marker at a fixed place.
+    """
+
+    maps: tuple[Map, ...]
+    kinds: tuple[str, ...] = ("person", "dog", "bird")
+    uav: Uav = "avoiding"
+    state: str = "relative"
+    reward: Reward = "collision-first"
+    discount: float = 0.99
+    environment: Literal["clear", "drawn"] = "clear"
+    airframe: Airframe = field(default_factory=Airframe)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Preset:
+    """How a shipped policy was trained; ``garl train`` fills in the maps.
+
+    ``help`` continues "The policy learns".
+    """
+
+    help: str
+    surrogate: Surrogate
+    training: Training
+
+
+PRESETS: Mapping[str, Preset] = MappingProxyType(
+    {
+        "dqn": Preset(
+            help="to collide with a UAV that avoids what it sees",
+            surrogate=Surrogate(
+                maps=(), uav="avoiding", state="relative", reward="collision-first"
+            ),
+            training=Training(),
+        ),
+        "dqn-paper": Preset(
+            help="by the paper's state and reward, against a UAV that flies straight down",
+            surrogate=Surrogate(maps=(), uav="straight", state="paper", reward="paper"),
+            training=Training(double=False, steps=1),
+        ),
+        "online-rl": Preset(
+            help="to change weather and light as well, like the paper's Online RL",
+            surrogate=Surrogate(
+                maps=(), uav="straight", state="online", reward="paper", environment="drawn"
+            ),
+            training=Training(double=False, steps=1),
+        ),
+    }
+)
