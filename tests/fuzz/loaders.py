@@ -153,8 +153,9 @@ def _load_weights(path: Path, rng: random.Random) -> None:
 def _prepare_record(folder: Path, rng: random.Random) -> Path:
     path = folder / "flight.npz"
     if not hasattr(_prepare_record, "sample"):
-        fly_job(job_of(Good, folder), scenario(0.05), FlightId(search="flight", map="lawn"), None)
-        vars(_prepare_record)["sample"] = path.read_bytes()
+        job, flight = job_of(Good, folder), FlightId(search="flight", map="lawn")
+        fly_job(job, scenario(0.05), flight, None)
+        vars(_prepare_record)["sample"] = job.record(flight).read_bytes()
     content: bytes = vars(_prepare_record)["sample"]
     if rng.random() < 0.5:
         path.write_bytes(binary_mutations.archive_changed(content, rng))
