@@ -14,11 +14,12 @@ from collections.abc import Iterable
 from contextlib import closing
 from pathlib import Path
 
-from pytest_garl.execution.job import load_scenario, loads
+from pytest_garl.execution.job import parse_job
 from pytest_garl.execution.ledger import Ledger
 from pytest_garl.experiments.measure import HASH_DIGITS
 from pytest_garl.experiments.results import SEPARATOR
 from pytest_garl.experiments.results import read as rows_of
+from pytest_garl.scenarios.files import parse_scenario
 from pytest_garl.scenarios.genes import genome_for
 from pytest_garl.scenarios.maps.map import load_map
 from pytest_garl.scenarios.scenario import Scenario
@@ -40,7 +41,7 @@ def count(ledger: Ledger, search: str, map: str) -> dict[str, int | str]:
         if key.endswith(".velocity")
     ]
     for flight in ledger.queries.flown(search):
-        scenario, outcome = load_scenario(flight.scenario), flight.result.outcome
+        scenario, outcome = parse_scenario(flight.scenario), flight.result.outcome
         if flight.signature:
             kinds[flight.signature] += 1
         counts[outcome] += 1
@@ -81,7 +82,7 @@ def main() -> None:
                     "map": row.map,
                     "method": row.method,
                     "seed": row.seed,
-                    **count(ledger, search, loads(text).map),
+                    **count(ledger, search, parse_job(text).map),
                     "result_hash": row.result_hash,
                 }
     ordered = [lines[key] for key in rows if key in lines]

@@ -19,7 +19,7 @@ from typing import Any
 
 import numpy as np
 
-from pytest_garl.execution.job import FlightJob, load_scenario, loads
+from pytest_garl.execution.job import FlightJob, parse_job
 from pytest_garl.execution.ledger import Ledger
 from pytest_garl.execution.ledger_queries import LedgerFlight
 from pytest_garl.execution.local_pool import local_pool
@@ -36,6 +36,7 @@ from pytest_garl.regressions.shrink import (
     shrink,
     tidy,
 )
+from pytest_garl.scenarios.files import parse_scenario
 from pytest_garl.scenarios.maps.map import load_map
 from pytest_garl.scenarios.scenario import Scenario
 from studies.table import ResultTable, Row, run_study
@@ -102,10 +103,10 @@ def _violation(ledger: Ledger, row: LedgerFlight) -> Violation:
     assert text is not None
     done = CompletedFlight(result=row.result, sha256=row.sha256, record=Path())
     return Violation(
-        job=loads(text),
+        job=parse_job(text),
         slot=f"g{row.flight.slot.generation:02d}-s{row.flight.slot.index:02d}",
         signature=row.signature,
-        scenario=load_scenario(row.scenario),
+        scenario=parse_scenario(row.scenario),
         colliding_object=find_colliding_object(done),
     )
 

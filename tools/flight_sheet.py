@@ -14,9 +14,9 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from pytest_garl.execution.job import load_scenario
 from pytest_garl.execution.ledger import Ledger
 from pytest_garl.landing_system import Camera
+from pytest_garl.scenarios.files import parse_scenario
 from pytest_garl.scenarios.maps.map import load_map
 from pytest_garl.simulation.camera.projection import View
 from pytest_garl.simulation.camera.renderer import Renderer
@@ -80,7 +80,7 @@ def main() -> None:
         )
     for path in paths:
         flight = load(path)
-        scenario = load_scenario(next(iter(scenarios.values())))
+        scenario = parse_scenario(next(iter(scenarios.values())))
         map = load_map(name)
         renderer = Renderer(scenario, map, Camera(), generator(scenario.seed, "sensor"))
         target = arguments.garl_dir / f"{path.stem}.png"

@@ -16,11 +16,12 @@ from pytest_garl.baselines.pairs import summary_of
 from pytest_garl.errors import BaselineError, PolicyError
 from pytest_garl.execution.batch import fly_all, temporary_pool
 from pytest_garl.execution.checkout import Checkout, describe
-from pytest_garl.execution.job import FlightJob, load_scenario, loads
+from pytest_garl.execution.job import FlightJob, parse_job
 from pytest_garl.execution.ledger import Ledger
 from pytest_garl.execution.reference import BUILT_IN, Reference
 from pytest_garl.execution.result import CompletedFlight
 from pytest_garl.execution.stored_ledger import check_stored
+from pytest_garl.scenarios.files import parse_scenario
 from pytest_garl.scenarios.genes import WeatherRange, genome_for
 from pytest_garl.scenarios.maps.map import Map, load_map
 from pytest_garl.scenarios.scenario import Scenario
@@ -28,7 +29,6 @@ from pytest_garl.search.methods.random import propose
 from pytest_garl.simulation.npc_policy import PolicySpec
 from pytest_garl.verdicts.verdict import Limits
 
-TIMEOUT_S = 10.0
 ShowProgress = Callable[[Iterator[CompletedFlight], str, int], Iterable[CompletedFlight]]
 """Passes flights on and shows the progress: (flights, title, total) -> the same flights."""
 
@@ -104,18 +104,16 @@ def _job(
     map: Map,
     scratch: Path,
 ) -> FlightJob:
-    return FlightJob(
-        system=system,
+    return FlightJob.for_system(
+        system,
+        map,
+        policy_spec(spec.npcs),
         system_sha256=sources,
         simulator=spec.simulator,
-        map=map.name,
-        map_sha256=map.sha256,
-        map_folders=tuple(str(folder.resolve()) for folder in spec.map_folders),
-        npcs=policy_spec(spec.npcs),
+        map_folders=spec.map_folders,
         limits=spec.limits,
-        timeout_s=TIMEOUT_S,
         path=(str(checkout.folder.resolve()),),
-        flights=str(scratch / "flights"),
+        flights=scratch / "flights",
     )
 
 
@@ -126,7 +124,9 @@ def baseline_from_ledger(path: Path) -> Baseline:
     ledger = Ledger(path)
     try:
         check_stored(ledger)
-        searches = [(loads(job), ledger.queries.flown(search)) for search, job in ledger.searches()]
+        searches = [
+            (parse_job(job), ledger.queries.flown(search)) for search, job in ledger.searches()
+        ]
         method = str(ledger.fact("method") or "")
     finally:
         ledger.close()
@@ -135,7 +135,7 @@ def baseline_from_ledger(path: Path) -> Baseline:
         _check_npcs(path, job.npcs)
         flights = [
             (
-                load_scenario(row.scenario),
+                parse_scenario(row.scenario),
                 CompletedFlight(result=row.result, sha256=row.sha256, record=Path()),
             )
             for row in rows

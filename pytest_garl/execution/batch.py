@@ -12,12 +12,13 @@ from pathlib import Path
 from pytest_garl.errors import LedgerError
 from pytest_garl.execution.checkout import Checkout
 from pytest_garl.execution.flight_id import FlightId, search_key
-from pytest_garl.execution.job import FlightJob, dump_scenario, loads
+from pytest_garl.execution.job import FlightJob, parse_job
 from pytest_garl.execution.ledger import Ledger
 from pytest_garl.execution.local_pool import local_pool
 from pytest_garl.execution.pool import Pool, wait_for
 from pytest_garl.execution.result import CompletedFlight
 from pytest_garl.execution.slot import Slot
+from pytest_garl.scenarios.files import dump_scenario
 from pytest_garl.scenarios.scenario import Scenario
 
 
@@ -38,7 +39,7 @@ def fly_all(
     search = search_key(json.dumps(facts))
     ledger.add_search(search, system, job.map, len(texts), job.dumps(), "case")
     known = ledger.job(search)
-    differing = job.differences(loads(known)) if known else ()
+    differing = job.differences(parse_job(known)) if known else ()
     if differing:
         raise LedgerError(
             f"{ledger.path}: {system} on {job.map} flew the same scenarios before, but "

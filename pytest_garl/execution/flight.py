@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 import sys
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from pytest_garl.execution.flight_id import FlightId
 from pytest_garl.execution.job import FlightJob
 from pytest_garl.execution.result import FlightResult, broken_result
-from pytest_garl.scenarios.maps.map import load_map
 from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.simulation.flight import Crash
 from pytest_garl.verdicts.verdict import PAPER_LIMITS
@@ -35,7 +33,7 @@ def fly_job(
     for entry in job.path:
         if entry not in sys.path:
             sys.path.append(entry)
-    map = load_map(job.map, tuple(Path(folder) for folder in job.map_folders))
+    map = job.load_map()
     flown = job.simulator.load()(
         scenario,
         job.system.load(),

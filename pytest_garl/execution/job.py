@@ -1,21 +1,25 @@
-"""What a child must know to fly a slot: system, map, policy, limits, simulator."""
+"""The job of a flight: all that a worker must know to fly a scenario, except the scenario."""
 
 from __future__ import annotations
 
 import dataclasses
 import json
+import sys
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 from pytest_garl.errors import LedgerError
 from pytest_garl.execution.database import REMEDY
 from pytest_garl.execution.flight_id import FlightId
-from pytest_garl.execution.reference import Reference
+from pytest_garl.execution.reference import BUILT_IN, Reference
 from pytest_garl.files.json_values import dataclass_from, parse_json
-from pytest_garl.scenarios.scenario import Scenario
+from pytest_garl.scenarios.maps.map import Map, load_map
 from pytest_garl.simulation.npc_policy import PolicySpec
-from pytest_garl.verdicts.verdict import Limits
+from pytest_garl.verdicts.verdict import PAPER_LIMITS, Limits
 
+TIMEOUT_S = 10.0
+"""Wall time that one call of a landing system may take if nobody says otherwise, in seconds."""
 _OF_SOURCES = ("sources", "system_sha256")
 _PLACES = {"path", "flights", "map_folders"}
 """Where things lie: that may change when a run is resumed, what is flown may not."""
@@ -23,7 +27,12 @@ _PLACES = {"path", "flights", "map_folders"}
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FlightJob:
-    """Everything but the scenario, as it stands in the ledger."""
+    """Landing system, simulator, map, NPC policy and limits of flights, as the ledger holds them.
+
+    ``timeout_s`` limits the wall time of one call of the landing system.  ``path`` are the folders
+    that imports search, ``flights`` is the folder of the flights' records.  ``sources`` are the
+    parts of the landing system by name and hash, of which ``system_sha256`` is the combined hash.
+    """
 
     system: Reference
     system_sha256: str
@@ -37,7 +46,45 @@ class FlightJob:
     path: tuple[str, ...]
     flights: str
     sources: tuple[tuple[str, str], ...] = ()
-    """What the landing system consists of, by name and hash: ``system_sha256`` taken apart."""
+
+    @classmethod
+    def for_system(
+        cls,
+        system: Reference,
+        map: Map,
+        npcs: PolicySpec,
+        *,
+        flights: Path,
+        system_sha256: str = "",
+        sources: tuple[tuple[str, str], ...] = (),
+        simulator: Reference = BUILT_IN,
+        map_folders: Sequence[Path] = (),
+        limits: Limits = PAPER_LIMITS,
+        timeout_s: float = TIMEOUT_S,
+        path: Sequence[str] | None = None,
+    ) -> FlightJob:
+        """Return the job to fly a landing system on a map.
+
+        Imports search the folders of this process unless ``path`` names others.
+        """
+        return cls(
+            system=system,
+            system_sha256=system_sha256,
+            simulator=simulator,
+            map=map.name,
+            map_sha256=map.sha256,
+            map_folders=tuple(str(folder.absolute()) for folder in map_folders),
+            npcs=npcs,
+            limits=limits,
+            timeout_s=timeout_s,
+            path=tuple(entry for entry in (sys.path if path is None else path) if entry),
+            flights=str(flights),
+            sources=sources,
+        )
+
+    def load_map(self) -> Map:
+        """Return the map of its flights."""
+        return load_map(self.map, tuple(Path(folder) for folder in self.map_folders))
 
     def differences(self, other: FlightJob) -> tuple[str, ...]:
         """Return what makes results of ``other`` not comparable to this one's."""
@@ -64,31 +111,9 @@ class FlightJob:
         return json.dumps(dataclasses.asdict(self), sort_keys=True)
 
 
-def loads(text: str) -> FlightJob:
+def parse_job(text: str) -> FlightJob:
     """Return the job in ``text``; raise LedgerError for a damaged one."""
     try:
         return dataclass_from(FlightJob, parse_json(text))
     except ValueError as error:
         raise LedgerError(f"a job in the ledger is damaged: {error}. {REMEDY}") from error
-
-
-def dump_scenario(scenario: Scenario) -> str:
-    """Return a scenario as one line of JSON."""
-    values = {"map": scenario.map, "seed": scenario.seed, "genes": scenario.genes}
-    return json.dumps(
-        values | ({"absent": scenario.removed_objects} if scenario.removed_objects else {})
-    )
-
-
-def load_scenario(text: str) -> Scenario:
-    """Return the scenario in a line of JSON; raise LedgerError for a damaged one."""
-    try:
-        values = parse_json(text)
-        if isinstance(values, dict):
-            removed = values.pop("absent", [])
-            values["removed_objects"] = removed
-        scenario = dataclass_from(Scenario, values)
-    except ValueError as error:
-        raise LedgerError(f"a scenario in the ledger is damaged: {error}. {REMEDY}") from error
-    genes = tuple((key, float(value)) for key, value in scenario.genes)
-    return dataclasses.replace(scenario, genes=genes)

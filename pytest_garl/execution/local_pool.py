@@ -10,11 +10,12 @@ from pathlib import Path
 from pytest_garl import cpu_dispatch
 from pytest_garl.execution.checkout import Checkout
 from pytest_garl.execution.flight import fly_job
-from pytest_garl.execution.job import load_scenario, loads
+from pytest_garl.execution.job import parse_job
 from pytest_garl.execution.ledger_queue import Claim, WorkQueue
 from pytest_garl.execution.pool import Pool
 from pytest_garl.execution.process_pool import TURN_S, ProcessPool
 from pytest_garl.execution.worker_failure import WorkerExit, retry_or_record
+from pytest_garl.scenarios.files import parse_scenario
 
 
 def local_pool(queue: WorkQueue, workers: int, checkout: Checkout | None = None) -> Pool:
@@ -65,8 +66,8 @@ class InProcessPool:
             self._queue.release_dead()
             time.sleep(TURN_S)
             return
-        scenario = load_scenario(claim.scenario)
-        self._queue.record(claim, *fly_job(loads(claim.job), scenario, claim.flight, None))
+        scenario = parse_scenario(claim.scenario)
+        self._queue.record(claim, *fly_job(parse_job(claim.job), scenario, claim.flight, None))
 
     def close(self) -> None:
         """Do nothing: no flight is under way between two turns."""

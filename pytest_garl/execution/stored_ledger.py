@@ -10,11 +10,12 @@ from typing import get_args
 
 from pytest_garl.errors import GarlError, LedgerError
 from pytest_garl.execution.database import VERSION, SearchKind
-from pytest_garl.execution.job import load_scenario, loads
+from pytest_garl.execution.job import parse_job
 from pytest_garl.execution.ledger import Ledger
 from pytest_garl.execution.result import parse_result
 from pytest_garl.execution.slot import Slot
 from pytest_garl.messages import shortened, shown
+from pytest_garl.scenarios.files import parse_scenario
 from pytest_garl.scenarios.scenario import Scenario
 
 _TYPES = {
@@ -72,7 +73,7 @@ def read_slot(path: Path, map: str, slot: Slot) -> StoredSlot:
             map=map,
             slot=slot,
             npcs=str(ledger.fact("npcs") or ""),
-            scenarios={system: load_scenario(text) for system, text in found.items()},
+            scenarios={system: parse_scenario(text) for system, text in found.items()},
         )
     finally:
         ledger.close()
@@ -134,7 +135,7 @@ def _wrong_search(ledger: Ledger) -> str:
         if kind not in get_args(SearchKind) or wanted < 0:
             return f"search {shown(search)}: found {shown((kind, wanted))}"
         try:
-            loads(job)
+            parse_job(job)
         except GarlError as error:
             return f"search {shown(search)}: {error.__cause__ or error}"
     return ""
@@ -154,7 +155,7 @@ def _wrong_slot(ledger: Ledger) -> str:
                 f"{where}: found the state {state} with{'out' if result is None else ''} a result"
             )
         try:
-            load_scenario(scenario)
+            parse_scenario(scenario)
             if result is not None:
                 parse_result(result)
         except (GarlError, ValueError) as error:

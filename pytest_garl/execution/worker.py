@@ -114,9 +114,10 @@ class Worker:
 
     def _fly(self, claim: Claim) -> tuple[FlightResult, str, float]:
         from pytest_garl.execution.flight import fly_job
-        from pytest_garl.execution.job import load_scenario, loads
+        from pytest_garl.execution.job import parse_job
+        from pytest_garl.scenarios.files import parse_scenario
 
-        job, scenario = loads(claim.job), load_scenario(claim.scenario)
+        job, scenario = parse_job(claim.job), parse_scenario(claim.scenario)
         if not job.system.module.startswith(_TRUSTED):
             self._system = job.system.name
         limit_s = job.timeout_s * (RETRY_LIMIT_FACTOR if claim.after else 1.0)
@@ -137,13 +138,14 @@ class Worker:
     def _prove_simulator(self, claim: Claim) -> None:
         """Fly the scenario with the reference pilot; raise GarlError if that fails too."""
         from pytest_garl.execution.flight import fly_job
-        from pytest_garl.execution.job import load_scenario, loads
+        from pytest_garl.execution.job import parse_job
         from pytest_garl.execution.reference import reference_to
+        from pytest_garl.scenarios.files import parse_scenario
         from pytest_garl.simulation.system_under_test.reference_pilot import ReferencePilot
 
-        job = dataclasses.replace(loads(claim.job), system=reference_to(ReferencePilot))
+        job = dataclasses.replace(parse_job(claim.job), system=reference_to(ReferencePilot))
         try:
-            fly_job(job, load_scenario(claim.scenario), claim.flight, None)
+            fly_job(job, parse_scenario(claim.scenario), claim.flight, None)
         except GarlError:
             raise
         except Exception as error:

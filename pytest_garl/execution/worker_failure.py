@@ -10,12 +10,10 @@ from __future__ import annotations
 
 import signal
 from dataclasses import dataclass, replace
-from pathlib import Path
 
-from pytest_garl.execution.job import loads
+from pytest_garl.execution.job import parse_job
 from pytest_garl.execution.ledger_queue import Claim, WorkQueue
 from pytest_garl.execution.result import FlightResult, broken_result
-from pytest_garl.scenarios.maps.map import load_map
 from pytest_garl.simulation.flight import Crash
 
 ATTEMPTS = 3
@@ -62,8 +60,8 @@ def retry_or_record(queue: WorkQueue, claim: Claim, ended: WorkerExit) -> None:
 
 
 def _result(claim: Claim, ended: WorkerExit, repeated: bool, inconclusive: bool) -> FlightResult:
-    job = loads(claim.job)
-    diagonal = load_map(job.map, tuple(Path(folder) for folder in job.map_folders)).diagonal_m
+    job = parse_job(claim.job)
+    diagonal = job.load_map().diagonal_m
     crash = _crash(ended)
     if inconclusive:
         how = f"each of {ATTEMPTS} flights ended its process in a different way"

@@ -13,7 +13,6 @@ import numpy as np
 
 from pytest_garl.adversary.recorded import recorded_spec
 from pytest_garl.errors import LedgerError
-from pytest_garl.execution.job import load_scenario
 from pytest_garl.execution.ledger import Ledger
 from pytest_garl.execution.ledger_queries import LedgerFlight
 from pytest_garl.execution.local_pool import local_pool
@@ -22,6 +21,7 @@ from pytest_garl.execution.reference import reference_to
 from pytest_garl.experiments.measure import AvoidabilityCounts, FinishedSearch
 from pytest_garl.regressions.follow_up import done_of
 from pytest_garl.regressions.new_case import recorded_behaviour
+from pytest_garl.scenarios.files import parse_scenario
 from pytest_garl.simulation.system_under_test.reference_pilot import ReferencePilot
 
 
@@ -74,7 +74,7 @@ def _opened(path: Path) -> Ledger:
 
 def _avoids(search: FinishedSearch, flight: LedgerFlight, fly: FlyFunction) -> bool:
     """Return whether the reference pilot flies the scenario without a violation."""
-    scenario, done = load_scenario(flight.scenario), done_of(flight, search.job)
+    scenario, done = parse_scenario(flight.scenario), done_of(flight, search.job)
     behaviour = recorded_behaviour(done, scenario, search.map)
     npcs = recorded_spec(dict(behaviour.moves), dict(behaviour.changes))
     job = dataclasses.replace(search.job, system=reference_to(ReferencePilot), npcs=npcs)

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -13,14 +12,15 @@ from numpy.typing import NDArray
 
 from pytest_garl.cpu_dispatch import of_children
 from pytest_garl.errors import ExperimentError
-from pytest_garl.execution.job import FlightJob, load_scenario, loads
+from pytest_garl.execution.job import FlightJob, parse_job
 from pytest_garl.execution.ledger import Ledger
 from pytest_garl.execution.ledger_queries import LedgerFlight
 from pytest_garl.experiments.results import ResultRow
 from pytest_garl.experiments.spec import PAPER_TYPES, ExperimentRun
 from pytest_garl.regressions.follow_up import done_of
+from pytest_garl.scenarios.files import parse_scenario
 from pytest_garl.scenarios.genes import WEATHER, genome_for
-from pytest_garl.scenarios.maps.map import Map, load_map
+from pytest_garl.scenarios.maps.map import Map
 from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.simulation.flight_file import load
 from pytest_garl.verdicts.paper_metrics import empty_cells, mark_visited, mean_distance, top_k
@@ -42,7 +42,7 @@ class FinishedSearch:
     @property
     def map(self) -> Map:
         """The map that was flown."""
-        return load_map(self.job.map, tuple(Path(each) for each in self.job.map_folders))
+        return self.job.load_map()
 
     @property
     def verdicts(self) -> tuple[Verdict, ...]:
@@ -71,7 +71,7 @@ def finished_searches(run: ExperimentRun, ledger: Ledger) -> tuple[FinishedSearc
     """Return the search of a run on each map; raise ExperimentError if one is not finished."""
     found: dict[str, FinishedSearch] = {}
     for key, text in ledger.searches():
-        job = loads(text)
+        job = parse_job(text)
         if job.map in found:
             raise ExperimentError(
                 f"{run.tests}: found more than one landing system with tests on {job.map}, "
@@ -133,7 +133,7 @@ def _violations(search: FinishedSearch) -> dict[str, Any]:
 
 def _diversity(search: FinishedSearch, weather: str) -> dict[str, Any]:
     """Return the columns of distances between scenarios and of coverage."""
-    scenarios = [load_scenario(flight.scenario) for flight in search.flights]
+    scenarios = [parse_scenario(flight.scenario) for flight in search.flights]
     raw_weather, genes = chromosomes(scenarios, search.map, weather)
     violating = np.array([verdict.paper_violation for verdict in search.verdicts])
     cells = covered_cells(search)

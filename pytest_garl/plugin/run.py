@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import functools
 import os
-import sys
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -128,13 +127,13 @@ class Run:
 
     def check_resumed(self) -> None:
         """Raise LedgerError if a search to resume flew something else."""
-        from pytest_garl.execution.job import loads
+        from pytest_garl.execution.job import parse_job
 
         for search, wanted in self.targets.items():
             target = next(iter(wanted.values()))
             text = self.ledger.job(search)
             if text is not None:
-                then = loads(text)
+                then = parse_job(text)
                 differing = self.job(target, _of_today(then.npcs)).differences(then)
                 if differing:
                     raise LedgerError(
@@ -203,11 +202,11 @@ class Run:
 
     def scenario(self, target: Target) -> Scenario:
         """Return what a slot flies."""
-        from pytest_garl.execution.job import load_scenario
+        from pytest_garl.scenarios.files import parse_scenario
 
         text = self.ledger.scenario(target.flight)
         assert text is not None
-        return load_scenario(text)
+        return parse_scenario(text)
 
     def expected_signatures(self, target: Target) -> dict[str, str]:
         """Return the signatures that known cases expect of a system on a map, with their files.
@@ -292,7 +291,7 @@ class Run:
 
     def _add(self, search: str, wanted: Mapping[Slot, Target], npcs: PolicySpec) -> None:
         from pytest_garl.adversary.policy_check import check_policy
-        from pytest_garl.execution.job import loads
+        from pytest_garl.execution.job import parse_job
         from pytest_garl.scenarios.maps.map import load_map
         from pytest_garl.search.breeder import Breeder
 
@@ -317,10 +316,10 @@ class Run:
         # For the summary, which xdist's controller writes without having had the items.
         self.ledger.note_fact(f"files of {name} on {target.map}", " ".join(files))
         known = self.ledger.job(search)
-        if known is not None and job.differences(loads(known)):
+        if known is not None and job.differences(parse_job(known)):
             raise LedgerError(
                 f"{name} on {target.map}: two sets of tests fly the same search with different "
-                f"{', '.join(job.differences(loads(known)))}"
+                f"{', '.join(job.differences(parse_job(known)))}"
             )
         self.breeders[search] = Breeder(self.ledger, search, method, slots)
 
@@ -332,19 +331,17 @@ class Run:
         map = load_map(target.map, self.options.map_folders)
         sources = self._sources_of(target)
         own = sources_of(self.simulator.load()) if self.simulator != BUILT_IN else ()
-        return FlightJob(
-            system=reference_to(target.system),
+        return FlightJob.for_system(
+            reference_to(target.system),
+            map,
+            npcs,
             system_sha256=combined_sha256(sources),
+            sources=tuple(sorted({*sources, *own})),
             simulator=self.simulator,
-            map=map.name,
-            map_sha256=map.sha256,
-            map_folders=tuple(str(folder) for folder in self.options.map_folders),
-            npcs=npcs,
+            map_folders=self.options.map_folders,
             limits=target.limits,
             timeout_s=self.options.timeout_s,
-            path=tuple(_path()),
-            flights=str(self.flights),
-            sources=tuple(sorted({*sources, *own})),
+            flights=self.flights,
         )
 
     def _sources_of(self, target: Target) -> tuple[tuple[str, str], ...]:
@@ -402,7 +399,3 @@ def _repeated(options: Options, target: Target) -> Scenario:
         return load(Path(target.file), options.map_folders)
     assert options.repeated_slot is not None
     return options.repeated_slot.scenarios[target.system_name]
-
-
-def _path() -> list[str]:
-    return [entry for entry in sys.path if entry]

@@ -9,7 +9,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from pytest_garl.execution.job import FlightJob, load_scenario, loads
+from pytest_garl.execution.job import FlightJob, parse_job
 from pytest_garl.execution.ledger import Ledger
 from pytest_garl.execution.ledger_queries import LedgerFlight
 from pytest_garl.execution.on_demand import FlyFunction, OnDemandFlights
@@ -26,6 +26,7 @@ from pytest_garl.regressions.investigation import (
 )
 from pytest_garl.regressions.new_case import as_found
 from pytest_garl.regressions.user_failure import UserAssertion
+from pytest_garl.scenarios.files import parse_scenario
 from pytest_garl.scenarios.maps.map import load_map
 from pytest_garl.scenarios.scenario import Scenario
 
@@ -80,7 +81,7 @@ def case_requests(
     for search, rows in groups.items():
         text = ledger.job(search)
         assert text is not None
-        job = loads(text)
+        job = parse_job(text)
         if noted is None:
             expected = corpus.expected_signatures(job.system.name, job.map)
             wanted[search] = [signature for signature in rows if signature not in expected]
@@ -185,7 +186,7 @@ def _failures(
 ) -> tuple[tuple[Scenario, CompletedFlight], ...]:
     """Return scenarios with their flights: those that violated, or those that a test refuses."""
     rows = ledger.queries.flown(search) if user_assertion else violating
-    flights = [(load_scenario(row.scenario), done_of(row, job)) for row in rows]
+    flights = [(parse_scenario(row.scenario), done_of(row, job)) for row in rows]
     if user_assertion is None:
         return tuple(flights)
     return tuple(

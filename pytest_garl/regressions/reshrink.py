@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import dataclasses
 import re
-import sys
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -34,7 +33,6 @@ from pytest_garl.regressions.user_failure import UserAssertion
 from pytest_garl.scenarios.maps.map import load_map
 from pytest_garl.scenarios.scenario import Scenario
 
-TIMEOUT_S = 10.0
 LEAST = 1 + 1 + 1 + COUNT + PILOTS
 """Flights without which nothing can be found: the case as it is, a simpler one, that one as it is
 recorded, its neighbours, the reference pilot."""
@@ -71,18 +69,15 @@ def shrink_case(
     map = load_map(case.scenario.map, map_folders)
     system = system_of(case, folder)
     with temporary_pool(workers) as (ledger, pool):
-        job = FlightJob(
-            system=reference_to(system),
+        job = FlightJob.for_system(
+            reference_to(system),
+            map,
+            policy_spec(case.policy),
             system_sha256=sources_sha256(system, dict(means.files)),
             simulator=means.simulator,
-            map=map.name,
-            map_sha256=map.sha256,
-            map_folders=tuple(str(each) for each in map_folders),
-            npcs=policy_spec(case.policy),
+            map_folders=map_folders,
             limits=case.limits,
-            timeout_s=TIMEOUT_S,
-            path=tuple(entry for entry in sys.path if entry),
-            flights=str(ledger.path.parent / "flights"),
+            flights=ledger.path.parent / "flights",
         )
         request = CaseRequest(
             name=case.id,

@@ -1,10 +1,13 @@
-"""Scenarios as small, sorted, commented TOML files."""
+"""Scenarios as text: TOML files for people, one line of JSON in a ledger."""
 
 from __future__ import annotations
 
+import dataclasses
+import json
 from pathlib import Path
 
 from pytest_garl.errors import ScenarioError
+from pytest_garl.files.json_values import dataclass_from, parse_json
 from pytest_garl.files.reading import read_text
 from pytest_garl.files.toml import Table, parse, quoted
 from pytest_garl.messages import shown
@@ -97,3 +100,28 @@ def load(path: Path, search_path: tuple[Path, ...] = ()) -> Scenario:
     text = read_text(path)
     map = load_map(map_name_in(text, source=str(path)), search_path)
     return loads(text, map, source=str(path))
+
+
+def dump_scenario(scenario: Scenario) -> str:
+    """Return a scenario as one line of JSON."""
+    values: dict[str, object] = {
+        "map": scenario.map,
+        "seed": scenario.seed,
+        "genes": scenario.genes,
+    }
+    if scenario.removed_objects:
+        values["absent"] = scenario.removed_objects
+    return json.dumps(values)
+
+
+def parse_scenario(text: str) -> Scenario:
+    """Return the scenario in a line of JSON; raise ScenarioError for a damaged one."""
+    try:
+        values = parse_json(text)
+        if isinstance(values, dict):
+            values["removed_objects"] = values.pop("absent", [])
+        scenario = dataclass_from(Scenario, values)
+    except ValueError as error:
+        raise ScenarioError(f"a stored scenario is damaged: {error}") from error
+    genes = tuple((key, float(value)) for key, value in scenario.genes)
+    return dataclasses.replace(scenario, genes=genes)

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
-from pytest_garl.execution.job import dump_scenario, load_scenario
 from pytest_garl.execution.ledger import Ledger
+from pytest_garl.scenarios.files import dump_scenario, parse_scenario
 from pytest_garl.search.method import Flown, Method
 
 
@@ -50,7 +50,7 @@ class Breeder:
         if not self._method.learns:
             return
         flown = [
-            Flown(scenario=load_scenario(text), result=result)
+            Flown(scenario=parse_scenario(text), result=result)
             for text, result in self._ledger.generation(self._search, generation)
             if result is not None
         ]

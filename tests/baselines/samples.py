@@ -12,9 +12,10 @@ from pytest_garl.baselines.file import (
 )
 from pytest_garl.baselines.pairs import FlightSummary
 from pytest_garl.baselines.record import BaselineSpec
-from pytest_garl.execution.job import FlightJob, dump_scenario
+from pytest_garl.execution.job import FlightJob
 from pytest_garl.execution.ledger import Ledger
 from pytest_garl.execution.reference import BUILT_IN, Reference
+from pytest_garl.scenarios.files import dump_scenario
 from pytest_garl.scenarios.maps.map import load_map
 from pytest_garl.verdicts.verdict import Limits
 from tests.support.results import flight_result
@@ -44,18 +45,13 @@ def baseline(*sets: BaselineSet) -> Baseline:
 
 
 def job(simulator: Reference = BUILT_IN) -> FlightJob:
-    return FlightJob(
-        system=Reference(module="stack.landing", file="", qualname="Lander"),
-        system_sha256="",
+    return FlightJob.for_system(
+        Reference(module="stack.landing", file="", qualname="Lander"),
+        LAWN,
+        policy_spec("waypoint"),
         simulator=simulator,
-        map="lawn",
-        map_sha256=LAWN.sha256,
-        map_folders=(),
-        npcs=policy_spec("waypoint"),
-        limits=Limits(),
-        timeout_s=10.0,
         path=(),
-        flights="flights",
+        flights=Path("flights"),
     )
 
 

@@ -13,11 +13,11 @@ from click.testing import CliRunner, Result
 
 import pytest_garl
 from pytest_garl.cli import main
-from pytest_garl.execution.job import load_scenario
 from pytest_garl.execution.ledger import Ledger
 from pytest_garl.experiments.results import ResultRow, read
 from pytest_garl.experiments.spec import read as plan
 from pytest_garl.scenarios.chromosome import encode
+from pytest_garl.scenarios.files import parse_scenario
 from pytest_garl.scenarios.genes import genome_for
 from pytest_garl.scenarios.maps.map import load_map
 from pytest_garl.scenarios.placement import marker_position_m
@@ -118,7 +118,7 @@ def test_rows_hold_the_figures_of_the_ledger(project: Path) -> None:
     # The analytic simulator's UAV is 12 m above where it lands, then there: two cells a flight.
     cells = set()
     for flight in bad:
-        x, y = marker_position_m(load_scenario(flight.scenario), map)
+        x, y = marker_position_m(parse_scenario(flight.scenario), map)
         off = flight.result.final_distance_m
         # Some places lie beyond the lawn, which counts as nowhere.
         if abs(x + off) < 10:
@@ -126,7 +126,7 @@ def test_rows_hold_the_figures_of_the_ledger(project: Path) -> None:
     assert row.covered == len(cells)
     assert row.cells == 10 * 20 * 15
     genome = genome_for(map)
-    genes = [genome.normalise(encode(load_scenario(f.scenario), genome)) for f in flights]
+    genes = [genome.normalise(encode(parse_scenario(f.scenario), genome)) for f in flights]
     pairs = [float(np.linalg.norm(a - b)) for a in genes for b in genes]
     assert row.parameter_distance == pytest.approx(np.mean(pairs), abs=1e-4)
     weather = np.array(genes)[:, :8] * 0.15

@@ -16,7 +16,6 @@ from pytest_garl.scenarios.maps.map import load_map
 from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.scenarios.validity import repair
 from pytest_garl.simulation.npc_policy import PolicySpec
-from pytest_garl.verdicts.verdict import Limits
 from tests.plugin import tiny_simulator
 
 LAWN = load_map("lawn")
@@ -80,16 +79,12 @@ def scenario(fog: float = 0.0) -> Scenario:
 
 
 def job_of(system: type, flights: Path, timeout_s: float = 10.0) -> FlightJob:
-    return FlightJob(
-        system=reference_to(system),
-        system_sha256="",
+    return FlightJob.for_system(
+        reference_to(system),
+        LAWN,
+        PolicySpec(name="none", factory="nowhere:Nothing"),
         simulator=reference_to(tiny_simulator.fly),
-        map="lawn",
-        map_sha256=LAWN.sha256,
-        map_folders=(),
-        npcs=PolicySpec(name="none", factory="nowhere:Nothing"),
-        limits=Limits(),
         timeout_s=timeout_s,
         path=(str(Path(__file__).parents[2]),),
-        flights=str(flights),
+        flights=flights,
     )

@@ -10,26 +10,22 @@ from pytest_garl.adversary.catalogue import policy_spec
 from pytest_garl.baselines.record import BaselineSpec
 from pytest_garl.errors import LedgerError
 from pytest_garl.execution.batch import fly_all, temporary_pool
-from pytest_garl.execution.job import FlightJob, dump_scenario
+from pytest_garl.execution.job import FlightJob
 from pytest_garl.execution.ledger import Ledger
-from pytest_garl.execution.reference import BUILT_IN, Reference
+from pytest_garl.execution.reference import Reference
+from pytest_garl.scenarios.files import dump_scenario
 from pytest_garl.scenarios.maps.map import load_map
 from pytest_garl.verdicts.verdict import Limits
 from tests.execution.flying import Good, Replaces, job_of, scenario
 from tests.support.results import flight_result
 
-JOB = FlightJob(
-    system=Reference(module="stack", file="", qualname="Lander"),
+JOB = FlightJob.for_system(
+    Reference(module="stack", file="", qualname="Lander"),
+    load_map("lawn"),
+    policy_spec("waypoint"),
     system_sha256="one",
-    simulator=BUILT_IN,
-    map="lawn",
-    map_sha256="",
-    map_folders=(),
-    npcs=policy_spec("waypoint"),
-    limits=Limits(),
-    timeout_s=10.0,
     path=(),
-    flights="flights",
+    flights=Path("flights"),
 )
 SCENARIOS = BaselineSpec(count=3).scenarios(load_map("lawn"))
 

@@ -13,9 +13,9 @@ import pytest
 from pytest_garl.baselines.record import baseline_from_ledger
 from pytest_garl.errors import LedgerError
 from pytest_garl.execution.database import VERSION, Database
-from pytest_garl.execution.job import dump_scenario, load_scenario, loads
 from pytest_garl.execution.ledger import Ledger
 from pytest_garl.execution.stored_ledger import check_stored
+from pytest_garl.scenarios.files import dump_scenario
 from tests.baselines.samples import job, write_ledger
 from tests.execution.flying import scenario
 from tests.support.results import flight_result
@@ -149,16 +149,6 @@ def test_a_value_as_large_as_the_memory_is_refused(tmp_path: Path) -> None:
     with pytest.raises(LedgerError, match="string or blob too big"):
         database.execute("SELECT zeroblob(100000000)")
     database.close()
-
-
-def test_jobs_and_scenarios_survive_their_text() -> None:
-    assert loads(job().dumps()) == job()
-    for each in (scenario(0.25), scenario(0.25).without("dog-1")):
-        assert load_scenario(dump_scenario(each)) == each
-    with pytest.raises(LedgerError, match="a job in the ledger is damaged: not valid JSON"):
-        loads("")
-    with pytest.raises(LedgerError, match="a scenario in the ledger is damaged: map: found 1"):
-        load_scenario('{"map": 1, "seed": 1, "genes": []}')
 
 
 def test_a_page_that_no_query_reads_is_found_too(path: Path) -> None:

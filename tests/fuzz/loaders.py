@@ -21,7 +21,7 @@ from pytest_garl.baselines import record
 from pytest_garl.errors import GarlError
 from pytest_garl.execution.flight import fly_job
 from pytest_garl.execution.flight_id import FlightId
-from pytest_garl.execution.job import load_scenario, loads
+from pytest_garl.execution.job import parse_job
 from pytest_garl.execution.ledger import Ledger
 from pytest_garl.execution.stored_ledger import check_stored
 from pytest_garl.experiments import results as rows
@@ -31,6 +31,7 @@ from pytest_garl.regressions import corpus
 from pytest_garl.regressions.description import meanings
 from pytest_garl.scenarios import files as scenarios
 from pytest_garl.scenarios.chromosome import decode
+from pytest_garl.scenarios.files import parse_scenario
 from pytest_garl.scenarios.genes import genome_for
 from pytest_garl.scenarios.maps import map as maps
 from pytest_garl.scenarios.validity import problems
@@ -192,14 +193,16 @@ def _write_ledger(path: Path) -> None:
     for _ in range(6):
         claim = ledger.queue.claim()
         assert claim is not None
-        ledger.queue.record(claim, *fly_job(job, load_scenario(claim.scenario), claim.flight, None))
+        ledger.queue.record(
+            claim, *fly_job(job, parse_scenario(claim.scenario), claim.flight, None)
+        )
     ledger.note_objectives("s", 0, [(0.5, 1.0)] * 8)
     ledger.database.execute("PRAGMA wal_checkpoint(TRUNCATE)")
     ledger.close()
 
 
 def _dumped(slot: int) -> str:
-    from pytest_garl.execution.job import dump_scenario
+    from pytest_garl.scenarios.files import dump_scenario
 
     return dump_scenario(scenario(0.02 * slot))
 
@@ -220,9 +223,9 @@ def _load_ledger(path: Path, rng: random.Random) -> None:
 def _use(ledger: Ledger) -> None:
     """Do what a resumed search, a repeated slot and the summary do."""
     for search, job in ledger.searches():
-        loads(job)
+        parse_job(job)
         for text, result in ledger.generation(search, 0):
-            load_scenario(text)
+            parse_scenario(text)
             if result is not None:
                 violation_proximity(result)
         ledger.queries.flown(search)
@@ -235,7 +238,7 @@ def _use(ledger: Ledger) -> None:
     ledger.queries.meters()
     ledger.queries.seconds_per_flight()
     for text in ledger.queries.scenarios(0, 1, "lawn").values():
-        load_scenario(text)
+        parse_scenario(text)
 
 
 def _rows() -> list[str]:

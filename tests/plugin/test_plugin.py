@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from pytest_garl.execution.job import loads
+from pytest_garl.execution.job import parse_job
 from pytest_garl.execution.ledger import Ledger
 from pytest_garl.execution.slot import slots
 from pytest_garl.plugin.options import population
@@ -213,7 +213,7 @@ def test_a_slot_is_repeated_with_the_objects_of_its_search_unless_one_says(
     ledger = Ledger(pytester.path / ".garl" / "repeat.sqlite")
     [(_, job)] = ledger.searches()
     ledger.close()
-    assert loads(job).npcs.name == policy
+    assert parse_job(job).npcs.name == policy
 
 
 def test_a_slot_of_a_ledger_that_cannot_be_read_is_one_clear_error(

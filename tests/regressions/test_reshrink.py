@@ -20,7 +20,6 @@ from pytest_garl.regressions.reshrink import CaseReshrinker, _all_removed
 from pytest_garl.regressions.robustness import neighbours
 from pytest_garl.regressions.simplicity import no_worse, simplicity
 from pytest_garl.scenarios.scenario import Scenario
-from pytest_garl.verdicts.verdict import Limits
 from tests.regressions.test_case_file import LAWN, NAMES
 from tests.regressions.test_case_file import case as dog_case
 from tests.regressions.test_shrink import COLLIDING_OBJECT, violation
@@ -28,18 +27,13 @@ from tests.support.results import flight_result
 
 SIGNATURE = "IV:dog:last-metre:unseen"
 Fails = Callable[[Scenario, str], bool]
-JOB = FlightJob(
-    system=Reference(module="stack.landing", file="", qualname="Lander"),
+JOB = FlightJob.for_system(
+    Reference(module="stack.landing", file="", qualname="Lander"),
+    LAWN,
+    policy_spec("stationary"),
     system_sha256="ab" * 32,
-    simulator=BUILT_IN,
-    map="lawn",
-    map_sha256=LAWN.sha256,
-    map_folders=(),
-    npcs=policy_spec("stationary"),
-    limits=Limits(),
-    timeout_s=10.0,
     path=(),
-    flights="/nowhere",
+    flights=Path("/nowhere"),
 )
 
 

@@ -10,7 +10,7 @@ import pytest
 from pytest_garl.errors import ScenarioError
 from pytest_garl.scenarios.chromosome import decode
 from pytest_garl.scenarios.extra_genes import EXTRAS
-from pytest_garl.scenarios.files import dumps, load, loads
+from pytest_garl.scenarios.files import dump_scenario, dumps, load, loads, parse_scenario
 from pytest_garl.scenarios.genes import genome_for, with_destinations
 from pytest_garl.scenarios.maps.map import load_map
 from pytest_garl.scenarios.scenario import Scenario
@@ -110,3 +110,19 @@ def test_a_strange_scenario_is_one_short_error(
         load(file)
     assert str(file) in str(caught.value)
     assert len(str(caught.value)) < 700
+
+
+@pytest.mark.parametrize("removed", [(), ("dog-1",)])
+def test_scenario_survives_its_line_of_json(removed: tuple[str, ...]) -> None:
+    genome = genome_for(load_map("lawn"))
+    scenario = decode(genome.nominal, genome, map="lawn", seed=1)
+    for name in removed:
+        scenario = scenario.without(name)
+    assert parse_scenario(dump_scenario(scenario)) == scenario
+
+
+def test_damaged_line_of_json_is_one_error() -> None:
+    with pytest.raises(ScenarioError, match="a stored scenario is damaged: map: found 1"):
+        parse_scenario('{"map": 1, "seed": 1, "genes": []}')
+    with pytest.raises(ScenarioError, match="a stored scenario is damaged: not valid JSON"):
+        parse_scenario("{")

@@ -4,10 +4,10 @@ from pathlib import Path
 
 import pytest
 
-from pytest_garl.execution.job import load_scenario
 from pytest_garl.execution.ledger import Ledger
 from pytest_garl.execution.slot import Slot, slots
 from pytest_garl.plugin.options import population
+from pytest_garl.scenarios.files import parse_scenario
 from pytest_garl.scenarios.genes import genome_for
 from pytest_garl.scenarios.maps.map import load_map
 from pytest_garl.search.breeder import Breeder
@@ -34,7 +34,7 @@ def searched(path: Path, name: str, budget: int, wanted: tuple[Slot, ...] = ()) 
         claim = ledger.queue.claim()
         if claim is None:
             return ledger
-        ledger.queue.record(claim, result(load_scenario(claim.scenario)), "", 0.0)
+        ledger.queue.record(claim, result(parse_scenario(claim.scenario)), "", 0.0)
 
 
 # Two more fly the scenarios of random search, each with other objects.

@@ -16,7 +16,7 @@ from pytest_garl import cpu_dispatch
 from pytest_garl.adversary.recorded import recorded_spec
 from pytest_garl.execution.batch import fly_all, temporary_pool
 from pytest_garl.execution.job import FlightJob
-from pytest_garl.execution.reference import BUILT_IN, Reference
+from pytest_garl.execution.reference import Reference
 from pytest_garl.regressions.case import Case
 from pytest_garl.regressions.corpus import Corpus
 from pytest_garl.scenarios.maps.map import load_map
@@ -104,18 +104,14 @@ def flown_by_a_child() -> list[tuple[str, str]]:
         for _, case in SHORT:
             map = load_map(case.scenario.map)
             module, _, qualname = case.system.partition(":")
-            job = FlightJob(
-                system=Reference(module=module, file="", qualname=qualname),
-                system_sha256="",
-                simulator=BUILT_IN,
-                map=map.name,
-                map_sha256=map.sha256,
-                map_folders=(),
-                npcs=recorded_spec(dict(case.moves), {}),
+            job = FlightJob.for_system(
+                Reference(module=module, file="", qualname=qualname),
+                map,
+                recorded_spec(dict(case.moves), {}),
                 limits=case.limits,
                 timeout_s=60.0,
                 path=(str(ROOT),),
-                flights=str(ledger.path.parent / "flights"),
+                flights=ledger.path.parent / "flights",
             )
             done = next(iter(fly_all(ledger, pool, job, [case.scenario])))
             flown.append((done.signature, done.sha256))

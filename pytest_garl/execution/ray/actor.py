@@ -13,7 +13,7 @@ from pathlib import Path
 
 from pytest_garl import cpu_dispatch
 from pytest_garl.execution.flight_id import FlightId
-from pytest_garl.execution.job import FlightJob, loads
+from pytest_garl.execution.job import FlightJob, parse_job
 from pytest_garl.execution.ledger import Ledger
 from pytest_garl.execution.ledger_queue import Claim, WorkQueue
 from pytest_garl.execution.local_pool import FlightWorkers
@@ -112,7 +112,7 @@ class FlightActor:
         shutil.rmtree(self._folder, ignore_errors=True)
 
     def _job(self, text: str) -> FlightJob:
-        return self._paths.job(text) if self._paths else loads(text)
+        return self._paths.job(text) if self._paths else parse_job(text)
 
     def _to_local(self, text: str) -> str:
         return self._paths.to_local(text) if self._paths else text

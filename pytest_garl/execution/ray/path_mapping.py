@@ -7,7 +7,7 @@ import json
 import re
 from dataclasses import dataclass
 
-from pytest_garl.execution.job import FlightJob, loads
+from pytest_garl.execution.job import FlightJob, parse_job
 from pytest_garl.execution.reference import Reference
 
 
@@ -24,7 +24,7 @@ class PathMapping:
         Ray copies the project alone.  Landing systems and simulators from elsewhere are imported by
         name, from where this node has them installed.
         """
-        job = loads(_replace_folder(text, _quoted(self.local), _quoted(self.remote)))
+        job = parse_job(_replace_folder(text, _quoted(self.local), _quoted(self.remote)))
         return dataclasses.replace(
             job, system=self._by_name(job.system), simulator=self._by_name(job.simulator)
         )

@@ -11,7 +11,7 @@ from typing import Any
 
 from pytest_garl.errors import LedgerError, PoolError
 from pytest_garl.execution.flight_id import FlightId
-from pytest_garl.execution.job import loads
+from pytest_garl.execution.job import parse_job
 from pytest_garl.execution.ledger_queue import Claim, WorkQueue
 from pytest_garl.execution.ray.actor import ActorWorkspace, FlightActor, FlightOutput, versions
 from pytest_garl.execution.worker_failure import WorkerExit, retry_or_record
@@ -113,7 +113,7 @@ class RayScheduler:
                 return
             self._idle.pop()
             self._queue.count("idle_s", time.monotonic() - since)
-            loads(claim.job).record(claim.flight).unlink(missing_ok=True)
+            parse_job(claim.job).record(claim.flight).unlink(missing_ok=True)
             self._flying[actor.fly.remote(claim)] = actor, claim
 
     def _record(self, ref: Any, actor: Any, claim: Claim) -> None:
@@ -129,7 +129,7 @@ class RayScheduler:
         else:
             _write_record(found, claim)
             self._queue.record(claim, found.result, found.sha256, found.wall_s)
-        self._add_idle(actor, loads(claim.job).system.name)
+        self._add_idle(actor, parse_job(claim.job).system.name)
 
     def _give_back(self, claim: Claim, error: Exception) -> None:
         """Give back the slot of a lost actor: Ray's worker was killed, or its node is lost.
@@ -154,7 +154,7 @@ def different_versions(ours: Mapping[str, str], theirs: Mapping[str, str]) -> st
 
 def _write_record(flight: FlightOutput, claim: Claim) -> None:
     """Write a flight's record into the job's folder, whole or not at all."""
-    path = loads(claim.job).record(claim.flight)
+    path = parse_job(claim.job).record(claim.flight)
     scratch = path.with_name(f".{path.name}.{os.getpid()}")
     try:
         path.parent.mkdir(parents=True, exist_ok=True)

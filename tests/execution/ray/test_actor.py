@@ -11,12 +11,13 @@ import pytest
 from pytest_garl.errors import PoolError
 from pytest_garl.execution.flight import fly_job
 from pytest_garl.execution.flight_id import FlightId
-from pytest_garl.execution.job import dump_scenario, loads
+from pytest_garl.execution.job import parse_job
 from pytest_garl.execution.ledger_queue import Claim
 from pytest_garl.execution.ray.actor import ActorWorkspace, FlightActor, FlightOutput
 from pytest_garl.execution.reference import Reference, reference_to
 from pytest_garl.execution.slot import Slot
 from pytest_garl.execution.worker_failure import WorkerExit
+from pytest_garl.scenarios.files import dump_scenario
 from pytest_garl.simulation.flight_file import load
 from tests.execution.flying import Exits, Good, Loud, Reports, Sleeps, Slow, job_of, scenario
 from tests.plugin.test_plugin import write_project
@@ -66,7 +67,7 @@ def test_traceback_on_stderr_belongs_to_the_landing_system(actor: FlightActor) -
 
 
 def test_failure_of_the_simulator_is_no_failure_of_the_landing_system(actor: FlightActor) -> None:
-    job = loads(claim(Good).job)
+    job = parse_job(claim(Good).job)
     broken = dataclasses.replace(job, simulator=reference_to(scenario))
     first = actor.fly(dataclasses.replace(claim(Good), job=broken.dumps()))
     assert isinstance(first, WorkerExit)
