@@ -55,7 +55,7 @@ def case_of(seed: int) -> Case:
             property="collision",
             margin=0.0,
             unit="m",
-            story="A dog.",
+            description="A dog.",
         ),
         policy="dqn",
         policy_sha256="",

@@ -18,7 +18,7 @@ import numpy as np
 from pytest_garl.baselines.comparison import LEVEL, Comparison, compare
 from pytest_garl.baselines.gate_statistics import holm_adjusted
 from pytest_garl.baselines.pairs import FlightSummary, Pair
-from pytest_garl.regressions.robustness import COUNT
+from pytest_garl.regressions.robustness import NEIGHBOURS
 from studies.table import read_csv, share
 
 DOCS = Path(__file__).parents[1] / "docs"
@@ -137,7 +137,7 @@ def gated(
     if not found.pairs_to_confirm:
         return found
     flown = {
-        pair.name: [beside(pair.head) for _ in range(COUNT)] for pair in found.pairs_to_confirm
+        pair.name: [beside(pair.head) for _ in range(NEIGHBOURS)] for pair in found.pairs_to_confirm
     }
     return compare(pairs, neighbours=flown)
 

@@ -27,7 +27,7 @@ from pytest_garl.execution.on_demand import FlyFunction, OnDemandFlights
 from pytest_garl.execution.result import CompletedFlight
 from pytest_garl.experiments.pytest_run import run_pytest
 from pytest_garl.experiments.spec import ExperimentRun
-from pytest_garl.regressions.new_case import find_colliding_object
+from pytest_garl.regressions.recorded_behaviour import find_colliding_object
 from pytest_garl.regressions.shrink import (
     by_hypothesis,
     complexity,

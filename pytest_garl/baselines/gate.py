@@ -9,7 +9,7 @@ from pytest_garl.baselines.file import BaselineSet
 from pytest_garl.baselines.pairs import FlightSummary, Pair, summary_of
 from pytest_garl.errors import BaselineError
 from pytest_garl.execution.result import CompletedFlight
-from pytest_garl.regressions.robustness import COUNT, neighbours
+from pytest_garl.regressions.robustness import NEIGHBOURS, neighbours
 from pytest_garl.scenarios.maps.map import Map
 from pytest_garl.scenarios.scenario import Scenario
 
@@ -65,6 +65,7 @@ def _compare(
     flown = fly([each for name in names for each in neighbours(scenarios[name], map)])
     summaries = [summary_of(done.result, done.sha256) for done in flown]
     beside = {
-        name: summaries[index * COUNT : (index + 1) * COUNT] for index, name in enumerate(names)
+        name: summaries[index * NEIGHBOURS : (index + 1) * NEIGHBOURS]
+        for index, name in enumerate(names)
     }
     return compare(pairs, level=level, expected_signatures=expected_signatures, neighbours=beside)

@@ -17,7 +17,7 @@ from pytest_garl.messages import printable
 from pytest_garl.regressions.case import Case
 from pytest_garl.regressions.case_file import load
 from pytest_garl.regressions.corpus import Corpus, replace_file
-from pytest_garl.regressions.description import meanings
+from pytest_garl.regressions.description import describe_scenario
 from pytest_garl.regressions.replay import Replay, replay, system_of
 
 DEFAULT = Path("scenarios/regressions")
@@ -131,11 +131,11 @@ def show(project: _Project, file: Path) -> None:
     case = project.case(file)
     evidence = case.evidence
     _say(f"{case.id}  {case.status}  {case.system}")
-    _say(f"{case.violation.signature}: {case.violation.story}\n")
+    _say(f"{case.violation.signature}: {case.violation.description}\n")
     table = Table(box=None, header_style="bold")
     for name in ("what", "value", "meaning"):
         table.add_column(name)
-    for row in meanings(case.scenario, project.maps):
+    for row in describe_scenario(case.scenario, project.maps):
         table.add_row(*(Text(cell) for cell in row))
     _console().print(table)
     for key, by in _totals(case):
@@ -201,7 +201,7 @@ def replay_(context: click.Context, file: Path, live: bool, video: Path | None) 
 
 def _answer(result: Replay) -> None:
     click.secho(result.answer, bold=True, fg="green" if result.answer == "FIXED" else "red")
-    _say(f"{result.signature or 'no violation'}: {result.story}")
+    _say(f"{result.signature or 'no violation'}: {result.description}")
     for reason in result.reasons:
         _say(reason)
     _say(f"judged by {result.judge}")
@@ -279,21 +279,21 @@ def shrink(project: _Project, file: Path, flights: int, workers: int) -> None:
     The command replaces the file only by a case that is no worse in any respect (objects, genes,
     moves, size, neighbours that fail) and better in at least one.
     """
-    from pytest_garl.plugin.case_tests import means_of
-    from pytest_garl.regressions.reshrink import KEPT, shrink_case
+    from pytest_garl.plugin.case_tests import case_setup
+    from pytest_garl.regressions.reshrink import NOTHING_SIMPLER, shrink_case
 
     case = project.case(file)
-    means = means_of(case, project.root)
-    finding = shrink_case(case, project.root, project.maps, flights, workers, means)
-    spent = f"{finding.flights} flights"
-    if finding.case is None and finding.reason != KEPT:
-        raise GarlError(f"{file}: {finding.reason}; `garl cases replay {file}` tells more")
-    if finding.case is None:
-        _say(f"{file}: {finding.reason} ({spent}); it stays as it is")
+    setup = case_setup(case, project.root)
+    result = shrink_case(case, project.root, project.maps, flights, workers, setup)
+    spent = f"{result.flights} flights"
+    if result.case is None and result.reason != NOTHING_SIMPLER:
+        raise GarlError(f"{file}: {result.reason}; `garl cases replay {file}` tells more")
+    if result.case is None:
+        _say(f"{file}: {result.reason} ({spent}); it stays as it is")
         return
-    path = replace_file(file, finding.case)
-    evidence = finding.case.evidence
-    renewed = finding.case.id == case.id
+    path = replace_file(file, result.case)
+    evidence = result.case.evidence
+    renewed = result.case.id == case.id
     done = "its evidence is renewed" if renewed else f"all in all removed {evidence.removed}"
     _say(f"{path}: {done} ({spent})")
 

@@ -6,11 +6,12 @@ import hashlib
 import json
 import re
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 from pytest_garl.execution.database import Database, SearchKind
 from pytest_garl.execution.flight_id import FlightId
-from pytest_garl.execution.result import FlightResult, parse_result
+from pytest_garl.execution.result import CompletedFlight, FlightResult, parse_result
 from pytest_garl.execution.slot import Slot
 
 _ADDRESS = re.compile(r"0x[0-9a-f]+")
@@ -40,6 +41,11 @@ class LedgerFlight:
     def signature(self) -> str:
         """The violation's signature."""
         return self.result.signature
+
+    def completed(self, folder: Path) -> CompletedFlight:
+        """Return it with its record, which is in a folder of flights."""
+        record = self.flight.record(folder)
+        return CompletedFlight(result=self.result, sha256=self.sha256, record=record)
 
 
 class LedgerQueries:

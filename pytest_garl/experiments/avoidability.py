@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import dataclasses
 import functools
 from collections.abc import Callable, Sequence
 from contextlib import closing
@@ -11,18 +10,15 @@ from pathlib import Path
 
 import numpy as np
 
-from pytest_garl.adversary.recorded import recorded_spec
 from pytest_garl.errors import LedgerError
 from pytest_garl.execution.ledger import Ledger
 from pytest_garl.execution.ledger_queries import LedgerFlight
 from pytest_garl.execution.local_pool import local_pool
 from pytest_garl.execution.on_demand import FlyFunction, OnDemandFlights
-from pytest_garl.execution.reference import reference_to
 from pytest_garl.experiments.measure import AvoidabilityCounts, FinishedSearch
-from pytest_garl.regressions.follow_up import done_of
-from pytest_garl.regressions.new_case import recorded_behaviour
+from pytest_garl.regressions.avoidability import survives_recorded_moves
+from pytest_garl.regressions.recorded_behaviour import recorded_behaviour
 from pytest_garl.scenarios.files import parse_scenario
-from pytest_garl.simulation.system_under_test.reference_pilot import ReferencePilot
 
 
 def count_unavoidable(
@@ -74,8 +70,9 @@ def _opened(path: Path) -> Ledger:
 
 def _avoids(search: FinishedSearch, flight: LedgerFlight, fly: FlyFunction) -> bool:
     """Return whether the reference pilot flies the scenario without a violation."""
-    scenario, done = parse_scenario(flight.scenario), done_of(flight, search.job)
-    behaviour = recorded_behaviour(done, scenario, search.map)
-    npcs = recorded_spec(dict(behaviour.moves), dict(behaviour.changes))
-    job = dataclasses.replace(search.job, system=reference_to(ReferencePilot), npcs=npcs)
-    return not fly(job, scenario).signature
+    scenario, completed = (
+        parse_scenario(flight.scenario),
+        flight.completed(Path(search.job.flights)),
+    )
+    behaviour = recorded_behaviour(completed, scenario, search.map)
+    return survives_recorded_moves(search.job, scenario, behaviour, fly)

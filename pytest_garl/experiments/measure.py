@@ -17,7 +17,6 @@ from pytest_garl.execution.ledger import Ledger
 from pytest_garl.execution.ledger_queries import LedgerFlight
 from pytest_garl.experiments.results import ResultRow
 from pytest_garl.experiments.spec import PAPER_TYPES, ExperimentRun
-from pytest_garl.regressions.follow_up import done_of
 from pytest_garl.scenarios.files import parse_scenario
 from pytest_garl.scenarios.genes import WEATHER, genome_for
 from pytest_garl.scenarios.maps.map import Map
@@ -186,5 +185,5 @@ def covered_cells(search: FinishedSearch) -> NDArray[np.bool_]:
     bounds_m = search.map.bounds_m
     cells = empty_cells(bounds_m)
     for flight in search.violating:
-        mark_visited(cells, load(done_of(flight, search.job).record).uav.position_m, bounds_m)
+        mark_visited(cells, load(search.job.record(flight.flight)).uav.position_m, bounds_m)
     return cells

@@ -15,7 +15,7 @@ from pytest_garl.plugin.keys import target_of
 from pytest_garl.plugin.user_assertions import ItemAssertion
 from pytest_garl.regressions.case import Case
 from pytest_garl.regressions.judging import alone_in_a_folder, arguments
-from pytest_garl.regressions.reshrink import Means
+from pytest_garl.regressions.reshrink import CaseSetup
 
 IMPORTED = "ignore::pytest.PytestAssertRewriteWarning"
 """pytest warns that this package is imported already; a project may make errors of warnings."""
@@ -35,10 +35,10 @@ class _Collected:
         self.simulator = reference_to(own) if own else BUILT_IN
 
 
-def means_of(case: Case, root: Path) -> Means:
-    """Return with what the tests that found a case fly and judge it."""
+def case_setup(case: Case, root: Path) -> CaseSetup:
+    """Return how the tests that found a case fly and judge it."""
     if not case.test:
-        return Means()
+        return CaseSetup()
     collected = _Collected()
     with alone_in_a_folder(case, live=False) as folder, contextlib.chdir(root):
         told = io.StringIO()
@@ -55,13 +55,13 @@ def means_of(case: Case, root: Path) -> Means:
     for item, target in tests:
         if case.own_test and item.originalname != case.own_test:
             continue
-        return Means(
+        return CaseSetup(
             user_assertion=ItemAssertion(item, target) if case.assertion else None,
             simulator=collected.simulator,
             files=tuple(data_files(target.files, root).items()),
         )
     if not case.assertion:
-        return Means(simulator=collected.simulator)
+        return CaseSetup(simulator=collected.simulator)
     raise GarlError(
         f"the case {case.id} is of a property of your own, and its test {case.test!r} is not found "
         f"in {root}; run this where you run pytest, or correct the case's key 'test'"

@@ -30,7 +30,7 @@ SHRINK = 12
 """Flights for each new kind of violation: enough for the barest scenario, its neighbours, the
 reference pilot and a shorter record of moves."""
 LEAST_SHRINK = 8
-"""Fewer say nothing: ``pursuit.LEAST``, which to import takes long."""
+"""``investigation.LEAST_FLIGHTS``, whose module takes long to import."""
 
 
 @dataclass(frozen=True, kw_only=True)

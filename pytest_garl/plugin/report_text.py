@@ -111,7 +111,7 @@ def case_text(
     signature, story = flown
     state = _CASE_FAILURES[decision.reason]
     paragraphs = [
-        f"Saved: {case.violation.signature}. {case.violation.story}",
+        f"Saved: {case.violation.signature}. {case.violation.description}",
         f"Flown: {signature}. {story}",
     ]
     replay = f"See it: garl cases replay {file}"
@@ -146,12 +146,12 @@ def _scenario(config: pytest.Config, run: Run, target: Target) -> list[str]:
     """Return the scenario in physical units if ``-v`` is given."""
     if config.get_verbosity() < 1:
         return []
-    from pytest_garl.regressions.description import meanings
+    from pytest_garl.regressions.description import describe_scenario
 
     scenario = run.scenario(target)
     genes = [
         meaning if gene.startswith("environment.") else f"{gene} {meaning}"
-        for gene, _, meaning in meanings(scenario, run.options.map_folders)
+        for gene, _, meaning in describe_scenario(scenario, run.options.map_folders)
     ]
     return [f"Scenario (seed {scenario.seed}): {'; '.join(genes)}"]
 

@@ -187,18 +187,18 @@ class Run:
 
     def unproven(self, target: Target) -> tuple[str, ...]:
         """Return why it proves nothing that a case passes; nothing if the system was repaired."""
-        from pytest_garl.regressions.staleness import Sources, unproven
+        from pytest_garl.regressions.staleness import SourceHashes, stale_reasons
         from pytest_garl.scenarios.maps.map import load_map
 
         case = target.entry.case if target.entry else None
         if case is None:
             return ()
-        sources = Sources(
+        sources = SourceHashes(
             system_sha256=combined_sha256(self._sources_of(target)),
             simulator_sha256=simulator_sha256(self.simulator),
             map_sha256=load_map(target.map, self.options.map_folders).sha256,
         )
-        return unproven(case, sources, self.trajectory_sha256(target))
+        return stale_reasons(case, sources, self.trajectory_sha256(target))
 
     def scenario(self, target: Target) -> Scenario:
         """Return what a slot flies."""

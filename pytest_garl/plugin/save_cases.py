@@ -20,12 +20,12 @@ from pytest_garl.plugin.user_assertions import collect_assertion
 from pytest_garl.plugin.wrapping import begin_line, counted, width_of, wrapped
 from pytest_garl.regressions.case import Case
 from pytest_garl.regressions.case_request import CaseRequest
+from pytest_garl.regressions.flight_shares import divide_flights
 from pytest_garl.regressions.follow_up import (
     InvestigatedSignature,
     ShrinkBudget,
     case_requests,
     follow_up,
-    shares,
 )
 from pytest_garl.regressions.forecast import remaining_work
 
@@ -45,19 +45,20 @@ def pursue(run: Run, session: pytest.Session) -> None:
             target, user_assertion = collect_assertion(session, nodeid)
             run.user_assertions[target.search, signature] = user_assertion
         shrinking = ShrinkBudget(each=options.shrink, capped=options.shrink_capped)
-        wanted = case_requests(
+        requests = case_requests(
             run.ledger, options.corpus, shrinking, run.user_assertions, run.finding_tests
         )
-        if wanted:
-            most = sum(each.budget for each in shares(wanted))
-            run.rest = remaining_work(wanted, _flight_s(run, wanted), options.workers or 1)
+        if requests:
+            most = sum(each.budget for each in divide_flights(requests))
+            run.rest = remaining_work(requests, _flight_s(run, requests), options.workers or 1)
             begin_line(reporter)
             reporter.write_line(
-                f"garl: confirming and shrinking {counted(len(wanted), 'new kind')} of violation, "
+                "garl: confirming and shrinking "
+                f"{counted(len(requests), 'new kind')} of violation, "
                 f"at most {counted(most, 'flight')}, about {duration(run.rest.seconds)}"
             )
         with live(run, config):
-            run.pursued = follow_up(run.ledger, run.pool, wanted, _saver(run), run.on_wait)
+            run.pursued = follow_up(run.ledger, run.pool, requests, _saver(run), run.on_wait)
     except KeyboardInterrupt:
         begin_line(reporter)
         reporter.write_line(
@@ -80,11 +81,11 @@ def _saver(run: Run) -> Callable[[Case], Path | None]:
     return functools.partial(options.corpus.save_patch, patches=patches, root=options.root)
 
 
-def _flight_s(run: Run, wanted: Sequence[CaseRequest]) -> dict[str, float]:
+def _flight_s(run: Run, requests: Sequence[CaseRequest]) -> dict[str, float]:
     """Return how long a flight of each signature took in the search."""
     known = run.ledger.queries.kinds()
     any_s = run.ledger.queries.seconds_per_flight() or run.flight_s
-    return {each.name: known.get((each.search, each.signature)) or any_s for each in wanted}
+    return {each.name: known.get((each.search, each.signature)) or any_s for each in requests}
 
 
 def told(pursued: tuple[InvestigatedSignature, ...], config: pytest.Config) -> list[str]:
@@ -93,10 +94,10 @@ def told(pursued: tuple[InvestigatedSignature, ...], config: pytest.Config) -> l
     patches = []
     width = width_of(config)
     for each in pursued:
-        case = each.finding.case
-        name = f"{each.system.split(':')[-1]} on {each.map}: {each.finding.signature}"
+        case = each.result.case
+        name = f"{each.system.split(':')[-1]} on {each.map}: {each.result.signature}"
         if case is None:
-            lines.append(f"not saved: {name}: {each.finding.reason}")
+            lines.append(f"not saved: {name}: {each.result.reason}")
             continue
         if each.file is None:
             lines.append(f"not saved: {name}: the same case is saved already")
@@ -105,7 +106,7 @@ def told(pursued: tuple[InvestigatedSignature, ...], config: pytest.Config) -> l
         if each.file.suffix == ".patch":
             patches.append(shlex.quote(file))
         lines.append(f"{'patch' if each.file.suffix == '.patch' else 'saved'} {file}")
-        text = f"{case.violation.story} ({'; '.join(_facts(each, case))})"
+        text = f"{case.violation.description} ({'; '.join(_facts(each, case))})"
         lines.append(wrapped(text, width, first="    ", others="    "))
     if patches:
         lines.append("Nothing in the tree was changed (CI is set). To keep the cases:")
@@ -122,7 +123,7 @@ def told(pursued: tuple[InvestigatedSignature, ...], config: pytest.Config) -> l
 def _facts(each: InvestigatedSignature, case: Case) -> list[str]:
     """Return in words why a case may be believed, and what it cost."""
     evidence = case.evidence
-    if not each.finding.flights:
+    if not each.result.flights:
         return ["as the search found it, not shrunk"]
     asked = [
         f"{evidence.neighbours_failed} of {evidence.neighbours} neighbours fail too",
@@ -132,13 +133,13 @@ def _facts(each: InvestigatedSignature, case: Case) -> list[str]:
     return [
         *(asked if evidence.neighbours else []),
         f"shrinking removed {evidence.removed}",
-        counted(each.finding.flights, "flight"),
+        counted(each.result.flights, "flight"),
     ]
 
 
 def _unreached(pursued: tuple[InvestigatedSignature, ...], width: int) -> list[str]:
     """Say which kinds are not shrunk, and how many flights would reach them."""
-    left = sum(not each.finding.flights for each in pursued)
+    left = sum(not each.result.flights for each in pursued)
     if not left:
         return []
     text = (

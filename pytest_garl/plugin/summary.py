@@ -246,7 +246,7 @@ def _spent(run: Run) -> str:
     """Return what the run cost beside the budget."""
     meters = run.ledger.queries.meters()
     flying, idle = meters.get("flying_s", 0.0), meters.get("idle_s", 0.0)
-    pursued = sum(each.finding.flights for each in run.pursued)
+    pursued = sum(each.result.flights for each in run.pursued)
     repeats = meters.get("on_demand", 0) - pursued
     counts = {
         "flown again after a time-out or a kill": meters.get("retried", 0),

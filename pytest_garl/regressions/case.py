@@ -1,21 +1,24 @@
-"""A saved case: one way to fail, with everything that it takes to fly it again and believe it."""
+"""A saved case: one way to fail, with all that is needed to fly it again and to trust it."""
 
 from __future__ import annotations
 
 import hashlib
 import re
+from collections.abc import Callable, Collection
 from dataclasses import dataclass
 from typing import Literal
 
+from pytest_garl.adversary.recorded import recorded_spec
 from pytest_garl.scenarios.scenario import Scenario
+from pytest_garl.simulation.npc_policy import PolicySpec
 from pytest_garl.verdicts.verdict import Limits, PropertyName, ViolationType
 
 Status = Literal["open", "fixed", "unavoidable"]
-"""Open: known, expected to fail.  Fixed: must pass.  Unavoidable: not even a pilot that knows where
-everything is, and may give up, comes through; gates nothing."""
+"""Open: known, expected to fail.  Fixed: must pass.  Unavoidable: the reference pilot, which knows
+where everything is and may abort, violates a property as well; such a case gates nothing."""
 Avoidable = Literal["live", "recorded", "no"]
-"""Among which objects that pilot comes through without a violation: those that a live policy
-steers after it, those that only repeat what they did, or neither."""
+"""The objects among which the reference pilot violates nothing: those that a live policy steers
+(and those that repeat their moves), only those that repeat their moves, or neither."""
 MoveList = tuple[tuple[float, float], ...]
 Moves = tuple[tuple[str, MoveList], ...]
 ChangeList = tuple[tuple[int, str, float], ...]
@@ -24,24 +27,24 @@ Changes = tuple[tuple[str, ChangeList], ...]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Violation:
-    """What failed: the property, its measured margin (negative or 0 when violated), the story."""
+    """A violated property, its measured margin (negative or 0), and a description in words."""
 
     signature: str
     type: ViolationType
     property: PropertyName
     margin: float
     unit: str
-    story: str
+    description: str
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Evidence:
-    """Why a case may be believed.
+    """The measurements that support a case.
 
     ``neighbours_failed`` of ``neighbours`` slightly different scenarios failed with the same
     signature; ``trajectory_sha256`` is that of the flight, on CPUs of the class ``cpu``;
-    ``removed`` says what shrinking took away.  ``system_sha256`` and ``simulator_sha256`` are of
-    the sources that flew it; empty in files that were written before they were stored.
+    ``removed`` says what shrinking removed.  ``system_sha256`` and ``simulator_sha256`` are hashes
+    of the sources that flew it; empty in files of earlier versions.
     """
 
     trajectory_sha256: str
@@ -57,28 +60,48 @@ class Evidence:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RecordedBehaviour:
-    """What objects did in a flight, and what their policies changed of the environment.
+    """The moves that objects made in a flight, and their policies' changes of the environment.
 
-    ``changes`` names the objects whose policy changed anything: the number of the decision,
-    the gene, what was added to it.
+    A move is the wanted velocity (x, y) for half a second, as shares of the object's speed.
+    ``changes`` names only the objects whose policy changed anything: the number of the decision,
+    the gene, the value that was added to it.
     """
 
     moves: Moves
     changes: Changes = ()
+
+    @property
+    def policy(self) -> PolicySpec:
+        """The policy with which the objects repeat it."""
+        return recorded_spec(dict(self.moves), dict(self.changes))
+
+    def only(self, name: str) -> RecordedBehaviour:
+        """Return the behaviour of one object."""
+        return self._of(lambda each: each == name)
+
+    def without(self, names: Collection[str]) -> RecordedBehaviour:
+        """Return the behaviour of all objects but some."""
+        return self._of(lambda each: each not in names)
+
+    def _of(self, wanted: Callable[[str], bool]) -> RecordedBehaviour:
+        return RecordedBehaviour(
+            moves=tuple(each for each in self.moves if wanted(each[0])),
+            changes=tuple(each for each in self.changes if wanted(each[0])),
+        )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Case:
     """One saved case.
 
-    ``system`` is "module:class"; ``moves`` are what each object did, ``changes`` what of the
-    environment, so that no policy is needed to fly it again; ``policy`` and ``policy_sha256``
-    name who moved them when it was found.  ``test`` is the node id of the test that failed, without
-    parameters; empty where none is known.  ``assertion`` is set where a test's own assertion failed
-    and the built-in verdict is content: the hash of the assertion's source.
-    ``avoidable`` says what may be asked of a repair: not to outrun a pursuer that nobody outruns.
-    ``limits`` are those of the tests when it was found; pytest flies it with those of today.
-    ``accepted`` says that somebody knows of it, where git does not say so.
+    ``system`` is "module:class".  ``moves`` and ``changes`` are the objects' recorded behaviour, so
+    that no policy is needed to fly it again; ``policy`` and ``policy_sha256`` name the policy that
+    moved the objects when it was found.  ``test`` is the node id of the test that failed, without
+    parameters; empty if none is known.  ``assertion`` is the hash of the assertion's source if a
+    test's own assertion failed and the built-in verdict found nothing.  ``avoidable`` limits what
+    the case asks of a repair: not to outrun a pursuer that nobody outruns.  ``limits`` are those of
+    the tests when it was found; pytest flies it with those of today.  ``accepted`` says that
+    somebody knows of the case, for projects without git.
     """
 
     system: str
@@ -97,13 +120,18 @@ class Case:
     accepted: bool = False
 
     @property
+    def behaviour(self) -> RecordedBehaviour:
+        """What the objects did, so that they can repeat it."""
+        return RecordedBehaviour(moves=self.moves, changes=self.changes)
+
+    @property
     def own_test(self) -> str:
         """The name of the test whose own assertion failed; empty for the built-in verdict."""
         return own_test(self.test, self.assertion)
 
     @property
     def edge(self) -> bool:
-        """Whether a neighbour does not fail: such a case decides nothing and gates nothing."""
+        """Whether a neighbour does not fail; such a case gates nothing."""
         return self.evidence.neighbours_failed < self.evidence.neighbours
 
     @property
@@ -116,12 +144,12 @@ class Case:
             f"genes={scenario.genes!r}, absent={scenario.removed_objects!r}), "
             f"{self.violation.signature!r}, {self.moves!r}, {self.own_test!r})"
         )
-        # Nothing where nothing was changed, so that the names of other cases stay.
+        # Empty without changes, so that cases from before they were recorded keep their names.
         changes = repr(self.changes) if self.changes else ""
         digest = hashlib.sha256(f"{facts}{changes}".encode()).hexdigest()
         words = self.violation.signature.split(":")[:2] or [self.violation.type]
         subject = "-".join(_SAFE.sub("_", word.partition("@")[0]).strip("_") for word in words)
-        # A file's name has 255 bytes at most, and that of a test may be longer.
+        # A file's name has 255 bytes at most; a test's name may be longer.
         return f"{self.scenario.map}-{subject[:60]}-{digest[:6]}"
 
 

@@ -22,6 +22,7 @@ from pytest_garl.regressions.case import (
     Changes,
     Evidence,
     MoveList,
+    RecordedBehaviour,
     Status,
     Violation,
     own_test,
@@ -61,8 +62,8 @@ class CaseHeader:
 def dumps(case: Case) -> str:
     """Return the case as TOML: the same bytes for equal cases."""
     violation, evidence, scenario = case.violation, case.evidence, case.scenario
-    story = "".join(char if char.isprintable() else " " for char in violation.story)
-    lines = [f"# {line}" for line in textwrap.wrap(story, _WIDTH)]
+    description = "".join(char if char.isprintable() else " " for char in violation.description)
+    lines = [f"# {line}" for line in textwrap.wrap(description, _WIDTH)]
     lines += [
         f"schema = {SCHEMA}",
         f"system = {_text(case.system)}",
@@ -86,7 +87,7 @@ def dumps(case: Case) -> str:
         f'property = "{violation.property}"',
         f"margin = {violation.margin!r}  # {violation.unit}; what is not above 0 is violated",
         f"unit = {_text(violation.unit)}",
-        f"story = {_text(violation.story)}",
+        f"story = {_text(violation.description)}",
     ]
     lines += [
         "",
@@ -144,13 +145,13 @@ def dumps(case: Case) -> str:
 
 def size_of(case: Case) -> int:
     """Return how many characters the scenario and the record take in the file."""
-    return sum(len(line) for line in (*gene_lines(case.scenario), *record_lines(case)))
+    return sum(len(line) for line in (*gene_lines(case.scenario), *record_lines(case.behaviour)))
 
 
-def record_lines(case: Case) -> list[str]:
+def record_lines(behaviour: RecordedBehaviour) -> list[str]:
     """Return the lines that hold what the objects did and what their policies changed."""
-    lines = [f"{name} = {_moves(moves)}" for name, moves in case.moves]
-    return lines + [f"{name} = {_changes(own)}" for name, own in case.changes]
+    lines = [f"{name} = {_moves(moves)}" for name, moves in behaviour.moves]
+    return lines + [f"{name} = {_changes(own)}" for name, own in behaviour.changes]
 
 
 def loads(text: str, load_map: Callable[[str], Map], *, source: str = "case") -> Case:
@@ -198,7 +199,7 @@ def loads(text: str, load_map: Callable[[str], Map], *, source: str = "case") ->
             property=cast(PropertyName, violation.text("property", among=_PROPERTIES)),
             margin=violation.number("margin"),
             unit=violation.text("unit"),
-            story=violation.text("story"),
+            description=violation.text("story"),
         ),
         policy=policy.text("name"),
         policy_sha256=policy.text("sha256"),

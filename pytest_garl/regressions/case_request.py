@@ -1,4 +1,4 @@
-"""What is to be found out about a violation, and what came of it."""
+"""A request to make a case of a violation, and its result."""
 
 from __future__ import annotations
 
@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from pytest_garl.execution.job import FlightJob
 from pytest_garl.execution.result import CompletedFlight
 from pytest_garl.regressions.case import Case, RecordedBehaviour
-from pytest_garl.regressions.robustness import COUNT
 from pytest_garl.regressions.shrink import complexity, genome_of
 from pytest_garl.regressions.user_failure import UserAssertion
 from pytest_garl.scenarios.maps.map import Map
@@ -16,12 +15,12 @@ from pytest_garl.scenarios.scenario import Scenario
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class CaseRequest:
-    """What is to be found out about one signature of one search.
+    """A request to make a case of one signature of one search.
 
     ``violations`` are scenarios with the flights that violated.  ``name`` begins with the search.
-    ``budget`` bounds the flights, ``cap`` those of the landing system for all signatures of the
-    search together unless it is None.  ``user_assertion`` is the assertion that failed, None for
-    the built-in verdict; ``test`` is the node id of the test that found it.
+    ``budget`` limits the flights of this request, ``cap`` those of the landing system for all
+    signatures of the search together; None is no limit.  ``user_assertion`` is the test's assertion
+    that failed, None for the built-in verdict; ``test`` is the node id of the test that found it.
     """
 
     name: str
@@ -36,61 +35,63 @@ class CaseRequest:
 
     @property
     def search(self) -> str:
-        """The search that found it."""
+        """The key of the search that found the violations."""
         return self.name.partition(" ")[0]
 
     @property
-    def exception(self) -> bool:
+    def is_exception(self) -> bool:
         """Whether the landing system raised, returned nonsense or hung.
 
-        No scenario explains more than the traceback does, and each flight that hangs costs four
-        times the limit of a call.
+        The traceback explains more than a scenario can, and each flight that hangs costs four times
+        the limit of a call.
         """
         if self.user_assertion is not None or not self.violations:
             return False
         crash = self.violations[0][1].result.crash
         return crash is not None and crash.kind in ("raised", "nonsense", "hung")
 
-    def failed(self, scenario: Scenario, done: CompletedFlight) -> bool:
-        """Whether a flight failed in the way that is asked about."""
+    @property
+    def scenarios(self) -> list[Scenario]:
+        """The scenarios of the violations, the simplest first."""
+        return sorted(
+            (scenario for scenario, _ in self.violations),
+            key=lambda each: complexity(each, genome_of(each, self.map)),
+        )
+
+    def fails(self, scenario: Scenario, flight: CompletedFlight) -> bool:
+        """Return whether a flight fails with this request's signature."""
         if self.user_assertion is None:
-            return done.signature == self.signature
-        own = self.user_assertion(done.result, done.record, scenario)
-        return own is not None and own.signature == self.signature
+            return flight.signature == self.signature
+        failure = self.user_assertion(flight.result, flight.record, scenario)
+        return failure is not None and failure.signature == self.signature
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class CaseResult:
-    """What came of it: a case, or the reason why there is none."""
+    """The case that was made, or the reason why there is none.
+
+    ``pilot_flights`` are the reference pilot's among the ``flights``: it sees without a camera, so
+    that its flights take a fraction of the time.
+    """
 
     signature: str
     case: Case | None
     flights: int
-    piloted: int = 0
-    """How many of the flights are the reference pilot's, which sees without a camera: they take a
-    fraction of the time."""
+    pilot_flights: int = 0
     reason: str = ""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Failure:
-    """A scenario that fails, what its objects did, its flight, how many neighbours fail too.
+class FailingScenario:
+    """A scenario that fails, what its objects did, and its flight.
 
-    ``first`` is the search's scenario that it was made from; ``asked`` how many neighbours were
-    flown.
+    ``origin`` is the scenario of the search that it was made from.  Of
+    ``neighbours_flown`` slightly different scenarios, ``neighbours_failed`` fail in the same way.
     """
 
-    first: Scenario
+    origin: Scenario
     scenario: Scenario
     behaviour: RecordedBehaviour
-    done: CompletedFlight
-    robust: int
-    asked: int = COUNT
-
-
-def simplest_first(request: CaseRequest) -> list[Scenario]:
-    """Return the violations' scenarios, the simplest first."""
-    return sorted(
-        (scenario for scenario, _ in request.violations),
-        key=lambda each: complexity(each, genome_of(each, request.map)),
-    )
+    flight: CompletedFlight
+    neighbours_failed: int = 0
+    neighbours_flown: int = 0

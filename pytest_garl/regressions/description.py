@@ -1,4 +1,4 @@
-"""One sentence about a violation, for somebody who has seen no flight."""
+"""Describe a violation and a scenario in words, for a reader who has not seen the flight."""
 
 from __future__ import annotations
 
@@ -17,54 +17,47 @@ from pytest_garl.scenarios.placement import (
 )
 from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.simulation.camera.weather import in_units
-from pytest_garl.simulation.flight import Contact, Flight, ObjectRecord
+from pytest_garl.simulation.flight import Flight, ObjectRecord
 from pytest_garl.simulation.physics.vehicle import up_m
 from pytest_garl.verdicts.verdict import Verdict
 from pytest_garl.verdicts.wording import compass_point
 
 NEAR_M = 3.0
-"""Horizontal distance at which an object enters the scene: two of the UAV's lengths and its
+"""Horizontal distance at which an object enters the scene: twice the UAV's length and the object's
 own stride."""
 
 
-def tell(flight: Flight, verdict: Verdict) -> str:
-    """Return the story: for a moving object how it came, then what happened where."""
+def describe(flight: Flight, verdict: Verdict) -> str:
+    """Return the verdict's sentence; after a collision, how the moving object came near as well."""
     contact = flight.contacts[-1] if flight.contacts else None
     if verdict.violation_type != "IV" or contact is None:
         return verdict.story
-    colliding_object = next((item for item in flight.objects if item.name == contact.body), None)
-    return (
-        f"{_entrance(flight, colliding_object, contact)} {verdict.story}"
-        if colliding_object
-        else verdict.story
-    )
+    hit = next((item for item in flight.objects if item.name == contact.body), None)
+    return f"{_approach(flight, hit)} {verdict.story}" if hit else verdict.story
 
 
-def _entrance(flight: Flight, colliding_object: ObjectRecord, contact: Contact) -> str:
+def _approach(flight: Flight, hit: ObjectRecord) -> str:
     """Return how the object came near: ``A dog at 2.1 m/s enters from the south-east ...``."""
-    there, own = flight.uav.position_m, colliding_object.track.position_m
-    away = np.hypot(own[:, 0] - there[:, 0], own[:, 1] - there[:, 1])
-    outside = np.flatnonzero(away > NEAR_M)
+    uav, own = flight.uav.position_m, hit.track.position_m
+    distance = np.hypot(own[:, 0] - uav[:, 0], own[:, 1] - uav[:, 1])
+    outside = np.flatnonzero(distance > NEAR_M)
     entered = int(outside[-1]) + 1 if len(outside) else 0
-    entered = min(entered, len(away) - 1)
-    up = up_m(float(there[entered, 2]))
-    speeds = np.hypot(
-        colliding_object.track.velocity_mps[:, 0], colliding_object.track.velocity_mps[:, 1]
-    )
+    entered = min(entered, len(distance) - 1)
+    up = up_m(float(uav[entered, 2]))
+    speeds = np.hypot(hit.track.velocity_mps[:, 0], hit.track.velocity_mps[:, 1])
     speed = float(speeds[entered:].max())
-    kind = f"{_article(colliding_object.type)} {colliding_object.type}"
-    place = _over(flight, there[entered])
+    kind = f"{_article(hit.type)} {hit.type}"
     if speed < 0.1:
         return f"{kind} stands still in the UAV's way, {up:.1f} m below it."
-    side = own[entered] - there[entered]
+    side = own[entered] - uav[entered]
     point = compass_point(float(side[0]), float(side[1]))
     return (
         f"{kind} at {speed:.1f} m/s enters from the {point} while the UAV is {up:.1f} m above "
-        f"{place}."
+        f"{_ground_below(flight, uav[entered])}."
     )
 
 
-def _over(flight: Flight, position: np.ndarray) -> str:
+def _ground_below(flight: Flight, position: np.ndarray) -> str:
     mx, my = flight.marker_position_m
     distance = math.hypot(float(position[0]) - mx, float(position[1]) - my)
     return "the marker" if distance < 1.0 else f"the ground, {distance:.1f} m from the marker"
@@ -74,7 +67,9 @@ def _article(word: str) -> str:
     return "An" if word[0] in "aeiou" else "A"
 
 
-def meanings(scenario: Scenario, map_folders: tuple[Path, ...]) -> list[tuple[str, str, str]]:
+def describe_scenario(
+    scenario: Scenario, map_folders: tuple[Path, ...]
+) -> list[tuple[str, str, str]]:
     """Return what is off nominal as (gene, value, meaning in physical units)."""
     map = load_map(scenario.map, map_folders)
     rows = [

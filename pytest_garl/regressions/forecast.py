@@ -1,67 +1,69 @@
-"""How long a search will take, and what follows it."""
+"""Forecast the flights that follow a search, and their time."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
+from pytest_garl.regressions.case_flights import PILOT_FLIGHTS
 from pytest_garl.regressions.case_request import CaseRequest
-from pytest_garl.regressions.follow_up import shares
-from pytest_garl.regressions.investigation import LEAST, PILOTS
+from pytest_garl.regressions.flight_shares import divide_flights
+from pytest_garl.regressions.investigation import LEAST_FLIGHTS
 
-SPENT = 0.85
-"""Share of its flights that a kind of violation spends: many stop before the last is needed.  With
-it the forecast was 1.07 and 1.31 times what came (the tutorial's system, six kinds)."""
-PILOTED = 2
-"""Flights of the reference pilot for a kind."""
-PILOTED_S = 0.2
-"""What such a flight takes of the time of another: it needs no camera."""
+SPENT_SHARE = 0.85
+"""Share of its flights that a kind of violation spends: many need fewer than they may have.  With
+it the forecast was 1.07 and 1.31 times the measured time (the tutorial's system, six kinds)."""
+USUAL_PILOT_FLIGHTS = 2
+"""Flights that the reference pilot usually flies for a kind of violation."""
+PILOT_TIME_SHARE = 0.2
+"""Time of a flight of the reference pilot, as a share of another's: it needs no camera."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RemainingWork:
-    """What is to come after a search: flights, and the time that they take."""
+    """The flights that follow a search, and the time that they take."""
 
     flights: float
     seconds: float
 
 
 def flights_after_search(kinds: int, each: int, cap: int | None) -> float:
-    """Return the flights that the new kinds of a search take, those that repeat them included."""
+    """Return the flights that the new kinds of a search take, with those that confirm them."""
     if not kinds or not each:
         return 0.0
-    own = SPENT * (each - PILOTS)
-    least = SPENT * (LEAST - PILOTS)
+    own = SPENT_SHARE * (each - PILOT_FLIGHTS)
+    least = SPENT_SHARE * (LEAST_FLIGHTS - PILOT_FLIGHTS)
     if cap is None or kinds * own <= cap:
-        return kinds * (1 + own + PILOTED)
+        return kinds * (1 + own + USUAL_PILOT_FLIGHTS)
     reached = max(1, min(kinds, int(cap / least)))
-    return kinds + max(own, min(reached * own, cap)) + reached * PILOTED
+    return kinds + max(own, min(reached * own, cap)) + reached * USUAL_PILOT_FLIGHTS
 
 
 def seconds_of_kind(each: int, flight_s: float, workers: int) -> float:
     """Return how long one of several new kinds of violation takes."""
-    flights = 1 + SPENT * (each - PILOTS) + PILOTED * PILOTED_S
+    own = SPENT_SHARE * (each - PILOT_FLIGHTS)
+    flights = 1 + own + USUAL_PILOT_FLIGHTS * PILOT_TIME_SHARE
     return flights * flight_s / max(1, workers)
 
 
 def remaining_work(
-    wanted: Sequence[CaseRequest], flight_s: Mapping[str, float], workers: int
+    requests: Sequence[CaseRequest], flight_s: Mapping[str, float], workers: int
 ) -> RemainingWork:
-    """Return what signatures still take; ``flight_s`` is how long a flight of each takes."""
+    """Return the work of all requests; ``flight_s`` is the time of a flight of each, by name."""
     flights, each_s = 0.0, []
-    left: dict[str, float] = {each.search: float(each.cap or 0) for each in wanted}
-    for request in sorted(shares(wanted), key=lambda each: not each.budget):
+    left: dict[str, float] = {each.search: float(each.cap or 0) for each in requests}
+    for request in sorted(divide_flights(requests), key=lambda each: not each.budget):
         budget = request.budget
-        if not budget and left[request.search] >= LEAST - PILOTS:
-            # Others leave something for it.
-            budget = LEAST
+        if not budget and left[request.search] >= LEAST_FLIGHTS - PILOT_FLIGHTS:
+            # It gets the flights that others do not need.
+            budget = LEAST_FLIGHTS
         if not budget:
             continue
-        own = 1.0 if request.exception else SPENT * (budget - PILOTS)
-        piloted = 0 if request.exception else PILOTED
+        own = 1.0 if request.is_exception else SPENT_SHARE * (budget - PILOT_FLIGHTS)
+        by_pilot = 0 if request.is_exception else USUAL_PILOT_FLIGHTS
         left[request.search] -= own
-        flights += own + piloted
-        each_s.append((own + piloted * PILOTED_S) * flight_s[request.name])
-    # Flights of one kind follow each other; those of several are flown side by side.
+        flights += own + by_pilot
+        each_s.append((own + by_pilot * PILOT_TIME_SHARE) * flight_s[request.name])
+    # Flights of one kind follow each other; those of several kinds are flown side by side.
     seconds = max([sum(each_s) / max(1, workers), *each_s], default=0.0)
     return RemainingWork(flights=flights, seconds=seconds)

@@ -1,17 +1,13 @@
-"""From a flight that failed to the case that is saved."""
+"""Make a case from a failing scenario."""
 
 from __future__ import annotations
 
 from pytest_garl.execution.reference import simulator_sha256
-from pytest_garl.execution.result import CompletedFlight
-from pytest_garl.regressions.case import Avoidable, Case, Evidence, RecordedBehaviour, Violation
-from pytest_garl.regressions.case_request import (
-    CaseRequest,
-    CaseResult,
-    Failure,
-    simplest_first,
-)
-from pytest_garl.regressions.description import tell
+from pytest_garl.regressions.avoidability import assumed_avoidability
+from pytest_garl.regressions.case import Avoidable, Case, Evidence, Violation
+from pytest_garl.regressions.case_request import CaseRequest, CaseResult, FailingScenario
+from pytest_garl.regressions.description import describe
+from pytest_garl.regressions.recorded_behaviour import recorded_behaviour
 from pytest_garl.regressions.shrink import complexity, genome_of
 from pytest_garl.regressions.user_failure import UserFailure
 from pytest_garl.scenarios.maps.map import Map
@@ -21,72 +17,63 @@ from pytest_garl.simulation.flight_file import load
 from pytest_garl.verdicts.verdict import Verdict
 
 
-def as_found(request: CaseRequest) -> CaseResult:
-    """Return the search's own flight as a case, without another flight."""
-    scenario = simplest_first(request)[0]
-    done = dict(request.violations)[scenario]
-    failure = unasked(scenario, scenario, recorded_behaviour(done, scenario, request.map), done)
-    case = case_of(request, failure, nobody_asked(failure))
+def case_without_flights(request: CaseRequest) -> CaseResult:
+    """Return the simplest violation of the search as a case, without another flight."""
+    scenario = request.scenarios[0]
+    flight = dict(request.violations)[scenario]
+    failing = FailingScenario(
+        origin=scenario,
+        scenario=scenario,
+        behaviour=recorded_behaviour(flight, scenario, request.map),
+        flight=flight,
+    )
+    case = new_case(request, failing, assumed_avoidability(failing.behaviour))
     return CaseResult(signature=request.signature, case=case, flights=0)
 
 
-def unasked(
-    first: Scenario, scenario: Scenario, behaviour: RecordedBehaviour, done: CompletedFlight
-) -> Failure:
-    """Return a failure of which no neighbour was flown."""
-    return Failure(
-        first=first, scenario=scenario, behaviour=behaviour, done=done, robust=0, asked=0
-    )
-
-
-def nobody_asked(failure: Failure) -> Avoidable:
-    """Return what may be demanded without asking the reference pilot: where nothing moves, all."""
-    return "recorded" if failure.behaviour.moves else "live"
-
-
-def case_of(request: CaseRequest, failure: Failure, avoidable: Avoidable) -> Case:
-    """Return a failure as what is saved."""
-    done, job = failure.done, request.job
-    flight = load(done.record) if done.record.exists() else None
+def new_case(request: CaseRequest, failing: FailingScenario, avoidable: Avoidable) -> Case:
+    """Return the case of a failing scenario."""
+    completed, job = failing.flight, request.job
+    flight = load(completed.record) if completed.record.exists() else None
     ask = request.user_assertion
-    own = ask(done.result, done.record, failure.scenario) if ask else None
+    failure = ask(completed.result, completed.record, failing.scenario) if ask else None
     return Case(
         system=job.system.name,
         status="unavoidable" if avoidable == "no" else "open",
         avoidable=avoidable,
-        scenario=failure.scenario,
-        violation=_violation(done.result.verdict, flight, own),
+        scenario=failing.scenario,
+        violation=_violation(completed.result.verdict, flight, failure),
         policy=job.npcs.name,
         policy_sha256=job.npcs.sha256,
-        moves=failure.behaviour.moves,
-        changes=failure.behaviour.changes,
+        moves=failing.behaviour.moves,
+        changes=failing.behaviour.changes,
         evidence=Evidence(
-            trajectory_sha256=done.sha256,
+            trajectory_sha256=completed.sha256,
             cpu=flight.cpu if flight else "",
             map_sha256=job.map_sha256,
-            neighbours=failure.asked,
-            neighbours_failed=failure.robust,
-            removed=removed(failure.first, failure.scenario, request.map),
+            neighbours=failing.neighbours_flown,
+            neighbours_failed=failing.neighbours_failed,
+            removed=_removed(failing.origin, failing.scenario, request.map),
             versions=flight.versions if flight else (),
             system_sha256=job.system_sha256,
             simulator_sha256=simulator_sha256(job.simulator),
         ),
         limits=job.limits,
-        test=request.test or (own.test if own else ""),
-        assertion=own.assertion if own else "",
+        test=request.test or (failure.test if failure else ""),
+        assertion=failure.assertion if failure else "",
     )
 
 
-def _violation(verdict: Verdict, flight: Flight | None, own: UserFailure | None) -> Violation:
-    """Return what failed, from the verdict or from the test's own assertion."""
-    if own is not None:
+def _violation(verdict: Verdict, flight: Flight | None, failure: UserFailure | None) -> Violation:
+    """Return the violation: of the verdict, or of the test's own assertion."""
+    if failure is not None:
         return Violation(
-            signature=own.signature,
+            signature=failure.signature,
             type="own",
             property="own",
             margin=0.0,
             unit="1",
-            story=f"{own.test}: {own.message}. {verdict.story}",
+            description=f"{failure.test}: {failure.message}. {verdict.story}",
         )
     assert verdict.primary is not None
     assert verdict.violation_type is not None
@@ -97,34 +84,13 @@ def _violation(verdict: Verdict, flight: Flight | None, own: UserFailure | None)
         property=verdict.primary,
         margin=margin.value if margin else 0.0,
         unit=margin.unit if margin else "1",
-        story=tell(flight, verdict) if flight else verdict.story,
+        description=describe(flight, verdict) if flight else verdict.story,
     )
 
 
-def recorded_behaviour(done: CompletedFlight, scenario: Scenario, map: Map) -> RecordedBehaviour:
-    """Return what each object did in a flight; nothing where its process did not live."""
-    names = [name for name, _ in map.without(scenario.removed_objects).object_names]
-    if not done.record.exists():
-        return RecordedBehaviour(moves=tuple((name, ()) for name in names))
-    objects = load(done.record).objects
-    made = {item.name: item.moves for item in objects}
-    return RecordedBehaviour(
-        moves=tuple(
-            (name, tuple((float(x), float(y)) for x, y in made.get(name, ()))) for name in names
-        ),
-        changes=tuple((item.name, item.changes) for item in objects if item.changes),
-    )
-
-
-def find_colliding_object(done: CompletedFlight) -> str:
-    """Return the moving object that the UAV hit, if it did."""
-    hit, kind = done.result.collisions, done.result.verdict.violation_type
-    return hit[-1] if hit and kind == "IV" else ""
-
-
-def removed(first: Scenario, last: Scenario, map: Map) -> str:
-    """Say what shrinking took away."""
-    before, after = (complexity(each, genome_of(first, map)) for each in (first, last))
+def _removed(origin: Scenario, scenario: Scenario, map: Map) -> str:
+    """Return in words what shrinking removed."""
+    before, after = (complexity(each, genome_of(origin, map)) for each in (origin, scenario))
     if before == after:
         return "nothing"
     objects, genes = before[0] - after[0], before[1] - after[1]

@@ -9,7 +9,6 @@ from typing import Literal
 
 from pytest_garl import cpu_dispatch
 from pytest_garl.adversary.catalogue import policy_spec
-from pytest_garl.adversary.recorded import recorded_spec
 from pytest_garl.errors import GarlError, LandingSystemError
 from pytest_garl.execution.reference import (
     BUILT_IN,
@@ -19,7 +18,7 @@ from pytest_garl.execution.reference import (
 from pytest_garl.execution.sources import sources_sha256
 from pytest_garl.regressions.case import Case
 from pytest_garl.regressions.judging import Judged, is_test, judged
-from pytest_garl.regressions.staleness import Sources, unproven
+from pytest_garl.regressions.staleness import SourceHashes, stale_reasons
 from pytest_garl.scenarios.maps.map import Map, load_map
 from pytest_garl.simulation.flight import Flight
 from pytest_garl.simulation.flight_file import load
@@ -43,7 +42,7 @@ class Replay:
     answer: Answer
     outcome: str
     signature: str
-    story: str
+    description: str
     judge: str
     reasons: tuple[str, ...]
     flight: Flight | None
@@ -112,7 +111,7 @@ def _by_tests(
         answer=answer,
         outcome=outcome,
         signature=facts.get("garl.signature", ""),
-        story=facts.get("garl.story", ""),
+        description=facts.get("garl.story", ""),
         judge=f"{case.test} and the tests beside it",
         reasons=reasons,
         flight=flight,
@@ -129,22 +128,22 @@ def _records(folder: Path) -> list[Flight]:
 def _by_verdict(case: Case, folder: Path, map: Map, judged_by: str, live: bool) -> Replay:
     system = system_of(case, folder)
     cpu_dispatch.check()
-    npcs = policy_spec(case.policy) if live else recorded_spec(dict(case.moves), dict(case.changes))
+    npcs = policy_spec(case.policy) if live else case.behaviour.policy
     limit = max(PAPER_LIMITS.time_s, case.limits.time_s)
     flight = fly(case.scenario, system, npcs, map=map, time_limit_s=limit)
     verdict = judge(flight, case.limits)
-    sources = Sources(
+    sources = SourceHashes(
         system_sha256=sources_sha256(system),
         simulator_sha256=simulator_sha256(BUILT_IN),
         map_sha256=map.sha256,
     )
-    reasons = () if verdict.violation else unproven(case, sources, flight.sha256)
+    reasons = () if verdict.violation else stale_reasons(case, sources, flight.sha256)
     answer: Answer = "STALE" if reasons else "FIXED"
     return Replay(
         answer="FAILED" if verdict.violation else answer,
         outcome=flight.outcome,
         signature=verdict.signature,
-        story=verdict.story,
+        description=verdict.story,
         judge=judged_by,
         reasons=reasons,
         flight=flight,

@@ -1,4 +1,4 @@
-"""Go on shrinking a saved case from its own record, with a ledger and a pool of its own."""
+"""Shrink a saved case further, from its own record, with a ledger and a pool of its own."""
 
 from __future__ import annotations
 
@@ -20,32 +20,33 @@ from pytest_garl.execution.reference import (
 )
 from pytest_garl.execution.sources import sources_sha256
 from pytest_garl.regressions.case import Avoidable, Case, RecordedBehaviour
-from pytest_garl.regressions.case_file import size_of
-from pytest_garl.regressions.case_request import CaseRequest, CaseResult, Failure
-from pytest_garl.regressions.investigation import PILOTS, CaseBuilder
-from pytest_garl.regressions.new_case import case_of, find_colliding_object
+from pytest_garl.regressions.case_flights import PILOT_FLIGHTS, CaseFlights
+from pytest_garl.regressions.case_request import CaseRequest, CaseResult, FailingScenario
+from pytest_garl.regressions.new_case import new_case
+from pytest_garl.regressions.recorded_behaviour import find_colliding_object
+from pytest_garl.regressions.reduction import simplest_robust, with_shorter_record
 from pytest_garl.regressions.replay import system_of
-from pytest_garl.regressions.robustness import COUNT
+from pytest_garl.regressions.robustness import NEIGHBOURS
 from pytest_garl.regressions.shrink import shrink
-from pytest_garl.regressions.simplicity import no_worse, simplicity
-from pytest_garl.regressions.staleness import Sources
+from pytest_garl.regressions.simplicity import is_simpler
+from pytest_garl.regressions.staleness import SourceHashes
 from pytest_garl.regressions.user_failure import UserAssertion
 from pytest_garl.scenarios.maps.map import load_map
 from pytest_garl.scenarios.scenario import Scenario
 
-LEAST = 1 + 1 + 1 + COUNT + PILOTS
-"""Flights without which nothing can be found: the case as it is, a simpler one, that one as it is
-recorded, its neighbours, the reference pilot."""
-GONE = "it does not fail in the same way any more with its recorded moves"
-KEPT = "nothing simpler was found"
+LEAST_FLIGHTS = 1 + 1 + 1 + NEIGHBOURS + PILOT_FLIGHTS
+"""The fewest flights that can improve a case: one of the case as it is, one of a simpler scenario,
+one of that scenario with recorded moves, its neighbours, the reference pilot."""
+NOT_REPRODUCED = "it does not fail in the same way any more with its recorded moves"
+NOTHING_SIMPLER = "nothing simpler was found"
 _REMOVED = re.compile(r"(\d+) of (\d+) objects, (\d+) of (\d+) genes off nominal")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Means:
-    """With what the tests of a case fly and judge: their simulator, data files, own assertion.
+class CaseSetup:
+    """How the tests of a case fly and judge: with which simulator, data files and assertion.
 
-    ``files`` are what the landing system reads, by the names that their hashes have.
+    ``files`` are the data files of the landing system, by the names that their hashes have.
     """
 
     user_assertion: UserAssertion | None = None
@@ -59,13 +60,13 @@ def shrink_case(
     map_folders: tuple[Path, ...],
     flights: int,
     workers: int,
-    means: Means | None = None,
+    setup: CaseSetup | None = None,
 ) -> CaseResult:
     """Return a case that is no worse in any respect and better in one, or the reason for none.
 
-    At most ``flights`` are flown.
+    Flies at most ``flights``.
     """
-    means = means or Means()
+    setup = setup or CaseSetup()
     map = load_map(case.scenario.map, map_folders)
     system = system_of(case, folder)
     with temporary_pool(workers) as (ledger, pool):
@@ -73,8 +74,8 @@ def shrink_case(
             reference_to(system),
             map,
             policy_spec(case.policy),
-            system_sha256=sources_sha256(system, dict(means.files)),
-            simulator=means.simulator,
+            system_sha256=sources_sha256(system, dict(setup.files)),
+            simulator=setup.simulator,
             map_folders=map_folders,
             limits=case.limits,
             flights=ledger.path.parent / "flights",
@@ -86,135 +87,121 @@ def shrink_case(
             job=job,
             map=map,
             budget=flights,
-            user_assertion=means.user_assertion,
+            user_assertion=setup.user_assertion,
             test=case.test,
         )
 
-        def think(fly: FlyFunction) -> CaseResult:
-            return CaseReshrinker(request, fly, case).run()
+        def shrink_further(fly: FlyFunction) -> CaseResult:
+            return CaseReshrinker(request, fly, case).build()
 
-        return OnDemandFlights(ledger, pool, lambda: None).run({case.id: think})[case.id]
+        return OnDemandFlights(ledger, pool, lambda: None).run({case.id: shrink_further})[case.id]
 
 
-class CaseReshrinker(CaseBuilder):
-    """The train of thought about a saved case: it begins with what its file says."""
+class CaseReshrinker:
+    """Makes a simpler case of a saved one, or finds the reason why it cannot."""
 
     def __init__(self, request: CaseRequest, fly: FlyFunction, case: Case) -> None:
-        super().__init__(request, fly)
-        self._case = case
+        self._request, self._case = request, case
+        self._flights = CaseFlights(request, fly)
 
-    def run(self) -> CaseResult:
-        """Return what was found."""
-        case = self._case
-        first = self._as_saved()
-        if first is None:
-            return self._finding(None, GONE)
-        better = self._better(first, self._by_record(first))
+    def build(self) -> CaseResult:
+        """Return the simpler case, or the reason for none."""
+        case, flights = self._case, self._flights
+        saved = self._reproduce()
+        if saved is None:
+            return flights.result(None, NOT_REPRODUCED)
+        better = self._better(saved, self._shrink_by_record(saved))
         if better is None:
-            better = self._better(first, self._by_policy(first))
-        if better is None and self._outdated():
-            better = self._saved_as(first, case.avoidable)
-        return self._finding(better, "" if better else KEPT)
+            better = self._better(saved, self._shrink_by_policy(saved))
+        if better is None and self._is_outdated():
+            better = self._successor(saved, case.avoidable)
+        return flights.result(better, "" if better else NOTHING_SIMPLER)
 
-    def _as_saved(self) -> Failure | None:
-        """Return the case's own failure, flown once more with its record."""
-        case = self._case
-        behaviour = RecordedBehaviour(moves=case.moves, changes=case.changes)
-        done = self._again(case.scenario, behaviour)
-        if not self._request.failed(case.scenario, done):
+    def _reproduce(self) -> FailingScenario | None:
+        """Fly the case once more with its record; return None if it does not fail."""
+        case, flights = self._case, self._flights
+        flight = flights.fly_recorded(case.scenario, case.behaviour)
+        if not self._request.fails(case.scenario, flight):
             return None
-        robust, asked = case.evidence.neighbours_failed, case.evidence.neighbours
-        if self._outdated() and asked and self._left >= COUNT:
-            # Counted in another world.
-            robust, asked = self._robust(case.scenario, behaviour), COUNT
-        return Failure(
-            first=case.scenario,
+        evidence = case.evidence
+        if self._is_outdated() and evidence.neighbours and flights.left >= NEIGHBOURS:
+            # The neighbours in the file were flown with other sources.
+            return flights.count_neighbours(case.scenario, case.scenario, case.behaviour, flight)
+        return FailingScenario(
+            origin=case.scenario,
             scenario=case.scenario,
-            behaviour=behaviour,
-            done=done,
-            robust=robust,
-            asked=asked,
+            behaviour=case.behaviour,
+            flight=flight,
+            neighbours_failed=evidence.neighbours_failed,
+            neighbours_flown=evidence.neighbours,
         )
 
-    def _outdated(self) -> bool:
-        """Whether the sources are not those that the case's evidence is of."""
-        evidence, job = self._case.evidence, self._request.job
-        today = Sources(
+    def _is_outdated(self) -> bool:
+        """Return whether the case's evidence comes from other sources than today's."""
+        job = self._request.job
+        today = SourceHashes(
             system_sha256=job.system_sha256,
             simulator_sha256=simulator_sha256(job.simulator),
             map_sha256=job.map_sha256,
         )
-        return today != Sources(
-            system_sha256=evidence.system_sha256,
-            simulator_sha256=evidence.simulator_sha256,
-            map_sha256=evidence.map_sha256,
-        )
+        return today != SourceHashes.of(self._case.evidence)
 
-    def _by_record(self, first: Failure) -> Failure:
-        """Return the simplest failure in which the objects that are left repeat their record."""
+    def _shrink_by_record(self, saved: FailingScenario) -> FailingScenario:
+        """Return the simplest failure in which the remaining objects repeat their record."""
 
-        def recorded_behaviour(scenario: Scenario) -> RecordedBehaviour:
-            return _without(first.behaviour, scenario.removed_objects)
+        def behaviour_of(scenario: Scenario) -> RecordedBehaviour:
+            return saved.behaviour.without(scenario.removed_objects)
 
         def fails(scenario: Scenario) -> bool:
-            return self._request.failed(
-                scenario, self._again(scenario, recorded_behaviour(scenario))
-            )
+            return self._flights.fails_recorded(scenario, behaviour_of(scenario))
 
-        # What the record does not give may need a policy.
-        share = 2 if first.behaviour.moves else 1
-        return self._shrunk_by(first, fails, recorded_behaviour, share)
+        # If the record gives nothing simpler, the policy needs flights as well.
+        share = 2 if saved.behaviour.moves else 1
+        return self._shrink(saved, fails, behaviour_of, share)
 
-    def _by_policy(self, first: Failure) -> Failure:
-        """Return the simplest failure in which a live policy steers: for what no record does."""
+    def _shrink_by_policy(self, saved: FailingScenario) -> FailingScenario:
+        """Return the simplest failure in which the search's policy steers the objects."""
+        if not saved.behaviour.moves:
+            return saved
+        return self._shrink(saved, self._flights.fails_live, self._flights.live_behaviour, 1)
 
-        def fails(scenario: Scenario) -> bool:
-            done = self._flown[scenario] = self._go(self._request.job, scenario)
-            return self._request.failed(scenario, done)
-
-        if not first.behaviour.moves:
-            return first
-        return self._shrunk_by(first, fails, self._recorded_behaviour, 1)
-
-    def _shrunk_by(
+    def _shrink(
         self,
-        first: Failure,
+        saved: FailingScenario,
         fails: Callable[[Scenario], bool],
-        recorded_behaviour: Callable[[Scenario], RecordedBehaviour],
+        behaviour_of: Callable[[Scenario], RecordedBehaviour],
         share: int,
-    ) -> Failure:
-        """Shrink with a share of the flights that are left; the last go to neighbours."""
-        # The last are for a result's neighbours and, if there are many, for a shorter record.
-        reserve = 1 + COUNT if self._left < 4 * (1 + COUNT) else 2 * (1 + COUNT)
-        budget = (self._left - reserve) // share
+    ) -> FailingScenario:
+        """Shrink with a share of the flights that are left."""
+        flights = self._flights
+        # The last flights are for a result's neighbours and, if there are many, a shorter record.
+        reserve = 1 + NEIGHBOURS if flights.left < 4 * (1 + NEIGHBOURS) else 2 * (1 + NEIGHBOURS)
+        budget = (flights.left - reserve) // share
         if budget < 1:
-            return first
-        colliding_object = find_colliding_object(first.done)
-        found = shrink(first.scenario, fails, self._map, budget, colliding_object=colliding_object)
-        return self._off_the_edge(first, found.history[1:], recorded_behaviour)
+            return saved
+        name = find_colliding_object(saved.flight)
+        found = shrink(saved.scenario, fails, flights.map, budget, colliding_object=name)
+        return simplest_robust(flights, saved, found.history[1:], behaviour_of)
 
-    def _better(self, first: Failure, simpler: Failure) -> Case | None:
+    def _better(self, saved: FailingScenario, simpler: FailingScenario) -> Case | None:
         """Return a failure as a case if it is no worse than the saved one, and better in one."""
-        candidates = [each for each in reversed(self._with_record(simpler)) if each is not first]
-        for failure in candidates:
-            case = self._saved_as(failure, self._case.avoidable)
-            # Only for what is better otherwise is the reference pilot asked.
-            if self._improves(case) and self._piloted + 2 <= PILOTS:
-                case = self._saved_as(failure, self._avoidable(failure))
+        flights = self._flights
+        candidates = reversed(with_shorter_record(flights, simpler))
+        for failing in (each for each in candidates if each is not saved):
+            case = self._successor(failing, self._case.avoidable)
+            # The reference pilot flies only what is better in other respects.
+            if self._improves(case) and flights.flown_by_pilot + 2 <= PILOT_FLIGHTS:
+                case = self._successor(failing, flights.avoidability(failing))
                 if self._improves(case):
                     return case
         return None
 
     def _improves(self, case: Case) -> bool:
-        one = simplicity(case, self._map)
-        other = simplicity(self._case, self._map, outdated=self._outdated())
-        if one == other:
-            return size_of(case) < size_of(self._case)
-        return no_worse(one, other)
+        return is_simpler(case, self._case, self._flights.map, outdated=self._is_outdated())
 
-    def _saved_as(self, failure: Failure, avoidable: Avoidable) -> Case:
-        """Return a failure as the case that takes the saved one's place."""
-        case, found = self._case, case_of(self._request, failure, avoidable)
+    def _successor(self, failing: FailingScenario, avoidable: Avoidable) -> Case:
+        """Return a failure as the case that replaces the saved one."""
+        case, found = self._case, new_case(self._request, failing, avoidable)
         removed = _all_removed(case.evidence.removed, found.evidence.removed)
         return dataclasses.replace(
             found,
@@ -226,16 +213,8 @@ class CaseReshrinker(CaseBuilder):
         )
 
 
-def _without(behaviour: RecordedBehaviour, removed: tuple[str, ...]) -> RecordedBehaviour:
-    """Return the behaviour of the objects that are not removed."""
-    return RecordedBehaviour(
-        moves=tuple(each for each in behaviour.moves if each[0] not in removed),
-        changes=tuple(each for each in behaviour.changes if each[0] not in removed),
-    )
-
-
 def _all_removed(before: str, after: str) -> str:
-    """Say what shrinking took away, this time and the times before."""
+    """Return in words what shrinking removed, this time and the times before."""
     first, second = _REMOVED.fullmatch(before), _REMOVED.fullmatch(after)
     if first is None or second is None:
         return before if second is None else after

@@ -1,4 +1,4 @@
-"""Neighbours of a scenario: so near that a violation which they do not share sits on an edge."""
+"""Robustness: a violation that slightly different scenarios do not share sits on an edge."""
 
 from __future__ import annotations
 
@@ -9,15 +9,16 @@ from pytest_garl.scenarios.maps.map import Map
 from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.scenarios.validity import repair
 
-COUNT = 3
+NEIGHBOURS = 3
+"""Slightly different scenarios that are flown for each case."""
 JITTER = 0.002
-"""Share of a gene's range: 1.5 cm of the marker's disc, 2 to 8 cm of an object's start, a hundredth
-of a metre per second: more than differs between two CPUs, less than a person would call another
-scenario."""
+"""Largest change of a gene, as a share of its range: 1.5 cm of the marker's disc, 2 to 8 cm of an
+object's start, a hundredth of a metre per second.  That is more than two CPUs differ, and less than
+a person would call another scenario."""
 
 
 def neighbours(scenario: Scenario, map: Map) -> tuple[Scenario, ...]:
-    """Return three scenarios next to this one, always the same; nominal weather stays nominal."""
+    """Return slightly different scenarios, always the same ones; nominal weather stays nominal."""
     rng = np.random.default_rng([scenario.seed, 0])
     present = dict(scenario.genes)
     items = [
@@ -27,7 +28,7 @@ def neighbours(scenario: Scenario, map: Map) -> tuple[Scenario, ...]:
         and (present[item.key] != item.nominal or not item.key.startswith("environment."))
     ]
     found = []
-    for _ in range(COUNT):
+    for _ in range(NEIGHBOURS):
         steps = rng.uniform(-JITTER, JITTER, len(items))
         moved = {
             item.key: float(

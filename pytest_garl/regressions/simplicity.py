@@ -1,4 +1,4 @@
-"""What makes a case simple, in every respect: less of each is better."""
+"""Compare how simple two cases of one failure are, in every respect."""
 
 from __future__ import annotations
 
@@ -7,22 +7,22 @@ import itertools
 from dataclasses import dataclass
 
 from pytest_garl.regressions.case import Avoidable, Case
-from pytest_garl.regressions.case_file import record_lines
-from pytest_garl.regressions.robustness import COUNT
+from pytest_garl.regressions.case_file import record_lines, size_of
+from pytest_garl.regressions.robustness import NEIGHBOURS
 from pytest_garl.regressions.shrink import complexity, genome_of
 from pytest_garl.scenarios.maps.map import Map
 
-_DEMANDED: dict[Avoidable, int] = {"live": 0, "recorded": 1, "no": 2}
+_EXCUSED: dict[Avoidable, int] = {"live": 0, "recorded": 1, "no": 2}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Simplicity:
-    """The respects in which two cases of one failure are compared.
+    """The respects in which two cases of one failure are compared; less of each is better.
 
     Objects; genes off nominal and their distance from it; decisions at which an object moves, and
-    runs of equal moves; characters of the record in the file; neighbours that do not fail, or were
-    not flown; how much less may be demanded of a repair; whether the evidence is of other sources
-    than today's.
+    runs of equal moves; characters of the record in the file; neighbours that do not fail or were
+    not flown; how much less the case asks of a repair; whether the evidence comes from other
+    sources than today's.
     """
 
     objects: int
@@ -46,14 +46,25 @@ def simplicity(case: Case, map: Map, *, outdated: bool = False) -> Simplicity:
         distance=distance,
         moving=sum(move != (0.0, 0.0) for _, own in case.moves for move in own),
         runs=sum(len(list(itertools.groupby(own))) for _, own in case.moves),
-        characters=sum(len(line) for line in record_lines(case)),
-        doubtful_neighbours=max(COUNT, evidence.neighbours) - evidence.neighbours_failed,
-        excused=_DEMANDED[case.avoidable],
+        characters=sum(len(line) for line in record_lines(case.behaviour)),
+        doubtful_neighbours=max(NEIGHBOURS, evidence.neighbours) - evidence.neighbours_failed,
+        excused=_EXCUSED[case.avoidable],
         outdated=outdated,
     )
 
 
 def no_worse(one: Simplicity, other: Simplicity) -> bool:
-    """Whether ``one`` is at least as simple as ``other`` in every respect."""
+    """Return whether ``one`` is at least as simple as ``other`` in every respect."""
     names = [field.name for field in dataclasses.fields(Simplicity)]
     return all(getattr(one, name) <= getattr(other, name) for name in names)
+
+
+def is_simpler(case: Case, saved: Case, map: Map, *, outdated: bool) -> bool:
+    """Return whether a case is no worse than the saved one and better in one respect.
+
+    ``outdated`` says that the saved case's evidence comes from other sources than today's.
+    """
+    one, other = simplicity(case, map), simplicity(saved, map, outdated=outdated)
+    if one == other:
+        return size_of(case) < size_of(saved)
+    return no_worse(one, other)

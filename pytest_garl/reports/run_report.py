@@ -156,7 +156,7 @@ def _cases(corpus: Corpus, systems: set[str]) -> list[dict[str, Any]]:
                 "signature": case.violation.signature,
                 "status": case.status,
                 "known": corpus.is_accepted(entry),
-                "story": case.violation.story,
+                "story": case.violation.description,
             }
         )
     return found

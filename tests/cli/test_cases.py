@@ -54,7 +54,7 @@ def broken_lander() -> Case:
             property="crash",
             margin=0.0,
             unit="1",
-            story="The landing system raised: ZeroDivisionError: no plan.",
+            description="The landing system raised: ZeroDivisionError: no plan.",
         ),
         policy="stationary",
         policy_sha256="",

@@ -28,7 +28,7 @@ from pytest_garl.experiments import results as rows
 from pytest_garl.experiments import spec as plan
 from pytest_garl.regressions import case_file as files
 from pytest_garl.regressions import corpus
-from pytest_garl.regressions.description import meanings
+from pytest_garl.regressions.description import describe_scenario
 from pytest_garl.scenarios import files as scenarios
 from pytest_garl.scenarios.chromosome import decode
 from pytest_garl.scenarios.files import parse_scenario
@@ -91,7 +91,7 @@ def _load_case(path: Path, rng: random.Random) -> None:
     assert case is not None
     assert files.loads(files.dumps(case), maps.load_map) == case
     assert case.id
-    list(meanings(case.scenario, ()))
+    list(describe_scenario(case.scenario, ()))
 
 
 def _load_map(path: Path, rng: random.Random) -> None:

@@ -483,7 +483,7 @@ def test_a_property_of_ones_own_is_shrunk_and_saved_for_its_test(
     case = load(own)
     assert (case.test, case.own_test) == ("test_it.py::test_own", "test_own")
     assert case.violation.type == "own"
-    assert case.violation.story.startswith("test_own: too much snow")
+    assert case.violation.description.startswith("test_own: too much snow")
     assert len(case.scenario.removed_objects) == 4
     assert 0.1 <= case.scenario["environment.snow"] <= 0.11
     commit(pytester.path)

@@ -70,7 +70,7 @@ def test_a_change_of_the_environment_beyond_the_longest_flight_is_refused() -> N
 
 def test_escape_sequences_in_a_case_are_written_out() -> None:
     text = TEXT.replace("A dog. It bites.", "A \\u001b[2Jdog.\\u202e")
-    assert loads(text, load_map).violation.story == "A \\x1b[2Jdog.\\u202e"
+    assert loads(text, load_map).violation.description == "A \\x1b[2Jdog.\\u202e"
 
 
 @pytest.mark.parametrize("value", [300.001, -1.0, float("nan"), float("inf"), "120", True])

@@ -24,7 +24,9 @@ NAMES = [name for name, _ in LAWN.object_names]
 SYSTEM = "stack.landing:Lander"
 
 
-def case(signature: str = "IV:dog:last-metre:unseen", story: str = "A dog. It bites.") -> Case:
+def case(
+    signature: str = "IV:dog:last-metre:unseen", description: str = "A dog. It bites."
+) -> Case:
     genome = genome_for(LAWN)
     row = genome.random(np.random.default_rng(1))
     scenario = repair(decode(row, genome, map="lawn", seed=9), LAWN).without(*NAMES[:-1])
@@ -39,7 +41,7 @@ def case(signature: str = "IV:dog:last-metre:unseen", story: str = "A dog. It bi
             property="collision",
             margin=0.0,
             unit="m",
-            story=story,
+            description=description,
         ),
         policy="dqn",
         policy_sha256="ab" * 32,
@@ -84,9 +86,9 @@ def test_the_id_of_a_case_stays() -> None:
 
 @settings(deadline=None)
 @given(st.text())
-def test_no_story_breaks_the_file(story: str) -> None:
-    strange = case(story=story)
-    assert loads(dumps(strange), load_map) == case(story=printable(story))
+def test_no_description_breaks_the_file(description: str) -> None:
+    strange = case(description=description)
+    assert loads(dumps(strange), load_map) == case(description=printable(description))
 
 
 def test_a_case_with_destinations_survives_its_file() -> None:

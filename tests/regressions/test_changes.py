@@ -14,7 +14,7 @@ from pytest_garl.adversary.catalogue import policy_spec
 from pytest_garl.execution.result import CompletedFlight
 from pytest_garl.plugin.run import _steered
 from pytest_garl.regressions.case import Case
-from pytest_garl.regressions.new_case import recorded_behaviour
+from pytest_garl.regressions.recorded_behaviour import recorded_behaviour
 from pytest_garl.regressions.replay import replay
 from pytest_garl.simulation.flight_file import save
 from pytest_garl.simulation.fly import fly

@@ -24,7 +24,7 @@ TEXT = dumps(case())
 def test_one_file_per_way_to_fail(tmp_path: Path) -> None:
     path = Corpus(tmp_path).save(case())
     assert path == tmp_path / "landing" / f"{case().id}.toml"
-    assert Corpus(tmp_path).save(case(story="Another flight, the same signature.")) is None
+    assert Corpus(tmp_path).save(case(description="Another flight, the same signature.")) is None
     assert Corpus(tmp_path).save(case(signature="IV:dog:descent:seen")) is not None
     assert len(Corpus(tmp_path).all_entries()) == 2
 
@@ -97,7 +97,7 @@ def test_saving_sees_what_another_process_saved(tmp_path: Path) -> None:
     corpus = Corpus(tmp_path)
     assert corpus.entries(SYSTEM) == ()
     Corpus(tmp_path).save(case())
-    assert corpus.save(case(story="Another flight, the same signature.")) is None
+    assert corpus.save(case(description="Another flight, the same signature.")) is None
 
 
 def _folder(tmp_path: Path) -> Path:

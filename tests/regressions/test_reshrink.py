@@ -14,8 +14,8 @@ from pytest_garl.execution.result import CompletedFlight, FlightResult
 from pytest_garl.regressions.case import Case
 from pytest_garl.regressions.case_file import size_of
 from pytest_garl.regressions.case_request import CaseRequest
-from pytest_garl.regressions.investigation import LEAST, CaseBuilder
-from pytest_garl.regressions.reshrink import LEAST as LEAST_AGAIN
+from pytest_garl.regressions.investigation import LEAST_FLIGHTS, CaseBuilder
+from pytest_garl.regressions.reshrink import LEAST_FLIGHTS as LEAST_RESHRINK_FLIGHTS
 from pytest_garl.regressions.reshrink import CaseReshrinker, _all_removed
 from pytest_garl.regressions.robustness import neighbours
 from pytest_garl.regressions.simplicity import no_worse, simplicity
@@ -85,9 +85,9 @@ def saved(scenario: Scenario, *, neighbours_failed: int = 3) -> Case:
 
 def shrunk(case: Case, fails: Fails, flights: int = 60) -> tuple[Case | None, int]:
     fly = Flights(fails)
-    finding = CaseReshrinker(request(flights), fly, case).run()
-    assert finding.flights == fly.count <= flights
-    return finding.case, fly.count
+    result = CaseReshrinker(request(flights), fly, case).build()
+    assert result.flights == fly.count <= flights
+    return result.case, fly.count
 
 
 FIRST = violation().replace({f"{COLLIDING_OBJECT}.velocity": 0.9, "environment.fog": 0.12})
@@ -134,7 +134,7 @@ def test_a_case_never_becomes_worse_in_any_respect(seed: int) -> None:
         return scenario == FIRST or answers.setdefault((scenario, npcs), likely)
 
     case = saved(FIRST, neighbours_failed=chance.randrange(4))
-    better, flights = shrunk(case, fails, chance.randrange(LEAST_AGAIN, 50))
+    better, flights = shrunk(case, fails, chance.randrange(LEAST_RESHRINK_FLIGHTS, 50))
     assert flights >= 1
     if better is not None:
         one, other = simplicity(better, LAWN), simplicity(case, LAWN)
@@ -163,11 +163,11 @@ def test_evidence_of_other_sources_is_renewed() -> None:
 @pytest.mark.parametrize("seed", range(40))
 def test_a_pursuit_never_flies_more_than_its_budget(seed: int) -> None:
     chance = random.Random(seed)
-    share, budget = chance.random(), chance.randrange(LEAST, 40)
+    share, budget = chance.random(), chance.randrange(LEAST_FLIGHTS, 40)
     fly = Flights(lambda *_: chance.random() < share)
     scenarios = [violation(seed=100 * seed + number) for number in range(4)]
-    finding = CaseBuilder(request(budget, *scenarios), fly).run()
-    assert finding.flights == fly.count <= budget
+    result = CaseBuilder(request(budget, *scenarios), fly).build()
+    assert result.flights == fly.count <= budget
 
 
 def test_a_pursuit_steps_back_until_all_neighbours_fail() -> None:
@@ -176,10 +176,10 @@ def test_a_pursuit_steps_back_until_all_neighbours_fail() -> None:
         fog = scenario["environment.fog"]
         return fog >= 0.04 or (0 < fog < 0.04 and round(fog, 2) == fog)
 
-    finding = CaseBuilder(request(60, FIRST), Flights(fails)).run()
-    assert finding.case is not None
-    assert finding.case.evidence.neighbours_failed == 3
-    assert finding.case.scenario["environment.fog"] >= 0.04
+    result = CaseBuilder(request(60, FIRST), Flights(fails)).build()
+    assert result.case is not None
+    assert result.case.evidence.neighbours_failed == 3
+    assert result.case.scenario["environment.fog"] >= 0.04
 
 
 def test_what_was_removed_adds_up() -> None:

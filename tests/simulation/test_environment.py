@@ -13,7 +13,7 @@ from pytest_garl.adversary.recorded import recorded_spec
 from pytest_garl.execution.result import CompletedFlight
 from pytest_garl.landing_system import Airframe, Camera
 from pytest_garl.regressions.case import RecordedBehaviour
-from pytest_garl.regressions.new_case import recorded_behaviour
+from pytest_garl.regressions.recorded_behaviour import recorded_behaviour
 from pytest_garl.scenarios.genes import ENVIRONMENT, genome_for
 from pytest_garl.scenarios.maps.map import load_map
 from pytest_garl.scenarios.scenario import Scenario

@@ -1,0 +1,53 @@
+"""Whether a violation can be avoided: the reference pilot flies the same scenario.
+
+The reference pilot knows where everything is, and it may abort.  If it violates a property as well,
+no landing system can be asked to avoid the violation.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+
+from pytest_garl.execution.job import FlightJob
+from pytest_garl.execution.on_demand import FlyFunction
+from pytest_garl.execution.reference import reference_to
+from pytest_garl.execution.result import CompletedFlight
+from pytest_garl.regressions.case import Avoidable, RecordedBehaviour
+from pytest_garl.regressions.case_request import CaseRequest
+from pytest_garl.scenarios.scenario import Scenario
+from pytest_garl.simulation.npc_policy import PolicySpec
+from pytest_garl.simulation.system_under_test.reference_pilot import ReferencePilot
+
+
+def avoidability(
+    request: CaseRequest, scenario: Scenario, behaviour: RecordedBehaviour, fly: FlyFunction
+) -> Avoidable:
+    """Return among which objects the reference pilot violates nothing."""
+
+    def survives(npcs: PolicySpec) -> bool:
+        flight = fly_reference_pilot(request.job, scenario, npcs, fly)
+        return not flight.signature and not request.fails(scenario, flight)
+
+    if not survives(behaviour.policy):
+        return "no"
+    # If nothing moves, a live policy cannot pursue the pilot.
+    return "live" if not behaviour.moves or survives(request.job.npcs) else "recorded"
+
+
+def assumed_avoidability(behaviour: RecordedBehaviour) -> Avoidable:
+    """Return what a case says that the reference pilot has not flown."""
+    return "recorded" if behaviour.moves else "live"
+
+
+def survives_recorded_moves(
+    job: FlightJob, scenario: Scenario, behaviour: RecordedBehaviour, fly: FlyFunction
+) -> bool:
+    """Return whether the reference pilot violates nothing among objects that repeat their moves."""
+    return not fly_reference_pilot(job, scenario, behaviour.policy, fly).signature
+
+
+def fly_reference_pilot(
+    job: FlightJob, scenario: Scenario, npcs: PolicySpec, fly: FlyFunction
+) -> CompletedFlight:
+    """Fly a job's scenario with the reference pilot in place of the landing system."""
+    return fly(dataclasses.replace(job, system=reference_to(ReferencePilot), npcs=npcs), scenario)

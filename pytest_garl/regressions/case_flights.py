@@ -1,0 +1,137 @@
+"""Flights for one case request: flown on demand, counted, within the request's budget."""
+
+from __future__ import annotations
+
+import dataclasses
+
+from pytest_garl.execution.job import FlightJob
+from pytest_garl.execution.on_demand import FlyFunction
+from pytest_garl.execution.result import CompletedFlight
+from pytest_garl.regressions.avoidability import avoidability
+from pytest_garl.regressions.case import Avoidable, Case, RecordedBehaviour
+from pytest_garl.regressions.case_request import CaseRequest, CaseResult, FailingScenario
+from pytest_garl.regressions.recorded_behaviour import recorded_behaviour
+from pytest_garl.regressions.robustness import NEIGHBOURS, neighbours
+from pytest_garl.scenarios.maps.map import Map
+from pytest_garl.scenarios.scenario import Scenario
+
+PILOT_FLIGHTS = 3
+"""Flights of the reference pilot: among objects that repeat the recorded moves, among objects with
+the live policy, and one more if the pilot cannot avoid the violation with the shortest record."""
+
+
+class CaseFlights:
+    """Flies scenarios for one case request and counts the flights.
+
+    Objects either follow the search's policy ("live") or repeat recorded moves.
+    """
+
+    def __init__(self, request: CaseRequest, fly: FlyFunction) -> None:
+        self.request = request
+        self.flown = 0
+        self.flown_by_pilot = 0
+        self._fly = fly
+        self._live: dict[Scenario, CompletedFlight] = dict(request.violations)
+
+    @property
+    def map(self) -> Map:
+        """The map of all scenarios."""
+        return self.request.map
+
+    @property
+    def left(self) -> int:
+        """The flights that remain, without those that are kept for the reference pilot."""
+        return self.request.budget - PILOT_FLIGHTS - (self.flown - self.flown_by_pilot)
+
+    def live_flight(self, scenario: Scenario) -> CompletedFlight:
+        """Return the flight of a scenario that the search or :meth:`fly_live` has flown."""
+        return self._live[scenario]
+
+    def live_behaviour(self, scenario: Scenario) -> RecordedBehaviour:
+        """Return what the objects did in the live flight of a scenario."""
+        return recorded_behaviour(self._live[scenario], scenario, self.map)
+
+    def fly_live(self, scenario: Scenario) -> CompletedFlight:
+        """Fly a scenario with the search's policy."""
+        flight = self._live[scenario] = self._go(self.request.job, scenario)
+        return flight
+
+    def fly_recorded(self, scenario: Scenario, behaviour: RecordedBehaviour) -> CompletedFlight:
+        """Fly a scenario in which the objects repeat recorded moves."""
+        return self._go(dataclasses.replace(self.request.job, npcs=behaviour.policy), scenario)
+
+    def fails_live(self, scenario: Scenario) -> bool:
+        """Fly a scenario with the search's policy; return whether it fails in the same way."""
+        return self.request.fails(scenario, self.fly_live(scenario))
+
+    def fails_recorded(self, scenario: Scenario, behaviour: RecordedBehaviour) -> bool:
+        """Fly a scenario with recorded moves; return whether it fails in the same way."""
+        return self.request.fails(scenario, self.fly_recorded(scenario, behaviour))
+
+    def confirm(
+        self,
+        origin: Scenario,
+        scenario: Scenario,
+        behaviour: RecordedBehaviour,
+        *,
+        at_least: int = 0,
+    ) -> FailingScenario | None:
+        """Fly a scenario and its neighbours with recorded moves.
+
+        Returns None if it does not fail, or if fewer than ``at_least`` neighbours fail.
+        """
+        flight = self.fly_recorded(scenario, behaviour)
+        if not self.request.fails(scenario, flight):
+            return None
+        failing = self.count_neighbours(origin, scenario, behaviour, flight, at_least=at_least)
+        return failing if failing.neighbours_failed >= at_least else None
+
+    def count_neighbours(
+        self,
+        origin: Scenario,
+        scenario: Scenario,
+        behaviour: RecordedBehaviour,
+        flight: CompletedFlight,
+        *,
+        at_least: int = 0,
+    ) -> FailingScenario:
+        """Return a scenario that failed in ``flight``, with the number of neighbours that fail.
+
+        Stops flying when fewer than ``at_least`` can fail.
+        """
+        failed = NEIGHBOURS
+        for each in neighbours(scenario, self.map):
+            failed -= not self.fails_recorded(each, behaviour)
+            if failed < at_least:
+                break
+        return FailingScenario(
+            origin=origin,
+            scenario=scenario,
+            behaviour=behaviour,
+            flight=flight,
+            neighbours_failed=failed,
+            neighbours_flown=NEIGHBOURS,
+        )
+
+    def avoidability(self, failing: FailingScenario) -> Avoidable:
+        """Let the reference pilot fly a scenario; return among which objects it succeeds."""
+
+        def fly(job: FlightJob, scenario: Scenario) -> CompletedFlight:
+            self.flown_by_pilot += 1
+            return self._go(job, scenario)
+
+        return avoidability(self.request, failing.scenario, failing.behaviour, fly)
+
+    def result(self, case: Case | None, reason: str = "") -> CaseResult:
+        """Return the end of the investigation, with the flights that it took."""
+        return CaseResult(
+            signature=self.request.signature,
+            case=case,
+            flights=self.flown,
+            pilot_flights=self.flown_by_pilot,
+            reason=reason,
+        )
+
+    def _go(self, job: FlightJob, scenario: Scenario) -> CompletedFlight:
+        self.flown += 1
+        return self._fly(job, scenario)
