@@ -18,29 +18,29 @@ from pytest_garl.files.atomic import write_text_atomically
 from pytest_garl.verdicts.paper_metrics import CELL_M, HEIGHT_M
 
 HOW_TO_READ = f"""\
-- A violation is the paper's: a collision, a landing more than 1.5 m off the marker, or none in
-  120 s. Landing late and giving up stand in columns of their own. In brackets the exact
-  (Clopper-Pearson) 95 % interval. The flights of a search that learns are no independent sample:
-  what seeds differ by tells more than an interval.
-- *Unavoidable*: of violations drawn at random, the share that a pilot which knows where everything
-  is does not avoid either, while the objects repeat what they did.
-- *Top-10*: flights until the tenth violation, one figure per seed; – where there were fewer than
-  ten. In comparisons and means such a search counts as the budget and one more.
-- *Hours*: of one search on its workers, idle ones included, and after "+" the training of the
+- A violation is what the paper calls one: a collision, a landing more than 1.5 m off the marker, or
+  no landing in 120 s. Late landings and aborts have columns of their own. Brackets hold the exact
+  (Clopper-Pearson) 95 % interval. The flights of a search that learns are no independent sample, so
+  the difference between seeds tells more than an interval.
+- *Unavoidable*: the share of violations that the reference pilot does not avoid either, of those
+  drawn at random. This pilot knows the position of everything, and the objects repeat their moves.
+- *Top-10*: flights until the tenth violation, one figure per seed; – if there were fewer than
+  ten. In comparisons and means such a search counts as the budget plus one.
+- *Hours*: of one search on its workers, idle time included. After "+" the training of the
   policy, which is done once for all searches.
 - *Parameter distance*: the mean Euclidean distance between all scenarios of a search (the paper's
-  equation), every gene that all methods have, normalised to [0, 1]; the same of the violating ones
-  alone; and that of the eight weather genes as they are. The paper's code measured weather alone,
-  without normalising it, so its figures stand beside that.
+  equation), over every gene that all methods have, normalised to [0, 1]; the same for the violating
+  scenarios alone; and that of the eight weather genes, not normalised. The paper's code measured
+  weather alone, without normalising it, so its figures stand beside that column.
 - *Coverage*: the share of cells of {CELL_M:g} m, up to {HEIGHT_M:g} m above the map, that
   violating flights pass through.
-- *Signatures*: distinct mechanisms and moments of violations, such as
+- *Signatures*: distinct mechanisms and phases of violations, such as
   `IV:dog:last-metre:unseen`, one count per seed.
-- *Paper*: its figure for its method of this name; its simulator, maps and landing systems are
-  others.
-- *A12* (Vargha and Delaney): how often a search of the first method has the larger figure; 0.5 is
-  no difference. *p*: exact two-sided Mann-Whitney test over the seeds. Three seeds against three
-  cannot come below 0.10."""
+- *Paper*: the paper's figure for its method of this name; its simulator, maps and landing systems
+  are different.
+- *A12* (Vargha and Delaney): how often a search of the first method has the larger figure; 0.5
+  means no difference. *p*: exact two-sided Mann-Whitney test over the seeds. Three seeds against
+  three cannot reach p below 0.10."""
 
 
 def write(experiment: Experiment, rows: Sequence[ResultRow], source: str, path: Path) -> Path:
@@ -59,8 +59,9 @@ def write(experiment: Experiment, rows: Sequence[ResultRow], source: str, path: 
         found = goals.goal_results(experiment, experiment.goals, rows)
         sections += [
             f"## Goals of {experiment.goals.method} on {experiment.goals.system}",
-            "Means over seeds. Two methods are compared on the seeds that both have flown;\n"
-            f"in brackets the mean of {experiment.goals.method} from those, where it flew more.",
+            "The figures are means over seeds. Two methods are compared on the seeds that both\n"
+            f"have flown. If {experiment.goals.method} flew more seeds, brackets hold its mean "
+            "over the common ones.",
             goals.table(found, experiment.goals.method),
             experiment.goals.remarks,
         ]
@@ -93,7 +94,7 @@ def _flown(experiment: Experiment, rows: Sequence[ResultRow]) -> Iterator[str]:
     if unique:
         yield "Flown with:\n\n" + "\n".join(_identity(unique))
     if len({row.package_sha256 for row in unique}) > 1:
-        yield "**These searches are of more than one state of pytest-garl.**"
+        yield "**These searches are from more than one state of pytest-garl.**"
 
 
 def _left(runs: Iterable[ExperimentRun]) -> Iterator[str]:
@@ -114,7 +115,7 @@ def _identity(rows: Iterable[ResultRow]) -> Iterator[str]:
             for row in rows
         ),
         Counter(f"map {row.map} {row.map_sha256}" for row in rows),
-        Counter(f"{row.method}: objects steered by {_policy(row)}" for row in rows),
+        Counter(f"{row.method}: objects moved by {_policy(row)}" for row in rows),
     ]
     for fact in facts:
         for text, count in sorted(fact.items()):
@@ -135,10 +136,10 @@ def _grid(experiment: Experiment, grid: Grid, rows: Sequence[ResultRow], path: P
         grid.text,
         tables.effect(experiment, grid, rows),
         tables.diversity(experiment, grid, rows),
-        "Types of violations, as shares of those of a type I to V:",
+        "Types of violations, as shares of all violations of types I to V:",
         tables.violation_types(experiment, grid, rows),
         f"![{grid.title}]({os.path.relpath(picture, path.parent)})" if drawn else "",
-        "Points are searches, boxes reach over quartiles and whiskers over all; × is the paper's."
+        "Points are searches, boxes span the quartiles, whiskers all searches; × is the paper's."
         if drawn
         else "",
         compared,

@@ -124,9 +124,9 @@ def test_the_report_lists_flown_and_missing_runs(experiment: Experiment) -> None
     assert "- Lander, ga, on court: seed 0, 1\n- Lander, random, on court: seed 1" in text
     assert "- pytest-garl 0.1.0, sources dddddddddddd (3 searches)" in text
     assert "- Lander: `stack.lander:Lander`, sources aaaaaaaaaaaa (3 searches)" in text
-    assert "- random: objects steered by waypoint (1 search)" in text
+    assert "- random: objects moved by waypoint (1 search)" in text
     assert "more than one state" not in text
-    assert "**These searches are of more than one state of pytest-garl.**" in report(
+    assert "**These searches are from more than one state of pytest-garl.**" in report(
         experiment, (GARL[0], row(seed=1, package_sha256="0"))
     )
 
