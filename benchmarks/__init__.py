@@ -1,1 +1,1 @@
-"""Measurements of speed, as ratios where machines are noisy; run with python -m benchmarks."""
+"""Benchmarks of speed; ``python -m benchmarks`` runs the quick ones."""

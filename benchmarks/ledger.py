@@ -1,4 +1,4 @@
-"""What the ledger costs per flight: claim and record, with a result of usual size."""
+"""The time of the ledger per flight, with a result of usual size: claim and record."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from pytest_garl.verdicts.verdict import Margin, Verdict
 
 
 def main(flights: int = 2000) -> None:
-    """Print the mean time of one flight's bookkeeping."""
+    """Print the mean time per flight."""
     result = FlightResult(
         outcome="landed",
         final_distance_m=1.0,

@@ -1,4 +1,4 @@
-"""What the plugin costs a test run that has no landing tests."""
+"""The time that the plugin adds to a test run without landing tests."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from pathlib import Path
 
 
 def main(repeats: int = 30) -> None:
-    """Print the difference of the fastest quarters of runs with and without, taken in turns."""
+    """Print the difference of the fastest quarters of runs with and without it, in turns."""
     with tempfile.TemporaryDirectory() as folder:
         (Path(folder) / "test_plain.py").write_text("def test_plain(): pass\n")
         times: dict[str, list[float]] = {"no:garl": [], "garl": []}

@@ -1,6 +1,7 @@
-"""The local pool and the Ray pool side by side: flights per second, and what a flight costs beside.
+"""The local pool and the Ray pool: flights per second, and the time that Ray adds per flight.
 
-Both fly the same scenarios in turns, so that what else the machine does meets both alike.
+``python -m benchmarks.pools`` flies the same scenarios with both in turns, so that other load of
+the machine affects both alike.
 """
 
 from __future__ import annotations
@@ -32,7 +33,7 @@ ROOT = Path(__file__).parents[1]
 
 
 @dataclasses.dataclass(frozen=True, slots=True, kw_only=True)
-class Contender:
+class MeasuredPool:
     """A pool with its ledger."""
 
     name: str
@@ -41,8 +42,8 @@ class Contender:
 
 
 @contextmanager
-def both(workers: int) -> Iterator[Sequence[Contender]]:
-    """Give both pools, each with a ledger of its own; nothing has started yet."""
+def both(workers: int) -> Iterator[Sequence[MeasuredPool]]:
+    """Yield both pools, each with its own ledger; no worker has started yet."""
     with ExitStack() as stack:
         found = []
         for name in ("local", "ray"):
@@ -54,12 +55,12 @@ def both(workers: int) -> Iterator[Sequence[Contender]]:
                 else local_pool(ledger.queue, workers)
             )
             stack.callback(pool.close)
-            found.append(Contender(name=name, ledger=ledger, pool=pool))
+            found.append(MeasuredPool(name=name, ledger=ledger, pool=pool))
         yield found
 
 
 def flown_s(
-    each: Contender, job: FlightJob, scenarios: Sequence[Scenario]
+    each: MeasuredPool, job: FlightJob, scenarios: Sequence[Scenario]
 ) -> tuple[float, list[str]]:
     """Return the wall time of these flights, and the hashes of their trajectories."""
     job = dataclasses.replace(job, flights=str(each.ledger.path.parent / "flights"))
@@ -70,24 +71,24 @@ def flown_s(
 
 
 def in_turns(
-    contenders: Sequence[Contender], job: FlightJob, rounds: int, flights: int
+    pools: Sequence[MeasuredPool], job: FlightJob, rounds: int, flights: int
 ) -> Mapping[str, float]:
     """Return each pool's wall time over all rounds of so many flights, and check their results."""
     scenarios = BaselineSpec(count=rounds * flights).scenarios(load_map(job.map))
-    spent = dict.fromkeys((each.name for each in contenders), 0.0)
+    spent = dict.fromkeys((each.name for each in pools), 0.0)
     hashes: dict[str, list[str]] = {name: [] for name in spent}
     for number in range(rounds):
         part = scenarios[number * flights : (number + 1) * flights]
-        for each in contenders if number % 2 else reversed(contenders):
+        for each in pools if number % 2 else reversed(pools):
             seconds, found = flown_s(each, job, part)
             spent[each.name] += seconds
             hashes[each.name] += found
     if hashes["local"] != hashes["ray"]:
-        raise SystemExit("the pools flew something else")
+        raise SystemExit("the pools returned different flights")
     return spent
 
 
-def told(what: str, spent: Mapping[str, float], flights: int, workers: int) -> None:
+def print_rates(what: str, spent: Mapping[str, float], flights: int, workers: int) -> None:
     """Print flights per second of both pools, their ratio, and the difference per flight."""
     local, ray = spent["local"], spent["ray"]
     beside = 1000 * workers * (ray - local) / flights
@@ -100,7 +101,7 @@ def told(what: str, spent: Mapping[str, float], flights: int, workers: int) -> N
 
 
 def main() -> None:
-    """Print how long each pool takes to its first flight, then both with short and real flights."""
+    """Print the time to the first flight of each pool, then the rates of short and real flights."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--workers", type=int, default=os.cpu_count() or 1)
     parser.add_argument("--rounds", type=int, default=4)
@@ -120,8 +121,8 @@ def main() -> None:
         npcs=policy_spec("waypoint"),
         timeout_s=60.0,
     )
-    with both(workers) as contenders:
-        for each in contenders:
+    with both(workers) as pools:
+        for each in pools:
             seconds, _ = flown_s(
                 each, short, BaselineSpec(count=1, seed=1).scenarios(load_map("lawn"))
             )
@@ -131,9 +132,9 @@ def main() -> None:
             ("OpenCV-MLS on court", real, arguments.real),
         ):
             # All workers have started, and imported what they fly.
-            in_turns(contenders, job, 1, 2 * workers)
-            spent = in_turns(contenders, job, rounds, flights)
-            told(what, spent, rounds * flights, workers)
+            in_turns(pools, job, 1, 2 * workers)
+            spent = in_turns(pools, job, rounds, flights)
+            print_rates(what, spent, rounds * flights, workers)
 
 
 if __name__ == "__main__":

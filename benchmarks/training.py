@@ -1,6 +1,6 @@
-"""How long the training of a policy takes: 800 episodes of one seed, and what a decision costs.
+"""The time of training a policy for 800 episodes of one seed, in total and per decision.
 
-``python -m benchmarks.training`` trains the default policy from nothing, without validation.
+``python -m benchmarks.training`` trains the default policy from random weights, without validation.
 """
 
 from __future__ import annotations

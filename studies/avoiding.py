@@ -1,7 +1,7 @@
-"""A landing system that climbs away from what its depth image shows; the adversary's sparring.
+"""OpenCV-MLS that climbs away from obstacles in its depth image; flown by two studies.
 
-OpenCV-MLS with eyes for obstacles.  It is no part of the product: learned policies are measured
-against it because the surrogate's UAV, which avoids by geometry, is not it.
+``studies.adversary`` and ``studies.team`` measure learned NPC policies against it, because the
+policies were trained against another avoiding UAV: the surrogate's, which avoids by geometry.
 """
 
 from __future__ import annotations
@@ -23,6 +23,7 @@ from pytest_garl import (
 
 CLIMB_MPS = 1.5
 CLEAR_S = 1.0
+"""It climbs until nothing has moved below for this long."""
 
 
 class AvoidingLandingSystem:
@@ -40,7 +41,7 @@ class AvoidingLandingSystem:
         self._moved_at = -np.inf
 
     def step(self, observation: Observation) -> Command:
-        """See, decide, give way."""
+        """Land, or climb while something moves below."""
         seen = self._detector.detect(observation)
         x, y, z = (float(value) for value in observation.position_m)
         now = observation.time_s

@@ -1,235 +1,39 @@
-"""The learned detector beside ArUco on the same pictures, by size, hiding and weather.
+"""The learned detector compared with ArUco on the same pictures, by size, hiding and weather.
 
-``python -m studies.detection`` renders the maps that are flown, from seeds that training never
-saw, and writes ``docs/detection.md`` and ``docs/pictures/reliability.png``.  ``--without-court``
-names weights that were trained without any court, to report the gap.
+``python -m studies.detection`` renders both maps from seeds that training never saw, and writes
+``docs/detection.md`` and ``docs/pictures/reliability.png``.  ``--without-court`` names weights
+that were trained without any court, to report the difference.
 """
 
 from __future__ import annotations
 
 import argparse
-import itertools
 import json
 import time
-from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass
+from collections.abc import Sequence
 from pathlib import Path
 
 import cv2
 import numpy as np
 
-from landing_systems.modules.detection_opencv import LOOKS, OpenCvDetector
 from landing_systems.modules.detection_tphyolo.calibration import (
     Bin,
     calibration_error,
     reliability,
 )
-from landing_systems.modules.detection_tphyolo.decoding import CLASS_IDS, NETWORK_SIZE
+from landing_systems.modules.detection_tphyolo.decoding import NETWORK_SIZE
 from landing_systems.modules.detection_tphyolo.detector import TphYoloDetector, load_network
 from landing_systems.modules.detection_tphyolo.weights import SHIPPED, read_weights
 from landing_systems.training.tphyolo.scenes import (
-    Marker,
-    Picture,
-    Weather,
     pictures,
 )
 from landing_systems.training.tphyolo.scoring import (
-    Scored,
     mission,
     observation_of,
-    score,
 )
-from pytest_garl import Detection, Observation
 from pytest_garl.scenarios.maps.map import load_map
-
-CONFIRM = 0.8
-"""The decision's threshold."""
-SEED = 778_000
-"""The training was changed once after a look at errors in the pictures of seed 777,000."""
-FRAMES = 12
-IDS = (0, 0, 0, 1, 2, 3, 17)
-"""Ids of the marker on the ground, in turn: the wanted one, the other classes, one of none."""
-SIZES_PX = (14.0, 16.0, 24.0, 48.0, 96.0, 1000.0)
-HIDDEN = (0.0, 0.05, 0.25, 0.50, 1.01)
-LEGIBLE = 8.0
-"""Grey levels between white and black; less is within a few times the sensor's noise."""
-Detect = Callable[[Observation], Sequence[Detection]]
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Sighting:
-    """A marker in a picture, and which detectors confirmed it with its id."""
-
-    map: str
-    weather: Weather
-    marker: Marker
-    confirmed: frozenset[str]
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Results:
-    """All markers that were to be found, and all detections, by detector."""
-
-    frames: int
-    sightings: list[Sighting]
-    scored: dict[str, list[tuple[str, Weather, Scored]]]
-    errors_m: dict[str, list[float]]
-
-
-def aruco_once(observation: Observation) -> Sequence[Detection]:
-    """Detect with a detector that has seen nothing before."""
-    return OpenCvDetector(mission()).detect(observation)
-
-
-def aruco_every_look(observation: Observation) -> Sequence[Detection]:
-    """Look in all its ways, as it does over several frames of a flight."""
-    detector = OpenCvDetector(mission())
-    return [item for _ in LOOKS for item in detector.detect(observation)]
-
-
-def evaluate(detectors: dict[str, Detect], scenarios: int) -> Results:
-    """Run all detectors on the same pictures of both maps in both weathers."""
-    results = Results(
-        frames=0,
-        sightings=[],
-        scored={name: [] for name in detectors},
-        errors_m={name: [] for name in detectors},
-    )
-    frames = 0
-    for map_index, name in enumerate(("court", "lawn")):
-        map = load_map(name)
-        for index in range(scenarios):
-            rng = np.random.default_rng([SEED, map_index, index])
-            weather: Weather = "full" if index % 2 else "confined"
-            number = IDS[index // 2 % len(IDS)]
-            for picture in pictures(rng, map, weather, FRAMES, marker_id=number):
-                frames += 1
-                _judge(results, detectors, name, picture)
-    return Results(
-        frames=frames,
-        sightings=results.sightings,
-        scored=results.scored,
-        errors_m=results.errors_m,
-    )
-
-
-def _judge(results: Results, detectors: dict[str, Detect], name: str, picture: Picture) -> None:
-    confirmed: dict[int, set[str]] = {id(marker): set() for marker in picture.markers}
-    for who, detect in detectors.items():
-        for each in score(picture, detect(observation_of(picture))):
-            results.scored[who].append((name, picture.weather, each))
-            sure = each.detection.confidence >= CONFIRM
-            if sure and each.kind == "right" and each.marker is not None:
-                confirmed[id(each.marker)].add(who)
-                away = np.subtract(each.detection.position_m[:2], each.marker.place_m)
-                results.errors_m[who].append(float(np.hypot(*away)))
-    results.sightings.extend(
-        Sighting(
-            map=name,
-            weather=picture.weather,
-            marker=marker,
-            confirmed=frozenset(confirmed[id(marker)]),
-        )
-        for marker in picture.markers
-        if marker.marker_id in CLASS_IDS
-    )
-
-
-def recall(sightings: Iterable[Sighting], who: str) -> str:
-    """Return the share of markers that a detector confirmed, as text."""
-    hits = [who in each.confirmed for each in sightings]
-    return f"{np.mean(hits):.3f}" if hits else "-"
-
-
-def clear(marker: Marker) -> bool:
-    """Whether a marker is wholly in the frame, large and legible, hidden or not."""
-    return marker.framed > 0.99 and marker.contrast >= LEGIBLE and marker.side_px >= 16
-
-
-def plain(marker: Marker) -> bool:
-    """Whether a marker is one of those for which the targets are set."""
-    return clear(marker) and marker.hidden <= 0.25
-
-
-def sure_ones(scored: Sequence[tuple[str, Weather, Scored]]) -> list[Scored]:
-    """Return the detections that the decision would confirm."""
-    return [each for _, _, each in scored if each.detection.confidence >= CONFIRM]
-
-
-def wrong_ids(sure: Sequence[Scored]) -> str:
-    """Return how many and which share of detections have another marker's id, as text."""
-    wrong = sum(each.kind == "wrong-id" for each in sure)
-    return f"{wrong} of {len(sure)}: {100 * wrong / max(1, len(sure)):.2f} %"
-
-
-def table(results: Results, names: Sequence[str]) -> list[str]:
-    """Return the table by weather, hidden share and size."""
-    whole = [
-        each
-        for each in results.sightings
-        if each.marker.framed > 0.99 and each.marker.contrast >= LEGIBLE
-    ]
-    lines = ["| weather | hidden | side | markers | " + " | ".join(names) + " |"]
-    lines.append("| --- | --- | --- | --- |" + " --- |" * len(names))
-    for weather in ("confined", "full"):
-        for low, high in itertools.pairwise(HIDDEN):
-            for small, large in itertools.pairwise(SIZES_PX):
-                chosen = [
-                    each
-                    for each in whole
-                    if each.weather == weather
-                    and low <= each.marker.hidden < high
-                    and small <= each.marker.side_px < large
-                ]
-                if chosen:
-                    hidden = f"{100 * low:.0f}-{min(100, 100 * high):.0f} %"
-                    side = f"{small:.0f}-{large:.0f} px" if large < 1000 else f"> {small:.0f} px"
-                    cells = " | ".join(recall(chosen, name) for name in names)
-                    lines.append(f"| {weather} | {hidden} | {side} | {len(chosen)} | {cells} |")
-    return lines
-
-
-def summary(results: Results, names: Sequence[str]) -> list[str]:
-    """Return the figures that have targets, and those that tell what else happens."""
-
-    def chosen(test: Callable[[Marker], bool], map: str = "") -> list[Sighting]:
-        return [each for each in results.sightings if test(each.marker) and map in ("", each.map)]
-
-    groups = {
-        "at least 16 px, at most 25 % hidden": chosen(plain),
-        "the same, court": chosen(plain, "court"),
-        "the same, lawn": chosen(plain, "lawn"),
-        "the same, only id 0": chosen(lambda m: plain(m) and m.marker_id == 0),
-        "5 to 25 % hidden": chosen(lambda m: clear(m) and 0.05 < m.hidden <= 0.25),
-        "25 to 50 % hidden": chosen(lambda m: clear(m) and 0.25 < m.hidden <= 0.5),
-        "half to nearly all in the frame, at most 25 % hidden": chosen(
-            lambda m: 0.5 < m.framed <= 0.99 and m.contrast >= LEGIBLE and m.hidden <= 0.25
-        ),
-        f"contrast below {LEGIBLE:.0f} grey levels": chosen(
-            lambda m: m.framed > 0.99 and m.contrast < LEGIBLE and m.hidden <= 0.25
-        ),
-    }
-    lines = ["| recall | markers | " + " | ".join(names) + " |"]
-    lines.append("| --- | --- |" + " --- |" * len(names))
-    for title, group in groups.items():
-        cells = " | ".join(recall(group, name) for name in names)
-        lines.append(f"| {title} | {len(group)} | {cells} |")
-    sure = {name: sure_ones(results.scored[name]) for name in names}
-    ghosts = {name: sum(e.kind == "nothing-there" for e in sure[name]) for name in names}
-    errors = {name: np.array(results.errors_m[name] or [np.nan]) for name in names}
-    rows = {
-        "wrong ids among confirmed, at least 16 px, at most 25 % hidden": [
-            wrong_ids([e for e in sure[name] if e.marker is not None and plain(e.marker)])
-            for name in names
-        ],
-        "wrong ids among all confirmed": [wrong_ids(sure[name]) for name in names],
-        "false positives per frame": [f"{ghosts[name] / results.frames:.4f}" for name in names],
-        "error in metres, median": [f"{np.median(errors[name]):.3f}" for name in names],
-        "error in metres, 95 %": [f"{np.quantile(errors[name], 0.95):.3f}" for name in names],
-    }
-    for title, cells_of_row in rows.items():
-        lines.append(f"| {title} | | " + " | ".join(cells_of_row) + " |")
-    return lines
+from studies.detection_evaluation import SEED, Detect, aruco_every_look, aruco_once, evaluate
+from studies.detection_tables import summary, table
 
 
 def inference_ms(detector: TphYoloDetector, repeats: int) -> tuple[float, float]:

@@ -1,9 +1,9 @@
-"""The gate of saved cases: how long it takes, and whether it ever says anything else.
+"""The gate of saved cases: its time, and whether its results repeat.
 
+``python -m studies.gate`` makes thirty cases from the committed ones and their neighbours, some of
+them with the status fixed.  pytest flies them twenty times, and the study compares outcomes and
+trajectories.  Then it flies one case three hundred times and counts the distinct hashes.
 ``python -m studies.gate rates`` simulates the gate against a baseline: see ``gate_rates``.
-``python -m studies.gate`` makes thirty cases of the committed ones and their neighbours, some of
-them called fixed, lets pytest fly them twenty times over and compares outcomes and trajectories;
-then it flies one case three hundred times and counts the hashes.
 """
 
 from __future__ import annotations
@@ -32,14 +32,14 @@ from pytest_garl.scenarios.maps.map import load_map
 CASES = Path("scenarios/regressions")
 COUNT = 30
 OUTCOMES = ("skipped", "failure", "error")
-Told = tuple[str, str]
-"""An item's outcome, and its flight's hash, empty where it has none."""
+ItemResult = tuple[str, str]
+"""The outcome of an item and the hash of its flight, which may be empty."""
 
 
 def mixed(found: list[Case]) -> Iterator[Case]:
-    """Yield cases of all systems, each with a neighbour, every second of these called fixed.
+    """Yield cases of all systems, each with a neighbour; every second neighbour is called fixed.
 
-    What is called fixed here fails: the gate must be as steady about red as about green.
+    A case called fixed fails here: failures must repeat as exactly as passes.
     """
     for index, case in enumerate(sorted(found, key=lambda each: each.id)):
         yield case
@@ -48,7 +48,7 @@ def mixed(found: list[Case]) -> Iterator[Case]:
         yield dataclasses.replace(case, scenario=beside, status=status)
 
 
-def gate(cases: Path, folder: Path) -> tuple[float, dict[str, Told]]:
+def gate(cases: Path, folder: Path) -> tuple[float, dict[str, ItemResult]]:
     """Fly all cases as pytest items; return the wall time, and each one's outcome and hash."""
     folder.mkdir()
     options = ("-q", "-p", "no:cacheprovider", "--tb=no", f"--junitxml={folder / 'junit.xml'}")
@@ -63,12 +63,12 @@ def gate(cases: Path, folder: Path) -> tuple[float, dict[str, Told]]:
     if done.returncode not in (0, 1):
         sys.exit(f"pytest ended with {done.returncode}")
     items = ElementTree.parse(folder / "junit.xml").iter("testcase")
-    flown = {f"{each.get('classname')}.{each.get('name')}": _told(each) for each in items}
-    return took, {name: told for name, told in flown.items() if "[case-" in name}
+    flown = {f"{each.get('classname')}.{each.get('name')}": _item_result(each) for each in items}
+    return took, {name: result for name, result in flown.items() if "[case-" in name}
 
 
-def _told(item: ElementTree.Element) -> Told:
-    """Return what came of an item."""
+def _item_result(item: ElementTree.Element) -> ItemResult:
+    """Return the result of an item in the JUnit file."""
     outcome = next((each.get("type", each.tag) for each in item if each.tag in OUTCOMES), "passed")
     values = {each.get("name"): each.get("value", "") for each in item.iter("property")}
     return outcome, values.get("garl.trajectory_sha256", "")
@@ -85,7 +85,7 @@ def hash_of_flight(path: Path) -> str:
 
 
 def main() -> None:
-    """Print times, how many different gates there were and how many different flights; or rates."""
+    """Print times and the numbers of different results and flights; or write the rates."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("what", nargs="?", choices=("cases", "rates"), default="cases")
     parser.add_argument("--draws", type=int, default=4000, help="Of each false alarm's rate.")
@@ -102,7 +102,7 @@ def main() -> None:
 def _cases(runs: int, replays: int) -> None:
     paths = sorted(CASES.rglob("*.toml"))
     if not paths:
-        sys.exit(f"no cases in {CASES}; a search saves what it finds")
+        sys.exit(f"found no cases in {CASES}, expected some; a search saves its violations there")
     with tempfile.TemporaryDirectory() as name:
         cases = Path(name, "cases")
         for case in itertools.islice(mixed([load(path) for path in paths]), COUNT):
@@ -114,7 +114,7 @@ def _cases(runs: int, replays: int) -> None:
     times = [took for took, _ in gates]
     outcomes = Counter(outcome for outcome, _ in gates[0][1].values())
     hashes = {sha256 for _, sha256 in gates[0][1].values()} - {""}
-    results = {tuple(sorted(told.items())) for _, told in gates}
+    results = {tuple(sorted(items.items())) for _, items in gates}
     print(f"{count} cases, {runs} runs: {len(results)} result(s), {len(hashes)} flights")
     print(f"  {dict(outcomes)}; {statistics.median(times):.0f} s (most {max(times):.0f} s)")
     cpu_dispatch.pin()

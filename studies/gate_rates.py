@@ -1,8 +1,8 @@
-"""How often the gate fails a stack that did not change, and how often one that got worse.
+"""How often the gate fails an unchanged landing system, and how often a worse one.
 
-``python -m studies.gate rates`` draws flights in the shares of ``docs/experiments/counts.csv``,
-draws some of them anew, lets the gate compare both, and writes its tables into ``docs/gate.md``.
-Nothing is flown.
+``python -m studies.gate rates`` draws flights with the shares of ``docs/experiments/counts.csv``,
+and draws a part of them again as the changed system's.  The gate compares both, and the tables go
+into ``docs/gate.md``.  Nothing is flown.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ DOCS = Path(__file__).parents[1] / "docs"
 COUNTS, PAGE = DOCS / "experiments" / "counts.csv", DOCS / "gate.md"
 BEGIN, END = "<!-- Written by `python -m studies.gate rates`: -->\n", "<!-- To here. -->\n"
 BUDGETS = (50, 100, 400)
-SHAKEN = (0.1, 0.25, 0.5, 1.0)
+PARTS = (0.1, 0.25, 0.5, 1.0)
 LANDED = FlightSummary(outcome="landed", signature="", sha256="base")
 ABORTED = FlightSummary(outcome="aborted", signature="", sha256="base")
 KNOWN = FlightSummary(outcome="collision", signature="IV:person:descent:seen", sha256="head")
@@ -37,37 +37,39 @@ RARE = (
     FlightSummary(outcome="crashed", signature="V:ValueError@planner.plan", sha256="base"),
 )
 EXPECTED = 2.5
-"""Flights of a baseline in which each rare type is expected: of 0.6 to 5, about the number at which
-four of them fool the gate most often."""
+"""Expected number of flights of a baseline with each rare type: of 0.6 to 5, about the number at
+which four rare types cause most false alarms."""
 Random = np.random.Generator
-Beside = Callable[[FlightSummary], FlightSummary]
-"""What a neighbour comes to of a flight that came to an answer."""
+NeighbourOf = Callable[[FlightSummary], FlightSummary]
+"""Returns the summary of a neighbour, given the summary of its flight."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Stack:
-    """A landing stack as a distribution: each flight comes to one of the answers."""
+class SimulatedSystem:
+    """A landing system as a distribution over summaries of flights."""
 
     name: str
-    answers: tuple[FlightSummary, ...]
+    summaries: tuple[FlightSummary, ...]
     shares: tuple[float, ...]
 
     def draw(self, count: int, rng: Random) -> list[FlightSummary]:
-        """Return what ``count`` flights come to."""
-        return [self.answers[index] for index in rng.choice(len(self.shares), count, p=self.shares)]
+        """Return the summaries of ``count`` flights."""
+        return [
+            self.summaries[index] for index in rng.choice(len(self.shares), count, p=self.shares)
+        ]
 
-    def with_rare(self, budget: int) -> Stack:
+    def with_rare(self, budget: int) -> SimulatedSystem:
         """Return the same with types so rare that a baseline often misses them."""
         each = EXPECTED / budget
         left = (value * (1 - each * len(RARE)) for value in self.shares)
-        return Stack(
+        return SimulatedSystem(
             name=f"{self.name}, and four rare types",
-            answers=(*self.answers, *RARE),
+            summaries=(*self.summaries, *RARE),
             shares=(*left, *[each] * len(RARE)),
         )
 
 
-def measured(system: str, method: str) -> Stack:
+def measured(system: str, method: str) -> SimulatedSystem:
     """Return a landing system in the scenarios of a method: all its rows of the counts together."""
     counts = Counter[FlightSummary]()
     for row in read_csv(COUNTS):
@@ -76,59 +78,59 @@ def measured(system: str, method: str) -> Stack:
             counts[ABORTED] += int(row["aborted"])
             for kind in filter(None, row["kinds"].split("|")):
                 signature, _, count = kind.rpartition("=")
-                answer = FlightSummary(outcome="collision", signature=signature, sha256="base")
-                counts[answer] += int(count)
+                summary = FlightSummary(outcome="collision", signature=signature, sha256="base")
+                counts[summary] += int(count)
     total = counts.total()
-    return Stack(
+    return SimulatedSystem(
         name=f"{system}, {method}",
-        answers=tuple(counts),
+        summaries=tuple(counts),
         shares=tuple(count / total for count in counts.values()),
     )
 
 
-def stacks() -> Iterator[Stack]:
-    """Yield those that the table is about, from few violations to many."""
+def systems() -> Iterator[SimulatedSystem]:
+    """Yield the systems of the table, from few violations to many."""
     yield measured("MM-MLS", "surrogate-random")
     yield measured("MM-MLS", "random")
     yield measured("OpenCV-MLS", "garl-paper")
     yield measured("MM-MLS", "random with dqn")
 
 
-def by_chance(stack: Stack, rng: Random) -> Beside:
-    """Return neighbours that are flights like any other."""
-    return lambda _: stack.draw(1, rng)[0]
+def by_chance(system: SimulatedSystem, rng: Random) -> NeighbourOf:
+    """Return neighbours that are independent flights."""
+    return lambda _: system.draw(1, rng)[0]
 
 
-def alike(probability: float, rng: Random) -> Beside:
-    """Return neighbours that end like the flight beside them with a probability, and else land."""
-    return lambda answer: answer if rng.random() < probability else LANDED
+def alike(probability: float, rng: Random) -> NeighbourOf:
+    """Return neighbours that end like their flight with a probability, and else land."""
+    return lambda summary: summary if rng.random() < probability else LANDED
 
 
-def shaken(
-    base: Sequence[FlightSummary], part: float, stack: Stack, rng: Random
+def partly_redrawn(
+    base: Sequence[FlightSummary], part: float, system: SimulatedSystem, rng: Random
 ) -> list[FlightSummary]:
-    """Return the flights with a part of them drawn anew: these have other bytes, the rest not."""
+    """Return the flights with a part of them drawn again; only these have other hashes."""
     head = list(base)
     chosen = rng.choice(len(head), round(part * len(head)), replace=False)
-    for index, answer in zip(chosen, stack.draw(len(chosen), rng), strict=True):
-        head[index] = dataclasses.replace(answer, sha256="head")
+    for index, summary in zip(chosen, system.draw(len(chosen), rng), strict=True):
+        head[index] = dataclasses.replace(summary, sha256="head")
     return head
 
 
 def worsened(
     head: Sequence[FlightSummary], part: float, into: FlightSummary, rng: Random
 ) -> list[FlightSummary]:
-    """Return the flights with a part of all, taken from those that land, ending in a violation."""
-    landed = [index for index, answer in enumerate(head) if answer.outcome == "landed"]
+    """Return the flights with violations in place of landings, in a part of all flights."""
+    landed = [index for index, summary in enumerate(head) if summary.outcome == "landed"]
     count = min(len(landed), int(rng.binomial(len(head), part)))
     chosen = set(rng.choice(landed, count, replace=False).tolist()) if landed else set[int]()
-    return [into if index in chosen else answer for index, answer in enumerate(head)]
+    return [into if index in chosen else summary for index, summary in enumerate(head)]
 
 
 def gated(
-    base: Sequence[FlightSummary], head: Sequence[FlightSummary], beside: Beside
+    base: Sequence[FlightSummary], head: Sequence[FlightSummary], beside: NeighbourOf
 ) -> Comparison:
-    """Return what the gate says, neighbours of new types flown."""
+    """Return the result of the gate, with neighbours of new types."""
     pairs = [
         Pair(name=str(index), base=before, head=after)
         for index, (before, after) in enumerate(zip(base, head, strict=True))
@@ -143,31 +145,33 @@ def gated(
 
 
 def uncorrected(found: Comparison) -> bool:
-    """Whether a gate would fail that believes each new type that shows, whatever its p-value."""
+    """Return whether a gate would fail that accepts each new type, whatever its p-value."""
     rates = holm_adjusted([found.violations.p, found.aborts.p])
     return min(rates) <= LEVEL or any(each.is_supported for each in found.new_types)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Alarms:
-    """How many of the draws failed: the gate, one without correction, one in a hostile world."""
+    """Failures in all draws: of the gate, of one without correction, of one in a hostile world."""
 
     gate: int
     uncorrected: int
     hostile: int
 
 
-def false_alarms(stack: Stack, budget: int, part: float, draws: int, rng: Random) -> Alarms:
-    """Count failures of a stack that did not change.
+def false_alarms(
+    system: SimulatedSystem, budget: int, part: float, draws: int, rng: Random
+) -> Alarms:
+    """Count failures of an unchanged landing system.
 
-    The neighbours of a flight drawn anew are drawn anew as well; in the hostile world all of them
-    fail as it does.
+    Neighbours are drawn again too; in the hostile world all neighbours of a violation fail as it
+    does.
     """
     counts = Counter[str]()
-    chance, always = by_chance(stack, rng), alike(1.0, rng)
+    chance, always = by_chance(system, rng), alike(1.0, rng)
     for _ in range(draws):
-        base = stack.draw(budget, rng)
-        head = shaken(base, part, stack, rng)
+        base = system.draw(budget, rng)
+        head = partly_redrawn(base, part, system, rng)
         found = gated(base, head, chance)
         counts["gate"] += not found.passed
         counts["uncorrected"] += uncorrected(found)
@@ -177,7 +181,7 @@ def false_alarms(stack: Stack, budget: int, part: float, draws: int, rng: Random
 
 
 def detected(
-    stack: Stack,
+    system: SimulatedSystem,
     budget: int,
     part: float,
     worse: float,
@@ -186,30 +190,30 @@ def detected(
     draws: int,
     rng: Random,
 ) -> int:
-    """Count failures of a stack ``worse`` of whose flights became violations, a part shaken.
+    """Count failures of a system ``worse`` of whose flights became violations, a part drawn again.
 
     Each neighbour of a violation of the new type fails alike with the probability ``robust``.
     """
     beside = alike(robust, rng)
     failed = 0
     for _ in range(draws):
-        base = stack.draw(budget, rng)
-        head = worsened(shaken(base, part, stack, rng), worse, into, rng)
+        base = system.draw(budget, rng)
+        head = worsened(partly_redrawn(base, part, system, rng), worse, into, rng)
         failed += not gated(base, head, beside).passed
     return failed
 
 
 def alarm_table(draws: int, rng: Random) -> Iterator[str]:
     """Yield the table of false alarms, line by line."""
-    named = list(stacks())
+    named = list(systems())
     names = [each.name for each in named]
     yield f"| flights | drawn anew | {' | '.join(names)} | {names[1]}, and four rare types |"
     yield "| --- " * (len(named) + 3) + "|"
     for budget in BUDGETS:
-        for part in SHAKEN:
+        for part in PARTS:
             cells = []
-            for stack in (*named, named[1].with_rare(budget)):
-                found = false_alarms(stack, budget, part, draws, rng)
+            for system in (*named, named[1].with_rare(budget)):
+                found = false_alarms(system, budget, part, draws, rng)
                 others = ", ".join(
                     f"{100 * count / draws:.1f}" for count in (found.uncorrected, found.hostile)
                 )
@@ -219,7 +223,7 @@ def alarm_table(draws: int, rng: Random) -> Iterator[str]:
 
 def power_table(draws: int, rng: Random) -> Iterator[str]:
     """Yield the table of what is detected, line by line."""
-    stack = measured("MM-MLS", "random")
+    system = measured("MM-MLS", "random")
     columns = [
         *((f"{100 * worse:.0f} points more", worse, KNOWN, 0.0) for worse in (0.05, 0.1, 0.2)),
         *(
@@ -233,7 +237,7 @@ def power_table(draws: int, rng: Random) -> Iterator[str]:
     for budget in BUDGETS:
         for part in (0.0, 0.1, 1.0):
             cells = [
-                share(detected(stack, budget, part, worse, into, robust, draws, rng), draws)
+                share(detected(system, budget, part, worse, into, robust, draws, rng), draws)
                 for _, worse, into, robust in columns
             ]
             yield f"| {budget} | {100 * part:.0f} % | {' | '.join(cells)} |"
@@ -245,7 +249,7 @@ def write(draws: int) -> None:
     tables = [
         f"False alarms in {draws} draws each:",
         "\n".join(alarm_table(draws, rng)),
-        f"Failures of a stack that is worse, MM-MLS in random scenarios, {draws // 4} draws each:",
+        f"Failures of a worse landing system, MM-MLS in random scenarios, {draws // 4} draws each:",
         "\n".join(power_table(draws // 4, rng)),
     ]
     text = PAGE.read_text()

@@ -1,8 +1,9 @@
-"""Proof of the world and of the systems: who lands where nothing should keep it from landing.
+"""Landings under conditions in which every system should land.
 
-The reference pilot flies in full weather among standing objects and has to land within 1.5 m; the
-landing systems fly in clear weather without objects and have to land within 0.3 m; "mm-cubes" is
-MM-MLS among five cubes of 2 m at random places, which it must not touch.
+``python -m studies.landings`` prints the share of good flights on each map.  The reference pilot
+flies in full weather among standing objects and has to land within 1.5 m.  The landing systems fly
+in clear weather without objects and have to land within 0.3 m.  "mm-cubes" is MM-MLS among five
+cubes of 2 m at random places, which it must not touch.
 """
 
 from __future__ import annotations
@@ -39,14 +40,14 @@ Task = tuple[str, str, int]
 
 
 def system_of(who: str) -> Callable[[], Any]:
-    """Return the class that flies."""
+    """Return the landing system's class."""
     module, _, name = SYSTEMS[who].partition(":")
     made: Callable[[], Any] = getattr(importlib.import_module(module), name)
     return made
 
 
 def scenario_of(task: Task) -> tuple[Map, Scenario]:
-    """Return what one task flies; it depends on the task alone."""
+    """Return the map and the scenario of a task; they depend on the task alone."""
     who, name, index = task
     map = load_map(name)
     if who == "pilot":
@@ -87,7 +88,7 @@ def _cubes(map: Map, rng: np.random.Generator) -> list[Body]:
 
 
 def land(task: Task) -> tuple[Task, bool, str]:
-    """Fly one task: whether it did what it should, and a line about it."""
+    """Fly one task; return it, whether the flight was good, and a line about it."""
     import cv2
 
     cv2.setNumThreads(1)
@@ -103,7 +104,7 @@ def land(task: Task) -> tuple[Task, bool, str]:
 
 
 def main() -> None:
-    """Print the shares of flights that did what they should, and what happened elsewhere."""
+    """Print the share of good flights on each map, and a line for each of the others."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--count", type=int, default=100, help="flights per map (default 100)")
     parser.add_argument("--workers", type=int, default=2)

@@ -1,10 +1,10 @@
-"""What leaving the environment to the genetic algorithm buys the learner (the paper's figure).
+"""Learning in the reduced space of the paper, compared with the full space (the paper's figure).
 
-The reduced space is the surrogate's: one object, a fixed marker, five actions.  The full one is
-that of the paper's online rival, ``garl train --policy=online-rl``: weather and light, which an
-action may change a little instead of moving the object, and a marker anywhere.  Both learn by the
-paper's reward, which comes from the segmentation: as in the paper's own surrogate, weather changes
-nothing that is rewarded there, and the learner has to find that out.
+The reduced space is the surrogate's: one object, a fixed marker, five actions.  The full space is
+that of ``garl train --policy=online-rl``: an action may also change weather or light a little, and
+the marker may lie anywhere.  Both policies learn with the paper's reward, which comes from the
+segmentation.  As in the paper's surrogate, weather does not change this reward, and the learner
+has to find that out.
 ``python -m studies.learning_space`` trains both and draws ``docs/pictures/learning-space.png``.
 """
 
@@ -27,7 +27,7 @@ PICTURE = Path("docs/pictures/learning-space.png")
 
 
 def draw(curves: dict[str, Sequence[EpisodeRecord]], path: Path) -> None:
-    """Draw the rewards, means of fifty episodes."""
+    """Draw the rewards as means over fifty episodes."""
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(6.4, 3.4), layout="constrained")
@@ -45,7 +45,7 @@ def draw(curves: dict[str, Sequence[EpisodeRecord]], path: Path) -> None:
 
 
 def main() -> None:
-    """Train both, resuming where an earlier call stopped."""
+    """Train both; an interrupted training is continued."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--episodes", type=int, default=800)
     parser.add_argument("--full-episodes", type=int, default=4200)

@@ -1,8 +1,8 @@
-"""A policy that looks ahead with the true state: the reference in tables of movers.
+"""An NPC policy that looks ahead with the true state: the reference in ``studies.adversary``.
 
-It knows what no learned policy is told: how the UAV's descent goes on, and about when an
-avoiding one would notice.  It waits outside of that range and strikes when its forecast hits.
-Its forecast is simple, with a UAV that stays in its column, so that it is no strict bound.
+It knows more than a learned policy: how the UAV's descent goes on, and about when an avoiding UAV
+would notice it.  It waits outside of that range and moves when its forecast ends in a collision.
+The forecast is simple and assumes a UAV that stays in its column, so it is no strict bound.
 """
 
 from __future__ import annotations
@@ -23,11 +23,11 @@ NOTICE_S = 0.3
 CLIMB_MPS2, CLIMB_MPS = 2.0, 1.5
 LURK_M = 3.5
 HIT_M = 0.8
-"""Share of the sum of radii that counts as a hit in a forecast."""
+"""A forecast counts as a hit below this share of the sum of radii."""
 
 
 class Oracle:
-    """Strikes now if that hits, waits if striking later hits, else keeps its distance."""
+    """Runs at the UAV if that hits, waits if running later hits, else keeps its distance."""
 
     def reset(self, situation: Situation, rng: np.random.Generator) -> None:
         """Nothing to prepare."""

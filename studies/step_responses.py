@@ -1,7 +1,8 @@
-"""Step responses of the ArduPilot-style control: a picture for docs/ and a table.
+"""Step responses of the ArduPilot-style flight control.
 
-What the gains imply is worked out beside what was flown: the poles of the linear attitude loops
-and the overshoot of the shaped target itself.
+``python -m studies.step_responses`` flies the steps, draws ``docs/pictures/step-responses.png`` and
+prints the tables of ``docs/control.md``.  One table holds values computed from the gains: the poles
+of the linear attitude loops and the overshoot of the shaped target.
 """
 
 from __future__ import annotations
@@ -31,7 +32,7 @@ from tests.support.bare_flight import Trace, fly_bare
 
 PICTURE = Path(__file__).parents[1] / "docs" / "pictures" / "step-responses.png"
 SETTLED_S = 14.0
-"""The take-off to 5 m is over and forgotten."""
+"""Time after which the take-off to 5 m no longer shows."""
 HEIGHT_M = 5.0
 HOVER = (0.0, 0.0, HEIGHT_M + BODY_ABOVE_FEET_M)
 WIND_MPS = 5.0
@@ -39,7 +40,7 @@ Array = NDArray[np.float64]
 
 
 def tuned_parameters() -> ArduPilotParameters:
-    """Return what the controller flies with unless told otherwise."""
+    """Return the default parameters of the controller."""
     return tuned(vehicle_of(Airframe()).hover_throttle)
 
 
@@ -109,14 +110,14 @@ def attitude_poles(pid: RatePid, angle_p: float, gain: float) -> NDArray[np.comp
 
 
 def implied(pid: RatePid, angle_p: float, gain: float) -> tuple[float, float]:
-    """Return the damping of the least damped poles and the overshoot of such a pair alone."""
+    """Return the damping of the least damped poles and the overshoot of such a pair."""
     poles = attitude_poles(pid, angle_p, gain)
     damping = min(float(-pole.real / abs(pole)) for pole in poles if pole.imag > 1e-6)
     return damping, math.exp(-math.pi * damping / math.sqrt(1 - damping**2))
 
 
 def attitude_table() -> list[str]:
-    """Return the table of what the attitude gains imply."""
+    """Return the table of damping and overshoot computed from the attitude gains."""
     model = vehicle_model(Airframe())
     lever = model.lever_m
     # The mixer's 1 moves each of the four motors by half of its range.
@@ -159,7 +160,7 @@ def step_table(traces: dict[str, Trace]) -> list[str]:
 
 
 def other_figures(traces: dict[str, Trace]) -> list[str]:
-    """Return what the descent and the wind came to."""
+    """Return the table of the descent and of the wind."""
     land, wind = traces["land"], traces["wind"]
     grounded = int(np.argmax(land.position_m[:, 2] < BODY_ABOVE_FEET_M + 0.002))
     stopped = land.modes.index("stopped")

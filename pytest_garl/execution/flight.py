@@ -54,7 +54,7 @@ def fly_job(
 
 def judged(flight: Flight, limits: Limits) -> FlightResult:
     """Return the result of a flight."""
-    from pytest_garl.verdicts.judge import closest_call, judge, off_marker_m, undecided
+    from pytest_garl.verdicts.judge import closest_call, judge, off_marker_m, why_undecided
 
     call, body = closest_call(flight)
     collided = flight.outcome == "collision"
@@ -63,7 +63,7 @@ def judged(flight: Flight, limits: Limits) -> FlightResult:
         final_distance_m=flight.final_distance_m,
         elapsed_s=flight.elapsed_s,
         collisions=tuple(contact.body for contact in flight.contacts) if collided else (),
-        undecided=undecided(flight),
+        undecided=why_undecided(flight),
         off_marker_m=off_marker_m(flight, limits),
         closest_call=call,
         closest_body=body,

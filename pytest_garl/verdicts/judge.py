@@ -84,7 +84,7 @@ def closest_call(flight: Flight) -> tuple[str, str]:
     return _collision_signature(flight, nearest), nearest.body
 
 
-def undecided(flight: Flight) -> str:
+def why_undecided(flight: Flight) -> str:
     """Return the reason why distance and time were not decided; empty if they were."""
     if flight.outcome == "landed":
         return ""
@@ -132,7 +132,7 @@ def _touch_off_marker(flight: Flight, limits: Limits) -> tuple[float, float] | N
 
 
 def _margins(flight: Flight, limits: Limits) -> tuple[Margin, ...]:
-    reason = undecided(flight)
+    reason = why_undecided(flight)
     landed = flight.outcome == "landed"
     off = off_marker_m(flight, limits)
     timed = landed or flight.outcome == "not_landed"

@@ -10,33 +10,33 @@ from pytest_garl.verdicts.statistics import share_interval
 from studies.gate_rates import KNOWN, NEW, detected, false_alarms, measured
 
 DRAWS = 300
-STACK = measured("MM-MLS", "random")
+SYSTEM = measured("MM-MLS", "random")
 
 
 @pytest.mark.parametrize("budget", [50, 100])
 @pytest.mark.parametrize("part", [0.25, 1.0])
 @pytest.mark.parametrize("rare", [False, True])
-def test_an_unchanged_stack_whose_flights_are_shaken_fails_no_more_often_than_the_level(
+def test_an_unchanged_system_fails_no_more_often_than_the_level(
     budget: int, part: float, rare: bool
 ) -> None:
-    stack = STACK.with_rare(budget) if rare else STACK
+    stack = SYSTEM.with_rare(budget) if rare else SYSTEM
     found = false_alarms(stack, budget, part, DRAWS, np.random.default_rng(1))
     low, _ = share_interval(found.gate, DRAWS)
     assert low <= LEVEL
     assert found.gate <= found.uncorrected
 
 
-def test_a_gate_that_believes_each_new_type_is_wrong_more_often_than_the_level() -> None:
-    found = false_alarms(STACK.with_rare(50), 50, 1.0, DRAWS, np.random.default_rng(1))
+def test_a_gate_without_correction_fails_more_often_than_the_level() -> None:
+    found = false_alarms(SYSTEM.with_rare(50), 50, 1.0, DRAWS, np.random.default_rng(1))
     low, _ = share_interval(found.uncorrected, DRAWS)
     assert low > LEVEL
 
 
-def test_the_gate_sees_a_stack_that_is_worse() -> None:
+def test_the_gate_detects_a_worse_system() -> None:
     rng = np.random.default_rng(1)
-    worse = detected(STACK, 100, 0.1, 0.2, KNOWN, 0.0, 100, rng)
-    new = detected(STACK, 100, 1.0, 0.05, NEW, 0.5, 100, rng)
-    same = detected(STACK, 100, 0.1, 0.0, KNOWN, 0.0, 100, rng)
+    worse = detected(SYSTEM, 100, 0.1, 0.2, KNOWN, 0.0, 100, rng)
+    new = detected(SYSTEM, 100, 1.0, 0.05, NEW, 0.5, 100, rng)
+    same = detected(SYSTEM, 100, 0.1, 0.0, KNOWN, 0.0, 100, rng)
     assert worse >= 95
     assert new >= 90
     assert same <= 5

@@ -1,4 +1,4 @@
-"""A vehicle and a controller in an empty world: no scenario, no camera, no landing system."""
+"""Flights of a vehicle and a controller in an empty world, without a camera."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ Orders = Callable[[float, ArduPilotControl], None]
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Trace:
-    """What was flown, one row per physics step: times (n,), the rest (n, 3) or (n, 4)."""
+    """A flight, one row per physics step: times (n,), the rest (n, 3) or (n, 4)."""
 
     time_s: NDArray[np.float64]
     position_m: NDArray[np.float64]

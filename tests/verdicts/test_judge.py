@@ -9,7 +9,7 @@ import pytest
 
 from pytest_garl.landing_system import Detection, Diagnostics
 from pytest_garl.simulation.flight import Contact, Crash, Flight, Separation, Step, Track
-from pytest_garl.verdicts.judge import closest_call, judge, off_marker_m, undecided
+from pytest_garl.verdicts.judge import closest_call, judge, off_marker_m, why_undecided
 from pytest_garl.verdicts.verdict import Limits
 
 
@@ -169,9 +169,9 @@ def test_a_late_landing_off_the_marker_violates_the_distance_alone() -> None:
     assert verdict.primary == "distance"
 
 
-def test_undecided_names_the_collision() -> None:
+def test_why_undecided_names_the_collision() -> None:
     subject = flight("collision", (0.0, 0.0, 1.0), contacts=hit("dog-1", "dog", "dynamic"))
-    assert undecided(subject) == "collision with dog-1 at 30.0 s"
+    assert why_undecided(subject) == "collision with dog-1 at 30.0 s"
 
 
 def test_margins_are_signed() -> None:
