@@ -68,18 +68,18 @@ def landing(request: pytest.FixtureRequest, garl_slot: Target, npcs: PolicySpec)
 
     run = request.config.stash[RUN]
     try:
-        result = run.fly(garl_slot, checked_policy(npcs))
+        flight = run.fly(garl_slot, checked_policy(npcs))
     except GarlError as error:
         abort_session(request.node, error)
     item = request.node
-    landing = Landing(garl_slot, result, run.record(garl_slot), getattr(item, "obj", None))
+    landing, result = Landing(garl_slot, flight, getattr(item, "obj", None)), flight.result
     item.user_properties += [
         ("garl.outcome", result.outcome),
         ("garl.signature", result.signature),
         ("garl.story", result.verdict.story),
         ("garl.final_distance_m", result.final_distance_m),
         ("garl.elapsed_s", result.elapsed_s),
-        ("garl.trajectory_sha256", run.trajectory_sha256(garl_slot)),
+        ("garl.trajectory_sha256", flight.sha256),
     ]
     if reasons := run.unproven(garl_slot):
         request.node.user_properties.append(("garl.unproven", "; ".join(reasons)))

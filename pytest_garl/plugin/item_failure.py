@@ -51,7 +51,7 @@ class ItemFailure:
             return True
         if not self.assertion.runs_on_any_flight:
             return False
-        found = self.assertion.failure(flight.result, flight.record, run.scenario(target))
+        found = self.assertion.failure(flight, run.scenario(target))
         if found is None or found.assertion != self.failed_assertion.assertion:
             return False
         return found.is_about(flight.result.verdict.primary) is not self.user_property
@@ -102,7 +102,7 @@ def first_with_same_signature(run: Run, target: Target, failure: ItemFailure, no
             and (failure.failed_assertion is None or item.test == failure.test)
             and not run.claims.has_run(item.nodeid)
         ]
-        shows = waiting and failure.shows_in(run, other, _flight(run, other))
+        shows = waiting and failure.shows_in(run, other, run.flight(other))
         if shows and refly(run, other, failure).confirm:
             return other.name
     return ""
@@ -115,7 +115,7 @@ def refly(run: Run, target: Target, failure: ItemFailure) -> Reflights:
     """
     if target.deterministic:
         (once,) = run.refly(target, 1)
-        if once.sha256 == run.trajectory_sha256(target):
+        if once.sha256 == run.flight(target).sha256:
             return Reflights(failed=2, flown=2, same=True)
     if failure.user_property and not failure.assertion.runs_on_any_flight:
         # The test takes what no other flight can give it.
@@ -125,16 +125,11 @@ def refly(run: Run, target: Target, failure: ItemFailure) -> Reflights:
     return Reflights(failed=failed, flown=1 + REFLIGHTS)
 
 
-def _flight(run: Run, target: Target) -> CompletedFlight:
-    sha256 = run.trajectory_sha256(target)
-    return CompletedFlight(result=run.result(target), sha256=sha256, record=run.record(target))
-
-
 def divergence_s(run: Run, target: Target) -> float | None:
     """Return when a slot's flight and its first reflight part; None if one was not recorded."""
     from pytest_garl.simulation.flight_file import load, parted_s
 
-    files = [flight.record(run.flights) for flight in (target.flight, target.reflight(0))]
+    files = [run.flight(target).record, target.reflight(0).record(run.flights)]
     if not all(file.exists() for file in files):
         return None
     first, second = (load(file) for file in files)

@@ -54,7 +54,9 @@ def report_item(
     """Decide the outcome of an item that asked for its landing, and write it into the report."""
     if not isinstance(item, pytest.Function) or LANDING not in item.stash:
         return
-    writer = _Writer(report=report, item=item, run=run, target=target, result=run.result(target))
+    writer = _Writer(
+        report=report, item=item, run=run, target=target, result=run.flight(target).result
+    )
     if report.failed and error is not None:
         writer.write_failure(error)
     elif report.passed and writer.case is not None:

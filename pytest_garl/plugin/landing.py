@@ -6,7 +6,6 @@ import functools
 import math
 import sys
 from collections.abc import Callable
-from pathlib import Path
 from types import FrameType
 from typing import TYPE_CHECKING, Any, NoReturn
 
@@ -15,7 +14,7 @@ import pytest
 from pytest_garl.plugin.failed_statement import AttributeRead, code_of
 
 if TYPE_CHECKING:
-    from pytest_garl.execution.result import FlightResult
+    from pytest_garl.execution.result import CompletedFlight, FlightResult
     from pytest_garl.plugin.target import Target
     from pytest_garl.simulation.flight import Flight
     from pytest_garl.verdicts.verdict import Limits, Verdict
@@ -32,11 +31,10 @@ class Landing:
     def __init__(
         self,
         target: Target,
-        result: FlightResult,
-        record: Path,
+        flight: CompletedFlight,
         test: Callable[..., Any] | None = None,
     ) -> None:
-        self._target, self._result, self._record = target, result, record
+        self._target, self._result, self._record = target, flight.result, flight.record
         self._code = code_of(test) if test else None
         self.slot: str = target.name
         self.reads: list[AttributeRead] = []

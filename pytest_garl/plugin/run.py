@@ -27,7 +27,7 @@ from pytest_garl.plugin.target import Target
 
 if TYPE_CHECKING:
     from pytest_garl.execution.job import FlightJob
-    from pytest_garl.execution.result import CompletedFlight, FlightResult
+    from pytest_garl.execution.result import CompletedFlight
     from pytest_garl.plugin.user_assertions import ItemAssertion
     from pytest_garl.regressions.follow_up import InvestigatedSignature
     from pytest_garl.regressions.forecast import RemainingWork
@@ -162,13 +162,13 @@ class Run:
         """Which item of which process reports what."""
         return ReportClaims(ledger=self.ledger)
 
-    def fly(self, target: Target, npcs: PolicySpec) -> FlightResult:
-        """Return the slot's result after it and all lower selected slots are flown."""
+    def fly(self, target: Target, npcs: PolicySpec) -> CompletedFlight:
+        """Return the slot's flight after it and all lower selected slots are flown."""
         self._register(target, npcs)
         try:
             for lower in self.lower_targets(target):
                 self._wait(lower.flight)
-            return self._wait(target.flight).result
+            return self._wait(target.flight)
         finally:
             self.on_wait_end()
 
@@ -176,14 +176,6 @@ class Run:
     def flights(self) -> Path:
         """The folder of the flights' records."""
         return self.options.folder / "flights"
-
-    def record(self, target: Target) -> Path:
-        """Return where the record of a slot's flight lies."""
-        return target.flight.record(self.flights)
-
-    def trajectory_sha256(self, target: Target) -> str:
-        """Return the hash of a slot's flight."""
-        return self._wait(target.flight).sha256
 
     def unproven(self, target: Target) -> tuple[str, ...]:
         """Return why it proves nothing that a case passes; nothing if the system was repaired."""
@@ -198,7 +190,7 @@ class Run:
             simulator_sha256=simulator_sha256(self.simulator),
             map_sha256=load_map(target.map, self.options.map_folders).sha256,
         )
-        return stale_reasons(case, sources, self.trajectory_sha256(target))
+        return stale_reasons(case, sources, self.flight(target).sha256)
 
     def scenario(self, target: Target) -> Scenario:
         """Return what a slot flies."""
@@ -237,9 +229,9 @@ class Run:
         targets = self.targets[target.search]
         return [targets[slot] for slot in sorted(targets) if slot < target.slot]
 
-    def result(self, target: Target) -> FlightResult:
-        """Return a slot's result; wait for its flight."""
-        return self._wait(target.flight).result
+    def flight(self, target: Target) -> CompletedFlight:
+        """Return a slot's flight; wait for its result."""
+        return self._wait(target.flight)
 
     def refly(self, target: Target, count: int) -> list[CompletedFlight]:
         """Fly a flown slot ``count`` times more."""
@@ -247,12 +239,10 @@ class Run:
         assert job is not None
         text = self.ledger.scenario(target.flight)
         assert text is not None
-        flown = []
-        for index in range(count):
-            flight = target.reflight(index)
+        flights = [target.reflight(index) for index in range(count)]
+        for flight in flights:
             self.ledger.add_flight(flight, target.system_name, job, text)
-            flown.append(self._wait(flight))
-        return flown
+        return [self._wait(flight) for flight in flights]
 
     def fly_all(
         self, target: Target, npcs: PolicySpec, scenarios: Sequence[Scenario]

@@ -5,13 +5,12 @@ from __future__ import annotations
 import contextlib
 import inspect
 from collections.abc import Callable
-from pathlib import Path
 from typing import Any
 
 import pytest
 
 from pytest_garl.errors import GarlError
-from pytest_garl.execution.result import FlightResult
+from pytest_garl.execution.result import CompletedFlight
 from pytest_garl.plugin.failed_statement import FAILS, failure_of
 from pytest_garl.plugin.keys import target_of
 from pytest_garl.plugin.landing import Landing
@@ -53,19 +52,17 @@ class ItemAssertion:
         """Whether the test can run on any flight: it takes no fixture but landing and scenario."""
         return self._parameters <= _AVAILABLE
 
-    def __call__(
-        self, result: FlightResult, record: Path, scenario: Scenario
-    ) -> UserFailure | None:
+    def __call__(self, flight: CompletedFlight, scenario: Scenario) -> UserFailure | None:
         """Return how the test fails on a flight without built-in violation, or None.
 
         A saved case of a user's property shows that property alone.
         """
-        violates = result.verdict.violation
-        return None if violates else self.failure(result, record, scenario)
+        violates = flight.result.verdict.violation
+        return None if violates else self.failure(flight, scenario)
 
-    def failure(self, result: FlightResult, record: Path, scenario: Scenario) -> UserFailure | None:
+    def failure(self, flight: CompletedFlight, scenario: Scenario) -> UserFailure | None:
         """Return how the test fails on a flight, or None."""
-        landing = Landing(self._target, result, record, self._function)
+        landing = Landing(self._target, flight, self._function)
         if landing.unjudged:
             return None
         arguments = {"landing": landing, "scenario": scenario}

@@ -62,7 +62,7 @@ class CaseRequest:
         """Return whether a flight fails with this request's signature."""
         if self.user_assertion is None:
             return flight.signature == self.signature
-        failure = self.user_assertion(flight.result, flight.record, scenario)
+        failure = self.user_assertion(flight, scenario)
         return failure is not None and failure.signature == self.signature
 
 

@@ -167,7 +167,7 @@ def _violations(
     return tuple(
         (scenario, flight)
         for scenario, flight in flights
-        if assertion is None or assertion(flight.result, flight.record, scenario)
+        if assertion is None or assertion(flight, scenario)
     )
 
 

@@ -36,7 +36,7 @@ def new_case(request: CaseRequest, failing: FailingScenario, avoidable: Avoidabl
     completed, job = failing.flight, request.job
     flight = load(completed.record) if completed.record.exists() else None
     ask = request.user_assertion
-    failure = ask(completed.result, completed.record, failing.scenario) if ask else None
+    failure = ask(completed, failing.scenario) if ask else None
     return Case(
         system=job.system.name,
         status="unavoidable" if avoidable == "no" else "open",

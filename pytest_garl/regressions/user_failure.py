@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Protocol
 
-from pytest_garl.execution.result import FlightResult
+from pytest_garl.execution.result import CompletedFlight
 from pytest_garl.scenarios.scenario import Scenario
 
 ABOUT: dict[str, frozenset[str]] = {
@@ -45,9 +44,7 @@ class UserFailure:
 
 
 class UserAssertion(Protocol):
-    """UserAssertion a user's assertion about a flight."""
+    """A user's assertion about a flight."""
 
-    def __call__(
-        self, result: FlightResult, record: Path, scenario: Scenario
-    ) -> UserFailure | None:
+    def __call__(self, flight: CompletedFlight, scenario: Scenario) -> UserFailure | None:
         """Return how the test fails on a flight without built-in violation, or None."""

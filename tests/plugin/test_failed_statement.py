@@ -10,6 +10,7 @@ from typing import Any
 
 import pytest
 
+from pytest_garl.execution.result import CompletedFlight
 from pytest_garl.plugin.failed_statement import failure_of
 from pytest_garl.plugin.landing import Landing
 from pytest_garl.regressions.user_failure import UserFailure
@@ -35,7 +36,8 @@ def failing(tmp_path: Path, body: str, helpers: str = "") -> UserFailure | None:
     exec(compile(file.read_text(), str(file), "exec"), space)
     test: Callable[[Landing], None] = space["test_it"]
     target: Any = SimpleNamespace(name="lawn-g00-s00")
-    landing = Landing(target, RESULT, file, test)
+    flight = CompletedFlight(result=RESULT, sha256="", record=file)
+    landing = Landing(target, flight, test)
     try:
         test(landing)
     except (AssertionError, AttributeError, TypeError, pytest.fail.Exception) as error:
