@@ -1,4 +1,4 @@
-"""The contract between a landing system and whatever flies it.
+"""The contract between a landing system and the simulator that flies it.
 
 A landing system is any class with two methods; there is nothing to inherit::
 
@@ -62,7 +62,7 @@ class Camera:
     Image right (+u) is the body's right (-y); image down (+v) is the body's back (-x).
     At zero yaw (nose east) the image's top is east and its right is south.  There is no
     lens distortion.  The default is 320x240 at 10 Hz with 90 degrees of horizontal field
-    of view; the paper's code used 640x480.  Raises LandingSystemError for what cannot be
+    of view; the paper's code used 640x480.  Raises LandingSystemError for a camera that cannot be
     simulated: fewer than 16 pixels on a side, more than 3840x2160 in all, a field of view
     outside 0.05 to 3 rad (towards pi the image plane grows without limit), a rate outside
     0.1 to 240 Hz.
@@ -106,14 +106,15 @@ class Camera:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Airframe:
-    """What a landing system declares about the vehicle that it flies.
+    """The vehicle of a landing system, declared by its class.
 
-    ``latency_s`` is the delay between an image and the command that it leads to.
-    ``control_rate_hz`` is how often ``control`` is asked for motor thrusts; ``None``
-    means that the simulator's own simple flight control follows the commands.  The
-    mass and size are those of the DJI Matrice 100 (see ``simulation/physics/vehicle.py``).  Raises
-    LandingSystemError for a mass outside 0.1 to 100 kg, a size outside 0.1 to 5 m, a
-    latency outside 0 to 5 s, a control rate outside 1 to 240 Hz.
+    ``latency_s`` is the delay between an image and the command that follows from it.
+    ``control_rate_hz`` is the rate at which the simulator calls ``control`` for motor thrusts;
+    ``None`` means that the simulator's own simple flight control follows the commands. The
+    default mass and size are those of the DJI Matrice 100 (see
+    ``simulation/physics/vehicle.py``). Raises LandingSystemError for a mass outside 0.1 to 100
+    kg, a size outside 0.1 to 5 m, a latency outside 0 to 5 s, a control rate outside 1 to 240
+    Hz.
     """
 
     mass_kg: float = 2.355
@@ -137,10 +138,10 @@ class Airframe:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Mission:
-    """What a landing system is told before take-off.
+    """The task of one flight, which a landing system gets before take-off.
 
     ``gps_position_m`` (x, y) is the approximate place of the marker, which lies up to
-    7.5 m off it.  ``home_m`` (x, y, z) is where the UAV stands at the start, motors off.
+    7.5 m away from it.  ``home_m`` (x, y, z) is where the UAV stands at the start, motors off.
     """
 
     gps_position_m: tuple[float, float]
@@ -155,7 +156,7 @@ class Mission:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Observation:
-    """What the UAV's sensors say at one camera frame.
+    """The readings of the UAV's sensors at one camera frame.
 
     ``position_m`` and ``velocity_mps`` are shape (3,) in the world frame, ``attitude``
     is the quaternion (4,); ``image`` is RGB uint8 (H, W, 3) and ``depth_m`` is planar
@@ -172,7 +173,7 @@ class Observation:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Detection:
-    """One marker that the landing system believes it saw.
+    """One marker that the landing system believes to see.
 
     ``position_m`` is the estimate of its centre in the world frame; ``corners_px`` are
     (u, v) pairs clockwise from the top left.
@@ -186,11 +187,11 @@ class Detection:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Diagnostics:
-    """What a landing system may tell about its thoughts; no system is obliged to.
+    """The view of a landing system on its flight, for reports and videos; optional.
 
-    ``phase`` is the system's own name of what it is doing (100 characters are kept);
-    ``target_m`` (x, y, z) is what it takes for the marker; ``planned_path_m`` are the
-    (x, y, z) points that it means to fly, at most 1,000, of which 100 are kept; ``note`` is
+    ``phase`` is the system's own name for its present activity (100 characters are kept);
+    ``target_m`` (x, y, z) is the place that it takes for the marker; ``planned_path_m`` are the
+    (x, y, z) points of its plan, at most 1,000, of which 100 are kept; ``note`` is
     a sentence for a reader (1,000 characters are kept).  At most 100 detections a frame.
     All numbers are finite: a NaN here is a finding, as it is in a command.  A flight's record
     keeps paths, corners and notes until 6 MB are full; phases, detections and targets that
@@ -255,7 +256,7 @@ class Land:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Abort:
-    """Give the landing up: the flight control climbs away and the flight ends when clear.
+    """Give up the landing: the flight control climbs away and the flight ends when clear.
 
     The nose stays at the yaw that was commanded last.  It is the last command: ``step`` is
     not called again.
@@ -269,7 +270,7 @@ Command = PositionSetpoint | VelocitySetpoint | AttitudeSetpoint | Land | Abort
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class VehicleState:
-    """What the inertial sensors know at the control rate.
+    """The state of the vehicle at the control rate.
 
     ``position_m``, ``velocity_mps`` (world) and ``angular_velocity_radps`` (body) are
     (3,) tuples, ``attitude`` is a quaternion.  ``thrusts_n`` are the four motors' present
@@ -288,7 +289,7 @@ class VehicleState:
 class MotorThrusts:
     """Wanted thrust of each motor in newtons: front left, front right, rear right, rear left.
 
-    A motor gives from nothing to its maximum, whatever is wanted; beyond ten times the
+    A motor limits this to the range from 0 to its maximum.  A value beyond ten times the
     maximum is refused.
     """
 
@@ -311,7 +312,7 @@ class LandingSystem(Protocol):
         """Prepare for one flight; called once, on the ground."""
 
     def step(self, observation: Observation) -> Command:
-        """Answer one camera frame with what the UAV shall do until the next.
+        """Return the command for the time until the next camera frame.
 
         Not called again after it has returned ``Abort()``.
         """
@@ -320,7 +321,7 @@ class LandingSystem(Protocol):
 def airframe_of(system: object) -> Airframe:
     """Return the airframe that a landing system (class or instance) declares, or the default.
 
-    Raises LandingSystemError where ``airframe`` is something else.
+    Raises LandingSystemError if ``airframe`` is something else.
     """
     airframe = getattr(system, "airframe", None)
     if airframe is None:
@@ -332,7 +333,7 @@ def airframe_of(system: object) -> Airframe:
             f"{name}.airframe is {what[:80]}; expected pytest_garl.Airframe(...) in the class"
         )
     camera = airframe.camera
-    # Rebuilt, so that what flies is what was checked, whatever a subclass does.
+    # Rebuilt, so that a subclass cannot change the values after the check.
     return Airframe(
         mass_kg=float(airframe.mass_kg),
         size_m=float(airframe.size_m),
