@@ -15,7 +15,7 @@ from pathlib import Path
 import numpy as np
 
 from pytest_garl.regressions.case import Case, Evidence, Violation
-from pytest_garl.regressions.case_file import dumps
+from pytest_garl.regressions.case_file import dump_case
 from pytest_garl.scenarios.chromosome import decode
 from pytest_garl.scenarios.genes import genome_for
 from pytest_garl.scenarios.maps.map import load_map
@@ -94,7 +94,7 @@ def main() -> None:
         for seed in range(CASES):
             scenario = dataclasses.replace(sample.scenario, seed=seed)
             case = dataclasses.replace(sample, scenario=scenario)
-            (cases / f"{case.id}.toml").write_text(dumps(case))
+            (cases / f"{case.id}.toml").write_text(dump_case(case))
         print(f"{CASES} cases: {collected(folder, 'test_first.py')}")
 
 

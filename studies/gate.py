@@ -24,7 +24,7 @@ from xml.etree import ElementTree
 
 from pytest_garl import cpu_dispatch
 from pytest_garl.regressions.case import Case
-from pytest_garl.regressions.case_file import dumps, load
+from pytest_garl.regressions.case_file import dump_case, load_case
 from pytest_garl.regressions.replay import replay
 from pytest_garl.regressions.robustness import neighbours
 from pytest_garl.scenarios.maps.map import load_map
@@ -79,7 +79,7 @@ def hash_of_flight(path: Path) -> str:
     import cv2
 
     cv2.setNumThreads(1)
-    flight = replay(dataclasses.replace(load(path), test=""), Path.cwd()).flight
+    flight = replay(dataclasses.replace(load_case(path), test=""), Path.cwd()).flight
     assert flight is not None
     return flight.sha256
 
@@ -105,10 +105,10 @@ def _cases(runs: int, replays: int) -> None:
         sys.exit(f"found no cases in {CASES}, expected some; a search saves its violations there")
     with tempfile.TemporaryDirectory() as name:
         cases = Path(name, "cases")
-        for case in itertools.islice(mixed([load(path) for path in paths]), COUNT):
+        for case in itertools.islice(mixed([load_case(path) for path in paths]), COUNT):
             file = cases / case.system.partition(":")[0].rpartition(".")[2] / f"{case.id}.toml"
             file.parent.mkdir(parents=True, exist_ok=True)
-            file.write_text(dumps(case))
+            file.write_text(dump_case(case))
         count = sum(1 for _ in cases.rglob("*.toml"))
         gates = [gate(cases, Path(name, f"run-{run}")) for run in range(runs)]
     times = [took for took, _ in gates]

@@ -14,7 +14,7 @@ import numpy as np
 from PIL import Image
 
 from pytest_garl.landing_system import airframe_of
-from pytest_garl.regressions.case_file import load
+from pytest_garl.regressions.case_file import load_case
 from pytest_garl.regressions.replay import replay, system_of
 from pytest_garl.video import drawing, frames, rate_hz
 from pytest_garl.video.camera_pane import HEIGHT, WIDTH
@@ -74,7 +74,7 @@ def main() -> None:
     parser.add_argument("--seconds", type=float, default=9.8, help="how much of the end is shown")
     parser.add_argument("--spacing", type=float, default=0.7, help="seconds between pictures")
     arguments = parser.parse_args()
-    case = load(arguments.case)
+    case = load_case(arguments.case)
     result = replay(case, Path.cwd())
     if result.flight is None:
         parser.error(f"{arguments.case}: the flight was not recorded")

@@ -15,7 +15,7 @@ from rich.text import Text
 from pytest_garl.errors import GarlError
 from pytest_garl.messages import printable
 from pytest_garl.regressions.case import Case
-from pytest_garl.regressions.case_file import load
+from pytest_garl.regressions.case_file import load_case
 from pytest_garl.regressions.corpus import Corpus, replace_file
 from pytest_garl.regressions.description import describe_scenario
 from pytest_garl.regressions.replay import Replay, replay, system_of
@@ -40,7 +40,7 @@ class _Project:
         return self.corpus.map_folders
 
     def case(self, file: Path) -> Case:
-        return load(file, self.maps)
+        return load_case(file, self.maps)
 
 
 FOLDER = click.option(

@@ -13,7 +13,7 @@ from pytest_garl.files.atomic import locked, write_text_atomically
 from pytest_garl.messages import printable
 from pytest_garl.regressions.acceptance import Acceptance, read_acceptance
 from pytest_garl.regressions.case import Case
-from pytest_garl.regressions.case_file import CaseHeader, dumps, load, load_header
+from pytest_garl.regressions.case_file import CaseHeader, dump_case, load_case, load_header
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -50,7 +50,7 @@ class CorpusEntry:
         if self.header_problem:
             return None, self.header_problem
         try:
-            return load(self.path, self.map_folders), ""
+            return load_case(self.path, self.map_folders), ""
         except ScenarioError as error:
             return None, str(error)
 
@@ -116,13 +116,13 @@ class Corpus:
             if self._find(case) is not None:
                 return None
             self._listed.pop(folder, None)
-            return write_text_atomically(folder / f"{case.id}.toml", dumps(case))
+            return write_text_atomically(folder / f"{case.id}.toml", dump_case(case))
 
     def save_patch(self, case: Case, patches: Path, root: Path) -> Path:
         """Write a patch that adds the case; the tree itself is left alone."""
         path = self._folder_of(case.system) / f"{case.id}.toml"
         try:
-            text = patch_of(path, root, dumps(case))
+            text = patch_of(path, root, dump_case(case))
         except ValueError as error:
             raise CorpusError(
                 f"{self.folder}: lies outside of the project at {root}: no patch"
@@ -179,7 +179,7 @@ class Corpus:
 def replace_file(path: Path, case: Case) -> Path:
     """Write a case in place of the one in ``path``, under the name that it should have."""
     with locked(path.parent):
-        written = write_text_atomically(path.with_name(f"{case.id}.toml"), dumps(case))
+        written = write_text_atomically(path.with_name(f"{case.id}.toml"), dump_case(case))
         if written != path:
             path.unlink(missing_ok=True)
         return written

@@ -16,7 +16,7 @@ from typing import Literal
 from pytest_garl.errors import GarlError
 from pytest_garl.files.atomic import write_text_atomically
 from pytest_garl.regressions.case import Case
-from pytest_garl.regressions.case_file import dumps
+from pytest_garl.regressions.case_file import dump_case
 from pytest_garl.regressions.corpus import folder_of
 
 NAME = "judged"
@@ -79,7 +79,7 @@ def alone_in_a_folder(case: Case, *, live: bool) -> Iterator[Path]:
             evidence=dataclasses.replace(case.evidence, neighbours=0, neighbours_failed=0),
         )
         folder = folder_of(Path(scratch, "cases"), case.system)
-        write_text_atomically(folder / f"{NAME}.toml", dumps(flown))
+        write_text_atomically(folder / f"{NAME}.toml", dump_case(flown))
         yield Path(scratch)
 
 

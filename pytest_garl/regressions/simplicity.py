@@ -46,7 +46,7 @@ def simplicity(case: Case, map: Map, *, outdated: bool = False) -> Simplicity:
         distance=distance,
         moving=sum(move != (0.0, 0.0) for _, own in case.moves for move in own),
         runs=sum(len(list(itertools.groupby(own))) for _, own in case.moves),
-        characters=sum(len(line) for line in record_lines(case.behaviour)),
+        characters=sum(len(line) for line in record_lines(case)),
         doubtful_neighbours=max(NEIGHBOURS, evidence.neighbours) - evidence.neighbours_failed,
         excused=_EXCUSED[case.avoidable],
         outdated=outdated,

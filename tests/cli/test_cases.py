@@ -12,14 +12,14 @@ from click.testing import CliRunner, Result
 
 from pytest_garl.cli import main
 from pytest_garl.regressions.case import Case, Evidence, Violation
-from pytest_garl.regressions.case_file import load
+from pytest_garl.regressions.case_file import load_case
 from pytest_garl.regressions.corpus import Corpus, replace_file
 from pytest_garl.scenarios.chromosome import decode
 from pytest_garl.scenarios.genes import genome_for
 from pytest_garl.scenarios.maps.map import load_map
 from pytest_garl.scenarios.validity import repair
 from pytest_garl.verdicts.verdict import Limits
-from tests.regressions.test_case_file import case as dog_case
+from tests.regressions.samples import case as dog_case
 
 SYSTEM = """
 from pathlib import Path
@@ -112,7 +112,7 @@ def test_list_tells_what_is_new_until_it_is_accepted(file: Path) -> None:
 
 
 def test_nothing_is_said_of_neighbours_where_none_was_tried(file: Path) -> None:
-    case = load(file)
+    case = load_case(file)
     evidence = dataclasses.replace(case.evidence, neighbours=0, neighbours_failed=0)
     file = replace_file(file, dataclasses.replace(case, evidence=evidence))
     assert "neighbours" not in garl("show", file).output
@@ -125,13 +125,13 @@ def test_replay_answers_failed_then_fixed_and_promote_believes_only_the_latter(f
     assert failed.exit_code == 1
     refused = garl("promote", file)
     assert "still fails with its recorded moves" in refused.output
-    assert load(file).status == "open"
+    assert load_case(file).status == "open"
     repaired()
     fixed = garl("replay", file)
     assert fixed.output.startswith("FIXED\nno violation")
     assert fixed.exit_code == 0
     assert garl("promote", file).exit_code == 0
-    assert load(file).status == "fixed"
+    assert load_case(file).status == "fixed"
 
 
 def test_what_passes_in_another_world_is_stale_and_can_be_pruned(file: Path) -> None:
@@ -151,7 +151,7 @@ def test_shrinking_goes_on(file: Path) -> None:
     result = garl("shrink", file, "--flights=20", "--workers=0")
     assert result.exit_code == 0, result.output
     (path,) = Path("scenarios/regressions/stack_of_test").glob("*.toml")
-    case = load(path)
+    case = load_case(path)
     assert case.scenario["environment.fog"] == 0.0
     assert len(case.scenario.removed_objects) == len(LAWN.all_objects)
     assert case.status == "open"

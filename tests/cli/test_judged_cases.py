@@ -12,7 +12,7 @@ import pytest
 from click.testing import CliRunner, Result
 
 from pytest_garl.cli import main
-from pytest_garl.regressions.case_file import load
+from pytest_garl.regressions.case_file import load_case
 from pytest_garl.regressions.corpus import replace_file
 from tests.plugin.test_cases import OWN, change, dodge
 from tests.plugin.test_plugin import write_project
@@ -79,7 +79,7 @@ def test_a_repaired_system_is_fixed_and_promoted(project: Path) -> None:
     assert "judged by test_it.py::test_collisions" in fixed.output
     assert fixed.exit_code == 0
     assert "fixed; from now on it must pass" in garl("promote", dog).output
-    assert load(dog).status == "fixed"
+    assert load_case(dog).status == "fixed"
 
 
 def test_a_property_of_ones_own_is_judged_by_its_own_test(project: Path) -> None:
@@ -88,7 +88,7 @@ def test_a_property_of_ones_own_is_judged_by_its_own_test(project: Path) -> None
     assert failed.output.startswith("FAILED\n")
     assert "test_own: AssertionError: too much snow" in failed.output
     assert "still fails" in garl("promote", own).output
-    assert load(own).status == "open"
+    assert load_case(own).status == "open"
 
 
 def test_a_case_that_still_fails_under_its_own_test_is_never_pruned(project: Path) -> None:
@@ -113,7 +113,7 @@ def test_a_pass_since_the_simulator_changed_is_stale_for_all(project: Path) -> N
     assert "the simulator has changed" in stale.output
     assert stale.exit_code == 3
     assert "passes, but is stale with its recorded moves" in garl("promote", dog).output
-    assert load(dog).status == "open"
+    assert load_case(dog).status == "open"
     done = subprocess.run(
         [sys.executable, "-m", "pytest", "--garl-workers=0"],
         cwd=project,
@@ -132,7 +132,7 @@ def test_a_test_that_asks_less_does_not_make_a_case_fixed(project: Path) -> None
     change(project / "test_it.py", "assert not landing.collisions", "assert True")
     assert "the recorded one to the byte" in garl("replay", dog).output
     assert "is stale" in garl("promote", dog).output
-    assert load(dog).status == "open"
+    assert load_case(dog).status == "open"
 
 
 def test_another_test_of_the_file_that_fails_keeps_it_open(project: Path) -> None:
@@ -153,13 +153,13 @@ def test_what_gave_up_is_told_and_what_is_undecided_is_refused(project: Path, ou
         simulator_is_as_it_was(dog)
         told = garl("promote", dog).output
         assert "with its recorded moves the landing system gave up; it did not land" in told
-        assert load(dog).status == "fixed"
+        assert load_case(dog).status == "fixed"
     else:
         change(project / "test_it.py", "not landing.collisions", "landing.time_to_landing_s")
         change(simulator, end, f"    outcome, contacts = 'collision', {CONTACT}\n{end}")
         simulator_is_as_it_was(dog)
         assert "is not decided with its recorded moves" in garl("promote", dog).output
-        assert load(dog).status == "open"
+        assert load_case(dog).status == "open"
 
 
 CONTACT = (
@@ -170,7 +170,7 @@ CONTACT = (
 
 def simulator_is_as_it_was(file: Path) -> None:
     """Let a case have been saved before its simulator was hashed."""
-    case = load(file)
+    case = load_case(file)
     replace_file(
         file,
         dataclasses.replace(case, evidence=dataclasses.replace(case.evidence, simulator_sha256="")),
@@ -194,11 +194,11 @@ def test_a_file_that_cannot_be_collected_is_one_clear_error(project: Path) -> No
 
 def test_a_case_of_a_property_of_ones_own_is_shrunk_by_its_test(project: Path) -> None:
     own = saved(project, "own")
-    case = load(own)
+    case = load_case(own)
     foggy = case.scenario.replace({"environment.dust": 0.1, "environment.snow": 0.14})
     file = replace_file(own, dataclasses.replace(case, scenario=foggy))
     shrunk(file, 30)
-    better = load(saved(project, "own"))
+    better = load_case(saved(project, "own"))
     assert better.scenario["environment.dust"] == 0.0
     assert 0.1 <= better.scenario["environment.snow"] <= 0.14
     assert (better.test, better.assertion) == (case.test, case.assertion)

@@ -42,7 +42,7 @@ from tests.execution.flying import Good, job_of, scenario
 from tests.experiments.samples import row
 from tests.experiments.test_spec import TEXT as PLAN
 from tests.fuzz import binary_mutations, mutations
-from tests.regressions import test_case_file as test_files
+from tests.regressions import samples as case_samples
 
 Change = Callable[[random.Random], None]
 _COURT = maps.load_map("court")
@@ -78,9 +78,9 @@ def _text_file(name: str, samples: Callable[[], list[str]]) -> Callable[..., Pat
 
 
 def _cases() -> list[str]:
-    own = [test_files.case(), test_files.changing()]
+    own = [case_samples.case(), case_samples.case_with_changes()]
     shipped = sorted(_CASES.glob("*/*.toml"))[:4]
-    return [*(files.dumps(each) for each in own), *(file.read_text() for file in shipped)]
+    return [*(files.dump_case(each) for each in own), *(file.read_text() for file in shipped)]
 
 
 def _load_case(path: Path, rng: random.Random) -> None:
@@ -89,7 +89,7 @@ def _load_case(path: Path, rng: random.Random) -> None:
         raise GarlError(entry.problem)
     case = entry.case
     assert case is not None
-    assert files.loads(files.dumps(case), maps.load_map) == case
+    assert files.parse_case(files.dump_case(case), maps.load_map) == case
     assert case.id
     list(describe_scenario(case.scenario, ()))
 

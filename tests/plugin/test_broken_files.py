@@ -8,9 +8,9 @@ from pathlib import Path
 
 import pytest
 
-from pytest_garl.regressions.case_file import dumps
+from pytest_garl.regressions.case_file import dump_case
 from tests.plugin.test_plugin import project, run
-from tests.regressions.test_case_file import case
+from tests.regressions.samples import case
 
 BROKEN = {
     "nested": "nested too deeply",
@@ -26,7 +26,7 @@ BROKEN = {
 def _break(folder: Path) -> None:
     """Write one file of each kind that says nothing, and hangs nobody."""
     folder.mkdir(parents=True)
-    text = dumps(case()).replace("stack.landing:Lander", "systems:Good")
+    text = dump_case(case()).replace("stack.landing:Lander", "systems:Good")
     (folder / "nested.toml").write_text("seed = " + "[" * 3000)
     (folder / "digits.toml").write_text("seed = " + "9" * 5000)
     (folder / "large.toml").write_text("#" * 1_000_005)

@@ -10,7 +10,7 @@ from click.testing import CliRunner
 
 from pytest_garl.cli import main
 from pytest_garl.execution.ledger import Ledger
-from pytest_garl.regressions.case_file import dumps, load
+from pytest_garl.regressions.case_file import dump_case, load_case
 from tests.plugin.test_plugin import project, result_hash, write_project
 
 SEARCH = ("--garl-budget=24", "--garl-workers=0", "--garl-shrink=60")
@@ -82,13 +82,13 @@ def dodge(project: Path) -> None:
 def test_what_a_search_finds_is_saved_small_and_then_expected(searched: pytest.Pytester) -> None:
     fog, dog = cases(searched)
     assert (fog.name[:14], dog.name[:11]) == ("lawn-I-unknown", "lawn-IV-dog")
-    found = load(dog)
+    found = load_case(dog)
     assert set(found.scenario.removed_objects) == {"bird-1", "person-1", "person-2"}
     assert found.scenario["environment.fog"] == 0.0
     assert 0.7 < found.scenario["dog-1.velocity"] < 0.8
-    assert load(fog).scenario["environment.fog"] < 0.12
-    assert load(dog).test == "test_it.py::test_collisions"
-    assert load(fog).test == "test_it.py::test_distance"
+    assert load_case(fog).scenario["environment.fog"] < 0.12
+    assert load_case(dog).test == "test_it.py::test_collisions"
+    assert load_case(fog).test == "test_it.py::test_distance"
     result = run(searched, *CASES, "-rx")
     result.assert_outcomes(passed=2, skipped=2, xfailed=2)
     result.stdout.fnmatch_lines(["*case-lawn-I*known: I?:unknown (scenarios/regressions/*"])
@@ -120,7 +120,7 @@ def test_cases_of_a_search_with_destinations_keep_them_and_are_flown(
 ) -> None:
     project(pytester)
     run(pytester, *SEARCH, "--garl-method=ga")
-    found = [load(path) for path in cases(pytester)]
+    found = [load_case(path) for path in cases(pytester)]
     assert {case.policy for case in found} == {"destination"}
     (dog,) = [case for case in found if case.violation.signature.startswith("IV:dog")]
     assert -1 <= dog.scenario["dog-1.destination_x"] <= 1
@@ -134,7 +134,7 @@ def test_what_the_cap_does_not_reach_is_saved_unshrunk_and_told(
 ) -> None:
     project(pytester)
     result = run(pytester, "--garl-budget=8", "--garl-workers=0")
-    fog, dog = (load(path) for path in cases(pytester))
+    fog, dog = (load_case(path) for path in cases(pytester))
     assert (fog.evidence.neighbours, dog.evidence.neighbours) == (3, 0)
     assert fog.evidence.removed.startswith("4 of 4 objects")
     assert dog.evidence.removed == "nothing"
@@ -152,7 +152,7 @@ def test_what_the_cap_does_not_reach_is_saved_unshrunk_and_told(
 def test_each_new_kind_has_flights_of_its_own(pytester: pytest.Pytester) -> None:
     project(pytester)
     result = run(pytester, "--garl-budget=8", "--garl-workers=0", "--garl-shrink=12")
-    assert [load(path).evidence.neighbours for path in cases(pytester)] == [3, 3]
+    assert [load_case(path).evidence.neighbours for path in cases(pytester)] == [3, 3]
     assert "not shrunk" not in result.stdout.str()
 
 
@@ -161,7 +161,7 @@ def test_a_python_exception_takes_two_flights_at_most(pytester: pytest.Pytester)
     result = run(pytester, "--garl-budget=4", "--garl-workers=0", "--garl-shrink=100")
     result.stdout.fnmatch_lines(["*1 new kind of violation, at most 2 flights, *"])
     (path,) = cases(pytester)
-    assert len(load(path).scenario.removed_objects) == 4
+    assert len(load_case(path).scenario.removed_objects) == 4
     assert "; 1 flight)" in result.stdout.str().replace("\n    ", " ")
 
 
@@ -286,7 +286,7 @@ def test_what_cannot_be_avoided_gates_nothing(pytester: pytest.Pytester) -> None
     change(pytester.path / "tiny_simulator.py", "is False", "is None")
     result = run(pytester, *SEARCH)
     result.stdout.fnmatch_lines(["*UNAVOIDABLE, gates nothing*"])
-    assert {load(path).status for path in cases(pytester)} == {"unavoidable"}
+    assert {load_case(path).status for path in cases(pytester)} == {"unavoidable"}
     commit(pytester.path)
     assert run(pytester).ret == 0
 
@@ -352,8 +352,8 @@ def test_who_repairs_need_not_outrun_what_the_reference_pilot_does_not(
     told = " ".join(result.stdout.str().split())
     assert "the reference pilot violates nothing unless it is pursued as well" in told
     fog, dog = cases(pytester)
-    assert (load(fog).avoidable, load(dog).avoidable) == ("live", "recorded")
-    assert load(dog).status == "open"
+    assert (load_case(fog).avoidable, load_case(dog).avoidable) == ("live", "recorded")
+    assert load_case(dog).status == "open"
     change(dog, 'status = "open"', 'status = "fixed"')
     change(simulator, hit, "> 7")
     change(fog, 'status = "open"', 'status = "open"\naccepted = true')
@@ -375,7 +375,7 @@ def test_with_ci_set_the_tree_is_left_alone_and_a_patch_brings_the_case(
     subprocess.run(["git", "init", "-q"], check=True, cwd=pytester.path)
     subprocess.run(["git", "apply", *map(str, patches)], check=True, cwd=pytester.path)
     for path in cases(pytester):
-        assert dumps(load(path)) == path.read_text()
+        assert dump_case(load_case(path)) == path.read_text()
     commit(pytester.path)
     assert run(pytester).ret == 0
 
@@ -480,7 +480,7 @@ def test_a_property_of_ones_own_is_shrunk_and_saved_for_its_test(
     result = run(pytester, *SEARCH, *how, "--garl-shrink=120")
     result.stdout.fnmatch_lines(["own:test_own:*: a property of your own"])
     (own,) = [path for path in cases(pytester) if "-own-" in path.name]
-    case = load(own)
+    case = load_case(own)
     assert (case.test, case.own_test) == ("test_it.py::test_own", "test_own")
     assert case.violation.type == "own"
     assert case.violation.description.startswith("test_own: too much snow")

@@ -8,13 +8,13 @@ import pytest
 
 from pytest_garl.baselines import file as baselines
 from pytest_garl.errors import BaselineError, OptionError, ScenarioError
-from pytest_garl.regressions.case_file import dumps, load, load_header, loads
+from pytest_garl.regressions.case_file import dump_case, load_case, load_header, parse_case
 from pytest_garl.scenarios.maps.map import load_map
 from pytest_garl.verdicts.verdict import Limits
 from tests.baselines.samples import baseline
-from tests.regressions.test_case_file import NAMES, SYSTEM, case, changing
+from tests.regressions.samples import NAMES, SYSTEM, case, case_with_changes
 
-TEXT = dumps(case())
+TEXT = dump_case(case())
 MOVES = "[[2, 0.0, 0.0], [1, 0.6, -0.8]]"
 
 
@@ -43,7 +43,7 @@ def test_a_case_that_would_eat_the_machine_or_leave_the_tree_is_refused(
 ) -> None:
     assert old in TEXT
     with pytest.raises(ScenarioError, match=words) as caught:
-        loads(TEXT.replace(old, new), load_map, source="lawn-x.toml")
+        parse_case(TEXT.replace(old, new), load_map, source="lawn-x.toml")
     assert "lawn-x.toml" in str(caught.value)
     assert len(str(caught.value)) < 500
 
@@ -51,26 +51,26 @@ def test_a_case_that_would_eat_the_machine_or_leave_the_tree_is_refused(
 @pytest.mark.parametrize("system", ["a-b.c_d.2nd:Outer.Inner", "stack:Länder"])
 def test_what_python_can_import_is_taken(system: str) -> None:
     text = TEXT.replace(SYSTEM, system)
-    assert loads(text, load_map).system == system
+    assert parse_case(text, load_map).system == system
 
 
 def test_moves_for_the_longest_flight_are_taken() -> None:
-    found = loads(TEXT.replace(MOVES, "[[599, 0.0, 0.0], [1, 0.6, -0.8]]"), load_map)
+    found = parse_case(TEXT.replace(MOVES, "[[599, 0.0, 0.0], [1, 0.6, -0.8]]"), load_map)
     assert len(dict(found.moves)[NAMES[-1]]) == 600
 
 
 def test_a_change_of_the_environment_beyond_the_longest_flight_is_refused() -> None:
-    text = dumps(changing())
-    assert loads(text.replace("[[0, ", "[[599, "), load_map)
+    text = dump_case(case_with_changes())
+    assert parse_case(text.replace("[[0, ", "[[599, "), load_map)
     with pytest.raises(ScenarioError, match=r"found \[600, 'environment.fog', 0.01\], expected"):
-        loads(text.replace("[[0, ", "[[600, "), load_map)
+        parse_case(text.replace("[[0, ", "[[600, "), load_map)
     with pytest.raises(ScenarioError, match=r"found \[0, 'environment.fog', 999"):
-        loads(text.replace("0.01]", f"{'9' * 400}]", 1), load_map)
+        parse_case(text.replace("0.01]", f"{'9' * 400}]", 1), load_map)
 
 
 def test_escape_sequences_in_a_case_are_written_out() -> None:
     text = TEXT.replace("A dog. It bites.", "A \\u001b[2Jdog.\\u202e")
-    assert loads(text, load_map).violation.description == "A \\x1b[2Jdog.\\u202e"
+    assert parse_case(text, load_map).violation.description == "A \\x1b[2Jdog.\\u202e"
 
 
 @pytest.mark.parametrize("value", [300.001, -1.0, float("nan"), float("inf"), "120", True])
@@ -89,7 +89,7 @@ def test_other_limits_that_make_no_sense_are_told() -> None:
 
 def test_the_head_of_a_case_is_read_within_the_limit(tmp_path: Path) -> None:
     (tmp_path / "a.toml").write_text(TEXT + "#" * 1_000_000)
-    for read in (load, load_header):
+    for read in (load_case, load_header):
         with pytest.raises(ScenarioError, match="bytes, expected at most 1000000"):
             read(tmp_path / "a.toml")
 

@@ -10,59 +10,20 @@ from hypothesis import strategies as st
 
 from pytest_garl.errors import ScenarioError
 from pytest_garl.messages import printable
-from pytest_garl.regressions.case import Case, Evidence, Violation
-from pytest_garl.regressions.case_file import dumps, load, loads
+from pytest_garl.regressions.case_file import dump_case, load_case, parse_case
 from pytest_garl.scenarios.chromosome import decode
 from pytest_garl.scenarios.genes import genome_for, with_destinations
 from pytest_garl.scenarios.maps.map import load_map
 from pytest_garl.scenarios.validity import repair
-from pytest_garl.verdicts.verdict import Limits
+from tests.regressions.samples import LAWN, NAMES, case, case_with_changes
 
-LAWN = load_map("lawn")
 ROOT = Path(__file__).parents[2]
-NAMES = [name for name, _ in LAWN.object_names]
-SYSTEM = "stack.landing:Lander"
-
-
-def case(
-    signature: str = "IV:dog:last-metre:unseen", description: str = "A dog. It bites."
-) -> Case:
-    genome = genome_for(LAWN)
-    row = genome.random(np.random.default_rng(1))
-    scenario = repair(decode(row, genome, map="lawn", seed=9), LAWN).without(*NAMES[:-1])
-    return Case(
-        system=SYSTEM,
-        status="open",
-        avoidable="live",
-        scenario=scenario,
-        violation=Violation(
-            signature=signature,
-            type="IV",
-            property="collision",
-            margin=0.0,
-            unit="m",
-            description=description,
-        ),
-        policy="dqn",
-        policy_sha256="ab" * 32,
-        moves=((NAMES[-1], ((0.0, 0.0), (0.0, 0.0), (0.6, -0.8))),),
-        evidence=Evidence(
-            trajectory_sha256="cd" * 32,
-            cpu="x86_64-avx2",
-            map_sha256=LAWN.sha256,
-            neighbours=3,
-            neighbours_failed=3,
-            removed="3 of 4 objects",
-            versions=(("pytest-garl", "0.1.0"), ("numpy", "2.4.0")),
-        ),
-        limits=Limits(),
-    )
 
 
 def test_a_case_survives_its_file_and_has_the_same_bytes_again() -> None:
-    text = dumps(case())
-    assert loads(text, load_map) == case()
-    assert dumps(loads(text, load_map)) == text
+    text = dump_case(case())
+    assert parse_case(text, load_map) == case()
+    assert dump_case(parse_case(text, load_map)) == text
 
 
 COMMITTED = [
@@ -74,21 +35,21 @@ COMMITTED = [
 
 @pytest.mark.parametrize("path", COMMITTED, ids=lambda path: path.stem)
 def test_a_committed_case_keeps_its_bytes_and_its_name(path: Path) -> None:
-    committed = load(path)
-    assert dumps(committed) == path.read_text(encoding="utf-8")
+    committed = load_case(path)
+    assert dump_case(committed) == path.read_text(encoding="utf-8")
     assert committed.id == path.stem
 
 
 def test_the_id_of_a_case_stays() -> None:
     assert case().id == "lawn-IV-dog-33ab15"
-    assert changing().id == "lawn-IV-dog-96cf0c"
+    assert case_with_changes().id == "lawn-IV-dog-96cf0c"
 
 
 @settings(deadline=None)
 @given(st.text())
 def test_no_description_breaks_the_file(description: str) -> None:
     strange = case(description=description)
-    assert loads(dumps(strange), load_map) == case(description=printable(description))
+    assert parse_case(dump_case(strange), load_map) == case(description=printable(description))
 
 
 def test_a_case_with_destinations_survives_its_file() -> None:
@@ -96,21 +57,16 @@ def test_a_case_with_destinations_survives_its_file() -> None:
     row = genome.random(np.random.default_rng(1))
     scenario = repair(decode(row, genome, map="lawn", seed=9), LAWN).without(*NAMES[:-1])
     bound = dataclasses.replace(case(), scenario=scenario, policy="destination")
-    assert loads(dumps(bound), load_map) == bound
-
-
-def changing() -> Case:
-    changes = ((0, "environment.fog", 0.01), (2, "environment.sun_position", -0.01))
-    return dataclasses.replace(case(), policy="online-rl", changes=((NAMES[-1], changes),))
+    assert parse_case(dump_case(bound), load_map) == bound
 
 
 def test_what_a_policy_changed_of_the_environment_survives_the_file() -> None:
-    text = dumps(changing())
+    text = dump_case(case_with_changes())
     assert f'{NAMES[-1]} = [[0, "environment.fog", 0.01], [2, "environment.sun_position"' in text
-    assert loads(text, load_map) == changing()
-    assert dumps(loads(text, load_map)) == text
-    assert changing().id != case().id
-    assert "[changes]" not in dumps(case())
+    assert parse_case(text, load_map) == case_with_changes()
+    assert dump_case(parse_case(text, load_map)) == text
+    assert case_with_changes().id != case().id
+    assert "[changes]" not in dump_case(case())
 
 
 def test_names_with_quotes_and_backslashes_survive_the_file() -> None:
@@ -119,7 +75,7 @@ def test_names_with_quotes_and_backslashes_survive_the_file() -> None:
     strange = dataclasses.replace(
         strange, scenario=dataclasses.replace(strange.scenario, map=odd.name)
     )
-    assert loads(dumps(strange), lambda _: odd) == strange
+    assert parse_case(dump_case(strange), lambda _: odd) == strange
 
 
 def test_a_case_keeps_the_test_that_found_it_and_the_hashes_of_the_sources() -> None:
@@ -128,7 +84,7 @@ def test_a_case_keeps_the_test_that_found_it_and_the_hashes_of_the_sources() -> 
         plain.evidence, system_sha256="ef" * 32, simulator_sha256="12" * 32
     )
     told = dataclasses.replace(plain, test="tests/test_it.py::TestIt::test_a", evidence=evidence)
-    assert loads(dumps(told), load_map) == told
+    assert parse_case(dump_case(told), load_map) == told
     assert told.id == plain.id
     assert told.own_test == ""
 
@@ -136,7 +92,7 @@ def test_a_case_keeps_the_test_that_found_it_and_the_hashes_of_the_sources() -> 
 def test_a_case_of_a_tests_own_assertion_belongs_to_that_test_wherever_its_file_is() -> None:
     old = dataclasses.replace(case(), test="test_own", assertion="12345678")
     told = dataclasses.replace(old, test="tests/test_it.py::test_own")
-    assert loads(dumps(old), load_map) == old
+    assert parse_case(dump_case(old), load_map) == old
     assert (told.own_test, told.id) == ("test_own", old.id)
     assert told.id != case().id
 
@@ -153,31 +109,31 @@ def test_a_case_of_a_tests_own_assertion_belongs_to_that_test_wherever_its_file_
     ],
 )
 def test_changes_that_make_no_sense_name_source_and_key(old: str, new: str) -> None:
-    text = dumps(changing())
+    text = dump_case(case_with_changes())
     start = text.index("[changes]")
     broken = text[:start] + text[start:].replace(old, new, 1)
     words = rf"lawn-x.toml: key 'changes.{NAMES[-1]}': found .* expected a list of \[decision, gene"
     with pytest.raises(ScenarioError, match=words):
-        loads(broken, load_map, source="lawn-x.toml")
+        parse_case(broken, load_map, source="lawn-x.toml")
 
 
 def test_an_unknown_object_changes_nothing() -> None:
-    text = dumps(changing()).replace(f'{NAMES[-1]} = [[0, "env', 'cat-1 = [[0, "env')
+    text = dump_case(case_with_changes()).replace(f'{NAMES[-1]} = [[0, "env', 'cat-1 = [[0, "env')
     with pytest.raises(ScenarioError, match=r"'changes.cat-1': unknown key"):
-        loads(text, load_map)
+        parse_case(text, load_map)
 
 
 def test_a_negative_zero_survives_the_file_with_the_name() -> None:
     plain = dataclasses.replace(
         case(), moves=((NAMES[-1], ((0.0, 0.0), (0.0, -0.0), (-0.0, 0.0))),)
     )
-    again = loads(dumps(plain), load_map)
+    again = parse_case(dump_case(plain), load_map)
     assert repr(again.moves) == repr(plain.moves)
     assert again.id == plain.id
 
 
 def test_moves_are_written_as_runs() -> None:
-    assert f"{NAMES[-1]} = [[2, 0.0, 0.0], [1, 0.6, -0.8]]" in dumps(case())
+    assert f"{NAMES[-1]} = [[2, 0.0, 0.0], [1, 0.6, -0.8]]" in dump_case(case())
 
 
 @pytest.mark.parametrize(
@@ -195,10 +151,10 @@ def test_moves_are_written_as_runs() -> None:
     ],
 )
 def test_a_broken_file_names_source_and_key(old: str, new: str, words: str) -> None:
-    text = dumps(case())
+    text = dump_case(case())
     assert old in text
     with pytest.raises(ScenarioError, match=words) as caught:
-        loads(text.replace(old, new), load_map, source="lawn-x.toml")
+        parse_case(text.replace(old, new), load_map, source="lawn-x.toml")
     assert "lawn-x.toml" in str(caught.value)
 
 

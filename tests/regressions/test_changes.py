@@ -19,7 +19,7 @@ from pytest_garl.regressions.replay import replay
 from pytest_garl.simulation.flight_file import save
 from pytest_garl.simulation.fly import fly
 from pytest_garl.simulation.system_under_test.reference_pilot import ReferencePilot
-from tests.regressions.test_case_file import NAMES, case, changing
+from tests.regressions.samples import NAMES, case, case_with_changes
 from tests.simulation.test_environment import LAWN, SCENARIO, WEATHERMAKER
 from tests.support.results import flight_result
 
@@ -60,7 +60,7 @@ def test_pytest_flies_a_case_with_its_moves_and_its_changes() -> None:
         target: Any = SimpleNamespace(entry=SimpleNamespace(case=each), live=False)
         return dict(_steered(target, policy_spec("greedy")).arguments)
 
-    changes = json.loads(arguments(changing())["changes"])
+    changes = json.loads(arguments(case_with_changes())["changes"])
     assert changes == {
         NAMES[-1]: [[0, "environment.fog", 0.01], [2, "environment.sun_position", -0.01]]
     }

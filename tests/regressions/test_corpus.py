@@ -12,13 +12,13 @@ import pytest
 from pytest_garl.errors import CorpusError
 from pytest_garl.files import reading
 from pytest_garl.regressions.case import Status
-from pytest_garl.regressions.case_file import dumps, load
+from pytest_garl.regressions.case_file import dump_case, load_case
 from pytest_garl.regressions.corpus import Corpus, patch_of, replace_file
 from pytest_garl.scenarios.maps import map as package
 from pytest_garl.scenarios.maps.map import load_map
-from tests.regressions.test_case_file import NAMES, SYSTEM, case
+from tests.regressions.samples import NAMES, SYSTEM, case
 
-TEXT = dumps(case())
+TEXT = dump_case(case())
 
 
 def test_one_file_per_way_to_fail(tmp_path: Path) -> None:
@@ -198,7 +198,7 @@ def test_a_long_signature_makes_no_file_name_that_is_too_long(tmp_path: Path) ->
     path = Corpus(tmp_path).save(strange)
     assert path is not None
     assert len(path.name) < 100
-    assert load(path) == strange
+    assert load_case(path) == strange
 
 
 def test_a_link_to_a_file_beside_the_cases_is_no_lost_case(tmp_path: Path) -> None:

@@ -20,9 +20,8 @@ from pytest_garl.regressions.reshrink import CaseReshrinker, _all_removed
 from pytest_garl.regressions.robustness import neighbours
 from pytest_garl.regressions.simplicity import no_worse, simplicity
 from pytest_garl.scenarios.scenario import Scenario
-from tests.regressions.test_case_file import LAWN, NAMES
-from tests.regressions.test_case_file import case as dog_case
-from tests.regressions.test_shrink import COLLIDING_OBJECT, violation
+from tests.regressions.samples import COLLIDING_OBJECT, LAWN, NAMES, violation
+from tests.regressions.samples import case as dog_case
 from tests.support.results import flight_result
 
 SIGNATURE = "IV:dog:last-metre:unseen"

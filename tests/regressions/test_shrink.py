@@ -15,19 +15,9 @@ from pytest_garl.regressions.shrink import (
 )
 from pytest_garl.scenarios.chromosome import decode
 from pytest_garl.scenarios.genes import genome_for, with_destinations
-from pytest_garl.scenarios.maps.map import load_map
 from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.scenarios.validity import problems, repair
-
-LAWN = load_map("lawn")
-NAMES = [name for name, _ in LAWN.object_names]
-COLLIDING_OBJECT = NAMES[0]
-
-
-def violation(seed: int = 7) -> Scenario:
-    genome = genome_for(LAWN)
-    row = genome.random(np.random.default_rng(seed))
-    return repair(decode(row, genome, map="lawn", seed=1), LAWN)
+from tests.regressions.samples import COLLIDING_OBJECT, LAWN, NAMES, violation
 
 
 def fast(scenario: Scenario) -> bool:

@@ -48,7 +48,7 @@ import numpy as np
 from pathlib import Path
 from pytest_garl import cpu_dispatch
 from pytest_garl.adversary.recorded import recorded_spec
-from pytest_garl.regressions.case_file import load
+from pytest_garl.regressions.case_file import load_case
 from pytest_garl.execution.reference import system_named
 from pytest_garl.simulation.fly import fly
 from pytest_garl.verdicts.judge import judge
@@ -59,7 +59,7 @@ try:
     cpu_dispatch.check()
 except Exception as error:
     refused = str(error)
-cases = [load(Path(file), ()) for file in sys.argv[1:]]
+cases = [load_case(Path(file), ()) for file in sys.argv[1:]]
 flown = [
     fly(case.scenario, system_named(case.system), recorded_spec(dict(case.moves), {}))
     for case in cases

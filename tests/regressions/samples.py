@@ -1,0 +1,69 @@
+"""Cases and scenarios that several tests share."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+
+from pytest_garl.regressions.case import Case, Evidence, Violation
+from pytest_garl.scenarios.chromosome import decode
+from pytest_garl.scenarios.genes import genome_for
+from pytest_garl.scenarios.maps.map import load_map
+from pytest_garl.scenarios.scenario import Scenario
+from pytest_garl.scenarios.validity import repair
+from pytest_garl.verdicts.verdict import Limits
+
+LAWN = load_map("lawn")
+NAMES = [name for name, _ in LAWN.object_names]
+COLLIDING_OBJECT = NAMES[0]
+SYSTEM = "stack.landing:Lander"
+
+
+def case(
+    signature: str = "IV:dog:last-metre:unseen", description: str = "A dog. It bites."
+) -> Case:
+    """Return a case in which the UAV hits a dog on the lawn."""
+    genome = genome_for(LAWN)
+    row = genome.random(np.random.default_rng(1))
+    scenario = repair(decode(row, genome, map="lawn", seed=9), LAWN).without(*NAMES[:-1])
+    return Case(
+        system=SYSTEM,
+        status="open",
+        avoidable="live",
+        scenario=scenario,
+        violation=Violation(
+            signature=signature,
+            type="IV",
+            property="collision",
+            margin=0.0,
+            unit="m",
+            description=description,
+        ),
+        policy="dqn",
+        policy_sha256="ab" * 32,
+        moves=((NAMES[-1], ((0.0, 0.0), (0.0, 0.0), (0.6, -0.8))),),
+        evidence=Evidence(
+            trajectory_sha256="cd" * 32,
+            cpu="x86_64-avx2",
+            map_sha256=LAWN.sha256,
+            neighbours=3,
+            neighbours_failed=3,
+            removed="3 of 4 objects",
+            versions=(("pytest-garl", "0.1.0"), ("numpy", "2.4.0")),
+        ),
+        limits=Limits(),
+    )
+
+
+def case_with_changes() -> Case:
+    """Return a case whose policy changed the environment."""
+    changes = ((0, "environment.fog", 0.01), (2, "environment.sun_position", -0.01))
+    return dataclasses.replace(case(), policy="online-rl", changes=((NAMES[-1], changes),))
+
+
+def violation(seed: int = 7) -> Scenario:
+    """Return a scenario on the lawn, with all of its objects."""
+    genome = genome_for(LAWN)
+    row = genome.random(np.random.default_rng(seed))
+    return repair(decode(row, genome, map="lawn", seed=1), LAWN)
