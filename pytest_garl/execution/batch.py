@@ -1,4 +1,4 @@
-"""Many flights of given scenarios at once, beside any search."""
+"""Many flights of given scenarios at once, beside the searches."""
 
 from __future__ import annotations
 

@@ -21,8 +21,8 @@ from pytest_garl.verdicts.verdict import PAPER_LIMITS, Limits
 TIMEOUT_S = 10.0
 """Wall time that one call of a landing system may take if nobody says otherwise, in seconds."""
 _OF_SOURCES = ("sources", "system_sha256")
-_PLACES = {"path", "flights", "map_folders"}
-"""Where things lie: that may change when a run is resumed, what is flown may not."""
+_FOLDERS = {"path", "flights", "map_folders"}
+"""Folders: they may change when a run is resumed, unlike the other facts."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -87,9 +87,9 @@ class FlightJob:
         return load_map(self.map, tuple(Path(folder) for folder in self.map_folders))
 
     def differences(self, other: FlightJob) -> tuple[str, ...]:
-        """Return what makes results of ``other`` not comparable to this one's."""
+        """Return the names of the facts that make results of ``other`` not comparable."""
         mine, theirs = dataclasses.asdict(self), dataclasses.asdict(other)
-        keys = [key for key in mine if key not in _PLACES and mine[key] != theirs[key]]
+        keys = [key for key in mine if key not in _FOLDERS and mine[key] != theirs[key]]
         if "sources" in keys:
             names = {name for name, _ in {*self.sources} ^ {*other.sources}}
             keys = [*sorted(names), *(key for key in keys if key not in _OF_SOURCES)]
@@ -98,8 +98,8 @@ class FlightJob:
         return tuple(keys)
 
     def flown_facts(self) -> str:
-        """Return as JSON all but where things lie."""
-        facts = {key: each for key, each in dataclasses.asdict(self).items() if key not in _PLACES}
+        """Return as JSON all facts on which a flight depends: all but the folders."""
+        facts = {key: each for key, each in dataclasses.asdict(self).items() if key not in _FOLDERS}
         return json.dumps(facts, sort_keys=True)
 
     def record(self, flight: FlightId) -> Path:

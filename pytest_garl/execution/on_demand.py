@@ -32,16 +32,16 @@ class FlyFunction(Protocol):
     """Flies a scenario as a job says, and waits for it."""
 
     def __call__(self, job: FlightJob, scenario: Scenario) -> CompletedFlight:
-        """Return what the flight came to."""
+        """Return the flight with its result."""
 
 
 class _StoppedError(BaseException):
-    """Ends a thread whose results nobody waits for any more."""
+    """Ends the thread of a procedure whose result is not needed any more."""
 
 
 @dataclass(slots=True, kw_only=True)
 class _Procedure:
-    """One function under way; None ends its questions, or the wait for an answer."""
+    """One procedure under way; None in a queue ends its questions, or the wait for an answer."""
 
     name: str
     asked: queue.SimpleQueue[tuple[FlightJob, Scenario] | None]
@@ -50,11 +50,11 @@ class _Procedure:
     flown: int = 0
 
     def fly(self, job: FlightJob, scenario: Scenario) -> CompletedFlight:
-        """Ask for a flight and wait for it: what the function is given."""
+        """Ask for a flight and wait for it; the procedure calls this method as ``fly``."""
         self.asked.put((job, scenario))
         answer = self.answers.get()
         if answer is None:
-            # Whoever asks on is to be ended again.
+            # A procedure that catches the error and asks again is ended again.
             self.answers.put(None)
             raise _StoppedError
         return answer
@@ -67,9 +67,9 @@ class OnDemandFlights:
         self._ledger, self._pool, self._on_wait = ledger, pool, on_wait
 
     def run(self, functions: Mapping[str, Callable[[FlyFunction], T]]) -> dict[str, T]:
-        """Return what each function returns; raise the first one's error.
+        """Return what each procedure returns; raise the first error of one.
 
-        The names tell flights of different functions apart and must be the same when resumed.
+        The names are part of the flights' keys, so that a resumed run must give the same.
         """
         procedures = [
             _Procedure(name=name, asked=queue.SimpleQueue(), answers=queue.SimpleQueue())
@@ -88,7 +88,7 @@ class OnDemandFlights:
         return {name: future.result() for name, future in futures.items()}
 
     def _wait(self, procedures: Sequence[_Procedure]) -> None:
-        """Let the pool fly what is asked for until nobody asks any more."""
+        """Let the pool fly until no procedure asks any more."""
         waiting = list(procedures)
         while waiting:
             waiting = [procedure for procedure in waiting if not self._advance(procedure)]
@@ -97,7 +97,7 @@ class OnDemandFlights:
             self._on_wait()
 
     def _advance(self, procedure: _Procedure) -> bool:
-        """Take a function as far as it goes without a flight; return whether it is done."""
+        """Take a procedure as far as it goes without a new flight; return whether it has ended."""
         while True:
             if procedure.awaited is not None:
                 done = self._ledger.completed(*procedure.awaited)
@@ -112,8 +112,8 @@ class OnDemandFlights:
 
     def _ask(self, procedure: _Procedure, job: FlightJob, scenario: Scenario) -> None:
         text = dump_scenario(scenario)
-        # What is asked belongs to the key: resumed with another budget, a function asks otherwise.
-        key = f"errand {procedure.name} {procedure.flown} {job.flown_facts()} {text}"
+        # The key holds the question: a run resumed with another budget asks other questions.
+        key = f"on demand {procedure.name} {procedure.flown} {job.flown_facts()} {text}"
         flight = FlightId(search=search_key(key), map=job.map)
         procedure.awaited = flight, Path(job.flights)
         procedure.flown += 1

@@ -7,6 +7,7 @@ import hashlib
 import importlib
 import importlib.util
 import inspect
+import operator
 import re
 import sys
 from dataclasses import dataclass
@@ -17,7 +18,7 @@ from pytest_garl.errors import LandingSystemError
 from pytest_garl.messages import shown
 
 SYSTEM_NAME = re.compile(r"\w[\w-]*(\.\w[\w-]*)*:[^\W\d]\w*(\.[^\W\d]\w*)*")
-"""Of a class, "module:class", names with dots between: what is imported is no path to elsewhere."""
+"""Form of "module:class", names with dots between, so that no path can be imported."""
 
 HASHED = (
     "adversary",
@@ -64,7 +65,7 @@ class Reference:
         return f"{self.module}:{self.qualname}"
 
     def load(self) -> Any:
-        """Return the object, imported by name, or from its file where the name fails."""
+        """Return the object, imported by name, or from its file if the name fails."""
         try:
             module = importlib.import_module(self.module)
             if self.file and Path(module.__file__ or "").resolve() != Path(self.file):
@@ -76,10 +77,7 @@ class Reference:
             module = importlib.util.module_from_spec(spec)
             sys.modules[self.module] = module
             spec.loader.exec_module(module)
-        found: Any = module
-        for name in self.qualname.split("."):
-            found = getattr(found, name)
-        return found
+        return operator.attrgetter(self.qualname)(module)
 
 
 BUILT_IN = Reference(module="pytest_garl.simulation.fly", file="", qualname="fly")
@@ -103,7 +101,10 @@ def reference_to(thing: Any) -> Reference:
 
 @functools.cache
 def package_sha256() -> str:
-    """Hash what of this package shapes a search: its sources, maps, meshes and weights."""
+    """Return the hash of the parts of this package that shape a search.
+
+    These are sources, maps, meshes and weights.
+    """
     home = Path(__file__).parents[1]
     digest = hashlib.sha256()
     for place in (home / name for name in HASHED):
@@ -114,31 +115,29 @@ def package_sha256() -> str:
 
 
 def simulator_sha256(simulator: Reference) -> str:
-    """Hash what of a flight is not the landing system's: this package, another simulator's file."""
+    """Return the hash of a flight's code except the landing system: package and simulator."""
     own = Path(simulator.file).read_bytes() if simulator.file else b""
     return hashlib.sha256(package_sha256().encode() + own).hexdigest()
 
 
 def system_named(name: str) -> Any:
-    """Import a landing system by "module:class"; raise LandingSystemError for what is none."""
+    """Import a landing system by "module:class"; raise LandingSystemError if there is none."""
     if not SYSTEM_NAME.fullmatch(name):
         raise LandingSystemError(
             f"found {shown(name)}, expected 'module:class', names with dots between"
         )
     module, _, qualname = name.partition(":")
     try:
-        found: Any = importlib.import_module(module)
-        for part in qualname.split("."):
-            found = getattr(found, part)
+        found: Any = operator.attrgetter(qualname)(importlib.import_module(module))
     except (Exception, SystemExit) as error:
-        # A module may raise what it likes while it is imported.
+        # A module may raise anything while it is imported.
         raise LandingSystemError(f"{type(error).__name__}: {error}") from error
     check_system(found)
     return found
 
 
 def check_system(system: Any) -> None:
-    """Raise LandingSystemError for what can be no landing system."""
+    """Raise LandingSystemError if a class cannot be a landing system."""
     if not inspect.isclass(system):
         raise LandingSystemError(
             f"system={system!r}: expected a class, found {type(system).__name__}"

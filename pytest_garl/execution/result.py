@@ -1,4 +1,4 @@
-"""The result of a flight: what the ledger keeps of it, and everybody else reads."""
+"""Results of flights: the ledger stores them as JSON, all other rooms read their attributes."""
 
 from __future__ import annotations
 

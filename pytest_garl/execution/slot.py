@@ -1,4 +1,4 @@
-"""Slots: the names of a search's flights, known before any of them is bred."""
+"""Slots: places of a search for flights, which have names before they are bred."""
 
 from __future__ import annotations
 

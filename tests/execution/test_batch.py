@@ -2,7 +2,6 @@ from __future__ import annotations
 
 import dataclasses
 from pathlib import Path
-from typing import Any
 
 import pytest
 
@@ -31,7 +30,7 @@ SCENARIOS = BaselineSpec(count=3).scenarios(load_map("lawn"))
 
 
 class Instant:
-    """Flies nothing; remembers what had been handed out when the first flight was awaited."""
+    """Flies nothing; remembers the slots that waited at its first turn."""
 
     def __init__(self, ledger: Ledger) -> None:
         self.ledger = ledger
@@ -58,18 +57,18 @@ def fly(pool: Instant, job: FlightJob = JOB, count: int = 3) -> list[float]:
     return [done.result.elapsed_s for done in flights]
 
 
-def test_all_flights_are_handed_out_before_the_first_is_awaited(pool: Instant) -> None:
+def test_batch_hands_out_all_flights_before_it_waits(pool: Instant) -> None:
     assert fly(pool) == [0, 1, 2]
     assert pool.handed_out == [dump_scenario(each) for each in SCENARIOS]
 
 
-def test_flights_beside_a_search_count_as_none(pool: Instant) -> None:
+def test_batch_is_no_search(pool: Instant) -> None:
     fly(pool)
     assert pool.ledger.queries.progress() == []
     assert pool.ledger.searches() == []
 
 
-def test_a_resumed_batch_must_be_of_the_same_system_but_others_do_not_matter(
+def test_resumed_batch_refuses_another_version_of_the_system(
     pool: Instant,
 ) -> None:
     fly(pool)
@@ -81,27 +80,11 @@ def test_a_resumed_batch_must_be_of_the_same_system_but_others_do_not_matter(
     assert fly(pool, changed, count=2) == [0, 1]
 
 
-@pytest.mark.parametrize(
-    ("change", "differing"),
-    [
-        ({"limits": Limits(distance_m=1.0)}, ("limits",)),
-        ({"limits": Limits(abort="violation")}, ("limits",)),
-        ({"map_sha256": "two"}, ("map_sha256",)),
-        ({"timeout_s": 5.0}, ("timeout_s",)),
-        ({"path": ("elsewhere",), "flights": "there", "map_folders": ("maps",)}, ()),
-    ],
-)
-def test_jobs_differ_in_what_is_flown_and_not_in_where_it_lies(
-    change: dict[str, Any], differing: tuple[str, ...]
-) -> None:
-    assert JOB.differences(dataclasses.replace(JOB, **change)) == differing
-
-
-def test_what_one_system_replaces_in_its_process_bends_no_flight_of_another(tmp_path: Path) -> None:
+def test_flight_does_not_see_what_another_system_replaced_in_its_process(tmp_path: Path) -> None:
     with temporary_pool(1) as (ledger, pool):
 
         def hash_of(system: type, distance_m: float) -> str:
-            # Limits of their own make a search of their own.
+            # Other limits make another search.
             job = dataclasses.replace(
                 job_of(system, tmp_path), limits=Limits(distance_m=distance_m)
             )

@@ -1,4 +1,4 @@
-"""A flight with a NaN in it is a finding, whoever made the NaN, and is written nowhere."""
+"""One flight is flown, judged and saved; one with a NaN is a finding without a record."""
 
 from __future__ import annotations
 
@@ -10,11 +10,12 @@ from typing import Any
 
 import pytest
 
-from pytest_garl.execution.flight import fly_job
+from pytest_garl.execution.flight import fly_job, judged
 from pytest_garl.execution.flight_id import FlightId
 from pytest_garl.execution.reference import reference_to
 from pytest_garl.landing_system import Diagnostics
 from pytest_garl.simulation.flight import Flight, Step
+from pytest_garl.simulation.flight_file import load
 from tests.execution.flying import Good, job_of, scenario
 from tests.plugin import tiny_simulator
 
@@ -61,3 +62,20 @@ def test_flight_that_is_not_finite_is_a_finding(
     assert f"holds a NaN or an infinity in {words}" in result.verdict.story
     result.dumps()
     assert (sha256, list(tmp_path.iterdir())) == ("", [])
+
+
+def test_flight_is_judged_and_its_record_saved(tmp_path: Path) -> None:
+    job, flight = job_of(Good, tmp_path), FlightId(search="search", map="lawn")
+    result, sha256, wall_s = fly_job(job, scenario(), flight, None)
+    record = load(job.record(flight))
+    assert result == judged(record, job.limits)
+    assert (result.outcome, result.signature, result.crash) == ("landed", "", None)
+    assert (record.sha256, record.wall_s) == (sha256, wall_s)
+
+
+def test_flight_removes_the_record_of_an_earlier_attempt(tmp_path: Path) -> None:
+    job, flight = job_of(Good, tmp_path), FlightId(search="search", map="lawn")
+    fly_job(job, scenario(), flight, None)
+    broken = dataclasses.replace(job, simulator=reference_to(with_nan_distance))
+    fly_job(broken, scenario(), flight, None)
+    assert not job.record(flight).exists()

@@ -3,6 +3,7 @@ from __future__ import annotations
 import dataclasses
 import sys
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -13,20 +14,20 @@ from pytest_garl.execution.reference import BUILT_IN, reference_to
 from pytest_garl.plugin.arguments import OPTIONS
 from pytest_garl.scenarios.maps.map import load_map
 from pytest_garl.simulation.npc_policy import PolicySpec
-from pytest_garl.verdicts.verdict import PAPER_LIMITS
+from pytest_garl.verdicts.verdict import PAPER_LIMITS, Limits
 from tests.execution.flying import Good
 
 LAWN = load_map("lawn")
 NPCS = PolicySpec(name="none", factory="nowhere:Nothing")
 
 
-def job(**more: object) -> FlightJob:
+def job(**more: Any) -> FlightJob:
     return FlightJob.for_system(
         reference_to(Good),
         LAWN,
         NPCS,
         flights=Path("flights"),
-        **more,  # type: ignore[arg-type]
+        **more,
     )
 
 
@@ -56,8 +57,21 @@ def test_job_survives_its_text(tmp_path: Path) -> None:
         parse_job("")
 
 
-def test_folders_make_no_difference_between_jobs(tmp_path: Path) -> None:
-    other = dataclasses.replace(job(), flights=str(tmp_path), path=("elsewhere",))
-    assert job().differences(other) == ()
-    assert job().flown_facts() == other.flown_facts()
-    assert job().differences(dataclasses.replace(other, timeout_s=1.0)) == ("timeout_s",)
+@pytest.mark.parametrize(
+    ("change", "differing"),
+    [
+        ({"limits": Limits(distance_m=1.0)}, ("limits",)),
+        ({"limits": Limits(abort="violation")}, ("limits",)),
+        ({"map_sha256": "two"}, ("map_sha256",)),
+        ({"timeout_s": 5.0}, ("timeout_s",)),
+        ({"sources": (("a.py", "ab"),)}, ("a.py",)),
+        ({"npcs": PolicySpec(name="none", factory="a:B")}, ("npcs",)),
+        ({"path": ("elsewhere",), "flights": "there", "map_folders": ("maps",)}, ()),
+    ],
+)
+def test_jobs_differ_in_facts_but_not_in_folders(
+    change: dict[str, Any], differing: tuple[str, ...]
+) -> None:
+    other = dataclasses.replace(job(), **change)
+    assert job().differences(other) == differing
+    assert (job().flown_facts() == other.flown_facts()) == (not differing)
