@@ -1,4 +1,4 @@
-"""Breeds a search's generations as soon as their parents are flown."""
+"""Breeds the generations of a search, each as soon as its parents are flown."""
 
 from __future__ import annotations
 
@@ -10,10 +10,10 @@ from pytest_garl.search.method import Flown, Method
 
 
 class Breeder:
-    """One search in one pytest process; several may breed the same search, all alike.
+    """One search in one pytest process; all processes of a run breed the same scenarios.
 
-    ``wanted`` are the slots of each generation that shall be flown.  A method that learns
-    needs every generation before the last one whole.
+    ``wanted`` are the slots of each generation that are to be flown.  A method that learns needs
+    all slots of every generation but the last.
     """
 
     def __init__(
@@ -29,7 +29,7 @@ class Breeder:
         self._next = 0
 
     def advance(self) -> None:
-        """Hand out every generation that can be bred now."""
+        """Put every generation that can be bred now into the ledger."""
         while self._next <= self._last and self._parents_are_flown():
             if self._next > 0:
                 self._learn(self._next - 1)

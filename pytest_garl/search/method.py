@@ -1,4 +1,4 @@
-"""The search methods' interface: propose a generation, learn from what it came to."""
+"""The interface of a search method: propose a generation, learn from its results."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from pytest_garl.scenarios.scenario import Scenario
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SearchPlan:
-    """What a search is given: where, over which genes, from which seed, how many at a time."""
+    """The task of a search: its map, its genes, its seed and the size of a generation."""
 
     map: Map
     genome: Genome
@@ -24,7 +24,7 @@ class SearchPlan:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Flown:
-    """A scenario with the result of its flight, as the ledger holds it."""
+    """A scenario with the result of its flight."""
 
     scenario: Scenario
     result: FlightResult
@@ -33,8 +33,8 @@ class Flown:
 class Method(Protocol):
     """Breeds whole generations, so that the outcome does not depend on the workers.
 
-    ``ask`` and ``tell`` alternate.  What ``ask`` returns depends on the plan and on what
-    was told alone.  A method that does not learn is never told.
+    ``ask`` and ``tell`` alternate.  The scenarios that ``ask`` returns depend only on the plan and
+    on the results given to ``tell``.  ``tell`` is never called on a method that does not learn.
     """
 
     @property
@@ -42,7 +42,7 @@ class Method(Protocol):
         """Whether a generation depends on the results of the one before."""
 
     def ask(self) -> Sequence[Scenario]:
-        """Return the next generation, ``population`` scenarios of which none came before."""
+        """Return the next generation: ``population`` scenarios, all of them new."""
 
     def tell(self, flown: Sequence[Flown]) -> Sequence[tuple[float, ...]]:
         """Learn from the generation; return each flight's objectives, for the ledger."""

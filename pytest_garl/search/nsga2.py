@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-import hashlib
 from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from pymoo.algorithms.base.genetic import GeneticAlgorithm
 from pymoo.core.duplicate import NoDuplicateElimination
 from pymoo.core.infill import InfillCriterion
@@ -19,9 +17,9 @@ from pytest_garl.scenarios.chromosome import decode, encode
 from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.scenarios.validity import repair
 from pytest_garl.search.method import Flown, SearchPlan
-from pytest_garl.search.operators import nuclear_gene_crossover
+from pytest_garl.search.operators import Matrix, nuclear_gene_crossover
+from pytest_garl.search.seeding import seed_sequence
 
-Matrix = NDArray[np.float64]
 Objectives = Callable[[Matrix, Sequence[Flown]], Matrix]
 """From normalised chromosomes (k, d) and their flights to objectives (k, m), all maximised."""
 Mutation = Callable[[Matrix, Matrix, Matrix, np.random.Generator], Matrix]
@@ -30,11 +28,10 @@ _TRIES = 100
 
 
 class Nsga2:
-    """A genetic search; objectives and mutation make the method.
+    """A genetic search, defined by its objectives and its mutation.
 
-    ``width`` is the number of objectives.  A scenario's own seed is inherited with the tail
-    of the chromosome, where the objects are: what they do by chance is part of what a parent
-    was selected for.
+    ``width`` is the number of objectives.  A child inherits the scenario's seed with the tail of
+    the chromosome, which holds the NPCs: their random moves are part of the parent's success.
     """
 
     learns = True
@@ -43,13 +40,11 @@ class Nsga2:
         self, name: str, plan: SearchPlan, objectives: Objectives, width: int, mutation: Mutation
     ) -> None:
         self._plan, self._objectives, self._mutation = plan, objectives, mutation
-        place = hashlib.sha256(f"{name} {plan.map.name}".encode()).digest()
-        sequence = np.random.SeedSequence(plan.seed, spawn_key=(int.from_bytes(place[:4], "big"),))
-        variation, survival = sequence.spawn(2)
+        variation, survival = seed_sequence(name, plan.map.name, plan.seed).spawn(2)
         self._rng = np.random.default_rng(variation)
         self._seeds: dict[bytes, int] = {}
         self._flown: dict[bytes, Flown] = {}
-        self._asked: Any = None
+        self._generation: Any = None
         genome = plan.genome
         first = np.array(
             [
@@ -70,7 +65,7 @@ class Nsga2:
 
     def ask(self) -> Sequence[Scenario]:
         """Return the next generation."""
-        self._asked = self._algorithm.ask()
+        self._generation = self._algorithm.ask()
         return [
             decode(
                 row,
@@ -78,21 +73,21 @@ class Nsga2:
                 map=self._plan.map.name,
                 seed=self._seeds[row.tobytes()],
             )
-            for row in self._asked.get("X")
+            for row in self._generation.get("X")
         ]
 
     def tell(self, flown: Sequence[Flown]) -> Sequence[tuple[float, ...]]:
-        """Learn from the generation; survivors are the best of parents and offspring."""
-        rows = self._asked.get("X")
+        """Learn from the generation: the best of parents and offspring survive."""
+        rows = self._generation.get("X")
         for row, item in zip(rows, flown, strict=True):
             self._flown[row.tobytes()] = item
         values = self.values(rows)
-        self._asked.set("F", -values)
-        self._algorithm.tell(infills=self._asked)
+        self._generation.set("F", -values)
+        self._algorithm.tell(infills=self._generation)
         return [tuple(float(value) for value in row) for row in values]
 
     def values(self, rows: Matrix) -> Matrix:
-        """Return the objectives of flown chromosomes, each measured against all the others."""
+        """Return the objectives of flown chromosomes, measured among each other."""
         flown = [self._flown[row.tobytes()] for row in rows]
         return self._objectives(self._plan.genome.normalise(rows), flown)
 
@@ -114,14 +109,14 @@ class Nsga2:
         return self._mutation(rows, genome.lower, genome.upper, self._rng)
 
     def _valid(self, row: Matrix, seed: int) -> Matrix:
-        """Repair a chromosome; mutate one that came before until it is new."""
+        """Repair a chromosome; mutate a known one until it is new."""
         genome, map = self._plan.genome, self._plan.map
         for _ in range(_TRIES):
-            mended = encode(repair(decode(row, genome, map=map.name, seed=0), map), genome)
-            key = mended.tobytes()
+            repaired = encode(repair(decode(row, genome, map=map.name, seed=0), map), genome)
+            key = repaired.tobytes()
             if key not in self._seeds:
                 self._seeds[key] = seed
-                return mended
+                return repaired
             row = self._mutate(row[None])[0]
         return self._valid(genome.random(self._rng), seed)
 
@@ -136,7 +131,7 @@ class _Mating(InfillCriterion):  # type: ignore[misc]
 
 
 class _Survival(RankAndCrowding):  # type: ignore[misc]
-    """Rank and crowding over objectives measured anew in the union of P and O."""
+    """Rank and crowding by objectives that are measured again in the union of P and O."""
 
     def __init__(self, search: Nsga2) -> None:
         super().__init__()

@@ -1,14 +1,12 @@
-"""What the search maximises: the paper's three objectives, as functions of values."""
+"""What searches maximise: the paper's diversity, and the proximity to a violation."""
 
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from pytest_garl.execution.result import FlightResult
+from pytest_garl.search.operators import Matrix
 from pytest_garl.verdicts.judge import CLOSE_CALL_M
-
-Matrix = NDArray[np.float64]
 
 
 def diversity(generation: Matrix) -> Matrix:
@@ -24,11 +22,11 @@ def diversity(generation: Matrix) -> Matrix:
 
 
 def violation_proximity(result: FlightResult) -> float:
-    """Return how near a flight came to a violation: 1 for a violation, 0 for none in sight.
+    """Return how near a flight came to a violation: 1 for a violation, 0 for a wide margin.
 
-    Each decided property contributes its margin as a share of its limit; the smallest
-    counts.  A flight that aborted decided neither distance nor time: the distance to the
-    nearest body is what is left.
+    The margin of each decided property is taken as a share of its limit; the smallest share
+    counts.  An aborted flight decides neither distance nor time, so only the distance to the
+    nearest body counts.
     """
     verdict = result.verdict
     if verdict.violation:

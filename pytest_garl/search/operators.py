@@ -15,8 +15,8 @@ Matrix = NDArray[np.float64]
 CROSSOVER_PROBABILITY = 0.2
 MUTATION_PROBABILITY = 0.2
 CANDIDATES = 10
-"""Paper, supplement: both rates 0.2 and ten candidates.  Its Algorithm 1 varies where
-``r > threshold``; the thresholds are read as 1 - rate, as its published code does."""
+"""Paper, supplement: both rates 0.2 and ten candidates.  Algorithm 1 varies a gene if
+``r > threshold``; the thresholds are read as 1 - rate, as in the published code."""
 
 
 def nuclear_gene_crossover(
@@ -28,8 +28,8 @@ def nuclear_gene_crossover(
     """Return offspring (n, d) of parents (n, d): adjacent pairs swap their tails.
 
     Rows 0 and 1 are a pair, 2 and 3 the next; the last of an odd number is copied.
-    ``borders`` are the columns at which a nuclear gene begins, without 0; one of them is
-    drawn for each pair, so that no nuclear gene is ever torn.
+    ``borders`` are the columns at which a nuclear gene begins, without 0.  One of them is drawn
+    for each pair, so that crossover never divides a nuclear gene.
     """
     offspring = parents.copy()
     for first in range(0, len(parents) - 1, 2):
@@ -43,8 +43,7 @@ def nuclear_gene_crossover(
 def farthest_from_all(candidates: Matrix, values: Matrix) -> int:
     """Index of the candidate with the largest sum of distances to ``values`` (paper, eq. 2).
 
-    The sum is convex in the candidate, so the winner lies at an end of the range nearly
-    always.
+    The sum is convex in the candidate, so the winner nearly always lies at an end of the range.
     """
     return int(np.argmax(np.abs(candidates[:, None] - values[None, :]).sum(axis=1)))
 
@@ -52,8 +51,8 @@ def farthest_from_all(candidates: Matrix, values: Matrix) -> int:
 def farthest_from_nearest(candidates: Matrix, values: Matrix) -> int:
     """Index of the candidate (n, d) whose nearest of ``values`` (m, d) is farthest away.
 
-    Mitchell's best candidate (1991, "Spectrally optimal sampling for distribution ray tracing"):
-    what is drawn so, one after another, fills the range evenly.
+    Mitchell's best candidate (1991, "Spectrally optimal sampling for distribution ray tracing").
+    Points drawn in this way, one after another, fill the range evenly.
     """
     apart = np.linalg.norm(candidates[:, None] - values[None, :], axis=2)
     return int(np.argmax(apart.min(axis=1)))
@@ -70,9 +69,9 @@ def property_mutation(
 ) -> Matrix:
     """Return a copy of ``offspring`` in which each property mutates with ``probability``.
 
-    A mutating property draws ``candidates`` values uniformly from its range and takes
-    the one farthest from all of that property's values in the generation as it stands at
-    that moment: earlier rows have mutated already, as in Algorithm 1.
+    A mutating property draws ``candidates`` values uniformly from its range and takes the one
+    farthest from all current values of that property in the generation.  Earlier rows have mutated
+    already, as in Algorithm 1.
     """
     mutated = offspring.copy()
     rows, columns = mutated.shape
@@ -99,8 +98,8 @@ def local_steps(
 ) -> Matrix:
     """Return a copy in which each property moves a little with ``probability``, at least one.
 
-    How far is drawn for each chromosome, log-uniformly up to ``largest``: a collision may hang
-    on centimetres.
+    The size of the steps is drawn for each chromosome, log-uniformly up to ``largest``, because a
+    collision may depend on centimetres.
     """
     rows, columns = offspring.shape
     scale = np.exp(rng.uniform(np.log(LEAST_STEP), np.log(largest), (rows, 1)))

@@ -70,5 +70,5 @@ class OwnMethod:
         shown = reprlib.repr(found)
         raise GarlError(
             f"search method {self._name!r}: {what} returned {shown}, expected {expected} "
-            "(pytest_garl.search.method.Method tells more)"
+            "(see pytest_garl.search.method.Method)"
         )

@@ -41,7 +41,7 @@ def test_numpy_computes_what_torch_computes() -> None:
     assert (ours.argmax(axis=1) == theirs.argmax(axis=1)).all()
 
 
-def test_weights_survive_their_file_and_are_the_same_bytes(tmp_path: Path) -> None:
+def test_saved_weights_are_loaded_unchanged_and_their_bytes_repeat(tmp_path: Path) -> None:
     net = network()
     save(tmp_path / "a.npz", net, {"seed": 1})
     save(tmp_path / "b.npz", net, {"seed": 1})
@@ -159,7 +159,7 @@ def _unknown_state(path: Path) -> None:
         (_unknown_state, "names the state 'psychic'; known: paper"),
     ],
 )
-def test_weights_that_cannot_be_trusted_are_refused(
+def test_damaged_weights_are_refused(
     tmp_path: Path, damage: Callable[[Path], object], words: str
 ) -> None:
     path = tmp_path / "w.npz"
@@ -175,7 +175,7 @@ def test_a_network_with_other_actions_is_refused(tmp_path: Path) -> None:
         learned_spec(str(tmp_path / "w.npz"))
 
 
-def test_weights_that_are_not_finite_are_refused(tmp_path: Path) -> None:
+def test_infinite_weights_are_refused(tmp_path: Path) -> None:
     net = network()
     net.layers[0][0][0, 0] = np.nan
     save(tmp_path / "w.npz", net, {})

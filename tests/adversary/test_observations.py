@@ -18,7 +18,7 @@ def test_the_papers_state_is_object_and_uav_relative_to_the_marker() -> None:
     assert ENCODINGS["paper"].state(seen) == pytest.approx([0.2, -0.3, 0.4, 0.4])
 
 
-def test_the_extended_state_adds_what_timing_needs() -> None:
+def test_the_extended_state_adds_height_speed_step_and_size() -> None:
     seen = situation(being((3.0, -1.0), "bird", 8.0), uav=(5.0, 6.0, 9.0), marker=(1.0, 2.0))
     assert ENCODINGS["extended"].state(seen)[4:] == pytest.approx(
         [0.9, -0.5, 1.0, 3.1 / 3, 2.9 / 3]
@@ -104,7 +104,7 @@ def test_the_online_rival_keeps_to_the_confined_range() -> None:
     assert fog(0.0) == [0.01]
 
 
-def test_one_object_is_drawn_for_each_decision() -> None:
+def test_one_npc_is_drawn_for_each_decision() -> None:
     names = ["bird-1", "dog-1", "person-1", "person-2"]
     turns: Counter[str] = Counter()
     for marker in ((1.0, 2.0), (-3.0, 0.5)):
@@ -125,7 +125,7 @@ def test_one_object_is_drawn_for_each_decision() -> None:
 
 
 @pytest.mark.parametrize("name", ENCODINGS)
-def test_states_are_bounded_and_as_long_as_they_say(name: str) -> None:
+def test_states_are_bounded_and_have_their_declared_size(name: str) -> None:
     seen = situation(being((4000.0, -3000.0)), uav=(1e6, 0.0, 500.0))
     state = ENCODINGS[name].state(seen)
     assert state.shape == (ENCODINGS[name].size,)

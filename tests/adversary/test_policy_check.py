@@ -53,15 +53,13 @@ class Wild:
         ("bare", "found the change 'environment.fog'"),
     ],
 )
-def test_a_policy_that_answers_nonsense_is_refused_before_any_flight(
-    answer: str, words: str
-) -> None:
+def test_an_invalid_move_is_refused_before_any_flight(answer: str, words: str) -> None:
     spec = PolicySpec(name="wild", factory=f"{__name__}:Wild", arguments=(("answer", answer),))
     with pytest.raises(PolicyError, match=words):
         check_policy(spec, MAP)
 
 
-def test_a_policy_that_cannot_be_made_is_refused() -> None:
+def test_a_policy_with_wrong_arguments_is_refused() -> None:
     spec = PolicySpec(name="wild", factory=f"{__name__}:Wild", arguments=(("colour", "red"),))
     with pytest.raises(PolicyError, match=r"'wild': .*raised TypeError"):
         check_policy(spec, MAP)

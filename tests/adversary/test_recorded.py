@@ -59,7 +59,7 @@ def away(place: tuple[float, float], marker: tuple[float, float] = (0.0, 0.0)) -
 
 
 @pytest.mark.parametrize("name", ["person-1", "dog-1", "bird-1"])
-def test_an_object_goes_on_over_the_marker_and_leaves(name: str) -> None:
+def test_a_recorded_npc_continues_over_the_marker_and_leaves(name: str) -> None:
     places = walked(((0.0, 1.0),) * 2, (0.0, -3.0), name=name)
     assert min(map(away, places)) < 1.5
     assert away(places[-1]) >= LANDING_ZONE_M
@@ -67,29 +67,29 @@ def test_an_object_goes_on_over_the_marker_and_leaves(name: str) -> None:
     assert places[-1] == places[-4], "it stands once it is out of the way"
 
 
-def test_an_object_that_stood_leaves_away_from_the_marker() -> None:
+def test_a_standing_npc_leaves_away_from_the_marker() -> None:
     places = walked(((0.0, -1.0), (0.0, 0.0), (0.0, 0.0)), (-1.0, 1.0))
     assert [away(place) for place in places[4:]] == sorted(away(place) for place in places[4:])
     assert away(places[-1]) >= LANDING_ZONE_M
 
 
-def test_an_object_on_the_marker_that_never_moved_leaves() -> None:
+def test_an_npc_that_never_moved_leaves_the_marker() -> None:
     assert away(walked((), (0.0, 0.0))[-1]) >= LANDING_ZONE_M
 
 
-def test_an_object_that_is_out_of_the_way_stays_there() -> None:
+def test_an_npc_outside_the_landing_zone_stays_there() -> None:
     places = walked(((0.0, 0.5),), (0.0, -9.0))
     assert away(places[-1]) > 8.0
 
 
 @pytest.mark.parametrize("marker", [(7.4, 0.0), (-5.0, 5.0), (3.5, 3.0), (0.0, 7.4)])
 @pytest.mark.parametrize("heading", [(1.0, 0.0), (0.0, 1.0), (-0.6, 0.8)])
-def test_the_edge_of_the_map_and_trees_do_not_hold_it(
+def test_an_npc_leaves_past_trees_and_the_edge_of_the_map(
     marker: tuple[float, float], heading: tuple[float, float]
 ) -> None:
     start = (marker[0] - heading[0], marker[1] - heading[1])
     assert away(walked((heading,), start, marker=marker)[-1], marker) >= LANDING_ZONE_M - 0.5
 
 
-def test_the_way_out_is_always_the_same() -> None:
+def test_the_way_out_repeats() -> None:
     assert walked(((0.6, 0.8),), (-1.0, 0.0)) == walked(((0.6, 0.8),), (-1.0, 0.0))

@@ -12,7 +12,7 @@ def test_an_npc_goes_straight_at_full_speed() -> None:
     assert (move.x, move.y) == pytest.approx((0.6, 0.8))
 
 
-def test_an_npc_that_is_there_stays() -> None:
+def test_an_npc_at_its_goal_stays() -> None:
     assert towards((3.0, 4.0), situation(being((3.0, 4.0)))) == STAY
 
 

@@ -53,7 +53,7 @@ def test_every_budget_is_flown_exactly(tmp_path: Path, name: str) -> None:
         ledger.close()
 
 
-def test_a_method_that_learns_flies_the_parents_of_what_is_wanted(tmp_path: Path) -> None:
+def test_a_learning_method_flies_the_parents_of_selected_slots(tmp_path: Path) -> None:
     wanted = (Slot(generation=2, index=3),)
     ledger = searched(tmp_path / "garl.sqlite", "garl", 40, wanted)
     assert [len(ledger.generation("s", generation)) for generation in range(4)] == [8, 8, 1, 0]
@@ -61,7 +61,7 @@ def test_a_method_that_learns_flies_the_parents_of_what_is_wanted(tmp_path: Path
     assert [len(ledger.generation("s", generation)) for generation in range(4)] == [0, 0, 1, 0]
 
 
-def test_selecting_changes_nothing_of_what_is_bred(tmp_path: Path) -> None:
+def test_selected_slots_are_bred_like_the_whole_search(tmp_path: Path) -> None:
     whole = searched(tmp_path / "whole.sqlite", "garl", 40)
     part = searched(tmp_path / "part.sqlite", "garl", 40, (Slot(generation=2, index=3),))
     assert part.generation("s", 2)[0] == whole.generation("s", 2)[3]

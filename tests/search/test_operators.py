@@ -20,7 +20,7 @@ def test_crossover_swaps_the_tails_of_adjacent_pairs() -> None:
     assert children.tolist() == [[1, 2, 7, 8], [5, 6, 3, 4], [9, 10, 11, 12]]
 
 
-def test_crossover_leaves_parents_alone_at_probability_zero() -> None:
+def test_crossover_copies_parents_at_probability_zero() -> None:
     parents = np.arange(8.0).reshape(2, 4)
     children = nuclear_gene_crossover(parents, [1, 2, 3], np.random.default_rng(0), probability=0.0)
     assert (children == parents).all()
@@ -49,13 +49,13 @@ def test_paper_candidate_rule_takes_the_largest_sum_of_distances() -> None:
     assert farthest_from_all(np.array([0.5, 0.9, 0.1]), np.array([0.0, 0.2, 1.0])) == 1
 
 
-def test_the_candidate_with_the_farthest_neighbour_is_the_one_between() -> None:
+def test_farthest_from_nearest_takes_the_candidate_in_the_largest_gap() -> None:
     values = np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0]])
     candidates = np.array([[0.1, 0.1], [0.5, 0.4], [1.0, 0.8], [0.0, 0.5]])
     assert farthest_from_nearest(candidates, values) == 1
 
 
-def test_local_steps_are_of_all_sizes_and_never_none() -> None:
+def test_local_steps_have_all_sizes_and_move_every_chromosome() -> None:
     lower, upper = np.full(5, -1.0), np.full(5, 1.0)
     parents = np.zeros((2000, 5))
     moved = local_steps(parents, lower, upper, np.random.default_rng(5))
@@ -77,7 +77,7 @@ def test_mutation_keeps_every_property_in_its_range() -> None:
     assert (mutated != generation).all()
 
 
-def test_mutation_compares_with_the_generation_as_it_stands() -> None:
+def test_mutation_compares_with_rows_that_have_mutated_already() -> None:
     generation = np.zeros((2, 1))
     lower, upper = np.array([0.0]), np.array([1.0])
     mutated = property_mutation(

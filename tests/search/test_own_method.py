@@ -29,13 +29,13 @@ def own(monkeypatch: pytest.MonkeyPatch) -> types.ModuleType:
     return module
 
 
-def test_an_own_method_flies_as_it_is(own: types.ModuleType) -> None:
+def test_an_own_method_proposes_its_scenarios(own: types.ModuleType) -> None:
     ours, shipped = make_method("own_method:make", PLAN), make_method("random", PLAN)
     assert ours.ask() == shipped.ask()
     assert ours.learns is False
 
 
-def test_a_factory_that_gives_no_method_is_named(own: types.ModuleType) -> None:
+def test_a_factory_without_a_method_is_an_error(own: types.ModuleType) -> None:
     own.make = lambda plan: 3  # type: ignore[attr-defined]
     with pytest.raises(GarlError, match="'own_method:make': the factory returned 3, expected a"):
         make_method("own_method:make", PLAN)
@@ -52,7 +52,7 @@ def test_an_error_in_an_own_method_is_reported_with_its_place(own: types.ModuleT
 
 
 @pytest.mark.parametrize("nonsense", [None, 7, [], ["a", "b"]])
-def test_generations_of_anything_but_scenarios_are_refused(
+def test_a_generation_without_scenarios_is_refused(
     own: types.ModuleType, monkeypatch: pytest.MonkeyPatch, nonsense: object
 ) -> None:
     monkeypatch.setattr(Own, "ask", lambda self: nonsense, raising=False)
@@ -61,7 +61,7 @@ def test_generations_of_anything_but_scenarios_are_refused(
 
 
 @pytest.mark.parametrize("nonsense", [None, [], [(0.0,)], [(0.0,), (float("nan"),)], ["ab", "cd"]])
-def test_objectives_that_are_no_numbers_are_refused(
+def test_objectives_other_than_numbers_are_refused(
     own: types.ModuleType, monkeypatch: pytest.MonkeyPatch, nonsense: object
 ) -> None:
     monkeypatch.setattr(Own, "tell", lambda self, flown: nonsense, raising=False)

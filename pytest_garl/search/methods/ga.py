@@ -1,20 +1,23 @@
-"""ga: the paper's multi-objective genetic algorithm, whose genes say where each object goes.
+"""ga: the paper's multi-objective genetic algorithm, with a destination for each NPC as genes.
 
 The paper's second baseline (after Tian et al. 2022, MOSAT), GARL without reinforcement learning:
 fitness, chromosome, sorting and crossover are GARL's, "however, this baseline adds the dynamic
 object's destination into the dynamic object composite gene and utilizes a standard mutation
-strategy".  So all but genes and mutation is that of ``garl-paper``, rates among it.  The policy
-``destination`` walks each object to its destination and back, over and over.
+strategy".  So everything but genes and mutation is as in ``garl-paper``, including the rates.  The
+policy ``destination`` walks each NPC to its destination and back, again and again.
 
-Paper and code differ in four places.  The code lets an object stand at its destination, of which
-the paper says nothing; here it turns back, which makes the stronger rival: a system that sees what
-stands goes around it, and the objects of ``random`` never stand either.  Which mutation is
-standard the paper does not say; the code adds or subtracts a fixed step.  Taken is polynomial
-mutation (Deb and Agrawal 1999), which belongs to the NSGA-II that the paper cites (Deb et al.
-2002) and reaches every value, as steps from a grid do not.  The code measures diversity by the
-weather alone; taken is the whole chromosome, the paper's definition, destinations included.  The
-code crosses objects over as one list; taken is the paper's border between nuclear genes, so that
-an object keeps its destination with its start.
+Choices, if paper and code differ or say nothing:
+
+- The code lets an object stand at its destination; the paper says nothing.  Here it turns back,
+  which is the stronger rival: a landing system flies around an object that stands, and the NPCs of
+  ``random`` never stand either.
+- The paper does not say which mutation is standard; the code adds or subtracts a fixed step.  This
+  method takes polynomial mutation (Deb and Agrawal 1999), which belongs to the NSGA-II that the
+  paper cites (Deb et al. 2002) and, unlike fixed steps, reaches every value.
+- The code measures diversity by the weather alone.  This method follows the paper: the whole
+  chromosome, including destinations.
+- The code crosses the objects over as one list.  This method follows the paper: the border lies
+  between nuclear genes, so that an NPC keeps its destination with its start.
 """
 
 from __future__ import annotations
@@ -34,7 +37,7 @@ range."""
 
 
 def make(plan: SearchPlan) -> Method:
-    """Return the search; its genome is the plan's with a destination for each object."""
+    """Start the search; its genome has a destination for each NPC."""
     from pytest_garl.search.nsga2 import Nsga2
 
     plan = dataclasses.replace(plan, genome=with_destinations(plan.genome))

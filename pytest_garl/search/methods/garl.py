@@ -1,18 +1,19 @@
-"""garl: a search that looks for every way to fail.
+"""garl: an archive of ways to fail, from which scenarios are bred.
 
-MAP-Elites (Mouret and Clune 2015, "Illuminating search spaces by mapping elites") with the
-paper's chromosomes and crossover.  A cell is a way to fail: a violation's signature, or that which
-a near miss would have had.  Which cell is bred from is decided by Thompson sampling (Thompson
-1933) of what its children came to: a first violation of a kind counts most, the twentieth little,
-so that near misses of another kind are worth more than one more of the same.  The objects' places
-and speeds are spread out as the paper's mutation does, away from all asked for before, which is to
-the ends of their ranges; the marker, which decides where the UAV flies, is put where none has been
-near.  Weather and light are not spread: at their ends a flight is aborted rather than failed.
+MAP-Elites (Mouret and Clune 2015, "Illuminating search spaces by mapping elites") with the paper's
+chromosomes and crossover.  A cell of the archive is a way to fail: the signature of a violation, or
+the signature that a near miss would have had.  Thompson sampling (Thompson 1933) chooses the cell
+to breed from by the results of its children.  The first violation of a kind counts most and the
+twentieth little, so that near misses of another kind are worth more than one more of the same.
+
+Places and speeds of NPCs are spread out as in the paper's mutation: away from all earlier ones,
+which means to the ends of their ranges.  The marker decides where the UAV flies, and is put far
+from its nearest earlier place.  Weather and light are not spread, because at the ends of their
+ranges a flight is aborted rather than failed.
 """
 
 from __future__ import annotations
 
-import hashlib
 from collections import Counter, defaultdict
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -36,9 +37,10 @@ from pytest_garl.search.operators import (
     local_steps,
     nuclear_gene_crossover,
 )
+from pytest_garl.search.seeding import seed_sequence
 
 NEAR, FAR = "near", "far"
-"""Ways to breed: by small steps, or with all but the nearest object spread out."""
+"""Ways to breed: by small steps, or with everything but the nearest NPC spread out."""
 
 Genes = tuple[tuple[str, float], ...]
 Arm = tuple[str, str]
@@ -62,14 +64,14 @@ class GarlParameters:
     explore_share: float = 0.25
     """Share of scenarios without parents, so that cells are still found late in a search."""
     aimed_share: float = 0.5
-    """Share of children bred near whose small steps change only the object that their parent came
-    nearest to: that object decides whether centimetres are missing."""
+    """Share of children bred near whose small steps change only the NPC that their parent came
+    nearest to, because the last centimetres depend on that NPC."""
     other_weather_share: float = 0.5
     """Share of aimed children that also get the weather of another flight that was not aborted."""
     crossover_probability: float = CROSSOVER_PROBABILITY
     """The paper's probability, for children bred near that are not aimed."""
     spread_share: float = 0.75
-    """Share of places and speeds that are put away from all asked for before, in a scenario without
+    """Share of places and speeds that are put away from all earlier ones, in a scenario without
     parents and in one bred far from its parent."""
     least_progress: float = 0.01
     """A child succeeds if it raises its cell's proximity to a violation by this much."""
@@ -84,19 +86,17 @@ class GarlParameters:
 
 
 class Garl:
-    """The archive of cells, and how it is bred from."""
+    """The archive of cells, and the breeding from it."""
 
     learns = True
 
     def __init__(self, plan: SearchPlan, parameters: GarlParameters | None = None) -> None:
         self._plan, self._parameters = plan, parameters or GarlParameters()
-        place = hashlib.sha256(f"garl {plan.map.name}".encode()).digest()
-        key = int.from_bytes(place[:4], "big")
-        self._rng = np.random.default_rng(np.random.SeedSequence(plan.seed, spawn_key=(key,)))
+        self._rng = np.random.default_rng(seed_sequence("garl", plan.map.name, plan.seed))
         self._cells: defaultdict[str, list[Flown]] = defaultdict(list)
         self._trials: defaultdict[Arm, tuple[float, float]] = defaultdict(lambda: (0.0, 0.0))
         self._arms: dict[Genes, Arm] = {}
-        self._asked: list[Matrix] = []
+        self._chromosomes: list[Matrix] = []
         self._signatures: Counter[str] = Counter()
         keys = plan.genome.keys
         self._weather = np.array([key.startswith("environment.") for key in keys])
@@ -119,7 +119,7 @@ class Garl:
         return [(violation_proximity(item.result),) for item in flown]
 
     def _worth(self, name: str, item: Flown) -> float:
-        """Return how much of a success a flight is, 0 to 1."""
+        """Return the success of a flight, 0 to 1."""
         signature = item.result.signature
         if signature:
             self._signatures[signature] += 1
@@ -128,20 +128,20 @@ class Garl:
         return float(violation_proximity(item.result) > best + self._parameters.least_progress)
 
     def _new(self) -> Scenario:
-        """Return a scenario that was not asked for before."""
+        """Return a scenario that differs from all earlier ones."""
         while True:
             explores = not self._cells or self._rng.random() < self._parameters.explore_share
             arm = NO_PARENT if explores else self._choose()
             scenario = self._random() if arm == NO_PARENT else self._child(*arm)
             if scenario.genes not in self._arms:
                 self._arms[scenario.genes] = arm
-                self._asked.append(encode(scenario, self._plan.genome))
+                self._chromosomes.append(encode(scenario, self._plan.genome))
                 return scenario
 
     def _choose(self) -> Arm:
-        """Return the arm that looks most promising in a draw from what is known of each."""
+        """Return the arm with the best draw from the distribution of its success."""
         arms = [(name, NEAR) for name in sorted(self._cells)]
-        # What is but nearly a violation hangs on all of its genes.
+        # A near miss depends on all of its genes, so only violations are bred far.
         arms += [(name, FAR) for name, _ in arms if name in self._signatures]
         if not self._parameters.learns_cells:
             bred = Counter(self._arms.values())
@@ -154,12 +154,12 @@ class Garl:
         return self._scenario(row, int(self._rng.integers(2**32)))
 
     def _spread(self, row: Matrix, which: NDArray[np.bool_]) -> Matrix:
-        """Return a copy, a share of whose genes among ``which`` is away from all asked for.
+        """Return a copy in which a share of the genes ``which`` is away from all earlier values.
 
-        One by one (paper, eq. 2); but for the marker, whose place is drawn as a whole.
+        Genes are drawn one by one (paper, eq. 2), except the marker's place, a point.
         """
         rng, genome, spread = self._rng, self._plan.genome, row.copy()
-        asked = np.array(self._asked) if self._asked else row[None]
+        asked = np.array(self._chromosomes) if self._chromosomes else row[None]
         marker, share = self._marker, self._parameters.spread_share
         for column in np.flatnonzero(which & ~marker & (rng.random(row.size) < share)):
             drawn = rng.uniform(genome.lower[column], genome.upper[column], CANDIDATES)
@@ -173,13 +173,13 @@ class Garl:
     def _child(self, name: str, way: str) -> Scenario:
         """Return a child of one of a cell's flights.
 
-        A scenario's own seed is inherited with the tail of the chromosome, where the objects
-        are: what they do by chance is part of what a parent was selected for.
+        The child inherits the scenario's seed with the tail of the chromosome, which holds the
+        NPCs: their random moves are part of the parent's success.
         """
         rng, genome = self._rng, self._plan.genome
         first = self._elite(name)
         row, seed = encode(first.scenario, genome), first.scenario.seed
-        # What nearly fails needs a small change, and so does what shall fail again.
+        # A near miss needs a small change, and a violation keeps failing only after a small one.
         largest = LARGEST_STEP * max(
             self._parameters.least_step_share, 1 - violation_proximity(first.result)
         )
@@ -202,13 +202,13 @@ class Garl:
         return self._scenario(moved, int(crossed[0, -1]))
 
     def _in_other_weather(self) -> Scenario:
-        """Return a flight that was not aborted, or any where all were."""
+        """Return a scenario whose flight was not aborted, or any if all were."""
         every = [item for name in sorted(self._cells) for item in self._cells[name]]
         good = [item for item in every if item.result.outcome != "aborted"] or every
         return good[int(self._rng.integers(len(good)))].scenario
 
     def _elite(self, name: str) -> Flown:
-        """Return one of a cell's flights that came nearest to a violation, or violated."""
+        """Return one of a cell's flights with the highest proximity to a violation."""
         cell = self._cells[name]
         most = max(violation_proximity(item.result) for item in cell)
         elites = [item for item in cell if violation_proximity(item.result) == most]

@@ -1,25 +1,26 @@
 """garl-paper: the paper's Algorithm 1, with its three objectives and its operators.
 
-GARL as published, for ``garl`` to be measured against: NSGA-II over distance to landing, time to
-landing and diversity, with objects that ``dqn-paper`` steers.
+GARL as published, the rival of ``garl``: NSGA-II over distance to landing, time to landing and
+diversity, with NPCs that the policy ``dqn-paper`` moves.
 
-Where paper and code differ, or say nothing:
+Choices, if paper and code differ or say nothing:
 
-- The code measures diversity by the weather alone, as it is.  Taken is the paper's: the whole
-  chromosome, which is normalised so that no property drowns the others.
-- The code mutates a property to the candidate farthest from the middle of the violations known.
-  Taken is the paper's, farthest from all values of the generation, as it needs no violation first.
+- The code measures diversity by the weather alone, not normalised.  This method follows the paper:
+  the whole chromosome, normalised so that no property outweighs the others.
+- The code mutates a property to the candidate farthest from the middle of the known violations.
+  This method follows the paper: farthest from all values of the generation, which needs no
+  violation first.
 - The code mutates rain twice and snow never, crosses the marker with itself, and swaps halves of
-  genes with probability 1.  Taken are the paper's: every property at 0.2, and at 0.2 one cut, which
-  falls between nuclear genes.
+  genes with probability 1.  This method follows the paper: every property at 0.2, and at 0.2 one
+  cut, between nuclear genes.
 - The code draws parents by roulette over the fronts, and flies ten survivors again beside ten
-  children.  Taken is the paper's: the best 20 of parents and children are the next parents, each
-  once.  None is flown again, since a scenario gives the same flight.
-- The paper counts an object's start as one scalar.  Here it is two, mutated each by itself.
-- Algorithm 1 varies where a random number exceeds the threshold of 0.2, four times in five.  Taken
-  is 0.2 as the rate, as the code has it for the mutation.
+  children.  This method follows the paper: the best 20 of parents and children are the next
+  parents, each once.  None is flown again, because a scenario always gives the same flight.
+- The paper counts an object's start as one scalar.  Here it is two, each mutated on its own.
+- Algorithm 1 varies if a random number exceeds the threshold of 0.2, four times in five.  This
+  method takes 0.2 as the rate, as the code does for the mutation.
 - Without a landing the code takes ten seconds for the time to landing; the paper says nothing.
-  Taken is how long the flight was, since the objective is after those that take too long.
+  This method takes the duration of the flight, because the objective rewards long flights.
 """
 
 from __future__ import annotations
@@ -34,7 +35,7 @@ from pytest_garl.search.operators import Matrix, property_mutation
 
 
 def make(plan: SearchPlan) -> Method:
-    """Return the search; populations of 20 and rates of 0.2 as in the paper."""
+    """Start the search; rates of 0.2 as in the paper."""
     # pymoo takes a second to import.
     from pytest_garl.search.nsga2 import Nsga2
 

@@ -7,27 +7,26 @@ four directions; the reward adds up distance to landing, time to landing and div
 scenarios before.  Layers, learning rate, discount and exploration are those of the surrogate's
 training; batches of 32 and a target network every 20 updates are of the published code.
 
-Where paper and code differ, or say nothing:
+Choices, if paper and code differ or say nothing:
 
-- The code edits weather and time of day alone (18 actions) and draws marker and objects anew each
-  time.  Taken is the paper's; time of day is one of its environment's nine properties.
-- The code leaves diversity out of the reward.  Taken is the paper's.  How the three are weighed
-  nobody says; here each is a share of the most that it can be, the map's diagonal, 120 s and the
-  longest distance between two chromosomes, so that none drowns the others.
-- 0.1 is meant in gene units for weather and marker, as the paper writes it, and as a share of the
-  range for objects, of which it names directions only.  What leaves the range ends on its border.
-- Objects walk to their end and back, as those of ``ga``.
-- Exploration decays per edit, as in the code: a chain has no episodes.
+- The code edits weather and time of day alone (18 actions) and draws marker and objects again each
+  time.  This method follows the paper; time of day is one of its environment's nine properties.
+- The code leaves diversity out of the reward; this method follows the paper.  Neither gives the
+  weights of the three terms.  Here each term is a share of its maximum (the map's diagonal, 120 s,
+  the longest distance between two chromosomes), so that none outweighs the others.
+- The step of 0.1 is in gene units for weather and marker, as the paper writes it, and a share of
+  the range for objects, for which the paper names directions only.  Values are clipped.
+- NPCs walk to their destination and back, as in ``ga``.
+- Exploration decays per edit, as in the code, because a chain has no episodes.
 - The paper tests one scenario after the other.  Here each slot index of a generation is a chain of
-  its own, from a random scenario that keeps its seed and speeds; all share one network, which
+  its own, from a random scenario that keeps its seed and speeds.  All share one network, which
   learns when the generation is flown, so that results never depend on the number of workers.
-- An edit that changes nothing, makes a scenario invalid, or leads back to one that was proposed
-  before is not open: the next best is taken.
+- An edit is skipped, and the next best taken, if it changes nothing, makes the scenario invalid, or
+  leads back to an earlier scenario.
 """
 
 from __future__ import annotations
 
-import hashlib
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -42,21 +41,23 @@ from pytest_garl.scenarios.maps.map import Map
 from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.scenarios.validity import problems, repair
 from pytest_garl.search.method import Flown, MethodDeclaration, SearchPlan
+from pytest_garl.search.seeding import seed_sequence
 from pytest_garl.verdicts.verdict import PAPER_LIMITS
 
 if TYPE_CHECKING:
     from pytest_garl.adversary.training.dqn import Learner
 
-Row = NDArray[np.float64]
+Vector = NDArray[np.float64]
 STEP = 0.1
 BATCH, TARGET_EVERY = 32, 20
 _DIGITS = 9
-"""Two scenarios whose genes agree to so many digits are the same: there and back is nowhere."""
+"""Two scenarios are the same if their genes agree to so many digits, as after an edit and its
+reverse."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Edit:
-    """An action: what is added to one property, in gene units."""
+    """An action: adds ``by``, in gene units, to the property of a column."""
 
     column: int
     by: float
@@ -64,16 +65,16 @@ class Edit:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Link:
-    """A scenario of a chain, and the edit that led to it; the first of a chain has none."""
+    """A scenario of a chain and the edit that led to it; the first scenario has no edit."""
 
-    row: Row
+    row: Vector
     seed: int
-    before: Row | None = None
+    before: Vector | None = None
     edit: int = 0
 
 
 class OfflineRl:
-    """The chains, one for each column, and the network that all of them learn by."""
+    """The chains, one for each slot index, and the network that they share."""
 
     learns = True
 
@@ -83,10 +84,7 @@ class OfflineRl:
         self._edits = edits_of(genome)
         # Speeds are not encoded: no edit changes them.
         self._seen = np.array([not key.endswith(".velocity") for key in genome.keys])
-        place = hashlib.sha256(f"offline-rl {plan.map.name}".encode()).digest()
-        key = int.from_bytes(place[:4], "big")
-        sequence = np.random.SeedSequence(plan.seed, spawn_key=(key,))
-        drawing, learning = sequence.spawn(2)
+        drawing, learning = seed_sequence("offline-rl", plan.map.name, plan.seed).spawn(2)
         self._rng = np.random.default_rng(drawing)
         seed = int(learning.generate_state(1)[0])
         self._learner = _learner(int(self._seen.sum()), len(self._edits), seed)
@@ -120,14 +118,14 @@ class OfflineRl:
                     self._learn(link.before, link.edit, worth, row)
         return values
 
-    def _learn(self, before: Row, edit: int, worth: float, after: Row) -> None:
+    def _learn(self, before: Vector, edit: int, worth: float, after: Vector) -> None:
         learner = self._learner
         old, now = (row[self._seen].astype(np.float32) for row in (before, after))
         learner.remember(old, edit, worth, now, learner.training.discount)
         learner.update()
 
     def _begin(self) -> Link:
-        """Return a random scenario that was not proposed before."""
+        """Return a random scenario that differs from all earlier ones."""
         while True:
             seed = int(self._rng.integers(2**32))
             drawn = self._scenario(self._genome.random(self._rng), seed)
@@ -136,7 +134,7 @@ class OfflineRl:
                 return Link(row=row, seed=seed)
 
     def _edited(self, link: Link) -> Link:
-        """Return the next of a chain; one that cannot go on begins anew."""
+        """Return the next scenario of a chain, or a random one if no edit is open."""
         training = self._learner.training
         decayed = training.epsilon * training.epsilon_decay**self._count
         self._count += 1
@@ -155,21 +153,21 @@ class OfflineRl:
                 return Link(row=row, seed=link.seed, before=state, edit=int(index))
         return self._begin()
 
-    def _is_new(self, row: Row) -> bool:
-        """Whether a chromosome was never proposed; from then on it was."""
+    def _is_new(self, row: Vector) -> bool:
+        """Whether a chromosome is new; from now on it is known."""
         key = tuple(float(value) for value in np.round(row, _DIGITS))
         fresh = key not in self._known
         self._known.add(key)
         return fresh
 
-    def _scenario(self, row: Row, seed: int) -> Scenario:
+    def _scenario(self, row: Vector, seed: int) -> Scenario:
         return decode(row, self._genome, map=self._map.name, seed=seed)
 
 
 def edits_of(genome: Genome) -> tuple[Edit, ...]:
-    """Return the actions: each property but the speeds up or down by a step.
+    """Return the actions: each property except the speeds, up and down by a step.
 
-    For a place these are the four directions.
+    The four actions of a place are the four directions.
     """
     found = []
     for column, item in enumerate(genome.properties):
@@ -182,7 +180,7 @@ def edits_of(genome: Genome) -> tuple[Edit, ...]:
 
 
 def reward(distance_m: float, elapsed_s: float, spread: float, map: Map, genome: Genome) -> float:
-    """Return what a flight is worth: the sum of three shares, each from 0 to about 1."""
+    """Return the reward of a flight: the sum of three shares, each from 0 to about 1."""
     x_min, x_max, y_min, y_max = map.bounds_m
     return (
         distance_m / math.hypot(x_max - x_min, y_max - y_min)

@@ -1,14 +1,13 @@
-"""random: every scenario drawn uniformly and repaired.
+"""random: every scenario is drawn uniformly and repaired.
 
-The paper's first baseline: "all the static environments are randomly generated", objects' starts
-and destinations too.  In its code the objects never move.  Taken is the paper's: the policy
-``waypoint`` walks each to a random place, and then, of which the paper says nothing, to the next;
-objects that stand at their first would be the weaker rival.
+The paper's first baseline: "all the static environments are randomly generated", and so are the
+starts and destinations of NPCs.  In its code the NPCs never move.  This method follows the paper:
+the policy ``waypoint`` walks each NPC to a random place.  Then, which the paper does not mention,
+it walks to the next: NPCs that stand at their first destination would be the weaker rival.
 """
 
 from __future__ import annotations
 
-import hashlib
 from collections.abc import Sequence
 
 import numpy as np
@@ -19,10 +18,11 @@ from pytest_garl.scenarios.maps.map import Map
 from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.scenarios.validity import repair
 from pytest_garl.search.method import Flown, MethodDeclaration, SearchPlan
+from pytest_garl.search.seeding import seed_sequence
 
 
 class RandomSearch:
-    """Learns nothing; generation g is the same whatever came before."""
+    """Learns nothing: a generation does not depend on the ones before."""
 
     learns = False
 
@@ -41,12 +41,11 @@ class RandomSearch:
 
 
 def propose(map: Map, genome: Genome, seed: int, generation: int, size: int) -> Sequence[Scenario]:
-    """Return a generation; it depends on the seed, the map and the generation alone.
+    """Return a generation, which depends only on the seed, the map and the generation's number.
 
-    All landing systems meet the same scenarios, so that they can be compared.
+    All landing systems get the same scenarios, so that they can be compared.
     """
-    place = int.from_bytes(hashlib.sha256(f"random {map.name}".encode()).digest()[:4], "big")
-    rng = np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(place, generation)))
+    rng = np.random.default_rng(seed_sequence("random", map.name, seed, generation))
     scenarios = []
     for _ in range(size):
         chromosome = genome.random(rng)

@@ -1,11 +1,10 @@
-"""surrogate-random: random scenarios, whose objects the trained policy steers.
+"""surrogate-random: random scenarios whose NPCs the trained policy moves.
 
-The paper's ablation "Surrogate trained RL with random": GARL without its genetic algorithm.  What
-makes it another method than ``random`` is who moves the objects: ``dqn-paper``, the policy that
-``garl-paper`` flies with, unless another is named.  Paper
-and code agree on that; the code lets the policy walk every object at 3 m/s, here each has the
-speed of its gene, as in ``garl-paper``.  The scenarios are those of ``random`` to the byte, so that
-the two compare pair by pair.
+The paper's ablation "Surrogate trained RL with random": GARL without its genetic algorithm.  It
+differs from ``random`` by its NPC policy, ``dqn-paper``, the policy of ``garl-paper``.  Paper and
+code agree on that.  In the code every object walks at 3 m/s; here each has the speed of its gene,
+as in ``garl-paper``.  The scenarios are those of ``random`` to the byte, so that the two can be
+compared pair by pair.
 """
 
 from __future__ import annotations

@@ -8,7 +8,7 @@ import pytest
 from tests.adversary.situations import walk
 
 
-def test_greedy_walks_across_the_marker_again_and_again() -> None:
+def test_greedy_crosses_the_marker_again_and_again() -> None:
     path = walk("greedy", (-4.0, 1.0), 40)
     sides = [math.copysign(1, x - 3) for x, _ in path if abs(x - 3) > 0.4]
     assert sum(a != b for a, b in itertools.pairwise(sides)) >= 5

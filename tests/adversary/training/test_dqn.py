@@ -8,7 +8,7 @@ from pytest_garl.adversary.training.dqn import Experience, Learner
 from pytest_garl.adversary.training.presets import Training
 
 
-def test_rewards_of_several_steps_are_summed_and_cut_rightly() -> None:
+def test_experience_sums_the_rewards_of_several_steps_up_to_the_end() -> None:
     learner = Learner(10, 5, Training(steps=3, discount=0.5, replay=10))
     step = Experience(learner)
     states = [np.full(10, index, np.float32) for index in range(6)]

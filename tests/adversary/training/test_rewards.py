@@ -20,11 +20,13 @@ from pytest_garl.adversary.training import rewards
         (400, 400, True, 1.0),
     ],
 )
-def test_the_papers_reward(expected: int, seen: int, collided: bool, reward: float) -> None:
+def test_the_papers_reward_follows_its_equation(
+    expected: int, seen: int, collided: bool, reward: float
+) -> None:
     assert rewards.paper(expected, seen, collided=collided) == pytest.approx(reward)
 
 
-def test_shaping_does_not_change_what_an_episode_is_worth() -> None:
+def test_shaping_keeps_the_return_of_an_episode() -> None:
     """Discounted, all shaping telescopes to the first potential, whatever the way."""
     discount = 0.9
     for way in ([12.0, 9.0, 9.5, 2.0, 0.3], [12.0, 40.0, 3.0, 0.1, 0.1]):
@@ -37,6 +39,6 @@ def test_shaping_does_not_change_what_an_episode_is_worth() -> None:
         assert total == pytest.approx(discount**3 - rewards.potential(12.0))
 
 
-def test_nearer_is_better() -> None:
+def test_the_potential_grows_towards_the_column() -> None:
     assert rewards.potential(0) == 0 > rewards.potential(5) > rewards.potential(10)
     assert rewards.potential(30) == rewards.potential(50)

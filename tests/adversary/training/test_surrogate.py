@@ -61,7 +61,7 @@ def test_the_online_rival_changes_the_environment_that_it_sees() -> None:
 
 
 @pytest.mark.sim
-def test_walking_into_the_column_of_a_blind_uav_collides_and_ends_the_episode() -> None:
+def test_an_npc_in_the_column_of_a_blind_uav_collides_and_ends_the_episode() -> None:
     env = SurrogateEnv(dataclasses.replace(OURS, uav="straight", kinds=("person",)))
     ends = [fly(env, seed, action=3)[-1] for seed in range(6)]
     hits = [(reward, info) for _, reward, info in ends if info["collided"]]

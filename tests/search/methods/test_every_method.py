@@ -25,6 +25,6 @@ def test_every_scenario_is_valid_and_new(name: str) -> None:
 
 @pytest.mark.parametrize("name", ["garl", "garl-paper", "ga"])
 @pytest.mark.parametrize("population", [1, 2, 3, 20])
-def test_any_population_breeds_its_like(name: str, population: int) -> None:
+def test_every_generation_has_the_size_of_the_population(name: str, population: int) -> None:
     made = bred(make_method(name, plan(population=population)), 4)
     assert [len(generation) for generation in made] == [population] * 4

@@ -13,7 +13,7 @@ from tests.search.searches import MAP, bred, plan
 NAMES = [name for name, _ in MAP.object_names]
 
 
-def test_every_object_of_every_scenario_has_a_destination() -> None:
+def test_every_npc_of_every_scenario_has_a_destination() -> None:
     wanted = with_destinations(genome_for(MAP)).keys
     for generation in bred(make_method("ga", plan()), 4):
         for scenario in generation:
@@ -31,7 +31,7 @@ def test_destinations_are_bred() -> None:
     assert late - early
 
 
-def test_mutation_moves_as_many_properties_as_the_papers_and_mostly_a_little() -> None:
+def test_mutation_moves_a_fifth_of_the_properties_mostly_a_little() -> None:
     rows = np.full((2000, 3), [0.5, 0.0, 0.15])
     lower, upper = np.array([0.0, -1.0, 0.0]), np.array([1.0, 1.0, 0.15])
     moved = polynomial_mutation(rows, lower, upper, np.random.default_rng(1))
@@ -43,7 +43,7 @@ def test_mutation_moves_as_many_properties_as_the_papers_and_mostly_a_little() -
     assert (moved[:, 2] < 0.15).any()
 
 
-def test_an_object_keeps_its_destination_with_its_start() -> None:
+def test_an_npc_keeps_its_destination_with_its_start() -> None:
     genome = with_destinations(genome_for(MAP))
     for gene in genome.genes:
         if gene.name in NAMES:

@@ -50,14 +50,14 @@ def search(method: Any, generations: int) -> Counter[str]:
     return found
 
 
-def test_a_rare_way_to_fail_is_found_by_way_of_its_near_misses() -> None:
+def test_near_misses_lead_to_a_rare_way_to_fail() -> None:
     found, by_chance = search(Garl(PLAN), 40), search(RandomSearch(PLAN), 40)
     assert by_chance["rare"] <= 1
     assert found["rare"] >= 5
     assert found["common"] >= by_chance["common"] / 2
 
 
-def test_cells_of_which_nothing_is_known_are_bred_from_alike() -> None:
+def test_unknown_cells_are_chosen_equally_often() -> None:
     search_ = Garl(PLAN)
     first = search_.ask()
     cells = ["a"] * 17 + ["b", "c", ""]
@@ -72,7 +72,7 @@ def test_cells_of_which_nothing_is_known_are_bred_from_alike() -> None:
         assert 0.7 * share < bred[cell] < 1.3 * share
 
 
-def test_a_cell_whose_children_succeed_is_bred_from_more_often() -> None:
+def test_a_successful_cell_is_chosen_more_often() -> None:
     method = Garl(PLAN, GarlParameters(explore_share=0.0, crossover_probability=0.0))
     lines: dict[int, str] = {}
     bred: Counter[str] = Counter()
@@ -95,7 +95,7 @@ def test_the_first_violation_of_a_kind_is_worth_more_than_the_fourth() -> None:
     assert [method._worth("IV:dog", item) for item in items[:4]] == [1.0, 0.5**0.5, 3**-0.5, 0.5]
 
 
-def test_a_flights_cell_is_how_it_failed_or_nearly_did() -> None:
+def test_a_cell_is_named_by_signature_near_miss_or_outcome() -> None:
     assert cell_of(result("IV:dog:descent:seen", "IV:person:take-off:seen")) == (
         "IV:dog:descent:seen"
     )
@@ -125,7 +125,7 @@ def test_places_and_speeds_are_spread_out_and_weather_is_not() -> None:
     assert 0.4 < speeds.mean() < 0.6
 
 
-def test_the_marker_is_put_where_none_has_been_near() -> None:
+def test_markers_are_put_far_from_each_other() -> None:
     marker = np.array([key.startswith("marker.") for key in PLAN.genome.keys])
 
     def apart(method: Garl) -> float:
@@ -138,7 +138,7 @@ def test_the_marker_is_put_where_none_has_been_near() -> None:
     assert apart(Garl(PLAN)) > 1.2 * apart(Garl(PLAN, GarlParameters(spread_share=0.0)))
 
 
-def test_what_is_bred_far_from_a_violation_keeps_its_weather_and_who_was_hit() -> None:
+def test_a_far_child_keeps_the_weather_and_the_npc_that_was_hit() -> None:
     method = Garl(PLAN, GarlParameters(explore_share=0.0))
     first = method.ask()[:1]
     told = dataclasses.replace(result("IV:dog"), closest_body="dog-1")
@@ -150,7 +150,7 @@ def test_what_is_bred_far_from_a_violation_keeps_its_weather_and_who_was_hit() -
     assert np.abs(children - parent)[:, ~kept].mean() > 0.2
 
 
-def test_only_from_what_violates_is_bred_far() -> None:
+def test_only_violations_are_bred_far() -> None:
     method = Garl(PLAN)
     told = [result("", "near")] * 10 + [result("hit")] * 10
     method.tell([Flown(scenario=s, result=r) for s, r in zip(method.ask(), told, strict=True)])
@@ -158,7 +158,7 @@ def test_only_from_what_violates_is_bred_far() -> None:
     assert chosen == {("near", NEAR), ("hit", NEAR), ("hit", FAR)}
 
 
-def test_one_cell_for_all_is_bred_from() -> None:
+def test_a_search_with_one_cell_breeds_from_it() -> None:
     method = Garl(PLAN, GarlParameters(explore_share=0.0, cell=lambda result: ""))
     first = method.ask()
     method.tell([Flown(scenario=each, result=result("", "near")) for each in first])

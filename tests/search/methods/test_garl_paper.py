@@ -12,7 +12,7 @@ from pytest_garl.search.method import Flown
 from tests.search.searches import GENOME, bred, plan, result
 
 
-def test_selection_finds_more_of_what_it_wants() -> None:
+def test_selection_raises_the_objective() -> None:
     def share(made: Sequence[Sequence[Scenario]]) -> float:
         return float(np.mean([result(s).final_distance_m > 1.0 for made in made for s in made]))
 
@@ -22,12 +22,12 @@ def test_selection_finds_more_of_what_it_wants() -> None:
     assert late > early + 0.1
 
 
-def test_a_scenarios_seed_is_inherited_with_its_objects() -> None:
+def test_children_inherit_the_seed_of_a_parent() -> None:
     first, second = bred(make_method("garl-paper", plan()), 2)
     assert {each.seed for each in second} <= {each.seed for each in first}
 
 
-def test_objectives_of_the_paper_are_distance_time_and_diversity() -> None:
+def test_the_objectives_are_distance_time_and_diversity() -> None:
     method = make_method("garl-paper", plan())
     scenarios = method.ask()
     values = method.tell([Flown(scenario=each, result=result(each)) for each in scenarios])

@@ -61,12 +61,12 @@ def test_chains_begin_with_random_scenarios_of_their_own() -> None:
     assert rows.std(axis=0).min() > 0.15
 
 
-def test_what_was_proposed_before_is_not_proposed_again_after_there_and_back() -> None:
+def test_an_edit_and_its_reverse_never_repeat_a_scenario() -> None:
     made = [each for generation in bred(OfflineRl(plan()), 40) for each in generation]
     assert len({tuple(round(value, 6) for _, value in each.genes) for each in made}) == 320
 
 
-def test_a_chain_that_cannot_go_on_begins_anew() -> None:
+def test_a_chain_without_open_edits_starts_again() -> None:
     method = OfflineRl(plan(population=1))
     (first,) = method.ask()
     method.tell([Flown(scenario=first, result=result(first))])
@@ -103,7 +103,7 @@ def test_diversity_is_measured_to_every_scenario_so_far() -> None:
             assert told == pytest.approx((item.result.final_distance_m, 30.0, wanted))
 
 
-def test_it_learns_what_pays() -> None:
+def test_the_network_learns_which_edit_pays() -> None:
     """Where snow on the ground keeps the UAV away, the ground gets snowy."""
     method = OfflineRl(plan(population=20))
     snow = []
@@ -123,7 +123,7 @@ def test_it_learns_what_pays() -> None:
     assert np.mean(snow[-8:]) > np.mean(snow[:8]) + 0.2
 
 
-def test_the_network_is_of_the_papers_size_and_updated_once_per_step_of_a_chain() -> None:
+def test_the_network_has_the_papers_size_and_is_updated_once_per_edit() -> None:
     method = OfflineRl(plan())
     bred(method, 11)
     learner = method._learner
@@ -135,7 +135,7 @@ def test_the_network_is_of_the_papers_size_and_updated_once_per_step_of_a_chain(
     assert learner.updates == 80 - 31
 
 
-def test_nobody_elses_random_numbers_are_disturbed() -> None:
+def test_the_method_leaves_the_global_generator_of_torch_alone() -> None:
     import torch
 
     torch.manual_seed(7)

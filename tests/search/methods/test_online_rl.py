@@ -3,14 +3,19 @@ from __future__ import annotations
 import pytest
 
 from pytest_garl.adversary.catalogue import policy_spec
+from pytest_garl.search.catalogue import make_method
 from pytest_garl.search.methods.random import propose
 from pytest_garl.simulation.fly import fly
 from pytest_garl.simulation.system_under_test.reference_pilot import ReferencePilot
-from tests.search.searches import GENOME, MAP
+from tests.search.searches import GENOME, MAP, bred, plan
+
+
+def test_the_scenarios_are_those_of_random() -> None:
+    assert bred(make_method("online-rl", plan()), 3) == bred(make_method("random", plan()), 3)
 
 
 @pytest.mark.sim
-def test_one_object_acts_at_a_time_and_the_others_stand() -> None:
+def test_one_npc_acts_at_a_time_and_the_others_stand() -> None:
     (scenario,) = propose(MAP, GENOME, 4, 0, 1)
     flight = fly(scenario, ReferencePilot, policy_spec("online-rl"), map=MAP, time_limit_s=15)
     acted = [
