@@ -18,7 +18,7 @@ from pytest_garl.baselines.pairs import PairResult
 from pytest_garl.errors import GarlError
 from pytest_garl.execution.flight_id import FIRST
 from pytest_garl.plugin.fixtures import abort_session
-from pytest_garl.plugin.keys import RUN, is_xdist_worker
+from pytest_garl.plugin.keys import GATE_PLUGIN, RUN, is_xdist_worker
 from pytest_garl.plugin.marker import read_marker
 from pytest_garl.plugin.options import Options
 from pytest_garl.plugin.run import Run
@@ -36,7 +36,7 @@ def register(config: pytest.Config, options: Options) -> None:
     except GarlError as error:
         raise pytest.UsageError(f"--garl-baseline: {error}") from error
     config.pluginmanager.register(
-        BaselineGatePlugin(options, options.baseline, baseline), "garl_baseline_gate"
+        BaselineGatePlugin(options, options.baseline, baseline), GATE_PLUGIN
     )
 
 
@@ -103,7 +103,7 @@ class BaselineGatePlugin:
     def __init__(self, options: Options, file: Path, baseline: Baseline) -> None:
         self._options, self._file, self._baseline = options, file, baseline
         self._placed: set[tuple[str, str, str]] = set()
-        self._told: dict[str, list[str]] = {}
+        self._gate_reports: dict[str, list[str]] = {}
         self._problem = ""
 
     @pytest.hookimpl(wrapper=True)
@@ -140,7 +140,7 @@ class BaselineGatePlugin:
         """Refuse to begin where the command line asks for a gate and no selected test has one."""
         worker = is_xdist_worker(session.config)
         if not worker and not any(isinstance(item, BaselineGateItem) for item in session.items):
-            problem = self._nothing()
+            problem = self._missing_gate()
             if problem:
                 raise pytest.UsageError(problem)
 
@@ -148,19 +148,18 @@ class BaselineGatePlugin:
         """Remember what a gate says."""
         lines = [str(text) for key, text in report.user_properties if key == GATE_REPORT]
         if lines and report.when == "call":
-            self._told[report.nodeid] = lines
+            self._gate_reports[report.nodeid] = lines
 
-    def pytest_sessionfinish(self, session: pytest.Session) -> None:
-        """Refuse to pass without a gate under xdist, whose workers alone know the items."""
-        if not session.config.pluginmanager.hasplugin("dsession") or self._told:
-            return
+    def note_missing_gate(self, session: pytest.Session) -> bool:
+        """Note under xdist, whose workers alone know the items, whether a gate is missing."""
+        if not session.config.pluginmanager.hasplugin("dsession") or self._gate_reports:
+            return False
         if session.exitstatus in (pytest.ExitCode.OK, pytest.ExitCode.NO_TESTS_COLLECTED):
-            self._problem = self._nothing()
-            if self._problem:
-                session.exitstatus = pytest.ExitCode.USAGE_ERROR
+            self._problem = self._missing_gate()
+        return bool(self._problem)
 
-    def _nothing(self) -> str:
-        """Return what is wrong with a session without gate; an ini key asks for none."""
+    def _missing_gate(self) -> str:
+        """Return what is wrong with a session without a gate; an ini key does not demand one."""
         if "baseline" not in self._options.given:
             return ""
         wanted = ", ".join(f"{each.system} on {each.map}" for each in self._baseline.sets)
@@ -176,18 +175,18 @@ class BaselineGatePlugin:
 
     def pytest_terminal_summary(self, terminalreporter: Any) -> None:
         """Show what each gate says."""
-        if not self._told and not self._problem:
+        if not self._gate_reports and not self._problem:
             return
         terminalreporter.section("garl: baseline", sep="=")
         if self._problem:
             terminalreporter.write_line(self._problem, red=True)
         for note in environment_changes(self._baseline):
             terminalreporter.write_line(f"note: {note}; differences may be its doing")
-        titles = {title for title, *_ in self._told.values()}
+        titles = {title for title, *_ in self._gate_reports.values()}
         for each in self._baseline.sets:
             if each.title not in titles:
                 terminalreporter.write_line(f"note: {each.title} was not flown")
-        for _, (title, answer, *lines) in sorted(self._told.items()):
+        for _, (title, answer, *lines) in sorted(self._gate_reports.items()):
             terminalreporter.write_line(f"{title}: {answer}")
             for line in lines:
                 terminalreporter.write_line(f"    {line}")

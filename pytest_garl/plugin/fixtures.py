@@ -8,7 +8,17 @@ from typing import TYPE_CHECKING, NoReturn
 import pytest
 
 from pytest_garl.errors import GarlError
-from pytest_garl.plugin.keys import BEGUN, FATAL, LANDING, RUN, is_xdist_worker, target_of
+from pytest_garl.plugin.keys import (
+    BEGUN,
+    FATAL,
+    LANDING,
+    OUTCOME,
+    RUN,
+    SIGNATURE,
+    UNPROVEN,
+    is_xdist_worker,
+    target_of,
+)
 
 if TYPE_CHECKING:
     from pytest_garl.plugin.landing import Landing
@@ -74,15 +84,15 @@ def landing(request: pytest.FixtureRequest, garl_slot: Target, npcs: PolicySpec)
     item = request.node
     landing, result = Landing(garl_slot, flight, getattr(item, "obj", None)), flight.result
     item.user_properties += [
-        ("garl.outcome", result.outcome),
-        ("garl.signature", result.signature),
+        (OUTCOME, result.outcome),
+        (SIGNATURE, result.signature),
         ("garl.story", result.verdict.story),
         ("garl.final_distance_m", result.final_distance_m),
         ("garl.elapsed_s", result.elapsed_s),
         ("garl.trajectory_sha256", flight.sha256),
     ]
     if reasons := run.unproven(garl_slot):
-        request.node.user_properties.append(("garl.unproven", "; ".join(reasons)))
+        request.node.user_properties.append((UNPROVEN, "; ".join(reasons)))
     item.stash[LANDING] = landing
     if item.stash.get(BEGUN, False):
         # Asked for by the test's body, which must not go on.

@@ -1,4 +1,4 @@
-"""The step summary of GitHub Actions: a short table of what was found."""
+"""The step summary of GitHub Actions: a table of the violations that were found."""
 
 from __future__ import annotations
 
@@ -9,53 +9,57 @@ from typing import Any
 
 import pytest
 
-from pytest_garl.reports.violation_kinds import Found
+from pytest_garl.plugin.keys import SIGNATURE, SLOT
+from pytest_garl.reports.search_summary import SearchSummary
 
 VARIABLE = "GITHUB_STEP_SUMMARY"
-"""Names the file to which a step appends what its page shows."""
+"""GitHub names in this variable the file whose text it shows on the page of the step."""
+COLUMNS = ("where", "what", "flights", "what happened", "see it")
 
-HEAD = ("where", "what", "flights", "what happened", "see it")
+Row = tuple[str, str, str, str, str]
 
 
-def write_summary(reporter: Any, found: Sequence[Found], again: Sequence[Sequence[str]]) -> None:
-    """Append the kinds of violation and the failed cases to the summary, where there is one.
+def write_step_summary(
+    reporter: Any, searches: Sequence[SearchSummary], commands: Sequence[Sequence[str]]
+) -> None:
+    """Append the kinds of violation and the failed cases, if GitHub names a file.
 
-    ``again`` are the commands that fly each kind of ``found`` again.
+    ``commands`` fly the first flight of each kind of each search again.
     """
     path = os.environ.get(VARIABLE)
     if not path:
         return
-    rows = [
-        (f"{each.name} on {each.map}", kind.signature, str(kind.count), kind.headline, command)
-        for each, commands in zip(found, again, strict=True)
-        for kind, command in zip(each.kinds, commands, strict=True)
+    rows: list[Row] = [
+        (f"{search.name} on {search.map}", kind.signature, str(kind.count), kind.headline, command)
+        for search, of_search in zip(searches, commands, strict=True)
+        for kind, command in zip(search.kinds, of_search, strict=True)
     ]
-    rows += _cases(reporter)
-    title = "## pytest-garl\n\n"
-    lines = [
-        "| where | what | flights | what happened | see it |",
-        "| --- | --- | --- | --- | --- |",
-    ]
-    lines += [f"| {' | '.join([*map(_plain, row[:4]), _code(row[4])])} |" for row in rows]
-    flown = sum(len(each.verdicts) for each in found)
-    body = "\n".join(lines) if rows else f"No violation{f' in {flown} flights' if flown else ''}."
+    rows += _failed_cases(reporter)
+    flown = sum(len(search.verdicts) for search in searches)
+    text = _table(rows) if rows else f"No violation{f' in {flown} flights' if flown else ''}."
     try:
         with Path(path).open("a", encoding="utf-8") as file:
-            file.write(f"{title}{body}\n\n")
+            file.write(f"## pytest-garl\n\n{text}\n\n")
     except OSError as error:
         reporter.write_line(f"garl: {VARIABLE}: {path}: cannot be written ({error})")
 
 
-def _cases(reporter: Any) -> list[tuple[str, str, str, str, str]]:
+def _table(rows: Sequence[Row]) -> str:
+    lines = [f"| {' | '.join(COLUMNS)} |", f"|{' --- |' * len(COLUMNS)}"]
+    lines += [f"| {' | '.join([*map(_escaped, row[:4]), _code(row[4])])} |" for row in rows]
+    return "\n".join(lines)
+
+
+def _failed_cases(reporter: Any) -> list[Row]:
     """Return the saved cases whose tests failed."""
     rows = []
     for report in reporter.getreports("failed"):
-        told = dict(report.user_properties)
-        slot = str(told.get("garl.slot", ""))
+        properties = dict(report.user_properties)
+        slot = str(properties.get(SLOT, ""))
         if slot.startswith("case-"):
-            what, _, again = _message(report).partition("\n")
-            command = again.partition(": ")[2]
-            rows.append((slot, str(told["garl.signature"]), "1", what, command))
+            headline, _, see_it = _message(report).partition("\n")
+            command = see_it.partition(": ")[2]
+            rows.append((slot, str(properties[SIGNATURE]), "1", headline, command))
     return rows
 
 
@@ -64,14 +68,14 @@ def _message(report: pytest.TestReport) -> str:
     return str(crash.message) if crash is not None else str(report.longrepr)
 
 
-def _plain(text: str) -> str:
-    """Return text that means nothing in Markdown or HTML."""
+def _escaped(text: str) -> str:
+    """Return text without meaning in Markdown or HTML."""
     for mark in "\\`*_[]<>|#~":
         text = text.replace(mark, f"\\{mark}")
     return " ".join(text.split())
 
 
 def _code(text: str) -> str:
-    return (
-        f"`{' '.join(text.replace('`', '').replace('|', chr(92) + '|').split())}`" if text else ""
-    )
+    """Return text as code in a cell of a table, or nothing."""
+    plain = " ".join(text.replace("`", "").replace("|", "\\|").split())
+    return f"`{plain}`" if plain else ""

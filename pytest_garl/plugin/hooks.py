@@ -16,6 +16,7 @@ from pytest_garl.plugin.keys import (
     BEGUN,
     FATAL,
     FOUND,
+    GATE_PLUGIN,
     OWN,
     RUN,
     TALLY,
@@ -191,7 +192,7 @@ def pytest_report_header(config: pytest.Config) -> str | None:
     run = config.stash.get(RUN, None)
     if run is None:
         return None
-    from pytest_garl.plugin.summary import header
+    from pytest_garl.plugin.header import header
 
     return header(run)
 
@@ -201,20 +202,9 @@ def pytest_report_collectionfinish(config: pytest.Config) -> list[str]:
     run = config.stash.get(RUN, None)
     if run is None:
         return []
-    from pytest_garl.plugin.summary import forecast
+    from pytest_garl.plugin.header import acceptance_warning, forecast
 
-    lines = forecast(run)
-    problem = run.options.corpus.acceptance.problem
-    if problem:
-        lines.append(_known_by_mark(problem))
-    return lines
-
-
-def _known_by_mark(problem: str) -> str:
-    return (
-        f"garl: nobody can tell which cases are committed ({problem}); known are "
-        "only those that `garl cases accept` has marked"
-    )
+    return [*forecast(run), *acceptance_warning(run)]
 
 
 def pytest_terminal_summary(terminalreporter: Any, config: pytest.Config) -> None:
@@ -224,54 +214,47 @@ def pytest_terminal_summary(terminalreporter: Any, config: pytest.Config) -> Non
         folder = config.rootpath / str(config.getini("garl_dir"))
         if (folder / f"cases-{os.getpid()}.sqlite").is_file():
             _begin(config)
-    run = config.stash.get(RUN, None)
+    run, tally = config.stash.get(RUN, None), config.stash[TALLY]
     if run is not None:
-        from pytest_garl.plugin.summary import summary
+        from pytest_garl.plugin.summary import write_run
 
         try:
-            summary(terminalreporter, run)
+            write_run(terminalreporter, run, tally)
         except GarlError as error:
             terminalreporter.write_line(f"garl: {error}", red=True)
-    tally = config.stash.get(TALLY, None)
-    if tally is not None and tally.items:
-        from pytest_garl.plugin.summary import colour
+    if tally.items:
+        from pytest_garl.plugin.summary import write_status
 
-        colour(terminalreporter, tally)
+        write_status(terminalreporter, tally)
 
 
 def pytest_sessionfinish(session: pytest.Session) -> None:
-    """Pursue and save what a search found; say whether the session may be green."""
-    run = session.config.stash.get(RUN, None)
+    """Save cases of new violations, and set the exit status."""
+    stash = session.config.stash
+    run, tally = stash.get(RUN, None), stash.get(TALLY, None)
+    gate: Any = session.config.pluginmanager.get_plugin(GATE_PLUGIN)
+    nothing_compared = gate is not None and gate.note_missing_gate(session)
     if run is not None:
-        try:
-            if run.may_save(session):
-                from pytest_garl.plugin.save_cases import pursue
-
-                pursue(run, session)
-                if run.save_problem:
-                    session.exitstatus = pytest.ExitCode.INTERNAL_ERROR
-        except GarlError as error:
-            _lost_ledger(session, run, error)
-        finally:
-            run.pool.close()
-    tally = session.config.stash.get(TALLY, None)
-    if tally is not None and tally.items:
+        _save_cases(run, session, nothing_compared=nothing_compared)
+    if run is not None or gate is not None or (tally is not None and tally.items):
         from pytest_garl.plugin.options import options_of
-        from pytest_garl.plugin.session_status import problems
+        from pytest_garl.plugin.session_status import set_exit_status
 
-        try:
-            tally.problems = list(problems(tally, run, options_of(session.config)))
-        except GarlError as error:
-            _lost_ledger(session, run, error)
-        if tally.problems and session.exitstatus == pytest.ExitCode.OK:
-            session.exitstatus = pytest.ExitCode.TESTS_FAILED
+        options = options_of(session.config)
+        set_exit_status(session, run, tally, options, nothing_compared=nothing_compared)
 
 
-def _lost_ledger(session: pytest.Session, run: Any, error: GarlError) -> None:
-    """End a session without its ledger: nothing can be saved, and the summary says why."""
-    session.exitstatus = pytest.ExitCode.INTERNAL_ERROR
-    if run is not None:
+def _save_cases(run: Any, session: pytest.Session, *, nothing_compared: bool) -> None:
+    try:
+        if run.may_save(session) and not nothing_compared:
+            from pytest_garl.plugin.save_cases import save_cases
+
+            save_cases(run, session)
+    except GarlError as error:
+        # Without its ledger a session saves nothing; the summary says why.
         run.save_problem = run.save_problem or str(error)
+    finally:
+        run.pool.close()
 
 
 def pytest_unconfigure(config: pytest.Config) -> None:

@@ -25,6 +25,7 @@ from pytest_garl.plugin.keys import (
     OWN,
     OWN_FAILURE,
     STALE,
+    UNPROVEN,
     UNREPEATED,
     is_xdist_worker,
 )
@@ -109,9 +110,8 @@ class _Writer:
         """Write the outcome of a saved case whose test passed."""
         state = CaseState(signature=case.violation.signature, status=case.status, edge=case.edge)
         violates = self.result.verdict.primary is not None
-        unproven = ""
-        if case.status == "open" and not case.edge and not violates:
-            unproven = "; ".join(self.run.unproven(self.target))
+        # The fixture ``landing`` has found it out.
+        unproven = str(dict(self.item.user_properties).get(UNPROVEN, ""))
         facts = PassedCase(
             case=state,
             violates=violates,

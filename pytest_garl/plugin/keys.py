@@ -13,6 +13,8 @@ import pytest
 if TYPE_CHECKING:
     from pytest_garl.plugin.target import Target
 
+GATE_PLUGIN = "garl_baseline_gate"
+"""The name under which the plugin of a baseline gate is registered."""
 RUN = pytest.StashKey[Any]()
 """Where a session keeps its run; none if nothing is to be flown."""
 LANDING = pytest.StashKey[Any]()
@@ -29,6 +31,12 @@ TALLY = pytest.StashKey[Any]()
 """Where a session that is no xdist worker keeps what its items say."""
 SLOT = "garl.slot"
 """The user property that names the slot of an item."""
+OUTCOME = "garl.outcome"
+"""The user property with the outcome of an item's flight; an item that flew nothing has none."""
+SIGNATURE = "garl.signature"
+"""The user property with the signature of a flight's violation, empty if there is none."""
+UNPROVEN = "garl.unproven"
+"""The user property that says why it proves nothing if a saved case passes."""
 NOTHING = "garl.nothing"
 """The user property of an item that has nothing to fly, with the reason."""
 FAILURE = "garl.failure"

@@ -36,7 +36,7 @@ PILOT = {
 }
 
 
-def pursue(run: Run, session: pytest.Session) -> None:
+def save_cases(run: Run, session: pytest.Session) -> None:
     """Pursue new signatures; what comes of it is told in the summary."""
     options, config = run.options, session.config
     reporter: Any = config.pluginmanager.get_plugin("terminalreporter")
@@ -88,7 +88,7 @@ def _flight_s(run: Run, requests: Sequence[CaseRequest]) -> dict[str, float]:
     return {each.name: known.get((each.search, each.signature)) or any_s for each in requests}
 
 
-def told(pursued: tuple[InvestigatedSignature, ...], config: pytest.Config) -> list[str]:
+def saved_lines(pursued: tuple[InvestigatedSignature, ...], config: pytest.Config) -> list[str]:
     """Return the summary's lines about saved cases."""
     lines: list[str] = []
     patches = []

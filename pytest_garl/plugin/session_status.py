@@ -1,19 +1,75 @@
-"""Why a session must not be green although no item failed, and what else its colour leaves open."""
+"""Decide the exit status of a session, and say why it fails although no item does.
+
+No other module sets ``session.exitstatus``; a session that cannot go on ends by ``pytest.exit``.
+"""
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 
-from pytest_garl.execution.slot import Slot
+import pytest
+
+from pytest_garl.errors import GarlError
 from pytest_garl.plugin.options import Options
 from pytest_garl.plugin.run import Run
 from pytest_garl.plugin.tally import Tally
+from pytest_garl.plugin.wrapping import counted
+from pytest_garl.reports.search_summary import SearchSummary
 
-SHARE = 20
-"""One in so many flights of a search may come to no result, or fail without repeating it."""
-NAMED = 5
-"""So many flights are named; the rest are counted."""
+FLIGHTS_PER_EXCEPTION = 20
+"""One in so many flights of a search may be inconclusive, and one may fail without repeating it."""
+MOST_NAMED = 5
+"""A sentence names so many flights and counts the rest."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SessionFacts:
+    """What decides the exit status of a session, beside its items."""
+
+    nothing_compared: bool = False
+    """Whether the command line asks for a gate and none was flown."""
+    broken: bool = False
+    """Whether the ledger was lost, or cases could not be saved."""
+    problems: bool = False
+    """Whether :func:`problems` found any."""
+
+
+def exit_status(status: int, facts: SessionFacts) -> int:
+    """Return the exit status of a session that would end with ``status``."""
+    if facts.broken:
+        return pytest.ExitCode.INTERNAL_ERROR
+    passes = (pytest.ExitCode.OK, pytest.ExitCode.NO_TESTS_COLLECTED)
+    if facts.nothing_compared and status in passes:
+        return pytest.ExitCode.USAGE_ERROR
+    if facts.problems and status == pytest.ExitCode.OK:
+        return pytest.ExitCode.TESTS_FAILED
+    return status
+
+
+def set_exit_status(
+    session: pytest.Session,
+    run: Run | None,
+    tally: Tally | None,
+    options: Options,
+    *,
+    nothing_compared: bool,
+) -> None:
+    """Note the problems of a session in its tally, and set its exit status."""
+    broken = run is not None and bool(run.save_problem)
+    if tally is not None and tally.items:
+        try:
+            tally.problems = list(problems(tally, run, options))
+        except GarlError as error:
+            broken = True
+            if run is not None:
+                run.save_problem = run.save_problem or str(error)
+    facts = SessionFacts(
+        nothing_compared=nothing_compared,
+        broken=broken,
+        problems=tally is not None and bool(tally.problems),
+    )
+    session.exitstatus = exit_status(session.exitstatus, facts)
 
 
 def problems(tally: Tally, run: Run | None, options: Options) -> Iterator[str]:
@@ -21,80 +77,73 @@ def problems(tally: Tally, run: Run | None, options: Options) -> Iterator[str]:
     unfounded = tally.unfounded()
     if unfounded:
         yield (
-            f"{_counted(len(unfounded), 'test')} excused by a failure that no test shows (its test "
+            f"{counted(len(unfounded), 'test')} excused by a failure that no test shows (its test "
             f"was skipped, passed or was expected to fail): {_names(unfounded)}"
         )
     if run is not None and run.options.searches:
-        yield from _undecided(run)
-        yield from _unrepeated(tally, run)
+        searches = tally.search_summaries(run.ledger)
+        yield from _inconclusive(searches)
+        yield from _unrepeated(tally, searches)
     if (options.searches or "map" in options.given) and tally.items and not tally.flown:
-        yield f"nothing was flown, though it was asked for: {_why(tally)}"
+        yield f"nothing was flown, although flights were asked for: {_why_nothing_flew(tally)}"
 
 
 def notes(tally: Tally) -> Iterator[str]:
     """Yield what a green session leaves open."""
     if tally.items and not tally.flown:
-        yield f"nothing was flown: {_why(tally)}"
+        yield f"nothing was flown: {_why_nothing_flew(tally)}"
     if tally.unasserted:
-        kinds = [f"{name} ({_counted(n, 'flight')})" for name, n in tally.unasserted.most_common()]
+        kinds = [f"{name} ({counted(n, 'flight')})" for name, n in tally.unasserted.most_common()]
         yield f"no selected test fails for these violations: {', '.join(kinds)}"
-    for (system, map), slots in sorted(_by_search(tally).items()):
-        words = _counted(len(slots), "violation")
-        yield f"{_name(system, map)}: {words} did not repeat: {_names(slots)}"
+    for (system, map), slots in sorted(_unrepeated_by_search(tally).items()):
+        violations = counted(len(slots), "violation")
+        yield f"{_search(system, map)}: {violations} did not repeat: {_names(slots)}"
 
 
-def _why(tally: Tally) -> str:
-    """Say why the items of a session flew nothing."""
+def _why_nothing_flew(tally: Tally) -> str:
     reasons = [reason for reason, _ in tally.nothing.most_common()]
     return "; ".join(reasons) or "all landing tests were skipped before they asked for a landing"
 
 
-def _undecided(run: Run) -> Iterator[str]:
-    """Yield which searches left too many flights without a result."""
-    flown: Counter[tuple[str, str]] = Counter()
-    without: dict[tuple[str, str], list[str]] = {}
-    for system, map, generation, index, result in run.ledger.queries.results():
-        flown[system, map] += 1
-        if result.inconclusive:
-            slot = Slot(generation=generation, index=index).id(map)
-            without.setdefault((system, map), []).append(slot)
-    for (system, map), slots in without.items():
-        allowed = flown[system, map] // SHARE
+def _inconclusive(searches: Sequence[SearchSummary]) -> Iterator[str]:
+    """Yield which searches have too many inconclusive flights."""
+    for search in searches:
+        flights = zip(search.slots, search.results, strict=True)
+        slots = [slot for slot, result in flights if result.inconclusive]
+        flown = len(search.results)
+        allowed = flown // FLIGHTS_PER_EXCEPTION
         if len(slots) > allowed:
             yield (
-                f"{_name(system, map)}: {len(slots)} of {flown[system, map]} flights are "
-                f"inconclusive, at most {allowed} may be: {_names(slots)}. Fly them while the "
-                "machine has nothing else to do, or allow more time with --garl-timeout"
+                f"{search.name} on {search.map}: {len(slots)} of {flown} flights are inconclusive, "
+                f"at most {allowed} may be: {_names(slots)}. Fly them while the machine has "
+                "nothing else to do, or allow more time with --garl-timeout"
             )
 
 
-def _unrepeated(tally: Tally, run: Run) -> Iterator[str]:
-    """Yield which searches found too many violations that did not show again."""
-    flown = Counter((system, map) for system, map, *_ in run.ledger.queries.results())
-    for (system, map), slots in _by_search(tally).items():
-        allowed = max(1, flown[system, map] // SHARE)
+def _unrepeated(tally: Tally, searches: Sequence[SearchSummary]) -> Iterator[str]:
+    """Yield which searches have too many violations that did not repeat."""
+    flown = {(search.system, search.map): len(search.results) for search in searches}
+    for (system, map), slots in _unrepeated_by_search(tally).items():
+        flights = flown.get((system, map), 0)
+        allowed = max(1, flights // FLIGHTS_PER_EXCEPTION)
         if len(slots) > allowed:
             yield (
-                f"{_name(system, map)}: {len(slots)} violations in {flown[system, map]} flights "
-                f"did not repeat, at most {allowed} may: {_names(slots)}"
+                f"{_search(system, map)}: {len(slots)} violations in {flights} flights did not "
+                f"repeat, at most {allowed} may: {_names(slots)}"
             )
 
 
-def _by_search(tally: Tally) -> dict[tuple[str, str], list[str]]:
+def _unrepeated_by_search(tally: Tally) -> dict[tuple[str, str], list[str]]:
     found: dict[tuple[str, str], set[str]] = {}
     for system, map, slot, signature in tally.unrepeated:
         found.setdefault((system, map), set()).add(f"{slot} ({signature})")
     return {search: sorted(slots) for search, slots in found.items()}
 
 
-def _name(system: str, map: str) -> str:
+def _search(system: str, map: str) -> str:
     return f"{system.split(':')[-1]} on {map}"
 
 
 def _names(names: Sequence[str]) -> str:
-    more = f" and {len(names) - NAMED} more" if len(names) > NAMED else ""
-    return ", ".join(names[:NAMED]) + more
-
-
-def _counted(count: int, word: str) -> str:
-    return f"{count} {word}{'' if count == 1 else 's'}"
+    more = f" and {len(names) - MOST_NAMED} more" if len(names) > MOST_NAMED else ""
+    return ", ".join(names[:MOST_NAMED]) + more

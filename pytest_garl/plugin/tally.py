@@ -4,13 +4,24 @@ from __future__ import annotations
 
 import json
 from collections import Counter
+from typing import TYPE_CHECKING
 
 import pytest
 
-from pytest_garl.plugin.keys import EXCUSED, FAILURE, NOTHING, SLOT, UNREPEATED
+from pytest_garl.plugin.keys import (
+    EXCUSED,
+    FAILURE,
+    NOTHING,
+    OUTCOME,
+    OWN_FAILURE,
+    SIGNATURE,
+    SLOT,
+    UNREPEATED,
+)
 
-FLOWN = "garl.outcome"
-SIGNATURE = "garl.signature"
+if TYPE_CHECKING:
+    from pytest_garl.execution.ledger import Ledger
+    from pytest_garl.reports.search_summary import SearchSummary, SlotUserFailure
 
 
 class Tally:
@@ -26,6 +37,8 @@ class Tally:
         self._answered: set[tuple[str, str]] = set()
         self._failures: dict[str, str] = {}
         self._excused: dict[str, set[str]] = {}
+        self._user_failures: dict[str, list[str]] = {}
+        self._searches: list[SearchSummary] | None = None
 
     @pytest.hookimpl(tryfirst=True)
     def pytest_runtest_logreport(self, report: pytest.TestReport) -> None:
@@ -33,13 +46,14 @@ class Tally:
         if report.when == "setup":
             # A test that is run again tells anew; one with subtests tells more than once.
             self._failures.pop(report.nodeid, None)
+            self._user_failures.pop(report.nodeid, None)
         told = dict(report.user_properties)
         if SLOT not in told or report.when == "teardown":
             return
         if NOTHING in told and report.nodeid not in self.items:
             self.nothing[str(told[NOTHING])] += 1
         self.items.add(report.nodeid)
-        self.flown = self.flown or FLOWN in told
+        self.flown = self.flown or OUTCOME in told
         flight = (report.nodeid.partition("::")[0], str(told[SLOT]))
         if told.get(SIGNATURE):
             self._violating[flight] = str(told[SIGNATURE])
@@ -49,8 +63,30 @@ class Tally:
             self._failures[report.nodeid] = str(told[FAILURE])
         if EXCUSED in told and report.skipped:
             self._excused.setdefault(str(told[EXCUSED]), set()).add(report.nodeid)
+        if OWN_FAILURE in told:
+            self._user_failures.setdefault(report.nodeid, []).append(str(told[OWN_FAILURE]))
         if UNREPEATED in told:
             self.unrepeated.add(tuple(json.loads(str(told[UNREPEATED]))))
+
+    @property
+    def user_failures(self) -> list[SlotUserFailure]:
+        """The failed assertions about users' own properties, expected ones among them."""
+        from pytest_garl.reports.search_summary import SlotUserFailure
+
+        names = ("system", "map", "slot", "signature", "message")
+        return [
+            SlotUserFailure(**dict(zip(names, json.loads(text), strict=True)))
+            for texts in self._user_failures.values()
+            for text in texts
+        ]
+
+    def search_summaries(self, ledger: Ledger) -> list[SearchSummary]:
+        """Return the summary of each search, read from the ledger once when all has been flown."""
+        from pytest_garl.reports.search_summary import search_summaries
+
+        if self._searches is None:
+            self._searches = search_summaries(ledger, self.user_failures)
+        return self._searches
 
     @property
     def unasserted(self) -> Counter[str]:

@@ -1,7 +1,7 @@
-"""A run as data for other programs: what ``garl report --json`` writes.
+"""A run as data for other programs: the output of ``garl report --json``.
 
-``report.schema.json`` beside this file says what is in it.  A key is never taken away or given
-another meaning without a new ``version``; new keys may come.
+``report.schema.json`` beside this file describes it.  Keys may be added; removing a key or changing
+its meaning takes a new ``version``.
 """
 
 from __future__ import annotations
@@ -16,39 +16,43 @@ from typing import Any
 from pytest_garl.errors import LedgerError
 from pytest_garl.execution.ledger import Ledger
 from pytest_garl.regressions.corpus import Corpus
-from pytest_garl.reports.violation_kinds import Found, Own, found_by
+from pytest_garl.reports.search_summary import SearchSummary, SlotUserFailure, search_summaries
 from pytest_garl.verdicts.paper_metrics import top_k
 from pytest_garl.verdicts.statistics import share_interval
 from pytest_garl.verdicts.verdict import count_decided
 
 VERSION = 1
 SCHEMA = Path(__file__).with_name("report.schema.json")
-OWN_FACT = "own failures"
-"""The ledger's fact about tests' own assertions that failed, which no flight's result knows."""
+USER_FAILURES = "own failures"
+"""The ledger's fact with the failed assertions about users' own properties; no result has them."""
 BEGAN, ENDED = "began", "ended"
-"""Facts: when the run began, and when it came to its end, in UTC."""
+"""The ledger's facts: when the run began and ended, in UTC."""
 _RUN = ("seed", "budget", "method", "population", "weather", "npcs", "python")
 
 
 def utc() -> str:
-    """Return the time, as the facts say it."""
+    """Return the time in the form of the facts."""
     return datetime.now(UTC).isoformat(timespec="seconds")
 
 
 def report_of(path: Path, corpus: Corpus) -> dict[str, Any]:
-    """Return the run in a ledger, however far it came, with the saved cases of its systems."""
+    """Return the run in a ledger, finished or not, with the saved cases of its systems.
+
+    Raises LedgerError if there is no ledger.
+    """
     if not path.is_file():
         raise LedgerError(f"there is no ledger at {path}; run a search first")
     ledger = Ledger(path)
     try:
-        found = found_by(ledger, [Own(**each) for each in ledger.fact(OWN_FACT) or ()])
+        failures = [SlotUserFailure(**each) for each in ledger.fact(USER_FAILURES) or ()]
+        summaries = search_summaries(ledger, failures)
         progress = ledger.queries.progress()
         wanted: Counter[tuple[str, str]] = Counter()
         for each in progress:
             wanted[each.system, each.map] += each.all
-        saved = _cases(corpus, {search.system for search in found})
+        saved = _cases(corpus, {summary.system for summary in summaries})
         searches = [
-            _search(ledger, each, wanted[each.system, each.map], saved, path) for each in found
+            _search(ledger, each, wanted[each.system, each.map], saved, path) for each in summaries
         ]
         meters = ledger.queries.meters()
         return {
@@ -80,20 +84,20 @@ def report_of(path: Path, corpus: Corpus) -> dict[str, Any]:
 
 
 def _search(
-    ledger: Ledger, found: Found, wanted: int, cases: list[dict[str, Any]], path: Path
+    ledger: Ledger, summary: SearchSummary, wanted: int, cases: list[dict[str, Any]], path: Path
 ) -> dict[str, Any]:
-    total, verdicts = len(found.verdicts), found.verdicts
-    low, high = share_interval(found.violating, total)
+    total, verdicts = len(summary.verdicts), summary.verdicts
+    low, high = share_interval(summary.violating, total)
     return {
-        "system": found.system,
-        "map": found.map,
+        "system": summary.system,
+        "map": summary.map,
         "wanted": wanted,
         "flown": total,
-        "violating": found.violating,
+        "violating": summary.violating,
         "violating_interval_95": [low, high],
         "violating_by_the_paper": sum(verdict.paper_violation for verdict in verdicts),
         "tenth_violation": top_k(verdicts),
-        "outcomes": dict(sorted(Counter(each.outcome for each in found.results).items())),
+        "outcomes": dict(sorted(Counter(each.outcome for each in summary.results).items())),
         "types": dict(
             sorted(Counter(str(v.violation_type) for v in verdicts if v.violation_type).items())
         ),
@@ -106,25 +110,25 @@ def _search(
                 "signature": kind.signature,
                 "type": kind.signature.partition(":")[0],
                 "count": kind.count,
-                "first": _flight(ledger, found, kind.first),
+                "first": _flight(ledger, summary, kind.first),
                 "story": kind.story,
                 "headline": kind.headline,
-                "repeat": _again(found, kind.first, path),
+                "repeat": _repeat_command(summary, kind.first, path),
                 "cases": [
                     case["file"]
                     for case in cases
                     if (case["system"], case["map"], case["signature"])
-                    == (found.system, found.map, kind.signature)
+                    == (summary.system, summary.map, kind.signature)
                 ],
             }
-            for kind in found.kinds
+            for kind in summary.kinds
         ],
     }
 
 
-def _flight(ledger: Ledger, found: Found, name: str) -> dict[str, Any]:
-    slot = found.slots[name]
-    result, trajectory, scenario = ledger.queries.flight(found.system, found.map, slot)
+def _flight(ledger: Ledger, summary: SearchSummary, name: str) -> dict[str, Any]:
+    slot = summary.slots[name]
+    result, trajectory, scenario = ledger.queries.flight(summary.system, summary.map, slot)
     return {
         "slot": name,
         "seed": json.loads(scenario)["seed"],
@@ -135,14 +139,14 @@ def _flight(ledger: Ledger, found: Found, name: str) -> dict[str, Any]:
     }
 
 
-def _again(found: Found, slot: str, path: Path) -> str:
+def _repeat_command(summary: SearchSummary, slot: str, path: Path) -> str:
     folder = path.parent.name
-    words = ["pytest", *found.files, f"--garl-repeat={slot}"]
+    words = ["pytest", *summary.files, f"--garl-repeat={slot}"]
     return " ".join(words if folder == ".garl" else [*words, "-o", f"garl_dir={folder}"])
 
 
 def _cases(corpus: Corpus, systems: set[str]) -> list[dict[str, Any]]:
-    """Return the saved cases of systems; a file that cannot be read is `garl cases check`'s."""
+    """Return the saved cases of systems; leave broken files to `garl cases check`."""
     found = []
     for entry in corpus.all_entries():
         case = entry.case

@@ -314,7 +314,7 @@ def test_a_case_is_known_when_it_is_committed_or_accepted(
         result.assert_outcomes(passed=2, skipped=2, failed=2)
         result.stdout.fnmatch_lines(
             [
-                "garl: nobody can tell which cases are committed (*not a git repository*",
+                "garl: cannot tell which cases are committed (*not a git repository*",
                 "If that is known: commit it, or: garl cases accept *IV-dog*.toml",
             ]
         )

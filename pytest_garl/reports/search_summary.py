@@ -1,4 +1,4 @@
-"""What a search found, kind by kind: for the terminal, for GitHub, for ``garl report``."""
+"""The violations of a search, kind by kind: for the terminal, GitHub and ``garl report``."""
 
 from __future__ import annotations
 
@@ -13,8 +13,11 @@ from pytest_garl.verdicts.wording import headline
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Own:
-    """A test's own assertion that failed on a slot, where the built-in verdict is content."""
+class SlotUserFailure:
+    """A failed assertion about a user's own property, on a slot.
+
+    The ledger holds these fields under their names.
+    """
 
     system: str
     map: str
@@ -24,8 +27,8 @@ class Own:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Kind:
-    """One signature: how many flights have it, the first of them, and what happened there."""
+class ViolationKind:
+    """One signature: how many flights have it, the first of them, and what happened in that one."""
 
     signature: str
     count: int
@@ -35,8 +38,8 @@ class Kind:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Found:
-    """All flights of a system on a map, and their kinds, the most frequent first."""
+class SearchSummary:
+    """All flights of a system on a map, and their kinds of violation, the most frequent first."""
 
     system: str
     map: str
@@ -44,22 +47,22 @@ class Found:
     slots: Mapping[str, Slot]
     results: tuple[FlightResult, ...]
     verdicts: tuple[Verdict, ...]
-    kinds: tuple[Kind, ...]
+    kinds: tuple[ViolationKind, ...]
     violating: int
-    """Flights that violate a property, built in or a test's own."""
+    """How many flights violate a property, built in or a user's own."""
 
     @property
     def name(self) -> str:
-        """The class."""
+        """The name of the landing system's class."""
         return self.system.split(":")[-1]
 
     def count(self, outcome: str) -> int:
-        """Return how many flights ended so."""
+        """Return how many flights had an outcome."""
         return sum(result.outcome == outcome for result in self.results)
 
     @property
     def crashes(self) -> Mapping[str, int]:
-        """How often the landing system broke down, by how; nothing for what is inconclusive."""
+        """How often the landing system crashed, by the way it did; without inconclusive flights."""
         counts: dict[str, int] = {}
         for result, verdict in zip(self.results, self.verdicts, strict=True):
             if verdict.violation_type == "V":
@@ -69,37 +72,39 @@ class Found:
         return counts
 
 
-def found_by(ledger: Ledger, own: Iterable[Own] = ()) -> list[Found]:
-    """Return what each search of a ledger found."""
+def search_summaries(
+    ledger: Ledger, user_failures: Iterable[SlotUserFailure] = ()
+) -> list[SearchSummary]:
+    """Return the summary of each search in a ledger."""
     flown: dict[tuple[str, str], list[tuple[Slot, FlightResult]]] = {}
     for system, map, generation, index, result in ledger.queries.results():
         slot = Slot(generation=generation, index=index)
         flown.setdefault((system, map), []).append((slot, result))
-    mine: dict[tuple[str, str], list[Own]] = {}
-    for each in own:
-        mine.setdefault((each.system, each.map), []).append(each)
+    failures: dict[tuple[str, str], list[SlotUserFailure]] = {}
+    for each in user_failures:
+        failures.setdefault((each.system, each.map), []).append(each)
     return [
-        _found(ledger, system, map, rows, mine.get((system, map), []))
+        _summary(ledger, system, map, rows, failures.get((system, map), []))
         for (system, map), rows in flown.items()
     ]
 
 
-def _found(
+def _summary(
     ledger: Ledger,
     system: str,
     map: str,
     rows: list[tuple[Slot, FlightResult]],
-    own: list[Own],
-) -> Found:
+    user_failures: list[SlotUserFailure],
+) -> SearchSummary:
     verdicts = [result.verdict for _, result in rows]
     slots: dict[str, list[tuple[str, str]]] = {}
     for (slot, _), verdict in zip(rows, verdicts, strict=True):
         if verdict.violation:
             slots.setdefault(verdict.signature, []).append((slot.id(map), verdict.story))
-    for each in sorted(own, key=lambda each: each.slot):
+    for each in sorted(user_failures, key=lambda each: each.slot):
         slots.setdefault(each.signature, []).append((each.slot, each.message))
     kinds = [
-        Kind(
+        ViolationKind(
             signature=signature,
             count=len({slot for slot, _ in those}),
             first=those[0][0],
@@ -109,7 +114,7 @@ def _found(
         for signature, those in slots.items()
     ]
     files = str(ledger.fact(f"files of {system} on {map}") or "")
-    return Found(
+    return SearchSummary(
         system=system,
         map=map,
         files=tuple(files.split()),
@@ -137,7 +142,7 @@ LEGEND = {
 }
 
 
-def legend(kinds: Iterable[Kind]) -> str:
+def legend(kinds: Iterable[ViolationKind]) -> str:
     """Return what the types of these kinds mean, in one line."""
     types = {kind.signature.partition(":")[0] for kind in kinds}
     return "; ".join(f"{name}: {words}" for name, words in LEGEND.items() if name in types)

@@ -1,0 +1,88 @@
+"""The header of a session: what will be searched, and how long it will probably take."""
+
+from __future__ import annotations
+
+from pytest_garl import cpu_dispatch
+from pytest_garl.plugin.progress import duration
+from pytest_garl.plugin.run import Run
+from pytest_garl.plugin.wrapping import counted
+from pytest_garl.regressions.forecast import seconds_of_kind
+
+
+def header(run: Run) -> str:
+    """Return the header: what is searched, how long it takes, and whether NumPy came too early."""
+    return "\n".join([_plan(run), *cpu_dispatch_warning(run)])
+
+
+def forecast(run: Run) -> list[str]:
+    """Return how long all searches take together, if there are several."""
+    options = run.options
+    sizes = [
+        len(wanted)
+        for wanted in run.targets.values()
+        if all(target.entry is None for target in wanted.values())
+    ]
+    if not options.budget or options.workers is None or len(sizes) < 2:
+        return []
+    return [f"garl: {len(sizes)} searches, {_time_of(run, sum(sizes))}{_time_per_kind(run)}"]
+
+
+def acceptance_warning(run: Run) -> list[str]:
+    """Return a warning if git cannot tell which cases are committed."""
+    problem = run.options.corpus.acceptance.problem
+    if not problem:
+        return []
+    return [
+        f"garl: cannot tell which cases are committed ({problem}); only cases that "
+        "`garl cases accept` has marked are known"
+    ]
+
+
+def cpu_dispatch_warning(run: Run) -> list[str]:
+    """Return what follows if a library was loaded before its instructions could be chosen."""
+    libraries, options = cpu_dispatch.disobeying(), run.options
+    effects = []
+    if options.workers == 0:
+        effects.append("flown in a worker process, not inside pytest")
+    if options.searches:
+        effects.append("scenarios bred here may differ from those bred on another make of CPU")
+    if not libraries or not effects:
+        return []
+    cause = f"loaded before pytest-garl could choose its instructions: {', '.join(libraries)}"
+    return ["; ".join([f"garl: {cause}", *effects])]
+
+
+def _plan(run: Run) -> str:
+    options = run.options
+    if options.repeat:
+        return f"garl: repeating {options.repeat}"
+    done = sum(search.flown for search in run.ledger.queries.progress()) if options.resume else 0
+    resuming = f"resuming after {done} flights; " if options.resume else ""
+    return (
+        f"garl: {resuming}budget {options.budget} per system and map, method {options.method}, "
+        f"seed {options.seed}, objects {options.npcs}, weather {options.weather}, "
+        f"{_workers(run)}"
+    )
+
+
+def _workers(run: Run) -> str:
+    """Return how many workers fly and where, and how long it takes if that is known."""
+    options = run.options
+    ray = f" of Ray at {options.ray_address}" if options.ray_address else " of Ray, started here"
+    pool = ray if options.pool == "ray" else ""
+    if options.workers is None:
+        return f"all workers{pool}"
+    workers = counted(options.workers, "worker") if options.workers else "flown inside pytest"
+    time = f"{_time_of(run, options.budget)} per system and map{_time_per_kind(run)}"
+    return f"{workers}{pool}; {time}"
+
+
+def _time_of(run: Run, flights: int) -> str:
+    return f"about {duration(flights * run.flight_s / max(1, run.options.workers or 1))}"
+
+
+def _time_per_kind(run: Run) -> str:
+    if not run.options.shrink:
+        return ""
+    seconds = seconds_of_kind(run.options.shrink, run.flight_s, run.options.workers or 1)
+    return f", then about {duration(seconds)} per new kind of violation"
