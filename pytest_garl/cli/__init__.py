@@ -25,20 +25,20 @@ COMMANDS = {
     "train": "train",
 }
 """The subcommands, and the module of each."""
-_AGAIN = "_PYTEST_GARL_STARTED_AGAIN"
+_RESTARTED = "_PYTEST_GARL_STARTED_RESTARTED"
 
 
 class _Group(click.Group):
-    """Loads a subcommand when it is asked for, and shows the project's errors without traceback.
+    """Loads a subcommand only when it is used, and shows the project's errors without traceback.
 
-    What the subcommands import loads NumPy, which must not happen before it is told by which
-    instructions to compute.
+    The modules of the subcommands load NumPy.  Before that, the environment must name the CPU
+    instructions that NumPy may use.
     """
 
     def main(self, args: Any = None, *rest: Any, **more: Any) -> Any:
-        if args is None and not cpu_dispatch.pin() and _AGAIN not in os.environ:
-            # Something loaded NumPy as the interpreter started; the environment is right now.
-            os.environ[_AGAIN] = "1"
+        if args is None and not cpu_dispatch.pin() and _RESTARTED not in os.environ:
+            # NumPy was loaded while the interpreter started: start again with this environment.
+            os.environ[_RESTARTED] = "1"
             os.execv(sys.executable, [sys.executable, *sys.orig_argv[1:]])
         return super().main(args, *rest, **more)
 
@@ -55,15 +55,15 @@ class _Group(click.Group):
 
     def invoke(self, ctx: click.Context) -> object:
         try:
-            with _ended_in_order():
+            with _clean_exit_on_sigterm():
                 return super().invoke(ctx)
         except GarlError as error:
             raise click.ClickException(str(error)) from error
 
 
 @contextlib.contextmanager
-def _ended_in_order() -> Iterator[None]:
-    """Have SIGTERM, by which build servers cancel, end children and remove temporary folders."""
+def _clean_exit_on_sigterm() -> Iterator[None]:
+    """Let SIGTERM, the signal of build servers, end workers and remove temporary folders."""
     before = signal.signal(signal.SIGTERM, _exit)
     try:
         yield

@@ -27,7 +27,7 @@ COLOURS = {"broke": "red", "fixed": "green", "changed": "yellow"}
 _FOLDER = click.Path(path_type=Path, file_okay=False, exists=True)
 _FILE = click.Path(path_type=Path, dir_okay=False)
 
-_SURVEY = (
+_SPEC_OPTIONS = (
     click.option(
         "--system",
         "systems",
@@ -95,8 +95,8 @@ _SURVEY = (
 )
 
 
-def _survey_options(command: Callable[..., Any]) -> Callable[..., Any]:
-    for option in reversed(_SURVEY):
+def _spec_options(command: Callable[..., Any]) -> Callable[..., Any]:
+    for option in reversed(_SPEC_OPTIONS):
         command = option(command)
     return command
 
@@ -107,7 +107,7 @@ def baseline() -> None:
 
 
 @baseline.command()
-@_survey_options
+@_spec_options
 @click.option(
     "--from-ledger",
     "ledger",
@@ -135,18 +135,20 @@ def save(
         )
     else:
         checkout = Checkout(folder=Path.cwd())
-        made = fly_baseline(_survey(**chosen), checkout, systems, workers, _progress)
+        made = fly_baseline(_spec(**chosen), checkout, systems, workers, _progress)
     files.save(out, made)
     for each in made.sets:
-        bad = sum(flight.summary.violated for flight in each.flights)
-        given_up = sum(flight.summary.aborted for flight in each.flights)
-        unsure = sum(not flight.summary.decided for flight in each.flights)
-        count = f"{len(each.flights)} flown, {bad} violations, {given_up} aborts"
-        left_out = f", {unsure} inconclusive, which the gate leaves out" if unsure else ""
+        violations = sum(flight.summary.violated for flight in each.flights)
+        aborts = sum(flight.summary.aborted for flight in each.flights)
+        inconclusive = sum(not flight.summary.decided for flight in each.flights)
+        count = f"{len(each.flights)} flown, {violations} violations, {aborts} aborts"
+        left_out = (
+            f", {inconclusive} inconclusive, which the gate leaves out" if inconclusive else ""
+        )
         click.echo(f"{each.title}: {count}{left_out}")
         if each.warning:
             click.echo(f"    note: {each.warning}")
-    click.echo(f"saved {out}; the gate: pytest --garl-baseline={out}")
+    click.echo(f"saved {out}; compare with it: pytest --garl-baseline={out}")
 
 
 @baseline.command()
@@ -160,16 +162,16 @@ def scenario(file: Path, name: str) -> None:
     for each in files.load(file, (_maps_folder(),)).sets:
         for index, flight in enumerate(each.flights):
             if each.scenario_name(index) == name:
-                click.echo(f"# {name} of {file}; objects were moved by {each.npcs}")
+                click.echo(f"# {name} of {file}; the NPC policy was {each.npcs}")
                 click.echo(dumps(flight.scenario), nl=False)
                 return
-    raise OptionError(f"{file}: holds no scenario {name!r}; expected one such as court-0")
+    raise OptionError(f"{file}: found no scenario {name!r}, expected a name such as court-0")
 
 
 @click.command()
 @click.argument("base", type=_FOLDER)
 @click.argument("head", type=_FOLDER)
-@_survey_options
+@_spec_options
 @click.option(
     "--level",
     type=click.FloatRange(min=0, max=1, min_open=True, max_open=True),
@@ -197,16 +199,18 @@ def diff(
     from pytest_garl.scenarios.maps.map import load_map
 
     if not systems:
-        raise OptionError("garl diff: --system is missing; give MODULE:CLASS of the landing system")
-    survey = _survey(**chosen)
+        raise OptionError(
+            "garl diff: --system is missing; expected MODULE:CLASS of the landing system"
+        )
+    spec = _spec(**chosen)
     checkouts = [
         Checkout(folder=one, others=(other,)) for one, other in ((base, head), (head, base))
     ]
-    before, after = (fly_baseline(survey, each, systems, workers, _progress) for each in checkouts)
+    before, after = (fly_baseline(spec, each, systems, workers, _progress) for each in checkouts)
     passed = True
     for old, new in zip(before.sets, after.sets, strict=True):
-        map = load_map(old.map, survey.map_folders)
-        fly = neighbour_flyer(survey, checkouts[1], new, workers, _progress)
+        map = load_map(old.map, spec.map_folders)
+        fly = neighbour_flyer(spec, checkouts[1], new, workers, _progress)
         found = compare_sets(old, new, map, fly, level=level)
         passed = passed and found.passed
         _show(old.title, found)
@@ -214,7 +218,7 @@ def diff(
         raise SystemExit(FAILED)
 
 
-def _survey(
+def _spec(
     *,
     maps: str,
     distance_m: float,
@@ -256,7 +260,7 @@ def _maps_folder() -> Path:
 def _progress(
     flights: Iterator[CompletedFlight], title: str, total: int
 ) -> Iterable[CompletedFlight]:
-    """Show on a terminal how far flights are; on stderr, which is not what is asked for."""
+    """Show the progress of flights on a terminal, on stderr, because stdout takes the result."""
     console = Console(stderr=True)
     hidden = not console.is_terminal
     return track(flights, title, total, console=console, disable=hidden, transient=True)
@@ -270,7 +274,7 @@ def _show(title: str, found: Comparison) -> None:
         table.add_column(name, overflow="fold")
     for result in DIFFERENT_RESULTS:
         for pair in found.with_result(result):
-            # As texts: in a string rich would make an animal of ":dog:".
+            # As Text: rich would replace ":dog:" in a string by an emoji.
             cells = (pair.name, result, pair.base.text, pair.head.text)
             table.add_row(*(Text(cell) for cell in cells), style=COLOURS[result])
     console = Console()

@@ -11,7 +11,7 @@ import click
 from pytest_garl.errors import LandingSystemError
 
 LIMIT_S = 1800.0
-"""Wall time after which the command ends in any case, with a traceback."""
+"""The command ends after this wall time in any case, with a traceback."""
 
 
 @click.command()
@@ -45,7 +45,7 @@ def check(
     """
     from pytest_garl.testing import check_landing_system
 
-    # A call that hangs in C code and holds the interpreter can be interrupted by nothing else.
+    # Nothing else interrupts a call that hangs in C code and holds the interpreter.
     faulthandler.dump_traceback_later(LIMIT_S, exit=True, file=sys.__stderr__ or 2)
     try:
         found = _imported(system)

@@ -35,14 +35,14 @@ def report(ledger: Path, as_json: bool, out: Path | None, folder: Path) -> None:
     It works while the run goes on, and after a run was killed.
     """
     found = report_of(ledger, Corpus(folder, (Path.cwd() / "scenarios" / "maps",)))
-    text = json.dumps(found, indent=2) + "\n" if as_json else _words(found)
+    text = json.dumps(found, indent=2) + "\n" if as_json else _text(found)
     if out is None:
         click.echo(text, nl=False)
     else:
         write_text_atomically(out, text)
 
 
-def _words(found: dict[str, Any]) -> str:
+def _text(found: dict[str, Any]) -> str:
     lines = []
     for search in found["searches"]:
         name = search["system"].split(":")[-1]
@@ -55,4 +55,4 @@ def _words(found: dict[str, Any]) -> str:
                 f"  {kind['count']:4d}  {kind['signature']}: {kind['headline']}",
                 f"        {kind['repeat']}",
             ]
-    return "\n".join([*lines, ""]) if lines else "nothing flown\n"
+    return "\n".join([*lines, ""]) if lines else "no flights yet\n"

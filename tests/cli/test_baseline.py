@@ -65,14 +65,14 @@ def diff(*options: str) -> Result:
     return garl("diff", "../base", ".", "--system=stack.system:Lander", *TINY, *options)
 
 
-def test_two_alike_checkouts_pass(checkouts: Path) -> None:
+def test_diff_passes_two_equal_checkouts(checkouts: Path) -> None:
     result = diff("--count=12")
     assert result.exit_code == 0, result.output
     assert "Lander-lawn: gate passed" in result.output
     assert "12 pairs compared, 12 of them the same flight to the byte" in result.output
 
 
-def test_each_checkout_flies_with_its_own_modules_and_what_broke_is_listed(
+def test_diff_flies_each_checkout_with_its_own_modules_and_lists_broken_pairs(
     checkouts: Path,
 ) -> None:
     (checkouts / "head" / "stack" / "helper.py").write_text(WRONG)
@@ -84,7 +84,7 @@ def test_each_checkout_flies_with_its_own_modules_and_what_broke_is_listed(
     assert re.search(r"; new type of violation: V in lawn-0 and 23 more, in 9 of 9", result.output)
 
 
-def test_a_system_that_one_checkout_lacks_is_a_clear_error(checkouts: Path) -> None:
+def test_diff_refuses_a_system_that_one_checkout_lacks(checkouts: Path) -> None:
     shutil.rmtree(checkouts / "base" / "stack")
     result = diff("--count=1")
     assert result.exit_code == 1
@@ -106,16 +106,14 @@ def test_a_system_that_one_checkout_lacks_is_a_clear_error(checkouts: Path) -> N
         (("--from-ledger=.garl/ledger.sqlite",), "there is no ledger"),
     ],
 )
-def test_what_cannot_be_saved_is_told(
-    checkouts: Path, words: tuple[str, ...], expected: str
-) -> None:
+def test_save_refuses_wrong_options(checkouts: Path, words: tuple[str, ...], expected: str) -> None:
     result = garl("baseline", "save", *words, "--out=base.toml")
     assert result.exit_code == 1
     assert expected in result.output
     assert not Path("base.toml").exists()
 
 
-def test_the_same_options_save_the_same_bytes_and_a_scenario_can_be_taken_out(
+def test_equal_options_save_equal_bytes_and_scenario_prints_one_scenario(
     checkouts: Path,
 ) -> None:
     save = ("baseline", "save", "--system=stack.system:Lander", *TINY, "--count=4")
@@ -132,11 +130,11 @@ def test_the_same_options_save_the_same_bytes_and_a_scenario_can_be_taken_out(
     assert "GivesUp-lawn: 4 flown, " in several.output
     assert [each.title for each in load(Path("three.toml")).sets] == ["Lander-lawn", "GivesUp-lawn"]
     missing = garl("baseline", "scenario", "two.toml", "lawn-4")
-    assert "holds no scenario 'lawn-4'" in missing.output
+    assert "found no scenario 'lawn-4'" in missing.output
 
 
 @pytest.mark.sim
-def test_real_flights_become_a_baseline(checkouts: Path) -> None:
+def test_save_records_real_flights(checkouts: Path) -> None:
     save = (
         "baseline",
         "save",

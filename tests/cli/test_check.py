@@ -46,7 +46,7 @@ def garl(*arguments: str) -> Result:
     return CliRunner().invoke(main, ["check", *arguments])
 
 
-def test_check_prints_what_it_saw_and_ends_well() -> None:
+def test_check_prints_its_observations_and_exits_with_zero() -> None:
     done = garl("checked_stack:Climbs", "--seconds=2", "--map=lawn", "--map=court")
     assert done.exit_code == 0, done.output
     assert "Climbs: lawn: Not landed" in done.output
@@ -66,7 +66,7 @@ def test_check_prints_what_it_saw_and_ends_well() -> None:
         ("broken_stack:Climbs", "cannot be imported as a landing system (ZeroDivisionError"),
     ],
 )
-def test_fault_is_one_clear_error(system: str, words: str) -> None:
+def test_check_reports_a_fault_as_one_error(system: str, words: str) -> None:
     done = garl(system, "--seconds=2")
     assert done.exit_code == 1
     assert words in done.output

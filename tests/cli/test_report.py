@@ -47,11 +47,11 @@ def searched(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
-def test_the_schema_is_one() -> None:
+def test_the_schema_is_valid() -> None:
     Draft202012Validator.check_schema(VALIDATOR.schema)
 
 
-def test_a_report_holds_what_the_search_found(searched: Path) -> None:
+def test_a_report_holds_the_violations_of_the_search(searched: Path) -> None:
     found = report(searched)
     assert found["complete"]
     assert (found["version"], found["run"]["seed"], found["run"]["budget"]) == (1, 0, 8)
@@ -77,7 +77,9 @@ def test_a_report_holds_what_the_search_found(searched: Path) -> None:
     assert not any(case["known"] for case in found["cases"])
 
 
-def test_a_report_of_a_killed_run_tells_what_there_is(searched: Path, tmp_path: Path) -> None:
+def test_a_report_of_a_killed_run_holds_its_finished_flights(
+    searched: Path, tmp_path: Path
+) -> None:
     (tmp_path / "elsewhere").mkdir()
     path = tmp_path / "elsewhere" / "ledger.sqlite"
     with (
@@ -97,7 +99,7 @@ def test_a_report_of_a_killed_run_tells_what_there_is(searched: Path, tmp_path: 
     assert found["cases"] == []
 
 
-def test_a_report_goes_into_a_file_or_in_words_to_the_terminal(searched: Path) -> None:
+def test_a_report_is_written_to_a_file_or_printed_as_text(searched: Path) -> None:
     assert garl(searched, "report", "--json", "--out", "report.json") == ""
     VALIDATOR.validate(json.loads((searched / "report.json").read_text()))
     words = garl(searched, "report")
@@ -105,7 +107,7 @@ def test_a_report_goes_into_a_file_or_in_words_to_the_terminal(searched: Path) -
     assert "IV:dog:last-metre:unseen: collided with dog-1" in words
 
 
-def test_a_report_leaves_the_results_as_they_are(pytester: pytest.Pytester, searched: Path) -> None:
+def test_a_report_changes_no_result(pytester: pytest.Pytester, searched: Path) -> None:
     shutil.copytree(searched, pytester.path, dirs_exist_ok=True)
     before = result_hash(pytester)
     assert report(pytester.path)["results_sha256"] == before == result_hash(pytester)

@@ -3,13 +3,13 @@ from __future__ import annotations
 import pytest
 
 from pytest_garl.verdicts.phases import landing_phase
-from tests.verdicts.test_judge import flight, flown, step
+from tests.verdicts.flights import flight, step, track
 
 
 def at(x: float, z: float, highest: float = 10.0, visible: float = 0.0) -> str:
     """Return the phase of a UAV that was ``highest`` and is ``x`` m off the marker, ``z`` m up."""
-    track = flown((0.0, -10.0, 0.0, highest), (10.0, x, 0.0, z))
-    subject = flight("aborted", (x, 0.0, z), uav=track, steps=(step(5.0, visible=visible),))
+    path = track((0.0, -10.0, 0.0, highest), (10.0, x, 0.0, z))
+    subject = flight("aborted", (x, 0.0, z), uav=path, steps=(step(5.0, visible=visible),))
     return landing_phase(subject, 10.0)
 
 
@@ -42,7 +42,7 @@ def test_transit_ends_when_the_marker_comes_into_view(visible: float, name: str)
     later = flight(
         "aborted",
         (5.0, 0.0, 8.0),
-        uav=flown((0.0, -10.0, 0.0, 10.0), (10.0, 5.0, 0.0, 8.0)),
+        uav=track((0.0, -10.0, 0.0, 10.0), (10.0, 5.0, 0.0, 8.0)),
         steps=(step(10.1, visible=1.0),),
     )
     assert landing_phase(later, 10.0) == "transit"
