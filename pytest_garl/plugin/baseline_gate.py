@@ -56,7 +56,7 @@ class BaselineGateItem(pytest.Item):
         base = self.garl_gate
         try:
             npcs = policy_spec(base.npcs)
-            differing = incompatibilities(base, run.job(self._target, npcs))
+            differing = incompatibilities(base, run.searches.job(self._target, npcs))
             if differing:
                 refused = f"gate FAILED: no fair comparison, {'; '.join(differing)}"
                 lines = [refused, "If that is wanted, save the baseline anew."]

@@ -122,7 +122,7 @@ def pytest_collection_finish(session: pytest.Session) -> None:
         run.select(session.items)
         if run.options.resume:
             try:
-                run.check_resumed()
+                run.searches.check_resumed()
             except GarlError as error:
                 raise pytest.UsageError(str(error)) from error
 

@@ -94,10 +94,10 @@ def first_with_same_signature(run: Run, target: Target, failure: ItemFailure, no
     slot = run.claims.reporting_slot(failure.key(target.search), nodeid)
     if slot:
         return slot
-    for other in run.lower_targets(target):
+    for other in run.searches.lower(target):
         waiting = [
             item
-            for item in run.items[other.search][other.slot]
+            for item in run.items[other.flight]
             if item.shows
             and (failure.failed_assertion is None or item.test == failure.test)
             and not run.claims.has_run(item.nodeid)
@@ -129,7 +129,7 @@ def divergence_s(run: Run, target: Target) -> float | None:
     """Return when a slot's flight and its first reflight part; None if one was not recorded."""
     from pytest_garl.simulation.flight_file import load, parted_s
 
-    files = [run.flight(target).record, target.reflight(0).record(run.flights)]
+    files = [run.flight(target).record, target.reflight(0).record(run.options.flights)]
     if not all(file.exists() for file in files):
         return None
     first, second = (load(file) for file in files)

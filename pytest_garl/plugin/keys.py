@@ -51,6 +51,8 @@ CASE = "garl.case"
 """The user property that names the file of a case that fails."""
 MAYBE_FIXED = "garl.maybe_fixed"
 """The user property that names the file of an open case that passes."""
+UNPROVEN = "garl.unproven"
+"""The user property that says why it proves nothing that a case passes."""
 STALE = "garl.stale"
 """The user property that names the file of an open case that passes without proof, and why."""
 

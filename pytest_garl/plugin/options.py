@@ -88,6 +88,11 @@ class Options:
         return Corpus(self.cases, self.map_folders)
 
     @property
+    def flights(self) -> Path:
+        """The folder of the flights' records."""
+        return self.folder / "flights"
+
+    @property
     def ledger(self) -> Path:
         """The ledger of this run; repeating writes one of its own and keeps the search's.
 

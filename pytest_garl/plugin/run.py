@@ -4,37 +4,34 @@ from __future__ import annotations
 
 import functools
 import os
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
-from pathlib import Path
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, TextIO
 
 import pytest
 
-from pytest_garl.adversary.catalogue import policy_names
-from pytest_garl.errors import LedgerError
-from pytest_garl.execution.database import SearchKind
+from pytest_garl.execution.batch import fly_all
 from pytest_garl.execution.flight_id import FlightId
 from pytest_garl.execution.ledger import Ledger
 from pytest_garl.execution.pool import Pool, wait_for
-from pytest_garl.execution.reference import BUILT_IN, Reference, reference_to, simulator_sha256
-from pytest_garl.execution.slot import Slot
-from pytest_garl.execution.sources import combined_sha256, data_files, sources_of
+from pytest_garl.execution.reference import Reference, simulator_sha256
+from pytest_garl.execution.result import CompletedFlight
+from pytest_garl.execution.sources import combined_sha256
 from pytest_garl.plugin.keys import is_xdist_worker, target_of
 from pytest_garl.plugin.options import Options
 from pytest_garl.plugin.report_claims import ReportClaims
+from pytest_garl.plugin.search_setup import Searches
 from pytest_garl.plugin.target import Target
+from pytest_garl.regressions.staleness import SourceHashes, stale_reasons
+from pytest_garl.scenarios.files import parse_scenario
+from pytest_garl.scenarios.maps.map import load_map
+from pytest_garl.scenarios.scenario import Scenario
+from pytest_garl.simulation.npc_policy import PolicySpec
 
 if TYPE_CHECKING:
-    from pytest_garl.execution.job import FlightJob
-    from pytest_garl.execution.result import CompletedFlight
     from pytest_garl.plugin.user_assertions import ItemAssertion
     from pytest_garl.regressions.follow_up import InvestigatedSignature
     from pytest_garl.regressions.forecast import RemainingWork
-    from pytest_garl.scenarios.scenario import Scenario
-    from pytest_garl.search.breeder import Breeder
-    from pytest_garl.search.method import Method
-    from pytest_garl.simulation.npc_policy import PolicySpec
 
 SELECTED = "selected flights"
 """The ledger's fact: how many flights of searches the selected tests want."""
@@ -44,7 +41,7 @@ FLIGHT_S = 2.2
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Selected:
+class SelectedItem:
     """A selected test item of a slot.
 
     ``test`` is the same for all slots of one test; ``shows`` says whether its failure shows: it is
@@ -56,10 +53,10 @@ class Selected:
     shows: bool
 
 
-def selected(item: pytest.Item) -> Selected:
+def selected(item: pytest.Item) -> SelectedItem:
     """Return what a run must know of an item."""
     marked = any(item.get_closest_marker(name) for name in ("skip", "skipif", "xfail"))
-    return Selected(
+    return SelectedItem(
         nodeid=item.nodeid,
         test=test_of(item),
         shows=not marked and "landing" in getattr(item, "fixturenames", ()),
@@ -83,15 +80,19 @@ class Run:
     ledger: Ledger
     pool: Pool
     simulator: Reference
+    lock: TextIO | None = None
+    """Keeps other runs out of the folder."""
+    searches: Searches = field(init=False)
+    items: dict[FlightId, list[SelectedItem]] = field(default_factory=dict)
+    """The selected items that judge a flight."""
+    results: dict[FlightId, CompletedFlight] = field(default_factory=dict)
     flight_s: float = FLIGHT_S
     on_wait: Callable[[], None] = field(default=lambda: None)
     """Called while a flight is waited for."""
     on_wait_end: Callable[[], None] = field(default=lambda: None)
     """Called when the waiting is over."""
-    items: dict[str, dict[Slot, list[Selected]]] = field(default_factory=dict)
-    targets: dict[str, dict[Slot, Target]] = field(default_factory=dict)
-    breeders: dict[str, Breeder] = field(default_factory=dict)
-    results: dict[FlightId, CompletedFlight] = field(default_factory=dict)
+    loop_finished: bool = False
+    """Whether all tests ran to the end of the list, and nobody interrupted them."""
     pursued: tuple[InvestigatedSignature, ...] = ()
     """What became of new signatures after the search."""
     rest: RemainingWork | None = None
@@ -106,41 +107,26 @@ class Run:
     parameters."""
     reported_failures: dict[str, str] = field(default_factory=dict)
     """Tests of which xdist's workers say that they failed so, with the signature."""
-    lock: TextIO | None = None
-    loop_finished: bool = False
-    """Whether all tests ran to the end of the list, and nobody interrupted them."""
 
-    def select(self, items: list[pytest.Item]) -> None:
-        """Remember which slots the selected items want."""
+    def __post_init__(self) -> None:
+        self.searches = Searches(options=self.options, ledger=self.ledger, simulator=self.simulator)
+
+    def select(self, items: Sequence[pytest.Item]) -> None:
+        """Remember which flights the selected items want."""
+        files: dict[str, set[str]] = {}
         for item in items:
             target = target_of(item)
             if target is not None:
-                wanted = self.items.setdefault(target.search, {})
-                wanted.setdefault(target.slot, []).append(selected(item))
-                self.targets.setdefault(target.search, {})[target.slot] = target
-        searched = sum(
-            target.entry is None for slots in self.targets.values() for target in slots.values()
-        )
-        if searched:
-            # For the bar, which xdist's controller draws without having had the items.
-            self.ledger.note_fact(SELECTED, searched)
-
-    def check_resumed(self) -> None:
-        """Raise LedgerError if a search to resume flew something else."""
-        from pytest_garl.execution.job import parse_job
-
-        for search, wanted in self.targets.items():
-            target = next(iter(wanted.values()))
-            text = self.ledger.job(search)
-            if text is not None:
-                then = parse_job(text)
-                differing = self.job(target, _of_today(then.npcs)).differences(then)
-                if differing:
-                    raise LedgerError(
-                        f"--garl-resume: {target.system.__qualname__} on {target.map} is not what "
-                        f"it was: {', '.join(differing)} changed; run without --garl-resume to "
-                        "begin anew"
-                    )
+                self.searches.select(target)
+                self.items.setdefault(target.flight, []).append(selected(item))
+                search = f"{target.system_name} on {target.map}"
+                files.setdefault(search, set()).add(item.nodeid.partition("::")[0])
+        # xdist's controller, which writes the summary and the progress line, has no items.
+        for search, names in files.items():
+            self.ledger.note_fact(f"files of {search}", " ".join(sorted(names)))
+        wanted = sum(self.searches.sizes())
+        if wanted:
+            self.ledger.note_fact(SELECTED, wanted)
 
     def note_finding_test(self, search: str, signature: str, nodeid: str) -> None:
         """Remember which test failed for a violation: of several the first by name."""
@@ -149,7 +135,7 @@ class Run:
         self.finding_tests[search, signature] = min(known, test)
 
     def close(self) -> None:
-        """End the flying children and let others have the ledger."""
+        """End the workers, and let others have the ledger."""
         self.pool.close()
         self.ledger.close()
         if self.lock is not None:
@@ -163,39 +149,32 @@ class Run:
         return ReportClaims(ledger=self.ledger)
 
     def fly(self, target: Target, npcs: PolicySpec) -> CompletedFlight:
-        """Return the slot's flight after it and all lower selected slots are flown."""
-        self._register(target, npcs)
+        """Return a slot's flight after it and all lower selected slots are flown."""
+        self.searches.register(target.system, npcs)
         try:
-            for lower in self.lower_targets(target):
-                self._wait(lower.flight)
-            return self._wait(target.flight)
+            for lower in self.searches.lower(target):
+                self.flight(lower)
+            return self.flight(target)
         finally:
             self.on_wait_end()
 
-    @property
-    def flights(self) -> Path:
-        """The folder of the flights' records."""
-        return self.options.folder / "flights"
+    def flight(self, target: Target) -> CompletedFlight:
+        """Return the flight of a slot whose search is registered; wait for it."""
+        return self._wait(target.flight)
 
     def unproven(self, target: Target) -> tuple[str, ...]:
         """Return why it proves nothing that a case passes; nothing if the system was repaired."""
-        from pytest_garl.regressions.staleness import SourceHashes, stale_reasons
-        from pytest_garl.scenarios.maps.map import load_map
-
-        case = target.entry.case if target.entry else None
-        if case is None:
+        if target.case is None:
             return ()
         sources = SourceHashes(
-            system_sha256=combined_sha256(self._sources_of(target)),
+            system_sha256=combined_sha256(self.searches.sources(target)),
             simulator_sha256=simulator_sha256(self.simulator),
             map_sha256=load_map(target.map, self.options.map_folders).sha256,
         )
-        return stale_reasons(case, sources, self.flight(target).sha256)
+        return stale_reasons(target.case, sources, self.flight(target).sha256)
 
     def scenario(self, target: Target) -> Scenario:
         """Return what a slot flies."""
-        from pytest_garl.scenarios.files import parse_scenario
-
         text = self.ledger.scenario(target.flight)
         assert text is not None
         return parse_scenario(text)
@@ -224,15 +203,6 @@ class Run:
         # Interrupted twice, pytest tells of the status that it began with.
         return all(each.flown >= each.all for each in self.ledger.queries.progress())
 
-    def lower_targets(self, target: Target) -> list[Target]:
-        """Return what the selected tests of lower slots of a search test."""
-        targets = self.targets[target.search]
-        return [targets[slot] for slot in sorted(targets) if slot < target.slot]
-
-    def flight(self, target: Target) -> CompletedFlight:
-        """Return a slot's flight; wait for its result."""
-        return self._wait(target.flight)
-
     def refly(self, target: Target, count: int) -> list[CompletedFlight]:
         """Fly a flown slot ``count`` times more."""
         job = self.ledger.job(target.search)
@@ -248,10 +218,8 @@ class Run:
         self, target: Target, npcs: PolicySpec, scenarios: Sequence[Scenario]
     ) -> Sequence[CompletedFlight]:
         """Return what scenarios come to that are flown beside the searches."""
-        from pytest_garl.execution.batch import fly_all
-
         try:
-            job = self.job(target, npcs)
+            job = self.searches.job(target, npcs)
             return list(fly_all(self.ledger, self.pool, job, scenarios, self._advance))
         finally:
             self.on_wait_end()
@@ -260,132 +228,10 @@ class Run:
         """Return a flight; it never changes, so the ledger is read once."""
         known = self.results.get(flight)
         if known is None:
-            known = wait_for(self.ledger, self.pool, flight, self.flights, self._advance)
+            known = wait_for(self.ledger, self.pool, flight, self.options.flights, self._advance)
             self.results[flight] = known
         return known
 
     def _advance(self) -> None:
-        """Breed what can be bred, so that the pool has work ahead of the items."""
-        for breeder in self.breeders.values():
-            breeder.advance()
+        self.searches.advance()
         self.on_wait()
-
-    def _register(self, target: Target, npcs: PolicySpec) -> None:
-        """Put this search, and the others of the same system, into the ledger."""
-        for search, wanted in self.targets.items():
-            sample = next(iter(wanted.values()))
-            if search in self.breeders or sample.system is not target.system:
-                continue
-            if not sample.broken:
-                self._add(search, wanted, npcs)
-
-    def _add(self, search: str, wanted: Mapping[Slot, Target], npcs: PolicySpec) -> None:
-        from pytest_garl.adversary.policy_check import check_policy
-        from pytest_garl.execution.job import parse_job
-        from pytest_garl.scenarios.maps.map import load_map
-        from pytest_garl.search.breeder import Breeder
-
-        target = next(iter(wanted.values()))
-        npcs = _steered(target, npcs)
-        job = self.job(target, npcs)
-        case = target.entry.case if target.entry else None
-        removed = case.scenario.removed_objects if case else ()
-        check_policy(npcs, load_map(job.map, self.options.map_folders).without(removed))
-        name = target.system_name
-        slots: dict[int, list[int]] = {}
-        for slot in sorted(wanted):
-            slots.setdefault(slot.generation, []).append(slot.index)
-        method = self._method(wanted)
-        flights = len(wanted)
-        if method.learns:
-            flights = max(slots) * self.options.population + len(slots[max(slots)])
-        kind: SearchKind = "case" if case else "search"
-        self.ledger.add_search(search, name, target.map, flights, job.dumps(), kind)
-        nodes = [item.nodeid for each in self.items[search].values() for item in each]
-        files = sorted({node.partition("::")[0] for node in nodes})
-        # For the summary, which xdist's controller writes without having had the items.
-        self.ledger.note_fact(f"files of {name} on {target.map}", " ".join(files))
-        known = self.ledger.job(search)
-        if known is not None and job.differences(parse_job(known)):
-            raise LedgerError(
-                f"{name} on {target.map}: two sets of tests fly the same search with different "
-                f"{', '.join(job.differences(parse_job(known)))}"
-            )
-        self.breeders[search] = Breeder(self.ledger, search, method, slots)
-
-    def job(self, target: Target, npcs: PolicySpec) -> FlightJob:
-        """Return what a child must know to fly a target."""
-        from pytest_garl.execution.job import FlightJob
-        from pytest_garl.scenarios.maps.map import load_map
-
-        map = load_map(target.map, self.options.map_folders)
-        sources = self._sources_of(target)
-        own = sources_of(self.simulator.load()) if self.simulator != BUILT_IN else ()
-        return FlightJob.for_system(
-            reference_to(target.system),
-            map,
-            npcs,
-            system_sha256=combined_sha256(sources),
-            sources=tuple(sorted({*sources, *own})),
-            simulator=self.simulator,
-            map_folders=self.options.map_folders,
-            limits=target.limits,
-            timeout_s=self.options.timeout_s,
-            flights=self.flights,
-        )
-
-    def _sources_of(self, target: Target) -> tuple[tuple[str, str], ...]:
-        return sources_of(target.system, data_files(target.files, self.options.root))
-
-    def _method(self, wanted: Mapping[Slot, Target]) -> Method:
-        from pytest_garl.scenarios.genes import genome_for
-        from pytest_garl.scenarios.maps.map import load_map
-        from pytest_garl.search.catalogue import make_method
-        from pytest_garl.search.fixed import FixedScenarios
-        from pytest_garl.search.method import SearchPlan
-
-        if any(each.entry for each in wanted.values()) or self.options.repeat:
-            return FixedScenarios(
-                {slot: _repeated(self.options, each) for slot, each in wanted.items()}
-            )
-        map = load_map(next(iter(wanted.values())).map, self.options.map_folders)
-        plan = SearchPlan(
-            map=map,
-            genome=genome_for(map, weather=self.options.weather),
-            seed=self.options.seed,
-            population=self.options.population,
-        )
-        return make_method(self.options.method, plan)
-
-
-def _steered(target: Target, npcs: PolicySpec) -> PolicySpec:
-    """Return who moves the objects: a case's are those of its record, or of its policy."""
-    from pytest_garl.adversary.catalogue import policy_spec
-    from pytest_garl.adversary.recorded import recorded_spec
-
-    case = target.entry.case if target.entry else None
-    if case is None:
-        return npcs
-    if not target.live:
-        return recorded_spec(dict(case.moves), dict(case.changes))
-    return policy_spec(case.policy) if case.policy in policy_names() else npcs
-
-
-def _of_today(npcs: PolicySpec) -> PolicySpec:
-    """Return a policy with the weights that its file holds today."""
-    from pytest_garl.adversary.catalogue import policy_spec
-
-    weights = str(dict(npcs.arguments).get("weights", ""))
-    return replace(npcs, arguments=policy_spec(weights).arguments) if weights else npcs
-
-
-def _repeated(options: Options, target: Target) -> Scenario:
-    """Return the scenario that a case holds, or that ``--garl-repeat`` names."""
-    from pytest_garl.scenarios.files import load
-
-    if target.entry is not None and target.entry.case is not None:
-        return target.entry.case.scenario
-    if target.file:
-        return load(Path(target.file), options.map_folders)
-    assert options.repeated_slot is not None
-    return options.repeated_slot.scenarios[target.system_name]

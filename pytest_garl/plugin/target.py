@@ -14,6 +14,7 @@ from pytest_garl.execution.reference import reference_to
 from pytest_garl.execution.slot import Slot
 
 if TYPE_CHECKING:
+    from pytest_garl.regressions.case import Case
     from pytest_garl.regressions.corpus import CorpusEntry
     from pytest_garl.verdicts.verdict import Limits
 
@@ -48,6 +49,11 @@ class Target:
     def system_name(self) -> str:
         """The landing system's name in ledgers and cases: "module:class"."""
         return f"{self.system.__module__}:{self.system.__qualname__}"
+
+    @property
+    def case(self) -> Case | None:
+        """The saved case, if the target is one and its file can be read."""
+        return self.entry.case if self.entry is not None else None
 
     @property
     def broken(self) -> str:

@@ -12,7 +12,7 @@ import pytest
 
 from pytest_garl.adversary.catalogue import policy_spec
 from pytest_garl.execution.result import CompletedFlight
-from pytest_garl.plugin.run import _steered
+from pytest_garl.plugin.search_setup import npc_policy_of
 from pytest_garl.regressions.case import Case
 from pytest_garl.regressions.recorded_behaviour import recorded_behaviour
 from pytest_garl.regressions.replay import replay
@@ -57,8 +57,8 @@ def test_a_case_is_replayed_to_the_byte_only_with_its_changes(
 
 def test_pytest_flies_a_case_with_its_moves_and_its_changes() -> None:
     def arguments(each: Case) -> dict[str, Any]:
-        target: Any = SimpleNamespace(entry=SimpleNamespace(case=each), live=False)
-        return dict(_steered(target, policy_spec("greedy")).arguments)
+        target: Any = SimpleNamespace(case=each, live=False)
+        return dict(npc_policy_of(target, policy_spec("greedy")).arguments)
 
     changes = json.loads(arguments(case_with_changes())["changes"])
     assert changes == {

@@ -1,0 +1,178 @@
+"""The searches that the selected items fly: their jobs, methods and breeders.
+
+A saved case and a repeated scenario are searches of scenarios that are given.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+
+from pytest_garl.adversary.catalogue import policy_names, policy_spec
+from pytest_garl.adversary.policy_check import check_policy
+from pytest_garl.adversary.recorded import recorded_spec
+from pytest_garl.errors import LedgerError
+from pytest_garl.execution.database import SearchKind
+from pytest_garl.execution.job import FlightJob, parse_job
+from pytest_garl.execution.ledger import Ledger
+from pytest_garl.execution.reference import BUILT_IN, Reference, reference_to
+from pytest_garl.execution.slot import Slot
+from pytest_garl.execution.sources import combined_sha256, data_files, sources_of
+from pytest_garl.plugin.options import Options
+from pytest_garl.plugin.target import Target
+from pytest_garl.scenarios.files import load
+from pytest_garl.scenarios.genes import genome_for
+from pytest_garl.scenarios.maps.map import load_map
+from pytest_garl.scenarios.scenario import Scenario
+from pytest_garl.search.breeder import Breeder
+from pytest_garl.search.catalogue import make_method
+from pytest_garl.search.fixed import FixedScenarios
+from pytest_garl.search.method import Method, SearchPlan
+from pytest_garl.simulation.npc_policy import PolicySpec
+
+
+@dataclass(kw_only=True)
+class Searches:
+    """The searches of a run, by their keys in the ledger."""
+
+    options: Options
+    ledger: Ledger
+    simulator: Reference
+    targets: dict[str, dict[Slot, Target]] = field(default_factory=dict)
+    """What the selected items test."""
+    breeders: dict[str, Breeder] = field(default_factory=dict)
+    """Of the searches that are in the ledger."""
+
+    def select(self, target: Target) -> None:
+        """Remember that an item is selected that tests this."""
+        self.targets.setdefault(target.search, {})[target.slot] = target
+
+    def sizes(self) -> list[int]:
+        """Return how many flights the selected items want of each search; cases do not count."""
+        wanted = self.targets.values()
+        return [len(slots) for slots in wanted if not any(each.entry for each in slots.values())]
+
+    def lower(self, target: Target) -> list[Target]:
+        """Return what the selected items of lower slots of the same search test."""
+        wanted = self.targets[target.search]
+        return [wanted[slot] for slot in sorted(wanted) if slot < target.slot]
+
+    def register(self, system: type, npcs: PolicySpec) -> None:
+        """Put all searches of a landing system into the ledger."""
+        for search, wanted in self.targets.items():
+            sample = next(iter(wanted.values()))
+            if search not in self.breeders and sample.system is system and not sample.broken:
+                self._register(search, wanted, npcs)
+
+    def advance(self) -> None:
+        """Breed what can be bred, so that the pool has work ahead of the items."""
+        for breeder in self.breeders.values():
+            breeder.advance()
+
+    def check_resumed(self) -> None:
+        """Raise LedgerError if a search to resume flew something else."""
+        for search, wanted in self.targets.items():
+            target = next(iter(wanted.values()))
+            text = self.ledger.job(search)
+            if text is not None:
+                then = parse_job(text)
+                differing = self.job(target, _with_weights_of_today(then.npcs)).differences(then)
+                if differing:
+                    raise LedgerError(
+                        f"--garl-resume: {target.system.__qualname__} on {target.map} is not what "
+                        f"it was: {', '.join(differing)} changed; run without --garl-resume to "
+                        "begin anew"
+                    )
+
+    def job(self, target: Target, npcs: PolicySpec) -> FlightJob:
+        """Return what a worker must know to fly a target."""
+        sources = self.sources(target)
+        simulator = sources_of(self.simulator.load()) if self.simulator != BUILT_IN else ()
+        return FlightJob.for_system(
+            reference_to(target.system),
+            load_map(target.map, self.options.map_folders),
+            npcs,
+            system_sha256=combined_sha256(sources),
+            sources=tuple(sorted({*sources, *simulator})),
+            simulator=self.simulator,
+            map_folders=self.options.map_folders,
+            limits=target.limits,
+            timeout_s=self.options.timeout_s,
+            flights=self.options.flights,
+        )
+
+    def sources(self, target: Target) -> tuple[tuple[str, str], ...]:
+        """Return name and hash of everything that a target's landing system consists of."""
+        return sources_of(target.system, data_files(target.files, self.options.root))
+
+    def _register(self, search: str, wanted: Mapping[Slot, Target], npcs: PolicySpec) -> None:
+        target = next(iter(wanted.values()))
+        npcs = npc_policy_of(target, npcs)
+        job = self.job(target, npcs)
+        removed = target.case.scenario.removed_objects if target.case else ()
+        check_policy(npcs, load_map(job.map, self.options.map_folders).without(removed))
+        method = self._method(target, wanted)
+        slots = _by_generation(wanted)
+        flights = len(wanted)
+        if method.learns:
+            # Every generation before the last is flown whole.
+            flights = max(slots) * self.options.population + len(slots[max(slots)])
+        name = target.system_name
+        kind: SearchKind = "case" if target.case else "search"
+        self.ledger.add_search(search, name, target.map, flights, job.dumps(), kind)
+        known = self.ledger.job(search)
+        if known is not None and job.differences(parse_job(known)):
+            raise LedgerError(
+                f"{name} on {target.map}: two sets of tests fly the same search with different "
+                f"{', '.join(job.differences(parse_job(known)))}"
+            )
+        self.breeders[search] = Breeder(self.ledger, search, method, slots)
+
+    def _method(self, target: Target, wanted: Mapping[Slot, Target]) -> Method:
+        if target.entry or self.options.repeat:
+            return FixedScenarios(
+                {slot: _scenario_of(self.options, each) for slot, each in wanted.items()}
+            )
+        map = load_map(target.map, self.options.map_folders)
+        plan = SearchPlan(
+            map=map,
+            genome=genome_for(map, weather=self.options.weather),
+            seed=self.options.seed,
+            population=self.options.population,
+        )
+        return make_method(self.options.method, plan)
+
+
+def _by_generation(slots: Iterable[Slot]) -> dict[int, list[int]]:
+    """Return the indices of slots, in order, by their generation."""
+    found: dict[int, list[int]] = {}
+    for slot in sorted(slots):
+        found.setdefault(slot.generation, []).append(slot.index)
+    return found
+
+
+def npc_policy_of(target: Target, npcs: PolicySpec) -> PolicySpec:
+    """Return the NPC policy: of a case the recorded moves, or for a live one its policy."""
+    case = target.case
+    if case is None:
+        return npcs
+    if not target.live:
+        return recorded_spec(dict(case.moves), dict(case.changes))
+    return policy_spec(case.policy) if case.policy in policy_names() else npcs
+
+
+def _with_weights_of_today(npcs: PolicySpec) -> PolicySpec:
+    """Return a policy with the weights that its file holds today."""
+    weights = str(dict(npcs.arguments).get("weights", ""))
+    return replace(npcs, arguments=policy_spec(weights).arguments) if weights else npcs
+
+
+def _scenario_of(options: Options, target: Target) -> Scenario:
+    """Return the scenario of a saved case, or of ``--garl-repeat``."""
+    if target.case is not None:
+        return target.case.scenario
+    if target.file:
+        return load(Path(target.file), options.map_folders)
+    assert options.repeated_slot is not None
+    return options.repeated_slot.scenarios[target.system_name]
