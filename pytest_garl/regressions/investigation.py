@@ -13,7 +13,13 @@ from pytest_garl.regressions.new_case import new_case
 from pytest_garl.regressions.recorded_behaviour import find_colliding_object
 from pytest_garl.regressions.reduction import simplest_robust, with_shorter_record
 from pytest_garl.regressions.robustness import NEIGHBOURS
-from pytest_garl.regressions.shrink import alone, bare, clear, nobody, shrink
+from pytest_garl.regressions.shrink import shrink
+from pytest_garl.regressions.simplification import (
+    bare_scenario,
+    bare_scenario_around_marker,
+    empty_scenario,
+    without_other_objects,
+)
 from pytest_garl.scenarios.scenario import Scenario
 
 LEAST_FLIGHTS = 2 + NEIGHBOURS + PILOT_FLIGHTS
@@ -56,11 +62,11 @@ class CaseBuilder:
         return flights.result(new_case(request, failing, avoidable))
 
     def _exception(self, first: Scenario) -> CaseResult:
-        """Return the case of an exception or a hang: with a bare scenario if that fails too."""
+        """Return the case of an exception or a hang: with an empty scenario if that fails too."""
         request, flights = self._request, self._flights
         found = flights.live_behaviour(first)
-        bare_scenario = nobody(first, request.map)
-        for scenario, behaviour in ((bare_scenario, RecordedBehaviour(moves=())), (first, found)):
+        empty = empty_scenario(first, request.map)
+        for scenario, behaviour in ((empty, RecordedBehaviour(moves=())), (first, found)):
             flight = flights.fly_recorded(scenario, behaviour)
             if request.fails(scenario, flight):
                 failing = FailingScenario(
@@ -77,7 +83,7 @@ class CaseBuilder:
         """
         flights, map = self._flights, self._request.map
         name = find_colliding_object(flights.live_flight(first))
-        scenario = bare(first, map, name)
+        scenario = bare_scenario(first, map, name)
         # The flights that are left must do for the scenario as it was found.
         if scenario != first and flights.left >= (3 if name else 2) + NEIGHBOURS:
             failing = self._confirm_live(first, scenario)
@@ -86,7 +92,10 @@ class CaseBuilder:
         if not name:
             return None
         behaviour = flights.live_behaviour(first).only(name)
-        for scenario in (clear(first, map, name), alone(first, map, name)):
+        for scenario in (
+            bare_scenario_around_marker(first, map, name),
+            without_other_objects(first, map, name),
+        ):
             if scenario == first or flights.left < 2 + NEIGHBOURS:
                 continue
             failing = flights.confirm(first, scenario, behaviour)

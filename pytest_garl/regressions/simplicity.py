@@ -8,8 +8,8 @@ from dataclasses import dataclass
 
 from pytest_garl.regressions.case import Avoidable, Case
 from pytest_garl.regressions.case_file import record_lines, size_of
+from pytest_garl.regressions.complexity import complexity, genome_of
 from pytest_garl.regressions.robustness import NEIGHBOURS
-from pytest_garl.regressions.shrink import complexity, genome_of
 from pytest_garl.scenarios.maps.map import Map
 
 _EXCUSED: dict[Avoidable, int] = {"live": 0, "recorded": 1, "no": 2}

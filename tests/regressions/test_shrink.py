@@ -5,14 +5,10 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from pytest_garl.regressions.shrink import (
-    Trials,
-    by_hypothesis,
-    complexity,
-    genome_of,
-    reset_and_bisect,
-    shrink,
-)
+from pytest_garl.regressions.complexity import complexity, genome_of
+from pytest_garl.regressions.hypothesis_pass import shrink_by_hypothesis
+from pytest_garl.regressions.shrink import reset_and_bisect, shrink
+from pytest_garl.regressions.trials import Trials
 from pytest_garl.scenarios.chromosome import decode
 from pytest_garl.scenarios.genes import genome_for, with_destinations
 from pytest_garl.scenarios.scenario import Scenario
@@ -60,7 +56,7 @@ def test_hypothesis_finds_what_only_goes_together() -> None:
 
     first = FIRST.replace({"environment.dust": 0.12})
     plain = shrink(
-        first, unequal, LAWN, 300, colliding_object=COLLIDING_OBJECT, passes=(by_hypothesis,)
+        first, unequal, LAWN, 300, colliding_object=COLLIDING_OBJECT, passes=(shrink_by_hypothesis,)
     )
     assert plain.simplest["environment.fog"] == plain.simplest["environment.dust"] == 0
 

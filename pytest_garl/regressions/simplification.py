@@ -1,0 +1,89 @@
+"""Ways to make a scenario simpler: remove objects, reset weather, light and places to nominal."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+from pytest_garl.regressions.complexity import genome_of
+from pytest_garl.scenarios.genes import Genome
+from pytest_garl.scenarios.maps.map import Map
+from pytest_garl.scenarios.scenario import Scenario
+from pytest_garl.scenarios.validity import repair
+
+MARKER_PLACE = ("marker.x", "marker.y")
+"""The marker's place; an object that repeats its moves passes by a marker that lies elsewhere."""
+Simplification = Callable[[Scenario], Scenario]
+
+
+def simplifications(
+    scenario: Scenario, genome: Genome, colliding_object: str
+) -> list[list[Simplification]]:
+    """Return ways to make a scenario simpler in groups: objects, weather, light and places.
+
+    The object that the UAV hit is never removed, and places of objects stay.
+    """
+    removable = [
+        _removal(key.partition(".")[0])
+        for key, _ in scenario.genes
+        if key.endswith(".velocity") and key.partition(".")[0] != colliding_object
+    ]
+    weather: list[Simplification] = []
+    rest: list[Simplification] = []
+    for gene in genome.genes:
+        nominal = {item.key: item.nominal for item in gene.properties}
+        head = next(iter(nominal)).partition(".")[0]
+        if any(key.endswith(".velocity") for key in nominal):
+            continue
+        if all(scenario[key] == value for key, value in nominal.items()):
+            continue
+        is_weather = head == "environment" and "environment.sun_position" not in nominal
+        (weather if is_weather else rest).append(_reset(nominal))
+    return [group for group in (removable, weather, rest) if group]
+
+
+def simplified(scenario: Scenario, steps: Sequence[Simplification]) -> Scenario:
+    """Return a scenario with all simplifications applied."""
+    for step in steps:
+        scenario = step(scenario)
+    return scenario
+
+
+def bare_scenario(scenario: Scenario, map: Map, colliding_object: str) -> Scenario:
+    """Return a scenario without all that its failure should not need.
+
+    A collision needs the object that was hit, and everything else is nominal.  Any other failure
+    has its cause in weather, light or place, and needs no object.
+    """
+    if colliding_object:
+        return _nominal(scenario, map, colliding_object)
+    return without_other_objects(scenario, map, "")
+
+
+def bare_scenario_around_marker(scenario: Scenario, map: Map, colliding_object: str) -> Scenario:
+    """Return the bare scenario with the marker in its place, where the object moved around it."""
+    place = {key: value for key, value in scenario.genes if key in MARKER_PLACE}
+    return repair(_nominal(scenario, map, colliding_object).replace(place), map)
+
+
+def without_other_objects(scenario: Scenario, map: Map, colliding_object: str) -> Scenario:
+    """Return a scenario with no object but the one that was hit, everything else unchanged."""
+    names = [key.partition(".")[0] for key, _ in scenario.genes if key.endswith(".velocity")]
+    return repair(scenario.without(*(name for name in names if name != colliding_object)), map)
+
+
+def empty_scenario(scenario: Scenario, map: Map) -> Scenario:
+    """Return a scenario with everything nominal and no object."""
+    return _nominal(scenario, map, "")
+
+
+def _nominal(scenario: Scenario, map: Map, colliding_object: str) -> Scenario:
+    groups = simplifications(scenario, genome_of(scenario, map), colliding_object)
+    return repair(simplified(scenario, [step for group in groups for step in group]), map)
+
+
+def _removal(name: str) -> Simplification:
+    return lambda scenario: scenario if name in scenario.removed_objects else scenario.without(name)
+
+
+def _reset(values: dict[str, float]) -> Simplification:
+    return lambda scenario: scenario.replace(values)
