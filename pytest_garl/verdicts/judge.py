@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 
 import numpy as np
 
-from pytest_garl.simulation.flight import Contact, Flight, Separation
+from pytest_garl.simulation.flight import Contact, Crash, Flight, Separation
 from pytest_garl.simulation.physics.vehicle import up_m
 from pytest_garl.simulation.system_under_test.texts import cut
 from pytest_garl.verdicts.phases import (
@@ -42,6 +43,10 @@ TILTED_RAD = math.radians(20)
 """A touchdown beyond this angle is called tilted."""
 RECENT_S = 2.0
 """Length of the last part of a flight in which a hidden marker is described."""
+LEAST_HIDDEN_SHARE = 0.01
+"""A smaller hidden share of the marker is not described."""
+OVER_MARKER_M = 0.3
+"""A UAV within this horizontal distance is described as over the marker."""
 
 
 def judge(flight: Flight, limits: Limits) -> Verdict:
@@ -50,7 +55,7 @@ def judge(flight: Flight, limits: Limits) -> Verdict:
     A touchdown off the marker before an abort is a violation.  It is no violation by the paper's
     definition, which measures the distance of landings alone.
     """
-    primary, violation_type, signature, what = _mechanism(flight, limits)
+    mechanism = _mechanism(flight, limits)
     far = flight.final_distance_m > PAPER_LIMITS.distance_m
     paper = (
         flight.outcome == "collision"
@@ -59,12 +64,12 @@ def judge(flight: Flight, limits: Limits) -> Verdict:
     )
     return Verdict(
         outcome=flight.outcome,
-        primary=primary,
-        violation_type=violation_type,
-        signature=signature,
+        primary=mechanism.primary,
+        violation_type=mechanism.violation_type,
+        signature=mechanism.signature,
         paper_violation=paper,
         margins=_margins(flight, limits),
-        story=f"{what} {_where(flight)}".strip(),
+        story=f"{mechanism.sentence} {_where(flight)}".strip(),
     )
 
 
@@ -136,6 +141,7 @@ def _margins(flight: Flight, limits: Limits) -> tuple[Margin, ...]:
     landed = flight.outcome == "landed"
     off = off_marker_m(flight, limits)
     timed = landed or flight.outcome == "not_landed"
+    left_s = limits.time_s - flight.elapsed_s
     solid = [gap.distance_m for gap in flight.separations if gap.body_class != "ground"]
     hit = flight.outcome == "collision"
     nearest = 0.0 if hit else min(solid, default=math.hypot(*flight.marker_position_m) + 1e3)
@@ -149,9 +155,7 @@ def _margins(flight: Flight, limits: Limits) -> tuple[Margin, ...]:
         ),
         Margin(
             property="time",
-            value=limits.time_s - flight.elapsed_s
-            if landed
-            else min(0.0, limits.time_s - flight.elapsed_s),
+            value=left_s if landed else min(0.0, left_s),
             unit="s",
             decided=timed,
             reason="" if timed else reason,
@@ -161,25 +165,24 @@ def _margins(flight: Flight, limits: Limits) -> tuple[Margin, ...]:
     )
 
 
-def _mechanism(
-    flight: Flight, limits: Limits
-) -> tuple[PropertyName | None, ViolationType | None, str, str]:
+@dataclass(frozen=True, slots=True)
+class _Mechanism:
+    """How a flight ended: the violated property, its type and signature, and one sentence."""
+
+    primary: PropertyName | None
+    violation_type: ViolationType | None
+    signature: str
+    sentence: str
+
+
+def _mechanism(flight: Flight, limits: Limits) -> _Mechanism:
+    """Return the first violation of the flight, or how it ended without one."""
     if flight.outcome == "crashed" and flight.crash:
-        crash = flight.crash
-        message = cut(crash.message, MESSAGE_CHARS)
-        text = f"The landing system {_VERBS[crash.kind]}: {crash.error}: {message}".rstrip(": ")
-        return "crash", "V", f"V:{crash.error}@{crash.where}", text + "."
+        return _crash(flight.crash)
     if flight.outcome == "collision":
         return _collision(flight, flight.contacts[-1])
     if flight.outcome == "aborted":
-        touch = _touch_off_marker(flight, limits)
-        if touch:
-            off = f"Touched the ground {touch[0]:.1f} m off the marker before it gave up"
-            return _missed(flight, touch[1], off)
-        phase = landing_phase(flight, _abort_time(flight))
-        if limits.abort == "violation":
-            return "abort", "abort", f"abort:{phase}", "The landing was aborted."
-        return None, None, "", "The landing was aborted and the UAV climbed clear."
+        return _abort(flight, limits)
     if flight.outcome == "not_landed":
         return _not_landed(flight)
     if flight.final_distance_m > limits.distance_m:
@@ -187,30 +190,34 @@ def _mechanism(
         return _missed(flight, flight.elapsed_s, off)
     if flight.elapsed_s > limits.time_s:
         phase = landing_phase(flight, limits.time_s)
-        return "time", "late", f"late:{phase}", f"Landed late, after {flight.elapsed_s:.1f} s."
-    return None, None, "", f"Landed after {flight.elapsed_s:.1f} s."
+        sentence = f"Landed late, after {flight.elapsed_s:.1f} s."
+        return _Mechanism("time", "late", f"late:{phase}", sentence)
+    return _Mechanism(None, None, "", f"Landed after {flight.elapsed_s:.1f} s.")
 
 
 _VERBS = {"raised": "raised", "nonsense": "returned nonsense", "died": "died", "hung": "hung"}
 
 
-def _collision(flight: Flight, contact: Contact) -> tuple[PropertyName, ViolationType, str, str]:
+def _crash(crash: Crash) -> _Mechanism:
+    message = cut(crash.message, MESSAGE_CHARS)
+    text = f"The landing system {_VERBS[crash.kind]}: {crash.error}: {message}".rstrip(": ")
+    return _Mechanism("crash", "V", f"V:{crash.error}@{crash.where}", f"{text}.")
+
+
+def _collision(flight: Flight, contact: Contact) -> _Mechanism:
     speed = f"at {contact.speed_mps:.1f} m/s"
     if contact.body_class == "ground":
-        tilted = contact.tilt_rad > TILTED_RAD
-        how = "tilted" if tilted else "fast"
-        return "collision", "hard", f"hard:{how}", f"Touched down too {how}, {speed}."
+        how = "tilted" if contact.tilt_rad > TILTED_RAD else "fast"
+        return _Mechanism("collision", "hard", f"hard:{how}", f"Touched down too {how}, {speed}.")
     signature = _collision_signature(flight, contact)
     if contact.body_class == "static":
-        return "collision", "III", signature, f"Hit {contact.body} {speed}."
-    seen = was_in_view(flight, contact.body, contact.time_s)
+        return _Mechanism("collision", "III", signature, f"Hit {contact.body} {speed}.")
     view = (
         "The camera had it in view within the last 2 s."
-        if seen
+        if was_in_view(flight, contact.body, contact.time_s)
         else "The camera had not had it in view for 2 s."
     )
-    text = f"Collided with {contact.body} {speed}. {view}"
-    return "collision", "IV", signature, text
+    return _Mechanism("collision", "IV", signature, f"Collided with {contact.body} {speed}. {view}")
 
 
 def _collision_signature(flight: Flight, met: Contact | Separation) -> str:
@@ -221,57 +228,73 @@ def _collision_signature(flight: Flight, met: Contact | Separation) -> str:
     return f"IV:{met.kind}:{phase}:{sight}"
 
 
-def _not_landed(flight: Flight) -> tuple[PropertyName, ViolationType, str, str]:
+def _abort(flight: Flight, limits: Limits) -> _Mechanism:
+    touch = _touch_off_marker(flight, limits)
+    if touch:
+        off = f"Touched the ground {touch[0]:.1f} m off the marker before it gave up"
+        return _missed(flight, touch[1], off)
+    if limits.abort == "violation":
+        phase = landing_phase(flight, _abort_time(flight))
+        return _Mechanism("abort", "abort", f"abort:{phase}", "The landing was aborted.")
+    return _Mechanism(None, None, "", "The landing was aborted and the UAV climbed clear.")
+
+
+def _not_landed(flight: Flight) -> _Mechanism:
     """Distinguish a marker never seen or lost (II) from one seen to the end (late)."""
     phase = landing_phase(flight, flight.elapsed_s)
     # Without diagnostics nobody knows whether the system detected the marker in the picture.
     seen = "detected" if reports_detections(flight) or reports_targets(flight) else "in view"
     last = last_sighting_s(flight)
     if last is None:
-        return "time", "II", f"II:never-seen:{phase}", f"Not landed; the marker was never {seen}."
+        text = f"Not landed; the marker was never {seen}."
+        return _Mechanism("time", "II", f"II:never-seen:{phase}", text)
     if flight.elapsed_s - last > LOST_AFTER_S:
         text = f"Not landed; the marker was last {seen} at {last:.1f} s."
-        return "time", "II", f"II:lost:{phase}", text
+        return _Mechanism("time", "II", f"II:lost:{phase}", text)
     text = f"Not landed although the marker was {seen} to the end."
-    return "time", "late", f"late:not-landed:{phase}", text
+    return _Mechanism("time", "late", f"late:not-landed:{phase}", text)
 
 
-def _missed(
-    flight: Flight, time_s: float, off: str
-) -> tuple[PropertyName, ViolationType, str, str]:
+def _missed(flight: Flight, time_s: float, off: str) -> _Mechanism:
     """Return the violation of a touchdown elsewhere at ``time_s``: what was taken for the marker.
 
     ``off`` is the beginning of the sentence, with the distance from the marker.
     """
+    target = _last_target(flight, time_s)
+    if target is not None and math.dist(target, flight.marker_position_m) <= SAME_PLACE_M:
+        sentence = f"{off}, though its target was right."
+        return _Mechanism("distance", "off", "off:knew-better", sentence)
+    place = target or _position(flight, time_s)
+    decoys = [(math.dist(place, (x, y)), name) for name, x, y in flight.decoys]
+    distance_m, name = min(decoys, default=(math.inf, ""))
+    if distance_m <= SAME_PLACE_M:
+        signature = f"I:{name}:{_taken_at(flight, place, time_s)}"
+        return _Mechanism("distance", "I", signature, f"{off}, on {name}.")
+    if target is None:
+        return _Mechanism("distance", "I", "I?:unknown", f"{off}; it does not say on what.")
+    signature = f"I:phantom:{_taken_at(flight, place, time_s)}"
+    sentence = f"{off}, on something that it took for the marker."
+    return _Mechanism("distance", "I", signature, sentence)
+
+
+def _last_target(flight: Flight, time_s: float) -> tuple[float, float] | None:
+    """Return the last target (x, y) that the system reported up to a time."""
+    for step in reversed(flight.steps):
+        target = step.diagnostics.target_m if step.diagnostics else None
+        if step.time_s <= time_s and target:
+            return target[0], target[1]
+    return None
+
+
+def _position(flight: Flight, time_s: float) -> tuple[float, float]:
+    """Return the position (x, y) of the UAV at a time."""
     index = int(np.searchsorted(flight.uav.time_s, time_s, side="right")) - 1
     x, y = (float(value) for value in flight.uav.position_m[max(0, index), :2])
-    target = next(
-        (
-            s.diagnostics.target_m
-            for s in reversed(flight.steps)
-            if s.time_s <= time_s and s.diagnostics and s.diagnostics.target_m
-        ),
-        None,
-    )
-    if target is not None and math.dist(target[:2], flight.marker_position_m) <= SAME_PLACE_M:
-        return "distance", "off", "off:knew-better", f"{off}, though its target was right."
-    place = target[:2] if target is not None else (x, y)
-    near = [
-        (math.dist(place, (dx, dy)), name)
-        for name, dx, dy in flight.decoys
-        if math.dist(place, (dx, dy)) <= SAME_PLACE_M
-    ]
-    if near:
-        name = min(near)[1]
-        taken = _taken_at(flight, place, time_s)
-        return "distance", "I", f"I:{name}:{taken}", f"{off}, on {name}."
-    if target is None:
-        return "distance", "I", "I?:unknown", f"{off}; it does not say on what."
-    text = f"{off}, on something that it took for the marker."
-    return "distance", "I", f"I:phantom:{_taken_at(flight, place, time_s)}", text
+    return x, y
 
 
-def _taken_at(flight: Flight, place: tuple[float, ...], end_s: float) -> str:
+def _taken_at(flight: Flight, place: tuple[float, float], end_s: float) -> str:
+    """Return the phase in which the system first reported a place as its target."""
     for step in flight.steps:
         target = step.diagnostics.target_m if step.diagnostics else None
         if target is not None and math.dist(target[:2], place) <= SAME_PLACE_M:
@@ -284,15 +307,18 @@ def _abort_time(flight: Flight) -> float:
 
 
 def _where(flight: Flight) -> str:
+    """Return sentences about the UAV's position at the end, and about a hidden marker."""
     x, y, z = (float(value) for value in flight.uav.position_m[-1])
     mx, my = flight.marker_position_m
     distance = math.hypot(x - mx, y - my)
     point = compass_point(x - mx, y - my)
-    place = f"{distance:.1f} m {point} of the marker" if distance > 0.3 else "over the marker"
+    place = (
+        f"{distance:.1f} m {point} of the marker" if distance > OVER_MARKER_M else "over the marker"
+    )
     recent = [s for s in flight.steps if s.time_s > flight.elapsed_s - RECENT_S]
     hidden = ""
     share = 1 - sum(s.marker_visible for s in recent) / len(recent) if recent else 0.0
-    if share >= 0.01 and flight.outcome != "landed":
+    if share >= LEAST_HIDDEN_SHARE and flight.outcome != "landed":
         hidden = (
             f" In the last 2 s {100 * share:.0f} % of the marker was hidden or out of the frame."
         )
