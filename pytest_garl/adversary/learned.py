@@ -1,4 +1,4 @@
-"""Trained policies as data: a small network in NumPy, its file and its manifest."""
+"""Learned NPC policies: a small network in NumPy, its weights in a file, and their manifest."""
 
 from __future__ import annotations
 
@@ -26,15 +26,15 @@ from pytest_garl.simulation.npc_policy import STAY, Move, PolicySpec, Situation
 Array = NDArray[np.float64]
 FORMAT = 1
 _LARGEST = MEGABYTE
-"""Bytes of weights, packed or not: two hundred times those that are shipped."""
+"""Bytes of weights, packed or not: two hundred times the shipped ones."""
 _REMEDY = "; train it again with `garl train`, or restore the file"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Network:
-    """Linear layers with ReLU between them; double precision, so that CPUs agree.
+    """Linear layers with ReLU between them, in double precision, so that CPUs agree.
 
-    ``layers`` are (weight (out, in), bias (out,)); ``state`` names what goes in.
+    ``layers`` are (weight (out, in), bias (out,)); ``state`` is the name of the input's encoding.
     """
 
     state: str
@@ -50,17 +50,17 @@ class Network:
 
 
 class LearnedPolicy:
-    """Takes the action that the network values most; one instance steers one object."""
+    """Takes the action with the highest value; one instance moves one NPC."""
 
     def __init__(self, weights: str, sha256: str) -> None:
         self._network = _load(weights, sha256)
         self._encoding = ENCODINGS[self._network.state]
 
     def reset(self, situation: Situation, rng: np.random.Generator) -> None:
-        """Nothing to prepare: the state says everything."""
+        """Do nothing: the state holds everything."""
 
     def decide(self, situation: Situation) -> Move:
-        """Return the best action, or stay where it is another's turn."""
+        """Return the best action, or stay if it is another NPC's turn."""
         if self._encoding.in_turn and not on_turn(situation):
             return STAY
         values = self._network.values(self._encoding.state(situation))
@@ -70,9 +70,9 @@ class LearnedPolicy:
 def learned_spec(name: str) -> PolicySpec:
     """Return the specification of a shipped policy, or of one in a file.
 
-    ``name`` is "dqn", "dqn-paper", "online-rl", or the path of weights (``.npz``) that
-    ``garl train`` wrote, with their manifest (``.json``) beside them.  Raises PolicyError for a
-    file that is missing, damaged, or not what its manifest says.
+    ``name`` is that of shipped weights, or the path of weights (``.npz``) that ``garl train``
+    wrote, with their manifest (``.json``) beside them.  Raises PolicyError if the file is missing
+    or damaged, or contradicts its manifest.
     """
     path = _path(name)
     sha256 = str(read_manifest(path)["sha256"])
@@ -105,7 +105,7 @@ def save(path: Path, network: Network, about: Mapping[str, Any]) -> None:
 
 
 def read_manifest(path: Path) -> dict[str, Any]:
-    """Return the manifest of weights at ``path``; raise PolicyError where it is no manifest."""
+    """Return the manifest of weights at ``path``; raise PolicyError if it is not a manifest."""
     if not path.is_file():
         raise PolicyError(
             f"NPC policy: there are no weights at {path}; expected a file of `garl train`"
@@ -114,9 +114,11 @@ def read_manifest(path: Path) -> dict[str, Any]:
     try:
         manifest = parse_json(read_bytes(file, error=PolicyError))
     except (PolicyError, ValueError) as error:
-        raise _wrong(file, f"is no readable manifest ({error})") from error
+        raise _wrong(file, f"is not a readable manifest ({error})") from error
     if not isinstance(manifest, dict):
-        raise _wrong(file, f"is no readable manifest (found {shown(manifest)}, expected a table)")
+        raise _wrong(
+            file, f"is not a readable manifest (found {shown(manifest)}, expected a table)"
+        )
     known = {"format", "state", "sha256"} <= manifest.keys()
     if not known or manifest["format"] != FORMAT:
         raise _wrong(file, f"is not a manifest of format {FORMAT}")
@@ -137,12 +139,14 @@ def _load(weights: str, sha256: str) -> Network:
     try:
         arrays = unpack(data, _LARGEST)
     except ValueError as error:
-        raise _wrong(path, f"is no file of weights ({error})") from error
+        raise _wrong(path, f"is not a file of weights ({error})") from error
     count = len(arrays) // 2
     expected = {f"{kind}_{index}" for index in range(count) for kind in ("weight", "bias")}
     if arrays.keys() != expected:
         found = listed(sorted(arrays))
-        raise _wrong(path, f"is no file of weights (found {found}; expected weight_0, bias_0, …)")
+        raise _wrong(
+            path, f"is not a file of weights (found {found}; expected weight_0, bias_0, …)"
+        )
     layers = [
         (arrays[f"weight_{index}"].astype(np.float64), arrays[f"bias_{index}"].astype(np.float64))
         for index in range(count)
@@ -155,12 +159,12 @@ def _check(path: Path, layers: Sequence[tuple[Array, Array]], state: str) -> Non
     size, actions = ENCODINGS[state].size, ENCODINGS[state].actions
     for weight, bias in layers:
         if weight.ndim != 2 or bias.shape != weight.shape[:1] or weight.shape[1] != size:
-            raise _wrong(path, f"has a layer of shape {weight.shape} where {size} numbers go in")
+            raise _wrong(path, f"has a layer of shape {weight.shape} but {size} inputs")
         if not (np.isfinite(weight).all() and np.isfinite(bias).all()):
             raise _wrong(path, "has weights that are not finite")
         size = weight.shape[0]
     if size != actions:
-        raise _wrong(path, f"knows {size} actions; expected {actions} with the state {state!r}")
+        raise _wrong(path, f"has {size} actions; expected {actions} with the state {state!r}")
 
 
 def _path(name: str) -> Path:

@@ -1,4 +1,4 @@
-"""What a learned policy sees and what it may do: situations as numbers, actions as moves."""
+"""Input and output of a learned NPC policy: situations as numbers, actions as moves."""
 
 from __future__ import annotations
 
@@ -30,9 +30,9 @@ PLACE_SCALE_M = 10.0
 SPEED_SCALE_MPS = 3.0
 STEP_SCALE_M = 4.0
 BODY_SCALE_M = 3.0
-"""What each kind of number is divided by, so that all are of the order of one."""
+"""Divisors of each kind of number, so that all numbers are of the order of one."""
 LIMIT = 10.0
-"""No number is beyond this, however large the map."""
+"""Bound of every number, however large the map."""
 CONDITIONS = (
     "environment.dust",
     "environment.fog",
@@ -46,11 +46,11 @@ CONDITIONS = (
 )
 """The paper's nine genes of the environment; weights depend on their number and order."""
 CONDITION_STEP = 0.01
-"""What the paper's online rival alters a condition by at a time."""
+"""Change of a condition in one action of the paper's Online RL."""
 
 
 def paper(situation: Situation) -> State:
-    """Return object - marker and UAV - marker in the plane (4,), in metres / 10.
+    """Return NPC - marker and UAV - marker in the plane (4,), in metres / 10.
 
     Paper, section 3.4: the state S.
     """
@@ -58,27 +58,27 @@ def paper(situation: Situation) -> State:
 
 
 def extended(situation: Situation) -> State:
-    """Return nine numbers: the paper's four, and what timing needs.
+    """Return nine numbers: the paper's four, and five to choose the moment.
 
-    The UAV's height and vertical speed, how far the object can go in one decision, and the
-    heights of its top and bottom.
+    These are the UAV's height and vertical speed, the distance that the NPC can go in one
+    decision, and the heights of its top and bottom.
     """
     return _vector(
         (
             *_places(situation),
             situation.uav_position_m[2] / PLACE_SCALE_M,
             situation.uav_velocity_mps[2] / SPEED_SCALE_MPS,
-            *_being(situation),
+            *_step_and_heights(situation),
         )
     )
 
 
 def relative(situation: Situation) -> State:
-    """Return ten numbers in the frame of the object, whose x axis points to the UAV's column.
+    """Return ten numbers in the frame of the NPC, whose x axis points to the UAV's column.
 
-    Distance to the column; UAV - marker; the UAV's height and vertical speed; the object's
-    step, top and bottom; its velocity.  A landing looks the same from all sides, so what
-    is learned on one side need not be learned again on the others.
+    Distance to the column; UAV - marker; the UAV's height and vertical speed; the NPC's step, top
+    and bottom; its velocity.  A landing looks the same from all sides, so a policy learns it once
+    for all of them.
     """
     ox, oy, _ = situation.self.position_m
     ux, uy, height = situation.uav_position_m
@@ -92,7 +92,7 @@ def relative(situation: Situation) -> State:
             aside / PLACE_SCALE_M,
             height / PLACE_SCALE_M,
             situation.uav_velocity_mps[2] / SPEED_SCALE_MPS,
-            *_being(situation),
+            *_step_and_heights(situation),
             forward / SPEED_SCALE_MPS,
             sideways / SPEED_SCALE_MPS,
         )
@@ -103,9 +103,9 @@ def online(situation: Situation) -> State:
     """Return the paper's four, the environment's nine properties and the marker's genes, (15,).
 
     The state of the paper's Online RL "encodes the environment, marker position, and dynamic
-    objects' start points".  As in its code the places are those of the moment, the object's and
-    the UAV's; unlike there they are relative to the marker in flight as they were in training.
-    Weather is a share of the confined range, which the policy never leaves.
+    objects' start points".  As in its code the places are the current ones of the NPC and the UAV.
+    Unlike there they are relative to the marker both in training and in flight.  Weather is a share
+    of the confined range, which the policy never leaves.
     """
     scenario = situation.scenario
     conditions = [scenario[key] / _range(key) for key in CONDITIONS]
@@ -115,8 +115,8 @@ def online(situation: Situation) -> State:
 def online_moves(situation: Situation) -> tuple[Move, ...]:
     """Return the paper's five moves, then each of nine conditions up and down, (23,).
 
-    As many as in the paper's code: eight weathers by ±0.01, and time of day.  No weather is
-    raised beyond the confined range: the policy knows no other.
+    There are as many as in the paper's code: eight weathers by ±0.01, and time of day.  No weather
+    is raised beyond the confined range, the only one that the policy was trained in.
     """
     changes = []
     for key in CONDITIONS:
@@ -127,10 +127,10 @@ def online_moves(situation: Situation) -> tuple[Move, ...]:
 
 
 def on_turn(situation: Situation) -> bool:
-    """Whether a decision is this object's, where one of all is drawn for each.
+    """Whether this NPC acts, if one of all NPCs is drawn for each decision.
 
-    Objects have a generator each and none in common; what they draw together comes from what
-    all of them see.
+    Each NPC has its own generator, and they share none.  So the draw is a hash of values that all
+    of them see.
     """
     names = sorted(each.name for each in (situation.self, *situation.others))
     seen = struct.pack("<3d", situation.time_s, *situation.marker_position_m)
@@ -139,21 +139,22 @@ def on_turn(situation: Situation) -> bool:
 
 
 def compass_moves(situation: Situation) -> tuple[Move, ...]:
-    """Return what the paper's actions mean: north, south, west, east, stay."""
+    """Return the moves of the paper's actions: north, south, west, east, stay."""
     return ACTIONS
 
 
 def relative_moves(situation: Situation) -> tuple[Move, ...]:
-    """Return what actions mean in the object's frame: left, right, back, ahead, stay."""
+    """Return the moves of actions in the NPC's frame: left, right, back, ahead, stay."""
     cos, sin = _heading(situation)
     return tuple(Move(x=cos * m.x - sin * m.y, y=sin * m.x + cos * m.y) for m in ACTIONS)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Encoding:
-    """How a policy sees: the state's size, the state, what the actions mean and how many there are.
+    """Turns a situation into the input of a network, and its actions into moves.
 
-    ``in_turn`` is whether at each decision one object acts, drawn at random, and all others stay.
+    ``size`` is the length of the state.  ``in_turn`` is whether at each decision one NPC acts,
+    drawn at random, and all others stay.
     """
 
     size: int
@@ -181,7 +182,7 @@ ENCODINGS: Mapping[str, Encoding] = MappingProxyType(
 
 
 def _heading(situation: Situation) -> tuple[float, float]:
-    """Cosine and sine of the direction from the object to the UAV's column."""
+    """Return cosine and sine of the direction from the NPC to the UAV's column."""
     ox, oy, _ = situation.self.position_m
     ux, uy, _ = situation.uav_position_m
     length = math.dist((ox, oy), (ux, uy))
@@ -189,13 +190,13 @@ def _heading(situation: Situation) -> tuple[float, float]:
 
 
 def in_own_frame(situation: Situation, x: float, y: float) -> tuple[float, float]:
-    """Return a vector in the object's frame, whose x axis points to the UAV's column."""
+    """Return a vector in the NPC's frame, whose x axis points to the UAV's column."""
     cos, sin = _heading(situation)
     return cos * x + sin * y, cos * y - sin * x
 
 
-def _being(situation: Situation) -> tuple[float, float, float]:
-    """How far the object can go in one decision, and the heights of its top and bottom."""
+def _step_and_heights(situation: Situation) -> tuple[float, float, float]:
+    """Return the NPC's way in one decision, and the heights of its top and bottom."""
     kind = situation.self.type
     return (
         situation.self.speed_mps * DECISION_STEP_S / STEP_SCALE_M,

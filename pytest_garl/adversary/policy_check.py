@@ -13,9 +13,9 @@ from pytest_garl.simulation.npc_policy import NpcState, PolicySpec, Situation, d
 
 
 def check_policy(spec: PolicySpec, map: Map) -> None:
-    """Let a policy decide once for each object of a map, before anything is flown.
+    """Let a policy decide once for each NPC of a map, before anything is flown.
 
-    Raises PolicyError if it cannot be made, raises, or answers what is no move.
+    Raises PolicyError if the policy cannot be made, raises, or returns something else than a move.
     """
     x_min, x_max, y_min, y_max = map.bounds_m
     genome = with_destinations(genome_for(map))

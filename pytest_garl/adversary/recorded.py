@@ -1,4 +1,4 @@
-"""Objects that repeat what was recorded, so that a saved case needs no policy."""
+"""NPCs that repeat recorded moves, so that a saved case needs no policy."""
 
 from __future__ import annotations
 
@@ -13,31 +13,25 @@ from pytest_garl.errors import PolicyError
 from pytest_garl.simulation.npc_policy import DECISION_STEP_S, STAY, Move, PolicySpec, Situation
 
 Moves = Mapping[str, Sequence[tuple[float, float]]]
-"""The wanted velocities (x, y) of each object, one for every half second, as shares of its
-speed."""
+"""The moves (x, y) of each NPC, one for every half second, as shares of its speed."""
 Changes = Mapping[str, Sequence[tuple[int, str, float]]]
-"""What each object's policy changed of the environment: (decision, gene, what was added)."""
-
-
+"""The changes of the environment by each NPC's policy: (decision, gene, amount added)."""
 NONE: Changes = MappingProxyType({})
-
-
 LANDING_ZONE_M = 5.0
-"""Horizontal distance from the marker's centre to an object that is out of the way.  Engineering
+"""Horizontal distance from the marker's centre at which an NPC is out of the way.  Engineering
 estimate: half the UAV and half a bird's span are 1.2 m together; the rest is room to drift."""
 _STUCK = 0.1
-"""An object that comes less far in one decision than this share of its speed stands against
-something."""
+"""An NPC that moves less in one decision than this share of its speed is blocked."""
 _TURN_RAD = math.radians(70)
-"""No whole part of a circle, so that each try has a direction of its own."""
+"""Not a divisor of a full turn, so that each attempt has another direction."""
 
 
 class Recorded:
-    """Repeats an object's moves, decision by decision, and leaves the landing zone when they end.
+    """Repeats an NPC's moves, decision by decision, and leaves the landing zone when they end.
 
-    A recording ends when the UAV was hit.  If the object stood on the marker for ever after, a
-    repaired landing system that waits could never land.  What its policy changed of the environment
-    is changed again, at the same decisions.
+    A record ends when the UAV was hit.  If the NPC stood on the marker from then on, a repaired
+    landing system that waits could never land.  The policy's changes of the environment are
+    repeated at the same decisions.
     """
 
     def __init__(self, moves: str, changes: str = "{}") -> None:
@@ -49,7 +43,7 @@ class Recorded:
         name = situation.self.name
         if name not in self._all:
             raise PolicyError(
-                f"recorded moves: none for {name}; there are those of {', '.join(self._all)}"
+                f"recorded moves: none for {name}; found moves of {', '.join(self._all)}"
             )
         self._moves = enumerate(self._all[name])
         self._own = self._changes.get(name, [])
@@ -60,7 +54,7 @@ class Recorded:
         """Repeat the next move."""
         number, move = next(self._moves, (-1, None))
         if move is None and self._exit is None:
-            # Not at once: the flight of a shortened record may last a moment longer.
+            # Wait one decision: the flight of a shortened record may last a moment longer.
             self._exit = _Exit(situation, self._last)
             return STAY
         if move is None:
@@ -72,9 +66,9 @@ class Recorded:
 
 
 class _Exit:
-    """The way out of the landing zone: straight on, or away from the marker for one that stood.
+    """The way out of the landing zone: straight on, or away from the marker if the NPC stood.
 
-    An object that comes no farther turns, first away from the marker, then on from there.
+    An NPC that is blocked turns, first away from the marker, then further from there.
     """
 
     def __init__(self, situation: Situation, last: tuple[float, float]) -> None:
@@ -83,13 +77,13 @@ class _Exit:
         self._waited, self._turns = 0, 0
 
     def decide(self, situation: Situation) -> Move:
-        """Return the next move: at full speed until the object is clear of the landing zone."""
+        """Return the next move: at full speed until the NPC has left the landing zone."""
         x, y, _ = situation.self.position_m
         if math.dist((x, y), situation.marker_position_m) >= LANDING_ZONE_M:
             return STAY
         least = _STUCK * situation.self.speed_mps * DECISION_STEP_S
         stuck = self._place is not None and math.dist((x, y), self._place) < least
-        # Twice: one that turns back stands for a moment.
+        # Twice in a row, because an NPC that turns back stands for a moment.
         self._waited = self._waited + 1 if stuck else 0
         if self._waited == 2:
             self._heading = _away(situation) + self._turns * _TURN_RAD
@@ -99,14 +93,14 @@ class _Exit:
 
 
 def _away(situation: Situation) -> float:
-    """Return the direction from the marker to the object; east for one right on it."""
+    """Return the direction from the marker to the NPC; east if it stands on the centre."""
     x, y, _ = situation.self.position_m
     mx, my = situation.marker_position_m
     return math.atan2(y - my, x - mx)
 
 
 def recorded_spec(moves: Moves, changes: Changes = NONE) -> PolicySpec:
-    """Return the specification of objects that repeat ``moves`` and ``changes``."""
+    """Return the specification of NPCs that repeat ``moves`` and ``changes``."""
     text = json.dumps({name: [list(pair) for pair in each] for name, each in moves.items()})
     arguments = [("moves", text)]
     if any(changes.values()):

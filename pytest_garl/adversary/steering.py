@@ -1,4 +1,4 @@
-"""Ways of scripted NPCs: straight to a place in the plane."""
+"""How scripted NPCs walk straight to a place in the plane."""
 
 from __future__ import annotations
 

@@ -102,15 +102,15 @@ RECENT = 50
     help="File for the best weights; the manifest (.json) and the curve (.png) are written beside "
     "it.",
 )
-def train(**asked: Any) -> None:
+def train(**options: Any) -> None:
     """Train an NPC policy in the surrogate and write its weights.
 
     The surrogate is a landing on the project's own simulator: one object, a marker at a fixed
     place, and a UAV that knows the place. A seed takes about five minutes on two cores.
     Then use the weights: pytest --garl-budget=40 --garl-npcs=policy.npz
     """
-    if asked["out"].suffix != ".npz":
-        raise GarlError(f"--out: found {str(asked['out'])!r}, expected a name that ends in .npz")
+    if options["out"].suffix != ".npz":
+        raise GarlError(f"--out: found {str(options['out'])!r}, expected a name that ends in .npz")
     try:
         from pytest_garl.adversary.training.selection import train_best
     except ImportError as error:
@@ -118,7 +118,7 @@ def train(**asked: Any) -> None:
             f"training needs more than flying does ({error}): pip install 'pytest-garl[train]'"
         ) from error
     cpu_dispatch.check()
-    plan = _plan(asked)
+    plan = _plan(options)
     with _Progress(plan) as progress:
         outcome = train_best(plan, progress.episode, progress.validated)
     rates = ", ".join(f"seed {seed}: {100 * rate:.0f} %" for seed, rate in outcome.rates.items())
@@ -129,31 +129,31 @@ def train(**asked: Any) -> None:
     )
 
 
-def _plan(asked: dict[str, Any]) -> TrainingPlan:
+def _plan(options: dict[str, Any]) -> TrainingPlan:
     from pytest_garl.adversary.training.selection import TrainingPlan
     from pytest_garl.scenarios.maps.map import load_map
 
-    kinds = _words(asked["kinds"])
+    kinds = _words(options["kinds"])
     for kind in kinds:
         if kind not in OBJECT_TYPES:
             raise GarlError(f"--type: found {kind!r}, expected some of {', '.join(OBJECT_TYPES)}")
-    given = {name: asked[name] for name in ("state", "uav", "reward") if asked[name]}
+    overrides = {name: options[name] for name in ("state", "uav", "reward") if options[name]}
     folders = (Path.cwd() / "scenarios" / "maps",)
-    preset = PRESETS[asked["policy"]]
+    preset = PRESETS[options["policy"]]
     return TrainingPlan(
-        name=asked["policy"],
+        name=options["policy"],
         surrogate=dataclasses.replace(
             preset.surrogate,
-            maps=tuple(load_map(name, folders) for name in _words(asked["maps"])),
+            maps=tuple(load_map(name, folders) for name in _words(options["maps"])),
             kinds=kinds,
-            airframe=_airframe(asked["system"]),
-            **given,
+            airframe=_airframe(options["system"]),
+            **overrides,
         ),
-        training=dataclasses.replace(preset.training, episodes=asked["episodes"]),
-        seeds=tuple(range(asked["seed"], asked["seed"] + asked["seeds"])),
-        validation=asked["validation"],
-        folder=asked["folder"],
-        out=asked["out"],
+        training=dataclasses.replace(preset.training, episodes=options["episodes"]),
+        seeds=tuple(range(options["seed"], options["seed"] + options["seeds"])),
+        validation=options["validation"],
+        folder=options["folder"],
+        out=options["out"],
         processes=os.cpu_count() or 1,
     )
 

@@ -1,4 +1,4 @@
-"""Who moves the dynamic objects: the protocol, and the specification that names a policy."""
+"""The NPC policy: what it sees, what it decides, and the specification that names it."""
 
 from __future__ import annotations
 
@@ -23,10 +23,10 @@ DECISION_STEP_S = 0.5
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class NpcState:
-    """Ground truth about one dynamic object at a decision; positions (x, y, z) in metres.
+    """Ground truth about one NPC at a decision; positions (x, y, z) in metres.
 
-    ``speed_mps`` is how fast this object may move: its velocity gene times its type's
-    top speed.  ``position_m`` is that of the body's frame.
+    ``speed_mps`` is the NPC's highest speed: its velocity gene times its type's top speed.
+    ``position_m`` is that of the body's frame.
     """
 
     name: str
@@ -38,9 +38,10 @@ class NpcState:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Situation:
-    """What a policy may see when it decides for one object: everything, exactly.
+    """The input of a policy that decides for one NPC: the exact state of everything.
 
-    ``scenario`` is what is flown, with all its genes, the environment as it is at the moment.
+    ``self`` is that NPC, ``others`` are all other NPCs.  ``scenario`` holds all genes, with those
+    of the environment as they are at the moment.
     """
 
     time_s: float
@@ -54,12 +55,12 @@ class Situation:
 
 
 GeneChange = tuple[str, float]
-"""A gene of the environment, and what is added to it: ``("environment.fog", 0.01)``."""
+"""A gene of the environment and the amount added to it: ``("environment.fog", 0.01)``."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Move:
-    """The wanted velocity until the next decision, as a share (x, y) of the object's speed.
+    """The wanted velocity until the next decision, as a share (x, y) of the NPC's speed.
 
     Its length is at most 1; the paper's five actions are (0, 1), (0, -1), (-1, 0), (1, 0)
     and (0, 0).  A policy may change the environment as well: ``changes`` take effect at once,
@@ -75,9 +76,9 @@ STAY = Move(x=0.0, y=0.0)
 
 
 class NpcPolicy(Protocol):
-    """Decides every 0.5 s where one object goes; one instance serves one object.
+    """Decides every 0.5 s where one NPC goes; each NPC has an instance of its own.
 
-    ``rng`` is the object's own generator, derived from the scenario's seed.
+    ``rng`` is the NPC's own generator, derived from the scenario's seed.
     """
 
     def reset(self, situation: Situation, rng: np.random.Generator) -> None:
@@ -88,7 +89,7 @@ class NpcPolicy(Protocol):
 
 
 def decision(policy: NpcPolicy, situation: Situation) -> Move:
-    """Return the policy's move; raise PolicyError if it raises or answers what is no move."""
+    """Return the policy's move; raise PolicyError if it raises or returns anything else."""
     name = f"NPC policy {type(policy).__name__}, deciding for {situation.self.name}"
     try:
         move = policy.decide(situation)
@@ -101,7 +102,7 @@ def decision(policy: NpcPolicy, situation: Situation) -> Move:
         length, wrong = math.nan, []
     if not length <= 1 + 1e-9:
         raise PolicyError(
-            f"{name}: found {move!r}; expected Move(x=…, y=…), a share of the object's speed "
+            f"{name}: found {move!r}; expected Move(x=…, y=…), a share of the NPC's speed "
             "no longer than 1"
         )
     if wrong:
@@ -123,8 +124,7 @@ def _is_change(each: object) -> bool:
 class PolicySpec:
     """Names a policy so that a worker process can make it and a ledger can compare it.
 
-    ``factory`` is "module:attribute", called with ``arguments`` as keyword arguments for
-    each object.
+    ``factory`` is "module:attribute", called with ``arguments`` as keyword arguments for each NPC.
     """
 
     name: str
@@ -137,7 +137,7 @@ class PolicySpec:
         return str(dict(self.arguments).get("sha256", ""))
 
     def make(self) -> NpcPolicy:
-        """Return a fresh policy for one object; raise PolicyError where there is none."""
+        """Return a fresh policy for one NPC; raise PolicyError if it cannot be made."""
         module, _, attribute = self.factory.partition(":")
         try:
             factory = getattr(importlib.import_module(module), attribute)

@@ -142,10 +142,10 @@ def _unknown_state(path: Path) -> None:
     [
         (Path.unlink, "there are no weights at"),
         (_truncate, "has the hash"),
-        (_foreign, "is no file of weights"),
-        (lambda path: path.with_suffix(".json").unlink(), "no readable manifest"),
-        (_array, "is no file of weights"),
-        (_list, "no readable manifest"),
+        (_foreign, "is not a file of weights"),
+        (lambda path: path.with_suffix(".json").unlink(), "not a readable manifest"),
+        (_array, "is not a file of weights"),
+        (_list, "not a readable manifest"),
         (_bomb, "found 2000256 bytes when unpacked, expected at most 1000000"),
         (_claim, r"found 0 bytes for the shape \(100000000000, 4\)"),
         (_extra, "found bias_1, weight_0; expected weight_0, bias_0"),
@@ -155,7 +155,7 @@ def _unknown_state(path: Path) -> None:
         (lambda path: path.with_suffix(".json").write_text("[" * 99_999), "nested too deeply"),
         (lambda path: path.with_suffix(".json").write_text("9" * 5000), "Exceeds the limit"),
         (lambda path: path.with_suffix(".json").write_text("{}"), "not a manifest of format 1"),
-        (_other_state, "where 9 numbers go in"),
+        (_other_state, "but 9 inputs"),
         (_unknown_state, "names the state 'psychic'; known: paper"),
     ],
 )
@@ -171,7 +171,7 @@ def test_damaged_weights_are_refused(
 
 def test_a_network_with_other_actions_is_refused(tmp_path: Path) -> None:
     save(tmp_path / "w.npz", network(outputs=6), {})
-    with pytest.raises(PolicyError, match="knows 6 actions; expected 5 with the state 'paper'"):
+    with pytest.raises(PolicyError, match="has 6 actions; expected 5 with the state 'paper'"):
         learned_spec(str(tmp_path / "w.npz"))
 
 

@@ -11,14 +11,14 @@ from pytest_garl.simulation.npc_policy import Move, Situation
 
 
 class Destination:
-    """Walks from its start to the place that its genes say, back, and there again.
+    """Walks from its start to the destination in its genes and back, again and again.
 
-    For the paper's baselines whose objects have a start and an end, ``ga`` and ``offline-rl``;
-    the module of ``ga`` says why they turn back.
+    For the search methods of the paper that give NPCs a destination; the module of ``ga`` says why
+    the NPC turns back.
     """
 
     def reset(self, situation: Situation, rng: np.random.Generator) -> None:
-        """Look the destination up; raise PolicyError for a scenario without one."""
+        """Look the destination up; raise PolicyError if the scenario has none."""
         name = situation.self.name
         goal = object_destination_m(situation.scenario, situation.map, name)
         if goal is None:
@@ -31,7 +31,7 @@ class Destination:
         self._goal, self._next = goal, (x, y)
 
     def decide(self, situation: Situation) -> Move:
-        """Go straight there; turn where the way ends."""
+        """Go straight there, and turn at the end of the way."""
         if arrived(self._goal, situation):
             self._goal, self._next = self._next, self._goal
         return towards(self._goal, situation)

@@ -11,9 +11,9 @@ from pytest_garl.simulation.npc_policy import DECISION_STEP_S, Move, Situation
 
 
 class Greedy:
-    """Walks across the marker, turns, and walks across it again; it never stops.
+    """Walks across the marker, turns, and walks across it again, without a stop.
 
-    A rival of learned policies: most of what they do can be had this way.
+    A baseline for learned policies: it causes most of the violations that they cause.
     """
 
     def reset(self, situation: Situation, rng: np.random.Generator) -> None:
@@ -21,7 +21,7 @@ class Greedy:
         self._move = towards(situation.marker_position_m, situation)
 
     def decide(self, situation: Situation) -> Move:
-        """Go straight to the marker, and on beyond it by one decision."""
+        """Go straight to the marker, and one decision beyond it."""
         stride = situation.self.speed_mps * DECISION_STEP_S
         if math.dist(situation.self.position_m[:2], situation.marker_position_m) > stride:
             self._move = towards(situation.marker_position_m, situation)

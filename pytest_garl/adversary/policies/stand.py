@@ -14,10 +14,10 @@ class Stand:
     """Walks to the marker and stands on it."""
 
     def reset(self, situation: Situation, rng: np.random.Generator) -> None:
-        """Nothing to prepare."""
+        """Do nothing."""
 
     def decide(self, situation: Situation) -> Move:
-        """Go to the marker, slower over the last step, and stay."""
+        """Go to the marker, slow down over the last step, and stay."""
         goal = situation.marker_position_m
         stride = situation.self.speed_mps * DECISION_STEP_S
         distance = math.dist(situation.self.position_m[:2], goal)

@@ -11,7 +11,7 @@ class Stationary:
     """Stays where it starts."""
 
     def reset(self, situation: Situation, rng: np.random.Generator) -> None:
-        """Nothing to prepare."""
+        """Do nothing."""
 
     def decide(self, situation: Situation) -> Move:
         """Stay."""

@@ -9,7 +9,7 @@ from pytest_garl.simulation.npc_policy import Move, Situation
 
 
 class Waypoint:
-    """Walks to a destination drawn within the map's bounds, then to the next.
+    """Walks to a random destination within the map's bounds, then to the next.
 
     The paper's random baseline: "dynamic objects' start positions and destinations are
     generated randomly within the specified map range".

@@ -20,7 +20,7 @@ Array = NDArray[np.float32]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class EpisodeRecord:
-    """What one training episode came to."""
+    """The result of one training episode."""
 
     episode: int
     reward: float
@@ -36,7 +36,7 @@ class Learner:
         self.choices, self.training = actions, training
         self.history: list[EpisodeRecord] = []
         self.rng = np.random.default_rng(training.seed)
-        # Who else draws from torch's own generator in this process shall not notice.
+        # Others in this process may draw from torch's global generator.
         with torch.random.fork_rng(devices=[]):
             torch.manual_seed(training.seed)
             self.network, self.target = (_mlp(size, training.hidden, actions) for _ in range(2))
@@ -62,7 +62,7 @@ class Learner:
     def remember(
         self, state: Array, action: int, total: float, after: Array, discount: float
     ) -> None:
-        """Keep one experience."""
+        """Store one experience."""
         place = self.stored % self.training.replay
         self.states[place], self.afters[place] = state, after
         self.actions[place], self.sums[place], self.discounts[place] = action, total, discount
@@ -92,7 +92,7 @@ class Learner:
             self.target.load_state_dict(self.network.state_dict())
 
     def policy(self, state: str) -> Network:
-        """Return the network as NumPy arrays; ``state`` names what goes in."""
+        """Return the network as NumPy arrays; ``state`` is the name of its encoding."""
         linear = [layer for layer in self.network if isinstance(layer, torch.nn.Linear)]
         return Network(
             state=state,
@@ -107,7 +107,7 @@ class Learner:
 
 
 class Experience:
-    """Sums rewards over several steps of one episode before they are remembered."""
+    """Sums the rewards of several steps of one episode before the learner stores them."""
 
     def __init__(self, learner: Learner) -> None:
         self._learner = learner
@@ -116,7 +116,7 @@ class Experience:
     def add(
         self, state: Array, action: int, reward: float, after: Array, *, ended: bool, cut: bool
     ) -> None:
-        """Take in one step; ``ended`` leaves nothing to come, ``cut`` is a time-out."""
+        """Take in one step; ``ended`` means that no reward follows, ``cut`` is a time-out."""
         training = self._learner.training
         self._open.append((state, action, reward))
         if len(self._open) == training.steps or ended or cut:
@@ -134,7 +134,7 @@ class Experience:
 
 @contextlib.contextmanager
 def one_thread() -> Iterator[None]:
-    """Let torch compute on one thread: the cores are for flying, and sums are the same anywhere."""
+    """Let torch compute on one thread: the cores fly, and sums do not depend on their number."""
     threads = torch.get_num_threads()
     torch.set_num_threads(1)
     try:
@@ -146,8 +146,8 @@ def one_thread() -> Iterator[None]:
 def _one_vector(network: torch.nn.Module) -> tuple[torch.nn.Parameter, torch.Tensor]:
     """Make a network's parameters pieces of one vector, and their gradients pieces of another.
 
-    The optimiser then steps once instead of for each of them, to the same bits: for a network as
-    small as this a third of an update's time.
+    The optimiser then steps once instead of once for each parameter, with the same bits.  That
+    saves a third of an update's time in a network this small.
     """
     parts = list(network.parameters())
     weights = torch.nn.Parameter(torch.cat([part.detach().flatten() for part in parts]))

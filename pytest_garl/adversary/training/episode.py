@@ -1,4 +1,4 @@
-"""One episode of the surrogate: a landing whose objects are steered from outside."""
+"""One episode of the surrogate: a landing whose NPCs are moved from outside."""
 
 from __future__ import annotations
 
@@ -25,13 +25,13 @@ from pytest_garl.simulation.randomness import generator
 
 TIME_LIMIT_S = 60.0
 UAV_START_M = (4.0, 20.0)
-"""How far from the marker the UAV starts."""
+"""Least and largest distance from the marker at which the UAV starts."""
 _TICKS = round(DECISION_STEP_S * PHYSICS_RATE_HZ)
 _TRIES = 1000
 
 
-class _Steered:
-    """A policy that goes where it was told."""
+class _MovedFromOutside:
+    """A policy that makes the move that the episode sets."""
 
     def __init__(self) -> None:
         self.move = STAY
@@ -56,7 +56,7 @@ class Episode:
         time_limit_s: float = TIME_LIMIT_S,
     ) -> None:
         self.outcome: Outcome | None = None
-        self._loop = Loop(scenario, pilot, _Steered, map, time_limit_s, None)
+        self._loop = Loop(scenario, pilot, _MovedFromOutside, map, time_limit_s, None)
         self._loop.begin()
         self._names = [npc.name for npc in self._loop.npcs]
         self._renderer = (
@@ -67,7 +67,7 @@ class Episode:
 
     @property
     def situations(self) -> tuple[Situation, ...]:
-        """What each NPC may see."""
+        """The situation of each NPC."""
         return tuple(self._loop.situation(npc) for npc in self._loop.npcs)
 
     @property
@@ -87,7 +87,7 @@ class Episode:
             if self.outcome is not None:
                 return
         if self._loop.out_of_time:
-            # Said at once: one more decision would move nothing.
+            # End it here: one more decision would move nothing.
             self.outcome = self._loop.tick()
 
     def marker_pixels(self) -> tuple[int, int]:
@@ -106,9 +106,9 @@ class Episode:
 
 
 def draw_episode(map: Map, kinds: Sequence[str], rng: np.random.Generator) -> tuple[Scenario, Map]:
-    """Draw where objects of these types and the UAV start; the marker lies where GPS says.
+    """Draw the starts of NPCs of these types and of the UAV; the marker is at its GPS coordinate.
 
-    Weather is clear, and every being has a speed of its own, as in the scenarios.
+    Weather is clear, and each NPC has its own speed, as in scenarios of a search.
     """
     counts = {kind: list(kinds).count(kind) for kind in dict.fromkeys(kinds)}
     place = dataclasses.replace(
@@ -127,7 +127,7 @@ def draw_episode(map: Map, kinds: Sequence[str], rng: np.random.Generator) -> tu
 
 
 def in_any_environment(scenario: Scenario, map: Map, rng: np.random.Generator) -> Scenario:
-    """Return the scenario in weather and light, and with a marker, as a search draws them."""
+    """Return the scenario with weather, light and marker drawn as in a search."""
     drawn = {
         item.key: float(rng.uniform(item.low, item.high))
         for item in genome_for(map).properties

@@ -32,22 +32,22 @@ class Training:
     warm_up: int = 500
     """Decisions before the first update."""
     target_every: int = 500
-    """Updates after which the target network is the network again."""
+    """Updates after which the target network becomes a copy of the network."""
     double: bool = True
     steps: int = 3
-    """Rewards that are summed before a value is taken for the rest."""
+    """Rewards that are summed before a value stands for the rest."""
     environments: int = 2
-    """Episodes flown at the same time, each in a process of its own."""
+    """Episodes flown at the same time, each in its own process."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Surrogate:
-    """What is trained against: maps, types, UAV, state, reward.
+    """The environment of a training: maps, types of NPCs, UAV, state, reward.
 
-    ``uav`` is "straight", the paper's, "avoiding", or "both", half of the episodes each.
+    ``uav`` is "straight", the paper's, "avoiding", or "both" for half of the episodes each.
     ``discount`` is part of the potential-based reward.  With ``environment`` "drawn" an episode
-    begins in any weather and light of a search, with the marker anywhere, instead of clear
-    weather and a marker at a fixed place.
+    begins in any weather and light of a search and with the marker anywhere; with "clear" it begins
+    in clear weather with the marker at a fixed place.
     """
 
     maps: tuple[Map, ...]

@@ -56,7 +56,7 @@ def train_best(
 ) -> TrainingResult:
     """Train every seed, validate, write the best weights, its manifest and all curves.
 
-    Interrupted, it goes on from the checkpoints in the plan's folder.
+    An interrupted call continues from the checkpoints in the plan's folder.
     """
     curves: dict[int, Sequence[EpisodeRecord]] = {}
     networks, scores = {}, {}
@@ -112,7 +112,7 @@ def _about(
 
 
 def draw_curves(curves: Mapping[int, Sequence[EpisodeRecord]], path: Path) -> None:
-    """Draw reward and collision rate over the episodes, means of fifty, one line a seed."""
+    """Draw reward and collision rate over the episodes: means of fifty, one line per seed."""
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(9, 3.4), layout="constrained")

@@ -24,11 +24,11 @@ Observation = NDArray[np.float32]
 
 
 class SurrogateEnv(gymnasium.Env[Observation, np.int64]):
-    """One object, a marker at a fixed place, a UAV from take-off to landing or collision.
+    """One NPC, a marker at a fixed place, a UAV from take-off to landing or collision.
 
     Actions are those of the state's encoding, one every 0.5 s; the observation is its vector.
-    ``info`` tells ``collided``, ``outcome`` and, with the paper's reward, ``hidden``, the
-    share of the marker in the frame that is covered.  A step after the end changes nothing.
+    ``info`` holds ``collided``, ``outcome`` and, with the paper's reward, ``hidden``, the share of
+    the marker in the frame that is covered.  A step after the end changes nothing.
     """
 
     metadata = {"render_modes": []}  # noqa: RUF012
@@ -55,7 +55,7 @@ class SurrogateEnv(gymnasium.Env[Observation, np.int64]):
         if surrogate.environment == "drawn":
             scenario = in_any_environment(scenario, place, rng)
         avoiding = rng.random() < {"straight": 0.0, "both": 0.5, "avoiding": 1.0}[surrogate.uav]
-        # The paper's UAV always flies alike; ours as differently as landing systems do.
+        # The paper's UAV always flies the same way; ours differ as much as landing systems do.
         style = FlightStyle() if surrogate.uav == "straight" else FlightStyle.drawn(rng)
         pilot: Any = functools.partial(StraightPilot, style)
         if avoiding:
@@ -66,7 +66,7 @@ class SurrogateEnv(gymnasium.Env[Observation, np.int64]):
         return self._observe()
 
     def step(self, action: np.int64) -> tuple[Observation, float, bool, bool, dict[str, Any]]:
-        """Move the object for 0.5 s."""
+        """Move the NPC for 0.5 s."""
         episode = self._current()
         if episode.outcome is not None:
             observation, info = self._observe()

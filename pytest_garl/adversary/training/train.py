@@ -28,11 +28,11 @@ def train(
     report: Callable[[EpisodeRecord], None] = lambda record: None,
     every: int = 50,
 ) -> Learner:
-    """Train, telling ``report`` of each episode; return the learner.
+    """Train and return the learner; call ``report`` after each episode.
 
-    Episodes are flown in rounds of ``environments``, each from a seed of its own, so that a
-    training that goes on from its ``checkpoint``, written about ``every`` so many episodes,
-    ends with the same weights as one that was never interrupted.
+    Episodes are flown in rounds of ``environments``, each from its own seed.  So a training that
+    continues from its ``checkpoint``, which is written about every ``every`` episodes, ends with
+    the same weights as one without interruption.
     """
     envs: Any = gymnasium.vector.AsyncVectorEnv(
         [functools.partial(SurrogateEnv, surrogate)] * training.environments,
@@ -48,7 +48,7 @@ def train(
         kept = len(learner.history)
         while len(learner.history) < training.episodes:
             for record in _round(envs, learner, len(learner.history)):
-                # The last round may fly more than was asked for.
+                # The last round may fly more episodes than the training has.
                 if record.episode < training.episodes:
                     report(record)
                     learner.history.append(record)
@@ -60,7 +60,7 @@ def train(
 
 
 def _round(envs: Any, learner: Learner, first: int) -> Iterator[EpisodeRecord]:
-    """Fly one episode per environment to its end, learning meanwhile."""
+    """Fly one episode per environment to its end, and learn meanwhile."""
     training, count = learner.training, learner.training.environments
     decayed = training.epsilon * training.epsilon_decay**first
     epsilon = max(training.epsilon_least, decayed)
@@ -73,7 +73,7 @@ def _round(envs: Any, learner: Learner, first: int) -> Iterator[EpisodeRecord]:
     while flying.any():
         actions = learner.act(states, epsilon)
         envs.step_async(actions)
-        # The simulator flies in other processes: time to learn, once for each decision.
+        # Learn once for each decision while the simulator flies in other processes.
         for _ in range(int(flying.sum())):
             learner.update()
         afters, rewards, ended, cut, info = envs.step_wait()

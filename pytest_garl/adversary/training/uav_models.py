@@ -1,4 +1,4 @@
-"""The UAVs of the surrogate: they know the marker's place, and land on it."""
+"""The UAVs of the surrogate: they know the place of the marker and land on it."""
 
 from __future__ import annotations
 
@@ -39,10 +39,10 @@ class FlightStyle:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class AvoidanceParameters:
-    """When a UAV climbs away from what its depth camera shows.
+    """When a UAV climbs away from NPCs that its depth camera shows.
 
-    From an object within ``radius_m`` of its column and ``below_m`` under it, seen for
-    ``delay_s``, at ``climb_mps`` until none was there for ``clear_s``.
+    It climbs from an NPC that is within ``radius_m`` of its column and ``below_m`` under it, after
+    ``delay_s``, at ``climb_mps``, until there was none for ``clear_s``.
     """
 
     radius_m: float = 2.0
@@ -64,7 +64,7 @@ class AvoidanceParameters:
 
 
 class StraightPilot:
-    """The paper's: "flies directly to the marker without any additional trajectory planning"."""
+    """The paper's: it "flies directly to the marker without any additional trajectory planning"."""
 
     airframe = Airframe()
     needs_camera = False
@@ -79,7 +79,7 @@ class StraightPilot:
         self._up = self._there = False
 
     def observe_truth(self, truth: Truth) -> None:
-        """Be told where everything is."""
+        """Take in where everything is."""
         self._truth = truth
 
     def step(self, observation: Observation) -> Command:
@@ -100,7 +100,7 @@ class StraightPilot:
 
 
 class AvoidingPilot(StraightPilot):
-    """Climbs away from objects that a depth camera under its belly could see."""
+    """Climbs away from NPCs that a depth camera under its belly could see."""
 
     def __init__(
         self, style: FlightStyle | None = None, avoidance: AvoidanceParameters | None = None
@@ -117,7 +117,7 @@ class AvoidingPilot(StraightPilot):
         self._climbing = False
 
     def step(self, observation: Observation) -> Command:
-        """Climb where something is below, land where nothing is."""
+        """Climb if an NPC is below, land otherwise."""
         now, avoidance, truth = observation.time_s, self._avoidance, self._truth
         if truth is None:
             return super().step(observation)
@@ -138,7 +138,7 @@ class AvoidingPilot(StraightPilot):
         return super().step(observation)
 
     def _threatens(self, item: TruthObject, place: tuple[float, ...]) -> bool:
-        """Whether an object is near the column below, and inside the camera's view."""
+        """Whether an NPC is near the column below, and inside the camera's view."""
         below = place[2] - item.type.top_m
         dx, dy = abs(item.position_m[0] - place[0]), abs(item.position_m[1] - place[1])
         reach = item.type.radius_m
@@ -146,8 +146,8 @@ class AvoidingPilot(StraightPilot):
             return False
         if math.hypot(dx, dy) - reach > self._avoidance.radius_m:
             return False
-        # The camera covers as much to each side along x as the frame is high, along y as it
-        # is wide, seen from a level UAV with its nose east.
+        # On a level UAV with its nose east the frame is as high as it reaches along x, and as
+        # wide as it reaches along y.
         camera = self._camera
         wide = math.tan(camera.field_of_view_rad / 2)
         high = wide * camera.height_px / camera.width_px

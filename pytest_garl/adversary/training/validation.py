@@ -1,4 +1,4 @@
-"""What a policy is worth in the surrogate, on episodes that no training saw."""
+"""Collision rates of a policy in the surrogate, on episodes that no training used."""
 
 from __future__ import annotations
 
@@ -14,9 +14,10 @@ from pytest_garl.adversary.training.presets import Surrogate
 from pytest_garl.adversary.training.surrogate import SurrogateEnv
 
 CHOICE_SEEDS_FROM = 2_000_000_000
-"""Episodes with these seeds and the following choose between trainings, whose own are hashes."""
+"""First seed of the episodes that choose between trainings; seeds in training are hashes."""
 REPORT_SEEDS_FROM = 3_000_000_000
-"""Those with these seeds chose nothing, so that their rate is not that of the luckiest."""
+"""First seed of the episodes for the reported rate.  They choose nothing, so that the rate is not
+that of the luckiest training."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -40,7 +41,7 @@ def validate(
     processes: int = 1,
     seeds_from: int = CHOICE_SEEDS_FROM,
 ) -> Score:
-    """Return how a network fares when it always takes its best action."""
+    """Return the score of a network that always takes its best action."""
     chunks = np.array_split(np.arange(seeds_from, seeds_from + episodes), max(1, processes))
     jobs = [(network, surrogate, [int(seed) for seed in chunk]) for chunk in chunks]
     if processes > 1:
