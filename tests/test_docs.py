@@ -7,12 +7,27 @@ import subprocess
 import sys
 from pathlib import Path
 
+import pytest
+
 DOCS = Path(__file__).parents[1] / "docs"
 
 
-def test_the_workflow_for_github_is_one() -> None:
-    schema = ("--builtin-schema", "vendor.github-workflows")
-    command = [sys.executable, "-m", "check_jsonschema", *schema, str(DOCS / "github-actions.yml")]
+FORMS = sorted((DOCS.parent / ".github" / "ISSUE_TEMPLATE").glob("*.yml"))
+
+
+@pytest.mark.parametrize(
+    ("schema", "file"),
+    [
+        ("vendor.github-workflows", DOCS / "github-actions.yml"),
+        *(
+            (f"vendor.github-issue-{'config' if form.stem == 'config' else 'forms'}", form)
+            for form in FORMS
+        ),
+    ],
+    ids=lambda value: getattr(value, "name", ""),
+)
+def test_files_for_github_follow_their_schema(schema: str, file: Path) -> None:
+    command = [sys.executable, "-m", "check_jsonschema", "--builtin-schema", schema, str(file)]
     done = subprocess.run(command, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stdout
 

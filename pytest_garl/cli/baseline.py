@@ -35,7 +35,12 @@ _SPEC_OPTIONS = (
         multiple=True,
         help="The landing system; may be given several times.",
     ),
-    click.option("--maps", default="court,lawn", show_default=True, help="Maps, with commas."),
+    click.option(
+        "--maps",
+        default="court,lawn",
+        show_default=True,
+        help="Maps to fly on, separated by commas.",
+    ),
     click.option(
         "--count",
         type=click.IntRange(min=1),

@@ -31,7 +31,7 @@ _FOLDER = click.Path(path_type=Path, file_okay=False)
 @click.option(
     "--out",
     type=_FOLDER,
-    help="Folder for rows, report and pictures, instead of where FILE says.",
+    help="Folder for rows, report and pictures, instead of the place that FILE names.",
 )
 @click.option(
     "--folder",
@@ -50,7 +50,7 @@ _FOLDER = click.Path(path_type=Path, file_okay=False)
 def experiment(file: Path, report: bool, out: Path | None, folder: Path, workers: int) -> None:
     """Fly the searches of FILE that its rows lack.
 
-    FILE is a TOML file; the rows are a CSV file of its name beside it. Run it where you run pytest.
+    FILE is a TOML file; its rows are in a CSV file of the same name. Run it where you run pytest.
     Each finished run is added at once. If you interrupt it, the same command continues.
     """
     from pytest_garl.experiments import results as rows

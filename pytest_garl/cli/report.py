@@ -32,7 +32,7 @@ from pytest_garl.reports.run_report import report_of
 def report(ledger: Path, as_json: bool, out: Path | None, folder: Path) -> None:
     """Report the findings of the run in LEDGER (default .garl/ledger.sqlite).
 
-    It works while the run goes on, and after a run was killed.
+    Use it while the run goes on, or after a run was killed.
     """
     found = report_of(ledger, Corpus(folder, (Path.cwd() / "scenarios" / "maps",)))
     text = json.dumps(found, indent=2) + "\n" if as_json else _text(found)
