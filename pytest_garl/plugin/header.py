@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 from pytest_garl import cpu_dispatch
-from pytest_garl.plugin.progress import duration
 from pytest_garl.plugin.run import Run
-from pytest_garl.plugin.wrapping import counted
+from pytest_garl.plugin.terminal_text import counted, duration
 from pytest_garl.regressions.forecast import seconds_of_kind
 
 

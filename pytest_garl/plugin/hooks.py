@@ -133,9 +133,9 @@ def pytest_runtestloop(session: pytest.Session) -> Generator[None, object, objec
     run = session.config.stash.get(RUN, None)
     if run is None:
         return (yield)
-    from pytest_garl.plugin.progress import live
+    from pytest_garl.plugin.progress import show_progress
 
-    with live(run, session.config):
+    with show_progress(run, session.config):
         result = yield
     run.loop_finished = True
     return result
@@ -267,7 +267,7 @@ def pytest_unconfigure(config: pytest.Config) -> None:
 @pytest.hookimpl(optionalhook=True)
 def pytest_configure_node(node: Any) -> None:
     """Give an xdist worker the run's name, and its seed, so that a random one is drawn once."""
-    from pytest_garl.plugin.wrapping import WIDTH, width_of
+    from pytest_garl.plugin.terminal_text import WIDTH, width_of
 
     node.workerinput["garl_controller"] = str(os.getpid())
     node.workerinput[WIDTH] = width_of(node.config)

@@ -11,7 +11,7 @@ from pytest_garl.plugin.outcomes import CaseState, Decision, FailedItem, Reason,
 from pytest_garl.plugin.run import Run
 from pytest_garl.plugin.suggested_commands import repeat_line
 from pytest_garl.plugin.target import Target
-from pytest_garl.plugin.wrapping import width_of, wrapped
+from pytest_garl.plugin.terminal_text import width_of, wrapped
 from pytest_garl.regressions.case import Case
 from pytest_garl.verdicts.statistics import share_interval
 from pytest_garl.verdicts.verdict import Verdict

@@ -13,11 +13,11 @@ import pytest
 
 from pytest_garl.errors import GarlError
 from pytest_garl.plugin.options import SHRINK
-from pytest_garl.plugin.progress import duration, live
+from pytest_garl.plugin.progress import show_progress
 from pytest_garl.plugin.run import Run
 from pytest_garl.plugin.suggested_commands import shown
+from pytest_garl.plugin.terminal_text import begin_line, counted, duration, width_of, wrapped
 from pytest_garl.plugin.user_assertions import collect_assertion
-from pytest_garl.plugin.wrapping import begin_line, counted, width_of, wrapped
 from pytest_garl.regressions.case import Case
 from pytest_garl.regressions.case_request import CaseRequest
 from pytest_garl.regressions.flight_shares import divide_flights
@@ -57,7 +57,7 @@ def save_cases(run: Run, session: pytest.Session) -> None:
                 f"{counted(len(requests), 'new kind')} of violation, "
                 f"at most {counted(most, 'flight')}, about {duration(run.rest.seconds)}"
             )
-        with live(run, config):
+        with show_progress(run, config):
             run.pursued = follow_up(run.ledger, run.pool, requests, _saver(run), run.on_wait)
     except KeyboardInterrupt:
         begin_line(reporter)

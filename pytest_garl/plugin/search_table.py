@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from pytest_garl.plugin.suggested_commands import repeat_command, shown
-from pytest_garl.plugin.wrapping import wrapped
+from pytest_garl.plugin.terminal_text import wrapped
 from pytest_garl.reports.search_summary import SearchSummary, ViolationKind
 from pytest_garl.verdicts.paper_metrics import top_k
 from pytest_garl.verdicts.statistics import share_interval

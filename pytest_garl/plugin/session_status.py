@@ -14,7 +14,7 @@ from pytest_garl.errors import GarlError
 from pytest_garl.plugin.options import Options
 from pytest_garl.plugin.run import Run
 from pytest_garl.plugin.tally import Tally
-from pytest_garl.plugin.wrapping import counted
+from pytest_garl.plugin.terminal_text import counted
 from pytest_garl.reports.search_summary import SearchSummary
 
 FLIGHTS_PER_EXCEPTION = 20

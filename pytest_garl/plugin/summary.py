@@ -13,7 +13,7 @@ from pytest_garl.plugin.save_cases import saved_lines
 from pytest_garl.plugin.search_table import repeat_kind_command, search_table
 from pytest_garl.plugin.session_status import notes
 from pytest_garl.plugin.tally import Tally
-from pytest_garl.plugin.wrapping import width_of, wrapped
+from pytest_garl.plugin.terminal_text import width_of, wrapped
 from pytest_garl.reports.run_report import ENDED, USER_FAILURES, utc
 from pytest_garl.reports.search_summary import SearchSummary, legend
 

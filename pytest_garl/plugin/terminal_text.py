@@ -1,4 +1,4 @@
-"""Text that fits the terminal, also where an xdist worker writes it."""
+"""Text that fits the terminal, also if an xdist worker writes it."""
 
 from __future__ import annotations
 
@@ -9,14 +9,14 @@ from typing import Any
 import pytest
 
 WIDTH = "garl_width"
-"""What xdist's controller tells its workers about the terminal."""
+"""The key under which xdist's controller gives its workers the width of the terminal."""
 _NARROW = 40
 _HARD_SPACE = "\N{NO-BREAK SPACE}"
 _BEFORE_UNIT = re.compile(r"(?<=\d) (?=(?:%|m/s|m|s)(?!\w))")
 
 
 def width_of(config: pytest.Config) -> int:
-    """Return how many columns there are; as pytest does, 80 where there is no terminal."""
+    """Return the number of columns; without a terminal 80, as for pytest."""
     given: dict[str, Any] = getattr(config, "workerinput", {})
     if WIDTH in given:
         return max(_NARROW, int(given[WIDTH]))
@@ -25,7 +25,7 @@ def width_of(config: pytest.Config) -> int:
 
 
 def wrapped(text: str, width: int, *, first: str = "", others: str = "") -> str:
-    """Return text in lines of at most ``width`` columns; no word is broken, no unit left alone."""
+    """Return text in lines of at most ``width`` columns that split no word and no amount."""
     return textwrap.fill(
         _BEFORE_UNIT.sub(_HARD_SPACE, text),
         width,
@@ -41,8 +41,13 @@ def counted(number: int, noun: str) -> str:
     return f"{number} {noun}{'' if number == 1 else 's'}"
 
 
+def duration(seconds: float) -> str:
+    """Return a duration in seconds or minutes."""
+    return f"{seconds:.0f} s" if seconds < 90 else f"{seconds / 60:.0f} min"
+
+
 def begin_line(reporter: Any) -> None:
-    """Have pytest's reporter begin a line, also where it believes that it has just begun one."""
+    """Make pytest's reporter begin a line, even if it believes that it has just begun one."""
     reporter.ensure_newline()
     if reporter._tw.width_of_current_line:
         reporter.line("")

@@ -2,7 +2,7 @@ from __future__ import annotations
 
 import pytest
 
-from pytest_garl.plugin.wrapping import wrapped
+from pytest_garl.plugin.terminal_text import wrapped
 
 
 @pytest.mark.parametrize("amount", ["12.5 %", "2 s", "21.8 m", "2.7 m/s"])

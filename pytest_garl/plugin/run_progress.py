@@ -1,0 +1,144 @@
+"""How far a run is: read from the ledger, and put into one line."""
+
+from __future__ import annotations
+
+import time
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+from pytest_garl.execution.ledger import Ledger
+from pytest_garl.execution.ledger_queries import SearchProgress
+from pytest_garl.plugin.run import SELECTED, Run
+from pytest_garl.plugin.terminal_text import duration
+from pytest_garl.regressions.forecast import RemainingWork, flights_after_search
+
+_MARGINS = ("collision", "distance", "time")
+"""Properties whose nearest approach to a violation the line shows."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RunProgress:
+    """The progress of a run: its searches, the flights that follow them, and what was found."""
+
+    searches: Sequence[SearchProgress]
+    kinds: Mapping[str, int]
+    """How many violations of each type were found."""
+    nearest: Mapping[str, tuple[float, str]]
+    """The smallest margin of each property, with its unit."""
+    seconds: float
+    """Since flying began."""
+    selected: int = 0
+    """Flights that the selected tests need, those of searches that have not begun included."""
+    flown_after: float = 0
+    """Flights flown beside the searches, to repeat, confirm and shrink violations."""
+    expected_after: float = 0
+    """Flights expected beside the searches, those flown included."""
+    left_s: float | None = None
+    """A forecast of the time left, if there is a better one than the mean."""
+
+    @property
+    def flown(self) -> float:
+        """How many flights have been flown."""
+        return sum(each.flown for each in self.searches) + self.flown_after
+
+    @property
+    def total(self) -> float:
+        """How many flights of searches and beside them are expected."""
+        needed = max(self.selected, sum(each.all for each in self.searches))
+        return needed + max(self.expected_after, self.flown_after)
+
+    @property
+    def phrases(self) -> list[str]:
+        """The parts of the line, the most important first."""
+        phrases = [f"{self.flown:.0f}/{self.total:.0f} flights"]
+        left_s = self.left_s
+        if left_s is None and self.seconds > 0 and 0 < self.flown < self.total:
+            left_s = (self.total - self.flown) * self.seconds / self.flown
+        if left_s is not None:
+            phrases.append(f"{duration(left_s)} left")
+        if self.kinds:
+            phrases.append(" ".join(f"{kind}:{count}" for kind, count in self.kinds.items()))
+        flying = next((each for each in self.searches if each.flown < each.all), None)
+        if flying:
+            where = f"{flying.system.split(':')[-1]} on {flying.map}"
+            phrases.append(f"{where} g{flying.generation:02d} {flying.flown}/{flying.all}")
+        elif self.left_s is not None:
+            phrases.append("confirming and shrinking")
+        if self.flown and self.seconds > 0:
+            phrases.append(f"{self.flown / self.seconds:.2f} flights/s")
+        margins = [
+            f"{name} {self.nearest[name][0]:.2g} {self.nearest[name][1]}"
+            for name in _MARGINS
+            if name in self.nearest
+        ]
+        if margins:
+            phrases.append("nearest " + ", ".join(margins))
+        return phrases
+
+
+def progress_line(progress: RunProgress, width: int) -> str:
+    """Return a bar, then as many whole phrases as there is room for."""
+    cells = 20 if width >= 100 else 10
+    full = int(cells * progress.flown / progress.total) if progress.total else 0
+    line = f"garl [{'#' * full}{'-' * (cells - full)}]"
+    for phrase in progress.phrases:
+        if len(line) + 2 + len(phrase) > width:
+            # A later phrase matters less, but may be shorter.
+            continue
+        line += f"  {phrase}"
+    return line
+
+
+class ProgressReader:
+    """Reads the progress of a run from a ledger, at most once in ``every_s`` seconds."""
+
+    def __init__(self, run: Run, every_s: float) -> None:
+        self._run, self._every_s = run, every_s
+        self._last_read = self._began = self._remaining_since = 0.0
+        self._expected_after = 0.0
+        self._remaining: RemainingWork | None = None
+
+    def start_clock(self) -> None:
+        """Read nothing for ``every_s`` seconds; the forecast counts the flights of that time."""
+        self._began = self._last_read = time.monotonic()
+
+    def read(self, ledger: Ledger) -> RunProgress | None:
+        """Return the progress if it is time to show it, and if there is any."""
+        now = time.monotonic()
+        if now - self._last_read < self._every_s:
+            return None
+        self._last_read = now
+        queries = ledger.queries
+        searches = queries.progress()
+        if not searches:
+            return None
+        self._began = self._began or now
+        flown_after = queries.meters().get("on_demand", 0)
+        left_s = self._forecast(ledger, flown_after, now)
+        return RunProgress(
+            searches=searches,
+            kinds=queries.violations(),
+            nearest=queries.nearest(),
+            seconds=now - self._began,
+            selected=int(ledger.fact(SELECTED) or 0),
+            flown_after=flown_after,
+            expected_after=self._expected_after,
+            left_s=left_s,
+        )
+
+    def _forecast(self, ledger: Ledger, flown_after: float, now: float) -> float | None:
+        """Update how many flights follow the searches; return the time left if it is known."""
+        remaining = self._run.rest
+        if remaining is None:
+            options = self._run.options
+            cap = options.budget if options.shrink_capped else None
+            new_kinds = Counter(search for search, _ in ledger.queries.kinds())
+            self._expected_after = sum(
+                flights_after_search(kinds, options.shrink, cap) for kinds in new_kinds.values()
+            )
+            return None
+        if self._remaining is None:
+            self._remaining, self._remaining_since = remaining, now
+            self._expected_after = flown_after + remaining.flights
+        return max(0.0, self._remaining.seconds - (now - self._remaining_since))
