@@ -17,8 +17,7 @@ from pathlib import Path
 from pytest_garl.execution.job import parse_job
 from pytest_garl.execution.ledger import Ledger
 from pytest_garl.experiments.measure import HASH_DIGITS
-from pytest_garl.experiments.results import SEPARATOR
-from pytest_garl.experiments.results import read as rows_of
+from pytest_garl.experiments.results import SEPARATOR, read_rows
 from pytest_garl.scenarios.files import parse_scenario
 from pytest_garl.scenarios.genes import genome_for
 from pytest_garl.scenarios.maps.map import load_map
@@ -67,7 +66,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--folder", type=Path, default=Path(".garl/experiments"))
     folder = parser.parse_args().folder
-    rows = {row.result_hash: row for row in rows_of(ROWS)}
+    rows = {row.result_hash: row for row in read_rows(ROWS)}
     lines: dict[str, dict[str, int | str]] = {
         line["result_hash"]: dict(line) for line in read_csv(FILE) if line["result_hash"] in rows
     }

@@ -53,9 +53,9 @@ def test_the_page_of_experiments_tells_every_column_and_every_key() -> None:
 
 
 def test_counts_in_remarks_agree_with_the_rows() -> None:
-    from pytest_garl.experiments.results import read
+    from pytest_garl.experiments.results import read_rows
 
-    rows = {row.result_hash: row for row in read(DOCS / "experiments" / "rq.csv")}
+    rows = {row.result_hash: row for row in read_rows(DOCS / "experiments" / "rq.csv")}
     with (DOCS / "experiments" / "counts.csv").open(newline="") as file:
         lines = list(csv.DictReader(file))
     assert lines

@@ -101,7 +101,7 @@ class Baseline:
         return next(found, None)
 
 
-def dumps(baseline: Baseline) -> str:
+def dump_baseline(baseline: Baseline) -> str:
     """Return the baseline as TOML: the same bytes for equal baselines."""
     lines = [
         "# A baseline of pytest-garl: scenarios, and what a landing system made of them.",
@@ -149,7 +149,9 @@ def _row(flight: BaselineFlight) -> str:
     )
 
 
-def loads(text: str, load_map: Callable[[str], Map], *, source: str = "baseline") -> Baseline:
+def parse_baseline(
+    text: str, load_map: Callable[[str], Map], *, source: str = "baseline"
+) -> Baseline:
     """Return the baseline in ``text``; raise ScenarioError that names source and key."""
     top = Table(parse(text, source), source)
     top.only({"schema", "cpu", "versions", "set"})
@@ -165,19 +167,19 @@ def loads(text: str, load_map: Callable[[str], Map], *, source: str = "baseline"
     return baseline
 
 
-def load(path: Path, search_path: tuple[Path, ...] = ()) -> Baseline:
+def load_baseline(path: Path, search_path: tuple[Path, ...] = ()) -> Baseline:
     """Return the baseline in a file."""
     from pytest_garl.scenarios.maps.map import load_map
 
     hint = "; expected a file that `garl baseline save` wrote"
     text = read_text(path, LARGEST_BYTES, hint=hint)
-    return loads(text, lambda name: load_map(name, search_path), source=str(path))
+    return parse_baseline(text, lambda name: load_map(name, search_path), source=str(path))
 
 
-def save(path: Path, baseline: Baseline) -> None:
+def save_baseline(path: Path, baseline: Baseline) -> None:
     """Write the file atomically; an existing one is replaced."""
     _check(baseline, lambda problem: BaselineError(f"{path}: {problem}"))
-    text = dumps(baseline)
+    text = dump_baseline(baseline)
     if len(text.encode()) > LARGEST_BYTES:
         flights = sum(len(each.flights) for each in baseline.sets)
         raise BaselineError(

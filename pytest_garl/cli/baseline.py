@@ -127,7 +127,7 @@ def save(
 
     Run it where you run pytest. The same options choose the same scenarios for every system.
     """
-    from pytest_garl.baselines import file as files
+    from pytest_garl.baselines.file import save_baseline
     from pytest_garl.baselines.record import baseline_from_ledger, fly_baseline
     from pytest_garl.execution.checkout import Checkout
 
@@ -141,7 +141,7 @@ def save(
     else:
         checkout = Checkout(folder=Path.cwd())
         made = fly_baseline(_spec(**chosen), checkout, systems, workers, _progress)
-    files.save(out, made)
+    save_baseline(out, made)
     for each in made.sets:
         violations = sum(flight.summary.violated for flight in each.flights)
         aborts = sum(flight.summary.aborted for flight in each.flights)
@@ -161,10 +161,10 @@ def save(
 @click.argument("name")
 def scenario(file: Path, name: str) -> None:
     """Print one scenario of a baseline, such as court-17, as a file for pytest --garl-repeat."""
-    from pytest_garl.baselines import file as files
+    from pytest_garl.baselines.file import load_baseline
     from pytest_garl.scenarios.files import dumps
 
-    for each in files.load(file, (_maps_folder(),)).sets:
+    for each in load_baseline(file, (_maps_folder(),)).sets:
         for index, flight in enumerate(each.flights):
             if each.scenario_name(index) == name:
                 click.echo(f"# {name} of {file}; the NPC policy was {each.npcs}")

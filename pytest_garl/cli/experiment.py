@@ -53,16 +53,16 @@ def experiment(file: Path, report: bool, out: Path | None, folder: Path, workers
     FILE is a TOML file; its rows are in a CSV file of the same name. Run it where you run pytest.
     Each finished run is added at once. If you interrupt it, the same command continues.
     """
-    from pytest_garl.experiments import results as rows
     from pytest_garl.experiments.campaign import CampaignFolders, fly_experiment
-    from pytest_garl.experiments.report import write
-    from pytest_garl.experiments.spec import read
+    from pytest_garl.experiments.report import write_report
+    from pytest_garl.experiments.results import read_rows
+    from pytest_garl.experiments.spec import read_experiment
 
-    spec = read(file)
+    spec = read_experiment(file)
     rows_file = out / spec.rows.name if out else spec.rows
     if report:
         path = out / spec.report.name if out else spec.report
-        click.echo(f"wrote {write(spec, rows.read(rows_file), rows_file.name, path)}")
+        click.echo(f"wrote {write_report(spec, read_rows(rows_file), rows_file.name, path)}")
         return
     try:
         with _ProgressDisplay() as display:

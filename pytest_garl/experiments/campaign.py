@@ -15,11 +15,10 @@ from pytest_garl.adversary.catalogue import policy_spec
 from pytest_garl.errors import ExperimentError, GarlError
 from pytest_garl.execution.ledger import Ledger
 from pytest_garl.execution.ledger_queries import SearchProgress
-from pytest_garl.experiments import results
 from pytest_garl.experiments.avoidability import count_unavoidable
 from pytest_garl.experiments.measure import AvoidabilityCounts, finished_searches, result_row
 from pytest_garl.experiments.pytest_run import run_pytest
-from pytest_garl.experiments.results import ResultRow
+from pytest_garl.experiments.results import ResultRow, append_rows, read_rows
 from pytest_garl.experiments.spec import Experiment, ExperimentRun
 from pytest_garl.files.atomic import locked
 from pytest_garl.scenarios.maps.map import load_map
@@ -107,7 +106,7 @@ def fly_experiment(
     """Fly all missing runs; the rows of a run are saved as soon as it is finished."""
     check_experiment(experiment, folders.root)
     total = len(experiment.runs)
-    left = missing_runs(experiment, results.read(folders.rows))
+    left = missing_runs(experiment, read_rows(folders.rows))
     for run in {*experiment.runs} - {*left}:
         _tidy(folders.runs / run.folder)
     for number, run in enumerate(left, start=total - len(left) + 1):
@@ -115,9 +114,9 @@ def fly_experiment(
         observer.on_run_begin(run, number, total)
         # Wait for another process that flies the same run.
         with locked(folder):
-            if run in missing_runs(experiment, results.read(folders.rows)):
+            if run in missing_runs(experiment, read_rows(folders.rows)):
                 rows = _fly_run(run, folder, experiment.unavoidable, workers, observer)
-                results.append(folders.rows, rows)
+                append_rows(folders.rows, rows)
                 observer.on_run_end(rows)
             _tidy(folder)
 

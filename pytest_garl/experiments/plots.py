@@ -32,7 +32,7 @@ COLOURS = 64
 """Number of colours of a picture."""
 
 
-def draw(experiment: Experiment, grid: Grid, rows: Sequence[ResultRow], path: Path) -> bool:
+def draw_grid(experiment: Experiment, grid: Grid, rows: Sequence[ResultRow], path: Path) -> bool:
     """Draw a grid into a PNG file, equal bytes for equal rows; return False if there is no row."""
     from matplotlib.figure import Figure
 

@@ -11,7 +11,7 @@ from pathlib import Path
 from pytest_garl.experiments import goals, tables
 from pytest_garl.experiments.campaign import missing_runs
 from pytest_garl.experiments.metrics import searches_in_grid
-from pytest_garl.experiments.plots import draw
+from pytest_garl.experiments.plots import draw_grid
 from pytest_garl.experiments.results import ResultRow
 from pytest_garl.experiments.spec import Experiment, ExperimentRun, Grid
 from pytest_garl.files.atomic import write_text_atomically
@@ -43,7 +43,9 @@ HOW_TO_READ = f"""\
   three cannot reach p below 0.10."""
 
 
-def write(experiment: Experiment, rows: Sequence[ResultRow], source: str, path: Path) -> Path:
+def write_report(
+    experiment: Experiment, rows: Sequence[ResultRow], source: str, path: Path
+) -> Path:
     """Write the report to ``path``, and pictures beside it; ``source`` names the rows' file."""
     sections = [
         f"# {experiment.title}",
@@ -129,7 +131,7 @@ def _policy(row: ResultRow) -> str:
 def _grid(experiment: Experiment, grid: Grid, rows: Sequence[ResultRow], path: Path) -> list[str]:
     slug = re.sub(r"[^a-z0-9]+", "-", f"{experiment.file.stem}-{grid.name}".lower())
     picture = path.parent / "pictures" / f"{slug}.png"
-    drawn = draw(experiment, grid, rows, picture)
+    drawn = draw_grid(experiment, grid, rows, picture)
     compared = tables.comparison(experiment, grid, rows)
     return [
         f"## {grid.title}",

@@ -75,7 +75,7 @@ class ResultRow:
         return self.system, self.map, self.method, self.seed, self.budget
 
     @property
-    def kinds(self) -> tuple[int, ...]:
+    def type_counts(self) -> tuple[int, ...]:
         """Violations of the types I to V."""
         return self.type_i, self.type_ii, self.type_iii, self.type_iv, self.type_v
 
@@ -115,7 +115,7 @@ _EXPECTED = {"int": "a whole number from 0", "float": "a number"}
 _FIELDS = {field.name: str(field.type) for field in dataclasses.fields(ResultRow)}
 
 
-def read(path: Path) -> tuple[ResultRow, ...]:
+def read_rows(path: Path) -> tuple[ResultRow, ...]:
     """Return the rows in a file; none if there is no file.
 
     Raises ExperimentError that names file, line and column.
@@ -163,10 +163,10 @@ def _row(path: Path, line: int, cells: Mapping[str, str | None]) -> ResultRow:
     return ResultRow(**values)
 
 
-def append(path: Path, rows: Iterable[ResultRow]) -> None:
+def append_rows(path: Path, rows: Iterable[ResultRow]) -> None:
     """Add rows at once; a row that another process has added meanwhile is kept."""
     with locked(path.parent):
-        known = read(path)
+        known = read_rows(path)
         keys = {row.key for row in known}
         write_text_atomically(path, _dumps([*known, *(row for row in rows if row.key not in keys)]))
 

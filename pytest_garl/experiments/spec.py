@@ -172,7 +172,7 @@ class Experiment:
         )
 
 
-def read(file: Path) -> Experiment:
+def read_experiment(file: Path) -> Experiment:
     """Return the experiment in ``file``; raise ScenarioError that names file and key."""
     top = Table(parse(read_text(file), str(file)), str(file))
     top.only(TOP_KEYS)

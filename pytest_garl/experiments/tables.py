@@ -155,7 +155,9 @@ def _violation_type_cells(experiment: Experiment, searches: MethodSearches) -> l
     theirs = " / ".join(f"{kind:g}" for kind in paper.kinds) if paper and paper.kinds else NONE
     if not searches.rows:
         return [NOT_RUN, theirs, *[NONE] * 5]
-    counts = [sum(row.kinds[index] for row in searches.rows) for index in range(len(PAPER_TYPES))]
+    counts = [
+        sum(row.type_counts[index] for row in searches.rows) for index in range(len(PAPER_TYPES))
+    ]
     total = sum(counts)
     return [
         " / ".join(f"{100 * count / total:.0f}" for count in counts) if total else NONE,

@@ -12,7 +12,7 @@ import pytest
 from pytest_garl.adversary.catalogue import policy_spec
 from pytest_garl.baselines.comparison import Comparison
 from pytest_garl.baselines.compatibility import environment_changes, incompatibilities
-from pytest_garl.baselines.file import Baseline, BaselineSet, load
+from pytest_garl.baselines.file import Baseline, BaselineSet, load_baseline
 from pytest_garl.baselines.gate import compare_flights
 from pytest_garl.baselines.pairs import PairResult
 from pytest_garl.errors import GarlError
@@ -32,7 +32,7 @@ def register(config: pytest.Config, options: Options) -> None:
     """Add the gate to a session; raise UsageError for a file that is no baseline."""
     assert options.baseline is not None
     try:
-        baseline = load(options.baseline, options.map_folders)
+        baseline = load_baseline(options.baseline, options.map_folders)
     except GarlError as error:
         raise pytest.UsageError(f"--garl-baseline: {error}") from error
     config.pluginmanager.register(

@@ -7,7 +7,13 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from pytest_garl.baselines.file import BaselineFlight, dumps, load, loads, save
+from pytest_garl.baselines.file import (
+    BaselineFlight,
+    dump_baseline,
+    load_baseline,
+    parse_baseline,
+    save_baseline,
+)
 from pytest_garl.baselines.pairs import FlightSummary
 from pytest_garl.baselines.record import BaselineSpec
 from pytest_garl.errors import BaselineError, ScenarioError
@@ -26,13 +32,13 @@ def test_saving_and_loading_keeps_a_baseline_and_its_bytes(tmp_path: Path) -> No
         court, flights=tuple(BaselineFlight(scenario=each, summary=DOG) for each in scenarios)
     )
     both = baseline(dataclasses.replace(baseline_set(), method="garl"), court)
-    save(tmp_path / "new" / "base.toml", both)
-    assert load(tmp_path / "new" / "base.toml") == both
-    assert dumps(loads(dumps(both), load_map)) == dumps(both)
+    save_baseline(tmp_path / "new" / "base.toml", both)
+    assert load_baseline(tmp_path / "new" / "base.toml") == both
+    assert dump_baseline(parse_baseline(dump_baseline(both), load_map)) == dump_baseline(both)
 
 
 def test_the_file_has_one_line_per_flight_and_names_its_genes_once() -> None:
-    text = dumps(baseline(baseline_set(20)))
+    text = dump_baseline(baseline(baseline_set(20)))
     assert text.count("environment.fog") == 1
     assert len(text) < 20 * 550 + 2500
 
@@ -44,21 +50,21 @@ def test_any_signature_survives_the_file(signature: str, name: str) -> None:
     each = dataclasses.replace(baseline_set(1, strange), npcs=name)
     seen = dataclasses.replace(strange, signature=printable(signature))
     readable = dataclasses.replace(baseline_set(1, seen), npcs=printable(name))
-    assert loads(dumps(baseline(each)), load_map) == baseline(readable)
+    assert parse_baseline(dump_baseline(baseline(each)), load_map) == baseline(readable)
 
 
 def test_the_file_keeps_extra_genes() -> None:
     scenarios = propose(LAWN, genome_for(LAWN, extras=(WIND,)), 0, 0, 2)
     samples = tuple(BaselineFlight(scenario=each, summary=LANDED) for each in scenarios)
     windy = baseline(dataclasses.replace(baseline_set(), flights=samples))
-    assert loads(dumps(windy), load_map) == windy
+    assert parse_baseline(dump_baseline(windy), load_map) == windy
 
 
 def test_the_file_keeps_destinations() -> None:
     scenarios = propose(LAWN, with_destinations(genome_for(LAWN)), 0, 0, 2)
     samples = tuple(BaselineFlight(scenario=each, summary=LANDED) for each in scenarios)
     bound = baseline(dataclasses.replace(baseline_set(), flights=samples))
-    assert loads(dumps(bound), load_map) == bound
+    assert parse_baseline(dump_baseline(bound), load_map) == bound
 
 
 @pytest.mark.parametrize(
@@ -78,16 +84,16 @@ def test_the_file_keeps_destinations() -> None:
     ],
 )
 def test_the_error_of_a_broken_file_names_source_and_key(old: str, new: str, words: str) -> None:
-    text = dumps(baseline())
+    text = dump_baseline(baseline())
     assert old in text
     with pytest.raises(ScenarioError, match=words) as caught:
-        loads(text.replace(old, new, 1), load_map, source="base.toml")
+        parse_baseline(text.replace(old, new, 1), load_map, source="base.toml")
     assert "base.toml" in str(caught.value)
 
 
 def test_the_error_of_a_missing_file_names_the_command_that_writes_one(tmp_path: Path) -> None:
     with pytest.raises(ScenarioError, match=r"expected a file that `garl baseline save` wrote"):
-        load(tmp_path / "no.toml")
+        load_baseline(tmp_path / "no.toml")
 
 
 def test_save_refuses_sets_that_no_file_can_hold(tmp_path: Path) -> None:
@@ -101,5 +107,5 @@ def test_save_refuses_sets_that_no_file_can_hold(tmp_path: Path) -> None:
         ((mixed,), "different genes or without some"),
     ):
         with pytest.raises(BaselineError, match=words):
-            save(tmp_path / "base.toml", baseline(*wrong))
+            save_baseline(tmp_path / "base.toml", baseline(*wrong))
     assert not (tmp_path / "base.toml").exists()

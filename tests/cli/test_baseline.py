@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 from click.testing import CliRunner, Result
 
-from pytest_garl.baselines.file import load
+from pytest_garl.baselines.file import load_baseline
 from pytest_garl.cli import main
 from pytest_garl.scenarios.files import load as load_scenario
 from tests.plugin import tiny_simulator
@@ -122,13 +122,16 @@ def test_equal_options_save_equal_bytes_and_scenario_prints_one_scenario(
     assert "Lander-lawn: 4 flown, " in first.output
     garl(*save, "--out=two.toml", "--workers=2")
     assert Path("two.toml").read_bytes() == Path("one/base.toml").read_bytes()
-    (saved,) = load(Path("two.toml")).sets
+    (saved,) = load_baseline(Path("two.toml")).sets
     printed = garl("baseline", "scenario", "two.toml", "lawn-3")
     Path("one.toml").write_text(printed.output)
     assert load_scenario(Path("one.toml")) == saved.flights[3].scenario
     several = garl(*save, "--system=stack.system:GivesUp", "--out=three.toml")
     assert "GivesUp-lawn: 4 flown, " in several.output
-    assert [each.title for each in load(Path("three.toml")).sets] == ["Lander-lawn", "GivesUp-lawn"]
+    assert [each.title for each in load_baseline(Path("three.toml")).sets] == [
+        "Lander-lawn",
+        "GivesUp-lawn",
+    ]
     missing = garl("baseline", "scenario", "two.toml", "lawn-4")
     assert "found no scenario 'lawn-4'" in missing.output
 
@@ -146,7 +149,7 @@ def test_save_records_real_flights(checkouts: Path) -> None:
     result = garl(*save, "--out=base.toml", "--npcs=dqn", "--abort=violation")
     assert result.exit_code == 0, result.output
     assert "GivesUp-lawn: 1 flown, 1 violations, 1 aborts" in result.output
-    (saved,) = load(Path("base.toml")).sets
+    (saved,) = load_baseline(Path("base.toml")).sets
     assert saved.npcs_sha256
     assert {flight.summary.signature.partition(":")[0] for flight in saved.flights} == {"abort"}
     assert all(flight.summary.sha256 for flight in saved.flights)

@@ -14,8 +14,8 @@ from click.testing import CliRunner, Result
 import pytest_garl
 from pytest_garl.cli import main
 from pytest_garl.execution.ledger import Ledger
-from pytest_garl.experiments.results import ResultRow, read
-from pytest_garl.experiments.spec import read as plan
+from pytest_garl.experiments.results import ResultRow, read_rows
+from pytest_garl.experiments.spec import read_experiment
 from pytest_garl.scenarios.chromosome import encode
 from pytest_garl.scenarios.files import parse_scenario
 from pytest_garl.scenarios.genes import genome_for
@@ -72,7 +72,7 @@ def test_each_run_is_flown_once_and_reported_from_its_rows_alone(project: Path) 
     assert "run 2 of 2: Good, random, seed 0, 12 flights on lawn and court" in result.output
     assert "    court: " in result.output
     assert "all 2 runs are in out/toy.csv" in result.output
-    rows = read(project / "out" / "toy.csv")
+    rows = read_rows(project / "out" / "toy.csv")
     order = [(row.method, row.map) for row in rows]
     assert order == [(method, map) for method in ("garl", "random") for map in ("lawn", "court")]
     assert {row.piloted for row in rows} == {None}
@@ -82,7 +82,7 @@ def test_each_run_is_flown_once_and_reported_from_its_rows_alone(project: Path) 
     change(project, "seeds = [0]", "seeds = [0, 1]")
     longer = garl("--workers=1", "--out=out", "--folder=runs")
     assert "run 3 of 4: Good, garl, seed 1" in longer.output
-    assert read(project / "out" / "toy.csv")[: len(rows)] == rows
+    assert read_rows(project / "out" / "toy.csv")[: len(rows)] == rows
     shutil.rmtree(project / "runs")
     result = garl("--report", "--out=out")
     assert result.output.strip() == "wrote out/toy.md"
@@ -99,13 +99,13 @@ def test_rows_hold_the_figures_of_the_ledger(project: Path) -> None:
     text = (project / "toy.toml").read_text().replace("unavoidable = 0", "unavoidable = 2")
     (project / "toy.toml").write_text(text)
     # Killed while it was made, a ledger is an empty file.
-    (run,) = plan(Path("toy.toml")).runs
+    (run,) = read_experiment(Path("toy.toml")).runs
     path = project / ".garl" / "experiments" / run.folder / "ledger.sqlite"
     path.parent.mkdir(parents=True)
     path.touch()
     result = garl("--workers=2")
     assert result.exit_code == 0, result.output
-    row, _ = read(project / "toy.csv")
+    row, _ = read_rows(project / "toy.csv")
     assert row.map == "lawn"
     ledger = Ledger(path)
     search, _ = next(each for each in ledger.searches() if '"map": "lawn"' in each[1])
@@ -242,8 +242,8 @@ def test_an_interrupted_or_killed_run_continues(slow: Path) -> None:
     assert flown(ledger) == 24
     # Begun anew, it would have set the first one aside.
     assert not list(ledger.parent.glob("ledger-previous*"))
-    expected = read(slow / "undisturbed" / "toy.csv")
-    assert lasting(read(slow / "toy.csv")) == lasting(expected)
+    expected = read_rows(slow / "undisturbed" / "toy.csv")
+    assert lasting(read_rows(slow / "toy.csv")) == lasting(expected)
 
 
 def test_a_run_of_changed_code_is_refused(slow: Path) -> None:

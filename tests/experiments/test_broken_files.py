@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from pytest_garl.errors import ExperimentError, ScenarioError
-from pytest_garl.experiments.results import append, read
+from pytest_garl.experiments.results import append_rows, read_rows
 from tests.experiments.samples import row
 from tests.experiments.test_spec import TEXT, plan
 
@@ -42,16 +42,16 @@ def test_a_damaged_experiment_file_is_one_short_error(
 
 
 def test_an_experiment_file_that_is_a_pipe_is_refused(tmp_path: Path) -> None:
-    from pytest_garl.experiments.spec import read as read_plan
+    from pytest_garl.experiments.spec import read_experiment
 
     os.mkfifo(tmp_path / "mine.toml")
     with pytest.raises(ScenarioError, match="found a pipe, expected a regular file"):
-        read_plan(tmp_path / "mine.toml")
+        read_experiment(tmp_path / "mine.toml")
 
 
 @pytest.fixture
 def file(tmp_path: Path) -> Path:
-    append(tmp_path / "rows.csv", [row()])
+    append_rows(tmp_path / "rows.csv", [row()])
     return tmp_path / "rows.csv"
 
 
@@ -61,7 +61,7 @@ def test_a_cell_too_large_for_the_reader_is_refused(file: Path, line: int) -> No
     lines[line] = "x" * (csv.field_size_limit() + 1) + lines[line]
     file.write_text("\n".join(lines))
     with pytest.raises(ExperimentError, match=r"rows.csv, line .*: not valid CSV: field larger"):
-        read(file)
+        read_rows(file)
 
 
 @pytest.mark.parametrize(
@@ -78,17 +78,17 @@ def test_a_damaged_cell_is_one_short_error(file: Path, old: str, new: str, words
     assert old in text
     file.write_text(text.replace(old, new, 1))
     with pytest.raises(ExperimentError, match=words) as caught:
-        read(file)
+        read_rows(file)
     assert len(str(caught.value)) < 1100
 
 
 def test_escape_sequences_in_a_row_are_made_visible(file: Path) -> None:
     file.write_text(file.read_text().replace("Lander", "L\x1b[2Jander", 1))
-    assert read(file)[0].system == "L\\x1b[2Jander"
+    assert read_rows(file)[0].system == "L\\x1b[2Jander"
 
 
 @pytest.mark.parametrize(("target", "words"), [("gone", "No such file"), ("rows.csv", "Too many")])
 def test_a_broken_link_to_rows_is_refused(tmp_path: Path, target: str, words: str) -> None:
     (tmp_path / "rows.csv").symlink_to(target)
     with pytest.raises(ExperimentError, match=f"rows.csv: cannot be read: {words}"):
-        read(tmp_path / "rows.csv")
+        read_rows(tmp_path / "rows.csv")

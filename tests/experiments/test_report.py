@@ -5,9 +5,9 @@ from pathlib import Path
 import pytest
 
 from pytest_garl.experiments import goals
-from pytest_garl.experiments.report import write
+from pytest_garl.experiments.report import write_report
 from pytest_garl.experiments.results import ResultRow
-from pytest_garl.experiments.spec import Experiment, read
+from pytest_garl.experiments.spec import Experiment, read_experiment
 from tests.experiments.samples import row
 
 TEXT = """
@@ -80,12 +80,12 @@ RANDOM = (
 @pytest.fixture
 def experiment(tmp_path: Path) -> Experiment:
     (tmp_path / "mine.toml").write_text(TEXT)
-    return read(tmp_path / "mine.toml")
+    return read_experiment(tmp_path / "mine.toml")
 
 
 def report(experiment: Experiment, rows: tuple[ResultRow, ...]) -> str:
     path = experiment.file.parent / "out" / "mine.md"
-    assert write(experiment, rows, "mine.csv", path) == path
+    assert write_report(experiment, rows, "mine.csv", path) == path
     return path.read_text()
 
 

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from pytest_garl.errors import ExperimentError
-from pytest_garl.experiments.results import append, read
+from pytest_garl.experiments.results import append_rows, read_rows
 from tests.experiments.samples import PLAIN, row
 
 BARE = row(
@@ -16,15 +16,15 @@ BARE = row(
 
 def add(path: Path, seeds: range) -> None:
     for seed in seeds:
-        append(path, [row(seed=seed, map=map) for map in ("court", "lawn")])
+        append_rows(path, [row(seed=seed, map=map) for map in ("court", "lawn")])
 
 
 def test_read_returns_appended_rows(tmp_path: Path) -> None:
     path = tmp_path / "new" / "rows.csv"
-    assert read(path) == ()
-    append(path, [row()])
-    append(path, [BARE])
-    assert read(path) == (row(), BARE)
+    assert read_rows(path) == ()
+    append_rows(path, [row()])
+    append_rows(path, [BARE])
+    assert read_rows(path) == (row(), BARE)
     head, first, second = path.read_text().splitlines()
     assert head.split(",") == list(PLAIN)
     assert first.startswith("Lander,court,garl,0,40,10,1,2,0,6,1,3,1,0,4,0,1,4,30,II:lost:descent|")
@@ -33,9 +33,9 @@ def test_read_returns_appended_rows(tmp_path: Path) -> None:
 
 def test_a_search_has_one_row(tmp_path: Path) -> None:
     path = tmp_path / "rows.csv"
-    append(path, [row()])
-    append(path, [row(violations=11), BARE])
-    assert read(path) == (row(), BARE)
+    append_rows(path, [row()])
+    append_rows(path, [row(violations=11), BARE])
+    assert read_rows(path) == (row(), BARE)
 
 
 def test_simultaneous_appends_lose_no_row(tmp_path: Path) -> None:
@@ -48,7 +48,7 @@ def test_simultaneous_appends_lose_no_row(tmp_path: Path) -> None:
         process.start()
     for process in processes:
         process.join()
-    found = read(path)
+    found = read_rows(path)
     assert {each.key for each in found} == {
         ("Lander", map, "garl", seed, 40) for map in ("court", "lawn") for seed in range(12)
     }
@@ -75,10 +75,10 @@ def test_the_error_of_a_broken_file_names_line_and_column(
     tmp_path: Path, before: str, after: str, words: str
 ) -> None:
     path = tmp_path / "rows.csv"
-    append(path, [row()])
+    append_rows(path, [row()])
     path.write_text(path.read_text().replace(before, after, 1))
     with pytest.raises(ExperimentError) as caught:
-        read(path)
+        read_rows(path)
     assert words in str(caught.value)
     assert str(path) in str(caught.value)
 
@@ -86,4 +86,4 @@ def test_the_error_of_a_broken_file_names_line_and_column(
 def test_a_file_that_is_no_text_is_refused(tmp_path: Path) -> None:
     (tmp_path / "rows.csv").write_bytes(b"\xff\xfe")
     with pytest.raises(ExperimentError, match="cannot be read"):
-        read(tmp_path / "rows.csv")
+        read_rows(tmp_path / "rows.csv")

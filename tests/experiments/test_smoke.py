@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from pytest_garl.experiments.results import read
+from pytest_garl.experiments.results import read_rows
 
 ROOT = Path(__file__).parents[2]
 PLAN = "docs/experiments/smoke.toml"
@@ -27,7 +27,7 @@ def test_a_toy_experiment_is_flown_measured_and_reported(tmp_path: Path) -> None
         assert done.returncode == 0, done.stdout + done.stderr
 
     garl(f"--folder={tmp_path / 'runs'}")
-    rows = read(tmp_path / "smoke.csv")
+    rows = read_rows(tmp_path / "smoke.csv")
     assert [(row.method, row.policy, row.seed) for row in rows] == [
         ("garl", "dqn", 0),
         ("random with dqn", "dqn", 0),

@@ -6,7 +6,7 @@ import pytest
 
 from pytest_garl.errors import ExperimentError, ScenarioError
 from pytest_garl.experiments.campaign import check_experiment
-from pytest_garl.experiments.spec import Experiment, read
+from pytest_garl.experiments.spec import Experiment, read_experiment
 
 DOCS = Path(__file__).parents[2] / "docs" / "experiments"
 TEXT = """
@@ -53,7 +53,7 @@ kinds = [1, 2, 3, 4, 90]
 def plan(folder: Path, text: str = TEXT) -> Experiment:
     file = folder / "mine.toml"
     file.write_text(text)
-    return read(file)
+    return read_experiment(file)
 
 
 def test_every_run_is_flown_once_first_seeds_first(tmp_path: Path) -> None:
@@ -177,11 +177,11 @@ def test_a_spec_without_grids_is_refused(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("file", sorted(DOCS.glob("*.toml")), ids=lambda file: file.stem)
 def test_every_shipped_experiment_can_be_flown(file: Path) -> None:
-    check_experiment(read(file), DOCS.parents[1])
+    check_experiment(read_experiment(file), DOCS.parents[1])
 
 
 def test_the_shipped_experiment_asks_the_papers_questions() -> None:
-    found = read(DOCS / "rq.toml")
+    found = read_experiment(DOCS / "rq.toml")
     first, second, third = found.grids
     assert [len(first.systems), len(first.maps), first.methods] == [3, 2, ("garl", "garl-paper")]
     assert second.systems == ("MM-MLS",)

@@ -102,12 +102,12 @@ def _load_map(path: Path, rng: random.Random) -> None:
 
 
 def _load_baseline(path: Path, rng: random.Random) -> None:
-    found = baseline.load(path)
-    assert baseline.loads(baseline.dumps(found), maps.load_map) == found
+    found = baseline.load_baseline(path)
+    assert baseline.parse_baseline(baseline.dump_baseline(found), maps.load_map) == found
 
 
 def _load_plan(path: Path, rng: random.Random) -> None:
-    found = plan.read(path)
+    found = plan.read_experiment(path)
     assert all(run.folder and run.title for run in found.runs)
 
 
@@ -210,7 +210,7 @@ def _dumped(slot: int) -> str:
 def _load_ledger(path: Path, rng: random.Random) -> None:
     kind = rng.randrange(3)
     if kind == 0:
-        baseline.dumps(record.baseline_from_ledger(path))
+        baseline.dump_baseline(record.baseline_from_ledger(path))
         return
     ledger = Ledger.resume(path, _RUN) if kind == 1 else Ledger(path)
     try:
@@ -247,7 +247,7 @@ def _rows() -> list[str]:
 
 
 def _load_rows(path: Path, rng: random.Random) -> None:
-    found = rows.read(path)
+    found = rows.read_rows(path)
     assert len({each.key for each in found}) <= len(found)
 
 
@@ -264,7 +264,9 @@ LOADERS = {
         load=_load_map,
     ),
     "baseline": Loader(
-        prepare=_text_file("base.toml", lambda: [baseline.dumps(baseline_samples.baseline())]),
+        prepare=_text_file(
+            "base.toml", lambda: [baseline.dump_baseline(baseline_samples.baseline())]
+        ),
         load=_load_baseline,
     ),
     "experiment": Loader(prepare=_text_file("plan.toml", lambda: [PLAN]), load=_load_plan),

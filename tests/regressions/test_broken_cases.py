@@ -94,7 +94,7 @@ def test_the_head_of_a_case_is_read_within_the_limit(tmp_path: Path) -> None:
             read(tmp_path / "a.toml")
 
 
-BASELINE = baselines.dumps(baseline())
+BASELINE = baselines.dump_baseline(baseline())
 
 
 @pytest.mark.parametrize(
@@ -111,7 +111,7 @@ def test_a_broken_baseline_is_one_short_error(start: str, end: str, new: str, wo
     begin = BASELINE.index(start) + len(start)
     text = BASELINE[:begin] + new + BASELINE[BASELINE.index(end, begin) :]
     with pytest.raises(ScenarioError, match=words) as caught:
-        baselines.loads(text, load_map, source="base.toml")
+        baselines.parse_baseline(text, load_map, source="base.toml")
     assert "base.toml" in str(caught.value)
     assert len(str(caught.value)) < 400
 
@@ -121,7 +121,7 @@ def test_a_gene_too_large_for_a_float_is_one_error() -> None:
     value = BASELINE.index("[", row) + 1
     text = f"{BASELINE[:value]}{'9' * 400}{BASELINE[BASELINE.index(',', value) :]}"
     with pytest.raises(ScenarioError, match=r"flights\[0\]': environment.dust: found 999.* to 1$"):
-        baselines.loads(text, load_map, source="base.toml")
+        baselines.parse_baseline(text, load_map, source="base.toml")
 
 
 def test_no_baseline_is_saved_that_could_not_be_read(
@@ -129,7 +129,7 @@ def test_no_baseline_is_saved_that_could_not_be_read(
 ) -> None:
     monkeypatch.setattr(baselines, "LARGEST_BYTES", len(BASELINE) - 1)
     with pytest.raises(BaselineError, match=r"flights in .* bytes, expected at most"):
-        baselines.save(tmp_path / "base.toml", baseline())
+        baselines.save_baseline(tmp_path / "base.toml", baseline())
     (tmp_path / "base.toml").write_text(BASELINE)
     with pytest.raises(ScenarioError, match=r"bytes, expected at most .* `garl baseline save`"):
-        baselines.load(tmp_path / "base.toml")
+        baselines.load_baseline(tmp_path / "base.toml")
