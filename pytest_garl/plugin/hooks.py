@@ -15,11 +15,11 @@ from pytest_garl.plugin.fixtures import end_unjudged, garl_slot, landing, npcs, 
 from pytest_garl.plugin.keys import (
     BEGUN,
     FATAL,
-    FOUND,
+    FINDING_TEST,
     GATE_PLUGIN,
-    OWN,
     RUN,
     TALLY,
+    WORKER_ASSERTION,
     is_landing_item,
     is_xdist_worker,
     name_slots,
@@ -180,9 +180,9 @@ def pytest_runtest_logreport(report: pytest.TestReport) -> None:
         if key == FATAL:
             raise pytest.exit.Exception(f"garl: {value}", pytest.ExitCode.INTERNAL_ERROR)
         worker = getattr(report, "node", None)
-        if key == OWN and worker is not None:
+        if key == WORKER_ASSERTION and worker is not None:
             worker.config.stash[RUN].reported_failures[report.nodeid] = str(value)
-        if key == FOUND and worker is not None:
+        if key == FINDING_TEST and worker is not None:
             search, _, signature = str(value).partition(" ")
             worker.config.stash[RUN].note_finding_test(search, signature, report.nodeid)
 

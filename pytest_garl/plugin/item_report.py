@@ -17,16 +17,16 @@ from pytest_garl.plugin.item_failure import (
 )
 from pytest_garl.plugin.keys import (
     CASE,
-    EXCUSED,
-    FAILURE,
-    FOUND,
+    DUPLICATE_OF,
+    FINDING_TEST,
     LANDING,
     MAYBE_FIXED,
-    OWN,
-    OWN_FAILURE,
+    NOT_REPEATED,
+    REPORTED_FAILURE,
     STALE,
     UNPROVEN,
-    UNREPEATED,
+    USER_FAILURE,
+    WORKER_ASSERTION,
     is_xdist_worker,
 )
 from pytest_garl.plugin.outcomes import (
@@ -187,12 +187,12 @@ class _Writer:
         key = failure.key(target.search)
         if decision.reason is Reason.NOT_REPEATED:
             slot = [target.system_name, target.map, target.name, failure.signature]
-            self._note(UNREPEATED, json.dumps(slot))
+            self._note(NOT_REPEATED, json.dumps(slot))
         elif decision.reason is Reason.DUPLICATE:
-            self._note(EXCUSED, key)
+            self._note(DUPLICATE_OF, key)
         if decision.outcome == "xfailed":
             return self._expect(report_text.expected_failure(decision, facts, ""))
-        self._note(FAILURE, key)
+        self._note(REPORTED_FAILURE, key)
         self._note_finding_test(failure)
         verdict = self.result.verdict
         return self._fail(
@@ -206,7 +206,7 @@ class _Writer:
         target, failed = self.target, failure.failed_assertion
         if failure.user_property and failed is not None:
             slot = [target.system_name, target.map, target.name]
-            self._note(OWN_FAILURE, json.dumps([*slot, failure.signature, failed.message]))
+            self._note(USER_FAILURE, json.dumps([*slot, failure.signature, failed.message]))
 
     def _note_finding_test(self, failure: ItemFailure) -> None:
         """Remember which test found a violation: it judges the case that is saved."""
@@ -217,10 +217,10 @@ class _Writer:
         if failure.user_property:
             run.user_assertions[search, failure.signature] = failure.assertion
             if worker:
-                self._note(OWN, failure.signature)
+                self._note(WORKER_ASSERTION, failure.signature)
         run.note_finding_test(search, failure.signature, self.item.nodeid)
         if worker:
-            self._note(FOUND, f"{search} {failure.signature}")
+            self._note(FINDING_TEST, f"{search} {failure.signature}")
 
     def _note(self, key: str, value: str) -> None:
         self.report.user_properties.append((key, value))

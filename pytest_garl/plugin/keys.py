@@ -13,48 +13,48 @@ import pytest
 if TYPE_CHECKING:
     from pytest_garl.plugin.target import Target
 
-GATE_PLUGIN = "garl_baseline_gate"
-"""The name under which the plugin of a baseline gate is registered."""
 RUN = pytest.StashKey[Any]()
 """Where a session keeps its run; none if nothing is to be flown."""
+TALLY = pytest.StashKey[Any]()
+"""Where a session that is no xdist worker keeps what its reports say."""
 LANDING = pytest.StashKey[Any]()
 """Where an item keeps the landing that it asked for."""
 BEGUN = pytest.StashKey[bool]()
 """Where an item keeps whether the test's body runs."""
-FATAL = "garl.fatal"
-"""The user property by which an xdist worker tells the controller that the run cannot go on."""
-OWN = "garl.own"
-"""The user property by which it tells of a test that failed in an assertion of its own."""
-FOUND = "garl.found"
-"""The user property by which it tells that a test failed for a search's violation."""
-TALLY = pytest.StashKey[Any]()
-"""Where a session that is no xdist worker keeps what its items say."""
+GATE_PLUGIN = "garl_baseline_gate"
+"""The name under which the plugin of a baseline gate is registered."""
+
+# User properties of reports, which xdist carries from its workers to the controller.
 SLOT = "garl.slot"
-"""The user property that names the slot of an item."""
+"""The slot of an item; empty if it has nothing to fly."""
+NO_FLIGHT = "garl.nothing"
+"""Why an item has nothing to fly."""
 OUTCOME = "garl.outcome"
-"""The user property with the outcome of an item's flight; an item that flew nothing has none."""
+"""The outcome of an item's flight; an item that flew nothing has none."""
 SIGNATURE = "garl.signature"
-"""The user property with the signature of a flight's violation, empty if there is none."""
+"""The signature of a flight's violation, empty if there is none."""
 UNPROVEN = "garl.unproven"
-"""The user property that says why it proves nothing if a saved case passes."""
-NOTHING = "garl.nothing"
-"""The user property of an item that has nothing to fly, with the reason."""
-FAILURE = "garl.failure"
-"""The user property that names what a failing item tells of."""
-EXCUSED = "garl.excused"
-"""The user property of an item that is excused, with what another item tells of."""
-UNREPEATED = "garl.unrepeated"
-"""The user property of a violation that did not show when it was flown again."""
-OWN_FAILURE = "garl.own_failure"
-"""The user property that tells the summary of a failed assertion about the user's own property."""
+"""Why it proves nothing if a saved case passes."""
+REPORTED_FAILURE = "garl.failure"
+"""The failure that an item reports, as a key that is the same for all items which show it."""
+DUPLICATE_OF = "garl.excused"
+"""The failure that another item reports, by which an item is excused."""
+NOT_REPEATED = "garl.unrepeated"
+"""System, map, slot and signature of a violation that did not show in other flights."""
+USER_FAILURE = "garl.own_failure"
+"""System, map, slot, signature and message of a failed assertion about a user's own property."""
 CASE = "garl.case"
-"""The user property that names the file of a case that fails."""
+"""The file of a case that fails."""
 MAYBE_FIXED = "garl.maybe_fixed"
-"""The user property that names the file of an open case that passes."""
-UNPROVEN = "garl.unproven"
-"""The user property that says why it proves nothing that a case passes."""
+"""The file of an open case that passes."""
 STALE = "garl.stale"
-"""The user property that names the file of an open case that passes without proof, and why."""
+"""The file of an open case that passes without proof, and why."""
+WORKER_ASSERTION = "garl.own"
+"""A worker's item failed in an assertion about a user's own property: its signature."""
+FINDING_TEST = "garl.found"
+"""A worker's item failed for a violation that a search found: the search and the signature."""
+FATAL = "garl.fatal"
+"""Why the run cannot go on."""
 
 
 def is_xdist_worker(config: pytest.Config) -> bool:
@@ -81,6 +81,6 @@ def name_slots(items: Iterable[pytest.Item]) -> None:
         callspec: Any = getattr(item, "callspec", None)
         slot = callspec.params.get("garl_slot") if callspec else None
         if isinstance(slot, str):
-            item.user_properties += [(SLOT, ""), (NOTHING, slot)]
+            item.user_properties += [(SLOT, ""), (NO_FLIGHT, slot)]
         elif slot is not None:
             item.user_properties.append((SLOT, slot.name))

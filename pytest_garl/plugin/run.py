@@ -93,9 +93,9 @@ class Run:
     """Called when the waiting is over."""
     loop_finished: bool = False
     """Whether all tests ran to the end of the list, and nobody interrupted them."""
-    pursued: tuple[InvestigatedSignature, ...] = ()
+    investigated: tuple[InvestigatedSignature, ...] = ()
     """What became of new signatures after the search."""
-    rest: RemainingWork | None = None
+    remaining: RemainingWork | None = None
     """What is to come after the search, when it is known."""
     save_problem: str = ""
     """Why that could not be finished, if it could not."""

@@ -129,7 +129,7 @@ class ProgressReader:
 
     def _forecast(self, ledger: Ledger, flown_after: float, now: float) -> float | None:
         """Update how many flights follow the searches; return the time left if it is known."""
-        remaining = self._run.rest
+        remaining = self._run.remaining
         if remaining is None:
             options = self._run.options
             cap = options.budget if options.shrink_capped else None

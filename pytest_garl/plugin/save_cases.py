@@ -50,15 +50,15 @@ def save_cases(run: Run, session: pytest.Session) -> None:
         )
         if requests:
             most = sum(each.budget for each in divide_flights(requests))
-            run.rest = remaining_work(requests, _flight_s(run, requests), options.workers or 1)
+            run.remaining = remaining_work(requests, _flight_s(run, requests), options.workers or 1)
             begin_line(reporter)
             reporter.write_line(
                 "garl: confirming and shrinking "
                 f"{counted(len(requests), 'new kind')} of violation, "
-                f"at most {counted(most, 'flight')}, about {duration(run.rest.seconds)}"
+                f"at most {counted(most, 'flight')}, about {duration(run.remaining.seconds)}"
             )
         with show_progress(run, config):
-            run.pursued = follow_up(run.ledger, run.pool, requests, _saver(run), run.on_wait)
+            run.investigated = follow_up(run.ledger, run.pool, requests, _saver(run), run.on_wait)
     except KeyboardInterrupt:
         begin_line(reporter)
         reporter.write_line(

@@ -25,7 +25,7 @@ def write_run(reporter: Any, run: Run, tally: Tally) -> None:
     fold_skips(reporter)
     _write_searches(reporter, run, tally)
     lines = [
-        *saved_lines(run.pursued, reporter.config),
+        *saved_lines(run.investigated, reporter.config),
         *([f"nothing more was saved: {run.save_problem}"] if run.save_problem else []),
         *_passing_cases(reporter),
         *(wrapped(line, width_of(reporter.config)) for line in cpu_dispatch_warning(run)),
@@ -122,7 +122,7 @@ def _costs(run: Run) -> str:
     """Return how many flights the run needed beside the budget, and how busy its workers were."""
     meters = run.ledger.queries.meters()
     flying, idle = meters.get("flying_s", 0.0), meters.get("idle_s", 0.0)
-    confirming = sum(each.result.flights for each in run.pursued)
+    confirming = sum(each.result.flights for each in run.investigated)
     repeating = meters.get("on_demand", 0) - confirming
     counts = {
         "flown again after a time-out or a kill": meters.get("retried", 0),

@@ -9,14 +9,14 @@ from typing import TYPE_CHECKING
 import pytest
 
 from pytest_garl.plugin.keys import (
-    EXCUSED,
-    FAILURE,
-    NOTHING,
+    DUPLICATE_OF,
+    NO_FLIGHT,
+    NOT_REPEATED,
     OUTCOME,
-    OWN_FAILURE,
+    REPORTED_FAILURE,
     SIGNATURE,
     SLOT,
-    UNREPEATED,
+    USER_FAILURE,
 )
 
 if TYPE_CHECKING:
@@ -50,8 +50,8 @@ class Tally:
         told = dict(report.user_properties)
         if SLOT not in told or report.when == "teardown":
             return
-        if NOTHING in told and report.nodeid not in self.items:
-            self.nothing[str(told[NOTHING])] += 1
+        if NO_FLIGHT in told and report.nodeid not in self.items:
+            self.nothing[str(told[NO_FLIGHT])] += 1
         self.items.add(report.nodeid)
         self.flown = self.flown or OUTCOME in told
         flight = (report.nodeid.partition("::")[0], str(told[SLOT]))
@@ -59,14 +59,14 @@ class Tally:
             self._violating[flight] = str(told[SIGNATURE])
         if report.failed or hasattr(report, "wasxfail"):
             self._answered.add(flight)
-        if FAILURE in told and report.failed:
-            self._failures[report.nodeid] = str(told[FAILURE])
-        if EXCUSED in told and report.skipped:
-            self._excused.setdefault(str(told[EXCUSED]), set()).add(report.nodeid)
-        if OWN_FAILURE in told:
-            self._user_failures.setdefault(report.nodeid, []).append(str(told[OWN_FAILURE]))
-        if UNREPEATED in told:
-            self.unrepeated.add(tuple(json.loads(str(told[UNREPEATED]))))
+        if REPORTED_FAILURE in told and report.failed:
+            self._failures[report.nodeid] = str(told[REPORTED_FAILURE])
+        if DUPLICATE_OF in told and report.skipped:
+            self._excused.setdefault(str(told[DUPLICATE_OF]), set()).add(report.nodeid)
+        if USER_FAILURE in told:
+            self._user_failures.setdefault(report.nodeid, []).append(str(told[USER_FAILURE]))
+        if NOT_REPEATED in told:
+            self.unrepeated.add(tuple(json.loads(str(told[NOT_REPEATED]))))
 
     @property
     def user_failures(self) -> list[SlotUserFailure]:
