@@ -39,7 +39,7 @@ def count(ledger: Ledger, search: str, map: str) -> dict[str, int | str]:
         for key, low, high in zip(genome.keys, genome.lower, genome.upper, strict=True)
         if key.endswith(".velocity")
     ]
-    for flight in ledger.queries.flown(search):
+    for flight in ledger.queries.flights(search):
         scenario, outcome = parse_scenario(flight.scenario), flight.result.outcome
         if flight.signature:
             kinds[flight.signature] += 1

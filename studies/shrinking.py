@@ -87,19 +87,19 @@ def violations(ledger: Ledger, count: int) -> list[Violation]:
     """Return violations, one of each kind, then a second of each, until there are enough."""
     kinds: defaultdict[tuple[str, str], list[LedgerFlight]] = defaultdict(list)
     for row in ledger.queries.violating():
-        kinds[row.flight.search, row.signature].append(row)
+        kinds[row.id.search, row.signature].append(row)
     turns = itertools.zip_longest(*kinds.values())
     rows = [row for turn in turns for row in turn if row is not None]
     return [_violation(ledger, row) for row in rows[:count]]
 
 
 def _violation(ledger: Ledger, row: LedgerFlight) -> Violation:
-    text = ledger.job(row.flight.search)
+    text = ledger.job(row.id.search)
     assert text is not None
     done = CompletedFlight(result=row.result, sha256=row.sha256, record=Path())
     return Violation(
         job=parse_job(text),
-        slot=f"g{row.flight.slot.generation:02d}-s{row.flight.slot.index:02d}",
+        slot=f"g{row.id.slot.generation:02d}-s{row.id.slot.index:02d}",
         signature=row.signature,
         scenario=parse_scenario(row.scenario),
         colliding_object=find_colliding_object(done),

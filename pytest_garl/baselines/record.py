@@ -125,7 +125,7 @@ def baseline_from_ledger(path: Path) -> Baseline:
     try:
         check_stored(ledger)
         searches = [
-            (parse_job(job), ledger.queries.flown(search)) for search, job in ledger.searches()
+            (parse_job(job), ledger.queries.flights(search)) for search, job in ledger.searches()
         ]
         method = str(ledger.fact("method") or "")
     finally:

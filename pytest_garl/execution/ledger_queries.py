@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from pytest_garl.execution.database import Database, SearchKind
+from pytest_garl.execution.database import Database
 from pytest_garl.execution.flight_id import FlightId
 from pytest_garl.execution.result import CompletedFlight, FlightResult, parse_result
 from pytest_garl.execution.slot import Slot
@@ -30,21 +30,22 @@ class SearchProgress:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LedgerFlight:
-    """A flown slot."""
+    """A flight of a search; ``scenario`` is text, ``sha256`` the hash of the trajectory."""
 
-    flight: FlightId
+    id: FlightId
+    system: str
     scenario: str
     result: FlightResult
     sha256: str
 
     @property
     def signature(self) -> str:
-        """The violation's signature."""
+        """The violation's signature, empty for a flight without violation."""
         return self.result.signature
 
     def completed(self, folder: Path) -> CompletedFlight:
-        """Return it with its record, which is in a folder of flights."""
-        record = self.flight.record(folder)
+        """Return the flight with its record, which is in a folder of flights."""
+        record = self.id.record(folder)
         return CompletedFlight(result=self.result, sha256=self.sha256, record=record)
 
 
@@ -67,52 +68,42 @@ class LedgerQueries:
             for system, map, flown, wanted, generation in rows
         ]
 
-    def results(self, kind: SearchKind = "search") -> list[tuple[str, str, int, int, FlightResult]]:
-        """Return (system, map, generation, slot, result) of all flown slots in slot order."""
-        rows = self._database.execute(
-            "SELECT system, map, generation, slot, result FROM slot "
-            "JOIN search ON search.id = slot.search WHERE state = 'flown' AND kind = ? "
-            "ORDER BY system, map, generation, slot",
-            (kind,),
-        )
-        return [(*row[:4], parse_result(row[4])) for row in rows]
+    def flights(self, search: str = "") -> list[LedgerFlight]:
+        """Return the flights of all searches in slot order, or those of one search."""
+        return self._flights("? IN ('', search.id)", search)
 
     def violating(self) -> list[LedgerFlight]:
-        """Return the searches' violations in slot order."""
-        return self._rows("json_extract(result, '$.verdict.primary') IS NOT NULL")
+        """Return the flights of all searches that violated a property, in slot order."""
+        return self._flights("json_extract(result, '$.verdict.primary') IS NOT NULL")
 
-    def flown(self, search: str) -> list[LedgerFlight]:
-        """Return all flights of a search in slot order."""
-        return self._rows("search.id = ?", search)
+    def flight(self, system: str, map: str, slot: Slot) -> LedgerFlight:
+        """Return the flight of a slot that was flown."""
+        (found,) = self._flights(
+            "system = ? AND map = ? AND generation = ? AND slot = ?",
+            system,
+            map,
+            slot.generation,
+            slot.index,
+        )
+        return found
 
-    def _rows(self, condition: str, *values: str) -> list[LedgerFlight]:
+    def _flights(self, condition: str, *values: str | int) -> list[LedgerFlight]:
         rows = self._database.execute(
-            "SELECT search, generation, slot, scenario, result, sha256, map FROM slot "
+            "SELECT search, map, generation, slot, system, scenario, result, sha256 FROM slot "
             "JOIN search ON search.id = slot.search WHERE kind = 'search' AND state = 'flown' "
             f"AND {condition} ORDER BY system, map, generation, slot",
             values,
         )
         return [
             LedgerFlight(
-                flight=FlightId(
-                    search=row[0], map=row[6], slot=Slot(generation=row[1], index=row[2])
-                ),
-                scenario=row[3],
-                result=parse_result(row[4]),
-                sha256=row[5] or "",
+                id=FlightId(search=search, map=map, slot=Slot(generation=generation, index=index)),
+                system=system,
+                scenario=scenario,
+                result=parse_result(result),
+                sha256=sha256 or "",
             )
-            for row in rows
+            for search, map, generation, index, system, scenario, result, sha256 in rows
         ]
-
-    def flight(self, system: str, map: str, slot: Slot) -> tuple[FlightResult, str, str]:
-        """Return result, trajectory's hash and scenario of a search's flown slot."""
-        row = self._database.execute(
-            "SELECT result, coalesce(sha256, ''), scenario FROM slot "
-            "JOIN search ON search.id = slot.search WHERE kind = 'search' AND system = ? "
-            "AND map = ? AND generation = ? AND slot = ?",
-            (system, map, slot.generation, slot.index),
-        ).fetchone()
-        return parse_result(row[0]), str(row[1]), str(row[2])
 
     def scenarios(self, generation: int, slot: int, map: str) -> dict[str, str]:
         """Return the scenario of a slot for each landing system."""
@@ -135,7 +126,7 @@ class LedgerQueries:
         )
         return {name: (value, unit) for name, value, unit in rows}
 
-    def violations(self) -> dict[str, int]:
+    def violation_counts(self) -> dict[str, int]:
         """Return the number of violations of each type."""
         rows = self._database.execute(
             "SELECT json_extract(result, '$.verdict.violation_type') AS type, count(*) FROM slot "
@@ -144,7 +135,7 @@ class LedgerQueries:
         )
         return dict(rows.fetchall())
 
-    def kinds(self) -> dict[tuple[str, str], float]:
+    def seconds_by_kind(self) -> dict[tuple[str, str], float]:
         """Return the mean wall time of violations by search and signature."""
         rows = self._database.execute(
             "SELECT search.id, json_extract(result, '$.verdict.signature') AS signature, "

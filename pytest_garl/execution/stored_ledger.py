@@ -82,8 +82,8 @@ def read_slot(path: Path, map: str, slot: Slot) -> StoredSlot:
 def _flown_slots(ledger: Ledger) -> str:
     """Return which slots a ledger holds, as one range for each map."""
     slots: dict[str, list[Slot]] = {}
-    for _, map, generation, index, _ in ledger.queries.results():
-        slots.setdefault(map, []).append(Slot(generation=generation, index=index))
+    for flight in ledger.queries.flights():
+        slots.setdefault(flight.id.map, []).append(flight.id.slot)
     ranges = [f"{min(those).id(map)} to {max(those).id(map)}" for map, those in slots.items()]
     return ", ".join(ranges) or "no flights"
 

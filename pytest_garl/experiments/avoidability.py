@@ -39,7 +39,7 @@ def count_unavoidable(
     """
     drawn = {search.key: _drawn(search.violating, limit, seed) for search in searches}
     flights = {
-        "pilot {} {} {}".format(*flight.flight.key): functools.partial(_avoids, search, flight)
+        "pilot {} {} {}".format(*flight.id.key): functools.partial(_avoids, search, flight)
         for search in searches
         for flight in drawn[search.key]
     }

@@ -76,7 +76,9 @@ def finished_searches(run: ExperimentRun, ledger: Ledger) -> tuple[FinishedSearc
                 f"{run.tests}: found more than one landing system with tests on {job.map}, "
                 "expected one; name a file, or one of its tests, that has one"
             )
-        found[job.map] = FinishedSearch(key=key, job=job, flights=tuple(ledger.queries.flown(key)))
+        found[job.map] = FinishedSearch(
+            key=key, job=job, flights=tuple(ledger.queries.flights(key))
+        )
     for map in run.maps:
         flown = len(found[map].flights) if map in found else 0
         if flown != run.budget:
@@ -185,5 +187,5 @@ def covered_cells(search: FinishedSearch) -> NDArray[np.bool_]:
     bounds_m = search.map.bounds_m
     cells = empty_cells(bounds_m)
     for flight in search.violating:
-        mark_visited(cells, load(search.job.record(flight.flight)).uav.position_m, bounds_m)
+        mark_visited(cells, load(search.job.record(flight.id)).uav.position_m, bounds_m)
     return cells

@@ -118,7 +118,7 @@ class ProgressReader:
         left_s = self._forecast(ledger, flown_after, now)
         return RunProgress(
             searches=searches,
-            kinds=queries.violations(),
+            kinds=queries.violation_counts(),
             nearest=queries.nearest(),
             seconds=now - self._began,
             selected=int(ledger.fact(SELECTED) or 0),
@@ -133,7 +133,7 @@ class ProgressReader:
         if remaining is None:
             options = self._run.options
             cap = options.budget if options.shrink_capped else None
-            new_kinds = Counter(search for search, _ in ledger.queries.kinds())
+            new_kinds = Counter(search for search, _ in ledger.queries.seconds_by_kind())
             self._expected_after = sum(
                 flights_after_search(kinds, options.shrink, cap) for kinds in new_kinds.values()
             )

@@ -83,7 +83,7 @@ def _saver(run: Run) -> Callable[[Case], Path | None]:
 
 def _flight_s(run: Run, requests: Sequence[CaseRequest]) -> dict[str, float]:
     """Return how long a flight of each signature took in the search."""
-    known = run.ledger.queries.kinds()
+    known = run.ledger.queries.seconds_by_kind()
     any_s = run.ledger.queries.seconds_per_flight() or run.flight_s
     return {each.name: known.get((each.search, each.signature)) or any_s for each in requests}
 

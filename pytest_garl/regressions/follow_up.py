@@ -68,7 +68,7 @@ def case_requests(
     for search, signatures in _new_signatures(ledger, corpus, found).items():
         job = _job(ledger, search)
         map = job.load_map()
-        cap = len(ledger.queries.flown(search)) if shrinking.capped else None
+        cap = len(ledger.queries.flights(search)) if shrinking.capped else None
         own = []
         for signature in signatures:
             assertion = assertions.get((search, signature))
@@ -119,7 +119,7 @@ def _signatures(
     """Return, by search and signature, the flights that violated a built-in property."""
     found: dict[str, dict[str, list[LedgerFlight]]] = {}
     for row in ledger.queries.violating():
-        found.setdefault(row.flight.search, defaultdict(list))[row.signature].append(row)
+        found.setdefault(row.id.search, defaultdict(list))[row.signature].append(row)
     for search, signature in assertions:
         found.setdefault(search, {})[signature] = []
     return found
@@ -162,7 +162,7 @@ def _violations(
     job: FlightJob,
 ) -> tuple[tuple[Scenario, CompletedFlight], ...]:
     """Return the violating scenarios with their flights: by verdict, or by a test's assertion."""
-    rows = violating if assertion is None else ledger.queries.flown(search)
+    rows = violating if assertion is None else ledger.queries.flights(search)
     flights = [(parse_scenario(row.scenario), row.completed(Path(job.flights))) for row in rows]
     return tuple(
         (scenario, flight)

@@ -128,14 +128,15 @@ def _search(
 
 def _flight(ledger: Ledger, summary: SearchSummary, name: str) -> dict[str, Any]:
     slot = summary.slots[name]
-    result, trajectory, scenario = ledger.queries.flight(summary.system, summary.map, slot)
+    flight = ledger.queries.flight(summary.system, summary.map, slot)
+    result = flight.result
     return {
         "slot": name,
-        "seed": json.loads(scenario)["seed"],
+        "seed": json.loads(flight.scenario)["seed"],
         "outcome": result.outcome,
         "final_distance_m": result.final_distance_m,
         "elapsed_s": result.elapsed_s,
-        "trajectory_sha256": trajectory,
+        "trajectory_sha256": flight.sha256,
     }
 
 

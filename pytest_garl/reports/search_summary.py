@@ -6,6 +6,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
 from pytest_garl.execution.ledger import Ledger
+from pytest_garl.execution.ledger_queries import LedgerFlight
 from pytest_garl.execution.result import FlightResult
 from pytest_garl.execution.slot import Slot
 from pytest_garl.verdicts.verdict import Verdict
@@ -76,16 +77,15 @@ def search_summaries(
     ledger: Ledger, user_failures: Iterable[SlotUserFailure] = ()
 ) -> list[SearchSummary]:
     """Return the summary of each search in a ledger."""
-    flown: dict[tuple[str, str], list[tuple[Slot, FlightResult]]] = {}
-    for system, map, generation, index, result in ledger.queries.results():
-        slot = Slot(generation=generation, index=index)
-        flown.setdefault((system, map), []).append((slot, result))
+    flown: dict[tuple[str, str], list[LedgerFlight]] = {}
+    for flight in ledger.queries.flights():
+        flown.setdefault((flight.system, flight.id.map), []).append(flight)
     failures: dict[tuple[str, str], list[SlotUserFailure]] = {}
     for each in user_failures:
         failures.setdefault((each.system, each.map), []).append(each)
     return [
-        _summary(ledger, system, map, rows, failures.get((system, map), []))
-        for (system, map), rows in flown.items()
+        _summary(ledger, system, map, flights, failures.get((system, map), []))
+        for (system, map), flights in flown.items()
     ]
 
 
@@ -93,14 +93,15 @@ def _summary(
     ledger: Ledger,
     system: str,
     map: str,
-    rows: list[tuple[Slot, FlightResult]],
+    flights: list[LedgerFlight],
     user_failures: list[SlotUserFailure],
 ) -> SearchSummary:
-    verdicts = [result.verdict for _, result in rows]
+    verdicts = [flight.result.verdict for flight in flights]
     slots: dict[str, list[tuple[str, str]]] = {}
-    for (slot, _), verdict in zip(rows, verdicts, strict=True):
+    for flight, verdict in zip(flights, verdicts, strict=True):
         if verdict.violation:
-            slots.setdefault(verdict.signature, []).append((slot.id(map), verdict.story))
+            name = flight.id.slot.id(map)
+            slots.setdefault(verdict.signature, []).append((name, verdict.story))
     for each in sorted(user_failures, key=lambda each: each.slot):
         slots.setdefault(each.signature, []).append((each.slot, each.message))
     kinds = [
@@ -118,8 +119,8 @@ def _summary(
         system=system,
         map=map,
         files=tuple(files.split()),
-        slots={slot.id(map): slot for slot, _ in rows},
-        results=tuple(result for _, result in rows),
+        slots={flight.id.slot.id(map): flight.id.slot for flight in flights},
+        results=tuple(flight.result for flight in flights),
         verdicts=tuple(verdicts),
         kinds=tuple(sorted(kinds, key=lambda each: (-each.count, each.signature))),
         violating=len({slot for those in slots.values() for slot, _ in those}),

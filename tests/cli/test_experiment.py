@@ -109,7 +109,7 @@ def test_rows_hold_the_figures_of_the_ledger(project: Path) -> None:
     assert row.map == "lawn"
     ledger = Ledger(path)
     search, _ = next(each for each in ledger.searches() if '"map": "lawn"' in each[1])
-    flights, map = ledger.queries.flown(search), load_map("lawn")
+    flights, map = ledger.queries.flights(search), load_map("lawn")
     assert len(flights) == row.budget == 12
     bad = [flight for flight in flights if flight.result.verdict.paper_violation]
     assert row.violations == len(bad) > 0

@@ -48,7 +48,7 @@ def test_procedure_decides_on_each_flight_by_the_one_before(job: FlightJob, ledg
     assert found == {"one": (0.12, "I?:unknown"), "two": (0.12, "I?:unknown")}
     assert ledger.queries.meters()["on_demand"] == 8
     # These flights are not part of a search's figures.
-    assert ledger.queries.results() == []
+    assert ledger.queries.flights() == []
     assert ledger.queries.progress() == []
 
 

@@ -228,10 +228,10 @@ def _use(ledger: Ledger) -> None:
             parse_scenario(text)
             if result is not None:
                 violation_proximity(result)
-        ledger.queries.flown(search)
-    ledger.queries.results()
+        ledger.queries.flights(search)
+    ledger.queries.flights()
     ledger.queries.progress()
-    ledger.queries.violations()
+    ledger.queries.violation_counts()
     ledger.queries.nearest()
     ledger.queries.violating()
     ledger.queries.result_hash()

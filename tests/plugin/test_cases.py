@@ -63,7 +63,7 @@ def searched(pytester: pytest.Pytester, template: Path) -> pytest.Pytester:
 def violations(pytester: pytest.Pytester) -> list[tuple[int, int, str]]:
     ledger = Ledger(pytester.path / ".garl" / "ledger.sqlite")
     try:
-        return [(*row.flight.key[1:], row.signature) for row in ledger.queries.violating()]
+        return [(*row.id.key[1:], row.signature) for row in ledger.queries.violating()]
     finally:
         ledger.close()
 

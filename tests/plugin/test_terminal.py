@@ -183,7 +183,9 @@ def test_the_first_line_now_and_then_counts_the_time_before_it(
     )
     reader.start_clock()
     clock[0] += 30.0
-    queries = SimpleNamespace(progress=lambda: [TWO[1]], meters=dict, violations=dict, nearest=dict)
+    queries = SimpleNamespace(
+        progress=lambda: [TWO[1]], meters=dict, violation_counts=dict, nearest=dict
+    )
     ledger = SimpleNamespace(queries=queries, fact=lambda key: None)
     found = reader.read(cast(Ledger, ledger))
     assert found is not None
@@ -231,7 +233,7 @@ def test_lf_flies_exactly_the_failing_slots_again(
     result.assert_outcomes(failed=2)
     assert failed(result) == first
     ledger = Ledger(pytester.path / ".garl" / "ledger.sqlite")
-    flown = {f"lawn-g{each[2]:02d}-s{each[3]:02d}" for each in ledger.queries.results()}
+    flown = {each.id.slot.id("lawn") for each in ledger.queries.flights()}
     ledger.close()
     assert flown == {re.findall(r"\[(.+)\]", line)[0] for line in first}
 
