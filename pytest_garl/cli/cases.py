@@ -4,20 +4,21 @@ from __future__ import annotations
 
 import dataclasses
 import shlex
-import sys
 from pathlib import Path
 
 import click
-from rich.console import Console
-from rich.table import Table
-from rich.text import Text
 
+from pytest_garl.cli.case_tables import (
+    case_table,
+    environment_changes,
+    print_table,
+    scenario_table,
+)
 from pytest_garl.errors import GarlError
 from pytest_garl.messages import printable
 from pytest_garl.regressions.case import Case
 from pytest_garl.regressions.case_file import load_case
 from pytest_garl.regressions.corpus import Corpus, replace_file
-from pytest_garl.regressions.description import describe_scenario
 from pytest_garl.regressions.replay import Replay, replay, system_of
 
 DEFAULT = Path("scenarios/regressions")
@@ -25,9 +26,6 @@ NO_PROOF = 3
 """Exit status of a replay that proves nothing; 1 says that the case fails."""
 LEAST_FLIGHTS = 9
 STATUS = {"FIXED": 0, "FAILED": 1, "STALE": NO_PROOF, "UNDECIDED": NO_PROOF}
-
-_ENDLESS = 100_000
-"""Columns of what is no terminal: nobody looks at them, and names shall not be cut."""
 
 
 @dataclasses.dataclass(frozen=True, slots=True, kw_only=True)
@@ -80,24 +78,7 @@ def list_(project: _Project) -> None:
     if not found:
         _say(f"no cases in {project.corpus.folder}; a search saves what it finds")
         return
-    table = Table(box=None, header_style="bold")
-    for name in ("case", "status", "signature", "robust", "objects"):
-        table.add_column(name, overflow="fold")
-    for entry in found:
-        where = Text(printable(f"{entry.path.parent.name}/{entry.name}", keep=""))
-        if entry.case is None:
-            table.add_row(where, Text("broken", style="red"))
-            continue
-        case, evidence = entry.case, entry.case.evidence
-        robust = (
-            f"{evidence.neighbours_failed}/{evidence.neighbours}" if evidence.neighbours else ""
-        )
-        objects = str(len(case.moves))
-        # As texts: in a string rich would make an animal of ":dog:", and colours of "[red]".
-        signature = Text(printable(case.violation.signature, keep=""))
-        status = _coloured(case.status) + (" (edge)" if case.edge else "")
-        table.add_row(where, status, signature, robust, objects)
-    _console().print(table)
+    print_table(case_table(found))
     for entry in found:
         if entry.case is None:
             _say(entry.problem)
@@ -114,15 +95,6 @@ def list_(project: _Project) -> None:
         _say("    garl cases accept " + " \\\n        ".join(shlex.quote(each) for each in new))
 
 
-def _console() -> Console:
-    """Return where tables go: on a terminal they are folded, in a pipe no line ends early."""
-    return Console(width=None if sys.stdout.isatty() else _ENDLESS)
-
-
-def _coloured(status: str) -> Text:
-    return Text(status, style={"open": "yellow", "fixed": "green"}.get(status, "dim"))
-
-
 @cases.command()
 @FILE
 @click.pass_obj
@@ -132,13 +104,8 @@ def show(project: _Project, file: Path) -> None:
     evidence = case.evidence
     _say(f"{case.id}  {case.status}  {case.system}")
     _say(f"{case.violation.signature}: {case.violation.description}\n")
-    table = Table(box=None, header_style="bold")
-    for name in ("what", "value", "meaning"):
-        table.add_column(name)
-    for row in describe_scenario(case.scenario, project.maps):
-        table.add_row(*(Text(cell) for cell in row))
-    _console().print(table)
-    for key, by in _totals(case):
+    print_table(scenario_table(case, project.maps))
+    for key, by in environment_changes(case):
         _say(f"while it is flown {key} changes by {by:+.2f}")
     if case.edge:
         _say("\nIt sits on an edge: not all of its neighbours fail, so it gates nothing.")
@@ -148,15 +115,6 @@ def show(project: _Project, file: Path) -> None:
         f"were moved by {case.policy}"
     )
     _say(f"Fly it: garl cases replay {file}")
-
-
-def _totals(case: Case) -> list[tuple[str, float]]:
-    """Return what policies changed of the environment, all of a gene's changes together."""
-    totals: dict[str, float] = {}
-    for _, own in case.changes:
-        for _, key, by in own:
-            totals[key] = totals.get(key, 0.0) + by
-    return sorted(totals.items())
 
 
 @cases.command("replay")
