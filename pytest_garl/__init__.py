@@ -32,19 +32,17 @@ _HOMES = {
     "pytest_garl.plugin.landing": ("Landing",),
     "pytest_garl.simulation.flight": ("Flight",),
     "pytest_garl.simulation.npc_policy": ("Move", "PolicySpec", "Situation"),
-    "pytest_garl.verdicts.verdict": ("Limits",),
+    "pytest_garl.verdicts.verdict": ("Limits", "limits"),
     "pytest_garl.video": ("save_video",),
 }
 """Where each public name is defined."""
 _HOME_OF = {name: home for home, names in _HOMES.items() for name in names}
 
-__all__ = sorted([*_HOME_OF, "limits"])
+__all__ = sorted(_HOME_OF)
 
 
 def __getattr__(name: str) -> object:
-    # A marker reads as a verb: ``@pytest.mark.garl(limits=limits(distance_m=3))``.
-    defined = "Limits" if name == "limits" else name
-    if defined not in _HOME_OF:
+    if name not in _HOME_OF:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    found: object = getattr(importlib.import_module(_HOME_OF[defined]), defined)
+    found: object = getattr(importlib.import_module(_HOME_OF[name]), name)
     return found

@@ -7,7 +7,10 @@ import subprocess
 import sys
 from pathlib import Path
 
+import pytest
+
 import pytest_garl
+from pytest_garl.errors import OptionError
 from pytest_garl.verdicts.verdict import Limits
 
 
@@ -23,8 +26,14 @@ def test_the_stub_has_the_names_that_the_package_loads() -> None:
         assert getattr(pytest_garl, name) is not None
 
 
-def test_limits_is_the_class_of_limits() -> None:
-    assert pytest_garl.limits is Limits
+def test_limits_are_made_by_a_function_with_a_verbs_name() -> None:
+    assert pytest_garl.limits(distance_m=1.0) == Limits(distance_m=1.0)
+
+
+def test_a_name_that_is_no_limit_is_refused_with_the_names_that_are() -> None:
+    message = "found distance, expected distance_m, time_s or abort, such as"
+    with pytest.raises(OptionError, match=message):
+        pytest_garl.limits(distance=3)  # type: ignore[call-arg]
 
 
 def test_importing_the_package_loads_no_other_module_of_it() -> None:

@@ -79,6 +79,20 @@ def read_slot(path: Path, map: str, slot: Slot) -> StoredSlot:
         ledger.close()
 
 
+def stored_flight_s(path: Path) -> float | None:
+    """Return the wall time of a flight in the ledger at ``path``; None if nothing tells it."""
+    if not path.is_file():
+        return None
+    try:
+        ledger = Ledger(path)
+        try:
+            return ledger.queries.seconds_per_flight()
+        finally:
+            ledger.close()
+    except Exception:  # noqa: BLE001 (an earlier ledger that cannot be read costs the forecast only)
+        return None
+
+
 def _flown_slots(ledger: Ledger) -> str:
     """Return which slots a ledger holds, as one range for each map."""
     slots: dict[str, list[Slot]] = {}

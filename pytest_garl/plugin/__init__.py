@@ -1,1 +1,22 @@
-"""All that knows pytest: hooks, options, items, fixtures, outcomes and the summary."""
+"""All that knows pytest.
+
+The modules, in the order in which a session needs them:
+
+1. ``hooks`` has the hooks of pytest and delegates.  Every pytest run imports it, with ``arguments``
+   (options and ini keys as pytest declares them), ``keys`` (of stashes and reports), ``abort``
+   and ``fixtures``.  The other modules are imported once there is something to fly.
+2. ``options`` reads all options once into one frozen object; ``option_checks`` compares them.
+   ``startup`` begins the ``run``: options, ledger, pool and results of this process.
+3. ``collection`` makes the items of each marked test: ``marker`` reads the marker, and a ``target``
+   says what one item tests.  ``baseline_gate`` adds items that compare rates with a baseline.
+4. ``search_setup`` puts the searches of the selected items into the ledger when the first of them
+   asks for its ``landing``.  ``progress`` shows how far the flights are; ``header`` announced them.
+5. ``outcomes`` decides whether an item passes, fails, xfails or skips.  ``item_report`` gathers the
+   facts (``item_failure``, ``failed_statement``, ``user_assertions``, ``report_claims``) and writes
+   the decision into the report (``report_text``).
+6. ``tally`` counts what reports say, ``save_cases`` saves new violations, ``session_status`` sets
+   the exit status, and ``summary`` with ``search_table`` and ``github_summary`` tells all of it.
+
+``hookspecs`` has the hook that users may implement, ``case_tests`` finds the tests of a saved case
+for ``garl cases``, and ``suggested_commands`` and ``wrapping`` serve all texts.
+"""

@@ -17,7 +17,7 @@ from pytest_garl.baselines.gate import compare_flights
 from pytest_garl.baselines.pairs import PairResult
 from pytest_garl.errors import GarlError
 from pytest_garl.execution.flight_id import FIRST
-from pytest_garl.plugin.fixtures import abort_session
+from pytest_garl.plugin.abort import abort_session
 from pytest_garl.plugin.keys import GATE_PLUGIN, RUN, is_xdist_worker
 from pytest_garl.plugin.marker import read_marker
 from pytest_garl.plugin.options import Options

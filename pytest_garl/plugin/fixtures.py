@@ -2,22 +2,19 @@
 
 from __future__ import annotations
 
-import dataclasses
-from typing import TYPE_CHECKING, NoReturn
+from typing import TYPE_CHECKING
 
 import pytest
 
 from pytest_garl.errors import GarlError
+from pytest_garl.plugin.abort import abort_session
 from pytest_garl.plugin.keys import (
-    BEGUN,
-    FATAL,
+    BODY_RUNS,
     LANDING,
     OUTCOME,
     RUN,
     SIGNATURE,
     UNPROVEN,
-    is_xdist_worker,
-    target_of,
 )
 
 if TYPE_CHECKING:
@@ -47,38 +44,15 @@ def npcs(request: pytest.FixtureRequest) -> PolicySpec:
     return policy_spec(run.options.npcs if run else "dqn")
 
 
-def checked_policy(given: object) -> PolicySpec:
-    """Return what the fixture ``npcs`` names; raise PolicyError for what names no policy."""
-    from pytest_garl.adversary.catalogue import policy_spec
-    from pytest_garl.errors import PolicyError
-    from pytest_garl.simulation.npc_policy import PolicySpec
-
-    if isinstance(given, str):
-        return policy_spec(given)
-    if not isinstance(given, PolicySpec):
-        raise PolicyError(
-            f"fixture npcs: found {given!r}, expected the name of a policy as --garl-npcs takes it "
-            "('waypoint'), the path of weights (.npz), or a pytest_garl PolicySpec"
-        )
-    return given
-
-
-def abort_session(item: pytest.Item, error: GarlError) -> NoReturn:
-    """End the session: without ledger or policy no other item would fare better."""
-    if not is_xdist_worker(item.config):
-        pytest.exit(f"garl: {error}", returncode=pytest.ExitCode.INTERNAL_ERROR)
-    item.user_properties.append((FATAL, str(error)))
-    pytest.fail(f"garl: {error}", pytrace=False)
-
-
 @pytest.fixture
 def landing(request: pytest.FixtureRequest, garl_slot: Target, npcs: PolicySpec) -> Landing:
     """Return the slot's landing, flown when it is first asked for."""
+    from pytest_garl.plugin.item_report import end_unjudged
     from pytest_garl.plugin.landing import Landing
 
     run = request.config.stash[RUN]
     try:
-        flight = run.fly(garl_slot, checked_policy(npcs))
+        flight = run.fly(garl_slot, _checked_policy(npcs))
     except GarlError as error:
         abort_session(request.node, error)
     item = request.node
@@ -94,34 +68,10 @@ def landing(request: pytest.FixtureRequest, garl_slot: Target, npcs: PolicySpec)
     if reasons := run.unproven(garl_slot):
         request.node.user_properties.append((UNPROVEN, "; ".join(reasons)))
     item.stash[LANDING] = landing
-    if item.stash.get(BEGUN, False):
+    if item.stash.get(BODY_RUNS, False):
         # Asked for by the test's body, which must not go on.
         end_unjudged(item)
     return landing
-
-
-def end_unjudged(item: pytest.Item) -> None:
-    """Fail or skip a test whose flight no assertion can judge; ``outcomes`` decides which."""
-    landing = item.stash.get(LANDING, None)
-    target = target_of(item)
-    if landing is None or target is None or not landing.unjudged:
-        return
-    from pytest_garl.plugin.outcomes import Need, UnjudgedFlight, resolve
-
-    run = item.config.stash[RUN]
-
-    def claim(_: Need, facts: UnjudgedFlight) -> UnjudgedFlight:
-        return dataclasses.replace(facts, first=run.claims.claim_slot(target, item.nodeid))
-
-    facts = UnjudgedFlight(
-        inconclusive=landing.inconclusive,
-        alone=target.entry is not None or bool(run.options.repeat),
-        expects_failure=item.get_closest_marker("xfail") is not None,
-    )
-    decision, _ = resolve(facts, claim)
-    if decision.outcome == "skipped":
-        pytest.skip(landing.unjudged)
-    pytest.fail(landing.complaint, pytrace=False)
 
 
 @pytest.fixture
@@ -131,3 +81,19 @@ def scenario(request: pytest.FixtureRequest, garl_slot: Target, landing: Landing
     run = request.config.stash[RUN]
     scenario: Scenario = run.scenario(garl_slot)
     return scenario
+
+
+def _checked_policy(given: object) -> PolicySpec:
+    """Return what the fixture ``npcs`` names; raise PolicyError for what names no policy."""
+    from pytest_garl.adversary.catalogue import policy_spec
+    from pytest_garl.errors import PolicyError
+    from pytest_garl.simulation.npc_policy import PolicySpec
+
+    if isinstance(given, str):
+        return policy_spec(given)
+    if not isinstance(given, PolicySpec):
+        raise PolicyError(
+            f"fixture npcs: found {given!r}, expected the name of a policy as --garl-npcs takes it "
+            "('waypoint'), the path of weights (.npz), or a pytest_garl PolicySpec"
+        )
+    return given

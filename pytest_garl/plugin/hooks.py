@@ -10,13 +10,14 @@ import pytest
 
 from pytest_garl.errors import GarlError
 from pytest_garl.plugin import hookspecs
+from pytest_garl.plugin.abort import abort_if_reported, fail_report
 from pytest_garl.plugin.arguments import add_options, computes, is_enabled
-from pytest_garl.plugin.fixtures import end_unjudged, garl_slot, landing, npcs, scenario
+from pytest_garl.plugin.fixtures import garl_slot, landing, npcs, scenario
 from pytest_garl.plugin.keys import (
-    BEGUN,
-    FATAL,
+    BODY_RUNS,
     FINDING_TEST,
     GATE_PLUGIN,
+    LANDING,
     RUN,
     TALLY,
     WORKER_ASSERTION,
@@ -72,17 +73,9 @@ def pytest_configure(config: pytest.Config) -> None:
 
         register(config, options)
     if options.searches and not config.option.collectonly:
-        _begin(config)
+        from pytest_garl.plugin.startup import begin_run
 
-
-def _begin(config: pytest.Config) -> None:
-    from pytest_garl.plugin.options import options_of
-    from pytest_garl.plugin.startup import begin_run
-
-    try:
-        config.stash[RUN] = begin_run(config, options_of(config))
-    except GarlError as error:
-        raise pytest.UsageError(str(error)) from error
+        begin_run(config)
 
 
 def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
@@ -115,16 +108,10 @@ def pytest_collection_finish(session: pytest.Session) -> None:
         from pytest_garl.plugin.options import options_of
 
         check_selection(options_of(config), session.items)
-    if RUN not in config.stash and any(is_landing_item(item) for item in session.items):
-        _begin(config)
-    run = config.stash.get(RUN, None)
-    if run is not None:
-        run.select(session.items)
-        if run.options.resume:
-            try:
-                run.searches.check_resumed()
-            except GarlError as error:
-                raise pytest.UsageError(str(error)) from error
+    if RUN in config.stash or any(is_landing_item(item) for item in session.items):
+        from pytest_garl.plugin.startup import select_items
+
+        select_items(config, session.items)
 
 
 @pytest.hookimpl(wrapper=True, trylast=True)
@@ -143,13 +130,16 @@ def pytest_runtestloop(session: pytest.Session) -> Generator[None, object, objec
 
 @pytest.hookimpl(wrapper=True)
 def pytest_pyfunc_call(pyfuncitem: pytest.Function) -> Generator[None, Any, Any]:
-    """End a test before its body runs if the landing system crashed."""
-    pyfuncitem.stash[BEGUN] = True
+    """End a test before its body runs if no assertion can judge its flight."""
+    pyfuncitem.stash[BODY_RUNS] = True
     try:
-        end_unjudged(pyfuncitem)
+        if LANDING in pyfuncitem.stash:
+            from pytest_garl.plugin.item_report import end_unjudged
+
+            end_unjudged(pyfuncitem)
         return (yield)
     finally:
-        pyfuncitem.stash[BEGUN] = False
+        pyfuncitem.stash[BODY_RUNS] = False
 
 
 @pytest.hookimpl(wrapper=True)
@@ -168,18 +158,15 @@ def pytest_runtest_makereport(
                 report_item(report, item, run, target, call.excinfo.value if call.excinfo else None)
             run.claims.note_ran(item.nodeid)
         except GarlError as error:
-            # Without a ledger no other item would fare better.
-            report.outcome, report.longrepr = "failed", f"garl: {error}"
-            report.user_properties.append((FATAL, str(error)))
+            fail_report(report, error)
     return report
 
 
 def pytest_runtest_logreport(report: pytest.TestReport) -> None:
     """End a session that has lost its ledger; remember what xdist's workers tell of assertions."""
+    abort_if_reported(report)
+    worker = getattr(report, "node", None)
     for key, value in report.user_properties:
-        if key == FATAL:
-            raise pytest.exit.Exception(f"garl: {value}", pytest.ExitCode.INTERNAL_ERROR)
-        worker = getattr(report, "node", None)
         if key == WORKER_ASSERTION and worker is not None:
             worker.config.stash[RUN].reported_failures[report.nodeid] = str(value)
         if key == FINDING_TEST and worker is not None:
@@ -209,12 +196,12 @@ def pytest_report_collectionfinish(config: pytest.Config) -> list[str]:
 
 def pytest_terminal_summary(terminalreporter: Any, config: pytest.Config) -> None:
     """Show what was found, per system and map."""
-    if RUN not in config.stash and config.pluginmanager.hasplugin("dsession"):
-        # xdist's controller collects nothing: its workers' cases show by their ledger.
-        folder = config.rootpath / str(config.getini("garl_dir"))
-        if (folder / f"cases-{os.getpid()}.sqlite").is_file():
-            _begin(config)
-    run, tally = config.stash.get(RUN, None), config.stash[TALLY]
+    tally = config.stash[TALLY]
+    if RUN not in config.stash and tally.items and config.pluginmanager.hasplugin("dsession"):
+        from pytest_garl.plugin.startup import join_workers
+
+        join_workers(config)
+    run = config.stash.get(RUN, None)
     if run is not None:
         from pytest_garl.plugin.summary import write_run
 

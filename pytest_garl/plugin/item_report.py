@@ -23,11 +23,13 @@ from pytest_garl.plugin.keys import (
     MAYBE_FIXED,
     NOT_REPEATED,
     REPORTED_FAILURE,
+    RUN,
     STALE,
     UNPROVEN,
     USER_FAILURE,
     WORKER_ASSERTION,
     is_xdist_worker,
+    target_of,
 )
 from pytest_garl.plugin.outcomes import (
     CaseState,
@@ -36,6 +38,7 @@ from pytest_garl.plugin.outcomes import (
     Need,
     PassedCase,
     Reason,
+    UnjudgedFlight,
     resolve,
 )
 from pytest_garl.plugin.report_text import FailureText
@@ -43,6 +46,28 @@ from pytest_garl.plugin.run import Run
 from pytest_garl.plugin.suggested_commands import shown
 from pytest_garl.plugin.target import Target
 from pytest_garl.regressions.case import Case
+
+
+def end_unjudged(item: pytest.Item) -> None:
+    """Fail or skip a test whose flight no assertion can judge; ``outcomes`` decides which."""
+    landing = item.stash.get(LANDING, None)
+    target = target_of(item)
+    if landing is None or target is None or not landing.unjudged:
+        return
+    run = item.config.stash[RUN]
+
+    def claim(_: Need, facts: UnjudgedFlight) -> UnjudgedFlight:
+        return dataclasses.replace(facts, first=run.claims.claim_slot(target, item.nodeid))
+
+    facts = UnjudgedFlight(
+        inconclusive=landing.inconclusive,
+        alone=target.entry is not None or bool(run.options.repeat),
+        expects_failure=item.get_closest_marker("xfail") is not None,
+    )
+    decision, _ = resolve(facts, claim)
+    if decision.outcome == "skipped":
+        pytest.skip(landing.unjudged)
+    pytest.fail(landing.complaint, pytrace=False)
 
 
 def report_item(

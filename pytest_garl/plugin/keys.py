@@ -19,7 +19,7 @@ TALLY = pytest.StashKey[Any]()
 """Where a session that is no xdist worker keeps what its reports say."""
 LANDING = pytest.StashKey[Any]()
 """Where an item keeps the landing that it asked for."""
-BEGUN = pytest.StashKey[bool]()
+BODY_RUNS = pytest.StashKey[bool]()
 """Where an item keeps whether the test's body runs."""
 GATE_PLUGIN = "garl_baseline_gate"
 """The name under which the plugin of a baseline gate is registered."""

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -50,7 +49,7 @@ class MarkerArguments:
 def read_marker(marker: pytest.Mark, options: Options) -> MarkerArguments:
     """Return what a marker says; raise GarlError for one that makes no sense."""
     from pytest_garl.scenarios.maps.map import load_map, map_names
-    from pytest_garl.verdicts.verdict import Limits
+    from pytest_garl.verdicts.verdict import Limits, limits
 
     known = {"system", "maps", "limits", "deterministic", "files"}
     unknown = sorted(set(marker.kwargs) - known)
@@ -70,34 +69,21 @@ def read_marker(marker: pytest.Mark, options: Options) -> MarkerArguments:
         raise GarlError(f"mark.garl: maps=[]: nothing to fly on; expected one or more of {there}")
     for map in maps:
         load_map(map, options.map_folders)
-    limits = marker.kwargs.get("limits", Limits())
-    if isinstance(limits, dict):
-        limits = _limits(limits)
-    if not isinstance(limits, Limits):
-        raise GarlError(f"mark.garl: limits={limits!r}: expected pytest_garl.limits(...)")
+    given = marker.kwargs.get("limits", Limits())
+    if isinstance(given, dict):
+        given = limits(**{str(name): value for name, value in given.items()})
+    if not isinstance(given, Limits):
+        raise GarlError(f"mark.garl: limits={given!r}: expected pytest_garl.limits(...)")
     deterministic = marker.kwargs.get("deterministic", True)
     if not isinstance(deterministic, bool):
         raise GarlError(f"mark.garl: deterministic={deterministic!r}: expected True or False")
     return MarkerArguments(
         system=system,
         maps=tuple(m for m in maps if not options.maps or m in options.maps),
-        limits=limits,
+        limits=given,
         deterministic=deterministic,
         files=_files(marker.kwargs.get("files", ()), options),
     )
-
-
-def _limits(given: dict[Any, Any]) -> Limits:
-    from pytest_garl.verdicts.verdict import Limits
-
-    known = [field.name for field in dataclasses.fields(Limits)]
-    unknown = [str(key) for key in given if key not in known]
-    if unknown:
-        raise GarlError(
-            f"mark.garl: limits={given!r}: found {', '.join(unknown)}, expected "
-            f"{', '.join(known[:-1])} or {known[-1]}, such as limits(distance_m=1.0)"
-        )
-    return Limits(**given)
 
 
 def _files(given: Any, options: Options) -> tuple[str, ...]:

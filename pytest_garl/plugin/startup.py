@@ -1,10 +1,11 @@
-"""Begin a run, or join the one that the xdist controller began."""
+"""Begin a run, or join the one that xdist's controller began: ledger, pool, selected items."""
 
 from __future__ import annotations
 
 import fcntl
 import os
 import sys
+from collections.abc import Sequence
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any, TextIO
@@ -12,64 +13,102 @@ from typing import Any, TextIO
 import pytest
 
 from pytest_garl.adversary.catalogue import policy_spec
-from pytest_garl.errors import LedgerError
+from pytest_garl.errors import GarlError, LedgerError
 from pytest_garl.execution.ledger import Ledger
 from pytest_garl.execution.local_pool import local_pool
 from pytest_garl.execution.pool import Pool
 from pytest_garl.execution.processes import alive
 from pytest_garl.execution.ray.pool import check_ray, ray_pool
 from pytest_garl.execution.reference import BUILT_IN, package_sha256, reference_to
-from pytest_garl.execution.stored_ledger import check_stored
-from pytest_garl.plugin.keys import is_xdist_worker
-from pytest_garl.plugin.options import Options
-from pytest_garl.plugin.run import Run
+from pytest_garl.execution.stored_ledger import check_stored, stored_flight_s
+from pytest_garl.plugin.keys import RUN, is_xdist_worker
+from pytest_garl.plugin.options import Options, options_of
+from pytest_garl.plugin.run import FLIGHT_S, Run
 from pytest_garl.reports.run_report import BEGAN, utc
 
+EARLIER_FLIGHT_S = "seconds_per_flight"
+"""The ledger's fact: wall time of a flight in the run before, for the forecast."""
 
-def begin_run(config: pytest.Config, options: Options) -> Run:
-    """Return this process's part of the run; the ledger is made by the first process alone."""
-    # Weights that cannot be trusted, or no Ray, end the session before there is a ledger.
-    policy_spec(options.npcs)
-    if options.pool == "ray":
-        check_ray(options.ray_address)
-    lock = None
+
+def begin_run(config: pytest.Config) -> None:
+    """Begin this process's part of the run and keep it in the stash.
+
+    The first process alone makes the ledger.  Raises UsageError if nothing can be flown.
+    """
+    options = options_of(config)
+    try:
+        # Weights that cannot be trusted, or no Ray, end the session before there is a ledger.
+        policy_spec(options.npcs)
+        if options.pool == "ray":
+            check_ray(options.ray_address)
+        ledger, lock = _open_ledger(config, options)
+        own = config.hook.pytest_garl_fly(config=config)
+        config.stash[RUN] = Run(
+            options=options,
+            ledger=ledger,
+            pool=_pool(ledger, options),
+            simulator=reference_to(own) if own else BUILT_IN,
+            lock=lock,
+            flight_s=_flight_s(ledger),
+        )
+    except GarlError as error:
+        raise pytest.UsageError(str(error)) from error
+
+
+def select_items(config: pytest.Config, items: Sequence[pytest.Item]) -> None:
+    """Tell the run which items are selected; saved cases begin a run if there is none yet."""
+    if RUN not in config.stash:
+        begin_run(config)
+    run: Run = config.stash[RUN]
+    run.select(items)
+    if run.options.resume:
+        try:
+            run.searches.check_resumed()
+        except GarlError as error:
+            raise pytest.UsageError(str(error)) from error
+
+
+def join_workers(config: pytest.Config) -> None:
+    """Open the ledger of the saved cases that xdist's workers flew, for the controller."""
+    options = options_of(config)
+    if not options.searches and options.ledger.is_file():
+        begin_run(config)
+
+
+def _open_ledger(config: pytest.Config, options: Options) -> tuple[Ledger, TextIO | None]:
+    """Return the run's ledger, and the lock of the process that made it for a search."""
     if not options.searches:
-        ledger = _shared(options)
-    elif is_xdist_worker(config):
-        ledger = Ledger(options.ledger)
+        return _shared_ledger(options), None
+    if is_xdist_worker(config):
+        return Ledger(options.ledger), None
+    lock = _lock(options.ledger)
+    # The earlier ledger makes room for the new one.
+    earlier_s = stored_flight_s(options.folder / "ledger.sqlite")
+    if options.resume:
+        ledger = Ledger.resume(options.ledger, _facts(options))
+        check_stored(ledger)
     else:
-        lock = _lock(options.ledger)
-        facts: dict[str, Any] = {
-            "version": version("pytest-garl"),
-            "sources of pytest-garl": package_sha256()[:12],
-            "python": sys.version.split()[0],
-            "seed": options.seed,
-            "budget": options.budget,
-            "method": options.method,
-            "population": options.population,
-            "map": ",".join(options.maps),
-            "weather": options.weather,
-            "npcs": options.npcs,
-        }
-        earlier = _seconds_per_flight(options)
-        if options.resume:
-            ledger = Ledger.resume(options.ledger, facts)
-            check_stored(ledger)
-        else:
-            ledger = Ledger.create(options.ledger, facts)
-            ledger.note_fact(BEGAN, utc())
-        if earlier:
-            ledger.note_fact("seconds_per_flight", earlier)
-    own = config.hook.pytest_garl_fly(config=config)
-    run = Run(
-        options=options,
-        ledger=ledger,
-        pool=_pool(ledger, options),
-        simulator=reference_to(own) if own else BUILT_IN,
-        lock=lock,
-    )
-    run.flight_s = _or_default(ledger)
-    return run
+        ledger = Ledger.create(options.ledger, _facts(options))
+        ledger.note_fact(BEGAN, utc())
+    if earlier_s:
+        ledger.note_fact(EARLIER_FLIGHT_S, earlier_s)
+    return ledger, lock
+
+
+def _facts(options: Options) -> dict[str, Any]:
+    """Return what must be the same when the run is resumed."""
+    return {
+        "version": version("pytest-garl"),
+        "sources of pytest-garl": package_sha256()[:12],
+        "python": sys.version.split()[0],
+        "seed": options.seed,
+        "budget": options.budget,
+        "method": options.method,
+        "population": options.population,
+        "map": ",".join(options.maps),
+        "weather": options.weather,
+        "npcs": options.npcs,
+    }
 
 
 def _pool(ledger: Ledger, options: Options) -> Pool:
@@ -79,7 +118,7 @@ def _pool(ledger: Ledger, options: Options) -> Pool:
     return local_pool(ledger.queue, options.workers)
 
 
-def _shared(options: Options) -> Ledger:
+def _shared_ledger(options: Options) -> Ledger:
     """Return the ledger of a run of saved cases, made by whoever of its processes comes first."""
     path = options.ledger
     try:
@@ -131,22 +170,6 @@ def _lock(ledger: Path) -> TextIO:
     return file
 
 
-def _seconds_per_flight(options: Options) -> float | None:
-    path = options.folder / "ledger.sqlite"
-    if not path.is_file():
-        return None
-    try:
-        ledger = Ledger(path)
-        try:
-            return ledger.queries.seconds_per_flight()
-        finally:
-            ledger.close()
-    except Exception:  # noqa: BLE001 (an unreadable old ledger only costs the estimate)
-        return None
-
-
-def _or_default(ledger: Ledger) -> float:
-    from pytest_garl.plugin.run import FLIGHT_S
-
-    known = ledger.fact("seconds_per_flight")
+def _flight_s(ledger: Ledger) -> float:
+    known = ledger.fact(EARLIER_FLIGHT_S)
     return float(known) if isinstance(known, int | float) else FLIGHT_S

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Literal
+from typing import Any, Literal
 
 from pytest_garl.errors import OptionError
 from pytest_garl.messages import shown
@@ -46,8 +47,20 @@ class Limits:
             )
 
 
+def limits(**given: Any) -> Limits:
+    """Return the limits of a marker; raise OptionError for a name that is none of them."""
+    known = [field.name for field in dataclasses.fields(Limits)]
+    unknown = [name for name in given if name not in known]
+    if unknown:
+        raise OptionError(
+            f"limits: found {', '.join(unknown)}, expected {', '.join(known[:-1])} or {known[-1]}, "
+            "such as limits(distance_m=1.0)"
+        )
+    return Limits(**given)
+
+
 PAPER_LIMITS = Limits()
-"""The limits of the paper."""
+"""The limits of the paper's definition of a violation."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -88,10 +101,6 @@ class Verdict:
     def violation(self) -> bool:
         """Whether the flight violated a safety property."""
         return self.primary is not None
-
-
-PAPER_LIMITS = Limits()
-"""The limits of the paper's definition of a violation."""
 
 
 def count_decided(verdicts: Sequence[Verdict], name: PropertyName) -> int:
