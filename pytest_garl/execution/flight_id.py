@@ -35,9 +35,14 @@ class FlightId:
         return self.search, self.slot.generation, self.slot.index
 
     @property
+    def slot_id(self) -> str:
+        """The slot's name in item ids, such as ``court-g03-s17``."""
+        return self.slot.id(self.map)
+
+    @property
     def name(self) -> str:
         """The name of the flight's record, such as ``0123abcd-court-g03-s17``."""
-        return f"{self.search[:NAME_DIGITS]}-{self.slot.id(self.map)}"
+        return f"{self.search[:NAME_DIGITS]}-{self.slot_id}"
 
     def record(self, folder: Path) -> Path:
         """Return the file of the flight's record in a folder of flights."""

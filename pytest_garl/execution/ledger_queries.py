@@ -76,18 +76,7 @@ class LedgerQueries:
         """Return the flights of all searches that violated a property, in slot order."""
         return self._flights("json_extract(result, '$.verdict.primary') IS NOT NULL")
 
-    def flight(self, system: str, map: str, slot: Slot) -> LedgerFlight:
-        """Return the flight of a slot that was flown."""
-        (found,) = self._flights(
-            "system = ? AND map = ? AND generation = ? AND slot = ?",
-            system,
-            map,
-            slot.generation,
-            slot.index,
-        )
-        return found
-
-    def _flights(self, condition: str, *values: str | int) -> list[LedgerFlight]:
+    def _flights(self, condition: str, *values: str) -> list[LedgerFlight]:
         rows = self._database.execute(
             "SELECT search, map, generation, slot, system, scenario, result, sha256 FROM slot "
             "JOIN search ON search.id = slot.search WHERE kind = 'search' AND state = 'flown' "

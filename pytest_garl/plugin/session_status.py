@@ -108,9 +108,8 @@ def _why_nothing_flew(tally: Tally) -> str:
 def _inconclusive(searches: Sequence[SearchSummary]) -> Iterator[str]:
     """Yield which searches have too many inconclusive flights."""
     for search in searches:
-        flights = zip(search.slots, search.results, strict=True)
-        slots = [slot for slot, result in flights if result.inconclusive]
-        flown = len(search.results)
+        slots = [each.id.slot_id for each in search.flights if each.result.inconclusive]
+        flown = len(search.flights)
         allowed = flown // FLIGHTS_PER_EXCEPTION
         if len(slots) > allowed:
             yield (
@@ -122,7 +121,7 @@ def _inconclusive(searches: Sequence[SearchSummary]) -> Iterator[str]:
 
 def _unrepeated(tally: Tally, searches: Sequence[SearchSummary]) -> Iterator[str]:
     """Yield which searches have too many violations that did not repeat."""
-    flown = {(search.system, search.map): len(search.results) for search in searches}
+    flown = {(search.system, search.map): len(search.flights) for search in searches}
     for (system, map), slots in _unrepeated_by_search(tally).items():
         flights = flown.get((system, map), 0)
         allowed = max(1, flights // FLIGHTS_PER_EXCEPTION)

@@ -6,7 +6,6 @@ its meaning takes a new ``version``.
 
 from __future__ import annotations
 
-import json
 from collections import Counter
 from datetime import UTC, datetime
 from importlib.metadata import version
@@ -15,8 +14,10 @@ from typing import Any
 
 from pytest_garl.errors import LedgerError
 from pytest_garl.execution.ledger import Ledger
+from pytest_garl.execution.ledger_queries import LedgerFlight
 from pytest_garl.regressions.corpus import Corpus
 from pytest_garl.reports.search_summary import SearchSummary, SlotUserFailure, search_summaries
+from pytest_garl.scenarios.files import parse_scenario
 from pytest_garl.verdicts.paper_metrics import top_k
 from pytest_garl.verdicts.statistics import share_interval
 from pytest_garl.verdicts.verdict import count_decided
@@ -51,9 +52,7 @@ def report_of(path: Path, corpus: Corpus) -> dict[str, Any]:
         for each in progress:
             wanted[each.system, each.map] += each.all
         saved = _cases(corpus, {summary.system for summary in summaries})
-        searches = [
-            _search(ledger, each, wanted[each.system, each.map], saved, path) for each in summaries
-        ]
+        searches = [_search(each, wanted[each.system, each.map], saved, path) for each in summaries]
         meters = ledger.queries.meters()
         return {
             "schema": "pytest-garl-report",
@@ -84,7 +83,7 @@ def report_of(path: Path, corpus: Corpus) -> dict[str, Any]:
 
 
 def _search(
-    ledger: Ledger, summary: SearchSummary, wanted: int, cases: list[dict[str, Any]], path: Path
+    summary: SearchSummary, wanted: int, cases: list[dict[str, Any]], path: Path
 ) -> dict[str, Any]:
     total, verdicts = len(summary.verdicts), summary.verdicts
     low, high = share_interval(summary.violating, total)
@@ -97,7 +96,7 @@ def _search(
         "violating_interval_95": [low, high],
         "violating_by_the_paper": sum(verdict.paper_violation for verdict in verdicts),
         "tenth_violation": top_k(verdicts),
-        "outcomes": dict(sorted(Counter(each.outcome for each in summary.results).items())),
+        "outcomes": dict(sorted(Counter(each.result.outcome for each in summary.flights).items())),
         "types": dict(
             sorted(Counter(str(v.violation_type) for v in verdicts if v.violation_type).items())
         ),
@@ -110,7 +109,7 @@ def _search(
                 "signature": kind.signature,
                 "type": kind.signature.partition(":")[0],
                 "count": kind.count,
-                "first": _flight(ledger, summary, kind.first),
+                "first": _flight(summary.flight(kind.first)),
                 "story": kind.story,
                 "headline": kind.headline,
                 "repeat": _repeat_command(summary, kind.first, path),
@@ -126,16 +125,13 @@ def _search(
     }
 
 
-def _flight(ledger: Ledger, summary: SearchSummary, name: str) -> dict[str, Any]:
-    slot = summary.slots[name]
-    flight = ledger.queries.flight(summary.system, summary.map, slot)
-    result = flight.result
+def _flight(flight: LedgerFlight) -> dict[str, Any]:
     return {
-        "slot": name,
-        "seed": json.loads(flight.scenario)["seed"],
-        "outcome": result.outcome,
-        "final_distance_m": result.final_distance_m,
-        "elapsed_s": result.elapsed_s,
+        "slot": flight.id.slot_id,
+        "seed": parse_scenario(flight.scenario).seed,
+        "outcome": flight.result.outcome,
+        "final_distance_m": flight.result.final_distance_m,
+        "elapsed_s": flight.result.elapsed_s,
         "trajectory_sha256": flight.sha256,
     }
 

@@ -7,8 +7,6 @@ from dataclasses import dataclass
 
 from pytest_garl.execution.ledger import Ledger
 from pytest_garl.execution.ledger_queries import LedgerFlight
-from pytest_garl.execution.result import FlightResult
-from pytest_garl.execution.slot import Slot
 from pytest_garl.verdicts.verdict import Verdict
 from pytest_garl.verdicts.wording import headline
 
@@ -45,9 +43,7 @@ class SearchSummary:
     system: str
     map: str
     files: tuple[str, ...]
-    slots: Mapping[str, Slot]
-    results: tuple[FlightResult, ...]
-    verdicts: tuple[Verdict, ...]
+    flights: tuple[LedgerFlight, ...]
     kinds: tuple[ViolationKind, ...]
     violating: int
     """How many flights violate a property, built in or a user's own."""
@@ -57,17 +53,26 @@ class SearchSummary:
         """The name of the landing system's class."""
         return self.system.split(":")[-1]
 
+    @property
+    def verdicts(self) -> tuple[Verdict, ...]:
+        """The verdicts of the flights."""
+        return tuple(each.result.verdict for each in self.flights)
+
+    def flight(self, slot: str) -> LedgerFlight:
+        """Return the flight of a slot, such as ``court-g03-s17``."""
+        return next(each for each in self.flights if each.id.slot_id == slot)
+
     def count(self, outcome: str) -> int:
         """Return how many flights had an outcome."""
-        return sum(result.outcome == outcome for result in self.results)
+        return sum(each.result.outcome == outcome for each in self.flights)
 
     @property
     def crashes(self) -> Mapping[str, int]:
         """How often the landing system crashed, by the way it did; without inconclusive flights."""
         counts: dict[str, int] = {}
-        for result, verdict in zip(self.results, self.verdicts, strict=True):
-            if verdict.violation_type == "V":
-                kind = result.crash.kind if result.crash else "raised"
+        for each in self.flights:
+            if each.result.verdict.violation_type == "V":
+                kind = each.result.crash.kind if each.result.crash else "raised"
                 word = kind if kind in ("died", "hung", "broke") else "Python error"
                 counts[word] = counts.get(word, 0) + 1
         return counts
@@ -96,12 +101,12 @@ def _summary(
     flights: list[LedgerFlight],
     user_failures: list[SlotUserFailure],
 ) -> SearchSummary:
-    verdicts = [flight.result.verdict for flight in flights]
     slots: dict[str, list[tuple[str, str]]] = {}
-    for flight, verdict in zip(flights, verdicts, strict=True):
+    for flight in flights:
+        verdict = flight.result.verdict
         if verdict.violation:
-            name = flight.id.slot.id(map)
-            slots.setdefault(verdict.signature, []).append((name, verdict.story))
+            violation = flight.id.slot_id, verdict.story
+            slots.setdefault(verdict.signature, []).append(violation)
     for each in sorted(user_failures, key=lambda each: each.slot):
         slots.setdefault(each.signature, []).append((each.slot, each.message))
     kinds = [
@@ -119,9 +124,7 @@ def _summary(
         system=system,
         map=map,
         files=tuple(files.split()),
-        slots={flight.id.slot.id(map): flight.id.slot for flight in flights},
-        results=tuple(flight.result for flight in flights),
-        verdicts=tuple(verdicts),
+        flights=tuple(flights),
         kinds=tuple(sorted(kinds, key=lambda each: (-each.count, each.signature))),
         violating=len({slot for those in slots.values() for slot, _ in those}),
     )

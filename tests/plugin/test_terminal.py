@@ -179,13 +179,11 @@ def test_the_first_line_now_and_then_counts_the_time_before_it(
     clock = [100.0]
     monkeypatch.setattr(run_progress, "time", SimpleNamespace(monotonic=lambda: clock[0]))
     reader = ProgressReader(
-        cast(Run, SimpleNamespace(remaining=RemainingWork(flights=0.0, seconds=0.0))), 30.0
+        cast(Run, SimpleNamespace(rest=RemainingWork(flights=0.0, seconds=0.0))), 30.0
     )
     reader.start_clock()
     clock[0] += 30.0
-    queries = SimpleNamespace(
-        progress=lambda: [TWO[1]], meters=dict, violation_counts=dict, nearest=dict
-    )
+    queries = SimpleNamespace(progress=lambda: [TWO[1]], meters=dict, violations=dict, nearest=dict)
     ledger = SimpleNamespace(queries=queries, fact=lambda key: None)
     found = reader.read(cast(Ledger, ledger))
     assert found is not None
@@ -233,7 +231,7 @@ def test_lf_flies_exactly_the_failing_slots_again(
     result.assert_outcomes(failed=2)
     assert failed(result) == first
     ledger = Ledger(pytester.path / ".garl" / "ledger.sqlite")
-    flown = {each.id.slot.id("lawn") for each in ledger.queries.flights()}
+    flown = {each.id.slot_id for each in ledger.queries.flights()}
     ledger.close()
     assert flown == {re.findall(r"\[(.+)\]", line)[0] for line in first}
 
