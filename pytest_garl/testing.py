@@ -1,4 +1,4 @@
-"""A public checker: what a user runs on a landing system before anything else."""
+"""A public checker of landing systems: users run it before their first search."""
 
 from __future__ import annotations
 
@@ -32,18 +32,19 @@ from pytest_garl.verdicts.phases import reports_detections, reports_targets
 from pytest_garl.verdicts.verdict import PAPER_LIMITS, Limits
 
 FLIGHTS = 40
-"""What the estimate of a search's time is for: the budget that the README begins with."""
+"""Flights of the search whose time the check estimates: the README's first budget."""
 SLOW_FLIGHT_S = 10.0
 """Computing time of one flight above which the check warns: a night has some 3,000 such flights."""
 SLOW_CALL_S = 3.0
-"""A search takes a call of 10 s for hanging by default; a loaded machine may be thrice as slow."""
-LEAST_S = 2.0
-"""Shortest flights that are still compared."""
+"""Computing time of one call above which the check warns: a search ends calls of 10 s by default,
+and a loaded machine may be three times as slow."""
+SHORTEST_S = 2.0
+"""Simulated time of the shortest flights that are still compared."""
 
 
 @dataclasses.dataclass(frozen=True, slots=True, kw_only=True)
 class Check:
-    """What a check showed: how the flights ended, what a search will meet, what a flight costs.
+    """The result of a check: how the flights ended, warnings, and the cost of a flight.
 
     ``flights`` and ``warnings`` are sentences; ``cpu_s`` is the computing time of one flight in
     seconds, the simulator's included.
@@ -71,37 +72,43 @@ def check_landing_system(
     deterministic: bool = True,
     limit_s: float = 120.0,
 ) -> Check:
-    """Fly a class in two scenarios and return what it showed; raise LandingSystemError for a fault.
+    """Fly a class in two scenarios and return the result; raise LandingSystemError for a fault.
 
     Checks that the class has the contract's methods and can be imported by a worker process, that
-    its airframe is one, that it returns commands, leaves its observations alone, decides the same
-    in the same flight, and that ``reset`` forgets the flight before: one instance flies the first
-    scenario, the second and the first again, and each flight is compared with that of a fresh
+    its airframe is valid, that it returns commands, leaves its observations unchanged, decides the
+    same in the same flight, and that ``reset`` forgets the flight before: one instance flies the
+    first scenario, the second and the first again, and each flight is compared with that of a fresh
     instance.
 
     ``seconds`` ends each flight early (simulated time; by default it flies until it landed, or
     120 s).  ``deterministic=False`` turns a difference between equal flights into a warning.
     ``limit_s`` is the computing time (CPU) for all flights; a slow system is compared over shorter
-    ones.  A call that takes 30 s is taken for hanging.  Where NumPy was loaded earlier, and
-    computes by other instructions than a search flies by, all this happens in a separate process.
+    ones.  A call that takes 30 s counts as hanging.  If NumPy was loaded earlier and computes with
+    other instructions than a search, the check runs in a separate process.
     """
     check_system(system)
     _check_airframe(system)
     _check_signature(system, "reset", 1)
     _check_signature(system, "step", 1)
     if not cpu_dispatch.pin():
-        # NumPy was loaded earlier, and computes by other instructions than a search flies by.
-        asked = {"seconds": seconds, "map": map, "deterministic": deterministic, "limit_s": limit_s}
-        told = call_in_separate_process("pytest_garl.testing:_check_as_values", system, asked)
-        return Check(**{**told, "flights": (*told["flights"],), "warnings": (*told["warnings"],)})
+        # NumPy was loaded earlier, and computes with other instructions than a search.
+        options = {
+            "seconds": seconds,
+            "map": map,
+            "deterministic": deterministic,
+            "limit_s": limit_s,
+        }
+        values = call_in_separate_process("pytest_garl.testing:_check_as_values", system, options)
+        lists = {"flights": (*values["flights"],), "warnings": (*values["warnings"],)}
+        return Check(**{**values, **lists})
     return _Checker(system, map, seconds, deterministic, limit_s).run()
 
 
-def _check_as_values(system: type, **asked: Any) -> dict[str, Any]:
-    return dataclasses.asdict(check_landing_system(system, **asked))
+def _check_as_values(system: type, **options: Any) -> dict[str, Any]:
+    return dataclasses.asdict(check_landing_system(system, **options))
 
 
-class _Flown(NamedTuple):
+class _TimedFlight(NamedTuple):
     flight: Flight
     cpu_s: float
 
@@ -122,27 +129,27 @@ class _Checker:
         self._warnings: list[str] = []
 
     def run(self) -> Check:
-        """Fly and compare."""
+        """Fly the scenarios and compare the flights."""
         flights: list[str] = []
         cpu_s = self._limit_s
-        with _told_of_leftovers(self._warnings.append):
+        with _warning_of_leftovers(self._warnings.append):
             try:
                 first = self._fly(self._system, self._calm, self._seconds)
                 flights.append(f"{self._map.name}: {_ending(first.flight)}")
                 cpu_s = first.cpu_s
-                self._look_at(first)
+                self._warn_of_flight(first)
                 other = self._compare(first)
                 flights.append(f"{self._map.name}, another scenario: {_ending(other.flight)}")
                 if {first.flight.outcome, other.flight.outcome} == {"aborted"}:
-                    self._warnings.append("gave up in both scenarios; a search can tell nothing")
+                    self._warnings.append("gave up in both scenarios; a search would learn nothing")
             except OutOfTimeError:
                 self._warnings.append(
                     f"stopped after {self._limit_s:g} s of computing; not all flights were flown"
                 )
         if self._meter.slowest_s > SLOW_CALL_S:
             self._warnings.append(
-                f"one call took {self._meter.slowest_s:.1f} s of computing; a search takes a call "
-                "of 10 s for hanging (--garl-timeout)"
+                f"one call took {self._meter.slowest_s:.1f} s of computing; a search ends a call "
+                "of 10 s (--garl-timeout)"
             )
         return Check(
             system=self._system.__name__,
@@ -151,37 +158,37 @@ class _Checker:
             cpu_s=cpu_s,
         )
 
-    def _compare(self, first: _Flown) -> _Flown:
-        """Fly both scenarios by fresh instances and by one that keeps what it remembers."""
+    def _compare(self, first: _TimedFlight) -> _TimedFlight:
+        """Fly both scenarios with fresh instances and with one that flies them all."""
         seconds = self._seconds
         if 5 * first.cpu_s > self._limit_s:
             share = (self._limit_s - first.cpu_s) / (6 * first.cpu_s)
-            seconds = max(LEAST_S, share * first.flight.elapsed_s)
+            seconds = max(SHORTEST_S, share * first.flight.elapsed_s)
             first = self._fly(self._system, self._calm, seconds)
         other = self._fly(self._system, self._drawn, seconds)
-        kept = _keep_one(self._system)
+        reused = _reusing_one_instance(self._system)
         for fresh, scenario, problem in (
-            (first, self._calm, "two flights of the same scenario part"),
-            (other, self._drawn, _FORGETS_NOT),
-            (first, self._calm, _FORGETS_NOT),
+            (first, self._calm, "two flights of the same scenario differ"),
+            (other, self._drawn, _REMEMBERS),
+            (first, self._calm, _REMEMBERS),
         ):
-            again = self._fly(kept, scenario, seconds)
-            self._demand_equal(fresh.flight, again.flight, problem)
+            again = self._fly(reused, scenario, seconds)
+            self._check_equal(fresh.flight, again.flight, problem)
         return other
 
-    def _demand_equal(self, fresh: Flight, again: Flight, problem: str) -> None:
+    def _check_equal(self, fresh: Flight, again: Flight, problem: str) -> None:
         if fresh.sha256 == again.sha256:
             return
         text = f"{self._system.__name__}: {problem}, first at {parted_s(fresh, again):.2f} s"
         if self._deterministic:
             raise LandingSystemError(
-                f"{text}; if that is meant, say deterministic=False here and in the marker"
+                f"{text}; if that is intended, pass deterministic=False here and in the marker"
             )
         if text not in self._warnings:
             self._warnings.append(text)
 
-    def _look_at(self, first: _Flown) -> None:
-        """Warn of what a search will meet."""
+    def _warn_of_flight(self, first: _TimedFlight) -> None:
+        """Warn of problems that a search would have."""
         flight, warn = first.flight, self._warnings.append
         limits = Limits()
         if flight.outcome == "not_landed" and self._whole:
@@ -197,7 +204,7 @@ class _Checker:
             )
         if not any(step.diagnostics for step in flight.steps):
             warn(
-                "returns no diagnostics: findings cannot say what it saw or meant to do "
+                "returns no diagnostics: reports cannot say what it saw or intended to do "
                 "(Land(diagnostics=Diagnostics(...)))"
             )
         elif self._whole and not (reports_detections(flight) or reports_targets(flight)):
@@ -208,7 +215,7 @@ class _Checker:
                 f"{self._meter.mean_s * 1e3:.0f} ms in each call"
             )
 
-    def _fly(self, system: Any, scenario: Scenario, seconds: float) -> _Flown:
+    def _fly(self, system: Any, scenario: Scenario, seconds: float) -> _TimedFlight:
         began = time.process_time()
         with self._meter.timed():
             flight = fly(
@@ -226,10 +233,10 @@ class _Checker:
             raise LandingSystemError(
                 f"{crash.where}: {crash.error}: {crash.message}{hint}\n{crash.traceback}".rstrip()
             )
-        return _Flown(flight, time.process_time() - began)
+        return _TimedFlight(flight, time.process_time() - began)
 
 
-_FORGETS_NOT = (
+_REMEMBERS = (
     "a later flight of one instance differs from the first of a fresh one; reset(mission) must "
     "forget the flight before"
 )
@@ -251,8 +258,8 @@ def _ending(flight: Flight) -> str:
 
 
 def _check_airframe(system: type) -> None:
-    flies = callable(getattr(system, "control", None))
-    if flies != (airframe_of(system).control_rate_hz is not None):
+    controls_motors = callable(getattr(system, "control", None))
+    if controls_motors != (airframe_of(system).control_rate_hz is not None):
         raise LandingSystemError(
             f"{system.__name__}: a method control(state) and Airframe(control_rate_hz=...) belong "
             "together; found only one of them"
@@ -269,7 +276,7 @@ def _check_signature(system: type, method: str, count: int) -> None:
 
 
 @contextlib.contextmanager
-def _told_of_leftovers(warn: Callable[[str], None]) -> Iterator[None]:
+def _warning_of_leftovers(warn: Callable[[str], None]) -> Iterator[None]:
     """Warn of threads and processes that a landing system leaves running."""
     threads, processes = set(threading.enumerate()), _children()
     yield
@@ -286,11 +293,11 @@ def _children() -> set[str]:
     return {pid for file in files for pid in file.read_text().split()}
 
 
-def _keep_one(system: type) -> Any:
-    """Return a stand-in for the class that hands out one and the same instance."""
+def _reusing_one_instance(system: type) -> Any:
+    """Return a stand-in for the class that always gives the same instance."""
     instances: list[Any] = []
 
-    class Kept:
+    class Reused:
         airframe = airframe_of(system)
 
         def __init__(self) -> None:
@@ -307,5 +314,5 @@ def _keep_one(system: type) -> Any:
         def step(self, observation: Observation) -> Any:
             return self._instance.step(observation)
 
-    Kept.__name__ = system.__name__
-    return Kept
+    Reused.__name__ = system.__name__
+    return Reused

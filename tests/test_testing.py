@@ -146,7 +146,7 @@ def test_a_good_system_passes(system: type) -> None:
         (RateWithoutControl, "belong together"),
         (TakesTwo, "step: missing a required argument"),
         (Scribbles, "observations are read-only"),
-        (Whimsical, "two flights of the same scenario part, first at"),
+        (Whimsical, "two flights of the same scenario differ, first at"),
         (Remembers, "reset\\(mission\\) must forget"),
         (Misnamed, "speed_mps = -1.0; expected 0 to 100 m/s"),
         (Silent, "step returned None"),
@@ -171,7 +171,7 @@ def test_check_flies_until_landed_and_says_how_far_off() -> None:
     assert check.flights[0].startswith("lawn: landed 0.0")
     assert " m off after 2" in check.flights[0]
     assert check.warnings == (
-        "returns no diagnostics: findings cannot say what it saw or meant to do "
+        "returns no diagnostics: reports cannot say what it saw or intended to do "
         "(Land(diagnostics=Diagnostics(...)))",
     )
     assert "ReferencePilot: a flight takes" in str(check)
@@ -199,7 +199,7 @@ def test_check_warns_of_what_a_search_will_meet(system: type, words: list[str]) 
 
 def test_check_of_a_nondeterministic_system_may_only_warn() -> None:
     check = check_landing_system(Whimsical, seconds=2, deterministic=False)
-    assert any("two flights of the same scenario part" in text for text in check.warnings)
+    assert any("two flights of the same scenario differ" in text for text in check.warnings)
     assert any("warning: Whimsical: two flights" in line for line in str(check).splitlines())
 
 

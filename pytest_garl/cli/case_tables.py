@@ -35,7 +35,7 @@ def case_table(found: Iterable[CorpusEntry]) -> Table:
             f"{evidence.neighbours_failed}/{evidence.neighbours}" if evidence.neighbours else ""
         )
         objects = str(len(case.moves))
-        # As texts: in a string rich would make an animal of ":dog:", and colours of "[red]".
+        # In a plain string rich would draw ":dog:" as an emoji, and read "[red]" as a colour.
         signature = Text(printable(case.violation.signature, keep=""))
         status = Text(case.status, style=_STYLES.get(case.status, "dim"))
         if case.edge:

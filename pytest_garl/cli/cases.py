@@ -21,11 +21,12 @@ from pytest_garl.regressions.case_file import load_case
 from pytest_garl.regressions.corpus import Corpus, replace_file
 from pytest_garl.regressions.replay import Replay, replay, system_of
 
-DEFAULT = Path("scenarios/regressions")
+DEFAULT_FOLDER = Path("scenarios/regressions")
 NO_PROOF = 3
-"""Exit status of a replay that proves nothing; 1 says that the case fails."""
+"""Exit status of a replay that proves nothing."""
+EXIT_STATUS = {"FIXED": 0, "FAILED": 1, "STALE": NO_PROOF, "UNDECIDED": NO_PROOF}
 LEAST_FLIGHTS = 9
-STATUS = {"FIXED": 0, "FAILED": 1, "STALE": NO_PROOF, "UNDECIDED": NO_PROOF}
+"""``reshrink.LEAST_FLIGHTS``, whose module takes long to import."""
 
 
 @dataclasses.dataclass(frozen=True, slots=True, kw_only=True)
@@ -44,7 +45,7 @@ class _Project:
 FOLDER = click.option(
     "--folder",
     type=click.Path(path_type=Path, file_okay=False),
-    default=DEFAULT,
+    default=DEFAULT_FOLDER,
     show_default=True,
     help="Folder of the cases (the ini key garl_cases).",
 )
@@ -63,7 +64,7 @@ def cases(context: click.Context, folder: Path) -> None:
 
 
 def _say(text: str, *, err: bool = False) -> None:
-    """Show a text in which names of files and what files hold may stand."""
+    """Print a text that may hold names and content of files, without control characters."""
     click.echo(printable(text), err=err)
 
 
@@ -106,9 +107,9 @@ def show(project: _Project, file: Path) -> None:
     _say(f"{case.violation.signature}: {case.violation.description}\n")
     print_table(scenario_table(case, project.maps))
     for key, by in environment_changes(case):
-        _say(f"while it is flown {key} changes by {by:+.2f}")
+        _say(f"during the flight {key} changes by {by:+.2f}")
     if case.edge:
-        _say("\nIt sits on an edge: not all of its neighbours fail, so it gates nothing.")
+        _say("\nThis is an edge case: not all of its neighbours fail, so it gates nothing.")
     tried = f"{evidence.neighbours_failed} of {evidence.neighbours} neighbours fail too; "
     _say(
         f"\n{tried if evidence.neighbours else ''}shrinking removed {evidence.removed}; objects "
@@ -141,30 +142,31 @@ def replay_(context: click.Context, file: Path, live: bool, video: Path | None) 
     if video is not None:
         from pytest_garl.video.encoder import program
 
-        # Before the flight: it is for nothing if it cannot be drawn.
+        # Checked before the flight, which takes longer.
         program()
-    result = replay(case, project.root, project.maps, live=live)
-    _answer(result)
+    replayed = replay(case, project.root, project.maps, live=live)
+    _show_replay(replayed)
     if video is not None:
-        if result.flight is None:
+        if replayed.flight is None:
             raise GarlError(f"{file}: its process ended before the flight was recorded: no video")
         from pytest_garl.landing_system import airframe_of
         from pytest_garl.video import save_video
 
         camera = airframe_of(system_of(case, project.root)).camera
-        save_video(video, result.flight, case.scenario, result.map, camera, result.signature)
+        save_video(video, replayed.flight, case.scenario, replayed.map, camera, replayed.signature)
         _say(f"drawn: {video}")
-    context.exit(STATUS[result.answer])
+    context.exit(EXIT_STATUS[replayed.result])
 
 
-def _answer(result: Replay) -> None:
-    click.secho(result.answer, bold=True, fg="green" if result.answer == "FIXED" else "red")
-    _say(f"{result.signature or 'no violation'}: {result.description}")
-    for reason in result.reasons:
+def _show_replay(replayed: Replay) -> None:
+    click.secho(replayed.result, bold=True, fg="green" if replayed.result == "FIXED" else "red")
+    _say(f"{replayed.signature or 'no violation'}: {replayed.description}")
+    for reason in replayed.reasons:
         _say(reason)
-    _say(f"judged by {result.judge}")
-    if result.same is not None:
-        _say("the same flight to the byte" if result.same else "another flight than recorded")
+    _say(f"judged by {replayed.judged_by}")
+    if replayed.same_flight is not None:
+        same = replayed.same_flight
+        _say("the same flight to the byte" if same else "another flight than the recorded one")
 
 
 @cases.command()
@@ -197,27 +199,27 @@ def promote(project: _Project, file: Path) -> None:
     avoid the violation, with a live policy too. The case stays open if it fails, if it is
     undecided, or if nothing shows that a repair of the landing system made it pass.
     """
-    case, told = project.case(file), []
+    case, remarks = project.case(file), []
     for live in (False, True) if case.avoidable == "live" else (False,):
-        result = replay(case, project.root, project.maps, live=live)
+        replayed = replay(case, project.root, project.maps, live=live)
         how = "a live policy" if live else "its recorded moves"
-        if result.answer != "FIXED":
-            raise GarlError(f"{file}: {_refusal(result, how)}; it stays {case.status}")
-        if result.outcome == "aborted":
-            told.append(f"with {how} the landing system gave up; it did not land")
+        if replayed.result != "FIXED":
+            raise GarlError(f"{file}: {_refusal(replayed, how)}; it stays {case.status}")
+        if replayed.outcome == "aborted":
+            remarks.append(f"with {how} the landing system gave up; it did not land")
         if not live:
-            told.append(f"judged by {result.judge}")
+            remarks.append(f"judged by {replayed.judged_by}")
     replace_file(file, dataclasses.replace(case, status="fixed"))
     _say(f"{file}: fixed; from now on it must pass")
-    for line in told:
+    for line in remarks:
         _say(line)
 
 
-def _refusal(result: Replay, how: str) -> str:
-    if result.answer == "FAILED":
-        return f"still fails with {how} ({result.signature or '; '.join(result.reasons)})"
-    said = "passes, but is stale" if result.answer == "STALE" else "is not decided"
-    return f"{said} with {how}: {'; '.join(result.reasons)}"
+def _refusal(replayed: Replay, how: str) -> str:
+    if replayed.result == "FAILED":
+        return f"still fails with {how} ({replayed.signature or '; '.join(replayed.reasons)})"
+    state = "passes, but is stale" if replayed.result == "STALE" else "is not decided"
+    return f"{state} with {how}: {'; '.join(replayed.reasons)}"
 
 
 @cases.command()
@@ -245,14 +247,14 @@ def shrink(project: _Project, file: Path, flights: int, workers: int) -> None:
     result = shrink_case(case, project.root, project.maps, flights, workers, setup)
     spent = f"{result.flights} flights"
     if result.case is None and result.reason != NOTHING_SIMPLER:
-        raise GarlError(f"{file}: {result.reason}; `garl cases replay {file}` tells more")
+        raise GarlError(f"{file}: {result.reason}; `garl cases replay {file}` shows how it ends")
     if result.case is None:
         _say(f"{file}: {result.reason} ({spent}); it stays as it is")
         return
     path = replace_file(file, result.case)
     evidence = result.case.evidence
     renewed = result.case.id == case.id
-    done = "its evidence is renewed" if renewed else f"all in all removed {evidence.removed}"
+    done = "its evidence is renewed" if renewed else f"removed {evidence.removed} in all"
     _say(f"{path}: {done} ({spent})")
 
 
@@ -269,11 +271,11 @@ def prune(project: _Project, yes: bool) -> None:
     for entry in project.corpus.all_entries():
         if entry.case is None or entry.case.status == "fixed":
             continue
-        result = replay(entry.case, project.root, project.maps)
-        if result.answer != "STALE":
+        replayed = replay(entry.case, project.root, project.maps)
+        if replayed.result != "STALE":
             kept += 1
             continue
-        _say(f"{entry.path}: passes, but {'; '.join(result.reasons)}")
+        _say(f"{entry.path}: passes, but {'; '.join(replayed.reasons)}")
         if yes or click.confirm("delete it?"):
             entry.path.unlink()
     _say(f"{kept} cases are not stale")

@@ -14,7 +14,7 @@ from pytest_garl.execution.sources import data_files
 from pytest_garl.plugin.keys import target_of
 from pytest_garl.plugin.user_assertions import ItemAssertion
 from pytest_garl.regressions.case import Case
-from pytest_garl.regressions.judging import alone_in_a_folder, arguments
+from pytest_garl.regressions.case_test_run import corpus_of_one, pytest_arguments
 from pytest_garl.regressions.reshrink import CaseSetup
 
 IMPORTED = "ignore::pytest.PytestAssertRewriteWarning"
@@ -40,11 +40,13 @@ def case_setup(case: Case, root: Path) -> CaseSetup:
     if not case.test:
         return CaseSetup()
     collected = _Collected()
-    with alone_in_a_folder(case, live=False) as folder, contextlib.chdir(root):
+    with corpus_of_one(case, live=False) as folder, contextlib.chdir(root):
         told = io.StringIO()
         with contextlib.redirect_stdout(told), contextlib.redirect_stderr(told):
             options = ["--collect-only", "-q", "--capture=no", f"-W{IMPORTED}"]
-            status = pytest.main([*arguments(case, folder, live=False), *options], [collected])
+            status = pytest.main(
+                [*pytest_arguments(case, folder, live=False), *options], [collected]
+            )
     tests = [
         (item, target)
         for item in collected.items
@@ -63,6 +65,6 @@ def case_setup(case: Case, root: Path) -> CaseSetup:
     if not case.assertion:
         return CaseSetup(simulator=collected.simulator)
     raise GarlError(
-        f"the case {case.id} is of a property of your own, and its test {case.test!r} is not found "
+        f"the case {case.id} tests a property of your own, but its test {case.test!r} is not found "
         f"in {root}; run this where you run pytest, or correct the case's key 'test'"
     )

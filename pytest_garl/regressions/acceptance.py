@@ -1,4 +1,4 @@
-"""Which saved cases are known: those in git's index, and those that somebody accepted."""
+"""Accepted cases: those in git's index, and those that `garl cases accept` has marked."""
 
 from __future__ import annotations
 
@@ -11,14 +11,14 @@ from pytest_garl.regressions.case import Case
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Acceptance:
-    """What git knows of a folder of cases; ``problem`` says why it knows nothing."""
+    """The files of a folder that git knows; ``problem`` says why git could not be asked."""
 
     cases: Path
     committed: frozenset[str]
     problem: str = ""
 
-    def covers(self, path: Path, case: Case) -> bool:
-        """Whether a case is known, so that its failure is expected."""
+    def accepts(self, path: Path, case: Case) -> bool:
+        """Return whether a case is accepted, so that its failure is expected."""
         return case.accepted or path.relative_to(self.cases).as_posix() in self.committed
 
 

@@ -84,12 +84,12 @@ class Corpus:
 
     @functools.cached_property
     def acceptance(self) -> Acceptance:
-        """What git said of the folder when it was first asked."""
+        """The cases that git knows, asked once."""
         return read_acceptance(self.folder)
 
     def is_accepted(self, entry: CorpusEntry) -> bool:
-        """Return whether somebody knows of a case: it is committed or marked as accepted."""
-        return entry.case is not None and self.acceptance.covers(entry.path, entry.case)
+        """Return whether a case is committed, or marked as accepted."""
+        return entry.case is not None and self.acceptance.accepts(entry.path, entry.case)
 
     def expected_signatures(
         self, system: str, map: str, *, accepted: bool = False
@@ -97,7 +97,7 @@ class Corpus:
         """Return the signatures that open cases expect of a system on a map, with their files.
 
         An unavoidable case says nothing about other violations with its signature.  ``accepted``
-        leaves out cases that nobody has accepted.
+        leaves out cases that are not accepted.
         """
         return {
             entry.case.violation.signature: entry

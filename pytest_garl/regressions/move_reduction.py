@@ -1,4 +1,4 @@
-"""Shorter records of moves: whole hundredths, and an object that waits where it strikes from."""
+"""Shorter records of moves: whole hundredths, and an object that stands still at first."""
 
 from __future__ import annotations
 
@@ -13,8 +13,8 @@ from pytest_garl.scenarios.validity import problems
 from pytest_garl.simulation.flight import Flight
 from pytest_garl.simulation.npc_policy import DECISION_STEP_S
 
-LEADS_S = (2.0, 4.0, 8.0)
-"""How long before the end an object may still move, tried from short to long."""
+LAST_MOVES_S = (2.0, 4.0, 8.0)
+"""Times before the end of the flight in which an object moves, tried from short to long."""
 
 
 def shorter_records(
@@ -22,11 +22,11 @@ def shorter_records(
 ) -> Iterator[tuple[Scenario, Moves]]:
     """Yield scenarios with shorter records, the shortest first.
 
-    In the first ones the object ``name`` stands until shortly before the end of the flight,
-    where it was at that time; what makes no sense, such as standing on the marker, is left out.
-    In all of them moves are whole hundredths, so that equal ones are one run.
+    In the first scenarios the object ``name`` starts where it was shortly before the end of the
+    flight, and stands there until then; impossible places, such as on the marker, are left out.
+    In all scenarios moves are whole hundredths, so that more of them are equal and form one run.
     """
-    yield from _postponed(scenario, moves, flight, name, map)
+    yield from _with_later_moves(scenario, moves, flight, name, map)
     yield scenario, tuple((each, _rounded(own)) for each, own in moves)
 
 
@@ -42,17 +42,17 @@ def _round(x: float, y: float) -> tuple[float, float]:
     return x, y
 
 
-def _postponed(
+def _with_later_moves(
     scenario: Scenario, moves: Moves, flight: Flight, name: str, map: Map
 ) -> Iterator[tuple[Scenario, Moves]]:
-    # A team's own simulator may not record what its objects do.
+    # A user's own simulator may not record its objects.
     track = next((item.track for item in flight.objects if item.name == name), None)
     own = dict(moves).get(name, ())
     if track is None:
         return
-    for lead in LEADS_S:
-        wait = len(own) - round(lead / DECISION_STEP_S)
-        # The first moves of one that stands already need no replacing.
+    for moving_s in LAST_MOVES_S:
+        wait = len(own) - round(moving_s / DECISION_STEP_S)
+        # An object that stands at first already needs no change.
         if wait <= 0 or all(move == (0.0, 0.0) for move in own[:wait]):
             continue
         index = min(len(track.time_s) - 1, int(track.time_s.searchsorted(wait * DECISION_STEP_S)))

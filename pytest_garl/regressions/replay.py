@@ -1,4 +1,4 @@
-"""Fly a saved case again, and answer whether it is fixed."""
+"""Fly a saved case again, and decide whether it is fixed."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from pytest_garl.execution.reference import (
 )
 from pytest_garl.execution.sources import sources_sha256
 from pytest_garl.regressions.case import Case
-from pytest_garl.regressions.judging import Judged, is_test, judged
+from pytest_garl.regressions.case_test_run import CaseTestResult, run_case_tests
 from pytest_garl.regressions.staleness import SourceHashes, stale_reasons
 from pytest_garl.scenarios.maps.map import Map, load_map
 from pytest_garl.simulation.flight import Flight
@@ -26,28 +26,29 @@ from pytest_garl.simulation.fly import fly
 from pytest_garl.verdicts.judge import judge
 from pytest_garl.verdicts.verdict import PAPER_LIMITS
 
-Answer = Literal["FIXED", "FAILED", "STALE", "UNDECIDED"]
+ReplayResult = Literal["FIXED", "FAILED", "STALE", "UNDECIDED"]
 BUILT_IN_VERDICT = "the built-in verdict"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Replay:
-    """What a case came to: it fails, is fixed, passes without proof, or nobody can tell.
+    """The replay of a case: it fails, is fixed, passes without proof, or is not decided.
 
-    ``reasons`` say why it is stale or undecided, or which test failed.  ``judge`` is who decided.
-    ``same`` is whether the flight is the recorded one to the byte; None where it was recorded on
-    another class of CPUs or its process did not live, and then ``flight`` may be None as well.
+    ``reasons`` say why it is stale or undecided, or which test failed.  ``judged_by`` names the
+    tests, or the built-in verdict.  ``same_flight`` is whether the flight equals the recorded one
+    to the byte; None if it was recorded on another class of CPUs, or if the flight's process ended
+    early; then ``flight`` may be None as well.
     """
 
-    answer: Answer
+    result: ReplayResult
     outcome: str
     signature: str
     description: str
-    judge: str
+    judged_by: str
     reasons: tuple[str, ...]
     flight: Flight | None
     map: Map
-    same: bool | None
+    same_flight: bool | None
 
 
 def system_of(case: Case, folder: Path) -> type:
@@ -67,62 +68,66 @@ def system_of(case: Case, folder: Path) -> type:
 def replay(
     case: Case, folder: Path, map_folders: tuple[Path, ...] = (), *, live: bool = False
 ) -> Replay:
-    """Fly a case with its recorded moves, or with a ``live`` policy, and answer what it shows.
+    """Fly a case with its recorded moves, or with a ``live`` policy, and judge it.
 
-    The tests of the file in which it was found judge; the built-in verdict where no test is known.
+    The tests in the file of the test that found it judge; without a test, the built-in verdict.
     """
     map = load_map(case.scenario.map, map_folders)
     if not case.test:
         return _by_verdict(case, folder, map, f"{BUILT_IN_VERDICT}: the case names no test", live)
-    with judged(case, folder, live=live) as (found, flights):
-        finder = next((each for each in found if is_test(each, case.test)), None)
+    with run_case_tests(case, folder, live=live) as (results, flights):
+        finder = next((each for each in results if each.is_of(case.test)), None)
         if finder is not None:
-            return _by_tests(case, map, found, finder, flights, live)
+            return _by_tests(case, map, results, finder, flights, live)
     if case.assertion:
         raise GarlError(
-            f"the case {case.id} is of a property of your own, and its test {case.test!r} is not "
+            f"the case {case.id} tests a property of your own, but its test {case.test!r} is not "
             f"found in {folder}; run this where you run pytest, or correct the case's key 'test'"
         )
-    judge = f"{BUILT_IN_VERDICT}: the test {case.test} is not found in {folder}"
-    return _by_verdict(case, folder, map, judge, live)
+    judged_by = f"{BUILT_IN_VERDICT}: the test {case.test} is not found in {folder}"
+    return _by_verdict(case, folder, map, judged_by, live)
 
 
 def _by_tests(
-    case: Case, map: Map, found: tuple[Judged, ...], finder: Judged, flights: Path, live: bool
+    case: Case,
+    map: Map,
+    results: tuple[CaseTestResult, ...],
+    finder: CaseTestResult,
+    flights: Path,
+    live: bool,
 ) -> Replay:
-    failed = [each for each in found if each.outcome == "failed"]
-    facts = (failed[0] if failed else finder).facts
-    outcome, trajectory = facts.get("garl.outcome", ""), facts.get("garl.trajectory_sha256", "")
+    failed = [each for each in results if each.outcome == "failed"]
+    properties = (failed[0] if failed else finder).properties
+    outcome = properties.get("garl.outcome", "")
     reasons: tuple[str, ...] = ()
-    answer: Answer = "FIXED"
+    result: ReplayResult = "FIXED"
     if outcome == "inconclusive":
-        answer, reasons = "UNDECIDED", (finder.message or "the flight is inconclusive",)
+        result, reasons = "UNDECIDED", (finder.message or "the flight is inconclusive",)
     elif failed:
-        answer = "FAILED"
+        result = "FAILED"
         reasons = tuple(f"{each.nodeid.rpartition('.')[2]}: {each.message}" for each in failed)
     elif finder.outcome == "skipped" and outcome != "aborted":
-        answer, reasons = "UNDECIDED", (f"its test was skipped: {finder.message}",)
-    elif stale := facts.get("garl.unproven", ""):
-        answer, reasons = "STALE", (stale,)
-    flight = next(
-        (each for each in _records(flights) if not trajectory or each.sha256 == trajectory), None
-    )
+        result, reasons = "UNDECIDED", (f"its test was skipped: {finder.message}",)
+    elif stale := properties.get("garl.unproven", ""):
+        result, reasons = "STALE", (stale,)
+    flight = _recorded_flight(flights, properties.get("garl.trajectory_sha256", ""))
     return Replay(
-        answer=answer,
+        result=result,
         outcome=outcome,
-        signature=facts.get("garl.signature", ""),
-        description=facts.get("garl.story", ""),
-        judge=f"{case.test} and the tests beside it",
+        signature=properties.get("garl.signature", ""),
+        description=properties.get("garl.story", ""),
+        judged_by=f"{case.test} and the tests beside it",
         reasons=reasons,
         flight=flight,
         map=map,
-        same=_same(case, flight, live),
+        same_flight=_is_same(case, flight, live),
     )
 
 
-def _records(folder: Path) -> list[Flight]:
-    """Return the flights in a folder."""
-    return [load(path) for path in sorted(folder.glob("*.npz"))]
+def _recorded_flight(folder: Path, sha256: str) -> Flight | None:
+    """Return the flight with a hash in a folder of records; the first one without a hash."""
+    flights = (load(path) for path in sorted(folder.glob("*.npz")))
+    return next((each for each in flights if not sha256 or each.sha256 == sha256), None)
 
 
 def _by_verdict(case: Case, folder: Path, map: Map, judged_by: str, live: bool) -> Replay:
@@ -138,21 +143,21 @@ def _by_verdict(case: Case, folder: Path, map: Map, judged_by: str, live: bool) 
         map_sha256=map.sha256,
     )
     reasons = () if verdict.violation else stale_reasons(case, sources, flight.sha256)
-    answer: Answer = "STALE" if reasons else "FIXED"
+    passed: ReplayResult = "STALE" if reasons else "FIXED"
     return Replay(
-        answer="FAILED" if verdict.violation else answer,
+        result="FAILED" if verdict.violation else passed,
         outcome=flight.outcome,
         signature=verdict.signature,
         description=verdict.story,
-        judge=judged_by,
+        judged_by=judged_by,
         reasons=reasons,
         flight=flight,
         map=map,
-        same=_same(case, flight, live),
+        same_flight=_is_same(case, flight, live),
     )
 
 
-def _same(case: Case, flight: Flight | None, live: bool) -> bool | None:
+def _is_same(case: Case, flight: Flight | None, live: bool) -> bool | None:
     recorded = case.evidence.trajectory_sha256
     if live or flight is None or not recorded or case.evidence.cpu != flight.cpu:
         return None

@@ -51,8 +51,8 @@ def recorded(tmp_path: Path) -> Case:
 def test_a_case_is_replayed_to_the_byte_only_with_its_changes(
     recorded: Case, tmp_path: Path
 ) -> None:
-    assert replay(recorded, tmp_path).same is True
-    assert replay(dataclasses.replace(recorded, changes=()), tmp_path).same is False
+    assert replay(recorded, tmp_path).same_flight is True
+    assert replay(dataclasses.replace(recorded, changes=()), tmp_path).same_flight is False
 
 
 def test_pytest_flies_a_case_with_its_moves_and_its_changes() -> None:

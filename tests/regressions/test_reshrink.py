@@ -8,9 +8,11 @@ from pathlib import Path
 import pytest
 
 from pytest_garl.adversary.catalogue import policy_spec
+from pytest_garl.cli import cases
 from pytest_garl.execution.job import FlightJob
 from pytest_garl.execution.reference import BUILT_IN, Reference, simulator_sha256
 from pytest_garl.execution.result import CompletedFlight, FlightResult
+from pytest_garl.plugin import options
 from pytest_garl.regressions.case import Case
 from pytest_garl.regressions.case_file import size_of
 from pytest_garl.regressions.case_request import CaseRequest
@@ -189,3 +191,8 @@ def test_what_was_removed_adds_up() -> None:
     assert _all_removed(one, two) == "3 of 4 objects, 7 of 14 genes off nominal"
     assert _all_removed(one, "nothing") == one
     assert _all_removed("nothing", two) == two
+
+
+def test_options_require_the_least_flights_of_their_modules() -> None:
+    assert cases.LEAST_FLIGHTS == LEAST_RESHRINK_FLIGHTS
+    assert options.LEAST_SHRINK == LEAST_FLIGHTS
