@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 
 @pytest.fixture
 def garl_slot(request: pytest.FixtureRequest) -> Target:
-    """Return the slot that the item tests."""
+    """Return the slot of the item."""
     target: Target | str = request.param
     if isinstance(target, str):
         pytest.skip(target)
@@ -37,7 +37,7 @@ def garl_slot(request: pytest.FixtureRequest) -> Target:
 
 @pytest.fixture(scope="session")
 def npcs(request: pytest.FixtureRequest) -> PolicySpec:
-    """Return who moves the dynamic objects; override it in a conftest.py to change that."""
+    """Return the NPC policy; override this fixture in a conftest.py to choose another."""
     from pytest_garl.adversary.catalogue import policy_spec
 
     run = request.config.stash.get(RUN, None)
@@ -46,7 +46,7 @@ def npcs(request: pytest.FixtureRequest) -> PolicySpec:
 
 @pytest.fixture
 def landing(request: pytest.FixtureRequest, garl_slot: Target, npcs: PolicySpec) -> Landing:
-    """Return the slot's landing, flown when it is first asked for."""
+    """Return the landing of the item's slot; wait until it is flown."""
     from pytest_garl.plugin.item_report import end_unjudged
     from pytest_garl.plugin.landing import Landing
 
@@ -76,7 +76,7 @@ def landing(request: pytest.FixtureRequest, garl_slot: Target, npcs: PolicySpec)
 
 @pytest.fixture
 def scenario(request: pytest.FixtureRequest, garl_slot: Target, landing: Landing) -> Scenario:
-    """Return the scenario that the slot holds, flown as for ``landing``."""
+    """Return the scenario of the item's flight, which is flown as for ``landing``."""
     del landing
     run = request.config.stash[RUN]
     scenario: Scenario = run.scenario(garl_slot)

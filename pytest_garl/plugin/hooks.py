@@ -54,9 +54,9 @@ def pytest_configure(config: pytest.Config) -> None:
     config.addinivalue_line(
         "markers",
         "garl(system, maps, limits, deterministic, files): search for violations of a landing "
-        "system: its class; names of maps (default: court and lawn); limits(distance_m=1.5, "
-        "time_s=120, abort='ok'); whether it does the same in the same flight (default: True); "
-        "data files that it reads, so that --garl-resume knows when they change.",
+        "system. system is its class; maps are names (default: court and lawn); limits is "
+        "limits(distance_m=1.5, time_s=120, abort='ok'); deterministic is False if equal flights "
+        "may differ (default: True); files are its data files, which --garl-resume compares.",
     )
     if not is_xdist_worker(config):
         config.stash[TALLY] = Tally()

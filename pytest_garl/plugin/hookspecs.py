@@ -1,4 +1,4 @@
-"""Hooks by which users extend pytest-garl."""
+"""Hooks for users who extend pytest-garl."""
 
 from __future__ import annotations
 
@@ -12,7 +12,6 @@ import pytest
 def pytest_garl_fly(config: pytest.Config) -> Callable[..., Any] | None:
     """Return a function that flies instead of the built-in simulator.
 
-    It takes ``(scenario, system, npcs, *, map, time_limit_s, guard)`` and returns a
-    ``pytest_garl.simulation.flight.Flight``.  It must be importable by name, because child
-    processes call it.
+    The function takes ``(scenario, system, npcs, *, map, time_limit_s, guard)`` and returns a
+    ``pytest_garl.Flight``.  It must be importable by name, because worker processes call it.
     """
