@@ -133,13 +133,7 @@ def baseline_from_ledger(path: Path) -> Baseline:
     sets = []
     for job, rows in searches:
         _check_npcs(path, job.npcs)
-        flights = [
-            (
-                parse_scenario(row.scenario),
-                CompletedFlight(result=row.result, sha256=row.sha256, record=Path()),
-            )
-            for row in rows
-        ]
+        flights = [(parse_scenario(row.scenario), row.completed(Path(job.flights))) for row in rows]
         if flights:
             sets.append(_set(job, flights, method))
     if not sets:

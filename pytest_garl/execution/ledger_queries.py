@@ -72,6 +72,13 @@ class LedgerQueries:
         """Return the flights of all searches in slot order, or those of one search."""
         return self._flights("? IN ('', search.id)", search)
 
+    def count_flights(self, search: str) -> int:
+        """Return the number of flights of a search that have a result."""
+        row = self._database.execute(
+            "SELECT count(*) FROM slot WHERE search = ? AND state = 'flown'", (search,)
+        ).fetchone()
+        return int(row[0])
+
     def violating(self) -> list[LedgerFlight]:
         """Return the flights of all searches that violated a property, in slot order."""
         return self._flights("json_extract(result, '$.verdict.primary') IS NOT NULL")

@@ -68,7 +68,7 @@ def case_requests(
     for search, signatures in _new_signatures(ledger, corpus, found).items():
         job = _job(ledger, search)
         map = job.load_map()
-        cap = len(ledger.queries.flights(search)) if shrinking.capped else None
+        cap = ledger.queries.count_flights(search) if shrinking.capped else None
         own = []
         for signature in signatures:
             assertion = assertions.get((search, signature))

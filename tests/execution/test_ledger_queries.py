@@ -54,3 +54,21 @@ def test_a_search_has_a_hash_and_a_time_of_its_own(tmp_path: Path) -> None:
         0.5,
         0.0,
     )
+
+
+def test_flights_are_those_with_a_result_in_slot_order(tmp_path: Path) -> None:
+    ledger = waiting_ledger(tmp_path / "ledger.sqlite")
+    claims = [ledger.queue.claim() for _ in range(2)]
+    for claim in reversed(claims):
+        assert claim is not None
+        ledger.queue.record(claim, flight_result("IV:dog" if claim is claims[1] else ""), "ab", 0.1)
+    flights = ledger.queries.flights()
+    assert [each.id.slot.index for each in flights] == [0, 1]
+    assert [each.signature for each in flights] == ["", "IV:dog"]
+    assert [each.id for each in ledger.queries.violating()] == [flights[1].id]
+    search = flights[0].id.search
+    assert ledger.queries.count_flights(search) == len(ledger.queries.flights(search)) == 2
+    assert ledger.queries.flights("another") == []
+    done = flights[1].completed(tmp_path)
+    assert (done.signature, done.sha256) == ("IV:dog", "ab")
+    assert done.record == flights[1].id.record(tmp_path)
