@@ -17,10 +17,9 @@ from pytest_garl.errors import BaselineError, PolicyError
 from pytest_garl.execution.batch import fly_all, temporary_pool
 from pytest_garl.execution.checkout import Checkout, describe
 from pytest_garl.execution.job import FlightJob, parse_job
-from pytest_garl.execution.ledger import Ledger
 from pytest_garl.execution.reference import BUILT_IN, Reference
 from pytest_garl.execution.result import CompletedFlight
-from pytest_garl.execution.stored_ledger import check_stored
+from pytest_garl.execution.stored_ledger import checked_ledger
 from pytest_garl.scenarios.files import parse_scenario
 from pytest_garl.scenarios.genes import WeatherRange, genome_for
 from pytest_garl.scenarios.maps.map import Map, load_map
@@ -121,15 +120,11 @@ def baseline_from_ledger(path: Path) -> Baseline:
     """Return the flights of a finished search; raise BaselineError if they make no baseline."""
     if not path.is_file():
         raise BaselineError(f"{path}: there is no ledger; run pytest --garl-budget=N first")
-    ledger = Ledger(path)
-    try:
-        check_stored(ledger)
+    with checked_ledger(path) as ledger:
         searches = [
             (parse_job(job), ledger.queries.flights(search)) for search, job in ledger.searches()
         ]
         method = str(ledger.fact("method") or "")
-    finally:
-        ledger.close()
     sets = []
     for job, rows in searches:
         _check_npcs(path, job.npcs)

@@ -1,10 +1,11 @@
-"""What a ledger holds from an earlier process, checked before anybody relies on it."""
+"""Ledgers of earlier runs: each is checked in full before it is read."""
 
 from __future__ import annotations
 
 import dataclasses
 import sqlite3
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import closing, contextmanager
 from pathlib import Path
 from typing import get_args
 
@@ -43,7 +44,7 @@ _TYPES = {
     },
     "meter": {"name": "text", "value": "real integer"},
 }
-"""SQLite keeps in any column whatever a damaged page says."""
+"""The types of values; SQLite itself accepts any type in any column of a damaged page."""
 _STATES = ("waiting", "claimed", "flown")
 
 
@@ -58,14 +59,12 @@ class StoredSlot:
 
 
 def read_slot(path: Path, map: str, slot: Slot) -> StoredSlot:
-    """Return a slot of the ledger at ``path``; raise LedgerError where there is none."""
+    """Return a slot of the ledger at ``path``; raise LedgerError if there is none."""
     if not path.is_file():
         raise LedgerError(
             f"there is no ledger at {path}; run a search first, or give a scenario file"
         )
-    ledger = Ledger(path)
-    try:
-        check_stored(ledger)
+    with checked_ledger(path) as ledger:
         found = ledger.queries.scenarios(slot.generation, slot.index, map)
         if not found:
             raise LedgerError(f"no such slot in {path}; it holds {_flown_slots(ledger)}")
@@ -75,8 +74,14 @@ def read_slot(path: Path, map: str, slot: Slot) -> StoredSlot:
             npcs=str(ledger.fact("npcs") or ""),
             scenarios={system: parse_scenario(text) for system, text in found.items()},
         )
-    finally:
-        ledger.close()
+
+
+@contextmanager
+def checked_ledger(path: Path) -> Iterator[Ledger]:
+    """Open a ledger of an earlier run and check it; raise LedgerError for a damaged one."""
+    with closing(Ledger(path)) as ledger:
+        check_stored(ledger)
+        yield ledger
 
 
 def stored_flight_s(path: Path) -> float | None:
@@ -103,7 +108,7 @@ def _flown_slots(ledger: Ledger) -> str:
 
 
 def check_stored(ledger: Ledger) -> None:
-    """Raise LedgerError that says what is wrong with a ledger's file; nothing for a sound one."""
+    """Raise LedgerError, with the first problem found, if a ledger is damaged."""
     problem = _problem(ledger)
     if problem:
         raise LedgerError(

@@ -80,7 +80,7 @@ def test_resumed_batch_refuses_another_version_of_the_system(
     assert fly(pool, changed, count=2) == [0, 1]
 
 
-def test_flight_does_not_see_what_another_system_replaced_in_its_process(tmp_path: Path) -> None:
+def test_flight_does_not_see_replacements_by_another_system(tmp_path: Path) -> None:
     with temporary_pool(1) as (ledger, pool):
 
         def hash_of(system: type, distance_m: float) -> str:

@@ -15,14 +15,14 @@ from tests.execution.ledgers import FACTS, result_of, waiting_ledger
 from tests.support.results import flight_result
 
 
-def test_slots_are_bred_the_same_way_or_not_at_all(tmp_path: Path) -> None:
+def test_ledger_refuses_other_scenarios_for_the_same_slots(tmp_path: Path) -> None:
     ledger = waiting_ledger(tmp_path / "ledger.sqlite")
     ledger.add_slots("s", 0, {0: "a", 1: "b"})
     with pytest.raises(LedgerError, match="generation 0 was bred in another way"):
         ledger.add_slots("s", 0, {1: "other"})
 
 
-def test_resuming_gives_back_what_was_in_flight(tmp_path: Path) -> None:
+def test_resumed_ledger_gives_back_slots_in_flight(tmp_path: Path) -> None:
     ledger = waiting_ledger(tmp_path / "ledger.sqlite")
     claim = ledger.queue.claim()
     assert claim is not None
@@ -36,7 +36,7 @@ def test_resuming_gives_back_what_was_in_flight(tmp_path: Path) -> None:
     assert (again.flight.slot.index, again.after) == (1, "")
 
 
-def test_a_new_run_keeps_the_ledger_before_it(tmp_path: Path) -> None:
+def test_new_run_keeps_the_previous_ledger(tmp_path: Path) -> None:
     first = waiting_ledger(tmp_path / "ledger.sqlite")
     first.close()
     Ledger.create(tmp_path / "ledger.sqlite", FACTS).close()
@@ -51,13 +51,13 @@ def test_a_new_run_keeps_the_ledger_before_it(tmp_path: Path) -> None:
         ({"seed": 3, "version": "2"}, "version was 1, is 2"),
     ],
 )
-def test_another_run_is_not_resumed(tmp_path: Path, facts: dict[str, Any], words: str) -> None:
+def test_resume_refuses_another_run(tmp_path: Path, facts: dict[str, Any], words: str) -> None:
     waiting_ledger(tmp_path / "ledger.sqlite").close()
     with pytest.raises(LedgerError, match=words):
         Ledger.resume(tmp_path / "ledger.sqlite", facts)
 
 
-def test_a_ledger_of_another_version_is_not_resumed(tmp_path: Path) -> None:
+def test_resume_refuses_a_ledger_of_another_version(tmp_path: Path) -> None:
     waiting_ledger(tmp_path / "ledger.sqlite").close()
     database = sqlite3.connect(tmp_path / "ledger.sqlite")
     database.execute("UPDATE run SET value = '1' WHERE key = 'ledger'")
@@ -68,7 +68,7 @@ def test_a_ledger_of_another_version_is_not_resumed(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("damage", ["text", "middle", "empty"])
-def test_a_damaged_ledger_is_one_clear_error(tmp_path: Path, damage: str) -> None:
+def test_resume_of_a_damaged_ledger_raises_one_clear_error(tmp_path: Path, damage: str) -> None:
     path = tmp_path / "ledger.sqlite"
     waiting_ledger(path).close()
     whole = path.read_bytes()
@@ -82,6 +82,6 @@ def test_a_damaged_ledger_is_one_clear_error(tmp_path: Path, damage: str) -> Non
         Ledger.resume(path, FACTS)
 
 
-def test_a_missing_ledger_is_not_resumed(tmp_path: Path) -> None:
+def test_resume_refuses_a_missing_ledger(tmp_path: Path) -> None:
     with pytest.raises(LedgerError, match="there is no ledger"):
         Ledger.resume(tmp_path / "ledger.sqlite", FACTS)

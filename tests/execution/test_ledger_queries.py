@@ -8,7 +8,7 @@ from tests.execution.ledgers import waiting_ledger
 from tests.support.results import crash, flight_result
 
 
-def test_where_a_process_was_when_it_was_ended_is_no_part_of_the_hash(tmp_path: Path) -> None:
+def test_hash_ignores_the_stacks_of_an_ended_process(tmp_path: Path) -> None:
     def flown(path: Path, text: str) -> str:
         ledger = waiting_ledger(path)
         claim = ledger.queue.claim()
@@ -19,7 +19,7 @@ def test_where_a_process_was_when_it_was_ended_is_no_part_of_the_hash(tmp_path: 
     assert flown(tmp_path / "one.sqlite", "line 3") == flown(tmp_path / "two.sqlite", "line 4")
 
 
-def test_the_hash_covers_results_not_costs(tmp_path: Path) -> None:
+def test_hash_covers_results_but_no_costs(tmp_path: Path) -> None:
     hashes = set()
     for wall_s in (0.1, 0.2):
         ledger = waiting_ledger(tmp_path / "ledger.sqlite")
@@ -32,7 +32,7 @@ def test_the_hash_covers_results_not_costs(tmp_path: Path) -> None:
     assert len(hashes) == 1
 
 
-def test_a_search_has_a_hash_and_a_time_of_its_own(tmp_path: Path) -> None:
+def test_each_search_has_its_own_hash_and_time(tmp_path: Path) -> None:
     def flown(path: Path, value: float) -> Ledger:
         ledger = waiting_ledger(path)
         ledger.add_search("t", "systems:Good", "lawn", 1, "{}")

@@ -13,7 +13,7 @@ from tests.execution.ledgers import FACTS, result_of, waiting_ledger
 from tests.support.results import flight_result
 
 
-def test_a_slot_is_handed_out_once_and_recorded_once(tmp_path: Path) -> None:
+def test_slot_is_claimed_once_and_recorded_once(tmp_path: Path) -> None:
     ledger = waiting_ledger(tmp_path / "ledger.sqlite")
     claims = [ledger.queue.claim() for _ in range(4)]
     assert [claim.flight.slot.index if claim else None for claim in claims] == [0, 1, 2, None]
@@ -24,7 +24,7 @@ def test_a_slot_is_handed_out_once_and_recorded_once(tmp_path: Path) -> None:
     assert ledger.queries.meters()["flights"] == 1
 
 
-def test_a_claim_of_a_silent_process_lapses(tmp_path: Path) -> None:
+def test_claim_of_an_unwatched_process_lapses_after_its_lease(tmp_path: Path) -> None:
     ledger = waiting_ledger(tmp_path / "ledger.sqlite")
     first = ledger.queue.claim(lease_s=-1.0)
     assert first is not None
@@ -38,7 +38,7 @@ def test_a_claim_of_a_silent_process_lapses(tmp_path: Path) -> None:
     assert other.flight.slot.index == 1
 
 
-def test_a_claim_of_a_child_that_lives_never_lapses(tmp_path: Path) -> None:
+def test_claim_of_a_living_worker_never_lapses(tmp_path: Path) -> None:
     """Its pool watches it: it may be silent for as long as it flies."""
     ledger = waiting_ledger(tmp_path / "ledger.sqlite")
     assert ledger.queue.register_worker(1, os.getpid)
@@ -48,7 +48,7 @@ def test_a_claim_of_a_child_that_lives_never_lapses(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(("lease_s", "kept"), [(3600.0, True), (-1.0, False)])
-def test_a_dead_child_is_left_to_its_pool_for_as_long_as_the_lease(
+def test_pool_has_the_lease_to_decide_on_the_slot_of_an_ended_worker(
     tmp_path: Path, lease_s: float, kept: bool
 ) -> None:
     path = tmp_path / "ledger.sqlite"
@@ -61,7 +61,7 @@ def test_a_dead_child_is_left_to_its_pool_for_as_long_as_the_lease(
     assert (ledger.queue.claim_of(child.pid) is not None) == kept
 
 
-def test_a_dead_child_whose_pool_is_gone_is_given_back_at_once(tmp_path: Path) -> None:
+def test_slot_is_given_back_at_once_if_worker_and_pool_have_ended(tmp_path: Path) -> None:
     path = tmp_path / "ledger.sqlite"
     ledger = waiting_ledger(path)
     with subprocess.Popen(["true"]) as child:
@@ -71,7 +71,7 @@ def test_a_dead_child_whose_pool_is_gone_is_given_back_at_once(tmp_path: Path) -
     assert ledger.queue.claim_of(child.pid) is None
 
 
-def test_nobody_flies_beside_a_slot_that_flies_again(tmp_path: Path) -> None:
+def test_no_slot_flies_beside_a_repeated_one(tmp_path: Path) -> None:
     ledger = waiting_ledger(tmp_path / "ledger.sqlite")
     first = ledger.queue.claim()
     assert first is not None
@@ -91,7 +91,7 @@ def test_nobody_flies_beside_a_slot_that_flies_again(tmp_path: Path) -> None:
     assert beside.flight.slot.index == 1
 
 
-def test_a_slot_flies_again_when_the_others_have_come_down(tmp_path: Path) -> None:
+def test_repeated_slot_waits_until_no_other_flies(tmp_path: Path) -> None:
     ledger = waiting_ledger(tmp_path / "ledger.sqlite")
     first, other = ledger.queue.claim(), ledger.queue.claim()
     assert first is not None
@@ -104,7 +104,7 @@ def test_a_slot_flies_again_when_the_others_have_come_down(tmp_path: Path) -> No
     assert again.flight == first.flight
 
 
-def test_a_run_that_is_resumed_twice_counts_no_attempt_of_what_was_in_flight(
+def test_run_resumed_twice_counts_no_attempts_of_slots_in_flight(
     tmp_path: Path,
 ) -> None:
     ledger = waiting_ledger(tmp_path / "ledger.sqlite")
@@ -122,7 +122,7 @@ def test_a_run_that_is_resumed_twice_counts_no_attempt_of_what_was_in_flight(
     assert beside.flight.slot.index == 1
 
 
-def test_process_that_has_flown_gets_slots_of_its_own_system_alone(tmp_path: Path) -> None:
+def test_used_worker_gets_slots_of_its_own_system_alone(tmp_path: Path) -> None:
     ledger = waiting_ledger(tmp_path / "ledger.sqlite")
     ledger.add_search("t", "systems:Other", "court", 2, "{}")
     ledger.add_slots("t", 0, {0: "d", 1: "e"})

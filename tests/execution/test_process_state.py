@@ -29,7 +29,9 @@ def no_alarm() -> Iterator[None]:
     signal.setitimer(signal.ITIMER_REAL, 0)
 
 
-def test_what_flights_import_and_hide_changes_nothing(state: ProcessState, tmp_path: Path) -> None:
+def test_imports_and_warning_filters_of_flights_are_no_change(
+    state: ProcessState, tmp_path: Path
+) -> None:
     from pytest_garl.execution.flight import fly_job
 
     fly_job(job_of(Good, tmp_path), scenario(), FlightId(search="flight", map="lawn"), None)
@@ -69,7 +71,7 @@ def another_built_in(patch: pytest.MonkeyPatch) -> None:
     "change",
     [limits_nothing, never_ends, no_zeros, another_module, another_folder, another_built_in],
 )
-def test_what_another_flight_would_meet_is_noticed(
+def test_change_that_another_flight_would_meet_is_noticed(
     state: ProcessState, change: Callable[[pytest.MonkeyPatch], None]
 ) -> None:
     assert not state.changed()
@@ -79,7 +81,7 @@ def test_what_another_flight_would_meet_is_noticed(
     assert not state.changed()
 
 
-def test_settings_of_libraries_are_noticed(state: ProcessState) -> None:
+def test_changed_settings_of_libraries_are_noticed(state: ProcessState) -> None:
     with np.errstate(all="raise"):
         assert state.changed()
     optimized = cv2.useOptimized()
@@ -89,12 +91,12 @@ def test_settings_of_libraries_are_noticed(state: ProcessState) -> None:
     assert not state.changed()
 
 
-def test_a_timer_that_runs_on_is_noticed(state: ProcessState, no_alarm: None) -> None:
+def test_running_timer_is_noticed(state: ProcessState, no_alarm: None) -> None:
     signal.setitimer(signal.ITIMER_REAL, 3600)
     assert state.changed()
 
 
-def test_a_process_that_runs_on_is_noticed(state: ProcessState) -> None:
+def test_running_process_is_noticed(state: ProcessState) -> None:
     with subprocess.Popen([sys.executable, "-c", "input()"], stdin=subprocess.PIPE) as left:
         assert state.changed()
         left.communicate(b"\n")

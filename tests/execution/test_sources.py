@@ -58,14 +58,14 @@ def lander(name: str) -> Any:
     return importlib.import_module(f"{name}.lander").Lander
 
 
-def test_imports_are_followed_wherever_they_stand(make: Make) -> None:
+def test_sources_follow_imports_anywhere_in_a_module(make: Make) -> None:
     _, name = make()
     assert {file for file, _ in sources_of(lander(name))} == {f"{name}/{file}" for file in OWN}
     assert f"{name}.late" not in sys.modules
 
 
 @pytest.mark.parametrize("file", sorted(OWN))
-def test_each_of_them_changes_the_hash(make: Make, file: str) -> None:
+def test_each_source_changes_the_hash(make: Make, file: str) -> None:
     folder, name = make()
     system = lander(name)
     before = sources_sha256(system)
@@ -75,7 +75,7 @@ def test_each_of_them_changes_the_hash(make: Make, file: str) -> None:
 
 
 @pytest.mark.parametrize("file", ["other.py", "test_lander.py"])
-def test_what_it_does_not_import_does_not_count(make: Make, file: str) -> None:
+def test_hash_ignores_modules_that_are_not_imported(make: Make, file: str) -> None:
     folder, name = make()
     system = lander(name)
     before = sources_sha256(system)
@@ -85,7 +85,7 @@ def test_what_it_does_not_import_does_not_count(make: Make, file: str) -> None:
     assert sources_sha256(system) == before
 
 
-def test_modules_beside_each_other_belong_together(
+def test_sources_include_modules_of_the_same_folder(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Without a package, as in the README."""
@@ -100,7 +100,7 @@ def test_modules_beside_each_other_belong_together(
     assert sources_sha256(system) != before
 
 
-def test_a_folder_of_data_means_all_in_it(tmp_path: Path) -> None:
+def test_folder_of_data_stands_for_all_its_files(tmp_path: Path) -> None:
     for name in ("model/a.bin", "model/deep/b.bin", "one.txt", "another.txt"):
         (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
         (tmp_path / name).write_text(name)

@@ -42,7 +42,7 @@ def _run(path: Path, sql: str, *values: Any) -> None:
     database.close()
 
 
-def test_a_sound_ledger_is_taken(path: Path) -> None:
+def test_check_accepts_a_sound_ledger(path: Path) -> None:
     _checked(path)
 
 
@@ -100,7 +100,9 @@ SCENARIO = "UPDATE slot SET scenario = ? WHERE slot = 1"
         ("UPDATE meter SET value = ?", "x", "meter.value: found text, expected real"),
     ],
 )
-def test_a_damaged_row_is_one_short_error(path: Path, sql: str, value: Any, words: str) -> None:
+def test_check_names_a_damaged_row_in_one_short_error(
+    path: Path, sql: str, value: Any, words: str
+) -> None:
     _run(path, sql, value)
     with pytest.raises(LedgerError, match=words) as caught:
         _checked(path)
@@ -111,13 +113,13 @@ def test_a_damaged_row_is_one_short_error(path: Path, sql: str, value: Any, word
 
 
 @pytest.mark.parametrize("table", ["run", "search", "slot", "meter"])
-def test_a_ledger_without_a_table_is_one_error(path: Path, table: str) -> None:
+def test_check_names_a_missing_table(path: Path, table: str) -> None:
     _run(path, f"DROP TABLE {table}")
     with pytest.raises(LedgerError, match=f"no such table: {table}"):
         _checked(path)
 
 
-def test_a_page_that_is_damaged_shows_as_an_error_of_the_ledger(path: Path) -> None:
+def test_query_on_a_damaged_page_raises_a_ledger_error(path: Path) -> None:
     ledger = Ledger(path)
     ledger.add_slots("a", 1, {slot: dump_scenario(scenario(0.1)) for slot in range(200)})
     ledger.database.execute("PRAGMA wal_checkpoint(TRUNCATE)")
@@ -136,7 +138,7 @@ def test_a_page_that_is_damaged_shows_as_an_error_of_the_ledger(path: Path) -> N
     ledger.close()
 
 
-def test_an_error_that_shows_while_rows_are_fetched_is_the_ledgers(tmp_path: Path) -> None:
+def test_error_during_the_fetch_of_rows_is_a_ledger_error(tmp_path: Path) -> None:
     database = Database(tmp_path / "some.sqlite")
     rows = "WITH RECURSIVE n(i) AS (SELECT 1 UNION ALL SELECT i + 1 FROM n WHERE i < 5000) "
     with pytest.raises(LedgerError, match=r"some.sqlite: malformed JSON"):
@@ -144,14 +146,14 @@ def test_an_error_that_shows_while_rows_are_fetched_is_the_ledgers(tmp_path: Pat
     database.close()
 
 
-def test_a_value_as_large_as_the_memory_is_refused(tmp_path: Path) -> None:
+def test_database_refuses_a_value_as_large_as_the_memory(tmp_path: Path) -> None:
     database = Database(tmp_path / "some.sqlite")
     with pytest.raises(LedgerError, match="string or blob too big"):
         database.execute("SELECT zeroblob(100000000)")
     database.close()
 
 
-def test_a_page_that_no_query_reads_is_found_too(path: Path) -> None:
+def test_check_finds_damage_in_a_page_that_no_query_reads(path: Path) -> None:
     database = sqlite3.connect(path)
     sql = "SELECT rootpage FROM sqlite_master WHERE name = 'slot_state'"
     (page,) = database.execute(sql).fetchone()
@@ -164,7 +166,7 @@ def test_a_page_that_no_query_reads_is_found_too(path: Path) -> None:
         _checked(path)
 
 
-def test_an_error_that_quotes_damaged_bytes_is_the_ledgers(path: Path) -> None:
+def test_error_that_quotes_damaged_bytes_is_a_ledger_error(path: Path) -> None:
     content = path.read_bytes()
     start = content.index(b"tablemetermeter")
     damaged = content[:start] + b"tablem\x8aterm\x8ater" + content[start + 15 :]
@@ -173,7 +175,7 @@ def test_an_error_that_quotes_damaged_bytes_is_the_ledgers(path: Path) -> None:
         _checked(path)
 
 
-def test_the_name_of_a_search_is_shortened(path: Path) -> None:
+def test_error_shortens_the_name_of_a_search(path: Path) -> None:
     _run(path, "UPDATE slot SET search = ? WHERE slot = 1", "9" * 5000)
     with pytest.raises(LedgerError, match=r"slot 0/1 of 999.*…9+: found no such search") as caught:
         _checked(path)

@@ -118,7 +118,7 @@ def undisturbed(tmp_path_factory: pytest.TempPathFactory) -> str:
 
 
 @pytest.mark.parametrize("system", [HoldsTheLock, StopsClocks])
-def test_a_call_that_hangs_is_a_finding_whatever_it_does_to_the_process(
+def test_call_that_hangs_is_a_finding_even_if_it_harms_the_process(
     field: Field, undisturbed: str, system: type
 ) -> None:
     flown = field.fly(system, timeout_s=0.5)
@@ -127,7 +127,7 @@ def test_a_call_that_hangs_is_a_finding_whatever_it_does_to_the_process(
     assert flown.neighbour == undisturbed
 
 
-def test_a_hang_is_told_with_the_line_where_it_was(field: Field) -> None:
+def test_hang_is_reported_with_its_line(field: Field) -> None:
     flown = field.fly(HoldsTheLock, timeout_s=0.5)
     assert "misbehaving.py" in crash_of(flown).traceback
     assert "in step" in crash_of(flown).traceback
@@ -141,15 +141,13 @@ def works_between_calls(*args: Any, guard: Any, **more: Any) -> Any:
     return tiny_simulator.fly(*args, guard=guard, **more)
 
 
-def test_the_time_of_the_simulator_is_not_charged_to_the_system(field: Field) -> None:
+def test_limit_of_a_call_ignores_the_simulators_time(field: Field) -> None:
     flown = field.fly(Good, timeout_s=2.0, simulator=works_between_calls)
     assert flown.result.outcome == "landed"
     assert "retried" not in flown.meters
 
 
-def test_a_slow_flight_counts_as_if_it_had_had_more_time_at_once(
-    field: Field, tmp_path: Path
-) -> None:
+def test_slow_flight_is_repeated_with_more_time_and_counts(field: Field, tmp_path: Path) -> None:
     flown = field.fly(Slow, timeout_s=1.0)
     calm, sha256, _ = fly_job(
         job_of(Slow, tmp_path / "calm"), scenario(), flight_of("flight"), None
@@ -158,7 +156,7 @@ def test_a_slow_flight_counts_as_if_it_had_had_more_time_at_once(
     assert flown.meters["retried"] == 1
 
 
-def test_a_process_that_dies_once_is_a_finding(field: Field, undisturbed: str) -> None:
+def test_process_that_dies_once_is_a_finding(field: Field, undisturbed: str) -> None:
     flown = field.fly(DiesOnce)
     assert flown.signature == "V:died:signal-11"
     assert "in step" in crash_of(flown).traceback
@@ -166,7 +164,7 @@ def test_a_process_that_dies_once_is_a_finding(field: Field, undisturbed: str) -
     assert flown.neighbour == undisturbed
 
 
-def test_a_process_that_dies_leaves_no_record_of_an_earlier_run(field: Field) -> None:
+def test_process_that_dies_leaves_no_record_of_an_earlier_run(field: Field) -> None:
     flights = field.folder / "flights"
     flights.mkdir()
     stale = flight_of("bad").record(flights)
@@ -176,19 +174,19 @@ def test_a_process_that_dies_leaves_no_record_of_an_earlier_run(field: Field) ->
     assert (flight_of("good", NEXT).record(flights)).is_file()
 
 
-def test_a_process_that_is_killed_once_is_flown_again(field: Field) -> None:
+def test_killed_process_is_flown_again(field: Field) -> None:
     flown = field.fly(KilledOnce)
     assert flown.signature == ""
     assert flown.meters["retried"] == 1
 
 
-def test_nobody_can_say_that_the_run_cannot_go_on(field: Field, undisturbed: str) -> None:
+def test_landing_system_cannot_report_that_the_run_must_end(field: Field, undisturbed: str) -> None:
     flown = field.fly(Pretends)
     assert flown.signature == "V:died:exit-status-86"
     assert flown.neighbour == undisturbed
 
 
-def test_what_a_flight_starts_ends_with_it(field: Field, undisturbed: str) -> None:
+def test_processes_started_in_a_flight_end_with_it(field: Field, undisturbed: str) -> None:
     flown = field.fly(LeavesProcesses)
     assert flown.signature == ""
     assert flown.neighbour == undisturbed
@@ -196,7 +194,7 @@ def test_what_a_flight_starts_ends_with_it(field: Field, undisturbed: str) -> No
     assert left("misbehaving.py") == set()
 
 
-def test_a_system_that_forks_is_flown_once(field: Field, undisturbed: str) -> None:
+def test_system_that_forks_is_flown_once(field: Field, undisturbed: str) -> None:
     flown = field.fly(Forks)
     assert flown.signature == ""
     assert flown.meters["flights"] == 2
@@ -214,7 +212,7 @@ def test_a_system_that_forks_is_flown_once(field: Field, undisturbed: str) -> No
         (WillNotEnd, ""),
     ],
 )
-def test_what_harms_the_process_harms_nobody_else(
+def test_harm_to_the_process_changes_no_other_flight(
     field: Field, undisturbed: str, system: type, signature: str
 ) -> None:
     flown = field.fly(system)
@@ -222,7 +220,7 @@ def test_what_harms_the_process_harms_nobody_else(
     assert flown.neighbour == undisturbed
 
 
-def test_a_simulator_that_fails_in_one_flight_alone_is_proved_by_the_reference_pilot(
+def test_reference_pilot_proves_the_simulator_after_a_failure(
     field: Field,
 ) -> None:
     message = crash_of(field.fly(ReplacesZeros)).message
@@ -263,7 +261,7 @@ def test_workers_that_end_before_they_fly_end_the_run(field: Field) -> None:
         wait_for(field.ledger, field.pool, flight_of("one", NEXT), field.folder, kill_all)
 
 
-def test_nothing_is_left_beside_the_ledger(tmp_path: Path) -> None:
+def test_pool_leaves_no_files_beside_the_ledger(tmp_path: Path) -> None:
     field = Field(tmp_path)
     field.fly(Good)
     field.pool.close()
@@ -271,7 +269,7 @@ def test_nothing_is_left_beside_the_ledger(tmp_path: Path) -> None:
     assert {path.name for path in tmp_path.iterdir()} == {"ledger.sqlite", "flights"}
 
 
-def test_a_process_that_nothing_changed_flies_on(field: Field) -> None:
+def test_unchanged_process_flies_on(field: Field) -> None:
     field.fly(Good)
     (first,) = field.pool._workers
     job = job_of(Good, field.folder)
@@ -288,7 +286,7 @@ def test_a_process_that_nothing_changed_flies_on(field: Field) -> None:
     assert list(field.pool._workers) == [first]
 
 
-def test_only_a_call_is_charged_until_nothing_goes_on_at_all(
+def test_limit_applies_to_calls_until_the_flight_stands_still(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     now = 1000.0
@@ -314,7 +312,7 @@ def test_only_a_call_is_charged_until_nothing_goes_on_at_all(
 
 
 @pytest.mark.long
-def test_a_thread_that_holds_the_interpreter_between_calls_is_a_finding(
+def test_thread_that_holds_the_interpreter_between_calls_is_a_finding(
     field: Field, undisturbed: str
 ) -> None:
     flown = field.fly(LeavesLock)

@@ -4,7 +4,7 @@ import subprocess
 import sys
 
 
-def test_a_flying_child_imports_neither_pymoo_nor_torch_nor_pytest() -> None:
+def test_worker_imports_neither_pymoo_nor_torch_nor_pytest() -> None:
     code = (
         "import sys\n"
         "import pytest_garl.execution.worker, pytest_garl.execution.job\n"

@@ -48,7 +48,7 @@ def crash(ledger: Ledger) -> Crash:
 @pytest.mark.parametrize(
     ("ended", "after"), [(KILLED, "killed"), (HUNG, "hung"), (BROKE, "failed")]
 )
-def test_what_the_machine_may_have_done_is_flown_again_when_nobody_else_flies(
+def test_exit_that_the_machine_may_have_caused_is_flown_again_alone(
     ledger: Ledger, ended: WorkerExit, after: str
 ) -> None:
     first, other = claimed(ledger), claimed(ledger)
@@ -64,7 +64,7 @@ def test_what_the_machine_may_have_done_is_flown_again_when_nobody_else_flies(
     assert ledger.queries.meters()["retried"] == 1
 
 
-def test_a_process_that_ends_itself_is_a_finding_at_once(ledger: Ledger) -> None:
+def test_process_that_ends_itself_is_a_finding_at_once(ledger: Ledger) -> None:
     retry_or_record(ledger.queue, claimed(ledger), DIED)
     result = result_of(ledger, FIRST_FLIGHT)
     assert result is not None
@@ -87,7 +87,7 @@ def test_a_process_that_ends_itself_is_a_finding_at_once(ledger: Ledger) -> None
         ),
     ],
 )
-def test_what_happens_again_alone_is_a_finding(
+def test_repeated_exit_is_a_finding(
     ledger: Ledger, ended: WorkerExit, signature: str, message: str
 ) -> None:
     first = claimed(ledger)
@@ -100,7 +100,7 @@ def test_what_happens_again_alone_is_a_finding(
     assert crash(ledger).message == message
 
 
-def test_three_flights_that_end_each_in_another_way_leave_it_undecided(ledger: Ledger) -> None:
+def test_three_flights_with_different_exits_are_inconclusive(ledger: Ledger) -> None:
     first = claimed(ledger)
     ledger.queue.record(claimed(ledger), flight_result(), "", 0.0)
     retry_or_record(ledger.queue, first, HUNG)
@@ -114,7 +114,7 @@ def test_three_flights_that_end_each_in_another_way_leave_it_undecided(ledger: L
     assert result.undecided.startswith("each of 3 flights ended its process in a different way")
 
 
-def test_a_finding_after_another_death_is_one(ledger: Ledger) -> None:
+def test_process_that_ends_itself_after_a_kill_is_a_finding(ledger: Ledger) -> None:
     first = claimed(ledger)
     ledger.queue.record(claimed(ledger), flight_result(), "", 0.0)
     retry_or_record(ledger.queue, first, KILLED)
@@ -122,7 +122,7 @@ def test_a_finding_after_another_death_is_one(ledger: Ledger) -> None:
     assert crash(ledger).message == "its process ended with signal 11"
 
 
-def test_what_is_given_back_is_flown_as_if_it_had_not_been_claimed(ledger: Ledger) -> None:
+def test_slot_that_is_given_back_counts_no_attempt(ledger: Ledger) -> None:
     first = claimed(ledger)
     ledger.queue.give_back(first)
     assert claimed(ledger) == first

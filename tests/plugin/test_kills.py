@@ -176,7 +176,7 @@ KILLS = [at_random] * RANDOM + [at_a_childs_start] * STARTING + [while_saving] *
 
 @pytest.mark.long
 @pytest.mark.parametrize("number", range(len(KILLS)))
-def test_a_killed_run_that_is_resumed_is_as_if_nothing_had_happened(
+def test_killed_run_resumes_with_the_same_results(
     tmp_path: Path, undisturbed: Outcome, number: int
 ) -> None:
     prey = Prey(made(tmp_path / "project"))

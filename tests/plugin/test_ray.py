@@ -131,7 +131,7 @@ def slow_hash(pytester: pytest.Pytester, undisturbed: dict[str, str]) -> str:
 class TestOnACluster:
     pytestmark = needs_ray
 
-    def test_a_campaign_finds_and_saves_the_same_as_the_local_pool(
+    def test_ray_pool_finds_and_saves_the_same_as_the_local_pool(
         self, pytester: pytest.Pytester, cluster: int
     ) -> None:
         project(pytester)
@@ -157,7 +157,7 @@ class TestOnACluster:
         assert result.ret in (0, 1)
         assert result_hash(pytester) == expected
 
-    def test_a_broken_system_is_the_same_finding_as_in_the_local_pool(
+    def test_broken_system_is_the_same_finding_as_in_the_local_pool(
         self, pytester: pytest.Pytester, cluster: int
     ) -> None:
         project(pytester)
@@ -170,7 +170,7 @@ class TestOnACluster:
         assert result_hash(pytester) == local
 
     @pytest.mark.parametrize("victim", ["worker", "driver"])
-    def test_what_is_killed_loses_nothing(
+    def test_killed_processes_lose_no_flight(
         self, pytester: pytest.Pytester, cluster: int, undisturbed: dict[str, str], victim: str
     ) -> None:
         slow_project(pytester)
@@ -193,7 +193,7 @@ class TestOnAClusterOfItsOwn:
     pytestmark = needs_ray
 
     @pytest.mark.parametrize("end", [signal.SIGINT, signal.SIGKILL])
-    def test_nothing_is_left_of_a_run_that_ends_early_and_any_pool_goes_on(
+    def test_interrupted_run_leaves_nothing_and_resumes_on_any_pool(
         self,
         pytester: pytest.Pytester,
         monkeypatch: pytest.MonkeyPatch,
@@ -225,7 +225,7 @@ class TestOnAClusterOfItsOwn:
         assert result_hash(pytester) == expected
 
 
-def test_without_ray_one_is_told_how_to_get_it(pytester: pytest.Pytester) -> None:
+def test_error_without_ray_says_how_to_install_it(pytester: pytest.Pytester) -> None:
     write_project(pytester.path)
     hidden = "import importlib.util\nimportlib.util.find_spec = lambda *names: None\n"
     pytester.makeconftest(hidden + CONFTEST)
@@ -236,7 +236,7 @@ def test_without_ray_one_is_told_how_to_get_it(pytester: pytest.Pytester) -> Non
 
 
 @pytest.mark.skipif(importlib.util.find_spec("ray") is None, reason="needs pytest-garl[ray]")
-def test_a_cluster_that_is_not_there_is_one_clear_error(
+def test_missing_cluster_is_one_clear_error(
     pytester: pytest.Pytester, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     project(pytester)
@@ -250,7 +250,7 @@ def test_a_cluster_that_is_not_there_is_one_clear_error(
     assert not (pytester.path / ".garl").exists()
 
 
-def test_a_ray_worker_is_never_the_pytest_process(pytester: pytest.Pytester) -> None:
+def test_worker_of_ray_is_never_the_pytest_process(pytester: pytest.Pytester) -> None:
     project(pytester)
     result = run(pytester, "--garl-budget=8", "--garl-workers=0", *ON_RAY)
     result.stderr.fnmatch_lines(["*--garl-workers: found '0', expected a whole number*least 1*"])

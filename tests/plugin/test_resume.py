@@ -112,7 +112,7 @@ MOMENTS = [
 
 
 @pytest.mark.parametrize("moment", MOMENTS)
-def test_a_killed_run_resumes_as_if_nothing_had_happened(
+def test_killed_run_resumes_with_the_same_results(
     pytester: pytest.Pytester, undisturbed: dict[str, str], moment: int
 ) -> None:
     slow_project(pytester)
@@ -169,7 +169,7 @@ def test_ctrl_c_leaves_no_orphan_and_a_ledger_that_resumes(pytester: pytest.Pyte
     assert query(ledger, f"SELECT count(*) {FLOWN}") == [(30,)]
 
 
-def test_a_second_run_in_the_same_folder_is_refused(pytester: pytest.Pytester) -> None:
+def test_second_run_in_the_same_folder_is_refused(pytester: pytest.Pytester) -> None:
     slow_project(pytester)
     process = start(pytester)
     wait_for(pytester.path / ".garl" / "ledger.sqlite", 1, process)
@@ -188,7 +188,7 @@ def test_a_second_run_in_the_same_folder_is_refused(pytester: pytest.Pytester) -
         (("--garl-weather=full",), "*weather was confined, is full*"),
     ],
 )
-def test_another_search_is_not_resumed(
+def test_resume_refuses_another_search(
     pytester: pytest.Pytester, args: tuple[str, ...], words: str
 ) -> None:
     slow_project(pytester)
@@ -200,7 +200,7 @@ def test_another_search_is_not_resumed(
     assert result_hash(pytester) == before
 
 
-def test_a_changed_system_is_not_resumed(pytester: pytest.Pytester) -> None:
+def test_resume_refuses_a_changed_system(pytester: pytest.Pytester) -> None:
     slow_project(pytester)
     run(pytester, *BUDGET)
     before = result_hash(pytester)
@@ -242,7 +242,7 @@ def weigh(path: Path, scale: float) -> None:
 @pytest.mark.parametrize(
     ("file", "text"), [("helper.py", b"speed = 2"), ("model/net.bin", b"other weights")]
 )
-def test_what_a_system_needs_is_part_of_it(
+def test_resume_refuses_changed_modules_and_data_of_a_system(
     composed: pytest.Pytester, file: str, text: bytes
 ) -> None:
     assert run(composed, *COMPOSED, "--garl-resume").ret in (0, 1)
@@ -254,7 +254,7 @@ def test_what_a_system_needs_is_part_of_it(
     assert result_hash(composed) == before
 
 
-def test_other_weights_of_the_policy_are_told(composed: pytest.Pytester) -> None:
+def test_resume_names_changed_weights_of_the_policy(composed: pytest.Pytester) -> None:
     weigh(composed.path / "policy.npz", 2.0)
     result = run(composed, *COMPOSED, "--garl-resume")
     assert result.ret == pytest.ExitCode.USAGE_ERROR
@@ -268,7 +268,7 @@ def test_other_weights_of_the_policy_are_told(composed: pytest.Pytester) -> None
         ("'net.bin'", "*mark.garl: files='net.bin': expected a list of paths*"),
     ],
 )
-def test_data_files_must_be_there(pytester: pytest.Pytester, files: str, words: str) -> None:
+def test_missing_data_file_is_an_error(pytester: pytest.Pytester, files: str, words: str) -> None:
     slow_project(pytester)
     marked = (pytester.path / "test_it.py").read_text()
     (pytester.path / "test_it.py").write_text(
@@ -280,7 +280,7 @@ def test_data_files_must_be_there(pytester: pytest.Pytester, files: str, words: 
 
 
 @pytest.mark.parametrize("budget", [1, 2, 7, 19, 60])
-def test_the_budget_is_exact(pytester: pytest.Pytester, budget: int) -> None:
+def test_budget_counts_flights_exactly(pytester: pytest.Pytester, budget: int) -> None:
     project(pytester)
     run(pytester, f"--garl-budget={budget}", "--garl-workers=0")
     ledger = pytester.path / ".garl" / "ledger.sqlite"
@@ -289,7 +289,7 @@ def test_the_budget_is_exact(pytester: pytest.Pytester, budget: int) -> None:
 
 
 @pytest.mark.parametrize("parallel", [(), ("-n2",)])
-def test_a_full_disk_ends_the_run_with_one_clear_error(
+def test_full_disk_ends_the_run_with_one_clear_error(
     pytester: pytest.Pytester, parallel: tuple[str, ...]
 ) -> None:
     """A limit on the size of files stands for the full disk."""

@@ -57,5 +57,5 @@ def test_folder_may_have_any_name() -> None:
         ("/tmp/ray/_ray_pkg_1f2", "/tmp/ray/_ray_pkg_1f2"),
     ],
 )
-def test_a_traceback_reads_as_at_home(here: str, home: str) -> None:
+def test_traceback_gets_local_paths(here: str, home: str) -> None:
     assert PATHS.to_local(here) == home
