@@ -105,7 +105,7 @@ def _row(run: _Run, system: type, calm: Scenario, undisturbed: str) -> Row:
 
 
 class _Run:
-    """A ledger and a pool of one child, as a search has them."""
+    """A ledger and a pool of one worker, as in a search."""
 
     def __init__(self, ledger: Ledger, pool: Pool, folder: Path) -> None:
         self._ledger, self._pool, self._folder = ledger, pool, folder

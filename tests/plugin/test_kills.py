@@ -46,7 +46,7 @@ corpus.write_text_atomically = slowly
 """
 PATIENCE_S = 240.0
 RANDOM, STARTING, SAVING = 30, 10, 10
-"""Kills at random moments, in a child's first moments, and while cases are saved."""
+"""Kills at random moments, in a worker's first moments, and while cases are saved."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -103,7 +103,7 @@ def undisturbed(tmp_path_factory: pytest.TempPathFactory) -> Outcome:
 
 
 class Prey:
-    """A run to be killed: its process, and those of its children."""
+    """A run to be killed: its process, and those of its workers."""
 
     def __init__(self, folder: Path) -> None:
         self.folder, self.process = folder, start(folder)
@@ -150,9 +150,9 @@ def at_random(prey: Prey, rng: random.Random) -> None:
 
 
 def at_a_childs_start(prey: Prey, rng: random.Random) -> None:
-    """Kill pytest, or the child itself, when a child has just been started."""
+    """Kill pytest or a worker when the worker has just been started."""
     if rng.random() < 0.5:
-        # The next one: it takes the place of a child that was killed.
+        # The next worker takes the place of one that was killed.
         prey.until(lambda: prey.flown() > 2)
         before = prey.workers()
         kill(*prey.flying()[:1])
@@ -181,7 +181,7 @@ def test_killed_run_resumes_with_the_same_results(
 ) -> None:
     prey = Prey(made(tmp_path / "project"))
     KILLS[number](prey, random.Random(number))
-    # A child that is killed does not end the run: its slot is flown once more.
+    # A killed worker does not end the run: its slot is flown once more.
     killed = prey.process.wait(PATIENCE_S) == -signal.SIGKILL
     before = query(
         prey.ledger, "SELECT search, generation, slot, sha256 FROM slot WHERE state = 'flown'"

@@ -1,4 +1,4 @@
-"""Flights inside pytest are flown by the baseline, or by a child where that comes too late."""
+"""Flights inside pytest use the baseline kernels; if it is too late for that, a worker flies."""
 
 from __future__ import annotations
 
