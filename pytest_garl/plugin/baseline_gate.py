@@ -1,11 +1,11 @@
-"""The gate against a baseline: one item per landing system and map that flies all its scenarios."""
+"""The gate against a baseline: one item per landing system and map flies all its scenarios."""
 
 from __future__ import annotations
 
 import os
-from collections.abc import Generator, Iterable, Iterator
+from collections.abc import Generator, Iterable, Iterator, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, NoReturn
 
 import pytest
 
@@ -25,11 +25,11 @@ from pytest_garl.plugin.run import Run
 from pytest_garl.plugin.target import Target
 
 GATE_REPORT = "garl.gate"
-"""The user property under which a gate's sentences reach the summary, also from xdist's workers."""
+"""The user property with one line that a gate reports; the summary writes them all."""
 
 
 def register(config: pytest.Config, options: Options) -> None:
-    """Add the gate to a session; raise UsageError for a file that is no baseline."""
+    """Add the gate to a session; raise UsageError if the file is no baseline."""
     assert options.baseline is not None
     try:
         baseline = load_baseline(options.baseline, options.map_folders)
@@ -58,11 +58,8 @@ class BaselineGateItem(pytest.Item):
             npcs = policy_spec(base.npcs)
             differing = incompatibilities(base, run.searches.job(self._target, npcs))
             if differing:
-                refused = f"gate FAILED: no fair comparison, {'; '.join(differing)}"
-                lines = [refused, "If that is wanted, save the baseline anew."]
-                self._tell(lines)
-                pytest.fail("\n".join(lines), pytrace=False)
-            found = compare_flights(
+                self._refuse(differing)
+            comparison = compare_flights(
                 base,
                 run.fly_all(self._target, npcs, [each.scenario for each in base.flights]),
                 load_map(base.map, run.options.map_folders),
@@ -72,20 +69,31 @@ class BaselineGateItem(pytest.Item):
             )
         except GarlError as error:
             abort_session(self, error)
-        caution = [f"note: {base.warning}"] if base.warning else []
-        self._tell([*found.report_lines(), *self._hint(found, run.options.baseline), *caution])
-        if not found.passed:
-            # The pairs are listed once, in the summary.
-            pytest.fail("\n".join(found.summary_lines()), pytrace=False)
+        warning = [f"note: {base.warning}"] if base.warning else []
+        hint = self._hint(comparison, run.options.baseline)
+        self._report([*comparison.report_lines(), *hint, *warning])
+        if not comparison.passed:
+            # The summary lists the pairs, so the failure does not.
+            pytest.fail("\n".join(comparison.summary_lines()), pytrace=False)
 
-    def _tell(self, lines: Iterable[str]) -> None:
+    def _refuse(self, differing: Sequence[str]) -> NoReturn:
+        """Fail because the landing system is not flown as the baseline was."""
+        lines = [
+            f"gate FAILED: no fair comparison, {'; '.join(differing)}",
+            "If the difference is intended, save a new baseline.",
+        ]
+        self._report(lines)
+        pytest.fail("\n".join(lines), pytrace=False)
+
+    def _report(self, lines: Iterable[str]) -> None:
         """Leave lines for the summary."""
         self.user_properties += [(GATE_REPORT, line) for line in (self.garl_gate.title, *lines)]
 
-    def _hint(self, found: Comparison, file: Path | None) -> Iterator[str]:
-        """Say how to look at a pair that is worse."""
+    def _hint(self, comparison: Comparison, file: Path | None) -> Iterator[str]:
+        """Yield the command that flies the first pair that is worse."""
         worse: tuple[PairResult, ...] = ("broke", "changed")
-        first = next((pair for result in worse for pair in found.with_result(result)), None)
+        pairs = (pair for result in worse for pair in comparison.with_result(result))
+        first = next(pairs, None)
         if first is not None:
             yield (
                 f"fly it: garl baseline scenario {file} {first.name} > one.toml; "
@@ -93,7 +101,7 @@ class BaselineGateItem(pytest.Item):
             )
 
     def reportinfo(self) -> tuple[os.PathLike[str] | str, int | None, str]:
-        """Return where the item comes from and what it is called."""
+        """Return the item's file and name."""
         return self.path, None, self.name
 
 
@@ -102,7 +110,7 @@ class BaselineGatePlugin:
 
     def __init__(self, options: Options, file: Path, baseline: Baseline) -> None:
         self._options, self._file, self._baseline = options, file, baseline
-        self._placed: set[tuple[str, str, str]] = set()
+        self._gates_made: set[tuple[str, str, str]] = set()
         self._gate_reports: dict[str, list[str]] = {}
         self._problem = ""
 
@@ -121,23 +129,23 @@ class BaselineGatePlugin:
         self, collector: pytest.Module | pytest.Class, marker: pytest.Mark
     ) -> Iterator[BaselineGateItem]:
         try:
-            subject = read_marker(marker, self._options)
+            marked = read_marker(marker, self._options)
         except GarlError as error:
             raise pytest.Collector.CollectError(f"{collector.nodeid}: {error}") from error
-        for map in subject.maps:
-            base = self._baseline.find(subject.system_name, map)
-            place = (str(collector.path), subject.system_name, map)
-            if base is not None and place not in self._placed:
-                self._placed.add(place)
+        for map in marked.maps:
+            base = self._baseline.find(marked.system_name, map)
+            gate = (str(collector.path), marked.system_name, map)
+            if base is not None and gate not in self._gates_made:
+                self._gates_made.add(gate)
                 yield BaselineGateItem.from_parent(
                     collector,
                     name=f"baseline[{base.title}]",
-                    target=subject.target(map, FIRST),
+                    target=marked.target(map, FIRST),
                     base=base,
                 )
 
     def pytest_collection_finish(self, session: pytest.Session) -> None:
-        """Refuse to begin where the command line asks for a gate and no selected test has one."""
+        """Refuse to begin if the command line asks for a gate and no selected test has one."""
         worker = is_xdist_worker(session.config)
         if not worker and not any(isinstance(item, BaselineGateItem) for item in session.items):
             problem = self._missing_gate()
@@ -145,7 +153,7 @@ class BaselineGatePlugin:
                 raise pytest.UsageError(problem)
 
     def pytest_runtest_logreport(self, report: pytest.TestReport) -> None:
-        """Remember what a gate says."""
+        """Remember the lines that a gate reports."""
         lines = [str(text) for key, text in report.user_properties if key == GATE_REPORT]
         if lines and report.when == "call":
             self._gate_reports[report.nodeid] = lines
@@ -169,24 +177,24 @@ class BaselineGatePlugin:
         )
 
     def pytest_report_header(self) -> str:
-        """Say what the gate will fly, at most."""
+        """Return how many flights the gate compares."""
         sets = ", ".join(f"{len(each.flights)} of {each.title}" for each in self._baseline.sets)
         return f"garl: gate against {self._file}: {sets}, level {self._options.level:g}"
 
     def pytest_terminal_summary(self, terminalreporter: Any) -> None:
-        """Show what each gate says."""
+        """Write what each gate reports."""
         if not self._gate_reports and not self._problem:
             return
         terminalreporter.section("garl: baseline", sep="=")
         if self._problem:
             terminalreporter.write_line(self._problem, red=True)
         for note in environment_changes(self._baseline):
-            terminalreporter.write_line(f"note: {note}; differences may be its doing")
+            terminalreporter.write_line(f"note: {note}; it may be the cause of differences")
         titles = {title for title, *_ in self._gate_reports.values()}
         for each in self._baseline.sets:
             if each.title not in titles:
                 terminalreporter.write_line(f"note: {each.title} was not flown")
-        for _, (title, answer, *lines) in sorted(self._gate_reports.items()):
-            terminalreporter.write_line(f"{title}: {answer}")
+        for _, (title, result, *lines) in sorted(self._gate_reports.items()):
+            terminalreporter.write_line(f"{title}: {result}")
             for line in lines:
                 terminalreporter.write_line(f"    {line}")

@@ -1,4 +1,4 @@
-"""Find the tests that found a saved case: the simulator, files and assertions they fly it with."""
+"""Collect the tests that found a saved case, with their simulator, files and assertions."""
 
 from __future__ import annotations
 
@@ -17,11 +17,11 @@ from pytest_garl.regressions.case import Case
 from pytest_garl.regressions.case_test_run import corpus_of_one, pytest_arguments
 from pytest_garl.regressions.reshrink import CaseSetup
 
-IMPORTED = "ignore::pytest.PytestAssertRewriteWarning"
-"""pytest warns that this package is imported already; a project may make errors of warnings."""
+_IGNORE_IMPORTED = "ignore::pytest.PytestAssertRewriteWarning"
+"""pytest warns that this package is imported already; a project may turn warnings into errors."""
 
 
-class _Collected:
+class _Collector:
     """A plugin that keeps what pytest collects."""
 
     def __init__(self) -> None:
@@ -31,39 +31,39 @@ class _Collected:
     def pytest_collection_finish(self, session: pytest.Session) -> None:
         """Keep the items, and the simulator of the project."""
         self.items = list(session.items)
-        own = session.config.hook.pytest_garl_fly(config=session.config)
-        self.simulator = reference_to(own) if own else BUILT_IN
+        fly = session.config.hook.pytest_garl_fly(config=session.config)
+        self.simulator = reference_to(fly) if fly else BUILT_IN
 
 
 def case_setup(case: Case, root: Path) -> CaseSetup:
     """Return how the tests that found a case fly and judge it."""
     if not case.test:
         return CaseSetup()
-    collected = _Collected()
+    collector = _Collector()
     with corpus_of_one(case, live=False) as folder, contextlib.chdir(root):
-        told = io.StringIO()
-        with contextlib.redirect_stdout(told), contextlib.redirect_stderr(told):
-            options = ["--collect-only", "-q", "--capture=no", f"-W{IMPORTED}"]
+        output = io.StringIO()
+        with contextlib.redirect_stdout(output), contextlib.redirect_stderr(output):
+            options = ["--collect-only", "-q", "--capture=no", f"-W{_IGNORE_IMPORTED}"]
             status = pytest.main(
-                [*pytest_arguments(case, folder, live=False), *options], [collected]
+                [*pytest_arguments(case, folder, live=False), *options], [collector]
             )
     tests = [
         (item, target)
-        for item in collected.items
+        for item in collector.items
         if isinstance(item, pytest.Function) and (target := target_of(item)) is not None
     ]
     if status not in (pytest.ExitCode.OK, pytest.ExitCode.NO_TESTS_COLLECTED):
-        raise GarlError(f"pytest could not collect {case.test}:\n{told.getvalue()}")
+        raise GarlError(f"pytest could not collect {case.test}:\n{output.getvalue()}")
     for item, target in tests:
         if case.own_test and item.originalname != case.own_test:
             continue
         return CaseSetup(
             user_assertion=ItemAssertion(item, target) if case.assertion else None,
-            simulator=collected.simulator,
+            simulator=collector.simulator,
             files=tuple(data_files(target.files, root).items()),
         )
     if not case.assertion:
-        return CaseSetup(simulator=collected.simulator)
+        return CaseSetup(simulator=collector.simulator)
     raise GarlError(
         f"the case {case.id} tests a property of your own, but its test {case.test!r} is not found "
         f"in {root}; run this where you run pytest, or correct the case's key 'test'"

@@ -43,7 +43,7 @@ from pytest_garl.plugin.outcomes import (
 )
 from pytest_garl.plugin.report_text import FailureText
 from pytest_garl.plugin.run import Run
-from pytest_garl.plugin.suggested_commands import shown
+from pytest_garl.plugin.suggested_commands import shown_path
 from pytest_garl.plugin.target import Target
 from pytest_garl.regressions.case import Case
 
@@ -107,7 +107,7 @@ class _Writer:
     @property
     def _case_file(self) -> str:
         entry = self.target.entry
-        return shown(entry.path, self.item.config) if entry is not None else ""
+        return shown_path(entry.path, self.item.config) if entry is not None else ""
 
     def write_failure(self, error: BaseException) -> None:
         """Write the outcome of a test that failed."""

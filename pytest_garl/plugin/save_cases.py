@@ -1,4 +1,4 @@
-"""After the items: confirm, shrink and save what the search found, and say so."""
+"""After the tests: confirm, shrink and save the violations that a search found, and report them."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from pytest_garl.errors import GarlError
 from pytest_garl.plugin.options import SHRINK
 from pytest_garl.plugin.progress import show_progress
 from pytest_garl.plugin.run import Run
-from pytest_garl.plugin.suggested_commands import shown
+from pytest_garl.plugin.suggested_commands import shown_path
 from pytest_garl.plugin.terminal_text import begin_line, counted, duration, width_of, wrapped
 from pytest_garl.plugin.user_assertions import collect_assertion
 from pytest_garl.regressions.case import Case
@@ -29,7 +29,8 @@ from pytest_garl.regressions.follow_up import (
 )
 from pytest_garl.regressions.forecast import remaining_work
 
-PILOT = {
+_PATCH = ".patch"
+_AVOIDABLE = {
     "live": "the reference pilot violates nothing",
     "recorded": "the reference pilot violates nothing unless it is pursued as well",
     "no": "UNAVOIDABLE, gates nothing",
@@ -37,17 +38,11 @@ PILOT = {
 
 
 def save_cases(run: Run, session: pytest.Session) -> None:
-    """Pursue new signatures; what comes of it is told in the summary."""
+    """Confirm, shrink and save each new signature; ``run.investigated`` keeps what came of it."""
     options, config = run.options, session.config
     reporter: Any = config.pluginmanager.get_plugin("terminalreporter")
     try:
-        for nodeid, signature in sorted(run.reported_failures.items()):
-            target, user_assertion = collect_assertion(session, nodeid)
-            run.user_assertions[target.search, signature] = user_assertion
-        shrinking = ShrinkBudget(each=options.shrink, capped=options.shrink_capped)
-        requests = case_requests(
-            run.ledger, options.corpus, shrinking, run.user_assertions, run.finding_tests
-        )
+        requests = _requests(run, session)
         if requests:
             most = sum(each.budget for each in divide_flights(requests))
             run.remaining = remaining_work(requests, _flight_s(run, requests), options.workers or 1)
@@ -71,6 +66,18 @@ def save_cases(run: Run, session: pytest.Session) -> None:
         run.save_problem = str(error)
 
 
+def _requests(run: Run, session: pytest.Session) -> tuple[CaseRequest, ...]:
+    """Return the new signatures, those of xdist's workers among them."""
+    for nodeid, signature in sorted(run.reported_failures.items()):
+        target, user_assertion = collect_assertion(session, nodeid)
+        run.user_assertions[target.search, signature] = user_assertion
+    options = run.options
+    shrinking = ShrinkBudget(each=options.shrink, capped=options.shrink_capped)
+    return case_requests(
+        run.ledger, options.corpus, shrinking, run.user_assertions, run.finding_tests
+    )
+
+
 def _saver(run: Run) -> Callable[[Case], Path | None]:
     """Return how to save a case: as a file, or as a patch if the tree must not change."""
     options = run.options
@@ -88,63 +95,65 @@ def _flight_s(run: Run, requests: Sequence[CaseRequest]) -> dict[str, float]:
     return {each.name: known.get((each.search, each.signature)) or any_s for each in requests}
 
 
-def saved_lines(pursued: tuple[InvestigatedSignature, ...], config: pytest.Config) -> list[str]:
+def saved_lines(investigated: Sequence[InvestigatedSignature], config: pytest.Config) -> list[str]:
     """Return the summary's lines about saved cases."""
-    lines: list[str] = []
-    patches = []
     width = width_of(config)
-    for each in pursued:
-        case = each.result.case
-        name = f"{each.system.split(':')[-1]} on {each.map}: {each.result.signature}"
-        if case is None:
-            lines.append(f"not saved: {name}: {each.result.reason}")
-            continue
-        if each.file is None:
-            lines.append(f"not saved: {name}: the same case is saved already")
-            continue
-        file = shown(each.file, config)
-        if each.file.suffix == ".patch":
-            patches.append(shlex.quote(file))
-        lines.append(f"{'patch' if each.file.suffix == '.patch' else 'saved'} {file}")
-        text = f"{case.violation.description} ({'; '.join(_facts(each, case))})"
-        lines.append(wrapped(text, width, first="    ", others="    "))
+    lines = [line for each in investigated for line in _lines_about(each, config, width)]
+    files = [each.file for each in investigated if each.file is not None]
+    patches = [shlex.quote(shown_path(file, config)) for file in files if file.suffix == _PATCH]
     if patches:
         lines.append("Nothing in the tree was changed (CI is set). To keep the cases:")
         lines.append(" \\\n        ".join(["    git apply", *patches]))
-    if any(each.file for each in pursued) and not patches:
-        text = (
+    elif files:
+        hint = (
             "New cases fail until they are fixed, committed, or accepted with `garl cases accept "
-            "FILE`. `garl cases show FILE` tells more of one."
+            "FILE`. `garl cases show FILE` says more about a case."
         )
-        lines.append(wrapped(text, width))
-    return [*lines, *_unreached(pursued, width)]
+        lines.append(wrapped(hint, width))
+    return [*lines, *_not_shrunk(investigated, width)]
 
 
-def _facts(each: InvestigatedSignature, case: Case) -> list[str]:
+def _lines_about(each: InvestigatedSignature, config: pytest.Config, width: int) -> list[str]:
+    """Return the file of a case and its description, or why nothing was saved."""
+    case = each.result.case
+    name = f"{each.system.split(':')[-1]} on {each.map}: {each.result.signature}"
+    if case is None:
+        return [f"not saved: {name}: {each.result.reason}"]
+    if each.file is None:
+        return [f"not saved: {name}: the same case is saved already"]
+    saved = "patch" if each.file.suffix == _PATCH else "saved"
+    text = f"{case.violation.description} ({'; '.join(_evidence(each, case))})"
+    return [
+        f"{saved} {shown_path(each.file, config)}",
+        wrapped(text, width, first="    ", others="    "),
+    ]
+
+
+def _evidence(each: InvestigatedSignature, case: Case) -> list[str]:
     """Return in words why a case may be believed, and what it cost."""
     evidence = case.evidence
     if not each.result.flights:
         return ["as the search found it, not shrunk"]
-    asked = [
+    robust = [
         f"{evidence.neighbours_failed} of {evidence.neighbours} neighbours fail too",
         *(["EDGE, gates nothing"] if case.edge else []),
-        PILOT[case.avoidable],
+        _AVOIDABLE[case.avoidable],
     ]
     return [
-        *(asked if evidence.neighbours else []),
+        *(robust if evidence.neighbours else []),
         f"shrinking removed {evidence.removed}",
         counted(each.result.flights, "flight"),
     ]
 
 
-def _unreached(pursued: tuple[InvestigatedSignature, ...], width: int) -> list[str]:
-    """Say which kinds are not shrunk, and how many flights would reach them."""
-    left = sum(not each.result.flights for each in pursued)
+def _not_shrunk(investigated: Sequence[InvestigatedSignature], width: int) -> list[str]:
+    """Return how many kinds are not shrunk, and how many flights it takes to shrink them."""
+    left = sum(not each.result.flights for each in investigated)
     if not left:
         return []
     text = (
-        f"{counted(left, 'kind')} of violation not shrunk: shrinking has no more flights than the "
-        f"search. --garl-shrink={SHRINK} has no such limit and reaches all of them (at most "
-        f"{SHRINK * len(pursued)} flights); `garl cases shrink FILE` shrinks a saved one."
+        f"{counted(left, 'kind')} of violation not shrunk: by default shrinking has no more "
+        f"flights than the search. --garl-shrink={SHRINK} shrinks all of them (at most "
+        f"{SHRINK * len(investigated)} flights); `garl cases shrink FILE` shrinks a saved case."
     )
     return [wrapped(text, width)]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from pytest_garl.plugin.suggested_commands import repeat_command, shown
+from pytest_garl.plugin.suggested_commands import repeat_command, shown_path
 from pytest_garl.plugin.terminal_text import wrapped
 from pytest_garl.reports.search_summary import SearchSummary, ViolationKind
 from pytest_garl.verdicts.paper_metrics import top_k
@@ -30,7 +30,7 @@ def search_table(search: SearchSummary, config: pytest.Config, width: int) -> li
 
 def repeat_kind_command(search: SearchSummary, kind: ViolationKind, config: pytest.Config) -> str:
     """Return the command that repeats the first flight of a kind."""
-    files = " ".join(shown(config.rootpath / file, config) for file in search.files)
+    files = " ".join(shown_path(config.rootpath / file, config) for file in search.files)
     return repeat_command(config, files, kind.first)
 
 

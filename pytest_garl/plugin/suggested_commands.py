@@ -1,4 +1,4 @@
-"""Commands that a report prints: they work where pytest was called, with its settings."""
+"""The commands that a report prints; they work in the folder where pytest was called."""
 
 from __future__ import annotations
 
@@ -18,18 +18,20 @@ _FOLDERS = ("garl_dir", "garl_cases")
 
 def repeat_command(config: pytest.Config, test: str, scenario: str) -> str:
     """Return the command that flies a scenario again in ``test``, a node id or several files."""
-    return " ".join(filter(None, ["pytest", test, f"--garl-repeat={scenario}", *settings(config)]))
+    return " ".join(
+        filter(None, ["pytest", test, f"--garl-repeat={scenario}", *_location_options(config)])
+    )
 
 
 def repeat_line(item: pytest.Item, target: Target) -> str:
-    """Return the line of a failure that tells how to fly its scenario again."""
+    """Return the line of a failure with the command that repeats its scenario."""
     nodeid: Any = item.nodeid
     test = f'"{item.config.cwd_relative_nodeid(nodeid)}"'
     return f"Repeat: {repeat_command(item.config, test, target.file or target.name)}"
 
 
-def settings(config: pytest.Config) -> list[str]:
-    """Return what the command line says about where things lie."""
+def _location_options(config: pytest.Config) -> list[str]:
+    """Return the options of the command line that set files and folders."""
     found = []
     for option, value in (("-c", config.option.inifilename), ("--rootdir", config.option.rootdir)):
         if value:
@@ -40,7 +42,7 @@ def settings(config: pytest.Config) -> list[str]:
     return found
 
 
-def shown(path: Path, config: pytest.Config) -> str:
+def shown_path(path: Path, config: pytest.Config) -> str:
     """Return a path as seen from where pytest was called."""
     here = config.invocation_params.dir
     found = path.relative_to(here) if path.is_relative_to(here) else path
