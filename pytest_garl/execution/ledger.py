@@ -25,6 +25,9 @@ from pytest_garl.execution.result import CompletedFlight, FlightResult, parse_re
 from pytest_garl.files.json_values import parse_json
 from pytest_garl.messages import shortened
 
+SESSION_FACT = "session "
+"""Prefix of the keys of facts that hold for one session of pytest; a resumed run forgets them."""
+
 
 class Ledger:
     """A run's facts, searches, slots and results; several processes may use it at once.
@@ -85,8 +88,7 @@ class Ledger:
                 "run without --garl-resume to begin anew"
             )
         ledger.queue.reset()
-        # The tests of this session report again what those of the interrupted one reported.
-        ledger.database.execute("DELETE FROM run WHERE key LIKE 'told %'")
+        ledger.database.execute("DELETE FROM run WHERE key LIKE ?", (f"{SESSION_FACT}%",))
         return ledger
 
     def close(self) -> None:

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from pytest_garl.execution.ledger import Ledger
+from pytest_garl.execution.ledger import SESSION_FACT, Ledger
 from pytest_garl.plugin.target import Target
 
 
@@ -19,7 +19,7 @@ class ReportClaims:
 
     def claim_slot(self, target: Target, nodeid: str) -> bool:
         """Return whether an item is the first that reports its slot."""
-        key = f"told slot {target.search} {target.slot.id(target.map)}"
+        key = f"{SESSION_FACT}slot {target.search} {target.slot.id(target.map)}"
         return bool(self.ledger.first_fact(key, nodeid) == nodeid)
 
     def claim_failure(self, key: str, slot: str, nodeid: str) -> str:
@@ -34,12 +34,12 @@ class ReportClaims:
 
     def note_ran(self, nodeid: str) -> None:
         """Note that a test has run; its claims are in the ledger by then."""
-        self.ledger.note_fact(f"told ran {nodeid}", value=True)
+        self.ledger.note_fact(f"{SESSION_FACT}ran {nodeid}", value=True)
 
     def has_run(self, nodeid: str) -> bool:
         """Return whether a test has run in any process."""
-        return bool(self.ledger.fact(f"told ran {nodeid}"))
+        return bool(self.ledger.fact(f"{SESSION_FACT}ran {nodeid}"))
 
 
 def _failure(key: str) -> str:
-    return f"told failure {key}"
+    return f"{SESSION_FACT}failure {key}"
