@@ -38,10 +38,10 @@ def garl_slot(request: pytest.FixtureRequest) -> Target:
 @pytest.fixture(scope="session")
 def npcs(request: pytest.FixtureRequest) -> PolicySpec:
     """Return the NPC policy; override this fixture in a conftest.py to choose another."""
-    from pytest_garl.adversary.catalogue import policy_spec
+    from pytest_garl.adversary.catalogue import DEFAULT_POLICY, policy_spec
 
     run = request.config.stash.get(RUN, None)
-    return policy_spec(run.options.npcs if run else "dqn")
+    return policy_spec(run.options.npcs if run else DEFAULT_POLICY)
 
 
 @pytest.fixture

@@ -16,7 +16,7 @@ def header(run: Run) -> str:
 def forecast(run: Run) -> list[str]:
     """Return how long all searches take together, if there are several."""
     options = run.options
-    sizes = run.searches.sizes()
+    sizes = run.search_sizes
     if not options.budget or options.workers is None or len(sizes) < 2:
         return []
     return [f"garl: {len(sizes)} searches, {_time_of(run, sum(sizes))}{_time_per_kind(run)}"]

@@ -108,10 +108,16 @@ def pytest_collection_finish(session: pytest.Session) -> None:
         from pytest_garl.plugin.options import options_of
 
         check_selection(options_of(config), session.items)
-    if RUN in config.stash or any(is_landing_item(item) for item in session.items):
-        from pytest_garl.plugin.startup import select_items
+    if RUN not in config.stash and any(is_landing_item(item) for item in session.items):
+        from pytest_garl.plugin.startup import begin_run
 
-        select_items(config, session.items)
+        begin_run(config)
+    run = config.stash.get(RUN, None)
+    if run is not None:
+        try:
+            run.select(session.items)
+        except GarlError as error:
+            raise pytest.UsageError(str(error)) from error
 
 
 @pytest.hookimpl(wrapper=True, trylast=True)

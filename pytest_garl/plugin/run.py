@@ -85,6 +85,8 @@ class Run:
     searches: Searches = field(init=False)
     items: dict[FlightId, list[SelectedItem]] = field(default_factory=dict)
     """The selected items that judge a flight."""
+    search_sizes: list[int] = field(default_factory=list)
+    """How many flights the selected items want of each search; saved cases are none."""
     results: dict[FlightId, CompletedFlight] = field(default_factory=dict)
     flight_s: float = FLIGHT_S
     on_wait: Callable[[], None] = field(default=lambda: None)
@@ -112,7 +114,10 @@ class Run:
         self.searches = Searches(options=self.options, ledger=self.ledger, simulator=self.simulator)
 
     def select(self, items: Sequence[pytest.Item]) -> None:
-        """Remember which flights the selected items want."""
+        """Remember which flights the selected items want.
+
+        Raises LedgerError if a search to resume flew something else.
+        """
         files: dict[str, set[str]] = {}
         for item in items:
             target = target_of(item)
@@ -124,9 +129,13 @@ class Run:
         # xdist's controller, which writes the summary and the progress line, has no items.
         for search, names in files.items():
             self.ledger.note_fact(f"files of {search}", " ".join(sorted(names)))
-        wanted = sum(self.searches.sizes())
-        if wanted:
-            self.ledger.note_fact(SELECTED, wanted)
+        wanted = self.searches.targets.values()
+        searched = [slots for slots in wanted if not any(each.entry for each in slots.values())]
+        self.search_sizes = [len(slots) for slots in searched]
+        if searched:
+            self.ledger.note_fact(SELECTED, sum(self.search_sizes))
+        if self.options.resume:
+            self.searches.check_resumed()
 
     def note_finding_test(self, search: str, signature: str, nodeid: str) -> None:
         """Remember which test failed for a violation: of several the first by name."""

@@ -48,11 +48,6 @@ class Searches:
         """Remember that an item is selected that tests this."""
         self.targets.setdefault(target.search, {})[target.slot] = target
 
-    def sizes(self) -> list[int]:
-        """Return how many flights the selected items want of each search; cases do not count."""
-        wanted = self.targets.values()
-        return [len(slots) for slots in wanted if not any(each.entry for each in slots.values())]
-
     def lower(self, target: Target) -> list[Target]:
         """Return what the selected items of lower slots of the same search test."""
         wanted = self.targets[target.search]

@@ -1,11 +1,10 @@
-"""Begin a run, or join the one that xdist's controller began: ledger, pool, selected items."""
+"""Begin a run, or join the one that xdist's controller began."""
 
 from __future__ import annotations
 
 import fcntl
 import os
 import sys
-from collections.abc import Sequence
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any, TextIO
@@ -53,19 +52,6 @@ def begin_run(config: pytest.Config) -> None:
         )
     except GarlError as error:
         raise pytest.UsageError(str(error)) from error
-
-
-def select_items(config: pytest.Config, items: Sequence[pytest.Item]) -> None:
-    """Tell the run which items are selected; saved cases begin a run if there is none yet."""
-    if RUN not in config.stash:
-        begin_run(config)
-    run: Run = config.stash[RUN]
-    run.select(items)
-    if run.options.resume:
-        try:
-            run.searches.check_resumed()
-        except GarlError as error:
-            raise pytest.UsageError(str(error)) from error
 
 
 def join_workers(config: pytest.Config) -> None:
