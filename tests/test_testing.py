@@ -133,7 +133,7 @@ class Misnamed(Climbs):
 
 
 @pytest.mark.parametrize("system", [Climbs, OpenCvLandingSystem])
-def test_a_good_system_passes(system: type) -> None:
+def test_check_accepts_a_good_system(system: type) -> None:
     check_landing_system(system, seconds=2)
 
 
@@ -152,12 +152,12 @@ def test_a_good_system_passes(system: type) -> None:
         (Silent, "step returned None"),
     ],
 )
-def test_what_is_wrong_is_named(system: type, words: str) -> None:
+def test_check_names_each_fault(system: type, words: str) -> None:
     with pytest.raises(LandingSystemError, match=words):
         check_landing_system(system, seconds=2)
 
 
-def test_a_class_inside_a_function_is_refused() -> None:
+def test_check_refuses_a_class_inside_a_function() -> None:
     class Inner(Climbs):
         pass
 
@@ -165,7 +165,7 @@ def test_a_class_inside_a_function_is_refused() -> None:
         check_landing_system(Inner)
 
 
-def test_check_flies_until_landed_and_says_how_far_off() -> None:
+def test_check_flies_until_landed_and_reports_the_distance() -> None:
     check = check_landing_system(ReferencePilot)
     assert len(check.flights) == 2
     assert check.flights[0].startswith("lawn: landed 0.0")
@@ -191,7 +191,7 @@ def test_check_finds_a_flight_that_depends_on_the_one_before() -> None:
         (Climbs, ["did not land within 120 s"]),
     ],
 )
-def test_check_warns_of_what_a_search_will_meet(system: type, words: list[str]) -> None:
+def test_check_warns_of_problems_of_a_search(system: type, words: list[str]) -> None:
     warnings = check_landing_system(system).warnings
     for each in words:
         assert any(each in warning for warning in warnings), warnings

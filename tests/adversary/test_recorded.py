@@ -6,13 +6,18 @@ import math
 import numpy as np
 import pytest
 
+from pytest_garl.adversary.catalogue import policy_spec
 from pytest_garl.adversary.recorded import LANDING_ZONE_M, recorded_spec
+from pytest_garl.errors import PolicyError
 from pytest_garl.scenarios.chromosome import decode
 from pytest_garl.scenarios.genes import genome_for
 from pytest_garl.scenarios.maps.map import load_map
 from pytest_garl.scenarios.placement import start_genes
+from pytest_garl.search.methods.random import propose
+from pytest_garl.simulation.fly import fly
 from pytest_garl.simulation.npc_policy import DECISION_STEP_S, Situation
 from pytest_garl.simulation.physics.npc import Npc
+from pytest_garl.simulation.system_under_test.reference_pilot import ReferencePilot
 
 LAWN = load_map("lawn")
 GENOME = genome_for(LAWN)
@@ -93,3 +98,38 @@ def test_an_npc_leaves_past_trees_and_the_edge_of_the_map(
 
 def test_the_way_out_repeats() -> None:
     assert walked(((0.6, 0.8),), (-1.0, 0.0)) == walked(((0.6, 0.8),), (-1.0, 0.0))
+
+
+SCENARIO = propose(LAWN, genome_for(LAWN), 5, 0, 1)[0]
+
+
+@pytest.mark.sim
+def test_recorded_moves_give_the_identical_flight() -> None:
+    live = fly(SCENARIO, ReferencePilot, policy_spec("random_walk"), time_limit_s=12)
+    moves = {item.name: [(float(x), float(y)) for x, y in item.moves] for item in live.objects}
+    again = fly(SCENARIO, ReferencePilot, recorded_spec(moves), time_limit_s=12)
+    assert again.sha256 == live.sha256
+
+
+@pytest.mark.sim
+def test_reference_pilot_waits_until_the_recorded_person_has_left() -> None:
+    genome = genome_for(LAWN)
+    nominal = decode(genome.nominal, genome, map="lawn", seed=3)
+    names = [name for name, _ in LAWN.object_names]
+    alone = nominal.without(*(name for name in names if name != "person-1"))
+    start = start_genes("person-1", (4.0, 0.0), LAWN)
+    scenario = alone.replace({**start, "person-1.velocity": 0.5, "marker.x": 0.0, "marker.y": 0.0})
+    # It stands, walks onto the marker while a pilot would come down, and there the record ends.
+    moves = ((0.0, 0.0),) * 20 + ((-1.0, 0.0),) * 6 + ((0.0, 0.0),)
+    flight = fly(scenario, ReferencePilot, recorded_spec({"person-1": moves}), time_limit_s=60)
+    assert flight.outcome == "landed"
+    heights = flight.uav.position_m[:, 2]
+    turns = np.flatnonzero(np.diff(np.sign(np.diff(heights[::20]))))
+    assert len(turns) >= 2, "it climbed again before it landed"
+    x, y = flight.objects[0].track.position_m[-1, :2]
+    assert np.hypot(x, y) >= LANDING_ZONE_M
+
+
+def test_object_without_recorded_moves_is_refused() -> None:
+    with pytest.raises(PolicyError, match="recorded moves: none for"):
+        fly(SCENARIO, ReferencePilot, recorded_spec({"cat-1": []}), time_limit_s=1)

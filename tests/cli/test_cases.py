@@ -93,7 +93,7 @@ def repaired() -> None:
     Path("broken").unlink()
 
 
-def test_list_and_show_tell_what_it_is(file: Path) -> None:
+def test_list_and_show_describe_a_case(file: Path) -> None:
     listed = garl("list")
     assert "stack_of_test/lawn-V-ZeroDivisionError-" in listed.output
     assert "open" in listed.output
@@ -103,7 +103,7 @@ def test_list_and_show_tell_what_it_is(file: Path) -> None:
     assert "a person of up to 0.00 m/s" in shown
 
 
-def test_list_tells_what_is_new_until_it_is_accepted(file: Path) -> None:
+def test_list_names_new_cases_until_they_are_accepted(file: Path) -> None:
     new = garl("list").output
     assert "pytest fails on them until they are fixed, committed or accepted" in new
     assert new.endswith(f"garl cases accept {file}\n")
@@ -111,7 +111,7 @@ def test_list_tells_what_is_new_until_it_is_accepted(file: Path) -> None:
     assert "garl cases accept" not in garl("list").output
 
 
-def test_nothing_is_said_of_neighbours_where_none_was_tried(file: Path) -> None:
+def test_show_omits_neighbours_if_none_was_flown(file: Path) -> None:
     case = load_case(file)
     evidence = dataclasses.replace(case.evidence, neighbours=0, neighbours_failed=0)
     file = replace_file(file, dataclasses.replace(case, evidence=evidence))
@@ -119,7 +119,7 @@ def test_nothing_is_said_of_neighbours_where_none_was_tried(file: Path) -> None:
     assert "0/0" not in garl("list").output
 
 
-def test_replay_answers_failed_then_fixed_and_promote_believes_only_the_latter(file: Path) -> None:
+def test_promote_requires_a_replay_that_is_fixed(file: Path) -> None:
     failed = garl("replay", file)
     assert failed.output.startswith("FAILED\nV:ZeroDivisionError@stack_of_test.step")
     assert failed.exit_code == 1
@@ -134,7 +134,7 @@ def test_replay_answers_failed_then_fixed_and_promote_believes_only_the_latter(f
     assert load_case(file).status == "fixed"
 
 
-def test_what_passes_in_another_world_is_stale_and_can_be_pruned(file: Path) -> None:
+def test_prune_deletes_a_case_that_passes_on_a_changed_map(file: Path) -> None:
     file.write_text(file.read_text().replace(LAWN.sha256, "0" * 64))
     assert garl("replay", file).exit_code == 1
     assert "1 cases are not stale" in garl("prune", "--yes").output
@@ -147,7 +147,7 @@ def test_what_passes_in_another_world_is_stale_and_can_be_pruned(file: Path) -> 
     assert not file.exists()
 
 
-def test_shrinking_goes_on(file: Path) -> None:
+def test_shrink_simplifies_a_saved_case(file: Path) -> None:
     result = garl("shrink", file, "--flights=20", "--workers=0")
     assert result.exit_code == 0, result.output
     (path,) = Path("scenarios/regressions/stack_of_test").glob("*.toml")
@@ -157,7 +157,7 @@ def test_shrinking_goes_on(file: Path) -> None:
     assert case.status == "open"
 
 
-def test_what_does_not_fail_any_more_is_not_shrunk(file: Path) -> None:
+def test_shrink_refuses_a_case_that_passes(file: Path) -> None:
     before = file.read_text()
     repaired()
     told = garl("shrink", file, "--workers=0").output
@@ -175,20 +175,20 @@ def test_check_names_every_problem(file: Path) -> None:
     assert checked.exit_code == 1
 
 
-def test_a_missing_system_is_one_clear_error(file: Path) -> None:
+def test_missing_system_gives_one_clear_error(file: Path) -> None:
     file.write_text(file.read_text().replace("stack_of_test:Lander", "stack_of_test:Landr"))
     result = garl("replay", file)
     assert "system 'stack_of_test:Landr': cannot be imported from" in result.output
     assert result.exit_code == 1
 
 
-def test_a_replay_draws_a_film(file: Path) -> None:
+def test_replay_draws_a_video(file: Path) -> None:
     pytest.importorskip("imageio_ffmpeg")
     assert "drawn: it.mp4" in garl("replay", file, "--video=it.mp4").output
     assert Path("it.mp4").read_bytes()[4:8] == b"ftyp"
 
 
-def test_a_list_shows_signatures_as_they_are_and_no_animals(tmp_path: Path) -> None:
+def test_list_shows_signatures_without_emoji(tmp_path: Path) -> None:
     Corpus(tmp_path).save(dog_case())
     listed = CliRunner().invoke(
         main, ["cases", "--folder", str(tmp_path), "list"], env={"COLUMNS": "200"}
@@ -196,7 +196,7 @@ def test_a_list_shows_signatures_as_they_are_and_no_animals(tmp_path: Path) -> N
     assert "IV:dog:last-metre:unseen" in listed.output
 
 
-def test_no_escape_sequence_of_a_case_or_a_name_reaches_the_terminal(file: Path) -> None:
+def test_commands_print_no_escape_sequences_of_cases_or_names(file: Path) -> None:
     text = file.read_text()
     hostile = text.replace("V:ZeroDivisionError@", "[red]\\u001b[2J:[/x]@")
     hostile = hostile.replace("raised: ZeroDivisionError", "raised \\u202e: ZeroDivisionError")
@@ -228,9 +228,7 @@ def test_no_escape_sequence_of_a_case_or_a_name_reaches_the_terminal(file: Path)
         ("def", "SyntaxError"),
     ],
 )
-def test_a_module_that_raises_while_it_is_imported_is_one_problem(
-    file: Path, code: str, words: str
-) -> None:
+def test_check_names_a_module_that_raises_on_import(file: Path, code: str, words: str) -> None:
     Path("stack_of_test.py").write_text(code)
     checked = garl("check")
     assert words in checked.output
@@ -239,7 +237,7 @@ def test_a_module_that_raises_while_it_is_imported_is_one_problem(
 
 
 @pytest.mark.parametrize("system", ["../../x:Straight", "x.:Straight", "x:Stra ight", "/x:y"])
-def test_a_system_that_is_no_name_is_imported_from_nowhere(
+def test_invalid_system_name_is_never_imported(
     file: Path, system: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     real = importlib.import_module
@@ -256,7 +254,7 @@ def test_a_system_that_is_no_name_is_imported_from_nowhere(
         assert told.exit_code == 1
 
 
-def test_a_list_in_a_pipe_has_whole_names(file: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_list_in_a_pipe_keeps_whole_names(file: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("COLUMNS", "40")
     output = garl("list").output
     assert f"{file.parent.name}/{file.stem} " in output
@@ -264,7 +262,7 @@ def test_a_list_in_a_pipe_has_whole_names(file: Path, monkeypatch: pytest.Monkey
     assert "…" not in output
 
 
-def test_a_video_without_an_encoder_is_refused_before_the_flight(
+def test_video_without_an_encoder_is_refused_before_the_flight(
     file: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setitem(sys.modules, "imageio_ffmpeg", None)

@@ -65,7 +65,7 @@ def saved(project: Path, kind: str) -> Path:
     return path.relative_to(project)
 
 
-def test_a_repaired_system_is_fixed_and_promoted(project: Path) -> None:
+def test_promote_accepts_a_repaired_system(project: Path) -> None:
     dog = saved(project, "IV-dog")
     failed = garl("replay", dog)
     assert failed.output.startswith("FAILED\nIV:dog:")
@@ -82,7 +82,7 @@ def test_a_repaired_system_is_fixed_and_promoted(project: Path) -> None:
     assert load_case(dog).status == "fixed"
 
 
-def test_a_property_of_ones_own_is_judged_by_its_own_test(project: Path) -> None:
+def test_own_test_judges_an_own_property(project: Path) -> None:
     own = saved(project, "own")
     failed = garl("replay", own)
     assert failed.output.startswith("FAILED\n")
@@ -91,7 +91,7 @@ def test_a_property_of_ones_own_is_judged_by_its_own_test(project: Path) -> None
     assert load_case(own).status == "open"
 
 
-def test_a_case_that_still_fails_under_its_own_test_is_never_pruned(project: Path) -> None:
+def test_prune_keeps_cases_that_fail_in_their_own_test(project: Path) -> None:
     own = saved(project, "own")
     change(own, 'map_sha256 = "', 'map_sha256 = "0')
     before = own.read_text()
@@ -99,13 +99,13 @@ def test_a_case_that_still_fails_under_its_own_test_is_never_pruned(project: Pat
     assert own.read_text() == before
 
 
-def test_a_case_of_an_older_file_finds_its_own_test_by_name(project: Path) -> None:
+def test_case_of_an_older_file_finds_its_test_by_name(project: Path) -> None:
     own = saved(project, "own")
     change(own, '"test_it.py::test_own"', '"test_own"')
     assert garl("replay", own).output.startswith("FAILED\n")
 
 
-def test_a_pass_since_the_simulator_changed_is_stale_for_all(project: Path) -> None:
+def test_pass_on_a_changed_simulator_is_stale(project: Path) -> None:
     dog = saved(project, "IV-dog")
     change(project / "tiny_simulator.py", "> 0.7 and", "> 7 and")
     stale = garl("replay", dog)
@@ -127,7 +127,7 @@ def test_a_pass_since_the_simulator_changed_is_stale_for_all(project: Path) -> N
     assert not dog.exists()
 
 
-def test_a_test_that_asks_less_does_not_make_a_case_fixed(project: Path) -> None:
+def test_weaker_test_does_not_make_a_case_fixed(project: Path) -> None:
     dog = saved(project, "IV-dog")
     change(project / "test_it.py", "assert not landing.collisions", "assert True")
     assert "the recorded one to the byte" in garl("replay", dog).output
@@ -135,7 +135,7 @@ def test_a_test_that_asks_less_does_not_make_a_case_fixed(project: Path) -> None
     assert load_case(dog).status == "open"
 
 
-def test_another_test_of_the_file_that_fails_keeps_it_open(project: Path) -> None:
+def test_failure_of_another_test_of_the_file_keeps_a_case_open(project: Path) -> None:
     dog = saved(project, "IV-dog")
     dodge(project)
     change(project / "test_it.py", "< 100", "< 1")
@@ -143,7 +143,9 @@ def test_another_test_of_the_file_that_fails_keeps_it_open(project: Path) -> Non
 
 
 @pytest.mark.parametrize("outcome", ["aborted", "inconclusive"])
-def test_what_gave_up_is_told_and_what_is_undecided_is_refused(project: Path, outcome: str) -> None:
+def test_promote_reports_an_abort_and_refuses_an_undecided_case(
+    project: Path, outcome: str
+) -> None:
     dog = saved(project, "IV-dog")
     dodge(project)
     end = "    flight = Flight(\n"
@@ -177,14 +179,14 @@ def simulator_is_as_it_was(file: Path) -> None:
     )
 
 
-def test_a_case_whose_test_is_gone_is_judged_by_the_verdict_which_is_told(project: Path) -> None:
+def test_built_in_verdict_judges_a_case_without_its_test(project: Path) -> None:
     dog = saved(project, "IV-dog")
     change(project / "test_it.py", "def test_collisions", "def test_hits")
     replayed = garl("replay", dog)
     assert "judged by the built-in verdict: the test test_it.py::test_collisions" in replayed.output
 
 
-def test_a_file_that_cannot_be_collected_is_one_clear_error(project: Path) -> None:
+def test_file_that_cannot_be_collected_gives_one_clear_error(project: Path) -> None:
     change(project / "test_it.py", "import pytest", "import pytestt")
     result = garl("replay", saved(project, "IV-dog"))
     assert "pytest could not fly the case" in result.output
@@ -192,7 +194,7 @@ def test_a_file_that_cannot_be_collected_is_one_clear_error(project: Path) -> No
     assert result.exit_code == 1
 
 
-def test_a_case_of_a_property_of_ones_own_is_shrunk_by_its_test(project: Path) -> None:
+def test_shrink_uses_the_test_of_an_own_property(project: Path) -> None:
     own = saved(project, "own")
     case = load_case(own)
     foggy = case.scenario.replace({"environment.dust": 0.1, "environment.snow": 0.14})
@@ -205,12 +207,12 @@ def test_a_case_of_a_property_of_ones_own_is_shrunk_by_its_test(project: Path) -
     assert garl("replay", saved(project, "own")).output.startswith("FAILED")
 
 
-def test_a_case_is_shrunk_where_warnings_are_errors(project: Path) -> None:
+def test_shrink_works_if_warnings_are_errors(project: Path) -> None:
     (project / "pytest.ini").write_text("[pytest]\nfilterwarnings = error\n")
     assert "flights)" in shrunk(saved(project, "IV-dog"), 9)
 
 
-def test_a_case_as_simple_as_can_be_stays_as_it_is(project: Path) -> None:
+def test_shrink_keeps_the_simplest_case(project: Path) -> None:
     dog = saved(project, "IV-dog")
     shrunk(dog, 60)
     dog = saved(project, "IV-dog")
@@ -222,13 +224,13 @@ def test_a_case_as_simple_as_can_be_stays_as_it_is(project: Path) -> None:
 
 
 @pytest.mark.parametrize("flights", ["0", "8", "-3"])
-def test_too_few_flights_to_shrink_a_case_are_refused(project: Path, flights: str) -> None:
+def test_shrink_refuses_too_few_flights(project: Path, flights: str) -> None:
     result = garl("shrink", saved(project, "IV-dog"), f"--flights={flights}")
     assert result.exit_code == 2
     assert "--flights" in result.output
 
 
-def test_check_names_a_test_whose_file_is_gone(project: Path) -> None:
+def test_check_names_a_test_without_file(project: Path) -> None:
     assert garl("check").exit_code == 0
     change(saved(project, "IV-dog"), '"test_it.py::', '"test_that.py::')
     checked = garl("check")

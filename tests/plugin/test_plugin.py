@@ -362,7 +362,7 @@ def test_a_bad_marker_is_one_clear_error_and_other_tests_run(
     result.assert_outcomes(passed=1, errors=1)
 
 
-def test_a_class_inside_a_function_is_refused(pytester: pytest.Pytester) -> None:
+def test_check_refuses_a_class_inside_a_function(pytester: pytest.Pytester) -> None:
     project(pytester)
     pytester.makepyfile(
         test_it=TESTS.format(system="make()", maps="['lawn']").replace(

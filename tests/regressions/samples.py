@@ -3,16 +3,24 @@
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Callable
+from pathlib import Path
 
 import numpy as np
 
+from pytest_garl.adversary.catalogue import policy_spec
+from pytest_garl.execution.job import FlightJob
+from pytest_garl.execution.reference import Reference
+from pytest_garl.execution.result import CompletedFlight, FlightResult
 from pytest_garl.regressions.case import Case, Evidence, Violation
+from pytest_garl.regressions.case_request import CaseRequest
 from pytest_garl.scenarios.chromosome import decode
 from pytest_garl.scenarios.genes import genome_for
 from pytest_garl.scenarios.maps.map import load_map
 from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.scenarios.validity import repair
 from pytest_garl.verdicts.verdict import Limits
+from tests.support.results import flight_result
 
 LAWN = load_map("lawn")
 NAMES = [name for name, _ in LAWN.object_names]
@@ -67,3 +75,53 @@ def violation(seed: int = 7) -> Scenario:
     genome = genome_for(LAWN)
     row = genome.random(np.random.default_rng(seed))
     return repair(decode(row, genome, map="lawn", seed=1), LAWN)
+
+
+FIRST = violation().replace({f"{COLLIDING_OBJECT}.velocity": 0.9, "environment.fog": 0.12})
+SIGNATURE = "IV:dog:last-metre:unseen"
+Fails = Callable[[Scenario, str], bool]
+JOB = FlightJob.for_system(
+    Reference(module="stack.landing", file="", qualname="Lander"),
+    LAWN,
+    policy_spec("stationary"),
+    system_sha256="ab" * 32,
+    path=(),
+    flights=Path("/nowhere"),
+)
+
+
+def collision_result(signature: str) -> FlightResult:
+    """Return the result of a collision with a signature, or of a landing without one."""
+    return flight_result(signature, collisions=(COLLIDING_OBJECT,) if signature else ())
+
+
+class FakeFlights:
+    """Stands for the simulator: ``fails`` gets scenario and NPC policy; flights are counted."""
+
+    def __init__(self, fails: Fails) -> None:
+        self.fails, self.count = fails, 0
+
+    def __call__(self, job: FlightJob, scenario: Scenario) -> CompletedFlight:
+        self.count += 1
+        pilot = job.system.qualname == "ReferencePilot"
+        failed = not pilot and self.fails(scenario, job.npcs.name)
+        return CompletedFlight(
+            result=collision_result(SIGNATURE if failed else ""),
+            sha256="cd" * 32,
+            record=Path("/nowhere/x"),
+        )
+
+
+def request(budget: int, *scenarios: Scenario) -> CaseRequest:
+    """Return a request for a case of violating scenarios."""
+    found = CompletedFlight(
+        result=collision_result(SIGNATURE), sha256="", record=Path("/nowhere/x")
+    )
+    return CaseRequest(
+        name=f"search {SIGNATURE}",
+        signature=SIGNATURE,
+        violations=tuple((each, found) for each in scenarios),
+        job=JOB,
+        map=LAWN,
+        budget=budget,
+    )

@@ -21,7 +21,7 @@ from tests.regressions.samples import NAMES, SYSTEM, case
 TEXT = dump_case(case())
 
 
-def test_one_file_per_way_to_fail(tmp_path: Path) -> None:
+def test_corpus_saves_one_file_per_failure(tmp_path: Path) -> None:
     path = Corpus(tmp_path).save(case())
     assert path == tmp_path / "landing" / f"{case().id}.toml"
     assert Corpus(tmp_path).save(case(description="Another flight, the same signature.")) is None
@@ -29,7 +29,7 @@ def test_one_file_per_way_to_fail(tmp_path: Path) -> None:
     assert len(Corpus(tmp_path).all_entries()) == 2
 
 
-def test_what_was_fixed_and_comes_back_is_saved_anew(tmp_path: Path) -> None:
+def test_corpus_saves_a_fixed_failure_again(tmp_path: Path) -> None:
     path = Corpus(tmp_path).save(case())
     assert path is not None
     replace_file(path, dataclasses.replace(case(), status="fixed"))
@@ -39,7 +39,7 @@ def test_what_was_fixed_and_comes_back_is_saved_anew(tmp_path: Path) -> None:
     assert sorted(each.case.status for each in found if each.case) == ["fixed", "open"]
 
 
-def test_a_file_that_changes_is_read_again(tmp_path: Path) -> None:
+def test_new_corpus_reads_a_changed_file(tmp_path: Path) -> None:
     path = Corpus(tmp_path).save(case())
     assert path is not None
     assert Corpus(tmp_path).entries(SYSTEM)[0].case == case()
@@ -47,7 +47,7 @@ def test_a_file_that_changes_is_read_again(tmp_path: Path) -> None:
     assert "not valid TOML" in Corpus(tmp_path).entries(SYSTEM)[0].problem
 
 
-def test_a_patch_says_how_to_make_the_file(tmp_path: Path) -> None:
+def test_patch_creates_the_file(tmp_path: Path) -> None:
     patch = patch_of(tmp_path / "scenarios" / "a.toml", tmp_path, "one\ntwo\n")
     assert patch.splitlines()[:2] == [
         "diff --git a/scenarios/a.toml b/scenarios/a.toml",
@@ -56,7 +56,7 @@ def test_a_patch_says_how_to_make_the_file(tmp_path: Path) -> None:
     assert patch.endswith("@@ -0,0 +1,2 @@\n+one\n+two\n")
 
 
-def test_a_corpus_reads_each_file_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_corpus_reads_each_file_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     Corpus(tmp_path).save(case())
     corpus, read = Corpus(tmp_path), []
     real = reading.read_text
@@ -73,7 +73,7 @@ def test_a_corpus_reads_each_file_once(tmp_path: Path, monkeypatch: pytest.Monke
     assert len(read) == 2
 
 
-def test_an_open_case_is_expected_on_its_own_map_only(tmp_path: Path) -> None:
+def test_open_case_expects_its_signature_on_its_map(tmp_path: Path) -> None:
     corpus = Corpus(tmp_path)
     path = corpus.save(case())
     assert path is not None
@@ -87,13 +87,13 @@ def test_an_open_case_is_expected_on_its_own_map_only(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("status", ["fixed", "unavoidable"])
-def test_only_an_open_case_expects_its_signature(tmp_path: Path, status: Status) -> None:
+def test_fixed_and_unavoidable_cases_expect_no_signature(tmp_path: Path, status: Status) -> None:
     corpus = Corpus(tmp_path)
     corpus.save(dataclasses.replace(case(), status=status))
     assert corpus.expected_signatures(SYSTEM, "lawn") == {}
 
 
-def test_saving_sees_what_another_process_saved(tmp_path: Path) -> None:
+def test_save_sees_cases_of_other_processes(tmp_path: Path) -> None:
     corpus = Corpus(tmp_path)
     assert corpus.entries(SYSTEM) == ()
     Corpus(tmp_path).save(case())
@@ -112,7 +112,7 @@ def _folder(tmp_path: Path) -> Path:
     ["seed = " + "[" * 3000, "seed = " + "9" * 5000, "x" * 1_000_001, "[" * 3000],
     ids=["nested", "digits", "large", "header"],
 )
-def test_a_file_that_cannot_be_parsed_is_a_fault_of_its_own(tmp_path: Path, text: str) -> None:
+def test_file_that_cannot_be_parsed_is_a_problem_of_its_entry(tmp_path: Path, text: str) -> None:
     folder = _folder(tmp_path)
     (folder / "bad.toml").write_text(text)
     bad, good = Corpus(tmp_path).entries(SYSTEM)
@@ -122,7 +122,7 @@ def test_a_file_that_cannot_be_parsed_is_a_fault_of_its_own(tmp_path: Path, text
     assert good.case == case()
 
 
-def test_a_case_that_is_no_regular_file_is_a_fault_of_its_own(tmp_path: Path) -> None:
+def test_file_that_is_not_regular_is_a_problem_of_its_entry(tmp_path: Path) -> None:
     folder = _folder(tmp_path)
     (folder / "device.toml").symlink_to("/dev/zero")
     os.mkfifo(folder / "pipe.toml")
@@ -134,7 +134,7 @@ def test_a_case_that_is_no_regular_file_is_a_fault_of_its_own(tmp_path: Path) ->
     assert found["good"] == ""
 
 
-def test_a_link_that_leads_nowhere_is_told_and_not_passed_over(tmp_path: Path) -> None:
+def test_dangling_link_is_a_problem_of_its_entry(tmp_path: Path) -> None:
     folder = _folder(tmp_path)
     (folder / "lost.toml").symlink_to("gone.toml")
     (folder / "round.toml").symlink_to("round.toml")
@@ -146,7 +146,7 @@ def test_a_link_that_leads_nowhere_is_told_and_not_passed_over(tmp_path: Path) -
 
 
 @pytest.mark.parametrize("target", ["elsewhere", "landing", "landing/round.toml"])
-def test_a_folder_that_is_a_link_to_nothing_is_told(tmp_path: Path, target: str) -> None:
+def test_dangling_folder_is_one_problem(tmp_path: Path, target: str) -> None:
     (tmp_path / "landing").symlink_to(target)
     for found in (Corpus(tmp_path).entries(SYSTEM), Corpus(tmp_path).all_entries()):
         (entry,) = found
@@ -154,7 +154,7 @@ def test_a_folder_that_is_a_link_to_nothing_is_told(tmp_path: Path, target: str)
         assert "found a symbolic link that leads nowhere" in entry.problem
 
 
-def test_a_folder_of_cases_that_cannot_be_read_is_one_error(
+def test_unreadable_corpus_raises_one_error(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def refuse(self: Path) -> None:
@@ -166,9 +166,7 @@ def test_a_folder_of_cases_that_cannot_be_read_is_one_error(
 
 
 @pytest.mark.parametrize("name", ['la"wn', "la\\wn", "la wn", "ländle", "a'b;c$d", "-m", "m" * 50])
-def test_the_patch_of_a_case_on_a_map_with_a_strange_name_applies(
-    tmp_path: Path, name: str
-) -> None:
+def test_patch_applies_for_maps_with_strange_names(tmp_path: Path, name: str) -> None:
     maps = tmp_path / "scenarios" / "maps"
     maps.mkdir(parents=True)
     (maps / f"{name}.toml").write_text((Path(package.__file__).parent / "lawn.toml").read_text())
@@ -185,7 +183,7 @@ def test_the_patch_of_a_case_on_a_map_with_a_strange_name_applies(
     assert entry.case == strange
 
 
-def test_a_corpus_that_is_a_link_to_nothing_is_one_error(tmp_path: Path) -> None:
+def test_dangling_corpus_raises_one_error(tmp_path: Path) -> None:
     (tmp_path / "regressions").symlink_to("gone")
     with pytest.raises(CorpusError, match="regressions: found a symbolic link that leads nowhere"):
         Corpus(tmp_path / "regressions").all_entries()
@@ -193,7 +191,7 @@ def test_a_corpus_that_is_a_link_to_nothing_is_one_error(tmp_path: Path) -> None
         Corpus(tmp_path / "regressions").entries(SYSTEM)
 
 
-def test_a_long_signature_makes_no_file_name_that_is_too_long(tmp_path: Path) -> None:
+def test_long_signature_gives_a_short_file_name(tmp_path: Path) -> None:
     strange = case(signature=f"own:test_{'x' * 400}:12345678")
     path = Corpus(tmp_path).save(strange)
     assert path is not None
@@ -201,7 +199,7 @@ def test_a_long_signature_makes_no_file_name_that_is_too_long(tmp_path: Path) ->
     assert load_case(path) == strange
 
 
-def test_a_link_to_a_file_beside_the_cases_is_no_lost_case(tmp_path: Path) -> None:
+def test_link_to_another_file_is_ignored(tmp_path: Path) -> None:
     _folder(tmp_path)
     (tmp_path / "notes.txt").write_text("")
     (tmp_path / "link").symlink_to("notes.txt")

@@ -3,70 +3,30 @@ from __future__ import annotations
 import dataclasses
 import random
 from collections.abc import Callable
-from pathlib import Path
 
 import pytest
 
-from pytest_garl.adversary.catalogue import policy_spec
 from pytest_garl.cli import cases
-from pytest_garl.execution.job import FlightJob
-from pytest_garl.execution.reference import BUILT_IN, Reference, simulator_sha256
-from pytest_garl.execution.result import CompletedFlight, FlightResult
+from pytest_garl.execution.reference import BUILT_IN, simulator_sha256
 from pytest_garl.plugin import options
 from pytest_garl.regressions.case import Case
 from pytest_garl.regressions.case_file import size_of
-from pytest_garl.regressions.case_request import CaseRequest
-from pytest_garl.regressions.investigation import LEAST_FLIGHTS, CaseBuilder
+from pytest_garl.regressions.investigation import LEAST_FLIGHTS
 from pytest_garl.regressions.reshrink import LEAST_FLIGHTS as LEAST_RESHRINK_FLIGHTS
 from pytest_garl.regressions.reshrink import CaseReshrinker, _all_removed
 from pytest_garl.regressions.robustness import neighbours
 from pytest_garl.regressions.simplicity import no_worse, simplicity
 from pytest_garl.scenarios.scenario import Scenario
-from tests.regressions.samples import COLLIDING_OBJECT, LAWN, NAMES, violation
-from tests.regressions.samples import case as dog_case
-from tests.support.results import flight_result
-
-SIGNATURE = "IV:dog:last-metre:unseen"
-Fails = Callable[[Scenario, str], bool]
-JOB = FlightJob.for_system(
-    Reference(module="stack.landing", file="", qualname="Lander"),
+from tests.regressions.samples import (
+    COLLIDING_OBJECT,
+    FIRST,
+    JOB,
     LAWN,
-    policy_spec("stationary"),
-    system_sha256="ab" * 32,
-    path=(),
-    flights=Path("/nowhere"),
+    NAMES,
+    FakeFlights,
+    request,
 )
-
-
-def result(signature: str) -> FlightResult:
-    return flight_result(signature, collisions=(COLLIDING_OBJECT,) if signature else ())
-
-
-class Flights:
-    """Stands for the simulator: which scenarios fail, steered by whom; counts what is flown."""
-
-    def __init__(self, fails: Fails) -> None:
-        self.fails, self.count = fails, 0
-
-    def __call__(self, job: FlightJob, scenario: Scenario) -> CompletedFlight:
-        self.count += 1
-        pilot = job.system.qualname == "ReferencePilot"
-        failed = not pilot and self.fails(scenario, job.npcs.name)
-        return CompletedFlight(
-            result=result(SIGNATURE if failed else ""), sha256="cd" * 32, record=Path("/nowhere/x")
-        )
-
-
-def request(budget: int, *scenarios: Scenario) -> CaseRequest:
-    found = CompletedFlight(result=result(SIGNATURE), sha256="", record=Path("/nowhere/x"))
-    return CaseRequest(
-        name=f"search {SIGNATURE}",
-        signature=SIGNATURE,
-        violations=tuple((each, found) for each in scenarios),
-        job=JOB,
-        map=LAWN,
-        budget=budget,
-    )
+from tests.regressions.samples import case as dog_case
 
 
 def saved(scenario: Scenario, *, neighbours_failed: int = 3) -> Case:
@@ -84,21 +44,20 @@ def saved(scenario: Scenario, *, neighbours_failed: int = 3) -> Case:
     )
 
 
-def shrunk(case: Case, fails: Fails, flights: int = 60) -> tuple[Case | None, int]:
-    fly = Flights(fails)
+def shrunk(
+    case: Case, fails: Callable[[Scenario, str], bool], flights: int = 60
+) -> tuple[Case | None, int]:
+    fly = FakeFlights(fails)
     result = CaseReshrinker(request(flights), fly, case).build()
     assert result.flights == fly.count <= flights
     return result.case, fly.count
-
-
-FIRST = violation().replace({f"{COLLIDING_OBJECT}.velocity": 0.9, "environment.fog": 0.12})
 
 
 def by_record(scenario: Scenario, npcs: str) -> bool:
     return npcs == "recorded" and COLLIDING_OBJECT not in scenario.removed_objects
 
 
-def test_a_case_is_shrunk_from_its_own_record() -> None:
+def test_reshrinker_shrinks_a_case_from_its_own_record() -> None:
     case = saved(FIRST)
     better, _ = shrunk(case, by_record)
     assert better is not None
@@ -109,7 +68,7 @@ def test_a_case_is_shrunk_from_its_own_record() -> None:
     assert no_worse(simplicity(better, LAWN), simplicity(case, LAWN))
 
 
-def test_what_only_a_policy_makes_simpler_is_found_as_well() -> None:
+def test_reshrinker_uses_the_policy_if_the_record_gives_nothing_simpler() -> None:
     records = {FIRST}
 
     def fails(scenario: Scenario, npcs: str) -> bool:
@@ -126,7 +85,7 @@ def test_what_only_a_policy_makes_simpler_is_found_as_well() -> None:
 
 
 @pytest.mark.parametrize("seed", range(30))
-def test_a_case_never_becomes_worse_in_any_respect(seed: int) -> None:
+def test_reshrinker_makes_a_case_worse_in_no_respect(seed: int) -> None:
     chance = random.Random(seed)
     answers: dict[tuple[Scenario, str], bool] = {}
 
@@ -143,12 +102,12 @@ def test_a_case_never_becomes_worse_in_any_respect(seed: int) -> None:
         assert one != other or size_of(better) < size_of(case)
 
 
-def test_what_fails_only_as_it_is_stays_as_it_is() -> None:
+def test_reshrinker_keeps_a_case_that_fails_only_as_it_is() -> None:
     better, _ = shrunk(saved(FIRST), lambda scenario, _: scenario == FIRST)
     assert better is None
 
 
-def test_evidence_of_other_sources_is_renewed() -> None:
+def test_reshrinker_renews_evidence_of_other_sources() -> None:
     case = saved(FIRST)
     old = dataclasses.replace(case.evidence, simulator_sha256="00" * 32)
     around = (FIRST, *neighbours(FIRST, LAWN))
@@ -161,29 +120,7 @@ def test_evidence_of_other_sources_is_renewed() -> None:
     assert better.evidence.neighbours_failed == 3
 
 
-@pytest.mark.parametrize("seed", range(40))
-def test_a_pursuit_never_flies_more_than_its_budget(seed: int) -> None:
-    chance = random.Random(seed)
-    share, budget = chance.random(), chance.randrange(LEAST_FLIGHTS, 40)
-    fly = Flights(lambda *_: chance.random() < share)
-    scenarios = [violation(seed=100 * seed + number) for number in range(4)]
-    result = CaseBuilder(request(budget, *scenarios), fly).build()
-    assert result.flights == fly.count <= budget
-
-
-def test_a_pursuit_steps_back_until_all_neighbours_fail() -> None:
-    def fails(scenario: Scenario, npcs: str) -> bool:
-        # On the edge: near nominal fog it fails at round values alone.
-        fog = scenario["environment.fog"]
-        return fog >= 0.04 or (0 < fog < 0.04 and round(fog, 2) == fog)
-
-    result = CaseBuilder(request(60, FIRST), Flights(fails)).build()
-    assert result.case is not None
-    assert result.case.evidence.neighbours_failed == 3
-    assert result.case.scenario["environment.fog"] >= 0.04
-
-
-def test_what_was_removed_adds_up() -> None:
+def test_removed_objects_and_genes_add_up() -> None:
     one, two = (
         "1 of 4 objects, 2 of 14 genes off nominal",
         "2 of 3 objects, 5 of 12 genes off nominal",

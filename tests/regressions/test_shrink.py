@@ -6,14 +6,12 @@ import numpy as np
 import pytest
 
 from pytest_garl.regressions.complexity import complexity, genome_of
-from pytest_garl.regressions.hypothesis_pass import shrink_by_hypothesis
 from pytest_garl.regressions.shrink import reset_and_bisect, shrink
-from pytest_garl.regressions.trials import Trials
 from pytest_garl.scenarios.chromosome import decode
 from pytest_garl.scenarios.genes import genome_for, with_destinations
 from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.scenarios.validity import problems, repair
-from tests.regressions.samples import COLLIDING_OBJECT, LAWN, NAMES, violation
+from tests.regressions.samples import COLLIDING_OBJECT, FIRST, LAWN, NAMES
 
 
 def fast(scenario: Scenario) -> bool:
@@ -28,10 +26,7 @@ def two_of_them(scenario: Scenario) -> bool:
     return fast(scenario) and NAMES[-1] not in scenario.removed_objects
 
 
-FIRST = violation().replace({f"{COLLIDING_OBJECT}.velocity": 0.9, "environment.fog": 0.12})
-
-
-def test_all_that_a_failure_does_not_need_is_gone_after_few_flights() -> None:
+def test_reset_and_bisect_removes_unneeded_parts_with_few_flights() -> None:
     found = shrink(
         FIRST, fast, LAWN, 100, colliding_object=COLLIDING_OBJECT, passes=(reset_and_bisect,)
     )
@@ -42,26 +37,14 @@ def test_all_that_a_failure_does_not_need_is_gone_after_few_flights() -> None:
 
 
 @pytest.mark.parametrize("fails", [in_fog, two_of_them])
-def test_what_a_failure_needs_stays(fails: Callable[[Scenario], bool]) -> None:
+def test_shrinking_keeps_the_parts_that_a_failure_needs(fails: Callable[[Scenario], bool]) -> None:
     found = shrink(FIRST, fails, LAWN, 100, colliding_object=COLLIDING_OBJECT)
     assert fails(found.simplest)
     assert problems(found.simplest, LAWN) == ()
     assert complexity(found.simplest, genome_of(FIRST, LAWN))[1] == (2 if fails is in_fog else 1)
 
 
-def test_hypothesis_finds_what_only_goes_together() -> None:
-    def unequal(scenario: Scenario) -> bool:
-        fog, dust = scenario["environment.fog"], scenario["environment.dust"]
-        return fast(scenario) and abs(fog - dust) < 0.01
-
-    first = FIRST.replace({"environment.dust": 0.12})
-    plain = shrink(
-        first, unequal, LAWN, 300, colliding_object=COLLIDING_OBJECT, passes=(shrink_by_hypothesis,)
-    )
-    assert plain.simplest["environment.fog"] == plain.simplest["environment.dust"] == 0
-
-
-def test_the_budget_is_kept_and_nothing_is_flown_twice() -> None:
+def test_shrinking_keeps_its_budget_and_flies_nothing_twice() -> None:
     seen: list[Scenario] = []
 
     def fails(scenario: Scenario) -> bool:
@@ -82,7 +65,7 @@ def test_shrinking_is_deterministic() -> None:
     assert one == other
 
 
-def test_every_scenario_on_the_way_failed_and_is_simpler_than_the_last() -> None:
+def test_history_holds_failing_scenarios_from_complex_to_simple() -> None:
     history = shrink(FIRST, in_fog, LAWN, 60, colliding_object=COLLIDING_OBJECT).history
     genome = genome_of(FIRST, LAWN)
     assert all(in_fog(each) for each in history)
@@ -91,7 +74,7 @@ def test_every_scenario_on_the_way_failed_and_is_simpler_than_the_last() -> None
     assert len(history) > 2
 
 
-def test_destinations_survive_shrinking_with_fewer_digits() -> None:
+def test_shrinking_rounds_destinations() -> None:
     genome = with_destinations(genome_for(LAWN))
     row = genome.random(np.random.default_rng(4))
     first = repair(decode(row, genome, map="lawn", seed=1), LAWN)
@@ -109,15 +92,3 @@ def test_destinations_survive_shrinking_with_fewer_digits() -> None:
     )
     assert set(found.simplest.removed_objects) == {*NAMES} - {COLLIDING_OBJECT}
     assert not any(key.startswith(NAMES[-1]) for key, _ in found.simplest.genes)
-
-
-def test_a_trial_is_of_a_scenario_that_makes_sense() -> None:
-    flown: list[Scenario] = []
-
-    def fails(scenario: Scenario) -> bool:
-        flown.append(scenario)
-        return False
-
-    trials = Trials(FIRST, fails, LAWN, 10)
-    trials(FIRST.replace({f"{COLLIDING_OBJECT}.start_x": FIRST[f"{NAMES[1]}.start_x"]}))
-    assert problems(flown[0], LAWN) == ()

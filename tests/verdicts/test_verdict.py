@@ -2,7 +2,10 @@ from __future__ import annotations
 
 import dataclasses
 
-from pytest_garl.verdicts.verdict import Margin, Verdict, count_decided
+import pytest
+
+from pytest_garl.errors import OptionError
+from pytest_garl.verdicts.verdict import Limits, Margin, Verdict, count_decided
 from pytest_garl.verdicts.wording import decided_text
 
 
@@ -30,3 +33,17 @@ def test_decided_properties_are_counted_over_flights() -> None:
     flights = [flown(True, True), flown(False, True), flown(False, False), verdict(False)]
     assert (count_decided(flights, "distance"), count_decided(flights, "time")) == (1, 2)
     assert decided_text(flights) == "distance decided in 1 of 4 flights, time in 2"
+
+
+@pytest.mark.parametrize("value", [300.001, -1.0, float("nan"), float("inf"), "120", True])
+def test_time_limit_has_a_maximum(value: float) -> None:
+    assert Limits(time_s=300.0).time_s == 300.0
+    with pytest.raises(OptionError, match=r"limits: found time_s=.* expected a number from 0 to"):
+        Limits(time_s=value)
+
+
+def test_invalid_limits_are_refused() -> None:
+    with pytest.raises(OptionError, match=r"found distance_m=-0.5, expected a number from 0 to 10"):
+        Limits(distance_m=-0.5)
+    with pytest.raises(OptionError, match="found abort='no', expected 'ok' or 'violation'"):
+        Limits(abort="no")  # type: ignore[arg-type]

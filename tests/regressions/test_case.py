@@ -1,0 +1,31 @@
+from __future__ import annotations
+
+import dataclasses
+
+from pytest_garl.regressions.case_file import dump_case, parse_case
+from pytest_garl.scenarios.maps.map import load_map
+from tests.regressions.samples import case, case_with_changes
+
+
+def test_ids_of_cases_never_change() -> None:
+    assert case().id == "lawn-IV-dog-33ab15"
+    assert case_with_changes().id == "lawn-IV-dog-96cf0c"
+
+
+def test_id_names_map_type_and_subject_and_differs_between_scenarios() -> None:
+    first, other = case(), case(signature="IV:dog:descent:seen")
+    assert first.id.startswith("lawn-IV-dog-")
+    assert len(first.id) == len("lawn-IV-dog-") + 6
+    assert first.id != other.id
+    fixed = dataclasses.replace(first, status="fixed")
+    assert fixed.id == first.id
+    assert case(signature="V:PlannerError@planning_ego").id.startswith("lawn-V-PlannerError-")
+    assert case(signature="I?:unknown").id.startswith("lawn-I-unknown-")
+
+
+def test_case_of_an_own_assertion_belongs_to_its_test_in_any_file() -> None:
+    old = dataclasses.replace(case(), test="test_own", assertion="12345678")
+    told = dataclasses.replace(old, test="tests/test_it.py::test_own")
+    assert parse_case(dump_case(old), load_map) == old
+    assert (told.own_test, told.id) == ("test_own", old.id)
+    assert told.id != case().id
