@@ -64,33 +64,31 @@ class RateChange:
 class NewType:
     """A violation type that no flight of the base has; ``pairs`` are those whose head has it.
 
-    ``alike`` holds, for each pair whose neighbours were flown, the number of neighbours that fail
-    with this type and the number flown.  ``p`` is that of :func:`new_type_p`; ``adjusted`` is ``p``
-    after Holm's correction.
+    ``neighbours`` holds, for each pair whose neighbours were flown, the number of neighbours that
+    fail with this type and the number flown.  ``p`` is that of :func:`new_type_p`; ``adjusted`` is
+    ``p`` after Holm's correction.
     """
 
     type: str
     pairs: tuple[Pair, ...]
-    alike: tuple[tuple[int, int], ...]
+    neighbours: tuple[tuple[int, int], ...]
     p: float
     adjusted: float = 1.0
 
     @property
     def is_supported(self) -> bool:
         """Whether two pairs show the type, or one pair whose neighbours fail in the same way."""
-        beside = any(alike >= NEIGHBOURS_FOR_SUPPORT for alike, _ in self.alike)
-        return beside or len(self.pairs) >= PAIRS_FOR_SUPPORT
+        confirmed = any(failing >= NEIGHBOURS_FOR_SUPPORT for failing, _ in self.neighbours)
+        return confirmed or len(self.pairs) >= PAIRS_FOR_SUPPORT
 
     @property
     def text(self) -> str:
         """The type, its pairs and the number of neighbours that fail in the same way."""
         first, more = self.pairs[0], len(self.pairs) - 1
-        flown = sum(count for _, count in self.alike)
-        beside = f", in {sum(alike for alike, _ in self.alike)} of {flown} neighbours"
-        return (
-            f"{self.type} in {first.name}{f' and {more} more' if more else ''}"
-            f"{beside if flown else ''}"
-        )
+        failing = sum(count for count, _ in self.neighbours)
+        flown = sum(count for _, count in self.neighbours)
+        neighbours = f", in {failing} of {flown} neighbours" if flown else ""
+        return f"{self.type} in {first.name}{f' and {more} more' if more else ''}{neighbours}"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -259,23 +257,23 @@ def _new_types(
 ) -> list[NewType]:
     """Return the types that only the head has; their p-values are not yet corrected."""
     old_types = {pair.base.type for pair in pairs} | {violation_type_of(each) for each in expected}
-    drawn = sum(not pair.identical for pair in pairs)
+    changed = sum(not pair.identical for pair in pairs)
     found = []
     for new_type in sorted({pair.head.type for pair in pairs} - old_types - {""}):
         having = tuple(pair for pair in pairs if pair.head.type == new_type)
-        alike = tuple(
+        failing = tuple(
             (sum(each.type == new_type for each in flown), len(flown))
             for pair in having
             if (flown := neighbours.get(pair.name))
         )
         p = new_type_p(
             base=len(pairs),
-            drawn=drawn,
+            changed=changed,
             found=len(having),
-            beside=max((count for _, count in alike), default=0),
-            alike=sum(count for count, _ in alike),
+            neighbours_each=max((flown for _, flown in failing), default=0),
+            failing=sum(count for count, _ in failing),
         )
-        found.append(NewType(type=new_type, pairs=having, alike=alike, p=p))
+        found.append(NewType(type=new_type, pairs=having, neighbours=failing, p=p))
     return found
 
 

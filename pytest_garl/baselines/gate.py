@@ -64,8 +64,10 @@ def _compare(
     }
     flown = fly([each for name in names for each in neighbours(scenarios[name], map)])
     summaries = [summary_of(done.result, done.sha256) for done in flown]
-    beside = {
+    neighbour_flights = {
         name: summaries[index * NEIGHBOURS : (index + 1) * NEIGHBOURS]
         for index, name in enumerate(names)
     }
-    return compare(pairs, level=level, expected_signatures=expected_signatures, neighbours=beside)
+    return compare(
+        pairs, level=level, expected_signatures=expected_signatures, neighbours=neighbour_flights
+    )

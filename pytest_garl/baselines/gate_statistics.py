@@ -34,57 +34,61 @@ def mcnemar_p(broke: int, fixed: int) -> float:
 
 
 @functools.lru_cache(maxsize=4096)
-def new_type_p(*, base: int, drawn: int, found: int, beside: int = 0, alike: int = 0) -> float:
+def new_type_p(
+    *, base: int, changed: int, found: int, neighbours_each: int = 0, failing: int = 0
+) -> float:
     """Return the p-value of a violation type that none of ``base`` flights has.
 
-    ``drawn`` flights of the head differ from those of the base, and ``found`` of them have the
-    type.  ``beside`` neighbours were flown of each of the first :data:`CONFIRMED_PAIRS` of these
-    flights; ``alike`` of all neighbours have the type too.
+    ``changed`` flights of the head differ from those of the base, and ``found`` of them have the
+    type.  ``neighbours_each`` neighbours were flown of each of the first :data:`CONFIRMED_PAIRS` of
+    these flights; ``failing`` of all neighbours have the type too.
 
     An unchanged landing system has the type with some rate v.  The probability that the base shows
     nothing, and that the head shows this result or a less probable one, is
 
-        (1 - v)^base · sum over k of P(found = k) · P(alike >= least(k)),
+        (1 - v)^base · sum over k of P(found = k) · P(failing >= least(k)),
 
     where least(k) is the smallest number that, together with k, is no more probable than the
     observation.  The rate is unknown, so the p-value is the maximum over v (as in Barnard's test:
     Barnard 1947, Biometrika 34, 123-138).
     """
     rates = _rates(base)
-    observed = _greatest_probability(base, drawn, found, _neighbours(found, beside), alike)
+    observed = _greatest_probability(
+        base, changed, found, _neighbours_flown(found, neighbours_each), failing
+    )
     if observed < NEGLIGIBLE_P:
         return observed
     total = np.zeros_like(rates)
-    for count in range(1, drawn + 1):
-        flown = _neighbours(count, beside)
+    for count in range(1, changed + 1):
+        flown = _neighbours_flown(count, neighbours_each)
         least = next(
             (
                 number
                 for number in range(flown + 1)
-                if _greatest_probability(base, drawn, count, flown, number) <= observed
+                if _greatest_probability(base, changed, count, flown, number) <= observed
             ),
             None,
         )
         if least == 0:
             # All larger counts are less probable still.
-            total += _tail(drawn, rates, count)
+            total += _tail(changed, rates, count)
             break
         if least is not None:
-            exactly = _tail(drawn, rates, count) - _tail(drawn, rates, count + 1)
+            exactly = _tail(changed, rates, count) - _tail(changed, rates, count + 1)
             total += exactly * _tail(flown, rates, least)
     return float(((1 - rates) ** base * total).max())
 
 
-def _neighbours(found: int, beside: int) -> int:
+def _neighbours_flown(found: int, neighbours_each: int) -> int:
     """Return the number of neighbours flown for ``found`` flights of a new type."""
-    return beside * min(found, CONFIRMED_PAIRS)
+    return neighbours_each * min(found, CONFIRMED_PAIRS)
 
 
 @functools.lru_cache(maxsize=65536)
-def _greatest_probability(base: int, drawn: int, found: int, flown: int, alike: int) -> float:
-    """Return the probability of at least ``found`` and ``alike``, maximised over the rate."""
+def _greatest_probability(base: int, changed: int, found: int, flown: int, failing: int) -> float:
+    """Return the probability of at least ``found`` and ``failing``, maximised over the rate."""
     rates = _rates(base)
-    both = _tail(drawn, rates, found) * _tail(flown, rates, alike)
+    both = _tail(changed, rates, found) * _tail(flown, rates, failing)
     return float(((1 - rates) ** base * both).max())
 
 

@@ -230,13 +230,13 @@ def test_a_signature_begins_with_its_type(signature: str, kind: str) -> None:
 
 def test_new_type_p_is_largest_for_one_flight_of_the_type() -> None:
     # (1 - v)^n (1 - (1 - v)^n) is largest where both factors are 1/2.
-    assert new_type_p(base=100, drawn=100, found=1) == pytest.approx(0.25, rel=1e-3)
-    assert new_type_p(base=100, drawn=0, found=1) == 0.0
+    assert new_type_p(base=100, changed=100, found=1) == pytest.approx(0.25, rel=1e-3)
+    assert new_type_p(base=100, changed=0, found=1) == 0.0
     # A type in so many flights is new however many flights there are.
-    assert new_type_p(base=5000, drawn=5000, found=2500, beside=3, alike=9) < 1e-9
-    values = [new_type_p(base=100, drawn=drawn, found=2) for drawn in (10, 25, 50, 100)]
+    assert new_type_p(base=5000, changed=5000, found=2500, neighbours_each=3, failing=9) < 1e-9
+    values = [new_type_p(base=100, changed=count, found=2) for count in (10, 25, 50, 100)]
     assert values == sorted(values)
-    assert new_type_p(base=100, drawn=100, found=1, beside=3, alike=2) < 0.001
+    assert new_type_p(base=100, changed=100, found=1, neighbours_each=3, failing=2) < 0.001
 
 
 # What was not decided.

@@ -33,7 +33,7 @@ def test_sets_are_compared_by_scenario_and_refused_if_the_scenarios_differ() -> 
     # The type is new: the neighbours of its scenario are flown, and say that it is real.
     assert flown == list(neighbours(after.flights[2].scenario, LAWN))
     assert [each.text for each in found.new_types] == ["IV in lawn-2, in 3 of 3 neighbours"]
-    assert [each.alike for each in found.new_types] == [((3, 3),)]
+    assert [each.neighbours for each in found.new_types] == [((3, 3),)]
     with pytest.raises(BaselineError, match="did not fly the same scenarios"):
         compare_sets(before, baseline_set(2), LAWN, fly)
 
