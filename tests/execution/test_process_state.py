@@ -12,10 +12,16 @@ import cv2
 import numpy as np
 import pytest
 
+from pytest_garl.adversary.catalogue import policy_spec
 from pytest_garl.execution.flight_id import FlightId
+from pytest_garl.execution.job import FlightJob
 from pytest_garl.execution.process_state import ProcessState
+from pytest_garl.execution.reference import reference_to
+from pytest_garl.scenarios.files import dump_scenario
 from pytest_garl.simulation import contacts, loop
-from tests.execution.flying import Good, job_of, scenario
+from pytest_garl.simulation.system_under_test.reference_pilot import ReferencePilot
+from pytest_garl.verdicts.verdict import Limits
+from tests.execution.flying import LAWN, Good, job_of, scenario
 
 
 @pytest.fixture
@@ -100,3 +106,31 @@ def test_running_process_is_noticed(state: ProcessState) -> None:
     with subprocess.Popen([sys.executable, "-c", "input()"], stdin=subprocess.PIPE) as left:
         assert state.changed()
         left.communicate(b"\n")
+
+
+def test_flight_imports_no_module_of_this_package_after_the_state_is_taken(tmp_path: Path) -> None:
+    """A landing system could replace functions of such a module, and nobody would notice."""
+    job = FlightJob.for_system(
+        reference_to(ReferencePilot),
+        LAWN,
+        policy_spec("dqn"),
+        flights=tmp_path,
+        limits=Limits(time_s=3.0),
+        path=(),
+    )
+    code = (
+        "import sys\n"
+        "from pytest_garl.execution import process_state, worker\n"
+        "process_state.ProcessState()\n"
+        "before = {*sys.modules}\n"
+        "from pytest_garl.execution.flight import fly_job\n"
+        "from pytest_garl.execution.flight_id import FlightId\n"
+        "from pytest_garl.execution.job import parse_job\n"
+        "from pytest_garl.scenarios.files import parse_scenario\n"
+        "job, scenario = parse_job(sys.argv[1]), parse_scenario(sys.argv[2])\n"
+        "fly_job(job, scenario, FlightId(search='flight', map='lawn'), None)\n"
+        "print(sorted(name for name in {*sys.modules} - before if 'pytest_garl' in name))\n"
+    )
+    command = [sys.executable, "-c", code, job.dumps(), dump_scenario(scenario())]
+    done = subprocess.run(command, capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == "[]"
