@@ -55,7 +55,7 @@ def _plan(run: Run) -> str:
     resuming = f"resuming after {done} flights; " if options.resume else ""
     return (
         f"garl: {resuming}budget {options.budget} per system and map, method {options.method}, "
-        f"seed {options.seed}, objects {options.npcs}, weather {options.weather}, "
+        f"seed {options.seed}, NPCs {options.npcs}, weather {options.weather}, "
         f"{_workers(run)}"
     )
 

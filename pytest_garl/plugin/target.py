@@ -36,7 +36,7 @@ class Target:
     entry: CorpusEntry | None = None
     """A saved case."""
     live: bool = False
-    """Whether the case's objects are steered as in a search, and do not repeat their moves."""
+    """Whether the search's policy moves the case's NPCs, instead of their recorded moves."""
 
     @property
     def name(self) -> str:

@@ -29,7 +29,7 @@ def fly(
 ) -> Flight:
     """Return the record of one flight, a pure function of its arguments.
 
-    ``system`` is the landing system's class, ``npcs`` says who moves the dynamic objects.
+    ``system`` is the landing system's class, ``npcs`` is the NPC policy.
     Whatever the landing system raises or returns ends in the record, never as an
     exception, its SystemExit included; KeyboardInterrupt passes through.
     """

@@ -297,17 +297,17 @@ def test_nonsense_on_the_command_line_is_one_clear_error(
 @pytest.mark.parametrize(
     ("args", "words"),
     [
-        ((), "*method garl, seed 0, objects dqn,*"),
-        (("--garl-method=garl-paper",), "*objects dqn-paper,*"),
-        (("--garl-method=random",), "*objects waypoint,*"),
-        (("--garl-method=surrogate-random",), "*objects dqn-paper,*"),
-        (("--garl-method=ga",), "*objects destination,*"),
-        (("--garl-method=offline-rl",), "*objects destination,*"),
-        (("--garl-method=online-rl",), "*objects online-rl,*"),
-        (("--garl-method=random", "--garl-npcs=stand"), "*objects stand,*"),
+        ((), "*method garl, seed 0, NPCs dqn,*"),
+        (("--garl-method=garl-paper",), "*NPCs dqn-paper,*"),
+        (("--garl-method=random",), "*NPCs waypoint,*"),
+        (("--garl-method=surrogate-random",), "*NPCs dqn-paper,*"),
+        (("--garl-method=ga",), "*NPCs destination,*"),
+        (("--garl-method=offline-rl",), "*NPCs destination,*"),
+        (("--garl-method=online-rl",), "*NPCs online-rl,*"),
+        (("--garl-method=random", "--garl-npcs=stand"), "*NPCs stand,*"),
     ],
 )
-def test_who_moves_objects_depends_on_the_method_unless_one_says(
+def test_the_method_chooses_the_npc_policy_unless_an_option_does(
     pytester: pytest.Pytester, args: tuple[str, ...], words: str
 ) -> None:
     project(pytester)
