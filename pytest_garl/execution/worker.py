@@ -32,6 +32,7 @@ _TRUSTED = "pytest_garl."
 RESTART_S = 1.0
 """How long a used worker waits for a fresh one to take a slot, before it ends to make room."""
 SIMULATOR = "the simulator"
+"""What failed, in the message of an error that ends the run."""
 
 
 def main(parent: Parent, path: str, *checkouts: str) -> None:
@@ -62,6 +63,7 @@ class Worker:
 
     def run(self) -> None:
         """Fly until the supervisor ends, or until a fresh process must continue."""
+        # The supervisor needs none of these modules, and is forked before they are imported.
         import cv2
 
         from pytest_garl.execution.process_state import ProcessState
@@ -69,7 +71,7 @@ class Worker:
         cv2.setNumThreads(1)
         cpu_dispatch.check()
         state = ProcessState()
-        while (claim := self._next()) is not None:
+        while (claim := self._wait_for_slot()) is not None:
             try:
                 result, sha256, wall_s = self._fly(claim)
                 with closing(WorkQueue.open(self._path, self._owner)) as queue:
@@ -83,7 +85,7 @@ class Worker:
             if state.changed():
                 break
 
-    def _next(self) -> Claim | None:
+    def _wait_for_slot(self) -> Claim | None:
         """Wait for a slot and return it; None if this process must end.
 
         The ledger is closed during a flight: a landing system may close all files and open others,
