@@ -1,0 +1,57 @@
+from __future__ import annotations
+
+import dataclasses
+
+from pytest_garl.execution.result import CompletedFlight
+from pytest_garl.regressions.case import RecordedBehaviour
+from pytest_garl.regressions.case_request import FailingScenario
+from pytest_garl.regressions.new_case import case_without_flights, new_case
+from pytest_garl.regressions.user_failure import UserFailure
+from pytest_garl.scenarios.scenario import Scenario
+from tests.regressions.samples import COLLIDING_OBJECT, FIRST, NAMES, SIGNATURE, request
+
+REQUEST = request(10, FIRST)
+SIMPLE = FIRST.without(*NAMES[1:])
+FAILING = FailingScenario(
+    origin=FIRST,
+    scenario=SIMPLE,
+    behaviour=RecordedBehaviour(moves=((COLLIDING_OBJECT, ((0.5, 0.0),)),)),
+    flight=REQUEST.violations[0][1],
+    neighbours_failed=2,
+    neighbours_flown=3,
+)
+
+
+def test_case_holds_scenario_moves_and_evidence() -> None:
+    made = new_case(REQUEST, FAILING, "live")
+    assert (made.scenario, made.moves) == (SIMPLE, FAILING.behaviour.moves)
+    assert (made.status, made.avoidable) == ("open", "live")
+    assert made.violation.signature == SIGNATURE
+    assert (made.evidence.neighbours_failed, made.evidence.neighbours) == (2, 3)
+    assert made.evidence.removed.startswith(f"{len(NAMES) - 1} of {len(NAMES)} objects, ")
+    assert made.edge
+
+
+def test_case_that_the_pilot_cannot_avoid_is_unavoidable() -> None:
+    assert new_case(REQUEST, FAILING, "no").status == "unavoidable"
+
+
+def test_case_of_an_own_assertion_describes_its_failure() -> None:
+    failure = UserFailure(
+        test="test_own", assertion="1234", message="too late", attributes=frozenset()
+    )
+
+    def assertion(flight: CompletedFlight, scenario: Scenario) -> UserFailure:
+        return failure
+
+    made = new_case(dataclasses.replace(REQUEST, user_assertion=assertion), FAILING, "live")
+    assert (made.violation.type, made.violation.signature) == ("own", "own:test_own:1234")
+    assert made.violation.description.startswith("test_own: too late. ")
+    assert (made.test, made.assertion) == ("test_own", "1234")
+
+
+def test_case_without_flights_is_the_simplest_violation() -> None:
+    result = case_without_flights(request(10, FIRST, SIMPLE))
+    assert result.case is not None
+    assert result.case.scenario == SIMPLE
+    assert (result.flights, result.case.evidence.neighbours) == (0, 0)
