@@ -9,12 +9,8 @@ import pytest
 
 from pytest_garl.execution.result import FlightResult
 from pytest_garl.plugin import report_text
-from pytest_garl.plugin.item_failure import (
-    ItemFailure,
-    failure_of_item,
-    first_with_same_signature,
-    refly,
-)
+from pytest_garl.plugin.item_facts import failed_item, failure_facts, passed_case, slot_claim
+from pytest_garl.plugin.item_failure import ItemFailure, failure_of_item
 from pytest_garl.plugin.keys import (
     CASE,
     DUPLICATE_OF,
@@ -32,11 +28,8 @@ from pytest_garl.plugin.keys import (
     target_of,
 )
 from pytest_garl.plugin.outcomes import (
-    CaseState,
     Decision,
     FailedItem,
-    Need,
-    PassedCase,
     Reason,
     UnjudgedFlight,
     resolve,
@@ -55,16 +48,12 @@ def end_unjudged(item: pytest.Item) -> None:
     if landing is None or target is None or not landing.unjudged:
         return
     run = item.config.stash[RUN]
-
-    def claim(_: Need, facts: UnjudgedFlight) -> UnjudgedFlight:
-        return dataclasses.replace(facts, first=run.claims.claim_slot(target, item.nodeid))
-
     facts = UnjudgedFlight(
         inconclusive=landing.inconclusive,
         alone=target.entry is not None or bool(run.options.repeat),
         expects_failure=item.get_closest_marker("xfail") is not None,
     )
-    decision, _ = resolve(facts, claim)
+    decision, _ = resolve(facts, slot_claim(run, target, item.nodeid))
     if decision.outcome == "skipped":
         pytest.skip(landing.unjudged)
     pytest.fail(landing.complaint, pytrace=False)
@@ -85,13 +74,13 @@ def report_item(
     )
     if report.failed and error is not None:
         writer.write_failure(error)
-    elif report.passed and writer.case is not None:
-        writer.write_passing_case(writer.case)
+    elif report.passed:
+        writer.write_pass()
 
 
 @dataclasses.dataclass(frozen=True, slots=True, kw_only=True)
 class _Writer:
-    """Gathers the facts of one item, and writes what is decided."""
+    """Writes what is decided about one item into its report."""
 
     report: pytest.TestReport
     item: pytest.Function
@@ -114,12 +103,9 @@ class _Writer:
         failure = failure_of_item(self.item, self.target, self.result, error)
         if failure is not None and self.case is None and not self.result.inconclusive:
             self._note_user_failure(failure)
-
-        def gather(need: Need, facts: FailedItem) -> FailedItem:
-            assert failure is not None
-            return self._gather(need, facts, failure)
-
-        decision, facts = resolve(self._facts(failure), gather)
+        facts = failed_item(self.run, self.target, self.result, failure)
+        gather = failure_facts(self.run, self.target, failure, self.item.nodeid)
+        decision, facts = resolve(facts, gather)
         if decision.reason is Reason.TEST_ERROR:
             text = report_text.error_text(self.item, self.target, error)
             self.report.sections.append(("garl: what happened", text))
@@ -131,22 +117,17 @@ class _Writer:
         elif failure is not None:
             self._write_violation(failure, decision, facts)
 
-    def write_passing_case(self, case: Case) -> None:
-        """Write the outcome of a saved case whose test passed."""
-        state = CaseState(signature=case.violation.signature, status=case.status, edge=case.edge)
-        violates = self.result.verdict.primary is not None
+    def write_pass(self) -> None:
+        """Write the outcome of a test that passed; only a saved case has more to say."""
         # The fixture ``landing`` has found it out.
         unproven = str(dict(self.item.user_properties).get(UNPROVEN, ""))
-        facts = PassedCase(
-            case=state,
-            violates=violates,
-            unproven=bool(unproven),
-            strict=self.run.options.xfail_strict,
-        )
-        decision, _ = resolve(facts, self._claim_slot)
+        facts = passed_case(self.run, self.target, self.result, unproven)
+        if facts is None:
+            return None
+        decision, _ = resolve(facts, slot_claim(self.run, self.target, self.item.nodeid))
         file = self._case_file
         if decision.outcome == "xfailed":
-            return self._expect(report_text.passing_edge(state, file))
+            return self._expect(report_text.passing_edge(facts.case, file))
         if decision.reason is Reason.STALE:
             self._note(STALE, f"{file} passes, but {unproven}")
         elif decision.reason is Reason.MAYBE_FIXED:
@@ -155,47 +136,6 @@ class _Writer:
             self.report.outcome = "failed"
             self.report.longrepr = report_text.passing_failure(decision, file, unproven)
         return None
-
-    def _facts(self, failure: ItemFailure | None) -> FailedItem:
-        """Return the facts about a failed test that need no flight."""
-        if failure is None or self.result.inconclusive:
-            return FailedItem(signature="", inconclusive=self.result.inconclusive)
-        options, case, entry = self.run.options, self.case, self.target.entry
-        state = None
-        if case is not None and entry is not None:
-            state = CaseState(
-                signature=case.violation.signature,
-                status=case.status,
-                edge=case.edge,
-                accepted=options.corpus.is_accepted(entry),
-            )
-        return FailedItem(
-            signature=failure.signature,
-            user_property=failure.user_property,
-            crashed=self.result.verdict.violation_type == "V",
-            case=state,
-            expected_by=self.run.expected_signatures(self.target).get(failure.signature, ""),
-            repeating=bool(options.repeat),
-            duplicates=options.duplicates,
-        )
-
-    def _gather(self, need: Need, facts: FailedItem, failure: ItemFailure) -> FailedItem:
-        """Add a fact about a failed test that costs flights or an entry in the ledger."""
-        run, target, nodeid = self.run, self.target, self.item.nodeid
-        match need:
-            case Need.EARLIER:
-                earlier = first_with_same_signature(run, target, failure, nodeid)
-                return dataclasses.replace(facts, earlier=earlier)
-            case Need.REFLIGHTS:
-                return dataclasses.replace(facts, reflights=refly(run, target, failure))
-            case Need.CLAIM:
-                faster = run.claims.claim_failure(failure.key(target.search), target.name, nodeid)
-                return dataclasses.replace(facts, claimed=True, earlier=faster)
-
-    def _claim_slot(self, need: Need, facts: PassedCase) -> PassedCase:
-        assert need is Need.CLAIM
-        first = self.run.claims.claim_slot(self.target, self.item.nodeid)
-        return dataclasses.replace(facts, first=first)
 
     def _write_failing_case(
         self, case: Case, failure: ItemFailure, decision: Decision, facts: FailedItem

@@ -74,11 +74,11 @@ def set_exit_status(
 
 def problems(tally: Tally, run: Run | None, options: Options) -> Iterator[str]:
     """Yield why the session fails, beside its items."""
-    unfounded = tally.unfounded()
-    if unfounded:
+    excused = tally.wrongly_excused()
+    if excused:
         yield (
-            f"{counted(len(unfounded), 'test')} excused by a failure that no test shows (its test "
-            f"was skipped, passed or was expected to fail): {_names(unfounded)}"
+            f"{counted(len(excused), 'test')} excused by a failure that no test shows (its test "
+            f"was skipped, passed or was expected to fail): {_names(excused)}"
         )
     if run is not None and run.options.searches:
         searches = tally.search_summaries(run.ledger)
@@ -101,7 +101,7 @@ def notes(tally: Tally) -> Iterator[str]:
 
 
 def _why_nothing_flew(tally: Tally) -> str:
-    reasons = [reason for reason, _ in tally.nothing.most_common()]
+    reasons = [reason for reason, _ in tally.no_flight.most_common()]
     return "; ".join(reasons) or "all landing tests were skipped before they asked for a landing"
 
 
@@ -134,7 +134,7 @@ def _unrepeated(tally: Tally, searches: Sequence[SearchSummary]) -> Iterator[str
 
 def _unrepeated_by_search(tally: Tally) -> dict[tuple[str, str], list[str]]:
     found: dict[tuple[str, str], set[str]] = {}
-    for system, map, slot, signature in tally.unrepeated:
+    for system, map, slot, signature in tally.not_repeated:
         found.setdefault((system, map), set()).add(f"{slot} ({signature})")
     return {search: sorted(slots) for search, slots in found.items()}
 

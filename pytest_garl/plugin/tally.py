@@ -1,4 +1,4 @@
-"""What the items of a session say of landings, gathered where pytest ends it."""
+"""Count what the reports of landing items say; the controller of a session keeps it to the end."""
 
 from __future__ import annotations
 
@@ -25,16 +25,16 @@ if TYPE_CHECKING:
 
 
 class Tally:
-    """Listens to all reports, those of xdist's workers among them."""
+    """Gathers all reports, those of xdist's workers among them."""
 
     def __init__(self) -> None:
         self.items: set[str] = set()
-        self.nothing: Counter[str] = Counter()
+        self.no_flight: Counter[str] = Counter()
         self.flown = False
-        self.unrepeated: set[tuple[str, ...]] = set()
+        self.not_repeated: set[tuple[str, ...]] = set()
         self.problems: list[str] = []
-        self._violating: dict[tuple[str, str], str] = {}
-        self._answered: set[tuple[str, str]] = set()
+        self._signatures: dict[tuple[str, str], str] = {}
+        self._failing_flights: set[tuple[str, str]] = set()
         self._failures: dict[str, str] = {}
         self._excused: dict[str, set[str]] = {}
         self._user_failures: dict[str, list[str]] = {}
@@ -42,31 +42,31 @@ class Tally:
 
     @pytest.hookimpl(tryfirst=True)
     def pytest_runtest_logreport(self, report: pytest.TestReport) -> None:
-        """Remember what counts for the session's colour."""
+        """Remember what decides the exit status and what the summary shows."""
         if report.when == "setup":
-            # A test that is run again tells anew; one with subtests tells more than once.
+            # A test that runs again reports anew; one with subtests reports more than once.
             self._failures.pop(report.nodeid, None)
             self._user_failures.pop(report.nodeid, None)
-        told = dict(report.user_properties)
-        if SLOT not in told or report.when == "teardown":
+        properties = dict(report.user_properties)
+        if SLOT not in properties or report.when == "teardown":
             return
-        if NO_FLIGHT in told and report.nodeid not in self.items:
-            self.nothing[str(told[NO_FLIGHT])] += 1
+        if NO_FLIGHT in properties and report.nodeid not in self.items:
+            self.no_flight[str(properties[NO_FLIGHT])] += 1
         self.items.add(report.nodeid)
-        self.flown = self.flown or OUTCOME in told
-        flight = (report.nodeid.partition("::")[0], str(told[SLOT]))
-        if told.get(SIGNATURE):
-            self._violating[flight] = str(told[SIGNATURE])
+        self.flown = self.flown or OUTCOME in properties
+        flight = (report.nodeid.partition("::")[0], str(properties[SLOT]))
+        if properties.get(SIGNATURE):
+            self._signatures[flight] = str(properties[SIGNATURE])
         if report.failed or hasattr(report, "wasxfail"):
-            self._answered.add(flight)
-        if REPORTED_FAILURE in told and report.failed:
-            self._failures[report.nodeid] = str(told[REPORTED_FAILURE])
-        if DUPLICATE_OF in told and report.skipped:
-            self._excused.setdefault(str(told[DUPLICATE_OF]), set()).add(report.nodeid)
-        if USER_FAILURE in told:
-            self._user_failures.setdefault(report.nodeid, []).append(str(told[USER_FAILURE]))
-        if NOT_REPEATED in told:
-            self.unrepeated.add(tuple(json.loads(str(told[NOT_REPEATED]))))
+            self._failing_flights.add(flight)
+        if REPORTED_FAILURE in properties and report.failed:
+            self._failures[report.nodeid] = str(properties[REPORTED_FAILURE])
+        if DUPLICATE_OF in properties and report.skipped:
+            self._excused.setdefault(str(properties[DUPLICATE_OF]), set()).add(report.nodeid)
+        if USER_FAILURE in properties:
+            self._user_failures.setdefault(report.nodeid, []).append(str(properties[USER_FAILURE]))
+        if NOT_REPEATED in properties:
+            self.not_repeated.add(tuple(json.loads(str(properties[NOT_REPEATED]))))
 
     @property
     def user_failures(self) -> list[SlotUserFailure]:
@@ -90,16 +90,16 @@ class Tally:
 
     @property
     def unasserted(self) -> Counter[str]:
-        """Violations for which no selected test fails, by signature: how many flights."""
+        """How many flights violate without failing any selected test, by signature."""
         return Counter(
             signature
-            for flight, signature in self._violating.items()
-            if flight not in self._answered
+            for flight, signature in self._signatures.items()
+            if flight not in self._failing_flights
         )
 
-    def unfounded(self) -> list[str]:
-        """Return the items that are excused by a failure that no item shows."""
-        shown = set(self._failures.values())
+    def wrongly_excused(self) -> list[str]:
+        """Return the items that are excused by a failure that no item reports."""
+        reported = set(self._failures.values())
         return sorted(
-            item for key, items in self._excused.items() if key not in shown for item in items
+            item for key, items in self._excused.items() if key not in reported for item in items
         )
