@@ -39,7 +39,7 @@ def fly_job(
         job.system.load(),
         job.npcs,
         map=map,
-        time_limit_s=max(PAPER_LIMITS.time_s, job.limits.time_s),
+        time_limit_s=time_limit_s(job.limits),
         guard=guard,
     )
     try:
@@ -50,6 +50,11 @@ def fly_job(
         )
         return broken_result(crash, map.diagonal_m), "", flown.wall_s
     return judged(flown, job.limits), flown.sha256, flown.wall_s
+
+
+def time_limit_s(limits: Limits) -> float:
+    """Return the simulated time after which a flight ends: the paper's limit, or a longer one."""
+    return max(PAPER_LIMITS.time_s, limits.time_s)
 
 
 def judged(flight: Flight, limits: Limits) -> FlightResult:

@@ -10,6 +10,7 @@ from typing import Literal
 from pytest_garl import cpu_dispatch
 from pytest_garl.adversary.catalogue import policy_spec
 from pytest_garl.errors import GarlError, LandingSystemError
+from pytest_garl.execution.flight import time_limit_s
 from pytest_garl.execution.reference import (
     BUILT_IN,
     simulator_sha256,
@@ -24,7 +25,6 @@ from pytest_garl.simulation.flight import Flight
 from pytest_garl.simulation.flight_file import load
 from pytest_garl.simulation.fly import fly
 from pytest_garl.verdicts.judge import judge
-from pytest_garl.verdicts.verdict import PAPER_LIMITS
 
 ReplayResult = Literal["FIXED", "FAILED", "STALE", "UNDECIDED"]
 BUILT_IN_VERDICT = "the built-in verdict"
@@ -134,8 +134,7 @@ def _by_verdict(case: Case, folder: Path, map: Map, judged_by: str, live: bool) 
     system = system_of(case, folder)
     cpu_dispatch.check()
     npcs = policy_spec(case.policy) if live else case.behaviour.policy
-    limit = max(PAPER_LIMITS.time_s, case.limits.time_s)
-    flight = fly(case.scenario, system, npcs, map=map, time_limit_s=limit)
+    flight = fly(case.scenario, system, npcs, map=map, time_limit_s=time_limit_s(case.limits))
     verdict = judge(flight, case.limits)
     sources = SourceHashes(
         system_sha256=sources_sha256(system),

@@ -10,12 +10,13 @@ from typing import Any
 
 import pytest
 
-from pytest_garl.execution.flight import fly_job, judged
+from pytest_garl.execution.flight import fly_job, judged, time_limit_s
 from pytest_garl.execution.flight_id import FlightId
 from pytest_garl.execution.reference import reference_to
 from pytest_garl.landing_system import Diagnostics
 from pytest_garl.simulation.flight import Flight, Step
 from pytest_garl.simulation.flight_file import load
+from pytest_garl.verdicts.verdict import Limits
 from tests.execution.flying import Good, job_of, scenario
 from tests.plugin import tiny_simulator
 
@@ -62,6 +63,11 @@ def test_flight_that_is_not_finite_is_a_finding(
     assert f"holds a NaN or an infinity in {words}" in result.verdict.story
     result.dumps()
     assert (sha256, list(tmp_path.iterdir())) == ("", [])
+
+
+def test_flight_ends_at_the_limit_of_the_paper_or_later() -> None:
+    assert time_limit_s(Limits(time_s=20.0)) == 120.0
+    assert time_limit_s(Limits(time_s=200.0)) == 200.0
 
 
 def test_flight_is_judged_and_its_record_saved(tmp_path: Path) -> None:
