@@ -10,7 +10,7 @@ from click.testing import CliRunner, Result
 from pytest_garl.baselines.file import load_baseline
 from pytest_garl.cli import main
 from pytest_garl.scenarios.files import load as load_scenario
-from tests.plugin import tiny_simulator
+from tests.support import tiny_simulator
 
 SYSTEM = """
 try:

@@ -21,8 +21,8 @@ from pytest_garl.scenarios.files import parse_scenario
 from pytest_garl.scenarios.genes import genome_for
 from pytest_garl.scenarios.maps.map import load_map
 from pytest_garl.scenarios.placement import marker_position_m
-from tests.plugin.test_plugin import write_project
 from tests.plugin.test_resume import FLOWN, SLOW, query
+from tests.support.landing_project import write_project
 
 TEXT = """
 title = "Toy"

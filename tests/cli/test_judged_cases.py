@@ -15,7 +15,7 @@ from pytest_garl.cli import main
 from pytest_garl.regressions.case_file import load_case
 from pytest_garl.regressions.corpus import replace_file
 from tests.plugin.test_cases import OWN, change, dodge
-from tests.plugin.test_plugin import write_project
+from tests.support.landing_project import write_project
 
 SEARCH = ("--garl-budget=24", "--garl-workers=0", "--garl-shrink=60")
 CLOCK = """

@@ -12,7 +12,7 @@ import pytest
 from jsonschema import Draft202012Validator
 
 from pytest_garl.reports.run_report import SCHEMA
-from tests.plugin.test_plugin import result_hash, write_project
+from tests.support.landing_project import result_hash, write_project
 
 VALIDATOR = Draft202012Validator(json.loads(SCHEMA.read_text()))
 

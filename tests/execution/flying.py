@@ -16,7 +16,7 @@ from pytest_garl.scenarios.maps.map import load_map
 from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.scenarios.validity import repair
 from pytest_garl.simulation.npc_policy import PolicySpec
-from tests.plugin import tiny_simulator
+from tests.support import tiny_simulator
 
 LAWN = load_map("lawn")
 

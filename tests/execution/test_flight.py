@@ -18,7 +18,7 @@ from pytest_garl.simulation.flight import Flight, Step
 from pytest_garl.simulation.flight_file import load
 from pytest_garl.verdicts.verdict import Limits
 from tests.execution.flying import Good, job_of, scenario
-from tests.plugin import tiny_simulator
+from tests.support import tiny_simulator
 
 NAN = math.nan
 

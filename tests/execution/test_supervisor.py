@@ -42,7 +42,7 @@ from tests.execution.misbehaving import (
     WillNotEnd,
     left,
 )
-from tests.plugin import tiny_simulator
+from tests.support import tiny_simulator
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)

@@ -9,7 +9,7 @@ import pytest
 from click.testing import CliRunner
 
 from pytest_garl.cli import main
-from tests.plugin.test_plugin import write_project
+from tests.support.landing_project import write_project
 
 GATE = ("--garl-baseline=base.toml", "--garl-workers=0")
 BETTER = ("> 0.7 and", "> 7 and")

@@ -9,8 +9,8 @@ from pathlib import Path
 import pytest
 
 from pytest_garl.regressions.case_file import dump_case
-from tests.plugin.test_plugin import project, run
 from tests.regressions.samples import case
+from tests.support.landing_project import project, run
 
 BROKEN = {
     "nested": "nested too deeply",

@@ -11,7 +11,7 @@ from click.testing import CliRunner
 from pytest_garl.cli import main
 from pytest_garl.execution.ledger import Ledger
 from pytest_garl.regressions.case_file import dump_case, load_case
-from tests.plugin.test_plugin import project, result_hash, write_project
+from tests.support.landing_project import project, result_hash, write_project
 
 SEARCH = ("--garl-budget=24", "--garl-workers=0", "--garl-shrink=60")
 CASES = ("--garl-workers=0",)

@@ -7,8 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from tests.plugin.test_plugin import CONFTEST, project, run
 from tests.plugin.test_resume import BUDGET, query, slow_project, start, wait_for
+from tests.support.landing_project import CONFTEST, project, run
 
 SEARCH = ("--garl-budget=24", "--garl-shrink=12", "--garl-workers=2", "--garl-map=lawn")
 TWICE = """

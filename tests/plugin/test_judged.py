@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from tests.plugin.test_plugin import project, run
+from tests.support.landing_project import project, run
 
 TOUCHES_AND_GIVES_UP = """
 import dataclasses

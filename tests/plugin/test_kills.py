@@ -17,8 +17,8 @@ import pytest
 
 from pytest_garl.execution.ledger import Ledger
 from pytest_garl.execution.processes import any_command_contains, children_of
-from tests.plugin.test_plugin import CONFTEST, write_project
 from tests.plugin.test_resume import SLOW, query
+from tests.support.landing_project import CONFTEST, write_project
 
 BUDGET = 24
 ARGS = (

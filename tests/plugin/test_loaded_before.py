@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from pytest_garl import cpu_dispatch
-from tests.plugin.test_plugin import TESTS, result_hash, run, write_project
+from tests.support.landing_project import TESTS, result_hash, run, write_project
 
 SYSTEM = """
 import os

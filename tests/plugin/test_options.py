@@ -2,7 +2,70 @@ from __future__ import annotations
 
 import pytest
 
-from tests.plugin.test_plugin import CONFTEST, project, run
+from pytest_garl.execution.slot import slots
+from pytest_garl.plugin.options import population
+from tests.support.landing_project import (
+    CONFTEST,
+    project,
+    run,
+)
+
+
+@pytest.mark.parametrize("budget", [1, 7, 8, 9, 40, 79, 80, 160, 200, 400, 401])
+def test_a_budget_makes_exactly_so_many_slots(budget: int) -> None:
+    names = slots(budget, population(budget))
+    assert len(set(names)) == budget
+    assert max(slot.index for slot in names) < population(budget) <= 20
+
+
+@pytest.mark.parametrize(
+    ("args", "words"),
+    [
+        (("--garl-budget=0",), "*--garl-budget: found '0', expected a whole number*"),
+        (("--garl-budget=many",), "*--garl-budget: found 'many'*"),
+        (
+            ("--garl-budget=8", "--garl-method=magic"),
+            "*--garl-method: found 'magic', expected one*",
+        ),
+        (
+            ("--garl-budget=8", "--garl-method=nowhere:search"),
+            "*--garl-method: search method 'nowhere:search': cannot be loaded*",
+        ),
+        (("--garl-budget=8", "--garl-npcs=magic"), "*--garl-npcs: found 'magic', expected one of*"),
+        (("--garl-budget=8", "--garl-npcs=mine.npz"), "*there are no weights at mine.npz*"),
+        (("--garl-budget=8", "--garl-repeat=nowhere"), "*--garl-repeat: found 'nowhere'*"),
+        (("--garl-budget=8", "-o", "garl_dir=/proc/garl"), "*cannot be written*garl_dir*"),
+    ],
+)
+def test_an_invalid_value_is_one_usage_error(
+    pytester: pytest.Pytester, args: tuple[str, ...], words: str
+) -> None:
+    project(pytester)
+    result = run(pytester, *args)
+    assert result.ret == pytest.ExitCode.USAGE_ERROR
+    result.stderr.fnmatch_lines([words])
+
+
+@pytest.mark.parametrize(
+    ("args", "words"),
+    [
+        ((), "*method garl, seed 0, NPCs dqn,*"),
+        (("--garl-method=garl-paper",), "*NPCs dqn-paper,*"),
+        (("--garl-method=random",), "*NPCs waypoint,*"),
+        (("--garl-method=surrogate-random",), "*NPCs dqn-paper,*"),
+        (("--garl-method=ga",), "*NPCs destination,*"),
+        (("--garl-method=offline-rl",), "*NPCs destination,*"),
+        (("--garl-method=online-rl",), "*NPCs online-rl,*"),
+        (("--garl-method=random", "--garl-npcs=stand"), "*NPCs stand,*"),
+    ],
+)
+def test_the_method_chooses_the_npc_policy_unless_an_option_does(
+    pytester: pytest.Pytester, args: tuple[str, ...], words: str
+) -> None:
+    project(pytester)
+    result = run(pytester, "--garl-budget=1", "--garl-workers=0", *args)
+    result.stdout.fnmatch_lines([words])
+
 
 NOTES_SEEDS = """
 from pathlib import Path

@@ -18,7 +18,6 @@ from pathlib import Path
 import pytest
 
 from tests.plugin.test_cases import cases, saved
-from tests.plugin.test_plugin import CONFTEST, project, result_hash, run, write_project
 from tests.plugin.test_resume import (
     BUDGET,
     FLOWN,
@@ -29,6 +28,7 @@ from tests.plugin.test_resume import (
     start,
     wait_for,
 )
+from tests.support.landing_project import CONFTEST, project, result_hash, run, write_project
 
 needs_ray = [
     pytest.mark.ray,

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.plugin.test_plugin import project, run
+from tests.support.landing_project import project, run
 
 PARALLEL = pytest.mark.parametrize("parallel", [(), pytest.param(("-n2",), marks=pytest.mark.long)])
 SEARCH = ("--garl-budget=8", "--garl-workers=1", "-o", "garl_dir=elsewhere")
@@ -153,37 +153,6 @@ def test_a_command_to_keep_patches_names_those_of_this_run(
     for name in ("git init", "git apply " + " ".join(files)):
         assert pytester.run(*name.split()).ret == 0
     assert len(list((pytester.path / "scenarios" / "regressions").rglob("*.toml"))) == 2
-
-
-@pytest.mark.parametrize(
-    ("fixture", "told"),
-    [
-        ("return 'waypoint'", ""),
-        ("return 'wayponit'", "unknown NPC policy 'wayponit'; expected one of"),
-        (
-            "return 3",
-            "fixture npcs: found 3, expected the name of a policy as --garl-npcs takes it",
-        ),
-    ],
-)
-def test_the_npcs_fixture_takes_a_name(pytester: pytest.Pytester, fixture: str, told: str) -> None:
-    project(pytester)
-    with (pytester.path / "conftest.py").open("a") as file:
-        file.write(f"import pytest\n@pytest.fixture(scope='session')\ndef npcs():\n    {fixture}\n")
-    result = run(pytester, "--garl-budget=2", "--garl-workers=0")
-    both = result.stdout.str() + result.stderr.str()
-    assert (told in both) if told else (result.ret in (0, 1))
-    assert "Traceback" not in both
-
-
-def test_limits_of_another_name_are_refused_with_the_names_that_there_are(
-    pytester: pytest.Pytester,
-) -> None:
-    project(pytester)
-    tests = pytester.path / "test_it.py"
-    tests.write_text(tests.read_text().replace("maps=", "limits={'distance': 1}, maps="))
-    result = run(pytester, "--garl-budget=2")
-    result.stdout.fnmatch_lines(["*found distance, expected distance_m, time_s or abort, such as*"])
 
 
 def test_a_folder_of_cases_that_cannot_be_written_is_told_in_the_summary(

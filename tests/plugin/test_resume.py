@@ -17,7 +17,7 @@ import pytest
 
 from pytest_garl.adversary.catalogue import WEIGHTS
 from pytest_garl.adversary.learned import Network, save
-from tests.plugin.test_plugin import project, result_hash, run
+from tests.support.landing_project import project, result_hash, run
 
 SLOW = """
 import time

@@ -22,7 +22,7 @@ from pytest_garl.plugin import run_progress
 from pytest_garl.plugin.run import Run
 from pytest_garl.plugin.run_progress import ProgressReader, RunProgress, progress_line
 from pytest_garl.regressions.forecast import RemainingWork
-from tests.plugin.test_plugin import project, run
+from tests.support.landing_project import project, run
 
 SLOW = """
 import time

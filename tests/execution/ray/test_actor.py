@@ -20,7 +20,7 @@ from pytest_garl.execution.worker_failure import WorkerExit
 from pytest_garl.scenarios.files import dump_scenario
 from pytest_garl.simulation.flight_file import load
 from tests.execution.flying import Exits, Good, Loud, Reports, Sleeps, Slow, job_of, scenario
-from tests.plugin.test_plugin import write_project
+from tests.support.landing_project import write_project
 
 
 def claim(system: type, after: str = "", timeout_s: float = 10.0) -> Claim:
