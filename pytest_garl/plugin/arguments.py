@@ -152,7 +152,7 @@ def add_options(parser: pytest.Parser) -> None:
 
 
 def is_enabled(config: pytest.Config) -> bool:
-    """Whether the command line or the configuration says anything about flying."""
+    """Whether the command line or the configuration asks for flights."""
     names = [option.name for option in OPTIONS]
     if config.getoption("--garl-resume"):
         return True
@@ -162,7 +162,7 @@ def is_enabled(config: pytest.Config) -> bool:
 
 
 def computes(config: pytest.Config) -> bool:
-    """Whether this process breeds or flies, as far as it can be told before conftest.py is read."""
+    """Whether this process may breed or fly, asked before a conftest.py is read."""
     given = config.known_args_namespace
     return (
         any(getattr(given, f"garl_{option.name}", None) is not None for option in OPTIONS)

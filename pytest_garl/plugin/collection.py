@@ -19,9 +19,9 @@ NOTHING_TO_FLY = "no --garl-budget given and no saved cases; to search: pytest -
 
 
 def parametrize(metafunc: pytest.Metafunc, marker: pytest.Mark) -> None:
-    """Make an item of each target of a marked test; one that says why if there is none.
+    """Make an item of each target of a marked test; without targets make one that is skipped.
 
-    Raises GarlError for a marker that makes no sense.
+    Raises GarlError if the marker is invalid.
     """
     options = options_of(metafunc.config)
     targets = targets_for(marker, options, metafunc.definition.originalname)
@@ -29,16 +29,16 @@ def parametrize(metafunc: pytest.Metafunc, marker: pytest.Mark) -> None:
         ids = [target.name for target in targets]
         return metafunc.parametrize("garl_slot", targets, ids=ids, indirect=True)
     if options.repeat:
-        reason = f"--garl-repeat={options.repeat}: not of this test"
+        reason = f"--garl-repeat={options.repeat}: this test does not fly it"
     else:
         reason = "no map selected" if options.budget else NOTHING_TO_FLY
     return metafunc.parametrize("garl_slot", [reason], ids=["nothing"], indirect=True)
 
 
 def targets_for(marker: pytest.Mark, options: Options, test: str) -> list[Target]:
-    """Return the saved cases and the slots of a marked test, which is called ``test``.
+    """Return the saved cases and the slots of a marked test called ``test``.
 
-    Raises GarlError for a marker that makes no sense.
+    Raises GarlError if the marker is invalid.
     """
     marked = read_marker(marker, options)
     if options.repeat:

@@ -42,7 +42,7 @@ def pytest_addhooks(pluginmanager: pytest.PytestPluginManager) -> None:
 
 
 def pytest_load_initial_conftests(early_config: pytest.Config) -> None:
-    """Choose the CPU's instructions before a conftest.py loads NumPy, if anything is asked for."""
+    """Choose the CPU's instructions before a conftest.py loads NumPy, if this process may fly."""
     if computes(early_config):
         from pytest_garl import cpu_dispatch
 
@@ -50,7 +50,7 @@ def pytest_load_initial_conftests(early_config: pytest.Config) -> None:
 
 
 def pytest_configure(config: pytest.Config) -> None:
-    """Register the marker, and join or begin a run if anything is to be flown."""
+    """Register the marker; read the options and begin the run if the session searches."""
     config.addinivalue_line(
         "markers",
         "garl(system, maps, limits, deterministic, files): search for violations of a landing "
@@ -79,7 +79,7 @@ def pytest_configure(config: pytest.Config) -> None:
 
 
 def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
-    """Turn a marked test into its slots."""
+    """Make the items of a marked test."""
     if "garl_slot" not in metafunc.fixturenames:
         return
     marker = metafunc.definition.get_closest_marker("garl")
@@ -98,7 +98,7 @@ def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
 
 @pytest.hookimpl(tryfirst=True)
 def pytest_collection_finish(session: pytest.Session) -> None:
-    """Tell the run which slots are wanted; where there is none yet, saved cases begin one."""
+    """Tell the run which items are selected; saved cases begin a run here."""
     config = session.config
     if config.option.collectonly:
         return
@@ -152,7 +152,7 @@ def pytest_pyfunc_call(pyfuncitem: pytest.Function) -> Generator[None, Any, Any]
 def pytest_runtest_makereport(
     item: pytest.Item, call: pytest.CallInfo[None]
 ) -> Generator[None, pytest.TestReport, pytest.TestReport]:
-    """Explain a violation, report a known one as xfailed, and judge saved cases."""
+    """Decide the outcome of a landing item, and write it into the report."""
     report = yield
     target = target_of(item)
     run = item.config.stash.get(RUN, None)
@@ -169,7 +169,7 @@ def pytest_runtest_makereport(
 
 
 def pytest_runtest_logreport(report: pytest.TestReport) -> None:
-    """End a session that has lost its ledger; remember what xdist's workers tell of assertions."""
+    """End a session without ledger; note the findings of xdist's workers."""
     abort_if_reported(report)
     worker = getattr(report, "node", None)
     for key, value in report.user_properties:
@@ -181,7 +181,7 @@ def pytest_runtest_logreport(report: pytest.TestReport) -> None:
 
 
 def pytest_report_header(config: pytest.Config) -> str | None:
-    """Say what will be searched, and how long it will probably take."""
+    """Announce the search and its time."""
     run = config.stash.get(RUN, None)
     if run is None:
         return None
@@ -191,7 +191,7 @@ def pytest_report_header(config: pytest.Config) -> str | None:
 
 
 def pytest_report_collectionfinish(config: pytest.Config) -> list[str]:
-    """Say how long all searches take, and where only accepted cases are known."""
+    """Announce the time of all searches; warn if git cannot tell which cases are committed."""
     run = config.stash.get(RUN, None)
     if run is None:
         return []
@@ -201,7 +201,7 @@ def pytest_report_collectionfinish(config: pytest.Config) -> list[str]:
 
 
 def pytest_terminal_summary(terminalreporter: Any, config: pytest.Config) -> None:
-    """Show what was found, per system and map."""
+    """Write the findings of each landing system on each map."""
     tally = config.stash[TALLY]
     if RUN not in config.stash and tally.items and config.pluginmanager.hasplugin("dsession"):
         from pytest_garl.plugin.startup import join_workers
@@ -251,7 +251,7 @@ def _save_cases(run: Any, session: pytest.Session, *, nothing_compared: bool) ->
 
 
 def pytest_unconfigure(config: pytest.Config) -> None:
-    """Leave the ledger to others."""
+    """End the workers and close the ledger."""
     run = config.stash.get(RUN, None)
     if run is not None:
         run.close()
@@ -259,7 +259,7 @@ def pytest_unconfigure(config: pytest.Config) -> None:
 
 @pytest.hookimpl(optionalhook=True)
 def pytest_configure_node(node: Any) -> None:
-    """Give an xdist worker the run's name, and its seed, so that a random one is drawn once."""
+    """Give an xdist worker the run's process and seed, so that a random seed is drawn once."""
     from pytest_garl.plugin.terminal_text import WIDTH, width_of
 
     node.workerinput["garl_controller"] = str(os.getpid())

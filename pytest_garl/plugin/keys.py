@@ -1,4 +1,4 @@
-"""Keys of what a session and its items keep, names of what reports carry, and quick questions.
+"""Keys of stashes and of reports, and questions about items that cost nothing.
 
 Every pytest run imports this module, so it imports as little as it can.
 """
@@ -68,15 +68,15 @@ def is_landing_item(item: pytest.Item) -> bool:
 
 
 def target_of(item: pytest.Item) -> Target | None:
-    """Return what an item tests, or None for an item that is not ours."""
+    """Return the target of an item, or None if it is no landing test."""
     callspec = getattr(item, "callspec", None)
     target = callspec.params.get("garl_slot") if callspec else None
-    # Where there is nothing to fly the parameter is the reason, a string.
+    # If there is nothing to fly, the parameter is the reason, a string.
     return None if isinstance(target, str) else target
 
 
 def name_slots(items: Iterable[pytest.Item]) -> None:
-    """Let the reports of landing tests tell what they test, whether or not it is flown."""
+    """Name the slot of each landing item in its reports, even if it is not flown."""
     for item in items:
         callspec: Any = getattr(item, "callspec", None)
         slot = callspec.params.get("garl_slot") if callspec else None

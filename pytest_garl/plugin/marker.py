@@ -1,4 +1,4 @@
-"""What a test's marker ``garl`` says."""
+"""Read a test's marker ``garl``: landing system, maps, limits, data files."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class MarkerArguments:
-    """What a marker says."""
+    """Checked arguments of a marker; ``maps`` are those that ``--garl-map`` selects."""
 
     system: type
     maps: tuple[str, ...]
@@ -35,7 +35,7 @@ class MarkerArguments:
         return f"{self.system.__module__}:{self.system.__qualname__}"
 
     def target(self, map: str, slot: Slot) -> Target:
-        """Return what an item tests that flies a slot on a map."""
+        """Return the target of an item that flies a slot on a map."""
         return Target(
             system=self.system,
             map=map,
@@ -47,7 +47,7 @@ class MarkerArguments:
 
 
 def read_marker(marker: pytest.Mark, options: Options) -> MarkerArguments:
-    """Return what a marker says; raise GarlError for one that makes no sense."""
+    """Return the arguments of a marker; raise GarlError if one is invalid."""
     from pytest_garl.scenarios.maps.map import load_map, map_names
     from pytest_garl.verdicts.verdict import Limits, limits
 
@@ -87,7 +87,7 @@ def read_marker(marker: pytest.Mark, options: Options) -> MarkerArguments:
 
 
 def _files(given: Any, options: Options) -> tuple[str, ...]:
-    """Return the marker's data files; raise GarlError for what is none."""
+    """Return the marker's data files; raise GarlError if one does not exist."""
     named = isinstance(given, list | tuple) and all(isinstance(each, str | Path) for each in given)
     if not named:
         raise GarlError(f"mark.garl: files={given!r}: expected a list of paths, as ['model.onnx']")

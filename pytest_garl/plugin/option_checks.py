@@ -1,4 +1,4 @@
-"""Checks of options together: one has no effect beside others, or names an unknown map."""
+"""Checks of several options together: options without effect, unknown maps, empty selections."""
 
 from __future__ import annotations
 
@@ -10,20 +10,20 @@ from pytest_garl.plugin.keys import is_landing_item
 from pytest_garl.plugin.options import Options
 
 OF_A_SEARCH = ("seed", "method", "population", "weather", "duplicates", "shrink", "resume")
-"""Options that say how a search goes."""
+"""Options that only a search uses."""
 
 
 def check_usage(options: Options) -> None:
     """Raise UsageError for an option without effect, or an unknown map.
 
-    Values of ini keys stand for every run and need not have an effect on each.
+    A value of an ini key applies to all runs and may have no effect on some.
     """
     for problem in (*_without_effect(options), *_unknown_maps(options)):
         raise pytest.UsageError(problem)
 
 
 def check_selection(options: Options, items: Iterable[pytest.Item]) -> None:
-    """Raise UsageError where maps or a slot are asked for that no selected test flies."""
+    """Raise UsageError if no selected test flies the maps or the slot of the command line."""
     landings = [item for item in items if "garl_slot" in getattr(item, "fixturenames", ())]
     if not landings or any(is_landing_item(item) for item in items):
         return
@@ -50,7 +50,7 @@ def _without_effect(options: Options) -> Iterator[str]:
     for name in OF_A_SEARCH:
         if name in given and not searches:
             reason = "beside --garl-repeat" if options.repeat else "without --garl-budget"
-            yield f"--garl-{name} has no effect {reason}: it says how a search goes"
+            yield f"--garl-{name} has no effect {reason}: only a search uses it"
     if "npcs" in given and not options.searches:
         yield (
             "--garl-npcs has no effect without --garl-budget or --garl-repeat: saved cases and "

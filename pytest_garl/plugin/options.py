@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 SLOT_ID = re.compile(r"(?P<map>.+)-g(?P<generation>\d{2,})-s(?P<slot>\d{2,})")
 LARGEST_POPULATION = 20
 SMALLEST_POPULATION = 8
-
+"""Limits of the default population."""
 SHRINK = 12
 """Flights for each new kind of violation: enough for the barest scenario, its neighbours, the
 reference pilot and a shorter record of moves."""
@@ -35,7 +35,7 @@ LEAST_SHRINK = 8
 
 @dataclass(frozen=True, kw_only=True)
 class Options:
-    """What the user wants, checked."""
+    """Checked values of all options, and the paths that follow from them."""
 
     given: frozenset[str]
     """Names of the options on the command line, without ``--garl-``."""
@@ -72,12 +72,12 @@ class Options:
 
     @property
     def searches(self) -> bool:
-        """Whether more than saved cases is flown."""
+        """Whether the session flies a search or a repeated scenario, and not saved cases only."""
         return self.budget > 0 or bool(self.repeat)
 
     @property
     def map_folders(self) -> tuple[Path, ...]:
-        """Where a user's own maps lie."""
+        """Folders of a user's own maps."""
         return (self.root / "scenarios" / "maps",)
 
     @functools.cached_property
@@ -94,9 +94,10 @@ class Options:
 
     @property
     def ledger(self) -> Path:
-        """The ledger of this run; repeating writes one of its own and keeps the search's.
+        """The file of the run's ledger.
 
-        Runs of saved cases alone may be several at a time; each has one until it ends.
+        A repeated scenario has a ledger of its own and leaves the search's unchanged.  Runs of
+        saved cases only may overlap: each has its own ledger and removes it at the end.
         """
         if not self.searches:
             return self.folder / f"cases-{self.controller}.sqlite"
@@ -107,9 +108,9 @@ _OPTIONS = pytest.StashKey[Options]()
 
 
 def options_of(config: pytest.Config) -> Options:
-    """Return the session's options; they are read when they are first asked for, and only then.
+    """Return the session's options; the first call reads them and keeps them in the stash.
 
-    Raises UsageError that says what was found and what is expected.
+    Raises UsageError for an invalid value.
     """
     if _OPTIONS not in config.stash:
         config.stash[_OPTIONS] = read_options(config)
@@ -117,7 +118,7 @@ def options_of(config: pytest.Config) -> Options:
 
 
 def read_options(config: pytest.Config) -> Options:
-    """Return the options; for ``options_of``, which remembers them."""
+    """Read the options; call ``options_of``, which does it once."""
     text = {option.name: _value(config, option) for option in OPTIONS}
     budget = _integer("budget", text["budget"], 1) if text["budget"] else 0
     size = _integer("population", text["population"], 1) if text["population"] else 0
@@ -158,12 +159,12 @@ def read_options(config: pytest.Config) -> Options:
 
 
 def population(budget: int) -> int:
-    """Return how many scenarios are bred at a time: a tenth of the budget, 8 to 20 of them."""
+    """Return the default population: a tenth of the budget, 8 to 20, at most the budget."""
     return min(LARGEST_POPULATION, max(SMALLEST_POPULATION, budget // 10), budget)
 
 
 def controller_of(config: pytest.Config) -> str:
-    """Return the process whose run this is: xdist's controller, or this one."""
+    """Return the id of the process that the run belongs to: xdist's controller, or this one."""
     given: dict[str, Any] = getattr(config, "workerinput", {})
     return str(given.get("garl_controller", os.getpid()))
 

@@ -1,4 +1,4 @@
-"""One pytest session's part in a run: its items' searches, the ledger, the pool."""
+"""The state of a run in one pytest process: options, ledger, pool, flights and findings."""
 
 from __future__ import annotations
 
@@ -54,7 +54,7 @@ class SelectedItem:
 
 
 def selected(item: pytest.Item) -> SelectedItem:
-    """Return what a run must know of an item."""
+    """Return what a run keeps of an item."""
     marked = any(item.get_closest_marker(name) for name in ("skip", "skipif", "xfail"))
     return SelectedItem(
         nodeid=item.nodeid,
@@ -74,7 +74,7 @@ def test_of(item: pytest.Item) -> str:
 
 @dataclass(kw_only=True)
 class Run:
-    """State of one pytest process; xdist workers each have one and share the ledger."""
+    """State of a run in one process; xdist's workers have one each and share the ledger."""
 
     options: Options
     ledger: Ledger
@@ -172,7 +172,7 @@ class Run:
         return self._wait(target.flight)
 
     def unproven(self, target: Target) -> tuple[str, ...]:
-        """Return why it proves nothing that a case passes; nothing if the system was repaired."""
+        """Return why a passing case proves nothing; empty if only the landing system changed."""
         if target.case is None:
             return ()
         sources = SourceHashes(
@@ -183,7 +183,7 @@ class Run:
         return stale_reasons(target.case, sources, self.flight(target).sha256)
 
     def scenario(self, target: Target) -> Scenario:
-        """Return what a slot flies."""
+        """Return the scenario of a slot."""
         text = self.ledger.scenario(target.flight)
         assert text is not None
         return parse_scenario(text)
@@ -226,7 +226,7 @@ class Run:
     def fly_all(
         self, target: Target, npcs: PolicySpec, scenarios: Sequence[Scenario]
     ) -> Sequence[CompletedFlight]:
-        """Return what scenarios come to that are flown beside the searches."""
+        """Fly given scenarios beside the searches and return their flights."""
         try:
             job = self.searches.job(target, npcs)
             return list(fly_all(self.ledger, self.pool, job, scenarios, self._advance))

@@ -20,7 +20,6 @@ from pytest_garl.plugin.terminal_text import begin_line, counted, duration, widt
 from pytest_garl.plugin.user_assertions import collect_assertion
 from pytest_garl.regressions.case import Case
 from pytest_garl.regressions.case_request import CaseRequest
-from pytest_garl.regressions.flight_shares import divide_flights
 from pytest_garl.regressions.follow_up import (
     InvestigatedSignature,
     ShrinkBudget,
@@ -44,13 +43,13 @@ def save_cases(run: Run, session: pytest.Session) -> None:
     try:
         requests = _requests(run, session)
         if requests:
-            most = sum(each.budget for each in divide_flights(requests))
-            run.remaining = remaining_work(requests, _flight_s(run, requests), options.workers or 1)
+            work = remaining_work(requests, _flight_s(run, requests), options.workers or 1)
+            run.remaining = work
             begin_line(reporter)
             reporter.write_line(
                 "garl: confirming and shrinking "
                 f"{counted(len(requests), 'new kind')} of violation, "
-                f"at most {counted(most, 'flight')}, about {duration(run.remaining.seconds)}"
+                f"at most {counted(work.at_most, 'flight')}, about {duration(work.seconds)}"
             )
         with show_progress(run, config):
             run.investigated = follow_up(run.ledger, run.pool, requests, _saver(run), run.on_wait)

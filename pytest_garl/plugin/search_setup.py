@@ -1,6 +1,6 @@
 """The searches that the selected items fly: their jobs, methods and breeders.
 
-A saved case and a repeated scenario are searches of scenarios that are given.
+A saved case, and a repeated scenario, is a search whose scenarios are given.
 """
 
 from __future__ import annotations
@@ -40,16 +40,16 @@ class Searches:
     ledger: Ledger
     simulator: Reference
     targets: dict[str, dict[Slot, Target]] = field(default_factory=dict)
-    """What the selected items test."""
+    """Targets of the selected items, by search and slot."""
     breeders: dict[str, Breeder] = field(default_factory=dict)
-    """Of the searches that are in the ledger."""
+    """Breeders of the searches that the ledger has."""
 
     def select(self, target: Target) -> None:
-        """Remember that an item is selected that tests this."""
+        """Add the target of a selected item."""
         self.targets.setdefault(target.search, {})[target.slot] = target
 
     def lower(self, target: Target) -> list[Target]:
-        """Return what the selected items of lower slots of the same search test."""
+        """Return the targets of the selected items of lower slots of the same search."""
         wanted = self.targets[target.search]
         return [wanted[slot] for slot in sorted(wanted) if slot < target.slot]
 
@@ -61,12 +61,12 @@ class Searches:
                 self._register(search, wanted, npcs)
 
     def advance(self) -> None:
-        """Breed what can be bred, so that the pool has work ahead of the items."""
+        """Breed all generations whose parents have flown, so that the pool has work."""
         for breeder in self.breeders.values():
             breeder.advance()
 
     def check_resumed(self) -> None:
-        """Raise LedgerError if a search to resume flew something else."""
+        """Raise LedgerError if the job of a search changed since the run that is resumed."""
         for search, wanted in self.targets.items():
             target = next(iter(wanted.values()))
             text = self.ledger.job(search)

@@ -1,4 +1,4 @@
-"""Begin a run, or join the one that xdist's controller began."""
+"""Begin a run, or join the run of xdist's controller."""
 
 from __future__ import annotations
 
@@ -82,7 +82,7 @@ def _open_ledger(config: pytest.Config, options: Options) -> tuple[Ledger, TextI
 
 
 def _facts(options: Options) -> dict[str, Any]:
-    """Return what must be the same when the run is resumed."""
+    """Return the facts that must be equal when the run is resumed."""
     return {
         "version": version("pytest-garl"),
         "sources of pytest-garl": package_sha256()[:12],
@@ -105,7 +105,7 @@ def _pool(ledger: Ledger, options: Options) -> Pool:
 
 
 def _shared_ledger(options: Options) -> Ledger:
-    """Return the ledger of a run of saved cases, made by whoever of its processes comes first."""
+    """Return the ledger of a run of saved cases; its first process makes the file."""
     path = options.ledger
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
@@ -122,7 +122,7 @@ def _shared_ledger(options: Options) -> Ledger:
 
 
 def _remove_stale(folder: Path) -> None:
-    """Remove the ledgers of runs of saved cases that were killed; each has its process's id."""
+    """Remove ledgers of saved cases whose process, named in the file, is gone."""
     for path in folder.glob("cases-*.*"):
         number = path.name.removeprefix("cases-").partition(".")[0]
         if number.isdigit() and not alive(int(number)):
@@ -130,7 +130,7 @@ def _remove_stale(folder: Path) -> None:
 
 
 def _lock(ledger: Path) -> TextIO:
-    """Keep other runs out of the folder until the file is closed, or this process is gone."""
+    """Lock the folder against other runs until the file is closed or this process ends."""
     path = ledger.with_suffix(".lock")
     try:
         path.parent.mkdir(parents=True, exist_ok=True)

@@ -1,4 +1,4 @@
-"""What one item tests: a system on a map, with a slot of a search, a saved case or a file."""
+"""The target of one item: a landing system on a map, with a slot, a saved case or a file."""
 
 from __future__ import annotations
 
@@ -21,14 +21,14 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, kw_only=True)
 class Target:
-    """What an item tests: which system on which map, and what it flies."""
+    """A landing system on a map, and the flight that an item judges."""
 
     system: type
     map: str
     limits: Limits
     slot: Slot
     deterministic: bool = True
-    """Whether the system does the same in the same flight, as its marker says."""
+    """Whether the marker says that the system repeats its flights exactly."""
     files: tuple[str, ...] = ()
     """Data files of the system, below the project's root."""
     file: str = ""
@@ -57,7 +57,7 @@ class Target:
 
     @property
     def broken(self) -> str:
-        """What is wrong with the case's file, if anything is."""
+        """The problem of the case's file, empty if it can be read."""
         return self.entry.problem if self.entry is not None else ""
 
     @functools.cached_property

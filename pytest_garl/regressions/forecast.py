@@ -23,6 +23,7 @@ PILOT_TIME_SHARE = 0.2
 class RemainingWork:
     """The flights that follow a search, and the time that they take."""
 
+    at_most: int
     flights: float
     seconds: float
 
@@ -52,7 +53,8 @@ def remaining_work(
     """Return the work of all requests; ``flight_s`` is the time of a flight of each, by name."""
     flights, each_s = 0.0, []
     left: dict[str, float] = {each.search: float(each.cap or 0) for each in requests}
-    for request in sorted(divide_flights(requests), key=lambda each: not each.budget):
+    divided = divide_flights(requests)
+    for request in sorted(divided, key=lambda each: not each.budget):
         budget = request.budget
         if not budget and left[request.search] >= LEAST_FLIGHTS - PILOT_FLIGHTS:
             # It gets the flights that others do not need.
@@ -66,4 +68,5 @@ def remaining_work(
         each_s.append((own + by_pilot * PILOT_TIME_SHARE) * flight_s[request.name])
     # Flights of one kind follow each other; those of several kinds are flown side by side.
     seconds = max([sum(each_s) / max(1, workers), *each_s], default=0.0)
-    return RemainingWork(flights=flights, seconds=seconds)
+    at_most = sum(each.budget for each in divided)
+    return RemainingWork(at_most=at_most, flights=flights, seconds=seconds)
