@@ -14,7 +14,7 @@ from click.testing import CliRunner, Result
 from pytest_garl.cli import main
 from pytest_garl.regressions.case_file import load_case
 from pytest_garl.regressions.corpus import replace_file
-from tests.plugin.test_cases import OWN, change, dodge
+from tests.support.case_project import OWN, change, dodge
 from tests.support.landing_project import write_project
 
 SEARCH = ("--garl-budget=24", "--garl-workers=0", "--garl-shrink=60")

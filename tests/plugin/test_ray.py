@@ -17,7 +17,6 @@ from pathlib import Path
 
 import pytest
 
-from tests.plugin.test_cases import cases, saved
 from tests.plugin.test_resume import (
     BUDGET,
     FLOWN,
@@ -28,6 +27,7 @@ from tests.plugin.test_resume import (
     start,
     wait_for,
 )
+from tests.support.case_project import cases, saved
 from tests.support.landing_project import CONFTEST, project, result_hash, run, write_project
 
 needs_ray = [

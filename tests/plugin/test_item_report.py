@@ -1,0 +1,190 @@
+from __future__ import annotations
+
+import shutil
+
+import pytest
+from click.testing import CliRunner
+
+from pytest_garl.cli import main
+from tests.support.case_project import (
+    CASES,
+    SEARCH,
+    cases,
+    change,
+    commit,
+    dodge,
+    run,
+    violations,
+)
+from tests.support.landing_project import project
+
+
+def test_cases_fly_under_xdist(searched: pytest.Pytester) -> None:
+    run(searched, "-n2", "--garl-workers=1").assert_outcomes(passed=2, skipped=2, xfailed=2)
+    assert not list((searched.path / ".garl").glob("cases-*"))
+
+
+def test_open_case_that_passes_on_a_changed_simulator_is_stale(
+    searched: pytest.Pytester,
+) -> None:
+    change(searched.path / "tiny_simulator.py", "> 0.7 and", "> 7 and")
+    result = run(searched)
+    result.assert_outcomes(passed=5, xfailed=1)
+    result.stdout.fnmatch_lines(["stale: *IV-dog*.toml passes, but the simulator has changed"])
+    result.stdout.no_fnmatch_line("maybe fixed*")
+
+
+def test_open_case_that_passes_may_be_fixed(searched: pytest.Pytester) -> None:
+    dodge(searched.path)
+    result = run(searched)
+    result.assert_outcomes(passed=5, xfailed=1)
+    result.stdout.fnmatch_lines(
+        [
+            "maybe fixed: scenarios/*IV-dog*.toml passes; if it is fixed:",
+            "    garl cases promote scenarios/*IV-dog*.toml",
+        ]
+    )
+    assert result.ret == 0
+    strict = run(searched, *CASES, "-o", "garl_xfail_strict=true")
+    assert strict.ret == pytest.ExitCode.TESTS_FAILED
+    strict.stdout.fnmatch_lines(["*is open but passes (garl_xfail_strict)*"])
+
+
+@pytest.mark.parametrize("status", ["open", "fixed", "unavoidable"])
+@pytest.mark.parametrize("repaired", [False, True])
+def test_edge_case_fails_no_run(searched: pytest.Pytester, status: str, repaired: bool) -> None:
+    dog = cases(searched)[1]
+    change(dog, "neighbours_failed = 3", "neighbours_failed = 2")
+    change(dog, 'status = "open"', f'status = "{status}"')
+    if repaired:
+        dodge(searched.path)
+    result = run(searched, "--garl-workers=0", "-rx", "-o", "garl_xfail_strict=true", "-kIV")
+    ends = "passes" if repaired else "fails"
+    result.stdout.fnmatch_lines([f"*case-lawn-IV-dog*edge: {ends}; IV:dog:*"])
+    assert result.ret == 0
+    result.stdout.no_fnmatch_line("maybe fixed*")
+
+
+def test_edge_case_hides_no_mistake_in_a_test(searched: pytest.Pytester) -> None:
+    change(cases(searched)[1], "neighbours_failed = 3", "neighbours_failed = 2")
+    change(searched.path / "test_it.py", "not landing.collisions", "not landing.colisions")
+    result = run(searched, "--garl-workers=0", "-kIV")
+    assert result.ret == pytest.ExitCode.TESTS_FAILED
+
+
+def test_open_case_that_ends_in_an_abort_counts_as_passed(
+    searched: pytest.Pytester,
+) -> None:
+    change(searched.path / "tiny_simulator.py", 'outcome = "collision"', 'outcome = "aborted"')
+    result = run(searched)
+    result.assert_outcomes(passed=3, skipped=2, xfailed=1)
+    result.stdout.fnmatch_lines(["stale: scenarios/*IV-dog*.toml passes, but the simulator*"])
+    strict = run(searched, *CASES, "-o", "garl_xfail_strict=true")
+    strict.assert_outcomes(passed=2, skipped=2, xfailed=1, failed=1)
+    assert strict.ret == pytest.ExitCode.TESTS_FAILED
+
+
+def test_case_hides_no_other_property(searched: pytest.Pytester) -> None:
+    tests = searched.path / "test_it.py"
+    own = "\ndef test_own(landing):\n    assert landing.flight.elapsed_s < 14\n"
+    tests.write_text(tests.read_text() + own + "\ndef test_typo(landing):\n    landing.hits\n")
+    result = run(searched)
+    # Both fail in each of the two cases, whose own failures stay expected.
+    result.assert_outcomes(passed=2, skipped=2, xfailed=2, failed=4)
+    again = run(searched, *SEARCH)
+    kinds = [line for line in again.outlines if line.startswith("FAILED")]
+    assert sum("test_own[lawn" in line for line in kinds) == 1
+    assert sum("test_typo[lawn" in line for line in kinds) == 24
+
+
+def test_open_case_that_fails_in_another_way_fails_the_run(searched: pytest.Pytester) -> None:
+    change(searched.path / "tiny_simulator.py", 'body="dog-1"', 'body="tree-1"')
+    change(searched.path / "tiny_simulator.py", 'kind="dog"', 'kind="tree"')
+    change(searched.path / "tiny_simulator.py", '"dynamic"', '"static"')
+    result = run(searched)
+    result.stdout.fnmatch_lines(
+        ["*IV-dog*fails in another way.", "Saved: IV:dog:*", "Flown: III:tree:*", "See it: garl*"]
+    )
+    assert result.ret == pytest.ExitCode.TESTS_FAILED
+
+
+def test_fixed_case_must_pass_with_its_moves_and_with_a_live_policy(
+    searched: pytest.Pytester,
+) -> None:
+    change(cases(searched)[1], 'status = "open"', 'status = "fixed"')
+    broken = run(searched)
+    broken.assert_outcomes(passed=2, skipped=4, xfailed=1, failed=2)
+    broken.stdout.fnmatch_lines(["*case-lawn-IV-dog-*-live*", "*was fixed and fails again.*"])
+    change(searched.path / "tiny_simulator.py", "> 0.7 and", "> 7 and")
+    run(searched).assert_outcomes(passed=8, xfailed=1)
+
+
+def test_unavoidable_case_excuses_no_other_violation_of_its_kind(
+    pytester: pytest.Pytester,
+) -> None:
+    project(pytester)
+    change(pytester.path / "tiny_simulator.py", "is False", "is None")
+    run(pytester, *SEARCH)
+    commit(pytester.path)
+    again = run(pytester, *SEARCH, "--garl-seed=1")
+    assert again.parseoutcomes()["failed"] == 2
+    assert again.ret == pytest.ExitCode.TESTS_FAILED
+
+
+def test_case_is_expected_once_it_is_committed_or_accepted(
+    searched: pytest.Pytester, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    shutil.rmtree(searched.path / ".git")
+    monkeypatch.setenv("COLUMNS", "200")
+    files = [str(path) for path in cases(searched)]
+    for _ in range(2):
+        result = run(searched, *CASES)
+        result.assert_outcomes(passed=2, skipped=2, failed=2)
+        result.stdout.fnmatch_lines(
+            [
+                "garl: cannot tell which cases are committed (*not a git repository*",
+                "If that is known: commit it, or: garl cases accept *IV-dog*.toml",
+            ]
+        )
+        result.stdout.fnmatch_lines(
+            ["FAILED *IV-dog* - collided with dog-1 at *; this case is new and not accepted yet"]
+        )
+        # A search says the same, however often.
+        assert run(searched, *SEARCH).parseoutcomes()["failed"] == 4
+    assert CliRunner().invoke(main, ["cases", "accept", *files]).exit_code == 0
+    run(searched).assert_outcomes(passed=2, skipped=2, xfailed=2)
+    assert run(searched, *SEARCH).ret == 0
+
+
+def test_repeat_shows_the_failure_of_an_expected_case(searched: pytest.Pytester) -> None:
+    run(searched, *SEARCH)
+    slot = next(
+        f"lawn-g{generation:02d}-s{slot:02d}"
+        for generation, slot, signature in violations(searched)
+        if signature.startswith("IV:dog")
+    )
+    result = run(searched, "--garl-workers=0", f"--garl-repeat={slot}")
+    result.assert_outcomes(failed=1, skipped=2)
+    result.stdout.fnmatch_lines(["*Collided with dog-1*"])
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "words"),
+    [
+        ('status = "open"', "status = open", "not valid TOML"),
+        ("schema = 1", "schema = 9", "key 'schema': found 9, expected 1"),
+        ("fog = 0.0", "fog = 1.5", "'genes.environment.fog': found 1.5"),
+        ('map = "lawn"', 'map = "moon"', "key 'map': unknown map 'moon'"),
+        ('"systems:Good"', '"systems:Other"', "key 'system': found 'systems:Other', expected"),
+        ("dog-1 = []", "dog-1 = [[1, 2.0, 0.0]]", "'moves.dog-1': found [[]1, 2.0, 0.0]"),
+        ("dog-1 = []", "cat-1 = []", "'moves.cat-1': unknown key"),
+    ],
+)
+def test_broken_case_fails_alone_and_names_file_and_key(
+    searched: pytest.Pytester, old: str, new: str, words: str
+) -> None:
+    path = cases(searched)[1]
+    change(path, old, new)
+    result = run(searched)
+    result.assert_outcomes(passed=2, xfailed=1, errors=3)
+    result.stdout.fnmatch_lines([f"*{path.name}*{words}*"])
