@@ -1,1 +1,1 @@
-"""Who interferes: the policies that steer the NPCs."""
+"""Who interferes: the policies that move the NPCs."""

@@ -46,7 +46,7 @@ RECENT = 50
     "kinds",
     default=",".join(OBJECT_TYPES),
     show_default=True,
-    help="Types of objects that the policy moves, separated by commas.",
+    help="Types of NPCs that the policy moves, separated by commas.",
 )
 @click.option(
     "--system",
@@ -57,7 +57,7 @@ RECENT = 50
     "--state",
     type=click.Choice([name for name, each in ENCODINGS.items() if not each.in_turn]),
     help="Input of the network, instead of that of --policy: the paper's four numbers, nine with "
-    "the paper's actions, or ten in the object's own frame.",
+    "the paper's actions, or ten in the NPC's own frame.",
 )
 @click.option(
     "--uav",
@@ -105,7 +105,7 @@ RECENT = 50
 def train(**options: Any) -> None:
     """Train an NPC policy in the surrogate and write its weights.
 
-    The surrogate is a landing on the project's own simulator: one object, a marker at a fixed
+    The surrogate is a landing on the project's own simulator: one NPC, a marker at a fixed
     place, and a UAV that knows the place. A seed takes about five minutes on two cores.
     Then use the weights: pytest --garl-budget=40 --garl-npcs=policy.npz
     """
@@ -120,12 +120,12 @@ def train(**options: Any) -> None:
     cpu_dispatch.check()
     plan = _plan(options)
     with _Progress(plan) as progress:
-        outcome = train_best(plan, progress.episode, progress.validated)
-    rates = ", ".join(f"seed {seed}: {100 * rate:.0f} %" for seed, rate in outcome.rates.items())
+        result = train_best(plan, progress.episode, progress.validated)
+    rates = ", ".join(f"seed {seed}: {100 * rate:.0f} %" for seed, rate in result.rates.items())
     click.echo(f"collisions in {plan.validation} validation episodes: {rates}")
     click.echo(
-        f"kept seed {outcome.best}: {100 * outcome.report.rate:.0f} % in {plan.validation} others; "
-        f"{plan.out} (with {plan.out.with_suffix('.json').name})"
+        f"kept seed {result.best}: {100 * result.report.rate:.0f} % in {plan.validation} other "
+        f"episodes; {plan.out} (with {plan.out.with_suffix('.json').name})"
     )
 
 

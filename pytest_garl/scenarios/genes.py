@@ -40,7 +40,7 @@ class Property:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class NuclearGene:
-    """Properties that crossover never tears apart: a fog density, or a place (x, y)."""
+    """Properties that crossover never separates: a fog density, or a place (x, y)."""
 
     name: str
     properties: tuple[Property, ...]
@@ -48,7 +48,7 @@ class NuclearGene:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class CompositeGene:
-    """Nuclear genes of one subject: the environment, the marker, the dynamic objects."""
+    """Nuclear genes of one subject: the environment, the marker, the NPCs."""
 
     name: str
     genes: tuple[NuclearGene, ...]
@@ -56,7 +56,7 @@ class CompositeGene:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Genome:
-    """Everything that may vary in a scenario on one map, in a fixed order."""
+    """All properties that may vary in a scenario on one map, in a fixed order."""
 
     composites: tuple[CompositeGene, ...]
 
@@ -99,12 +99,12 @@ class Genome:
 
     @property
     def nominal(self) -> NDArray[np.float64]:
-        """Nominal values, shape (size,): clear weather, noon, a marker where GPS says."""
+        """Nominal values, shape (size,): clear weather, noon, a marker at its GPS coordinate."""
         return np.array([item.nominal for item in self.properties])
 
     @property
     def borders(self) -> tuple[int, ...]:
-        """Columns at which a nuclear gene begins, without 0: where crossover may cut."""
+        """Columns at which a nuclear gene begins, without 0: crossover cuts only there."""
         starts = np.cumsum([len(gene.properties) for gene in self.genes])
         return tuple(int(start) for start in starts[:-1])
 
@@ -127,7 +127,7 @@ def _scalar(composite: str, name: str, high: float, nominal: float, meaning: str
 
 
 def place_gene(prefix: str, name: str, meaning: str) -> NuclearGene:
-    """Return a gene of two properties x and y from -1 to 1, which crossover never parts."""
+    """Return a gene of two properties x and y from -1 to 1, which crossover never separates."""
     return NuclearGene(
         name=name,
         properties=tuple(
@@ -163,7 +163,7 @@ ENVIRONMENT = (*(f"environment.{name}" for name, _ in WEATHER), SUN)
 def genome_for(
     map: Map, *, weather: WeatherRange = "confined", extras: Iterable[CompositeGene] = ()
 ) -> Genome:
-    """Return the genome of scenarios on ``map``: environment, marker, its objects, extras."""
+    """Return the genome of scenarios on ``map``: environment, marker, its NPCs, extras."""
     top = CONFINED_WEATHER if weather == "confined" else 1.0
     environment = CompositeGene(
         name="environment",
@@ -189,13 +189,13 @@ def genome_for(
 
 
 def with_destinations(genome: Genome) -> Genome:
-    """Return the genome with a place (x, y) for each dynamic object where it is bound for.
+    """Return the genome with a destination (x, y) for each NPC.
 
-    The place belongs to the object's nuclear gene: where it starts and where it goes are
-    inherited together.
+    The destination belongs to the NPC's nuclear gene, so start and destination are inherited
+    together.
     """
     composites = (
-        dataclasses.replace(each, genes=tuple(_bound(gene) for gene in each.genes))
+        dataclasses.replace(each, genes=tuple(_with_destination(gene) for gene in each.genes))
         if each.name == "objects"
         else each
         for each in genome.composites
@@ -203,8 +203,8 @@ def with_destinations(genome: Genome) -> Genome:
     return Genome(composites=tuple(composites))
 
 
-def _corner(name: str, end: str) -> tuple[Property, ...]:
-    """Return where an object starts or goes to; by default both is the same corner."""
+def _end_of_way(name: str, end: str) -> tuple[Property, ...]:
+    """Return the place at one end of an NPC's way; both ends have the same nominal corner."""
     return tuple(
         Property(
             key=f"{name}.{end}_{axis}",
@@ -217,9 +217,9 @@ def _corner(name: str, end: str) -> tuple[Property, ...]:
     )
 
 
-def _bound(gene: NuclearGene) -> NuclearGene:
+def _with_destination(gene: NuclearGene) -> NuclearGene:
     return dataclasses.replace(
-        gene, properties=(*gene.properties, *_corner(gene.name, "destination"))
+        gene, properties=(*gene.properties, *_end_of_way(gene.name, "destination"))
     )
 
 
@@ -231,4 +231,4 @@ def _object_gene(name: str) -> NuclearGene:
         nominal=0.0,
         meaning="speed as a share of the type's top speed",
     )
-    return NuclearGene(name=name, properties=(*_corner(name, "start"), velocity))
+    return NuclearGene(name=name, properties=(*_end_of_way(name, "start"), velocity))
