@@ -47,6 +47,6 @@ def check_policy(spec: PolicySpec, map: Map) -> None:
             raise
         except Exception as error:
             raise PolicyError(
-                f"object policy {spec.name!r}: reset raised {type(error).__name__}: {error}"
+                f"NPC policy {spec.name!r}: reset raised {type(error).__name__}: {error}"
             ) from error
         decision(policy, situation)

@@ -69,9 +69,9 @@ def make_method(name: str, plan: SearchPlan) -> Method:
     """
     make = find_method(name)
     if name not in method_names():
-        from pytest_garl.search.own_method import OwnMethod
+        from pytest_garl.search.user_method import UserMethod
 
-        return OwnMethod(name, make, plan)
+        return UserMethod(name, make, plan)
     try:
         return make(plan)
     except ImportError as error:

@@ -10,7 +10,7 @@ import pytest
 from pytest_garl.adversary.observations import ACTIONS, ENCODINGS, on_turn
 from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.simulation.npc_policy import Move
-from tests.adversary.situations import SCENARIO, being, situation
+from tests.support.situations import SCENARIO, being, situation
 
 
 def test_the_papers_state_is_object_and_uav_relative_to_the_marker() -> None:

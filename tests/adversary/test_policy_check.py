@@ -10,7 +10,7 @@ from pytest_garl.adversary.catalogue import policy_names, policy_spec
 from pytest_garl.adversary.policy_check import check_policy
 from pytest_garl.errors import PolicyError
 from pytest_garl.simulation.npc_policy import Move, PolicySpec, Situation
-from tests.adversary.situations import MAP
+from tests.support.situations import MAP
 
 
 @pytest.mark.parametrize("name", policy_names())

@@ -4,7 +4,7 @@ import pytest
 
 from pytest_garl.adversary.steering import arrived, towards
 from pytest_garl.simulation.npc_policy import STAY
-from tests.adversary.situations import being, situation
+from tests.support.situations import being, situation
 
 
 def test_an_npc_goes_straight_at_full_speed() -> None:

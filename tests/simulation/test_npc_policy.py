@@ -4,7 +4,7 @@ import pytest
 
 from pytest_garl.errors import PolicyError
 from pytest_garl.simulation.npc_policy import Move, PolicySpec, Situation, decision
-from tests.adversary.situations import being, situation
+from tests.support.situations import being, situation
 
 
 class Eastward:

@@ -8,7 +8,7 @@ import pytest
 from pytest_garl.adversary.learned import Network, save
 from pytest_garl.simulation.npc_policy import PolicySpec
 from studies import team
-from tests.adversary.situations import being, situation
+from tests.support.situations import being, situation
 
 
 def test_an_object_without_a_fellow_sees_one_far_behind() -> None:

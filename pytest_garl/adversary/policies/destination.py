@@ -23,7 +23,7 @@ class Destination:
         goal = object_destination_m(situation.scenario, situation.map, name)
         if goal is None:
             raise PolicyError(
-                f"object policy 'destination': the scenario has no gene '{name}.destination_x'; "
+                f"NPC policy 'destination': the scenario has no gene '{name}.destination_x'; "
                 "choose a search method that gives NPCs a destination, such as ga (--garl-method), "
                 "or another policy (--garl-npcs)"
             )

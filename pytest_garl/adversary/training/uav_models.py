@@ -122,7 +122,7 @@ class AvoidingPilot(StraightPilot):
         if truth is None:
             return super().step(observation)
         place = tuple(float(value) for value in observation.position_m)
-        if any(self._threatens(item, place) for item in truth.objects):
+        if any(self._is_close_below(item, place) for item in truth.objects):
             self._clear_since = now
             if self._seen_since is None:
                 self._seen_since = now
@@ -137,7 +137,7 @@ class AvoidingPilot(StraightPilot):
             return VelocitySetpoint(velocity_mps=(*centring(goal, (x, y)), climb))
         return super().step(observation)
 
-    def _threatens(self, item: TruthObject, place: tuple[float, ...]) -> bool:
+    def _is_close_below(self, item: TruthObject, place: tuple[float, ...]) -> bool:
         """Whether an NPC is near the column below, and inside the camera's view."""
         below = place[2] - item.type.top_m
         dx, dy = abs(item.position_m[0] - place[0]), abs(item.position_m[1] - place[1])

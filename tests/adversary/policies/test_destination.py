@@ -10,7 +10,7 @@ from pytest_garl.scenarios.placement import object_destination_m
 from pytest_garl.search.methods.random import propose
 from pytest_garl.simulation.fly import fly
 from pytest_garl.simulation.system_under_test.reference_pilot import ReferencePilot
-from tests.adversary.situations import MAP
+from tests.support.situations import MAP
 
 NAMES = [name for name, _ in MAP.object_names]
 

@@ -5,7 +5,7 @@ import math
 
 import pytest
 
-from tests.adversary.situations import walk
+from tests.support.situations import walk
 
 
 def test_greedy_crosses_the_marker_again_and_again() -> None:

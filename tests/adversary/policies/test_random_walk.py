@@ -2,7 +2,7 @@ from __future__ import annotations
 
 import itertools
 
-from tests.adversary.situations import walk
+from tests.support.situations import walk
 
 
 def test_each_step_is_one_of_the_papers_five_actions() -> None:

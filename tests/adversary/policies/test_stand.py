@@ -2,7 +2,7 @@ from __future__ import annotations
 
 import math
 
-from tests.adversary.situations import walk
+from tests.support.situations import walk
 
 
 def test_stand_walks_to_the_marker_and_stays() -> None:

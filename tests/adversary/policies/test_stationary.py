@@ -1,6 +1,6 @@
 from __future__ import annotations
 
-from tests.adversary.situations import walk
+from tests.support.situations import walk
 
 
 def test_a_stationary_npc_stays_where_it_starts() -> None:

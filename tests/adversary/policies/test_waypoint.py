@@ -5,7 +5,7 @@ import math
 
 import pytest
 
-from tests.adversary.situations import MAP, walk
+from tests.support.situations import MAP, walk
 
 
 def test_an_npc_walks_straight_to_one_place_after_the_other_within_the_map() -> None:

@@ -13,7 +13,7 @@ from pytest_garl.adversary.training.uav_models import (
 from pytest_garl.scenarios.genes import genome_for
 from pytest_garl.search.methods.random import propose
 from pytest_garl.simulation.fly import fly
-from tests.adversary.situations import MAP
+from tests.support.situations import MAP
 
 
 def test_styles_and_parameters_are_drawn_from_the_generator_alone() -> None:

@@ -17,7 +17,7 @@ from pytest_garl.search.method import Flown, Method, SearchPlan
 T = TypeVar("T")
 
 
-class OwnMethod:
+class UserMethod:
     """Passes calls on to a user's own method; any mistake in it is a GarlError that names it.
 
     ``name`` is "module:factory", ``make`` that factory.

@@ -46,7 +46,7 @@ def test_an_error_in_an_own_method_is_reported_with_its_place(own: types.ModuleT
         raise ZeroDivisionError("no seed")
 
     own.make = broken  # type: ignore[attr-defined]
-    expected = r"the factory raised ZeroDivisionError: no seed \(test_own_method.py:\d+\)"
+    expected = r"the factory raised ZeroDivisionError: no seed \(test_user_method.py:\d+\)"
     with pytest.raises(GarlError, match=expected):
         make_method("own_method:make", PLAN)
 
