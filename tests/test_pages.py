@@ -137,6 +137,11 @@ def test_readme_shows_output_of_the_tutorial() -> None:
     assert [line for line in output if line.split() not in [*tutorial, ["..."]]] == []
 
 
+def test_picture_of_the_readme_loads_quickly() -> None:
+    (picture,) = re.findall(r"!\[.*?\]\((.*?)\)", README.read_text())
+    assert (ROOT / picture).stat().st_size < 400_000
+
+
 def test_every_command_of_the_readme_is_run() -> None:
     shown = {
         line.partition("#")[0].strip()
