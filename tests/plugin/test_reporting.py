@@ -175,7 +175,7 @@ def test_landing_is_exported_for_annotations() -> None:
     assert "Landing" in pytest_garl.__all__
 
 
-def test_an_own_method_that_breaks_is_told_once(pytester: pytest.Pytester) -> None:
+def test_a_broken_users_method_is_reported_once(pytester: pytest.Pytester) -> None:
     project(pytester)
     (pytester.path / "broken_method.py").write_text(
         "class Broken:\n"

@@ -27,7 +27,7 @@ def test_each_file_of_a_method_declares_one() -> None:
         assert declared.policy in policy_names()
 
 
-def test_a_method_brings_its_policy_and_an_own_method_the_default() -> None:
+def test_a_method_brings_its_policy_and_a_users_method_the_default() -> None:
     assert default_policy("ga") == "destination"
     assert default_policy("online-rl") == "online-rl"
     assert default_policy("my_search:Hill") == DEFAULT_POLICY == default_policy(DEFAULT_METHOD)
@@ -43,7 +43,7 @@ def test_the_catalogue_imports_no_method_and_no_numpy() -> None:
     assert done.stdout.split() == []
 
 
-def test_an_own_method_is_named_by_its_module() -> None:
+def test_a_users_method_is_named_by_its_module() -> None:
     own = make_method("pytest_garl.search.methods.garl_paper:make", plan())
     assert bred(own, 2) == bred(make_method("garl-paper", plan()), 2)
     with pytest.raises(GarlError, match=r"'nowhere:method'.*cannot be loaded.*one of .*garl, "):
