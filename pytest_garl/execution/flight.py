@@ -1,4 +1,4 @@
-"""One flight as a job says: flown, judged, its record saved."""
+"""Fly one scenario as a job says: simulate the flight, judge it, save its record."""
 
 from __future__ import annotations
 
@@ -45,9 +45,7 @@ def fly_job(
     try:
         save(flown, record)
     except NotFiniteError as error:
-        crash = Crash(
-            kind="nonsense", error="NotFinite", message=str(error), where="", traceback=""
-        )
+        crash = Crash(kind="nonsense", error="NotFinite", message=str(error))
         return broken_result(crash, map.diagonal_m), "", flown.wall_s
     return judged(flown, job.limits), flown.sha256, flown.wall_s
 

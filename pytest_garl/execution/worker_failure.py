@@ -74,18 +74,15 @@ def _result(claim: Claim, ended: WorkerExit, repeated: bool, inconclusive: bool)
 def _crash(ended: WorkerExit) -> Crash:
     """Return the exit as the crash of a flight."""
     if ended.hung:
-        return Crash(
-            kind="hung", error="Timeout", message=ended.hung, where="", traceback=ended.stacks
-        )
+        return Crash(kind="hung", error="Timeout", message=ended.hung, traceback=ended.stacks)
     if ended.failure:
         error, message, text = ended.failure
         message = f"the simulator, which flies the reference pilot, failed with {error}: {message}"
-        return Crash(kind="broke", error=error, message=message, where="", traceback=text)
+        return Crash(kind="broke", error=error, message=message, traceback=text)
     how = f"signal {-ended.status}" if ended.status < 0 else f"exit status {ended.status}"
     return Crash(
         kind="died",
         error=how.replace(" ", "-"),
         message=f"its process ended with {how}",
-        where="",
         traceback=ended.stderr,
     )

@@ -116,8 +116,8 @@ class Crash:
     kind: Literal["raised", "nonsense", "died", "hung", "broke"]
     error: str
     message: str
-    where: str
-    traceback: str
+    where: str = ""
+    traceback: str = ""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

@@ -47,6 +47,4 @@ def flight_result(
 
 def crash(kind: Any = "raised", **fields: str) -> Crash:
     """Return how a landing system broke down."""
-    return Crash(
-        **{"kind": kind, "error": "E", "message": "", "where": "", "traceback": "", **fields}
-    )
+    return Crash(**{"kind": kind, "error": "E", "message": "", **fields})

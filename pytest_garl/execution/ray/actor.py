@@ -26,9 +26,7 @@ from pytest_garl.execution.worker_failure import WorkerExit
 from pytest_garl.files.json_values import parse_json
 from pytest_garl.simulation.flight import PACKAGES, Crash
 
-_NO_RESULT = broken_result(
-    Crash(kind="died", error="", message="", where="", traceback=""), diagonal_m=0.0
-)
+_NO_RESULT = broken_result(Crash(kind="died", error="", message=""), diagonal_m=0.0)
 """The result in the actor's own ledger for a flight whose worker ended; nobody reads it."""
 
 
