@@ -25,7 +25,7 @@ COMMANDS = {
     "train": "train",
 }
 """The subcommands, and the module of each."""
-_RESTARTED = "_PYTEST_GARL_STARTED_RESTARTED"
+_RESTARTED = "_PYTEST_GARL_RESTARTED"
 
 
 class _Group(click.Group):
