@@ -115,7 +115,8 @@ def train(**options: Any) -> None:
         from pytest_garl.adversary.training.selection import train_best
     except ImportError as error:
         raise GarlError(
-            f"training needs more than flying does ({error}): pip install 'pytest-garl[train]'"
+            f"training needs packages that flying does not need ({error}): "
+            "pip install 'pytest-garl[train]'"
         ) from error
     cpu_dispatch.check()
     plan = _plan(options)

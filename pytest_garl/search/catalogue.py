@@ -34,8 +34,8 @@ def method_names() -> tuple[str, ...]:
 
 
 def declaration_of(name: str) -> MethodDeclaration:
-    """Return what the module of a shipped method declares."""
-    module = importlib.import_module(f"{_PACKAGE}.{name.replace('-', '_')}")
+    """Return the declaration in the module of a shipped method."""
+    module = importlib.import_module(f"{__package__}.methods.{name.replace('-', '_')}")
     found: MethodDeclaration = module.METHOD
     return found
 
@@ -67,19 +67,17 @@ def make_method(name: str, plan: SearchPlan) -> Method:
     this function and the method that it returns raise GarlError if the method raises or returns
     something invalid.
     """
-    make = find_method(name)
     if name not in method_names():
         from pytest_garl.search.user_method import UserMethod
 
-        return UserMethod(name, make, plan)
+        return UserMethod(name, find_method(name), plan)
+    declared = declaration_of(name)
     try:
-        return make(plan)
+        return declared.make(plan)
     except ImportError as error:
+        if not declared.extra:
+            raise
         raise GarlError(
-            f"the search method {name} needs more than flying does ({error}): "
-            f"pip install 'pytest-garl[{declaration_of(name).extra}]', or choose another "
-            "--garl-method"
+            f"the search method {name} needs packages that flying does not need ({error}): "
+            f"pip install 'pytest-garl[{declared.extra}]', or choose another --garl-method"
         ) from error
-
-
-_PACKAGE = f"{__package__}.methods"

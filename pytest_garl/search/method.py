@@ -50,13 +50,13 @@ class Method(Protocol):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class MethodDeclaration:
-    """What a module of ``search/methods/`` declares as ``METHOD``.
+    """The declaration of a shipped method: ``METHOD`` in its module of ``search/methods/``.
 
-    ``make`` starts a search.  It may import what only this method needs.
+    ``make`` starts a search.  Packages that only this method needs are imported there.
     """
 
     make: Callable[[SearchPlan], Method]
     policy: str
     """The NPC policy that belongs to the method; ``--garl-npcs`` overrides it."""
     extra: str = ""
-    """The extra of pytest-garl that the method needs."""
+    """The extra of pytest-garl that holds packages which only this method needs."""

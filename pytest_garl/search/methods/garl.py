@@ -111,14 +111,14 @@ class Garl:
         weight = self._parameters.trial_weight
         for item in flown:
             name = self._parameters.cell(item.result)
-            worth = self._worth(name, item)
+            success = self._success(name, item)
             arm = self._arms[item.scenario.genes]
             wins, losses = self._trials[arm]
-            self._trials[arm] = weight * wins + worth, weight * losses + 1 - worth
+            self._trials[arm] = weight * wins + success, weight * losses + 1 - success
             self._cells[name].append(item)
         return [(violation_proximity(item.result),) for item in flown]
 
-    def _worth(self, name: str, item: Flown) -> float:
+    def _success(self, name: str, item: Flown) -> float:
         """Return the success of a flight, 0 to 1."""
         signature = item.result.signature
         if signature:
@@ -159,15 +159,15 @@ class Garl:
         Genes are drawn one by one (paper, eq. 2), except the marker's place, a point.
         """
         rng, genome, spread = self._rng, self._plan.genome, row.copy()
-        asked = np.array(self._chromosomes) if self._chromosomes else row[None]
+        earlier = np.array(self._chromosomes) if self._chromosomes else row[None]
         marker, share = self._marker, self._parameters.spread_share
         for column in np.flatnonzero(which & ~marker & (rng.random(row.size) < share)):
             drawn = rng.uniform(genome.lower[column], genome.upper[column], CANDIDATES)
-            spread[column] = drawn[farthest_from_all(drawn, asked[:, column])]
+            spread[column] = drawn[farthest_from_all(drawn, earlier[:, column])]
         if (which & marker).any() and rng.random() < share:
             shape = CANDIDATES, int(marker.sum())
             places = rng.uniform(genome.lower[marker], genome.upper[marker], shape)
-            spread[marker] = places[farthest_from_nearest(places, asked[:, marker])]
+            spread[marker] = places[farthest_from_nearest(places, earlier[:, marker])]
         return spread
 
     def _child(self, name: str, way: str) -> Scenario:

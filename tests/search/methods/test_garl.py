@@ -92,7 +92,7 @@ def test_a_successful_cell_is_chosen_more_often() -> None:
 def test_the_first_violation_of_a_kind_is_worth_more_than_the_fourth() -> None:
     method = Garl(PLAN)
     items = [Flown(scenario=each, result=result("IV:dog")) for each in method.ask()]
-    assert [method._worth("IV:dog", item) for item in items[:4]] == [1.0, 0.5**0.5, 3**-0.5, 0.5]
+    assert [method._success("IV:dog", item) for item in items[:4]] == [1.0, 0.5**0.5, 3**-0.5, 0.5]
 
 
 def test_a_cell_is_named_by_signature_near_miss_or_outcome() -> None:
