@@ -29,7 +29,7 @@ from pytest_garl.scenarios.chromosome import encode
 from pytest_garl.scenarios.genes import genome_for
 from pytest_garl.scenarios.maps.map import load_map
 from pytest_garl.scenarios.scenario import Scenario
-from pytest_garl.search.catalogue import find_method
+from pytest_garl.search.catalogue import default_policy, find_method
 from pytest_garl.search.method import Flown, Method, SearchPlan
 from pytest_garl.search.methods.garl import Garl, GarlParameters
 from pytest_garl.simulation.fly import fly
@@ -83,8 +83,6 @@ VARIANTS: dict[str, Callable[[SearchPlan], Method]] = {
     "random": find_method("random"),
     "random with dqn": find_method("random"),
 }
-POLICIES = {"garl-paper": "dqn-paper", "random": "waypoint"}
-"""The NPC policy of a variant; ``dqn`` for all others."""
 
 
 class Pilot(AvoidingPilot):
@@ -105,7 +103,7 @@ def search(key: Key, pool: Executor) -> dict[str, Any]:
     name, seed, map_name = key
     map = load_map(map_name)
     plan = SearchPlan(map=map, genome=genome_for(map), seed=int(seed), population=POPULATION)
-    flown = functools.partial(fly_one, policy=POLICIES.get(name, "dqn"))
+    flown = functools.partial(fly_one, policy=default_policy(name))
     method, verdicts, chromosomes = VARIANTS[name](plan), [], []
     for _ in range(BUDGET // POPULATION):
         scenarios = method.ask()
