@@ -179,11 +179,14 @@ def test_the_first_line_now_and_then_counts_the_time_before_it(
     clock = [100.0]
     monkeypatch.setattr(run_progress, "time", SimpleNamespace(monotonic=lambda: clock[0]))
     reader = ProgressReader(
-        cast(Run, SimpleNamespace(rest=RemainingWork(at_most=0, flights=0.0, seconds=0.0))), 30.0
+        cast(Run, SimpleNamespace(remaining=RemainingWork(at_most=0, flights=0.0, seconds=0.0))),
+        30.0,
     )
     reader.start_clock()
     clock[0] += 30.0
-    queries = SimpleNamespace(progress=lambda: [TWO[1]], meters=dict, violations=dict, nearest=dict)
+    queries = SimpleNamespace(
+        progress=lambda: [TWO[1]], meters=dict, violation_counts=dict, nearest=dict
+    )
     ledger = SimpleNamespace(queries=queries, fact=lambda key: None)
     found = reader.read(cast(Ledger, ledger))
     assert found is not None
