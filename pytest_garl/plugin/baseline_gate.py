@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import os
 from collections.abc import Generator, Iterable, Iterator, Sequence
 from pathlib import Path
@@ -16,7 +17,6 @@ from pytest_garl.baselines.file import Baseline, BaselineSet, load_baseline
 from pytest_garl.baselines.gate import compare_flights
 from pytest_garl.baselines.pairs import PairResult
 from pytest_garl.errors import GarlError
-from pytest_garl.execution.flight_id import FIRST
 from pytest_garl.plugin.abort import abort_session
 from pytest_garl.plugin.keys import GATE_PLUGIN, RUN, is_xdist_worker
 from pytest_garl.plugin.marker import read_marker
@@ -133,14 +133,14 @@ class BaselineGatePlugin:
         except GarlError as error:
             raise pytest.Collector.CollectError(f"{collector.nodeid}: {error}") from error
         for map in marked.maps:
-            base = self._baseline.find(marked.system_name, map)
-            gate = (str(collector.path), marked.system_name, map)
+            base = self._baseline.find(marked.target.system_name, map)
+            gate = (str(collector.path), marked.target.system_name, map)
             if base is not None and gate not in self._gates_made:
                 self._gates_made.add(gate)
                 yield BaselineGateItem.from_parent(
                     collector,
                     name=f"baseline[{base.title}]",
-                    target=marked.target(map, FIRST),
+                    target=dataclasses.replace(marked.target, map=map),
                     base=base,
                 )
 

@@ -2,28 +2,26 @@
 
 from __future__ import annotations
 
-import dataclasses
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
 from pytest_garl.errors import GarlError
-from pytest_garl.execution.flight_id import FIRST
 from pytest_garl.execution.slot import slots
 from pytest_garl.plugin.marker import MarkerArguments, read_marker
-from pytest_garl.plugin.options import Options, options_of
+from pytest_garl.plugin.options import Options
 from pytest_garl.plugin.target import Target
 
 NOTHING_TO_FLY = "no --garl-budget given and no saved cases; to search: pytest --garl-budget=40"
 
 
-def parametrize(metafunc: pytest.Metafunc, marker: pytest.Mark) -> None:
+def parametrize(metafunc: pytest.Metafunc, marker: pytest.Mark, options: Options) -> None:
     """Make an item of each target of a marked test; without targets make one that is skipped.
 
     Raises GarlError if the marker is invalid.
     """
-    options = options_of(metafunc.config)
     targets = targets_for(marker, options, metafunc.definition.originalname)
     if targets:
         ids = [target.name for target in targets]
@@ -44,7 +42,7 @@ def targets_for(marker: pytest.Mark, options: Options, test: str) -> list[Target
     if options.repeat:
         return [each for map in marked.maps for each in _repeated_targets(marked, map, options)]
     searched = [
-        marked.target(map, slot)
+        replace(marked.target, map=map, slot=slot)
         for map in marked.maps
         for slot in slots(options.budget, options.population)
     ]
@@ -57,17 +55,17 @@ def _saved_targets(marked: MarkerArguments, options: Options, test: str) -> Iter
     from pytest_garl.scenarios.maps.map import map_names
 
     there = map_names(options.map_folders)
-    for entry in options.corpus.entries(marked.system_name):
+    for entry in options.corpus.entries(marked.target.system_name):
         header = entry.header
         if header is None or header.map not in there:
-            yield dataclasses.replace(marked.target("", FIRST), entry=entry)
+            yield replace(marked.target, entry=entry)
             continue
         if header.map not in marked.maps or header.own_test not in ("", test):
             continue
-        target = dataclasses.replace(marked.target(header.map, FIRST), entry=entry)
+        target = replace(marked.target, map=header.map, entry=entry)
         yield target
         if header.status == "fixed" and header.avoidable == "live":
-            yield dataclasses.replace(target, live=True)
+            yield replace(target, live=True)
 
 
 def _repeated_targets(marked: MarkerArguments, map: str, options: Options) -> list[Target]:
@@ -83,8 +81,8 @@ def _repeated_targets(marked: MarkerArguments, map: str, options: Options) -> li
             )
         if map_name_in(text, source=options.repeat) != map:
             return []
-        return [dataclasses.replace(marked.target(map, FIRST), file=options.repeat)]
+        return [replace(marked.target, map=map, file=options.repeat)]
     slot = options.repeated_slot
-    if slot is None or slot.map != map or marked.system_name not in slot.scenarios:
+    if slot is None or slot.map != map or marked.target.system_name not in slot.scenarios:
         return []
-    return [marked.target(map, slot.slot)]
+    return [replace(marked.target, map=map, slot=slot.slot)]

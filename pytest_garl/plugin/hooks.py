@@ -75,7 +75,7 @@ def pytest_configure(config: pytest.Config) -> None:
     if options.searches and not config.option.collectonly:
         from pytest_garl.plugin.startup import begin_run
 
-        begin_run(config)
+        begin_run(config, options)
 
 
 def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
@@ -89,9 +89,10 @@ def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
             "@pytest.mark.garl(system=..., maps=[...])"
         )
     from pytest_garl.plugin.collection import parametrize
+    from pytest_garl.plugin.options import options_of
 
     try:
-        parametrize(metafunc, marker)
+        parametrize(metafunc, marker, options_of(metafunc.config))
     except GarlError as error:
         raise pytest.Collector.CollectError(f"{metafunc.definition.nodeid}: {error}") from error
 
@@ -109,9 +110,10 @@ def pytest_collection_finish(session: pytest.Session) -> None:
 
         check_selection(options_of(config), session.items)
     if RUN not in config.stash and any(is_landing_item(item) for item in session.items):
+        from pytest_garl.plugin.options import options_of
         from pytest_garl.plugin.startup import begin_run
 
-        begin_run(config)
+        begin_run(config, options_of(config))
     run = config.stash.get(RUN, None)
     if run is not None:
         try:
@@ -204,9 +206,10 @@ def pytest_terminal_summary(terminalreporter: Any, config: pytest.Config) -> Non
     """Write the findings of each landing system on each map."""
     tally = config.stash[TALLY]
     if RUN not in config.stash and tally.items and config.pluginmanager.hasplugin("dsession"):
+        from pytest_garl.plugin.options import options_of
         from pytest_garl.plugin.startup import join_workers
 
-        join_workers(config)
+        join_workers(config, options_of(config))
     run = config.stash.get(RUN, None)
     if run is not None:
         from pytest_garl.plugin.summary import write_run
@@ -239,9 +242,9 @@ def pytest_sessionfinish(session: pytest.Session) -> None:
 
 def _save_cases(run: Any, session: pytest.Session, *, nothing_compared: bool) -> None:
     try:
-        if run.may_save(session) and not nothing_compared:
-            from pytest_garl.plugin.save_cases import save_cases
+        from pytest_garl.plugin.save_cases import may_save, save_cases
 
+        if may_save(run, session) and not nothing_compared:
             save_cases(run, session)
     except GarlError as error:
         # Without its ledger a session saves nothing; the summary says why.

@@ -4,46 +4,25 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import pytest
 
 from pytest_garl.errors import GarlError
 from pytest_garl.execution.reference import check_system
-from pytest_garl.execution.slot import Slot
 from pytest_garl.execution.sources import data_files
 from pytest_garl.plugin.options import Options
 from pytest_garl.plugin.target import Target
 
-if TYPE_CHECKING:
-    from pytest_garl.verdicts.verdict import Limits
-
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class MarkerArguments:
-    """Checked arguments of a marker; ``maps`` are those that ``--garl-map`` selects."""
+    """Checked arguments of a marker."""
 
-    system: type
     maps: tuple[str, ...]
-    limits: Limits
-    deterministic: bool
-    files: tuple[str, ...]
-
-    @property
-    def system_name(self) -> str:
-        """The landing system's name in ledgers and cases: "module:class"."""
-        return f"{self.system.__module__}:{self.system.__qualname__}"
-
-    def target(self, map: str, slot: Slot) -> Target:
-        """Return the target of an item that flies a slot on a map."""
-        return Target(
-            system=self.system,
-            map=map,
-            limits=self.limits,
-            slot=slot,
-            deterministic=self.deterministic,
-            files=self.files,
-        )
+    """Those of the marker's maps that ``--garl-map`` selects."""
+    target: Target
+    """A target without map, which each item completes."""
 
 
 def read_marker(marker: pytest.Mark, options: Options) -> MarkerArguments:
@@ -78,11 +57,13 @@ def read_marker(marker: pytest.Mark, options: Options) -> MarkerArguments:
     if not isinstance(deterministic, bool):
         raise GarlError(f"mark.garl: deterministic={deterministic!r}: expected True or False")
     return MarkerArguments(
-        system=system,
-        maps=tuple(m for m in maps if not options.maps or m in options.maps),
-        limits=given,
-        deterministic=deterministic,
-        files=_files(marker.kwargs.get("files", ()), options),
+        maps=tuple(map for map in maps if not options.maps or map in options.maps),
+        target=Target(
+            system=system,
+            limits=given,
+            deterministic=deterministic,
+            files=_files(marker.kwargs.get("files", ()), options),
+        ),
     )
 
 

@@ -92,17 +92,6 @@ class Options:
         """The folder of the flights' records."""
         return self.folder / "flights"
 
-    @property
-    def ledger(self) -> Path:
-        """The file of the run's ledger.
-
-        A repeated scenario has a ledger of its own and leaves the search's unchanged.  Runs of
-        saved cases only may overlap: each has its own ledger and removes it at the end.
-        """
-        if not self.searches:
-            return self.folder / f"cases-{self.controller}.sqlite"
-        return self.folder / ("repeat.sqlite" if self.repeat else "ledger.sqlite")
-
 
 _OPTIONS = pytest.StashKey[Options]()
 

@@ -17,7 +17,7 @@ from pytest_garl.execution.pool import Pool, wait_for
 from pytest_garl.execution.reference import Reference, simulator_sha256
 from pytest_garl.execution.result import CompletedFlight
 from pytest_garl.execution.sources import combined_sha256
-from pytest_garl.plugin.keys import is_xdist_worker, target_of
+from pytest_garl.plugin.keys import target_of
 from pytest_garl.plugin.options import Options
 from pytest_garl.plugin.report_claims import ReportClaims
 from pytest_garl.plugin.search_setup import Searches
@@ -199,18 +199,6 @@ class Run:
         system = target.system_name
         expected = options.corpus.expected_signatures(system, target.map, accepted=True)
         return {signature: entry.path.name for signature, entry in expected.items()}
-
-    def may_save(self, session: pytest.Session) -> bool:
-        """Whether this process has seen a search to its end and may save what it found."""
-        options, worker = self.options, is_xdist_worker(session.config)
-        ended = session.exitstatus in (pytest.ExitCode.OK, pytest.ExitCode.TESTS_FAILED)
-        stopped = bool(session.shouldfail or session.shouldstop)
-        if not (ended and self.loop_finished) or stopped or worker:
-            return False
-        if options.repeat or not options.shrink:
-            return False
-        # Interrupted twice, pytest tells of the status that it began with.
-        return all(each.flown >= each.all for each in self.ledger.queries.progress())
 
     def refly(self, target: Target, count: int) -> list[CompletedFlight]:
         """Fly a flown slot ``count`` times more."""

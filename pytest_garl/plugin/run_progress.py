@@ -110,7 +110,7 @@ class ProgressReader:
             return None
         self._last_read = now
         queries = ledger.queries
-        searches = queries.progress()
+        searches, selected = queries.progress(), int(ledger.fact(SELECTED) or 0)
         if not searches:
             return None
         self._began = self._began or now
@@ -121,7 +121,7 @@ class ProgressReader:
             kinds=queries.violation_counts(),
             nearest=queries.nearest(),
             seconds=now - self._began,
-            selected=int(ledger.fact(SELECTED) or 0),
+            selected=selected,
             flown_after=flown_after,
             expected_after=self._expected_after,
             left_s=left_s,

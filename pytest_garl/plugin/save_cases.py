@@ -12,6 +12,7 @@ from typing import Any
 import pytest
 
 from pytest_garl.errors import GarlError
+from pytest_garl.plugin.keys import is_xdist_worker
 from pytest_garl.plugin.options import SHRINK
 from pytest_garl.plugin.progress import show_progress
 from pytest_garl.plugin.run import Run
@@ -34,6 +35,19 @@ _AVOIDABLE = {
     "recorded": "the reference pilot violates nothing unless it is pursued as well",
     "no": "UNAVOIDABLE, gates nothing",
 }
+
+
+def may_save(run: Run, session: pytest.Session) -> bool:
+    """Whether this process has seen a search to its end and may save what it found."""
+    options, worker = run.options, is_xdist_worker(session.config)
+    ended = session.exitstatus in (pytest.ExitCode.OK, pytest.ExitCode.TESTS_FAILED)
+    stopped = bool(session.shouldfail or session.shouldstop)
+    if not (ended and run.loop_finished) or stopped or worker:
+        return False
+    if options.repeat or not options.shrink:
+        return False
+    # Interrupted twice, pytest tells of the status that it began with.
+    return all(each.flown >= each.all for each in run.ledger.queries.progress())
 
 
 def save_cases(run: Run, session: pytest.Session) -> None:

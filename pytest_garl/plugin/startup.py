@@ -21,7 +21,7 @@ from pytest_garl.execution.ray.pool import check_ray, ray_pool
 from pytest_garl.execution.reference import BUILT_IN, package_sha256, reference_to
 from pytest_garl.execution.stored_ledger import check_stored, stored_flight_s
 from pytest_garl.plugin.keys import RUN, is_xdist_worker
-from pytest_garl.plugin.options import Options, options_of
+from pytest_garl.plugin.options import Options
 from pytest_garl.plugin.run import FLIGHT_S, Run
 from pytest_garl.reports.run_report import BEGAN, utc
 
@@ -29,12 +29,11 @@ EARLIER_FLIGHT_S = "seconds_per_flight"
 """The ledger's fact: wall time of a flight in the run before, for the forecast."""
 
 
-def begin_run(config: pytest.Config) -> None:
+def begin_run(config: pytest.Config, options: Options) -> None:
     """Begin this process's part of the run and keep it in the stash.
 
     The first process alone makes the ledger.  Raises UsageError if nothing can be flown.
     """
-    options = options_of(config)
     try:
         # Weights that cannot be trusted, or no Ray, end the session before there is a ledger.
         policy_spec(options.npcs)
@@ -54,31 +53,42 @@ def begin_run(config: pytest.Config) -> None:
         raise pytest.UsageError(str(error)) from error
 
 
-def join_workers(config: pytest.Config) -> None:
+def join_workers(config: pytest.Config, options: Options) -> None:
     """Open the ledger of the saved cases that xdist's workers flew, for the controller."""
-    options = options_of(config)
-    if not options.searches and options.ledger.is_file():
-        begin_run(config)
+    if not options.searches and _ledger_file(options).is_file():
+        begin_run(config, options)
 
 
 def _open_ledger(config: pytest.Config, options: Options) -> tuple[Ledger, TextIO | None]:
     """Return the run's ledger, and the lock of the process that made it for a search."""
+    path = _ledger_file(options)
     if not options.searches:
-        return _shared_ledger(options), None
+        return _shared_ledger(path), None
     if is_xdist_worker(config):
-        return Ledger(options.ledger), None
-    lock = _lock(options.ledger)
+        return Ledger(path), None
+    lock = _lock(path)
     # The earlier ledger makes room for the new one.
     earlier_s = stored_flight_s(options.folder / "ledger.sqlite")
     if options.resume:
-        ledger = Ledger.resume(options.ledger, _facts(options))
+        ledger = Ledger.resume(path, _facts(options))
         check_stored(ledger)
     else:
-        ledger = Ledger.create(options.ledger, _facts(options))
+        ledger = Ledger.create(path, _facts(options))
         ledger.note_fact(BEGAN, utc())
     if earlier_s:
         ledger.note_fact(EARLIER_FLIGHT_S, earlier_s)
     return ledger, lock
+
+
+def _ledger_file(options: Options) -> Path:
+    """Return the file of the run's ledger.
+
+    A repeated scenario has a ledger of its own and leaves the search's unchanged.  Runs of saved
+    cases only may overlap: each has its own ledger and removes it at the end.
+    """
+    if not options.searches:
+        return options.folder / f"cases-{options.controller}.sqlite"
+    return options.folder / ("repeat.sqlite" if options.repeat else "ledger.sqlite")
 
 
 def _facts(options: Options) -> dict[str, Any]:
@@ -104,9 +114,8 @@ def _pool(ledger: Ledger, options: Options) -> Pool:
     return local_pool(ledger.queue, options.workers)
 
 
-def _shared_ledger(options: Options) -> Ledger:
+def _shared_ledger(path: Path) -> Ledger:
     """Return the ledger of a run of saved cases; its first process makes the file."""
-    path = options.ledger
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         _remove_stale(path.parent)

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from pytest_garl.execution.flight_id import FlightId, search_key
+from pytest_garl.execution.flight_id import FIRST, FlightId, search_key
 from pytest_garl.execution.reference import reference_to
 from pytest_garl.execution.slot import Slot
 
@@ -24,9 +24,10 @@ class Target:
     """A landing system on a map, and the flight that an item judges."""
 
     system: type
-    map: str
     limits: Limits
-    slot: Slot
+    map: str = ""
+    """Empty for a saved case whose file cannot be read."""
+    slot: Slot = FIRST
     deterministic: bool = True
     """Whether the marker says that the system repeats its flights exactly."""
     files: tuple[str, ...] = ()
