@@ -89,7 +89,7 @@ def test_this_process_flies_by_the_baseline() -> None:
 def test_a_library_that_was_loaded_before_is_told(outside: dict[str, str], found: str) -> None:
     code = (
         "import cv2\n"
-        "from pytest_garl import dispatch, errors\n"
+        "from pytest_garl import cpu_dispatch, errors\n"
         "assert not cpu_dispatch.pin()\n"
         "try:\n    cpu_dispatch.check()\n"
         "except errors.DispatchError as error:\n    print(error)\n"
@@ -107,8 +107,8 @@ def test_a_library_that_was_loaded_before_is_told(outside: dict[str, str], found
 
 @needs_avx2
 def test_libraries_are_loaded_without_a_word() -> None:
-    code = "from pytest_garl import dispatch; assert cpu_dispatch.pin(); import cv2, scipy.linalg"
-    code += "; cpu_dispatch.check(); print(cpu_dispatch.dispatched())"
+    code = "from pytest_garl import cpu_dispatch; assert cpu_dispatch.pin()"
+    code += "; import cv2, scipy.linalg; cpu_dispatch.check(); print(cpu_dispatch.dispatched())"
     done = subprocess.run(
         [sys.executable, "-W", "error", "-c", code],
         env={**os.environ, "NPY_ENABLE_CPU_FEATURES": "X86_V3"},
@@ -134,7 +134,7 @@ def test_training_computes_by_the_baseline() -> None:
     code = (
         "from pytest_garl.cli import main\n"
         "assert main.get_command(None, 'train')\n"
-        "from pytest_garl import dispatch\n"
+        "from pytest_garl import cpu_dispatch\n"
         "import pytest_garl.adversary.training.train, torch\n"
         "print(torch.backends.cpu.get_cpu_capability(), cpu_dispatch.dispatched())\n"
     )

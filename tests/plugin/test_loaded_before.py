@@ -116,7 +116,7 @@ def test_the_command_starts_again_where_numpy_was_loaded_first(
     monkeypatch.setenv("PYTHONPATH", os.pathsep.join(paths))
     code = (
         "import sys, numpy\n"
-        "from pytest_garl import dispatch\n"
+        "from pytest_garl import cpu_dispatch\n"
         "from pytest_garl.cli import main\n"
         "sys.argv = ['garl', '--version']\n"
         "print('began')\n"
