@@ -54,7 +54,7 @@ def saved(pytester: pytest.Pytester, template: Path) -> pytest.Pytester:
     return pytester
 
 
-def test_an_unchanged_stack_passes_with_the_same_flights(saved: pytest.Pytester) -> None:
+def test_unchanged_system_passes_with_the_same_flights(saved: pytest.Pytester) -> None:
     result = run(saved)
     result.assert_outcomes(passed=1, skipped=3)
     result.stdout.fnmatch_lines(
@@ -71,7 +71,7 @@ def test_an_unchanged_stack_passes_with_the_same_flights(saved: pytest.Pytester)
 
 
 @pytest.mark.parametrize("how", [("--garl-workers=0",), ("--garl-workers=2", "-n2")])
-def test_a_worse_stack_fails_and_its_broken_pairs_are_listed(
+def test_worse_system_fails_and_summary_lists_its_broken_pairs(
     saved: pytest.Pytester, how: tuple[str, ...]
 ) -> None:
     change(saved.path / "tiny_simulator.py", *WORSE)
@@ -86,7 +86,7 @@ def test_a_worse_stack_fails_and_its_broken_pairs_are_listed(
     assert result.ret == pytest.ExitCode.TESTS_FAILED
 
 
-def test_the_level_decides_and_a_better_stack_passes(saved: pytest.Pytester) -> None:
+def test_level_decides_and_better_system_passes(saved: pytest.Pytester) -> None:
     change(saved.path / "tiny_simulator.py", *WORSE)
     lenient = run(saved, *GATE, "--garl-level=1e-9")
     lenient.assert_outcomes(passed=1, skipped=3)
@@ -96,7 +96,7 @@ def test_the_level_decides_and_a_better_stack_passes(saved: pytest.Pytester) -> 
     better.stdout.fnmatch_lines(["    fixed    lawn-*: IV:dog:* -> landed"])
 
 
-def test_a_new_kind_of_a_known_type_is_told_and_passes(saved: pytest.Pytester) -> None:
+def test_new_kind_of_a_known_type_passes_with_a_note(saved: pytest.Pytester) -> None:
     change(saved.path / "tiny_simulator.py", *OTHER)
     result = run(saved)
     result.assert_outcomes(passed=1, skipped=3)
@@ -104,7 +104,7 @@ def test_a_new_kind_of_a_known_type_is_told_and_passes(saved: pytest.Pytester) -
     result.stdout.fnmatch_lines(["    changed  lawn-*: IV:dog:* -> IV:cat:*"])
 
 
-def test_a_new_type_fails_at_an_equal_rate_once_its_neighbours_were_flown(
+def test_new_type_fails_at_an_equal_rate_if_its_neighbours_fail(
     saved: pytest.Pytester,
 ) -> None:
     change(saved.path / "tiny_simulator.py", *STATIC)
@@ -125,7 +125,7 @@ def test_collisions_that_became_aborts_pass(saved: pytest.Pytester) -> None:
     result.stdout.fnmatch_lines(["    fixed    lawn-*: IV:dog:* -> aborted"])
 
 
-def test_a_flight_that_decides_nothing_fails_the_gate(saved: pytest.Pytester) -> None:
+def test_inconclusive_flight_fails_the_gate(saved: pytest.Pytester) -> None:
     change(saved.path / "base.toml", '"landed", ""', '"inconclusive", ""', count=1)
     told = run(saved)
     told.assert_outcomes(passed=1, skipped=3)
@@ -140,7 +140,7 @@ def test_a_flight_that_decides_nothing_fails_the_gate(saved: pytest.Pytester) ->
     )
 
 
-def test_a_baseline_of_an_adaptive_search_is_told_to_be_kinder(saved: pytest.Pytester) -> None:
+def test_summary_warns_of_a_baseline_from_an_adaptive_search(saved: pytest.Pytester) -> None:
     change(saved.path / "base.toml", 'method = "random"', 'method = "garl"')
     result = run(saved)
     result.assert_outcomes(passed=1, skipped=3)
@@ -149,7 +149,7 @@ def test_a_baseline_of_an_adaptive_search_is_told_to_be_kinder(saved: pytest.Pyt
     )
 
 
-def test_another_world_is_no_fair_comparison(saved: pytest.Pytester) -> None:
+def test_gate_refuses_to_compare_other_limits(saved: pytest.Pytester) -> None:
     change(saved.path / "base.toml", "time_s = 120.0", "time_s = 60.0")
     result = run(saved)
     result.assert_outcomes(failed=1, skipped=3)
@@ -158,7 +158,7 @@ def test_another_world_is_no_fair_comparison(saved: pytest.Pytester) -> None:
     )
 
 
-def test_a_gate_is_selected_like_any_test_and_one_without_subject_is_an_error(
+def test_gate_is_selected_like_any_test_and_fails_without_a_marked_test(
     saved: pytest.Pytester,
 ) -> None:
     result = run(saved, *GATE, "test_it.py::baseline[Good-lawn]")
@@ -173,7 +173,7 @@ def test_a_gate_is_selected_like_any_test_and_one_without_subject_is_an_error(
     assert by_ini.ret == pytest.ExitCode.OK
 
 
-def test_a_broken_baseline_is_one_clear_error(saved: pytest.Pytester) -> None:
+def test_broken_baseline_is_one_clear_error(saved: pytest.Pytester) -> None:
     change(saved.path / "base.toml", "schema = 1", "schema = 9")
     result = run(saved)
     assert result.ret == pytest.ExitCode.USAGE_ERROR
@@ -182,7 +182,7 @@ def test_a_broken_baseline_is_one_clear_error(saved: pytest.Pytester) -> None:
     missing.stderr.fnmatch_lines(["*--garl-baseline: found 'no.toml', expected a file that `garl*"])
 
 
-def test_a_gate_beside_a_search_touches_none_of_its_figures(saved: pytest.Pytester) -> None:
+def test_gate_beside_a_search_changes_none_of_its_figures(saved: pytest.Pytester) -> None:
     search = ("--garl-budget=8", "--garl-shrink=0", "--garl-duplicates=fail")
     result = run(saved, *GATE, *search)
     result.stdout.fnmatch_lines(["*Good on lawn: 8 flown, *"])

@@ -36,7 +36,7 @@ def _break(folder: Path) -> None:
     (folder / "long.toml").write_text(text.replace("[[2, 0.0", "[[20000, 0.0"))
 
 
-def test_each_broken_case_is_told_by_its_own_item_and_the_rest_runs(
+def test_broken_case_fails_its_own_item_alone(
     pytester: pytest.Pytester,
 ) -> None:
     project(pytester)
@@ -49,7 +49,7 @@ def test_each_broken_case_is_told_by_its_own_item_and_the_rest_runs(
     assert "Traceback" not in result.stdout.str() + result.stderr.str()
 
 
-def test_no_escape_sequence_of_a_landing_system_reaches_terminal_or_report(
+def test_escape_sequences_of_a_system_reach_neither_terminal_nor_report(
     pytester: pytest.Pytester,
 ) -> None:
     project(pytester, system="Owns")
@@ -74,7 +74,7 @@ def test_no_escape_sequence_of_a_landing_system_reaches_terminal_or_report(
 @pytest.mark.parametrize(
     "option", ["--garl-resume", "--garl-repeat=lawn-g00-s00"], ids=["resume", "repeat"]
 )
-def test_a_damaged_ledger_is_one_message(pytester: pytest.Pytester, option: str) -> None:
+def test_damaged_ledger_is_one_message(pytester: pytest.Pytester, option: str) -> None:
     project(pytester)
     run(pytester, "--garl-workers=0", "--garl-budget=2", "-k", "test_time")
     database = sqlite3.connect(pytester.path / ".garl" / "ledger.sqlite")
@@ -94,7 +94,7 @@ def test_a_damaged_ledger_is_one_message(pytester: pytest.Pytester, option: str)
     [("seed = " + "[" * 3000, "nested too deeply"), ("\x00", "not valid TOML")],
     ids=["nested", "null"],
 )
-def test_a_scenario_that_cannot_be_read_is_one_message(
+def test_unreadable_scenario_is_one_message(
     pytester: pytest.Pytester, text: str, words: str
 ) -> None:
     project(pytester)
@@ -104,7 +104,7 @@ def test_a_scenario_that_cannot_be_read_is_one_message(
     assert "Traceback" not in result.stdout.str() + result.stderr.str()
 
 
-def test_a_baseline_that_cannot_be_read_is_one_message(pytester: pytest.Pytester) -> None:
+def test_unreadable_baseline_is_one_message(pytester: pytest.Pytester) -> None:
     project(pytester)
     (pytester.path / "base.toml").write_text("cpu = " + "[" * 3000)
     result = run(pytester, "--garl-workers=0", "--garl-baseline=base.toml")
@@ -125,9 +125,7 @@ def {hook}(session):
 
 
 @pytest.mark.parametrize("hook", ["pytest_sessionfinish", "pytest_runtestloop"])
-def test_a_ledger_that_breaks_while_it_is_used_is_one_message(
-    pytester: pytest.Pytester, hook: str
-) -> None:
+def test_ledger_that_breaks_in_use_is_one_message(pytester: pytest.Pytester, hook: str) -> None:
     project(pytester)
     conftest = pytester.path / "conftest.py"
     conftest.write_text(conftest.read_text() + SPOILS.format(hook=hook))

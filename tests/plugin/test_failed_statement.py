@@ -65,7 +65,7 @@ def digest(tmp_path: Path, body: str, helpers: str = "") -> str:
         "for name in landing.collisions:\n    assert not name",
     ],
 )
-def test_an_assertion_that_reads_collisions_is_about_them(tmp_path: Path, body: str) -> None:
+def test_assertion_that_reads_collisions_is_about_them(tmp_path: Path, body: str) -> None:
     found = failing(tmp_path, body, "def hit(landing):\n    return landing.collisions\n")
     assert found is not None
     assert found.is_about("collision")
@@ -81,7 +81,7 @@ def test_an_assertion_that_reads_collisions_is_about_them(tmp_path: Path, body: 
         "assert landing.elapsed_s < 1, f'{landing.collisions} and {landing.verdict}'",
     ],
 )
-def test_an_assertion_that_reads_something_else_is_not_about_collisions(
+def test_assertion_that_reads_something_else_is_not_about_collisions(
     tmp_path: Path, body: str
 ) -> None:
     found = failing(tmp_path, body)
@@ -107,7 +107,7 @@ def test_layout_comments_and_messages_do_not_change_a_statement(tmp_path: Path) 
     assert digest(tmp_path, "assert landing.elapsed_s < 2") != plain
 
 
-def test_calls_of_one_helper_are_told_apart(tmp_path: Path) -> None:
+def test_calls_of_one_helper_are_different_statements(tmp_path: Path) -> None:
     helper = "def below(value, limit):\n    assert value < limit\n"
     late = digest(tmp_path, "below(landing.elapsed_s, 1)", helper)
     far = digest(tmp_path, "below(landing.final_distance_m, 1)", helper)

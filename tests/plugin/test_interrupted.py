@@ -37,7 +37,7 @@ def searched(pytester: pytest.Pytester) -> pytest.Pytester:
     return pytester
 
 
-def test_a_run_that_was_killed_between_two_cases_saves_the_others_when_resumed(
+def test_resumed_run_saves_the_cases_that_a_kill_prevented(
     searched: pytest.Pytester,
 ) -> None:
     saved, before = cases(searched.path), flown(searched)
@@ -48,7 +48,7 @@ def test_a_run_that_was_killed_between_two_cases_saves_the_others_when_resumed(
     assert (cases(searched.path), flown(searched)) == (saved, before)
 
 
-def test_a_finished_run_that_is_resumed_repeats_its_outcome(searched: pytest.Pytester) -> None:
+def test_resumed_finished_run_repeats_its_outcome(searched: pytest.Pytester) -> None:
     saved, before = cases(searched.path), flown(searched)
     again = run(searched, *SEARCH, "--garl-resume")
     assert again.ret == pytest.ExitCode.TESTS_FAILED
@@ -57,7 +57,7 @@ def test_a_finished_run_that_is_resumed_repeats_its_outcome(searched: pytest.Pyt
 
 
 @pytest.mark.parametrize("shrink", ["10", pytest.param("30", marks=pytest.mark.long)])
-def test_a_finished_run_may_be_resumed_with_more_or_less_shrinking(
+def test_finished_run_resumes_with_more_or_less_shrinking(
     searched: pytest.Pytester, shrink: str
 ) -> None:
     again = run(searched, *SEARCH, f"--garl-shrink={shrink}", "--garl-resume")
@@ -66,9 +66,7 @@ def test_a_finished_run_may_be_resumed_with_more_or_less_shrinking(
 
 
 @pytest.mark.parametrize("conftest", ["", TWICE])
-def test_ctrl_c_once_or_twice_saves_nothing_of_half_a_search(
-    pytester: pytest.Pytester, conftest: str
-) -> None:
+def test_ctrl_c_saves_nothing_of_half_a_search(pytester: pytest.Pytester, conftest: str) -> None:
     slow_project(pytester)
     (pytester.path / "test_it.py").write_text(
         (pytester.path / "test_it.py").read_text() + "\n\ndef test_fails(landing): assert False\n"
@@ -86,7 +84,7 @@ def test_ctrl_c_once_or_twice_saves_nothing_of_half_a_search(
 
 
 @pytest.mark.parametrize("parallel", [(), ("-n2",)])
-def test_a_run_leaves_its_ledger_and_its_flights_and_nothing_beside(
+def test_run_leaves_nothing_but_its_ledger_and_flights(
     pytester: pytest.Pytester, parallel: tuple[str, ...]
 ) -> None:
     project(pytester, "Good", "['lawn']")

@@ -59,20 +59,22 @@ def flown(pytester: pytest.Pytester, *args: str) -> tuple[pytest.RunResult, list
 @pytest.mark.parametrize(
     "args", [("--garl-workers=0", "--garl-budget=1"), ("-o", "garl_workers=0", "--garl-budget=1")]
 )
-def test_before_conftest_is_early_enough(unpinned: pytest.Pytester, args: tuple[str, ...]) -> None:
+def test_conftest_loads_numpy_after_the_choice_of_instructions(
+    unpinned: pytest.Pytester, args: tuple[str, ...]
+) -> None:
     result, here, told = flown(unpinned, *args)
     assert told == here
     assert told[1] == cpu_dispatch.BASELINE
     result.stdout.no_fnmatch_line("*loaded before*")
 
 
-def test_a_search_is_bred_by_the_baseline(unpinned: pytest.Pytester) -> None:
+def test_search_is_bred_with_baseline_instructions(unpinned: pytest.Pytester) -> None:
     _, here, told = flown(unpinned, "--garl-workers=1", "--garl-budget=1")
     assert here[1] == told[1] == cpu_dispatch.BASELINE
     assert here[0] != told[0]
 
 
-def test_a_search_breeds_the_same_whatever_the_environment_says(
+def test_environment_does_not_change_what_a_search_breeds(
     pytester: pytest.Pytester, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """The method ga raises numbers to powers, which NumPy does otherwise by AVX-512 or SSE."""
@@ -89,12 +91,12 @@ def test_a_search_breeds_the_same_whatever_the_environment_says(
     assert len(found) == 1
 
 
-def test_other_runs_are_left_alone(unpinned: pytest.Pytester) -> None:
+def test_other_sessions_keep_their_instructions(unpinned: pytest.Pytester) -> None:
     unpinned.runpytest_subprocess("-p", "no:cacheprovider")
     assert (unpinned.path / "here.txt").read_text().endswith("-nehalem")
 
 
-def test_what_is_loaded_before_that_sends_the_flight_to_a_child(unpinned: pytest.Pytester) -> None:
+def test_numpy_loaded_early_sends_flights_to_a_worker(unpinned: pytest.Pytester) -> None:
     unpinned.makepyfile(early="import numpy")
     unpinned.syspathinsert()
     result, here, told = flown(unpinned, "-p", "early", "--garl-workers=0", "--garl-budget=1")
@@ -106,7 +108,7 @@ def test_what_is_loaded_before_that_sends_the_flight_to_a_child(unpinned: pytest
     )
 
 
-def test_the_command_starts_again_where_numpy_was_loaded_first(
+def test_command_restarts_if_numpy_was_loaded_first(
     unpinned: pytest.Pytester, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """As by a .pth file or sitecustomize.py."""
@@ -155,7 +157,7 @@ if __name__ == "__main__":
 
 
 @pytest.mark.sim
-def test_the_checker_flies_in_a_child_where_numpy_was_loaded_first(
+def test_checker_flies_in_a_worker_if_numpy_was_loaded_first(
     unpinned: pytest.Pytester,
 ) -> None:
     script = unpinned.makepyfile(checked=CHECKED)

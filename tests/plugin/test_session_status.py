@@ -1,10 +1,18 @@
-"""The exit status of a session, decided from facts alone."""
+"""The exit status of a session: decided from facts alone, and in real sessions."""
 
 from __future__ import annotations
 
 import pytest
 
 from pytest_garl.plugin.session_status import SessionFacts, exit_status
+from tests.support.landing_project import project, run
+from tests.support.search_tests import (
+    COLLISIONS,
+    DISTANCE,
+    SEARCH_ALL,
+    write_simulator,
+    write_tests,
+)
 
 ExitCode = pytest.ExitCode
 GREEN, RED, EMPTY = ExitCode.OK, ExitCode.TESTS_FAILED, ExitCode.NO_TESTS_COLLECTED
@@ -35,3 +43,73 @@ def test_exit_status_is_worst_of_items_and_session(
     status: int, facts: SessionFacts, decided: int
 ) -> None:
     assert exit_status(status, facts) == decided
+
+
+PARALLEL = pytest.mark.parametrize("parallel", [(), ("-n2",)], ids=["alone", "xdist"])
+
+
+def test_session_is_not_green_if_a_plugin_hides_the_failure_that_excuses_others(
+    pytester: pytest.Pytester,
+) -> None:
+    project(pytester)
+    conftest = (pytester.path / "conftest.py").read_text()
+    pytester.makeconftest(
+        f"import pytest\n{conftest}\n"
+        "@pytest.hookimpl(wrapper=True, tryfirst=True)\n"
+        "def pytest_runtest_makereport(item, call):\n"
+        "    report = yield\n"
+        "    if report.failed: report.outcome = 'passed'\n"
+        "    return report\n"
+    )
+    result = run(pytester, *SEARCH_ALL)
+    assert "failed" not in result.parseoutcomes()
+    assert result.ret == pytest.ExitCode.TESTS_FAILED
+    result.stdout.fnmatch_lines(["*garl: this run is not green*", "*by a failure that no test*"])
+
+
+@PARALLEL
+def test_too_many_inconclusive_flights_fail_the_run(
+    pytester: pytest.Pytester, parallel: tuple[str, ...]
+) -> None:
+    write_tests(pytester, "Good", "\ndef test_lands(landing): assert landing.outcome\n")
+    slow = "dataclasses.replace(flight, outcome='inconclusive')"
+    write_simulator(pytester, slow, "scenario.seed % 2 == 0")
+    result = run(pytester, "--garl-budget=20", "--garl-workers=1", *parallel)
+    assert "failed" not in result.parseoutcomes()
+    assert result.ret == pytest.ExitCode.TESTS_FAILED
+    result.stdout.fnmatch_lines(["Good on lawn: * of 20 flights are inconclusive, at most 1 may*"])
+
+
+def test_repeat_fails_if_its_flight_is_inconclusive(pytester: pytest.Pytester) -> None:
+    write_tests(pytester, "Good", COLLISIONS + DISTANCE)
+    slow = "dataclasses.replace(flight, outcome='inconclusive')"
+    write_simulator(pytester, slow, "True")
+    run(pytester, "--garl-budget=1", "--garl-workers=0")
+    result = run(pytester, "--garl-workers=0", "--garl-repeat=lawn-g00-s00")
+    result.assert_outcomes(failed=1, skipped=1)
+    result.stdout.fnmatch_lines(["*inconclusive:*Nothing was decided*"])
+
+
+def test_summary_says_why_nothing_was_flown(pytester: pytest.Pytester) -> None:
+    project(pytester)
+    result = run(pytester, "-q")
+    assert result.ret == 0
+    result.stdout.fnmatch_lines(["garl: nothing was flown: no --garl-budget given and no saved*"])
+    skipping = "\npytestmark = [pytestmark, pytest.mark.skip]\n"
+    (pytester.path / "test_it.py").write_text((pytester.path / "test_it.py").read_text() + skipping)
+    result = run(pytester, "--garl-budget=4")
+    assert result.ret == pytest.ExitCode.TESTS_FAILED
+    result.stdout.fnmatch_lines(["nothing was flown, although flights were asked for: all lan*"])
+
+
+def test_summary_notes_a_violation_that_no_test_asserts(pytester: pytest.Pytester) -> None:
+    write_tests(pytester, "Good", COLLISIONS)
+    result = run(pytester, "--garl-budget=1", "--garl-workers=0")
+    result.assert_outcomes(passed=1)
+    result.stdout.fnmatch_lines(["garl: no selected test fails for *: I[?]:unknown (1 flight)"])
+
+
+def test_session_without_landing_tests_reports_nothing(pytester: pytest.Pytester) -> None:
+    pytester.makepyfile(test_plain="def test_plain(): pass")
+    result = run(pytester)
+    result.stdout.no_fnmatch_line("*garl: *")

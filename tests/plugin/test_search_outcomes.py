@@ -1,25 +1,20 @@
-"""Red means broken, green means safe: what excuses a failing item, and what does not."""
+"""The outcomes of a search's items: who fails, and who is excused by whom."""
 
 from __future__ import annotations
 
 import pytest
 
 from tests.support.landing_project import project, run
+from tests.support.search_tests import (
+    COLLISIONS,
+    DISTANCE,
+    SEARCH_ALL,
+    outcomes_of,
+    write_simulator,
+    write_tests,
+)
 
 PARALLEL = pytest.mark.parametrize("parallel", [(), ("-n2",)], ids=["alone", "xdist"])
-
-
-def write_tests(pytester: pytest.Pytester, system: str, tests: str) -> None:
-    project(pytester, system)
-    head = (
-        "import pytest\nfrom systems import *\n"
-        f"pytestmark = pytest.mark.garl(system={system}, maps=['lawn'])\n"
-    )
-    (pytester.path / "test_it.py").write_text(head + tests)
-
-
-COLLISIONS = "\ndef test_collisions(landing):\n    assert not landing.collisions\n"
-DISTANCE = "\ndef test_distance(landing):\n    assert landing.distance_to_landing_m <= 1.5\n"
 
 
 @pytest.mark.parametrize(
@@ -36,7 +31,7 @@ DISTANCE = "\ndef test_distance(landing):\n    assert landing.distance_to_landin
     ],
     ids=["skipped", "xfailed", "scenario", "fixture"],
 )
-def test_a_crash_fails_an_item_whatever_happens_to_the_first(
+def test_crash_fails_an_item_although_the_first_is_skipped_or_xfailed(
     pytester: pytest.Pytester, first: str, parallel: tuple[str, ...]
 ) -> None:
     write_tests(pytester, "Raises", first + DISTANCE + COLLISIONS)
@@ -47,7 +42,7 @@ def test_a_crash_fails_an_item_whatever_happens_to_the_first(
     result.stdout.fnmatch_lines(["*ZeroDivisionError: no plan*"])
 
 
-def test_a_violating_abort_fails_an_item_though_the_first_is_skipped(
+def test_violating_abort_fails_an_item_although_the_first_is_skipped(
     pytester: pytest.Pytester,
 ) -> None:
     skipped = "\n@pytest.mark.skip\ndef test_first(landing): pass\n"
@@ -61,20 +56,11 @@ def test_a_violating_abort_fails_an_item_though_the_first_is_skipped(
     assert "passed" not in result.parseoutcomes()
 
 
-SEARCH = ("--garl-budget=24", "--garl-workers=0", "-rfx")
-
-
-def outcomes_of(result: pytest.RunResult, word: str) -> set[str]:
-    """Return the ids of the items of which the short summary says so."""
-    lines = [line for line in result.outlines if line.startswith(f"{word} ")]
-    return {line.removeprefix(f"{word} ").split(" - ")[0] for line in lines}
-
-
-def test_no_item_is_excused_by_one_that_did_not_fail(pytester: pytest.Pytester) -> None:
+def test_passing_item_excuses_no_other(pytester: pytest.Pytester) -> None:
     project(pytester)
     # Both slots are hit by the dog; the only selected test of the first one skips.
     selected = ("test_it.py::test_time[lawn-g00-s01]", "test_it.py::test_collisions[lawn-g00-s02]")
-    result = run(pytester, *SEARCH, *selected)
+    result = run(pytester, *SEARCH_ALL, *selected)
     result.assert_outcomes(skipped=1, failed=1)
     assert result.ret == pytest.ExitCode.TESTS_FAILED
 
@@ -95,24 +81,24 @@ def test_no_item_is_excused_by_one_that_did_not_fail(pytester: pytest.Pytester) 
     ],
     ids=["xfailed", "skipped", "deselected"],
 )
-def test_another_item_fails_where_the_first_of_a_kind_does_not(
+def test_another_item_fails_if_the_first_of_a_kind_does_not(
     pytester: pytest.Pytester, plugin: str
 ) -> None:
     project(pytester)
     conftest = (pytester.path / "conftest.py").read_text()
     first = "FIRST = ('test_distance[lawn-g00-s00]', 'test_collisions[lawn-g00-s01]')\n"
     pytester.makeconftest(f"import pytest\n{conftest}\n{first}{plugin}")
-    result = run(pytester, *SEARCH)
+    result = run(pytester, *SEARCH_ALL)
     assert len(outcomes_of(result, "FAILED")) == 2
     assert result.ret == pytest.ExitCode.TESTS_FAILED
 
 
 def test_xdist_fails_the_same_items(pytester: pytest.Pytester) -> None:
     project(pytester)
-    alone = outcomes_of(run(pytester, *SEARCH), "FAILED")
+    alone = outcomes_of(run(pytester, *SEARCH_ALL), "FAILED")
     assert len(alone) == 2
     for how in ("worksteal", "loadscope"):
-        result = run(pytester, *SEARCH[:1], "--garl-workers=1", "-rf", "-n2", f"--dist={how}")
+        result = run(pytester, *SEARCH_ALL[:1], "--garl-workers=1", "-rf", "-n2", f"--dist={how}")
         assert outcomes_of(result, "FAILED") == alone
 
 
@@ -123,7 +109,7 @@ def test_each_parameter_of_a_test_fails_once(
     parametrised = DISTANCE.replace("landing)", "landing, limit_m)").replace("1.5", "limit_m")
     given = "\n@pytest.mark.parametrize('limit_m', [1.5, 2.0])"
     write_tests(pytester, "Good", given + parametrised)
-    result = run(pytester, *SEARCH[:1], "--garl-workers=1", "-rf", *parallel)
+    result = run(pytester, *SEARCH_ALL[:1], "--garl-workers=1", "-rf", *parallel)
     failed = outcomes_of(result, "FAILED")
     assert sorted(name.rpartition("-")[2] for name in failed) == ["1.5]", "2.0]"]
     if not parallel:
@@ -132,29 +118,8 @@ def test_each_parameter_of_a_test_fails_once(
     assert result.parseoutcomes()["xfailed"] > 1
 
 
-def test_a_session_is_not_green_if_somebody_hides_the_failure_that_excuses_others(
-    pytester: pytest.Pytester,
-) -> None:
-    project(pytester)
-    conftest = (pytester.path / "conftest.py").read_text()
-    pytester.makeconftest(
-        f"import pytest\n{conftest}\n"
-        "@pytest.hookimpl(wrapper=True, tryfirst=True)\n"
-        "def pytest_runtest_makereport(item, call):\n"
-        "    report = yield\n"
-        "    if report.failed: report.outcome = 'passed'\n"
-        "    return report\n"
-    )
-    result = run(pytester, *SEARCH)
-    assert "failed" not in result.parseoutcomes()
-    assert result.ret == pytest.ExitCode.TESTS_FAILED
-    result.stdout.fnmatch_lines(["*garl: this run is not green*", "*by a failure that no test*"])
-
-
 @pytest.mark.parametrize("body", ["raise TypeError('in the test')", "assert not landing.colisions"])
-def test_an_exception_that_is_no_assertion_is_no_violation(
-    pytester: pytest.Pytester, body: str
-) -> None:
+def test_error_of_a_test_is_no_violation(pytester: pytest.Pytester, body: str) -> None:
     write_tests(pytester, "Good", f"\ndef test_broken(landing):\n    {body}\n")
     result = run(pytester, "--garl-budget=8", "--garl-workers=0")
     result.assert_outcomes(failed=8)
@@ -162,10 +127,10 @@ def test_an_exception_that_is_no_assertion_is_no_violation(
     result.stdout.no_fnmatch_line("Collided with dog-1*")
 
 
-def test_a_failure_by_pytest_fail_counts_as_an_assertion(pytester: pytest.Pytester) -> None:
+def test_pytest_fail_counts_as_an_assertion(pytester: pytest.Pytester) -> None:
     body = "\ndef test_hits(landing):\n    if landing.collisions:\n        pytest.fail('hit')\n"
     write_tests(pytester, "Good", body)
-    result = run(pytester, *SEARCH)
+    result = run(pytester, *SEARCH_ALL)
     outcomes = result.parseoutcomes()
     assert outcomes["failed"] == 1
     assert outcomes["xfailed"] > 1
@@ -184,11 +149,11 @@ def test_own(landing, scenario):
 """
 
 
-def test_properties_of_ones_own_are_told_apart_and_hidden_by_no_violation(
+def test_report_parts_users_properties_and_no_violation_hides_them(
     pytester: pytest.Pytester,
 ) -> None:
     write_tests(pytester, "Good", COLLISIONS + OWN)
-    result = run(pytester, *SEARCH)
+    result = run(pytester, *SEARCH_ALL)
     failed = outcomes_of(result, "FAILED")
     # Two statements of one test, in flights that hit the dog and in flights that do not.
     assert sorted(name.partition("[")[0] for name in failed) == [
@@ -201,46 +166,7 @@ def test_properties_of_ones_own_are_told_apart_and_hidden_by_no_violation(
     assert all("(own:test_own:" in line for line in expected)
 
 
-SIMULATOR = """
-import dataclasses
-import tiny_simulator
-from pytest_garl.simulation.flight import Contact
-
-def fly(scenario, *args, **kwargs):
-    flight = tiny_simulator.fly(scenario, *args, **kwargs)
-    return {change} if {when} else flight
-"""
-
-
-def write_simulator(pytester: pytest.Pytester, change: str, when: str) -> None:
-    (pytester.path / "simulator.py").write_text(SIMULATOR.format(change=change, when=when))
-    pytester.makeconftest("import simulator\ndef pytest_garl_fly(config): return simulator.fly\n")
-
-
-@PARALLEL
-def test_too_many_flights_without_a_result_fail_the_run(
-    pytester: pytest.Pytester, parallel: tuple[str, ...]
-) -> None:
-    write_tests(pytester, "Good", "\ndef test_lands(landing): assert landing.outcome\n")
-    slow = "dataclasses.replace(flight, outcome='inconclusive')"
-    write_simulator(pytester, slow, "scenario.seed % 2 == 0")
-    result = run(pytester, "--garl-budget=20", "--garl-workers=1", *parallel)
-    assert "failed" not in result.parseoutcomes()
-    assert result.ret == pytest.ExitCode.TESTS_FAILED
-    result.stdout.fnmatch_lines(["Good on lawn: * of 20 flights are inconclusive, at most 1 may*"])
-
-
-def test_a_repeat_without_a_result_fails(pytester: pytest.Pytester) -> None:
-    write_tests(pytester, "Good", COLLISIONS + DISTANCE)
-    slow = "dataclasses.replace(flight, outcome='inconclusive')"
-    write_simulator(pytester, slow, "True")
-    run(pytester, "--garl-budget=1", "--garl-workers=0")
-    result = run(pytester, "--garl-workers=0", "--garl-repeat=lawn-g00-s00")
-    result.assert_outcomes(failed=1, skipped=1)
-    result.stdout.fnmatch_lines(["*inconclusive:*Nothing was decided*"])
-
-
-def test_touching_the_ground_off_the_marker_before_an_abort_is_red(
+def test_ground_contact_off_the_marker_before_an_abort_fails(
     pytester: pytest.Pytester,
 ) -> None:
     project(pytester)
@@ -254,35 +180,10 @@ def test_touching_the_ground_off_the_marker_before_an_abort_is_red(
     assert outcomes_of(result, "FAILED") == {"test_it.py::test_distance[lawn-g00-s00]"}
 
 
-def test_a_run_that_flies_nothing_says_so(pytester: pytest.Pytester) -> None:
+def test_resumed_run_reports_all_failures_again(pytester: pytest.Pytester) -> None:
     project(pytester)
-    result = run(pytester, "-q")
-    assert result.ret == 0
-    result.stdout.fnmatch_lines(["garl: nothing was flown: no --garl-budget given and no saved*"])
-    skipping = "\npytestmark = [pytestmark, pytest.mark.skip]\n"
-    (pytester.path / "test_it.py").write_text((pytester.path / "test_it.py").read_text() + skipping)
-    result = run(pytester, "--garl-budget=4")
-    assert result.ret == pytest.ExitCode.TESTS_FAILED
-    result.stdout.fnmatch_lines(["nothing was flown, although flights were asked for: all lan*"])
-
-
-def test_a_violation_that_no_test_asserts_is_noted(pytester: pytest.Pytester) -> None:
-    write_tests(pytester, "Good", COLLISIONS)
-    result = run(pytester, "--garl-budget=1", "--garl-workers=0")
-    result.assert_outcomes(passed=1)
-    result.stdout.fnmatch_lines(["garl: no selected test fails for *: I[?]:unknown (1 flight)"])
-
-
-def test_a_run_without_landing_tests_says_nothing(pytester: pytest.Pytester) -> None:
-    pytester.makepyfile(test_plain="def test_plain(): pass")
-    result = run(pytester)
-    result.stdout.no_fnmatch_line("*garl: *")
-
-
-def test_a_resumed_run_shows_all_failures_again(pytester: pytest.Pytester) -> None:
-    project(pytester)
-    first = outcomes_of(run(pytester, *SEARCH), "FAILED")
-    assert outcomes_of(run(pytester, *SEARCH, "--garl-resume"), "FAILED") == first
+    first = outcomes_of(run(pytester, *SEARCH_ALL), "FAILED")
+    assert outcomes_of(run(pytester, *SEARCH_ALL, "--garl-resume"), "FAILED") == first
     assert len(first) == 2
 
 
@@ -299,7 +200,7 @@ def pytest_runtest_protocol(item, nextitem):
 
 
 @pytest.mark.parametrize(("system", "failures"), [("Good", 2), ("Raises", 1)])
-def test_an_item_that_is_run_again_excuses_not_itself(
+def test_rerun_item_does_not_excuse_itself(
     pytester: pytest.Pytester, system: str, failures: int
 ) -> None:
     project(pytester, system)
@@ -310,7 +211,7 @@ def test_an_item_that_is_run_again_excuses_not_itself(
     assert result.parseoutcomes()["xfailed"] > 1
 
 
-def test_an_own_property_that_fails_only_in_collisions_is_told_and_not_saved(
+def test_users_property_that_fails_only_in_collisions_is_not_saved(
     pytester: pytest.Pytester,
 ) -> None:
     own = "\ndef test_own(landing):\n    assert landing.flight.outcome != 'collision'\n"
@@ -324,3 +225,44 @@ def test_an_own_property_that_fails_only_in_collisions_is_told_and_not_saved(
     assert result.ret == pytest.ExitCode.TESTS_FAILED
     files = (pytester.path / "scenarios" / "regressions" / "systems").glob("*.toml")
     assert not any("-own-" in path.name for path in files)
+
+
+TOUCHES_AND_GIVES_UP = """
+import dataclasses
+
+import tiny_simulator
+from pytest_garl.simulation.flight import Contact
+from pytest_garl.simulation.flight_file import hash_of
+
+
+def fly(*args, **options):
+    flight = tiny_simulator.fly(*args, **options)
+    touch = Contact(
+        time_s=14.2,
+        body="ground",
+        kind="ground",
+        body_class="ground",
+        position_m=(0.0, 0.0, 0.0),
+        speed_mps=0.5,
+        tilt_rad=0.0,
+    )
+    changed = dataclasses.replace(flight, outcome="aborted", contacts=(touch,), crash=None)
+    return dataclasses.replace(changed, sha256=hash_of(changed))
+"""
+
+
+def test_ground_contact_before_an_abort_fails_the_search(
+    pytester: pytest.Pytester,
+) -> None:
+    project(pytester)
+    pytester.makepyfile(gives_up=TOUCHES_AND_GIVES_UP)
+    conftest = pytester.path / "conftest.py"
+    conftest.write_text(conftest.read_text().replace("tiny_simulator", "gives_up"))
+    # In fog it comes down 3 m off the marker.
+    result = run(pytester, "--garl-budget=6", "--garl-workers=0", "--garl-weather=full")
+    outcomes = result.parseoutcomes()
+    assert outcomes["failed"] == 1
+    assert result.ret == pytest.ExitCode.TESTS_FAILED
+    result.stdout.fnmatch_lines(["*Touched the ground 3.0 m off the marker before it gave up*"])
+    result.stdout.fnmatch_lines(["* I[?]:unknown * pytest test_it.py --garl-repeat=lawn-g*"])
+    result.stdout.fnmatch_lines(["FAILED test_it.py::test_distance*"])

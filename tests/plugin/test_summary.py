@@ -1,3 +1,5 @@
+"""The summary shows violations, commands and saved cases."""
+
 from __future__ import annotations
 
 import re
@@ -6,44 +8,12 @@ from pathlib import Path
 
 import pytest
 
+from pytest_garl.execution.ledger import Ledger
 from tests.support.landing_project import project, run
+from tests.support.search_tests import HIT
 
 PARALLEL = pytest.mark.parametrize("parallel", [(), pytest.param(("-n2",), marks=pytest.mark.long)])
 SEARCH = ("--garl-budget=8", "--garl-workers=1", "-o", "garl_dir=elsewhere")
-HIT = "collided with dog-1 at 1.0 m/s, 0.0 m up, over the marker"
-AGAIN = (
-    'Repeat: pytest "test_it.py::test_collisions[lawn-g00-s01]" --garl-repeat=lawn-g00-s01 '
-    "-o garl_dir=elsewhere"
-)
-
-
-@PARALLEL
-def test_the_sentence_stands_where_people_look(
-    pytester: pytest.Pytester, parallel: tuple[str, ...], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    project(pytester)
-    monkeypatch.setenv("COLUMNS", "150")
-    result = run(pytester, *SEARCH, "--junitxml=out.xml", *parallel)
-    text = result.stdout.str()
-    assert f"<Landing lawn-g00-s01: {HIT}>.collisions" in text
-    assert AGAIN in text
-    assert f"FAILED test_it.py::test_collisions[lawn-g00-s01] - {HIT}" in text
-    messages = [
-        str(failure.get("message"))
-        for failure in ElementTree.parse(Path(pytester.path) / "out.xml").iter("failure")
-    ]
-    assert f"{HIT}\n{AGAIN}" in messages
-
-
-def test_a_printed_command_flies_the_failure_again(pytester: pytest.Pytester) -> None:
-    project(pytester)
-    first = run(pytester, *SEARCH)
-    (line,) = [each for each in first.outlines if each.startswith(AGAIN[:50])]
-    words = re.fullmatch(r'Repeat: pytest "(.+)" (--garl-repeat=\S+) (-o) (\S+)', line)
-    assert words
-    again = run(pytester, *words.groups())
-    again.assert_outcomes(failed=1)
-    assert f"{HIT}" in again.stdout.str()
 
 
 @pytest.mark.parametrize(
@@ -54,7 +24,7 @@ def test_a_printed_command_flies_the_failure_again(pytester: pytest.Pytester) ->
         pytest.param("120", marks=pytest.mark.long),
     ],
 )
-def test_lines_of_our_own_fit_the_terminal(
+def test_lines_fit_the_terminal(
     pytester: pytest.Pytester, columns: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     project(pytester)
@@ -73,20 +43,8 @@ def test_lines_of_our_own_fit_the_terminal(
     assert max(len(line) for line in prose) <= int(columns)
 
 
-def test_a_scenario_is_told_with_v_in_physical_units(pytester: pytest.Pytester) -> None:
-    project(pytester)
-    quiet = run(pytester, *SEARCH).stdout.str()
-    assert "Scenario (seed" not in quiet
-    assert "environment." not in quiet
-    told = run(pytester, *SEARCH, "-v").stdout.str().replace("\n  ", " ")
-    assert re.search(r"Scenario \(seed \d+\): dust, visibility \d+ m; fog, visibility \d+ m;", told)
-    assert re.search(r"falling rain, [\d.]+ mm/h", told)
-    assert re.search(r"dog-1 a dog of up to [\d.]+ m/s, from \(-?[\d.]+, -?[\d.]+\) m", told)
-    assert "environment." not in told
-
-
 @PARALLEL
-def test_own_assertions_that_fail_are_violations_in_the_summary(
+def test_summary_counts_failures_of_users_properties_as_violations(
     pytester: pytest.Pytester, parallel: tuple[str, ...]
 ) -> None:
     project(pytester)
@@ -119,7 +77,7 @@ def test_own_assertions_that_fail_are_violations_in_the_summary(
 
 
 @PARALLEL
-def test_github_shows_a_table_of_what_was_found(
+def test_step_summary_holds_a_table_of_violations(
     pytester: pytest.Pytester, parallel: tuple[str, ...], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     project(pytester)
@@ -137,7 +95,7 @@ def test_github_shows_a_table_of_what_was_found(
     assert folded == ["SKIPPED [6] test_it.py: not decided: the flight ended before (-v tells how)"]
 
 
-def test_a_command_to_keep_patches_names_those_of_this_run(
+def test_command_to_keep_patches_names_those_of_this_run(
     pytester: pytest.Pytester, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     project(pytester)
@@ -155,7 +113,7 @@ def test_a_command_to_keep_patches_names_those_of_this_run(
     assert len(list((pytester.path / "scenarios" / "regressions").rglob("*.toml"))) == 2
 
 
-def test_a_folder_of_cases_that_cannot_be_written_is_told_in_the_summary(
+def test_summary_says_that_the_folder_of_cases_cannot_be_written(
     pytester: pytest.Pytester,
 ) -> None:
     project(pytester)
@@ -190,3 +148,48 @@ def test_a_broken_users_method_is_reported_once(pytester: pytest.Pytester) -> No
     told = "search method 'broken_method:Broken': ask() returned 3, expected a list of 2"
     assert both.count(told) == 1
     assert "Traceback" not in both
+
+
+@PARALLEL
+def test_lf_flies_only_the_failing_slots_again(
+    pytester: pytest.Pytester, parallel: tuple[str, ...]
+) -> None:
+    project(pytester)
+    args = ("--garl-budget=24", "--garl-shrink=0", "--garl-workers=1", "-rf", *parallel)
+
+    def failed(result: pytest.RunResult) -> set[str]:
+        return {line.split(" - ")[0] for line in result.outlines if line.startswith("FAILED")}
+
+    first = failed(pytester.runpytest_subprocess(*args))
+    assert len(first) == 2
+    result = pytester.runpytest_subprocess(*args, "--lf")
+    result.assert_outcomes(failed=2)
+    assert failed(result) == first
+    ledger = Ledger(pytester.path / ".garl" / "ledger.sqlite")
+    flown = {each.id.slot_id for each in ledger.queries.flights()}
+    ledger.close()
+    assert flown == {re.findall(r"\[(.+)\]", line)[0] for line in first}
+
+
+@PARALLEL
+def test_junit_carries_properties_of_the_flight(
+    pytester: pytest.Pytester, parallel: tuple[str, ...]
+) -> None:
+    project(pytester)
+    run(pytester, "--garl-budget=8", "--garl-workers=1", "--junitxml=out.xml", *parallel)
+    cases = list(ElementTree.parse(Path(pytester.path) / "out.xml").iter("testcase"))
+    assert len(cases) == 24
+    for case in cases:
+        found = {each.get("name"): each.get("value", "") for each in case.iter("property")}
+        assert set(found) == {
+            "garl.slot",
+            "garl.outcome",
+            "garl.signature",
+            "garl.story",
+            "garl.final_distance_m",
+            "garl.elapsed_s",
+            "garl.trajectory_sha256",
+        }
+        assert f"[{found['garl.slot']}]" in str(case.get("name"))
+        assert float(found["garl.elapsed_s"]) == 14.2
+        assert found["garl.trajectory_sha256"]

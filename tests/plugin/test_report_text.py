@@ -1,0 +1,60 @@
+"""The text of a failing item says what happened and how to see it."""
+
+from __future__ import annotations
+
+import re
+import xml.etree.ElementTree as ElementTree
+from pathlib import Path
+
+import pytest
+
+from tests.support.landing_project import project, run
+from tests.support.search_tests import HIT
+
+PARALLEL = pytest.mark.parametrize("parallel", [(), pytest.param(("-n2",), marks=pytest.mark.long)])
+SEARCH = ("--garl-budget=8", "--garl-workers=1", "-o", "garl_dir=elsewhere")
+AGAIN = (
+    'Repeat: pytest "test_it.py::test_collisions[lawn-g00-s01]" --garl-repeat=lawn-g00-s01 '
+    "-o garl_dir=elsewhere"
+)
+
+
+@PARALLEL
+def test_headline_stands_where_people_look(
+    pytester: pytest.Pytester, parallel: tuple[str, ...], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    project(pytester)
+    monkeypatch.setenv("COLUMNS", "150")
+    result = run(pytester, *SEARCH, "--junitxml=out.xml", *parallel)
+    text = result.stdout.str()
+    assert f"<Landing lawn-g00-s01: {HIT}>.collisions" in text
+    assert AGAIN in text
+    assert f"FAILED test_it.py::test_collisions[lawn-g00-s01] - {HIT}" in text
+    messages = [
+        str(failure.get("message"))
+        for failure in ElementTree.parse(Path(pytester.path) / "out.xml").iter("failure")
+    ]
+    assert f"{HIT}\n{AGAIN}" in messages
+
+
+def test_printed_command_repeats_the_failure(pytester: pytest.Pytester) -> None:
+    project(pytester)
+    first = run(pytester, *SEARCH)
+    (line,) = [each for each in first.outlines if each.startswith(AGAIN[:50])]
+    words = re.fullmatch(r'Repeat: pytest "(.+)" (--garl-repeat=\S+) (-o) (\S+)', line)
+    assert words
+    again = run(pytester, *words.groups())
+    again.assert_outcomes(failed=1)
+    assert f"{HIT}" in again.stdout.str()
+
+
+def test_verbose_report_shows_the_scenario_in_physical_units(pytester: pytest.Pytester) -> None:
+    project(pytester)
+    quiet = run(pytester, *SEARCH).stdout.str()
+    assert "Scenario (seed" not in quiet
+    assert "environment." not in quiet
+    told = run(pytester, *SEARCH, "-v").stdout.str().replace("\n  ", " ")
+    assert re.search(r"Scenario \(seed \d+\): dust, visibility \d+ m; fog, visibility \d+ m;", told)
+    assert re.search(r"falling rain, [\d.]+ mm/h", told)
+    assert re.search(r"dog-1 a dog of up to [\d.]+ m/s, from \(-?[\d.]+, -?[\d.]+\) m", told)
+    assert "environment." not in told
