@@ -141,7 +141,7 @@ def _load(weights: str, sha256: str) -> Network:
     except ValueError as error:
         raise _wrong(path, f"is not a file of weights ({error})") from error
     count = len(arrays) // 2
-    expected = {f"{kind}_{index}" for index in range(count) for kind in ("weight", "bias")}
+    expected = {f"{part}_{index}" for index in range(count) for part in ("weight", "bias")}
     if arrays.keys() != expected:
         found = listed(sorted(arrays))
         raise _wrong(

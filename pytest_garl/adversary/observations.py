@@ -197,11 +197,11 @@ def in_own_frame(situation: Situation, x: float, y: float) -> tuple[float, float
 
 def _step_and_heights(situation: Situation) -> tuple[float, float, float]:
     """Return the NPC's way in one decision, and the heights of its top and bottom."""
-    kind = situation.self.type
+    body = situation.self.type
     return (
         situation.self.speed_mps * DECISION_STEP_S / STEP_SCALE_M,
-        kind.top_m / BODY_SCALE_M,
-        kind.bottom_m / BODY_SCALE_M,
+        body.top_m / BODY_SCALE_M,
+        body.bottom_m / BODY_SCALE_M,
     )
 
 

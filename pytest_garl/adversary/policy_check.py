@@ -22,12 +22,12 @@ def check_policy(spec: PolicySpec, map: Map) -> None:
     states = [
         NpcState(
             name=name,
-            type=OBJECT_TYPES[kind],
-            position_m=(x_min, y_min, OBJECT_TYPES[kind].altitude_m),
+            type=OBJECT_TYPES[type_name],
+            position_m=(x_min, y_min, OBJECT_TYPES[type_name].altitude_m),
             velocity_mps=(0.0, 0.0),
-            speed_mps=OBJECT_TYPES[kind].top_speed_mps,
+            speed_mps=OBJECT_TYPES[type_name].top_speed_mps,
         )
-        for name, kind in map.object_names
+        for name, type_name in map.object_names
     ]
     for state in states:
         situation = Situation(

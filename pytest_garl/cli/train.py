@@ -43,7 +43,7 @@ RECENT = 50
 )
 @click.option(
     "--type",
-    "kinds",
+    "types",
     default=",".join(OBJECT_TYPES),
     show_default=True,
     help="Types of NPCs that the policy moves, separated by commas.",
@@ -134,10 +134,12 @@ def _plan(options: dict[str, Any]) -> TrainingPlan:
     from pytest_garl.adversary.training.selection import TrainingPlan
     from pytest_garl.scenarios.maps.map import load_map
 
-    kinds = _words(options["kinds"])
-    for kind in kinds:
-        if kind not in OBJECT_TYPES:
-            raise GarlError(f"--type: found {kind!r}, expected some of {', '.join(OBJECT_TYPES)}")
+    types = _words(options["types"])
+    for type_name in types:
+        if type_name not in OBJECT_TYPES:
+            raise GarlError(
+                f"--type: found {type_name!r}, expected some of {', '.join(OBJECT_TYPES)}"
+            )
     overrides = {name: options[name] for name in ("state", "uav", "reward") if options[name]}
     folders = (Path.cwd() / "scenarios" / "maps",)
     preset = PRESETS[options["policy"]]
@@ -146,7 +148,7 @@ def _plan(options: dict[str, Any]) -> TrainingPlan:
         surrogate=dataclasses.replace(
             preset.surrogate,
             maps=tuple(load_map(name, folders) for name in _words(options["maps"])),
-            kinds=kinds,
+            types=types,
             airframe=_airframe(options["system"]),
             **overrides,
         ),

@@ -16,12 +16,12 @@ SCENARIO = decode(GENOME.nominal, GENOME, map="court", seed=0)
 
 
 def being(
-    place: tuple[float, float], kind: str = "person", speed_mps: float = 2.0, name: str = "it"
+    place: tuple[float, float], type_name: str = "person", speed_mps: float = 2.0, name: str = "it"
 ) -> NpcState:
     return NpcState(
         name=name,
-        type=OBJECT_TYPES[kind],
-        position_m=(*place, OBJECT_TYPES[kind].altitude_m),
+        type=OBJECT_TYPES[type_name],
+        position_m=(*place, OBJECT_TYPES[type_name].altitude_m),
         velocity_mps=(0.0, 0.0),
         speed_mps=speed_mps,
     )

@@ -105,12 +105,12 @@ class Episode:
         self._loop.close()
 
 
-def draw_episode(map: Map, kinds: Sequence[str], rng: np.random.Generator) -> tuple[Scenario, Map]:
+def draw_episode(map: Map, types: Sequence[str], rng: np.random.Generator) -> tuple[Scenario, Map]:
     """Draw the starts of NPCs of these types and of the UAV; the marker is at its GPS coordinate.
 
     Weather is clear, and each NPC has its own speed, as in scenarios of a search.
     """
-    counts = {kind: list(kinds).count(kind) for kind in dict.fromkeys(kinds)}
+    counts = {type_name: list(types).count(type_name) for type_name in dict.fromkeys(types)}
     place = dataclasses.replace(
         map, objects=tuple(counts.items()), uav_start_m=_uav_start(map, rng)
     )

@@ -51,7 +51,7 @@ class Surrogate:
     """
 
     maps: tuple[Map, ...]
-    kinds: tuple[str, ...] = ("person", "dog", "bird")
+    types: tuple[str, ...] = ("person", "dog", "bird")
     uav: Uav = "avoiding"
     state: str = "relative"
     reward: Reward = "collision-first"

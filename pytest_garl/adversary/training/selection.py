@@ -91,7 +91,7 @@ def _about(
         "training": {**dataclasses.asdict(plan.training), "seed": best},
         "surrogate": {
             "maps": {map.name: map.sha256 for map in surrogate.maps},
-            "types": list(surrogate.kinds),
+            "types": list(surrogate.types),
             "uav": surrogate.uav,
             "reward": surrogate.reward,
             "environment": surrogate.environment,

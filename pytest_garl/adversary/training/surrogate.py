@@ -50,8 +50,8 @@ class SurrogateEnv(gymnasium.Env[Observation, np.int64]):
         self.close()
         rng, surrogate = self.np_random, self.surrogate
         map = surrogate.maps[int(rng.integers(len(surrogate.maps)))]
-        kind = surrogate.kinds[int(rng.integers(len(surrogate.kinds)))]
-        scenario, place = draw_episode(map, [kind], rng)
+        type_name = surrogate.types[int(rng.integers(len(surrogate.types)))]
+        scenario, place = draw_episode(map, [type_name], rng)
         if surrogate.environment == "drawn":
             scenario = in_any_environment(scenario, place, rng)
         avoiding = rng.random() < {"straight": 0.0, "both": 0.5, "avoiding": 1.0}[surrogate.uav]

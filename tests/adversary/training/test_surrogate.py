@@ -62,7 +62,7 @@ def test_the_online_rival_changes_the_environment_that_it_sees() -> None:
 
 @pytest.mark.sim
 def test_an_npc_in_the_column_of_a_blind_uav_collides_and_ends_the_episode() -> None:
-    env = SurrogateEnv(dataclasses.replace(OURS, uav="straight", kinds=("person",)))
+    env = SurrogateEnv(dataclasses.replace(OURS, uav="straight", types=("person",)))
     ends = [fly(env, seed, action=3)[-1] for seed in range(6)]
     hits = [(reward, info) for _, reward, info in ends if info["collided"]]
     assert hits
@@ -77,7 +77,7 @@ def test_an_npc_in_the_column_of_a_blind_uav_collides_and_ends_the_episode() -> 
 @pytest.mark.sim
 def test_an_avoiding_uav_hits_fewer_persons_than_a_straight_one() -> None:
     def hits(uav: str) -> int:
-        env = SurrogateEnv(dataclasses.replace(OURS, uav=uav, kinds=("person",)))  # type: ignore[arg-type]
+        env = SurrogateEnv(dataclasses.replace(OURS, uav=uav, types=("person",)))  # type: ignore[arg-type]
         count = sum(bool(fly(env, seed, action=3)[-1][2]["collided"]) for seed in range(8))
         env.close()
         return count
@@ -87,7 +87,7 @@ def test_an_avoiding_uav_hits_fewer_persons_than_a_straight_one() -> None:
 
 @pytest.mark.sim
 def test_the_papers_reward_pays_nothing_for_standing_aside() -> None:
-    env = SurrogateEnv(dataclasses.replace(PAPERS, kinds=("person",)))
+    env = SurrogateEnv(dataclasses.replace(PAPERS, types=("person",)))
     for seed in range(3):
         state, _ = env.reset(seed=seed)
         while np.hypot(*state[:2]) * 10 < 4.0:  # nearer to the marker than four metres
@@ -103,7 +103,7 @@ def test_the_papers_reward_pays_nothing_for_standing_aside() -> None:
 
 @pytest.mark.sim
 def test_the_papers_reward_pays_for_hiding_the_marker() -> None:
-    env = SurrogateEnv(dataclasses.replace(PAPERS, kinds=("person",), state="relative"))
+    env = SurrogateEnv(dataclasses.replace(PAPERS, types=("person",), state="relative"))
     paid = [
         (reward, info)
         for seed in range(4)
