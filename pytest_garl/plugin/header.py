@@ -39,7 +39,7 @@ def cpu_dispatch_warning(run: Run) -> list[str]:
     effects = []
     if options.workers == 0:
         effects.append("flown in a worker process, not inside pytest")
-    if options.searches:
+    if options.searches_or_repeats:
         effects.append("scenarios bred here may differ from those bred on another make of CPU")
     if not libraries or not effects:
         return []

@@ -72,7 +72,7 @@ def pytest_configure(config: pytest.Config) -> None:
         from pytest_garl.plugin.baseline_gate import register
 
         register(config, options)
-    if options.searches and not config.option.collectonly:
+    if options.searches_or_repeats and not config.option.collectonly:
         from pytest_garl.plugin.startup import begin_run
 
         begin_run(config, options)

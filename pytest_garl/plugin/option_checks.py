@@ -51,7 +51,7 @@ def _without_effect(options: Options) -> Iterator[str]:
         if name in given and not searches:
             reason = "beside --garl-repeat" if options.repeat else "without --garl-budget"
             yield f"--garl-{name} has no effect {reason}: only a search uses it"
-    if "npcs" in given and not options.searches:
+    if "npcs" in given and not options.searches_or_repeats:
         yield (
             "--garl-npcs has no effect without --garl-budget or --garl-repeat: saved cases and "
             "baselines have objects of their own"

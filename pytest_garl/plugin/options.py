@@ -71,7 +71,7 @@ class Options:
     controller: str
 
     @property
-    def searches(self) -> bool:
+    def searches_or_repeats(self) -> bool:
         """Whether the session flies a search or a repeated scenario, and not saved cases only."""
         return self.budget > 0 or bool(self.repeat)
 

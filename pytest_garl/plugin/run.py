@@ -149,7 +149,7 @@ class Run:
         self.ledger.close()
         if self.lock is not None:
             self.lock.close()
-        if not self.options.searches and self.options.controller == str(os.getpid()):
+        if not self.options.searches_or_repeats and self.options.controller == str(os.getpid()):
             self.ledger.remove()
 
     @functools.cached_property

@@ -80,11 +80,11 @@ def problems(tally: Tally, run: Run | None, options: Options) -> Iterator[str]:
             f"{counted(len(excused), 'test')} excused by a failure that no test shows (its test "
             f"was skipped, passed or was expected to fail): {_names(excused)}"
         )
-    if run is not None and run.options.searches:
+    if run is not None and run.options.searches_or_repeats:
         searches = tally.search_summaries(run.ledger)
         yield from _inconclusive(searches)
         yield from _unrepeated(tally, searches)
-    if (options.searches or "map" in options.given) and tally.items and not tally.flown:
+    if (options.searches_or_repeats or "map" in options.given) and tally.items and not tally.flown:
         yield f"nothing was flown, although flights were asked for: {_why_nothing_flew(tally)}"
 
 

@@ -55,14 +55,14 @@ def begin_run(config: pytest.Config, options: Options) -> None:
 
 def join_workers(config: pytest.Config, options: Options) -> None:
     """Open the ledger of the saved cases that xdist's workers flew, for the controller."""
-    if not options.searches and _ledger_file(options).is_file():
+    if not options.searches_or_repeats and _ledger_file(options).is_file():
         begin_run(config, options)
 
 
 def _open_ledger(config: pytest.Config, options: Options) -> tuple[Ledger, TextIO | None]:
     """Return the run's ledger, and the lock of the process that made it for a search."""
     path = _ledger_file(options)
-    if not options.searches:
+    if not options.searches_or_repeats:
         return _shared_ledger(path), None
     if is_xdist_worker(config):
         return Ledger(path), None
@@ -86,7 +86,7 @@ def _ledger_file(options: Options) -> Path:
     A repeated scenario has a ledger of its own and leaves the search's unchanged.  Runs of saved
     cases only may overlap: each has its own ledger and removes it at the end.
     """
-    if not options.searches:
+    if not options.searches_or_repeats:
         return options.folder / f"cases-{options.controller}.sqlite"
     return options.folder / ("repeat.sqlite" if options.repeat else "ledger.sqlite")
 

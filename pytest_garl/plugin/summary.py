@@ -72,7 +72,7 @@ def _property_values(reporter: Any, outcomes: tuple[str, ...], key: str) -> set[
 
 def _write_searches(reporter: Any, run: Run, tally: Tally) -> None:
     searches = tally.search_summaries(run.ledger)
-    if run.options.searches:
+    if run.options.searches_or_repeats:
         failures = [dataclasses.asdict(each) for each in tally.user_failures]
         run.ledger.note_fact(USER_FAILURES, failures)
         run.ledger.note_fact(ENDED, utc())
