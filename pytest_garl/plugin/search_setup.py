@@ -11,7 +11,6 @@ from pathlib import Path
 
 from pytest_garl.adversary.catalogue import policy_names, policy_spec
 from pytest_garl.adversary.policy_check import check_policy
-from pytest_garl.adversary.recorded import recorded_spec
 from pytest_garl.errors import LedgerError
 from pytest_garl.execution.database import SearchKind
 from pytest_garl.execution.job import FlightJob, parse_job
@@ -153,7 +152,7 @@ def npc_policy_of(target: Target, npcs: PolicySpec) -> PolicySpec:
     if case is None:
         return npcs
     if not target.live:
-        return recorded_spec(dict(case.moves), dict(case.changes))
+        return case.behaviour.policy
     return policy_spec(case.policy) if case.policy in policy_names() else npcs
 
 

@@ -65,8 +65,9 @@ def case_requests(
     """
     requests: list[CaseRequest] = []
     found = _signatures(ledger, assertions)
-    for search, signatures in _new_signatures(ledger, corpus, found).items():
-        job = _job(ledger, search)
+    jobs = {search: _job(ledger, search) for search in found}
+    for search, signatures in _new_signatures(ledger, corpus, found, jobs).items():
+        job = jobs[search]
         map = job.load_map()
         cap = ledger.queries.count_flights(search) if shrinking.capped else None
         own = []
@@ -126,7 +127,10 @@ def _signatures(
 
 
 def _new_signatures(
-    ledger: Ledger, corpus: Corpus, found: Mapping[str, Mapping[str, Sequence[LedgerFlight]]]
+    ledger: Ledger,
+    corpus: Corpus,
+    found: Mapping[str, Mapping[str, Sequence[LedgerFlight]]],
+    jobs: Mapping[str, FlightJob],
 ) -> dict[str, list[str]]:
     """Return, by search, the signatures that no saved case expects.
 
@@ -141,7 +145,7 @@ def _new_signatures(
         }
     new = {}
     for search, signatures in found.items():
-        job = _job(ledger, search)
+        job = jobs[search]
         expected = corpus.expected_signatures(job.system.name, job.map)
         new[search] = [signature for signature in signatures if signature not in expected]
     ledger.note_fact(NEW_SIGNATURES, new)
