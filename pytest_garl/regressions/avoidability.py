@@ -7,31 +7,39 @@ no landing system can be asked to avoid the violation.
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Callable
 
 from pytest_garl.execution.job import FlightJob
 from pytest_garl.execution.on_demand import FlyFunction
 from pytest_garl.execution.reference import reference_to
 from pytest_garl.execution.result import CompletedFlight
 from pytest_garl.regressions.case import Avoidable, RecordedBehaviour
-from pytest_garl.regressions.case_request import CaseRequest
 from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.simulation.npc_policy import PolicySpec
 from pytest_garl.simulation.system_under_test.reference_pilot import ReferencePilot
 
 
 def avoidability(
-    request: CaseRequest, scenario: Scenario, behaviour: RecordedBehaviour, fly: FlyFunction
+    job: FlightJob,
+    scenario: Scenario,
+    behaviour: RecordedBehaviour,
+    fly: FlyFunction,
+    *,
+    fails: Callable[[Scenario, CompletedFlight], bool],
 ) -> Avoidable:
-    """Return among which objects the reference pilot violates nothing."""
+    """Return among which objects the reference pilot violates nothing.
+
+    ``fails`` says whether a flight without built-in violation fails a test of the user.
+    """
 
     def survives(npcs: PolicySpec) -> bool:
-        flight = fly_reference_pilot(request.job, scenario, npcs, fly)
-        return not flight.signature and not request.fails(scenario, flight)
+        flight = fly_reference_pilot(job, scenario, npcs, fly)
+        return not flight.signature and not fails(scenario, flight)
 
     if not survives(behaviour.policy):
         return "no"
     # If nothing moves, a live policy cannot pursue the pilot.
-    return "live" if not behaviour.moves or survives(request.job.npcs) else "recorded"
+    return "live" if not behaviour.moves or survives(job.npcs) else "recorded"
 
 
 def assumed_avoidability(behaviour: RecordedBehaviour) -> Avoidable:

@@ -120,7 +120,10 @@ class CaseFlights:
             self.flown_by_pilot += 1
             return self._go(job, scenario)
 
-        return avoidability(self.request, failing.scenario, failing.behaviour, fly)
+        request = self.request
+        return avoidability(
+            request.job, failing.scenario, failing.behaviour, fly, fails=request.fails
+        )
 
     def result(self, case: Case | None, reason: str = "") -> CaseResult:
         """Return the end of the investigation, with the flights that it took."""

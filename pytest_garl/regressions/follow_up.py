@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from collections import defaultdict
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -10,14 +11,14 @@ from pathlib import Path
 from pytest_garl.execution.job import FlightJob, parse_job
 from pytest_garl.execution.ledger import Ledger
 from pytest_garl.execution.ledger_queries import LedgerFlight
-from pytest_garl.execution.on_demand import FlyFunction, OnDemandFlights
+from pytest_garl.execution.on_demand import OnDemandFlights
 from pytest_garl.execution.pool import Pool
 from pytest_garl.execution.result import CompletedFlight
 from pytest_garl.regressions.case import Case
 from pytest_garl.regressions.case_request import CaseRequest, CaseResult
 from pytest_garl.regressions.corpus import Corpus
 from pytest_garl.regressions.flight_shares import divide_flights
-from pytest_garl.regressions.investigation import CaseBuilder
+from pytest_garl.regressions.investigation import build_case
 from pytest_garl.regressions.new_case import case_without_flights
 from pytest_garl.regressions.user_failure import UserAssertion
 from pytest_garl.scenarios.files import parse_scenario
@@ -106,7 +107,7 @@ def follow_up(
     """
     results: dict[str, CaseResult] = {}
     while reached := _next_requests(requests, results):
-        procedures = {each.name: _procedure(each) for each in reached}
+        procedures = {each.name: functools.partial(build_case, each) for each in reached}
         results |= OnDemandFlights(ledger, pool, on_wait).run(procedures)
     for each in requests:
         if each.name not in results:
@@ -181,10 +182,6 @@ def _next_requests(
     """Return the requests to work on next, each with its flights."""
     waiting = [each for each in requests if each.name not in results]
     return [each for each in divide_flights(waiting, results) if each.budget]
-
-
-def _procedure(request: CaseRequest) -> Callable[[FlyFunction], CaseResult]:
-    return lambda fly: CaseBuilder(request, fly).build()
 
 
 def _save(

@@ -33,6 +33,11 @@ CANDIDATES = 3
 """Violations of a signature that are tried until the neighbours of one fail as well."""
 
 
+def build_case(request: CaseRequest, fly: FlyFunction) -> CaseResult:
+    """Return the case of a request, or the reason for none."""
+    return CaseBuilder(request, fly).build()
+
+
 class CaseBuilder:
     """Makes a case of one signature's violations, or finds the reason why it cannot."""
 

@@ -39,12 +39,15 @@ class ReferenceFlights:
 def test_avoidability_names_the_objects_among_which_the_pilot_succeeds(
     fatal: tuple[str, ...], expected: Avoidable
 ) -> None:
-    assert avoidability(request(10, FIRST), FIRST, MOVES, ReferenceFlights(*fatal)) == expected
+    asked = request(10, FIRST)
+    fly = ReferenceFlights(*fatal)
+    assert avoidability(asked.job, FIRST, MOVES, fly, fails=asked.fails) == expected
 
 
 def test_pilot_flies_once_if_nothing_moves() -> None:
     fly = ReferenceFlights()
-    assert avoidability(request(10, FIRST), FIRST, NOTHING, fly) == "live"
+    asked = request(10, FIRST)
+    assert avoidability(asked.job, FIRST, NOTHING, fly, fails=asked.fails) == "live"
     assert fly.policies == ["recorded"]
 
 
