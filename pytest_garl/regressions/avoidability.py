@@ -1,4 +1,4 @@
-"""Whether a violation can be avoided: the reference pilot flies the same scenario.
+"""Avoidability: the reference pilot flies the scenario of a violation.
 
 The reference pilot knows where everything is, and it may abort.  If it violates a property as well,
 no landing system can be asked to avoid the violation.

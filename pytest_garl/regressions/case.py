@@ -99,9 +99,9 @@ class Case:
     moved the objects when it was found.  ``test`` is the node id of the test that failed, without
     parameters; empty if none is known.  ``assertion`` is the hash of the assertion's source if a
     test's own assertion failed and the built-in verdict found nothing.  ``avoidable`` limits what
-    the case asks of a repair: not to outrun a pursuer that nobody outruns.  ``limits`` are those of
-    the tests when it was found; pytest flies it with those of today.  ``accepted`` says that
-    somebody knows of the case, for projects without git.
+    the case asks of a repair: no landing system has to outrun an object that the reference pilot
+    cannot outrun.  ``limits`` are those of the tests when it was found; pytest flies it with those
+    of today.  ``accepted`` marks a case as known in projects without git.
     """
 
     system: str
@@ -121,7 +121,7 @@ class Case:
 
     @property
     def behaviour(self) -> RecordedBehaviour:
-        """What the objects did, so that they can repeat it."""
+        """The moves and changes of the objects, so that they can repeat them."""
         return RecordedBehaviour(moves=self.moves, changes=self.changes)
 
     @property

@@ -42,7 +42,7 @@ class CorpusEntry:
 
     @property
     def problem(self) -> str:
-        """What is wrong with the file (source, key, what was expected); empty for a good one."""
+        """The problem of the file, with source, key and expected value; empty for a good file."""
         return self._content[1]
 
     @functools.cached_property

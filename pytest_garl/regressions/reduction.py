@@ -65,9 +65,9 @@ def _shorten_record(flights: CaseFlights, failing: FailingScenario) -> FailingSc
 
 
 def _from_last_to_first(history: Sequence[Scenario]) -> Iterator[Scenario]:
-    """Yield the last, where the failure may sit on an edge, then some before it, lastly the first.
+    """Yield the last scenario, which may sit on an edge, then some before it, and the first.
 
-    Steps double: three flights each decide whether one sits on an edge, and few are left.
+    Steps double: each scenario takes four flights, and few flights are left.
     """
     index, step = len(history) - 1, 1
     while index > 0:
