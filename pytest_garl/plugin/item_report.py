@@ -167,7 +167,7 @@ class _Writer:
         )
 
     def _note_user_failure(self, failure: ItemFailure) -> None:
-        """Tell the summary of a failure of the user's own property, whatever is decided."""
+        """Note a failure of the user's own property for the summary, whatever its outcome is."""
         target, failed = self.target, failure.failed_assertion
         if failure.user_property and failed is not None:
             slot = [target.system_name, target.map, target.name]

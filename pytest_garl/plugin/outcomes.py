@@ -22,7 +22,7 @@ LEAST_FAILURES = 2
 
 
 class Reason(Enum):
-    """Why an item has its outcome."""
+    """The reason for the outcome of an item."""
 
     TEST_ERROR = "the test raised something else than a failed assertion"
     INCONCLUSIVE = "the flight was not decided"
@@ -61,7 +61,7 @@ class Decision:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Reflights:
-    """How many flights of a slot show a failure; ``same`` if two are equal to the byte."""
+    """The flights of a slot that show a failure; ``same`` if two of them are equal to the byte."""
 
     failed: int
     flown: int
@@ -69,13 +69,13 @@ class Reflights:
 
     @property
     def confirm(self) -> bool:
-        """Whether the failure repeats; a single flight counts where no other can be asked."""
+        """Whether the failure repeats; a single flight is enough if the test can judge no other."""
         return self.flown == 1 or self.failed >= LEAST_FAILURES
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class CaseState:
-    """What a saved case says of itself."""
+    """The state of a saved case."""
 
     signature: str
     status: Status
@@ -119,7 +119,7 @@ class PassedCase:
     violates: bool
     """Whether the flight violates a built-in property, though this test passed."""
     unproven: bool = False
-    """Whether something else than the landing system changed, so that passing proves nothing."""
+    """Whether passing proves nothing, because more than the landing system has changed."""
     strict: bool = False
     """Value of ``garl_xfail_strict``."""
     first: bool | None = None
@@ -132,7 +132,7 @@ class UnjudgedFlight:
 
     inconclusive: bool
     alone: bool
-    """Whether the slot is a saved case or repeated, and not one of a search's many."""
+    """Whether the slot is a saved case or is repeated, and does not belong to a search."""
     expects_failure: bool
     """Whether the test is marked xfail."""
     first: bool | None = None

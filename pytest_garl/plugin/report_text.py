@@ -26,7 +26,7 @@ _CASE_FAILURES = {
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FailureText:
-    """What the report of a failing item says.
+    """The text that the report of a failing item gets.
 
     ``headline`` and ``command`` stand where only one or two lines are shown.
     """

@@ -1,4 +1,4 @@
-"""How far a run is: read from the ledger, and put into one line."""
+"""The progress of a run, read from the ledger and put into one line."""
 
 from __future__ import annotations
 

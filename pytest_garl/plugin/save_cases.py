@@ -46,7 +46,7 @@ def may_save(run: Run, session: pytest.Session) -> bool:
         return False
     if options.repeat or not options.shrink:
         return False
-    # Interrupted twice, pytest tells of the status that it began with.
+    # After a second Ctrl-C pytest still has the status with which it began.
     return all(each.flown >= each.all for each in run.ledger.queries.progress())
 
 

@@ -25,7 +25,7 @@ MOST_NAMED = 5
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SessionFacts:
-    """What decides the exit status of a session, beside its items."""
+    """Facts that decide the exit status of a session, beside its items."""
 
     nothing_compared: bool = False
     """Whether the command line asks for a gate and none was flown."""

@@ -1,1 +1,1 @@
-"""What a run found, as data: for the terminal, for ``garl report`` and other programs."""
+"""The findings of a run as data: for the terminal, ``garl report`` and other programs."""

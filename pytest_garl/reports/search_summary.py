@@ -130,7 +130,6 @@ def _summary(
     )
 
 
-_CRASHES = {"died": "died", "hung": "hung", "broke": "broke the simulator"}
 LEGEND = {
     "I": "landed on something else",
     "I?": "landed elsewhere, unknown on what",
