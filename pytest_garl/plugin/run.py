@@ -44,8 +44,8 @@ FLIGHT_S = 2.2
 class SelectedItem:
     """A selected test item of a slot.
 
-    ``test`` is the same for all slots of one test; ``shows`` says whether its failure shows: it is
-    marked neither to be skipped nor to fail, and takes the slot's landing.
+    ``test`` is the same for all slots of one test.  ``shows`` says whether pytest reports its
+    failure: the item has no mark that skips it or lets it fail, and it takes the slot's landing.
     """
 
     nodeid: str
@@ -94,21 +94,20 @@ class Run:
     on_wait_end: Callable[[], None] = field(default=lambda: None)
     """Called when the waiting is over."""
     loop_finished: bool = False
-    """Whether all tests ran to the end of the list, and nobody interrupted them."""
+    """Whether all tests ran and nobody interrupted them."""
     investigated: tuple[InvestigatedSignature, ...] = ()
-    """What became of new signatures after the search."""
+    """Results of the investigation of new signatures."""
     remaining: RemainingWork | None = None
-    """What is to come after the search, when it is known."""
+    """The work that follows the search, once it is known."""
     save_problem: str = ""
-    """Why that could not be finished, if it could not."""
+    """Why not everything was saved, empty if it was."""
     user_assertions: dict[tuple[str, str], ItemAssertion] = field(default_factory=dict)
-    """Assertions of tests that failed where the built-in verdict is content, by search and
-    signature."""
+    """Failed assertions about users' own properties, by search and signature."""
     finding_tests: dict[tuple[str, str], str] = field(default_factory=dict)
-    """The test that failed for a violation, by search and signature: its node id, without
-    parameters."""
+    """Node ids, without parameters, of tests that failed for a violation, by search and
+    signature."""
     reported_failures: dict[str, str] = field(default_factory=dict)
-    """Tests of which xdist's workers say that they failed so, with the signature."""
+    """Signatures of failed assertions in xdist's workers, by node id."""
 
     def __post_init__(self) -> None:
         self.searches = Searches(options=self.options, ledger=self.ledger, simulator=self.simulator)
@@ -138,7 +137,7 @@ class Run:
             self.searches.check_resumed()
 
     def note_finding_test(self, search: str, signature: str, nodeid: str) -> None:
-        """Remember which test failed for a violation: of several the first by name."""
+        """Note a test that failed for a violation; of several keep the first by name."""
         test = nodeid.partition("[")[0]
         known = self.finding_tests.setdefault((search, signature), test)
         self.finding_tests[search, signature] = min(known, test)
@@ -189,9 +188,9 @@ class Run:
         return parse_scenario(text)
 
     def expected_signatures(self, target: Target) -> dict[str, str]:
-        """Return the signatures that known cases expect of a system on a map, with their files.
+        """Return the signatures that known cases of a system on a map expect, with their files.
 
-        What is repeated is to be seen, known or not.
+        A repeated scenario expects none, because the user wants to see it fail.
         """
         options = self.options
         if options.repeat:
