@@ -86,7 +86,7 @@ def test_this_process_flies_by_the_baseline() -> None:
         ({"OPENCV_CPU_DISABLE": "AVX512-SKX,AVX2"}, "opencv with base"),
     ],
 )
-def test_a_library_that_was_loaded_before_is_told(outside: dict[str, str], found: str) -> None:
+def test_a_library_loaded_too_early_is_named(outside: dict[str, str], found: str) -> None:
     code = (
         "import cv2\n"
         "from pytest_garl import cpu_dispatch, errors\n"

@@ -123,7 +123,7 @@ def test_a_renderer_that_changes_draws_what_one_made_so_would(key: str) -> None:
     assert renderer.covered(np.zeros((1, 2))).shape == (1,)
 
 
-def test_the_ground_is_painted_anew_only_where_it_looks_different() -> None:
+def test_the_ground_is_repainted_only_where_it_looks_different() -> None:
     renderer = _renderer(SCENARIO)
     ground = renderer._ground
     assert ground is not None
@@ -158,7 +158,7 @@ def test_a_policy_that_changes_the_environment_is_seen_and_recorded() -> None:
     assert flight.sha256 != calm.sha256
 
 
-def test_a_policy_knows_the_environment_as_it_is() -> None:
+def test_a_policy_sees_the_present_environment() -> None:
     flown()
     snow = SCENARIO["environment.road_snow"]
     assert Weathermaker.known == pytest.approx([snow, snow, snow, snow + 0.4, snow + 0.8, 1.0])

@@ -59,7 +59,7 @@ def test_one_missing_sign_is_enough_to_fly_on(missing: dict[str, float]) -> None
     assert not stand(in_the_air(), 3.0, **missing)
 
 
-def test_a_bounce_starts_the_second_anew() -> None:
+def test_a_bounce_restarts_the_landing_timer() -> None:
     detector = in_the_air()
     stand(detector, 0.8)
     stand(detector, DT, climb_mps=1.5)

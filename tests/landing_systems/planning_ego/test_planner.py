@@ -182,7 +182,7 @@ def test_it_descends_beside_an_obstacle_seen_from_above() -> None:
     assert distance_to(boxes, down.position_m).min() > UAV_RADIUS_M
 
 
-def test_a_goal_in_an_obstacle_is_told_and_not_flown_into() -> None:
+def test_a_goal_in_an_obstacle_is_reported_and_avoided() -> None:
     boxes: list[Box] = [((5.0, -1.0, 0.0), (7.0, 1.0, 3.0))]
     planner = EgoPlanner(PARAMETERS, CAMERA)
     above, within = (6.0, 0.0, 7.0), (6.0, 0.0, 2.0)
