@@ -89,11 +89,8 @@ def stored_flight_s(path: Path) -> float | None:
     if not path.is_file():
         return None
     try:
-        ledger = Ledger(path)
-        try:
+        with closing(Ledger(path)) as ledger:
             return ledger.queries.seconds_per_flight()
-        finally:
-            ledger.close()
     except Exception:  # noqa: BLE001 (an earlier ledger that cannot be read costs the forecast only)
         return None
 
