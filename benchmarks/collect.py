@@ -59,7 +59,7 @@ def case_of(seed: int) -> Case:
         ),
         policy="dqn",
         policy_sha256="",
-        moves=tuple((name, moves) for name, _ in map.object_names),
+        moves=tuple((name, moves) for name, _ in map.present_objects),
         evidence=Evidence(
             trajectory_sha256="",
             cpu="",

@@ -61,7 +61,7 @@ def frames() -> None:
             camera = Camera(width_px=width, height_px=height)
             renderer = Renderer(case, map, camera, generator(0, "sensor"))
             x, y = renderer.marker_m
-            objects = [((x + 1.0 + i, y + 1.0, 0.0), 0.3) for i in range(len(map.object_names))]
+            objects = [((x + 1.0 + i, y + 1.0, 0.0), 0.3) for i in range(len(map.present_objects))]
             for up in (10.0, 2.0):
                 times = []
                 for index in range(60):

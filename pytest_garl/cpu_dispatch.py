@@ -126,7 +126,7 @@ def expected() -> str:
     return BASELINE if has_baseline() else f"{platform.machine()} without AVX2"
 
 
-def of_children() -> str:
+def cpu_class_of_flights() -> str:
     """Name the class of this machine's flying processes, whatever this one computes by."""
     return BASELINE if has_baseline() else dispatched()
 

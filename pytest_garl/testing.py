@@ -25,7 +25,7 @@ from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.scenarios.validity import repair
 from pytest_garl.search.methods.random import propose
 from pytest_garl.simulation.flight import Flight
-from pytest_garl.simulation.flight_file import parted_s
+from pytest_garl.simulation.flight_file import divergence_time_s
 from pytest_garl.simulation.fly import fly
 from pytest_garl.verdicts.judge import judge
 from pytest_garl.verdicts.phases import reports_detections, reports_targets
@@ -179,7 +179,9 @@ class _Checker:
     def _check_equal(self, fresh: Flight, again: Flight, problem: str) -> None:
         if fresh.sha256 == again.sha256:
             return
-        text = f"{self._system.__name__}: {problem}, first at {parted_s(fresh, again):.2f} s"
+        text = (
+            f"{self._system.__name__}: {problem}, first at {divergence_time_s(fresh, again):.2f} s"
+        )
         if self._deterministic:
             raise LandingSystemError(
                 f"{text}; if that is intended, pass deterministic=False here and in the marker"
@@ -245,7 +247,7 @@ _REMEMBERS = (
 def _scenarios(map: Map) -> tuple[Scenario, Scenario]:
     """Return the map's nominal scenario and one that a search might draw, without objects."""
     genome = genome_for(map)
-    names = [name for name, _ in map.object_names]
+    names = [name for name, _ in map.present_objects]
     calm = repair(decode(genome.nominal, genome, map=map.name, seed=1), map)
     drawn = propose(map, genome, 1, 0, 1)[0]
     return calm.without(*names), drawn.without(*names)

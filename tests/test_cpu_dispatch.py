@@ -123,9 +123,9 @@ def test_flying_processes_are_of_the_class_that_was_asked_for(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     cpu(monkeypatch, ICE_LAKE)
-    assert cpu_dispatch.of_children() == cpu_dispatch.BASELINE
+    assert cpu_dispatch.cpu_class_of_flights() == cpu_dispatch.BASELINE
     cpu(monkeypatch, OLD)
-    assert cpu_dispatch.of_children() == cpu_dispatch.dispatched()
+    assert cpu_dispatch.cpu_class_of_flights() == cpu_dispatch.dispatched()
 
 
 @needs_avx2

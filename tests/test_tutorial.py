@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from pytest_garl.cpu_dispatch import of_children
+from pytest_garl.cpu_dispatch import cpu_class_of_flights
 from pytest_garl.regressions.case_file import load_case
 
 DOCS = Path(__file__).parents[1] / "docs"
@@ -40,7 +40,9 @@ def test_every_command_of_the_tutorial_prints_what_it_says(
 ) -> None:
     stack, kept = tmp_path / "my-stack", DOCS / "tutorial" / CASES
     # What is found is the same to the byte on one class of CPUs; on others fly what is kept.
-    searches = all(load_case(path).evidence.cpu == of_children() for path in kept.iterdir())
+    searches = all(
+        load_case(path).evidence.cpu == cpu_class_of_flights() for path in kept.iterdir()
+    )
     left_out = ("__pycache__", "scenarios") if searches else ("__pycache__",)
     shutil.copytree(DOCS / "tutorial", stack, ignore=shutil.ignore_patterns(*left_out))
     for name in ("AUTHOR", "COMMITTER"):

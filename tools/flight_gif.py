@@ -25,7 +25,7 @@ COLOURS = 24
 HOLD_MS = 3000
 """How long the last picture, with the outcome, stands still."""
 FIXED = (
-    drawing.PAPER,
+    drawing.BACKGROUND,
     drawing.INK,
     drawing.FAINT,
     drawing.UAV,

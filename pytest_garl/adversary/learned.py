@@ -61,7 +61,7 @@ class LearnedPolicy:
 
     def decide(self, situation: Situation) -> Move:
         """Return the best action, or stay if it is another NPC's turn."""
-        if self._encoding.in_turn and not on_turn(situation):
+        if self._encoding.one_npc_acts and not on_turn(situation):
             return STAY
         values = self._network.values(self._encoding.state(situation))
         return self._encoding.moves(situation)[int(np.argmax(values))]

@@ -153,7 +153,7 @@ def relative_moves(situation: Situation) -> tuple[Move, ...]:
 class Encoding:
     """Turns a situation into the input of a network, and its actions into moves.
 
-    ``size`` is the length of the state.  ``in_turn`` is whether at each decision one NPC acts,
+    ``size`` is the length of the state.  ``one_npc_acts`` is whether at each decision one NPC acts,
     drawn at random, and all others stay.
     """
 
@@ -161,7 +161,7 @@ class Encoding:
     state: Callable[[Situation], State]
     moves: Callable[[Situation], tuple[Move, ...]]
     actions: int = len(ACTIONS)
-    in_turn: bool = False
+    one_npc_acts: bool = False
 
 
 ENCODINGS: Mapping[str, Encoding] = MappingProxyType(
@@ -174,7 +174,7 @@ ENCODINGS: Mapping[str, Encoding] = MappingProxyType(
             state=online,
             moves=online_moves,
             actions=len(ACTIONS) + 2 * len(CONDITIONS),
-            in_turn=True,
+            one_npc_acts=True,
         ),
     }
 )

@@ -27,7 +27,7 @@ def check_policy(spec: PolicySpec, map: Map) -> None:
             velocity_mps=(0.0, 0.0),
             speed_mps=OBJECT_TYPES[type_name].top_speed_mps,
         )
-        for name, type_name in map.object_names
+        for name, type_name in map.present_objects
     ]
     for state in states:
         situation = Situation(

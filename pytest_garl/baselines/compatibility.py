@@ -30,9 +30,9 @@ def _limits_text(limits: Limits) -> str:
 
 def environment_changes(base: Baseline) -> tuple[str, ...]:
     """Return changes of the CPU class and of packages since the baseline was saved."""
-    from pytest_garl.cpu_dispatch import of_children
+    from pytest_garl.cpu_dispatch import cpu_class_of_flights
 
-    cpu = of_children()
+    cpu = cpu_class_of_flights()
     found = [] if base.cpu == cpu else [f"the CPU was {base.cpu}, is {cpu}"]
     for name, then in base.versions:
         try:

@@ -11,7 +11,7 @@ from pytest_garl.baselines.pairs import FlightSummary
 from pytest_garl.errors import BaselineError, GarlError, ScenarioError
 from pytest_garl.files.atomic import write_text_atomically
 from pytest_garl.files.reading import MEGABYTE, read_text
-from pytest_garl.files.toml import LARGEST, Table, finite, parse, quoted
+from pytest_garl.files.toml import LARGEST_INTEGER, Table, finite, parse, quoted
 from pytest_garl.messages import listed, printable, shown
 from pytest_garl.regressions.case_file import read_limits
 from pytest_garl.scenarios.extra_genes import genome_like
@@ -154,13 +154,13 @@ def parse_baseline(
 ) -> Baseline:
     """Return the baseline in ``text``; raise ScenarioError that names source and key."""
     top = Table(parse(text, source), source)
-    top.only({"schema", "cpu", "versions", "set"})
+    top.refuse_unknown({"schema", "cpu", "versions", "set"})
     if top.integer("schema") != SCHEMA:
         raise top.error("schema", f"found {shown(top.get('schema'))}, expected {SCHEMA}")
     versions = top.table("versions")
     baseline = Baseline(
-        cpu=top.text("cpu"),
-        versions=tuple((name, versions.text(name)) for name in versions.values),
+        cpu=top.string("cpu"),
+        versions=tuple((name, versions.string(name)) for name in versions.values),
         sets=tuple(_read_set(table, load_map) for table in top.tables("set")),
     )
     _check(baseline, lambda problem: top.error("set", problem))
@@ -212,12 +212,12 @@ def _check(baseline: Baseline, error: Callable[[str], GarlError]) -> None:
 
 
 def _read_set(table: Table, load_map: Callable[[str], Map]) -> BaselineSet:
-    table.only(_KEYS)
+    table.refuse_unknown(_KEYS)
     for key in ("system", "simulator"):
-        if not all(table.text(key).partition(":")):
-            raise table.error(key, f"found {shown(table.text(key))}, expected 'module:name'")
+        if not all(table.string(key).partition(":")):
+            raise table.error(key, f"found {shown(table.string(key))}, expected 'module:name'")
     try:
-        map = load_map(table.text("map"))
+        map = load_map(table.string("map"))
     except ScenarioError as error:
         raise table.error("map", str(error)) from error
     properties = _read_genes(table, map)
@@ -225,13 +225,13 @@ def _read_set(table: Table, load_map: Callable[[str], Map]) -> BaselineSet:
     if not isinstance(rows, list):
         raise table.error("flights", f"found {shown(rows)}, expected a list of flights")
     return BaselineSet(
-        system=table.text("system"),
+        system=table.string("system"),
         map=map.name,
-        map_sha256=table.text("map_sha256"),
-        simulator=table.text("simulator"),
-        npcs=table.text("npcs"),
-        npcs_sha256=table.text("npcs_sha256"),
-        method=table.text("method", ""),
+        map_sha256=table.string("map_sha256"),
+        simulator=table.string("simulator"),
+        npcs=table.string("npcs"),
+        npcs_sha256=table.string("npcs_sha256"),
+        method=table.string("method", ""),
         limits=read_limits(table.table("limits")),
         flights=tuple(
             _read_row(table, index, row, map.name, properties) for index, row in enumerate(rows)
@@ -241,7 +241,7 @@ def _read_set(table: Table, load_map: Callable[[str], Map]) -> BaselineSet:
 
 def _read_genes(table: Table, map: Map) -> tuple[Property, ...]:
     """Return the genes whose values the flights list, in the order of the key ``genes``."""
-    keys = table.texts("genes")
+    keys = table.strings("genes")
     genome = genome_like(keys, map)
     if keys != genome.keys:
         wrong = sorted({*keys} ^ {*genome.keys})
@@ -269,9 +269,10 @@ def _read_row(
             "[seed, outcome, signature, true or false, hash, [genes]]",
         )
     seed, outcome, signature, paper_violation, sha256, values = row
-    if not 0 <= seed <= LARGEST:
+    if not 0 <= seed <= LARGEST_INTEGER:
         raise table.error(
-            key, f"found the seed {shown(seed)}, expected a whole number from 0 to {LARGEST}"
+            key,
+            f"found the seed {shown(seed)}, expected a whole number from 0 to {LARGEST_INTEGER}",
         )
     if outcome not in _OUTCOMES:
         raise table.error(key, f"found {shown(outcome)}, expected one of {', '.join(_OUTCOMES)}")

@@ -169,11 +169,11 @@ def _set(
 
 
 def _baseline(sets: Sequence[BaselineSet]) -> Baseline:
-    from pytest_garl.cpu_dispatch import of_children
+    from pytest_garl.cpu_dispatch import cpu_class_of_flights
     from pytest_garl.simulation.flight import PACKAGES
 
     return Baseline(
-        cpu=of_children(),
+        cpu=cpu_class_of_flights(),
         versions=tuple((name, version(name)) for name in PACKAGES),
         sets=tuple(sets),
     )

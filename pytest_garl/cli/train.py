@@ -55,7 +55,7 @@ RECENT = 50
 )
 @click.option(
     "--state",
-    type=click.Choice([name for name, each in ENCODINGS.items() if not each.in_turn]),
+    type=click.Choice([name for name, each in ENCODINGS.items() if not each.one_npc_acts]),
     help="Input of the network, instead of that of --policy: the paper's four numbers, nine with "
     "the paper's actions, or ten in the NPC's own frame.",
 )

@@ -19,8 +19,8 @@ from pytest_garl.execution.supervisor import FlightMonitor, supervise
 from pytest_garl.simulation.system_under_test.texts import (
     MESSAGE_CHARS,
     TRACEBACK_CHARS,
-    name_of,
-    told,
+    class_name,
+    text_from,
 )
 
 CLAIM_EVERY_S = 0.02
@@ -160,11 +160,11 @@ def _is_permanent(error: Exception) -> bool:
 
 
 def _failure(error: Exception) -> dict[str, str]:
-    kind = name_of(type(error))
+    kind = class_name(type(error))
     return {
         "error": kind,
-        "message": told(lambda: str(error), MESSAGE_CHARS, f"{kind}, whose str()"),
-        "traceback": told(lambda: _text(error), TRACEBACK_CHARS, f"{kind}, whose traceback"),
+        "message": text_from(lambda: str(error), MESSAGE_CHARS, f"{kind}, whose str()"),
+        "traceback": text_from(lambda: _text(error), TRACEBACK_CHARS, f"{kind}, whose traceback"),
     }
 
 

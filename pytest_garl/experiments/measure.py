@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pytest_garl.cpu_dispatch import of_children
+from pytest_garl.cpu_dispatch import cpu_class_of_flights
 from pytest_garl.errors import ExperimentError
 from pytest_garl.execution.job import FlightJob, parse_job
 from pytest_garl.execution.ledger import Ledger
@@ -107,7 +107,7 @@ def result_row(
         unavoidable=avoidability.unavoidable if avoidability else None,
         piloted=avoidability.tried if avoidability else None,
         workers=workers,
-        machine=of_children(),
+        machine=cpu_class_of_flights(),
         result_hash=ledger.queries.result_hash(search.key)[:HASH_DIGITS],
         **_violations(search),
         **_diversity(search, str(ledger.fact("weather"))),

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from pytest_garl.files.reading import read_text
-from pytest_garl.files.toml import LARGEST, Table, parse
+from pytest_garl.files.toml import LARGEST_INTEGER, Table, parse
 from pytest_garl.messages import listed, shown
 
 NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9 ._-]*")
@@ -175,9 +175,9 @@ class Experiment:
 def read_experiment(file: Path) -> Experiment:
     """Return the experiment in ``file``; raise ScenarioError that names file and key."""
     top = Table(parse(read_text(file), str(file)), str(file))
-    top.only(TOP_KEYS)
+    top.refuse_unknown(TOP_KEYS)
     systems = top.table("systems")
-    names = {_named(systems, name): systems.text(name) for name in systems.values}
+    names = {_named(systems, name): systems.string(name) for name in systems.values}
     grids = tuple(_grid(top, each, names) for each in top.tables("grids", most=_MOST_GRIDS))
     if not grids:
         raise top.error("grids", "missing; expected at least one [[grids]] with methods to fly")
@@ -193,9 +193,9 @@ def read_experiment(file: Path) -> Experiment:
     return Experiment(
         file=file,
         rows=file.with_suffix(".csv"),
-        report=Path(os.path.normpath(file.parent / top.text("report", f"{file.stem}.md"))),
-        title=top.text("title"),
-        text=top.text("text", "").strip(),
+        report=Path(os.path.normpath(file.parent / top.string("report", f"{file.stem}.md"))),
+        title=top.string("title"),
+        text=top.string("text", "").strip(),
         budget=top.integer("budget", low=1, high=_MOST_FLIGHTS),
         unavoidable=top.integer("unavoidable", 0),
         systems=names,
@@ -215,14 +215,16 @@ def _named(table: Table, name: str) -> str:
 
 
 def _grid(top: Table, table: Table, systems: Collection[str]) -> Grid:
-    table.only({"name", "title", "text", "remarks", "systems", "maps", "methods", "seeds"})
-    name = _named(table, table.text("name"))
+    table.refuse_unknown(
+        {"name", "title", "text", "remarks", "systems", "maps", "methods", "seeds"}
+    )
+    name = _named(table, table.string("name"))
     return Grid(
         name=name,
-        title=table.text("title", name),
-        text=table.text("text", "").strip(),
-        remarks=table.text("remarks", "").strip(),
-        systems=_some(table, "systems", among=systems)
+        title=table.string("title", name),
+        text=table.string("text", "").strip(),
+        remarks=table.string("remarks", "").strip(),
+        systems=_some(table, "systems", allowed=systems)
         if "systems" in table.values
         else (*systems,),
         maps=_some(table if "maps" in table.values else top, "maps"),
@@ -231,21 +233,21 @@ def _grid(top: Table, table: Table, systems: Collection[str]) -> Grid:
     )
 
 
-def _some(table: Table, key: str, among: Collection[str] = ()) -> tuple[str, ...]:
+def _some(table: Table, key: str, allowed: Collection[str] = ()) -> tuple[str, ...]:
     """Return a list of names that is not empty and has no name twice."""
-    found = table.texts(key)
+    found = table.strings(key)
     if not found or len(set(found)) < len(found):
         raise table.error(key, f"found {shown(list(found))}, expected names, each once")
     for name in found:
-        if among and name not in among:
-            raise table.error(key, f"found {shown(name)}, expected some of {listed(among)}")
+        if allowed and name not in allowed:
+            raise table.error(key, f"found {shown(name)}, expected some of {listed(allowed)}")
     return found
 
 
 def _seeds(table: Table) -> tuple[int, ...]:
     found = table.get("seeds")
     good = isinstance(found, list) and all(
-        type(seed) is int and 0 <= seed <= LARGEST for seed in found
+        type(seed) is int and 0 <= seed <= LARGEST_INTEGER for seed in found
     )
     if not good or not found or len(set(found)) < len(found):
         raise table.error(
@@ -255,28 +257,28 @@ def _seeds(table: Table) -> tuple[int, ...]:
 
 
 def _goals(table: Table, grids: Collection[Grid]) -> Goals:
-    table.only({"grid", "system", "method", "random", "baselines", "remarks"})
-    name = table.text("grid", among=[grid.name for grid in grids])
+    table.refuse_unknown({"grid", "system", "method", "random", "baselines", "remarks"})
+    name = table.string("grid", allowed=[grid.name for grid in grids])
     grid = next(grid for grid in grids if grid.name == name)
     methods = grid.methods
     return Goals(
-        system=table.text("system", among=grid.systems),
-        method=table.text("method", among=methods),
-        random=table.text("random", among=methods),
-        baselines=_some(table, "baselines", among=methods),
+        system=table.string("system", allowed=grid.systems),
+        method=table.string("method", allowed=methods),
+        random=table.string("random", allowed=methods),
+        baselines=_some(table, "baselines", allowed=methods),
         maps=grid.maps,
         seeds=grid.seeds,
-        remarks=table.text("remarks", "").strip(),
+        remarks=table.string("remarks", "").strip(),
     )
 
 
 def _published(table: Table, systems: Collection[str]) -> Published:
     figures = ("violations", "distance", "coverage", "hours")
-    table.only({"system", "map", "methods", "top10", "kinds", *figures})
+    table.refuse_unknown({"system", "map", "methods", "top10", "kinds", *figures})
     values = {key: table.number(key, low=0.0) if key in table.values else None for key in figures}
     return Published(
-        system=table.text("system", among=systems),
-        map=table.text("map"),
+        system=table.string("system", allowed=systems),
+        map=table.string("map"),
         methods=_some(table, "methods"),
         top10=table.integer("top10") if "top10" in table.values else None,
         kinds=table.numbers("kinds", len(PAPER_TYPES)) if "kinds" in table.values else None,

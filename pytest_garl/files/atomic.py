@@ -1,4 +1,4 @@
-"""Text files that are whole or not there at all, whoever else writes beside."""
+"""Atomic writing of text files, and a lock for processes that write into the same folder."""
 
 from __future__ import annotations
 
@@ -13,15 +13,15 @@ from pytest_garl.errors import SavingError
 
 
 def write_text_atomically(path: Path, text: str) -> Path:
-    """Write a file in one piece and return its path; its folder is made where it is missing."""
-    scratch = path.with_name(f".{path.name}.{os.getpid()}")
+    """Write a file atomically and return its path; make its folder if it is missing."""
+    incomplete = path.with_name(f".{path.name}.{os.getpid()}")
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
-        with scratch.open("w", encoding="utf-8", newline="") as file:
+        with incomplete.open("w", encoding="utf-8", newline="") as file:
             file.write(text)
             file.flush()
             os.fsync(file.fileno())
-        scratch.replace(path)
+        incomplete.replace(path)
     except OSError as error:
         raise SavingError(f"{path}: cannot be saved ({error})") from error
     return path
@@ -29,7 +29,7 @@ def write_text_atomically(path: Path, text: str) -> Path:
 
 @contextlib.contextmanager
 def locked(folder: Path) -> Iterator[None]:
-    """Let one process at a time change the files of a folder, from reading them to writing."""
+    """Lock a folder, so that one process at a time reads and then changes its files."""
     try:
         folder.mkdir(parents=True, exist_ok=True)
         # The folder itself is locked: a file for the purpose would have to be ignored by git.
@@ -41,14 +41,14 @@ def locked(folder: Path) -> Iterator[None]:
         ) from error
     try:
         fcntl.flock(handle, fcntl.LOCK_EX)
-        _remove_scratch(folder)
+        _remove_incomplete(folder)
         yield
     finally:
         os.close(handle)
 
 
-def _remove_scratch(folder: Path) -> None:
-    """Remove what processes that were killed have left half written."""
+def _remove_incomplete(folder: Path) -> None:
+    """Remove the incomplete files of processes that were killed while writing."""
     for path in folder.glob(".*"):
         found = re.fullmatch(r"\..+\.(\d+)", path.name)
         if found and not Path(f"/proc/{found[1]}").exists():

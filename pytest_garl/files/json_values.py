@@ -1,4 +1,4 @@
-"""Dataclasses from plain JSON values, each field checked: files of the project may be damaged."""
+"""Conversion of plain JSON values to dataclasses; each field is checked: files may be damaged."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import contextlib
 import dataclasses
 import functools
 import json
-import math
+import sys
 import types
 from typing import Any, Literal, TypeVar, Union, get_args, get_origin, get_type_hints
 
@@ -16,7 +16,7 @@ T = TypeVar("T")
 
 
 def parse_json(text: str | bytes) -> Any:
-    """Return the value in a JSON text; raise ValueError, briefly, for what is none."""
+    """Return the value of a JSON text; raise ValueError with a short message if it is not valid."""
     try:
         return json.loads(text)
     except RecursionError as error:
@@ -26,17 +26,17 @@ def parse_json(text: str | bytes) -> Any:
 
 
 def dataclass_from(kind: type[T], value: Any, where: str = "") -> T:
-    """Return a dataclass whose fields are plain values, as ``dataclasses.asdict`` has them.
+    """Return a dataclass from plain values, the inverse of ``dataclasses.asdict``.
 
     Lists become tuples.  Raises ValueError that names the field, what was found and what was
-    expected; the names of missing and unknown fields are told too.
+    expected, or that lists the missing and the unknown fields.
     """
     if not isinstance(value, dict):
         raise _wrong(where, value, "a table")
     hints = _hints(kind)  # type: ignore[arg-type]  # a class can be hashed
     if value.keys() != hints.keys():
         wrong = listed(sorted(value.keys() ^ hints.keys()))
-        raise ValueError(f"{where or 'the whole'}: found other keys than expected: {wrong}")
+        raise ValueError(f"{where or 'the value'}: found other keys than expected: {wrong}")
     prefix = f"{where}." if where else ""
     return kind(**{name: _value(hints[name], value[name], prefix + name) for name in hints})
 
@@ -53,7 +53,7 @@ def _value(kind: Any, value: Any, where: str) -> Any:
         return _float(value, where)
     if kind in (int, str, bool, type(None)):
         if type(value) is not kind:
-            raise _wrong(where, value, _WORDS[kind])
+            raise _wrong(where, value, _EXPECTED[kind])
         return value
     if origin is Literal:
         if not isinstance(value, str) or value not in get_args(kind):
@@ -80,18 +80,15 @@ def _one_of(kinds: tuple[Any, ...], value: Any, where: str) -> Any:
     return _value(last, value, where)
 
 
-_WORDS = {int: "a whole number", str: "a text", bool: "true or false", type(None): "null"}
+_EXPECTED = {int: "a whole number", str: "a text", bool: "true or false", type(None): "null"}
 
 
 def _float(value: Any, where: str) -> float:
-    if type(value) not in (int, float) or not -_LARGEST <= value <= _LARGEST:
+    if type(value) not in (int, float) or not abs(value) <= sys.float_info.max:
         raise _wrong(where, value, "a finite number")
-    # As it was written: 1 and 1.0 are other bytes in what is made of it.
+    # Not converted to float: 1 and 1.0 are written differently, which would change hashes.
     number: float = value
     return number
-
-
-_LARGEST = math.nextafter(math.inf, 0.0)
 
 
 def _tuple(kinds: tuple[Any, ...], value: Any, where: str) -> tuple[Any, ...]:
@@ -108,4 +105,4 @@ def _tuple(kinds: tuple[Any, ...], value: Any, where: str) -> tuple[Any, ...]:
 
 
 def _wrong(where: str, value: Any, expected: str) -> ValueError:
-    return ValueError(f"{where or 'the whole'}: found {shown(value)}, expected {expected}")
+    return ValueError(f"{where or 'the value'}: found {shown(value)}, expected {expected}")

@@ -14,20 +14,20 @@ from typing import Any
 from pytest_garl.errors import ScenarioError
 from pytest_garl.messages import listed, printable, shortened, shown
 
-LARGEST = 2**63 - 1
-"""The largest whole number that TOML promises to keep."""
-_DEEP = 32
-_PART = r"""(?:[\w-]++|"(?:[^"\\\n]|\\.)*+"|'[^'\n]*+')"""
-_DEEP_KEY = re.compile(rf"(?<![\w.-])(?:{_PART}[ \t]*+\.[ \t]*+){{{_DEEP}}}")
-"""A key of so many parts: the parser's time grows with the square of their number."""
+LARGEST_INTEGER = 2**63 - 1
+"""The largest integer that every TOML parser must accept."""
+_MOST_KEY_PARTS = 32
+_KEY_PART = r"""(?:[\w-]++|"(?:[^"\\\n]|\\.)*+"|'[^'\n]*+')"""
+_LONG_KEY = re.compile(rf"(?<![\w.-])(?:{_KEY_PART}[ \t]*+\.[ \t]*+){{{_MOST_KEY_PARTS}}}")
+"""Matches a key with too many parts: the parser's time grows with the square of their number."""
 
 
 def parse(text: str, source: str) -> dict[str, Any]:
     """Return the document; raise ScenarioError with the line for bad TOML."""
-    if _DEEP_KEY.search(text):
+    if _LONG_KEY.search(text):
         raise ScenarioError(
-            f"{source}: not valid TOML: found a name of more than {_DEEP} parts with dots "
-            "between, expected fewer"
+            f"{source}: not valid TOML: found a name of more than {_MOST_KEY_PARTS} parts with "
+            "dots between, expected fewer"
         )
     try:
         return tomllib.loads(text)
@@ -37,7 +37,7 @@ def parse(text: str, source: str) -> dict[str, Any]:
             "levels"
         ) from error
     except ValueError as error:
-        # Beside the parser's own errors these are numbers of more digits than Python takes.
+        # Either an error of the parser, or an integer with more digits than Python converts.
         raise ScenarioError(f"{source}: not valid TOML: {shortened(str(error), 200)}") from error
 
 
@@ -53,7 +53,7 @@ def finite(value: object) -> float | None:
 
 
 class Table:
-    """One table of a document that remembers where it stands, so that errors can say it."""
+    """One TOML table with its file and its path of keys, which the error messages name."""
 
     def __init__(self, values: Any, source: str, path: str = "") -> None:
         self.source = printable(source, keep="")
@@ -67,37 +67,39 @@ class Table:
         where = ".".join(part for part in (self.path, key) if part)
         return ScenarioError(f"{self.source}: key {shown(where)}: {problem}")
 
-    def only(self, known: Collection[str]) -> None:
-        """Refuse keys that nobody reads."""
+    def refuse_unknown(self, known: Collection[str]) -> None:
+        """Raise an error for a key that is not in ``known``."""
         for key in self.values:
             if key not in known:
                 raise self.error(key, f"unknown key; expected one of {listed(sorted(known))}")
 
     def get(self, key: str, default: Any = None) -> Any:
-        """Return a value; without default a missing key is an error."""
+        """Return a value, or ``default`` if the key is missing; without one raise an error."""
         if key in self.values:
             return self.values[key]
         if default is None:
             raise self.error(key, "missing")
         return default
 
-    def text(self, key: str, default: str | None = None, among: Collection[str] = ()) -> str:
-        """Return a string, control characters written out, one of ``among`` if given."""
+    def string(self, key: str, default: str | None = None, allowed: Collection[str] = ()) -> str:
+        """Return a string, one of ``allowed`` if given; control characters are escaped."""
         value = self.get(key, default)
         if not isinstance(value, str):
             raise self.error(key, f"found {shown(value)}, expected a string")
-        if among and value not in among:
-            raise self.error(key, f"found {shown(value)}, expected one of {listed(sorted(among))}")
+        if allowed and value not in allowed:
+            raise self.error(
+                key, f"found {shown(value)}, expected one of {listed(sorted(allowed))}"
+            )
         return printable(value)
 
-    def texts(self, key: str) -> tuple[str, ...]:
+    def strings(self, key: str) -> tuple[str, ...]:
         """Return a list of strings, empty if absent."""
         value = self.values.get(key, [])
         if not isinstance(value, list) or not all(isinstance(item, str) for item in value):
             raise self.error(key, f"found {shown(value)}, expected a list of strings")
         return tuple(printable(item) for item in value)
 
-    def truth(self, key: str, *, default: bool) -> bool:
+    def boolean(self, key: str, *, default: bool) -> bool:
         """Return true or false."""
         value = self.get(key, default=default)
         if not isinstance(value, bool):
@@ -105,12 +107,12 @@ class Table:
         return value
 
     def integer(
-        self, key: str, default: int | None = None, low: int = 0, high: int = LARGEST
+        self, key: str, default: int | None = None, low: int = 0, high: int = LARGEST_INTEGER
     ) -> int:
         """Return a whole number within [low, high]."""
         value = self.get(key, default)
         if not isinstance(value, int) or isinstance(value, bool) or not low <= value <= high:
-            bounds = f"of at least {low}" if high == LARGEST else f"from {low} to {high}"
+            bounds = f"of at least {low}" if high == LARGEST_INTEGER else f"from {low} to {high}"
             raise self.error(key, f"found {shown(value)}, expected a whole number {bounds}")
         return value
 

@@ -127,10 +127,10 @@ def refly(run: Run, target: Target, failure: ItemFailure) -> Reflights:
 
 def divergence_s(run: Run, target: Target) -> float | None:
     """Return when a slot's flight and its first reflight part; None if one was not recorded."""
-    from pytest_garl.simulation.flight_file import load, parted_s
+    from pytest_garl.simulation.flight_file import divergence_time_s, load
 
     files = [run.flight(target).record, target.reflight(0).record(run.options.flights)]
     if not all(file.exists() for file in files):
         return None
     first, second = (load(file) for file in files)
-    return parted_s(first, second)
+    return divergence_time_s(first, second)

@@ -28,13 +28,13 @@ def change_lines(behaviour: RecordedBehaviour) -> list[str]:
 
 def read_moves(table: Table, names: Sequence[str]) -> Moves:
     """Return the moves of the named objects; raise ScenarioError that names the key."""
-    table.only(names)
+    table.refuse_unknown(names)
     return tuple((name, _read_runs(table, name)) for name in names)
 
 
 def read_changes(table: Table, names: Sequence[str]) -> Changes:
     """Return the changes by the named objects; raise ScenarioError that names the key."""
-    table.only(names)
+    table.refuse_unknown(names)
     return tuple((name, _read_changes(table, name)) for name in names if name in table.values)
 
 

@@ -82,7 +82,7 @@ def dump_case(case: Case) -> str:
 def parse_case(text: str, load_map: Callable[[str], Map], *, source: str = "case") -> Case:
     """Return the case in ``text``; raise ScenarioError that names source and key."""
     top = Table(parse(text, source), source)
-    top.only(_KEYS | _SECTIONS)
+    top.refuse_unknown(_KEYS | _SECTIONS)
     header = _read_header(top)
     try:
         map = load_map(header.map)
@@ -92,22 +92,22 @@ def parse_case(text: str, load_map: Callable[[str], Map], *, source: str = "case
     removed = scenario.removed_objects
     names = [name for name, _ in map.all_objects if name not in removed]
     policy = top.table("policy")
-    policy.only({"name", "sha256"})
+    policy.refuse_unknown({"name", "sha256"})
     return Case(
         system=header.system,
         status=header.status,
         avoidable=header.avoidable,
         scenario=scenario,
         violation=_read_violation(top.table("violation")),
-        policy=policy.text("name"),
-        policy_sha256=policy.text("sha256"),
+        policy=policy.string("name"),
+        policy_sha256=policy.string("sha256"),
         moves=read_moves(top.table("moves"), names),
         changes=read_changes(top.table("changes"), names) if "changes" in top.values else (),
         evidence=_read_evidence(top.table("evidence")),
         limits=read_limits(top.table("limits")),
-        test=top.text("test", ""),
-        assertion=top.text("assertion", ""),
-        accepted=top.truth("accepted", default=False),
+        test=top.string("test", ""),
+        assertion=top.string("assertion", ""),
+        accepted=top.boolean("accepted", default=False),
     )
 
 
@@ -147,17 +147,17 @@ def _header_lines(case: Case) -> list[str]:
 def _read_header(top: Table) -> CaseHeader:
     if top.integer("schema") != SCHEMA:
         raise top.error("schema", f"found {shown(top.get('schema'))}, expected {SCHEMA}")
-    system = top.text("system")
+    system = top.string("system")
     if not SYSTEM_NAME.fullmatch(system):
         raise top.error(
             "system", f"found {shown(system)}, expected 'module:class', names with dots between"
         )
     return CaseHeader(
         system=system,
-        status=cast(Status, top.text("status", among=get_args(Status))),
-        avoidable=cast(Avoidable, top.text("avoidable", among=get_args(Avoidable))),
-        map=top.text("map"),
-        own_test=own_test(top.text("test", ""), top.text("assertion", "")),
+        status=cast(Status, top.string("status", allowed=get_args(Status))),
+        avoidable=cast(Avoidable, top.string("avoidable", allowed=get_args(Avoidable))),
+        map=top.string("map"),
+        own_test=own_test(top.string("test", ""), top.string("assertion", "")),
     )
 
 
@@ -174,14 +174,14 @@ def _violation_lines(violation: Violation) -> list[str]:
 
 
 def _read_violation(table: Table) -> Violation:
-    table.only({"signature", "type", "property", "margin", "unit", "story"})
+    table.refuse_unknown({"signature", "type", "property", "margin", "unit", "story"})
     return Violation(
-        signature=table.text("signature"),
-        type=cast(ViolationType, table.text("type", among=get_args(ViolationType))),
-        property=cast(PropertyName, table.text("property", among=get_args(PropertyName))),
+        signature=table.string("signature"),
+        type=cast(ViolationType, table.string("type", allowed=get_args(ViolationType))),
+        property=cast(PropertyName, table.string("property", allowed=get_args(PropertyName))),
         margin=table.number("margin"),
-        unit=table.text("unit"),
-        description=table.text("story"),
+        unit=table.string("unit"),
+        description=table.string("story"),
     )
 
 
@@ -196,8 +196,8 @@ def _limits_lines(limits: Limits) -> list[str]:
 
 def read_limits(table: Table) -> Limits:
     """Return the limits in a table of their own."""
-    table.only({"distance_m", "time_s", "abort"})
-    abort = table.text("abort", among=("ok", "violation"))
+    table.refuse_unknown({"distance_m", "time_s", "abort"})
+    abort = table.string("abort", allowed=("ok", "violation"))
     return Limits(
         distance_m=table.number("distance_m", low=0.0, high=FARTHEST_M),
         time_s=table.number("time_s", low=0.0, high=LONGEST_S),
@@ -257,16 +257,16 @@ def _evidence_lines(evidence: Evidence) -> list[list[str]]:
 
 def _read_evidence(table: Table) -> Evidence:
     hashes = {"trajectory_sha256", "map_sha256", "system_sha256", "simulator_sha256"}
-    table.only(hashes | {"cpu", "neighbours", "neighbours_failed", "removed", "versions"})
+    table.refuse_unknown(hashes | {"cpu", "neighbours", "neighbours_failed", "removed", "versions"})
     versions = table.table("versions")
     return Evidence(
-        trajectory_sha256=table.text("trajectory_sha256"),
-        cpu=table.text("cpu"),
-        map_sha256=table.text("map_sha256"),
+        trajectory_sha256=table.string("trajectory_sha256"),
+        cpu=table.string("cpu"),
+        map_sha256=table.string("map_sha256"),
         neighbours=table.integer("neighbours"),
         neighbours_failed=table.integer("neighbours_failed"),
-        removed=table.text("removed"),
-        versions=tuple((name, versions.text(name)) for name in versions.values),
-        system_sha256=table.text("system_sha256", ""),
-        simulator_sha256=table.text("simulator_sha256", ""),
+        removed=table.string("removed"),
+        versions=tuple((name, versions.string(name)) for name in versions.values),
+        system_sha256=table.string("system_sha256", ""),
+        simulator_sha256=table.string("simulator_sha256", ""),
     )

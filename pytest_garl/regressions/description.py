@@ -79,7 +79,7 @@ def describe_scenario(
     ]
     x, y = marker_position_m(scenario, map)
     rows.append(("marker", "", f"at ({x:.1f}, {y:.1f}) m, east and north"))
-    for name, kind in map.without(scenario.removed_objects).object_names:
+    for name, kind in map.without(scenario.removed_objects).present_objects:
         x, y = object_start_m(scenario, map, name)
         speed = object_speed_mps(scenario, map, name)
         way = f"from ({x:.1f}, {y:.1f}) m"

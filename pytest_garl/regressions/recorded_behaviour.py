@@ -11,7 +11,7 @@ from pytest_garl.simulation.flight_file import load
 
 def recorded_behaviour(flight: CompletedFlight, scenario: Scenario, map: Map) -> RecordedBehaviour:
     """Return what each object did in a flight; no moves if the flight left no record."""
-    names = [name for name, _ in map.without(scenario.removed_objects).object_names]
+    names = [name for name, _ in map.without(scenario.removed_objects).present_objects]
     if not flight.record.exists():
         return RecordedBehaviour(moves=tuple((name, ()) for name in names))
     objects = load(flight.record).objects

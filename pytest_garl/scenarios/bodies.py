@@ -1,4 +1,4 @@
-"""Solid bodies as parts: the one source of what collides and what the camera draws."""
+"""Solid bodies made of parts; the physics and the camera use the same parts."""
 
 from __future__ import annotations
 
@@ -13,8 +13,8 @@ Shape = Literal["box", "cylinder", "sphere", "ellipsoid"]
 class Part:
     """One convex primitive of a body.
 
-    ``size_m`` is (x, y, z) full extents for every shape: a cylinder stands along its own
-    z axis with x = y = diameter; a sphere has three equal extents; an ellipsoid any.
+    ``size_m`` is the full extents (x, y, z) of every shape.  A cylinder's axis is its own z
+    axis, and x = y = diameter; the three extents of a sphere are equal.
     ``position_m`` is the part's centre in the body's frame, ``rotation`` the quaternion
     (x, y, z, w) that turns the part's axes into the body's; ``colour`` is RGB 0-255.
     """
@@ -28,11 +28,11 @@ class Part:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Body:
-    """A named solid of several parts; ``kind`` is what people call it (tree, bench, dog).
+    """A named solid of several parts; ``kind`` is its common name (tree, bench, dog).
 
     ``position_m`` places the body's frame (on the ground, z up) in the world;
-    ``yaw_rad`` turns it about z.  Static bodies stay there; a dynamic object's body is
-    moved by the simulator, facing along +x of its own frame.
+    ``yaw_rad`` turns it about z.  Static bodies stay there.  The simulator moves the body of a
+    dynamic object, which faces along +x of its own frame.
     """
 
     name: str
@@ -42,7 +42,9 @@ class Body:
     yaw_rad: float = 0.0
 
 
-def tilted(*, pitch_rad: float = 0.0, yaw_rad: float = 0.0) -> tuple[float, float, float, float]:
+def quaternion_of(
+    *, pitch_rad: float = 0.0, yaw_rad: float = 0.0
+) -> tuple[float, float, float, float]:
     """Return the quaternion that first pitches about +y (z towards +x), then yaws about +z."""
     sin_p, cos_p = math.sin(pitch_rad / 2), math.cos(pitch_rad / 2)
     sin_y, cos_y = math.sin(yaw_rad / 2), math.cos(yaw_rad / 2)

@@ -51,17 +51,17 @@ def loads(text: str, map: Map, *, source: str = "scenario") -> Scenario:
     Weather may use the full range.  Raises ScenarioError that names source and key.
     """
     top = Table(parse(text, source), source)
-    top.only({"schema", "map", "seed", "absent", "genes"})
+    top.refuse_unknown({"schema", "map", "seed", "absent", "genes"})
     if top.integer("schema") != SCHEMA:
         raise top.error("schema", f"found {shown(top.get('schema'))}, expected {SCHEMA}")
-    if top.text("map") != map.name:
-        raise top.error("map", f"found {shown(top.text('map'))}, expected {map.name!r}")
+    if top.string("map") != map.name:
+        raise top.error("map", f"found {shown(top.string('map'))}, expected {map.name!r}")
     return read_genes(top, map)
 
 
 def read_genes(top: Table, map: Map) -> Scenario:
     """Return the scenario in a document's ``seed``, ``absent`` and ``genes``."""
-    removed = top.texts("absent")
+    removed = top.strings("absent")
     try:
         map = map.without(removed)
     except ScenarioError as error:
@@ -74,10 +74,12 @@ def read_genes(top: Table, map: Map) -> Scenario:
     )
     genome = genome_like(named, map)
     heads = {key.partition(".")[0] for key in genome.keys}
-    sections.only(heads)
+    sections.refuse_unknown(heads)
     tables = {head: sections.table(head) for head in heads}
     for head, table in tables.items():
-        table.only({key.partition(".")[2] for key in genome.keys if key.startswith(f"{head}.")})
+        table.refuse_unknown(
+            {key.partition(".")[2] for key in genome.keys if key.startswith(f"{head}.")}
+        )
     genes = []
     for item in genome.properties:
         head, _, name = item.key.partition(".")
@@ -90,7 +92,7 @@ def read_genes(top: Table, map: Map) -> Scenario:
 
 def map_name_in(text: str, *, source: str = "scenario") -> str:
     """Return the name of the map that a scenario file wants."""
-    return Table(parse(text, source), source).text("map")
+    return Table(parse(text, source), source).string("map")
 
 
 def load(path: Path, search_path: tuple[Path, ...] = ()) -> Scenario:

@@ -183,7 +183,7 @@ def genome_for(
         genes=(place_gene("marker", "position", "place of the marker in its disc of 7.5 m"),),
     )
     objects = CompositeGene(
-        name="objects", genes=tuple(_object_gene(name) for name, _ in map.object_names)
+        name="objects", genes=tuple(_object_gene(name) for name, _ in map.present_objects)
     )
     return Genome(composites=(environment, marker, objects, *extras))
 

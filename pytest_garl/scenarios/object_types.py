@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
 
-from pytest_garl.scenarios.bodies import Part, tilted
+from pytest_garl.scenarios.bodies import Part, quaternion_of
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -47,7 +47,7 @@ def _limb(
         shape="cylinder",
         size_m=(thickness_m, thickness_m, length_m),
         position_m=position_m,
-        rotation=tilted(pitch_rad=pitch_rad),
+        rotation=quaternion_of(pitch_rad=pitch_rad),
         colour=colour,
     )
 

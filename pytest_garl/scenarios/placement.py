@@ -93,5 +93,5 @@ def start_genes(name: str, position_m: tuple[float, float], map: Map) -> dict[st
 
 def object_speed_mps(scenario: Scenario, map: Map, name: str) -> float:
     """How fast an object may move: its velocity gene times its type's top speed."""
-    kind = dict(map.object_names)[name]
+    kind = dict(map.present_objects)[name]
     return scenario[f"{name}.velocity"] * OBJECT_TYPES[kind].top_speed_mps

@@ -1,4 +1,4 @@
-"""Static bodies by kind: what a map's ``[[bodies]]`` names, built from parts."""
+"""The kinds of static bodies that ``[[bodies]]`` of a map can name; each is built from parts."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable, Mapping
 from types import MappingProxyType
 
-from pytest_garl.scenarios.bodies import Part, tilted
+from pytest_garl.scenarios.bodies import Part, quaternion_of
 
 Parts = tuple[Part, ...]
 _BARK, _LEAVES, _WOOD, _STEEL = (96, 74, 56), (58, 92, 44), (142, 104, 66), (92, 96, 100)
@@ -14,7 +14,7 @@ _GOLDEN_ANGLE = math.pi * (3 - math.sqrt(5))
 
 
 def tree(*, height_m: float = 5.0, crown_m: float = 3.0, branches: int = 5) -> Parts:
-    """Return a broad-leaved tree: trunk, branches reaching out, leaves at their ends.
+    """Return a broad-leaved tree: a trunk, and branches with leaves at their ends.
 
     ``crown_m`` is the crown's diameter.  Branches leave the trunk in a golden-angle
     spiral (phyllotaxis) at 45 % to 75 % of the height and rise at about 30 degrees.
@@ -38,29 +38,31 @@ def tree(*, height_m: float = 5.0, crown_m: float = 3.0, branches: int = 5) -> P
                 shape="cylinder",
                 size_m=(0.09, 0.09, length),
                 position_m=middle,
-                rotation=tilted(pitch_rad=math.pi / 3, yaw_rad=yaw),
+                rotation=quaternion_of(pitch_rad=math.pi / 3, yaw_rad=yaw),
                 colour=_BARK,
             )
         )
-        leaves = crown_m * 0.30
+        leaves_m = crown_m * 0.30
         parts.append(
             Part(
                 shape="ellipsoid",
-                size_m=(leaves, leaves, 0.7 * leaves),
+                size_m=(leaves_m, leaves_m, 0.7 * leaves_m),
                 position_m=(reach * math.cos(yaw), reach * math.sin(yaw), base + rise),
                 colour=_LEAVES,
             )
         )
-    top = (0.55 * crown_m, 0.55 * crown_m, 0.35 * height_m)
+    top_m = (0.55 * crown_m, 0.55 * crown_m, 0.35 * height_m)
     parts.append(
-        Part(shape="ellipsoid", size_m=top, position_m=(0.0, 0.0, 0.85 * height_m), colour=_LEAVES)
+        Part(
+            shape="ellipsoid", size_m=top_m, position_m=(0.0, 0.0, 0.85 * height_m), colour=_LEAVES
+        )
     )
     return tuple(parts)
 
 
 def bench(*, length_m: float = 1.8) -> Parts:
     """Return a park bench along its own y axis: seat 0.45 m high, backrest, two supports."""
-    side = length_m / 2 - 0.2
+    support_y = length_m / 2 - 0.2
     return (
         Part(
             shape="box",
@@ -76,27 +78,27 @@ def bench(*, length_m: float = 1.8) -> Parts:
         ),
         *(
             Part(shape="box", size_m=(0.40, 0.06, 0.44), position_m=(0.0, y, 0.22), colour=_STEEL)
-            for y in (-side, side)
+            for y in (-support_y, support_y)
         ),
     )
 
 
 def hoop() -> Parts:
     """Return a basketball hoop facing +x: backboard 1.8 by 1.05 m, ring 3.05 m high (FIBA)."""
-    sides = 8
+    segments = 8
     ring = tuple(
         Part(
             shape="box",
             size_m=(0.02, 0.19, 0.02),
             position_m=(
-                1.575 + 0.225 * math.cos(2 * math.pi * index / sides),
-                0.225 * math.sin(2 * math.pi * index / sides),
+                1.575 + 0.225 * math.cos(2 * math.pi * index / segments),
+                0.225 * math.sin(2 * math.pi * index / segments),
                 3.05,
             ),
-            rotation=tilted(yaw_rad=2 * math.pi * index / sides),
+            rotation=quaternion_of(yaw_rad=2 * math.pi * index / segments),
             colour=(206, 88, 36),
         )
-        for index in range(sides)
+        for index in range(segments)
     )
     return (
         Part(
@@ -140,7 +142,7 @@ def box(*, x_m: float = 1.0, y_m: float = 1.0, height_m: float = 1.0) -> Parts:
     )
 
 
-FURNITURE: Mapping[str, Callable[..., Parts]] = MappingProxyType(
+STATIC_BODIES: Mapping[str, Callable[..., Parts]] = MappingProxyType(
     {"tree": tree, "bench": bench, "hoop": hoop, "post": post, "box": box}
 )
 """The kinds of static bodies that a map can name, with their keyword arguments."""

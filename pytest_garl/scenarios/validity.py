@@ -77,7 +77,7 @@ def problems(scenario: Scenario, map: Map) -> tuple[str, ...]:
     discs = tuple(disc for body in map.bodies for disc in discs_of(body))
     marker = marker_position_m(scenario, map)
     found = list(_marker_problems(marker, map, discs))
-    for index, (name, _) in enumerate(map.object_names):
+    for index, (name, _) in enumerate(map.present_objects):
         found += _start_problems(
             scenario, map, discs, marker, index, object_start_m(scenario, map, name)
         )
@@ -96,7 +96,7 @@ def repair(scenario: Scenario, map: Map) -> Scenario:
     if any(_marker_problems(marker, map, discs)):
         place = _nearest(marker, lambda at: not any(_marker_problems(at, map, discs)))
         scenario = scenario.replace(marker_genes(place, map))
-    for index, (name, _) in enumerate(map.object_names):
+    for index, (name, _) in enumerate(map.present_objects):
         marker = marker_position_m(scenario, map)
         start = object_start_m(scenario, map, name)
 
@@ -157,7 +157,7 @@ def _start_problems(
     index: int,
     at: tuple[float, float],
 ) -> Iterable[str]:
-    name, kind_name = map.object_names[index]
+    name, kind_name = map.present_objects[index]
     kind = OBJECT_TYPES[kind_name]
     reach = kind.radius_m + OBJECT_CLEARANCE_M
     x_min, x_max, y_min, y_max = map.bounds_m
@@ -176,7 +176,7 @@ def _start_problems(
         yield f"{name} starts at the UAV"
     if math.dist(at, marker) < MARKER_HALF_DIAGONAL_M + kind.radius_m:
         yield f"{name} starts on or over the marker"
-    for other, other_kind in map.object_names[:index]:
+    for other, other_kind in map.present_objects[:index]:
         near = kind.radius_m + OBJECT_TYPES[other_kind].radius_m
         if math.dist(at, object_start_m(scenario, map, other)) < near:
             yield f"{name} starts inside {other}"

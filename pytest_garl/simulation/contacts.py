@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from pytest_garl.simulation.flight import Outcome
 from pytest_garl.simulation.physics.npc import Npc
 from pytest_garl.simulation.physics.vehicle import Quaternion, Vector
-from pytest_garl.simulation.physics.world import Touch, World
+from pytest_garl.simulation.physics.world import HullContact, World
 from pytest_garl.simulation.recorder import Recorder
 
 LANDED_SPEED_MPS = 0.2
@@ -42,7 +42,7 @@ class Contacts:
 
     def record_pose(self, time_s: float) -> None:
         """Add a sample to the tracks, with the distance to every body."""
-        position, attitude, velocity, _ = self._world.uav()
+        position, attitude, velocity, _ = self._world.uav_state()
         gaps = self._world.separations()
         gaps.update({name: 0.0 for name, gap in self._gaps.items() if gap == 0.0})
         self._gaps = gaps
@@ -64,7 +64,7 @@ class Contacts:
         if not self._airborne and position[2] > AIRBORNE_M:
             self._airborne = True
             self._recorder.event("took_off", "left the ground")
-        touches = () if self._nothing_near else self._world.touches()
+        touches = () if self._nothing_near else self._world.hull_contacts()
         if not touches:
             self.landed_since = None
             return None
@@ -86,7 +86,7 @@ class Contacts:
         self._recorder.event("landed", "at rest on the ground")
         return "landed"
 
-    def _is_collision(self, touch: Touch, velocity: Vector, tilt_rad: float) -> bool:
+    def _is_collision(self, touch: HullContact, velocity: Vector, tilt_rad: float) -> bool:
         """Record the contact if it is the first with that body; tell whether it ends the flight."""
         if touch.body != "ground":
             approach = self._approach_mps(touch.body, velocity)

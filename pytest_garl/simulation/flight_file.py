@@ -36,7 +36,7 @@ LARGEST_BYTES = 32 * MEGABYTE
 LARGEST_UNPACKED_BYTES = 128 * MEGABYTE
 """The tracks of 150 objects over five minutes are 95 megabytes."""
 LARGEST_HEADER_BYTES = 32 * MEGABYTE
-"""What landing systems tell of their thoughts is some kilobytes a frame; reading takes ten times
+"""What landing systems tell of their diagnostics is some kilobytes a frame; reading takes ten times
 as much memory."""
 _TRACK = ("time_s", "position_m", "attitude", "velocity_mps")
 
@@ -58,7 +58,7 @@ def hash_of(flight: Flight) -> str:
     return digest.hexdigest()
 
 
-def parted_s(first: Flight, second: Flight) -> float:
+def divergence_time_s(first: Flight, second: Flight) -> float:
     """Return when two flights of the same scenario part: in a step, or else in the track."""
     steps = zip(first.steps, second.steps, strict=False)
     parted = next((a.time_s for a, b in steps if a != b), None)

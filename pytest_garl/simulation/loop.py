@@ -34,7 +34,7 @@ from pytest_garl.simulation.physics.vehicle import (
 from pytest_garl.simulation.physics.world import PHYSICS_RATE_HZ, World
 from pytest_garl.simulation.randomness import generator
 from pytest_garl.simulation.recorder import Recorder
-from pytest_garl.simulation.system_under_test.calls import BrokenError, StepGuard
+from pytest_garl.simulation.system_under_test.calls import StepGuard, SystemFailedError
 from pytest_garl.simulation.system_under_test.ground_truth import Truth, TruthObject
 from pytest_garl.simulation.system_under_test.mission import mission_for
 from pytest_garl.simulation.system_under_test.observation import observe
@@ -64,7 +64,7 @@ class Loop:
         self._system = SystemUnderTest(system, guard)
         self._marker = marker_position_m(scenario, map)
         self._model = vehicle_model(self._system.airframe)
-        self.npcs = [Npc(scenario, map, name, policy()) for name, _ in map.object_names]
+        self.npcs = [Npc(scenario, map, name, policy()) for name, _ in map.present_objects]
         self._world = World(
             self._model, map.uav_start_m, map.bodies, [npc.body for npc in self.npcs]
         )
@@ -89,7 +89,7 @@ class Loop:
             outcome = self.tick()
             while outcome is None:
                 outcome = self.tick()
-        except BrokenError as broken:
+        except SystemFailedError as broken:
             if _is_finite(self._world):
                 self._contacts.record_pose(self.recorder.time_s)
             self.recorder.event("crashed", broken.crash.message)
@@ -105,7 +105,7 @@ class Loop:
         for npc in self.npcs:
             rng = generator(self.scenario.seed, "objects", numbers[npc.name])
             npc.policy.reset(self.situation(npc), rng)
-        self.recorder.begin(*self._world.uav()[:3])
+        self.recorder.begin(*self._world.uav_state()[:3])
         airframe = self._system.airframe
         self._system.start(mission_for(self.scenario, self.map, airframe, self._time_limit_s))
         if self._system.needs_camera:
@@ -130,9 +130,9 @@ class Loop:
         self._ticks += 1
         now = tick / PHYSICS_RATE_HZ
         self.recorder.time_s = now
-        position, attitude, velocity, spin = self._world.uav()
+        position, attitude, velocity, spin = self._world.uav_state()
         if not math.isfinite(sum(position) + sum(attitude) + sum(velocity) + sum(spin)):
-            raise self._system.not_finite(now)
+            raise self._system.not_finite_error(now)
         if tick % TICKS_PER_NPC_STEP == 0:
             self._move_npcs(tick)
         if tick % TICKS_PER_TRACK_SAMPLE == 0:
@@ -193,7 +193,7 @@ class Loop:
 
     def situation(self, npc: Npc) -> Situation:
         """Return what the policy of an NPC may see at this moment."""
-        position, _, velocity, _ = self._world.uav()
+        position, _, velocity, _ = self._world.uav_state()
         return Situation(
             time_s=self.recorder.time_s,
             self=npc.state,
@@ -207,7 +207,7 @@ class Loop:
 
     def eye(self) -> tuple[Vector, Quaternion]:
         """Return the camera's place and the UAV's attitude."""
-        position, attitude, _, _ = self._world.uav()
+        position, attitude, _, _ = self._world.uav_state()
         return eye_under(position, attitude), attitude
 
     def _observe(self, tick: int, position: Vector, attitude: Quaternion, velocity: Vector) -> None:
@@ -245,11 +245,11 @@ class Loop:
             name = "abort_command" if isinstance(command, Abort) else "land_command"
             self.recorder.event(name, f"the system said {type(command).__name__}()")
         self._command = command
-        self._control.take(command)
+        self._control.remember_yaw(command)
 
 
 def _is_finite(world: World) -> bool:
-    return all(math.isfinite(value) for part in world.uav() for value in part)
+    return all(math.isfinite(value) for part in world.uav_state() for value in part)
 
 
 def _ticks_per_call(rate_hz: float | None) -> int:

@@ -115,10 +115,10 @@ class Recorder:
 
     def step(self, command: Command, sight: Sight) -> None:
         """Note one answer of the landing system with what there was to see."""
-        thoughts = command.diagnostics
-        if thoughts and thoughts.phase != self._phase:
-            self._phase = thoughts.phase
-            self.event("phase", thoughts.phase)
+        diagnostics = command.diagnostics
+        if diagnostics and diagnostics.phase != self._phase:
+            self._phase = diagnostics.phase
+            self.event("phase", diagnostics.phase)
         share, side, seen = sight
         self._steps.append(
             Step(
@@ -127,7 +127,7 @@ class Recorder:
                 marker_visible=share,
                 marker_px=side,
                 objects_visible=seen,
-                diagnostics=thoughts,
+                diagnostics=diagnostics,
             )
         )
 

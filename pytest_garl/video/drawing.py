@@ -15,7 +15,7 @@ Image = NDArray[np.uint8]
 Colour = tuple[int, int, int]
 Point = tuple[float, float]
 
-PAPER, INK, FAINT, RULE = (250, 250, 248), (28, 30, 34), (112, 116, 122), (206, 208, 212)
+BACKGROUND, INK, FAINT, RULE = (250, 250, 248), (28, 30, 34), (112, 116, 122), (206, 208, 212)
 UAV, VIEW, MARKER = (24, 84, 222), (96, 150, 246), (214, 0, 150)
 """The UAV and its path, the ground in view, the true marker."""
 SYSTEM, HIT = (240, 120, 0), (206, 22, 22)
@@ -30,7 +30,7 @@ _SHIFT = 4
 
 def sheet(width: int, height: int) -> Image:
     """Return an empty picture, RGB uint8 (height, width, 3)."""
-    return np.full((height, width, 3), PAPER, np.uint8)
+    return np.full((height, width, 3), BACKGROUND, np.uint8)
 
 
 def line(
@@ -93,7 +93,7 @@ def label(image: Image, words: str, at: Point, colour: Colour, size: int = 13) -
     x = round(min(max(at[0], 3), width - wide - 4))
     y = round(min(max(at[1], size + 3), height - 6))
     plate = image[y - size - 1 : y + 5, max(0, x - 3) : x + round(wide) + 4]
-    plate[:] = (plate // 4 + np.array(PAPER, np.uint8) // 4 * 3).astype(np.uint8)
+    plate[:] = (plate // 4 + np.array(BACKGROUND, np.uint8) // 4 * 3).astype(np.uint8)
     text(image, words, (x, y), colour, size)
 
 

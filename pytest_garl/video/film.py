@@ -85,7 +85,10 @@ def _check(flight: Flight, scenario: Scenario, map: Map) -> None:
             f"scenario's lies at ({marker[0]:.2f}, {marker[1]:.2f}) on map {map.name!r}; "
             "take the scenario and the map that were flown"
         )
-    flown, listed = [item.name for item in flight.objects], [name for name, _ in map.object_names]
+    flown, listed = (
+        [item.name for item in flight.objects],
+        [name for name, _ in map.present_objects],
+    )
     if flown != listed:
         raise GarlError(
             f"this flight is not of this scenario: it has the objects {', '.join(flown) or 'none'}"

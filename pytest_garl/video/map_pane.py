@@ -26,7 +26,7 @@ from pytest_garl.video.labels import Labels
 from pytest_garl.video.pose import Poses, path_until
 
 WIDTH, HEIGHT = 384, 656
-BEYOND_M = 2.0
+MARGIN_M = 2.0
 """How much is shown beyond the map's bounds."""
 _UAV_RADIUS_M = 0.5
 _WASH = 0.62
@@ -39,12 +39,12 @@ class MapPane:
     def __init__(self, flight: Flight, scenario: Scenario, map: Map, camera: Camera) -> None:
         self._flight, self._map, self._camera = flight, map, camera
         x_min, x_max, y_min, y_max = map.bounds_m
-        across, up = x_max - x_min + 2 * BEYOND_M, y_max - y_min + 2 * BEYOND_M
+        across, up = x_max - x_min + 2 * MARGIN_M, y_max - y_min + 2 * MARGIN_M
         self._scale = min(WIDTH / across, HEIGHT / up)
         self._left = WIDTH / 2 - (x_min + x_max) / 2 * self._scale
         self._bottom = HEIGHT / 2 + (y_min + y_max) / 2 * self._scale
-        self._still = self._ground(scenario)
-        self._draw_still()
+        self._background = self._ground(scenario)
+        self._draw_background()
 
     def pixels(self, places_m: NDArray[Any]) -> NDArray[np.float64]:
         """Turn world places (n, 2 or 3) into the pane's pixels (n, 2)."""
@@ -59,13 +59,13 @@ class MapPane:
 
     def draw(self, poses: Poses, step: Step | None, *, ended: bool = False) -> drawing.Image:
         """Return the pane at one moment; an ``ended`` flight shows what the UAV touched."""
-        pane = self._still.copy()
+        pane = self._background.copy()
         self._draw_footprint(pane, poses)
         for item in self._flight.objects:
             path = self.pixels(path_until(item.track, poses.time_s))
             drawing.line(pane, path, _colour(item), 1)
         drawing.line(pane, self.pixels(path_until(self._flight.uav, poses.time_s)), drawing.UAV, 2)
-        self._draw_thoughts(pane, step)
+        self._draw_diagnostics(pane, step)
         self._write_names(pane, poses)
         for item, (place, yaw) in zip(self._flight.objects, poses.objects, strict=True):
             self._draw_mover(pane, place, yaw, _radius_m(item), _colour(item))
@@ -104,8 +104,8 @@ class MapPane:
         rgb = cv2.cvtColor(painted, cv2.COLOR_RGBA2RGB)
         return np.asarray(cv2.addWeighted(rgb, 1 - _WASH, rgb, 0.0, 255 * _WASH), np.uint8)
 
-    def _draw_still(self) -> None:
-        image = self._still
+    def _draw_background(self) -> None:
+        image = self._background
         x_min, x_max, y_min, y_max = self._map.bounds_m
         corners = np.array([[x_min, y_min], [x_max, y_min], [x_max, y_max], [x_min, y_max]])
         drawing.line(image, self.pixels(corners), drawing.FAINT, 1, closed=True)
@@ -129,13 +129,13 @@ class MapPane:
     def _draw_scale_bar(self) -> None:
         end = np.array([WIDTH - 12.0, HEIGHT - 12.0])
         bar = np.array([end - (5 * self._scale, 0), end])
-        drawing.line(self._still, bar, drawing.INK, 2)
+        drawing.line(self._background, bar, drawing.INK, 2)
         drawing.label(
-            self._still, "5 m", (bar[0, 0] + 2 * self._scale, end[1] - 7), drawing.INK, 12
+            self._background, "5 m", (bar[0, 0] + 2 * self._scale, end[1] - 7), drawing.INK, 12
         )
-        drawing.label(self._still, "N", (12, 22), drawing.INK)
+        drawing.label(self._background, "N", (12, 22), drawing.INK)
         arrow = np.array([[16.0, 58], [16, 30], [11, 38], [16, 30], [21, 38]])
-        drawing.line(self._still, arrow, drawing.INK, 2)
+        drawing.line(self._background, arrow, drawing.INK, 2)
 
     def _draw_footprint(self, pane: drawing.Image, poses: Poses) -> None:
         """Outline the ground in view, its upper edge thick, unless the horizon is in view."""
@@ -148,14 +148,14 @@ class MapPane:
             drawing.line(pane, outline, drawing.VIEW, 1, closed=True)
             drawing.line(pane, outline[:2], drawing.VIEW, 4)
 
-    def _draw_thoughts(self, pane: drawing.Image, step: Step | None) -> None:
-        thoughts = step.diagnostics if step else None
-        if thoughts is None:
+    def _draw_diagnostics(self, pane: drawing.Image, step: Step | None) -> None:
+        diagnostics = step.diagnostics if step else None
+        if diagnostics is None:
             return
-        if thoughts.planned_path_m:
-            drawing.line(pane, self.pixels(np.array(thoughts.planned_path_m)), drawing.SYSTEM, 3)
-        if thoughts.target_m is not None:
-            drawing.cross(pane, self._pixel(thoughts.target_m), 10, drawing.SYSTEM)
+        if diagnostics.planned_path_m:
+            drawing.line(pane, self.pixels(np.array(diagnostics.planned_path_m)), drawing.SYSTEM, 3)
+        if diagnostics.target_m is not None:
+            drawing.cross(pane, self._pixel(diagnostics.target_m), 10, drawing.SYSTEM)
 
     def _write_names(self, pane: drawing.Image, poses: Poses) -> None:
         labels = Labels(pane)
@@ -180,10 +180,10 @@ class MapPane:
     ) -> None:
         """Draw a disc with a nose."""
         at, radius = self._pixel(place_m), max(4.0, radius_m * self._scale)
-        drawing.disc(pane, at, radius + 1.5, drawing.PAPER)
+        drawing.disc(pane, at, radius + 1.5, drawing.BACKGROUND)
         drawing.disc(pane, at, radius, colour)
         nose = (at[0] + radius * math.cos(yaw_rad), at[1] - radius * math.sin(yaw_rad))
-        drawing.line(pane, np.array([at, nose]), drawing.PAPER, 2)
+        drawing.line(pane, np.array([at, nose]), drawing.BACKGROUND, 2)
 
 
 def _colour(item: ObjectRecord) -> drawing.Colour:

@@ -31,12 +31,12 @@ class Timeline:
         self._heights = np.array([up_m(height) for height in flight.uav.position_m[:, 2].tolist()])
         self._longest = max(float(flight.elapsed_s), 1.0)
         self._highest = max(float(self._heights.max()), 1.0)
-        self._still = drawing.sheet(WIDTH, HEIGHT)
-        self._draw_still()
+        self._background = drawing.sheet(WIDTH, HEIGHT)
+        self._draw_background()
 
     def draw(self, poses: Poses, step: Step | None, *, ended: bool = False) -> drawing.Image:
         """Return the timeline at one moment; an ``ended`` flight shows its outcome."""
-        strip = self._still.copy()
+        strip = self._background.copy()
         height = up_m(float(poses.position_m[2]))
         past = self._times < poses.time_s
         line = self._pixels(self._times[past], self._heights[past])
@@ -72,8 +72,8 @@ class Timeline:
         across = _LEFT + times / self._longest * (_RIGHT - _LEFT)
         return np.stack([across, _BOTTOM - heights / self._highest * (_BOTTOM - _TOP)], axis=1)
 
-    def _draw_still(self) -> None:
-        image = self._still
+    def _draw_background(self) -> None:
+        image = self._background
         drawing.text(image, self._signature, (14, 24), size=17, bold=True, most_px=450)
         for value in _ticks(self._highest, 4):
             _, y = self._pixels(np.zeros(1), np.array([value]))[0]

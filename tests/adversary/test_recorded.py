@@ -115,7 +115,7 @@ def test_recorded_moves_give_the_identical_flight() -> None:
 def test_reference_pilot_waits_until_the_recorded_person_has_left() -> None:
     genome = genome_for(LAWN)
     nominal = decode(genome.nominal, genome, map="lawn", seed=3)
-    names = [name for name, _ in LAWN.object_names]
+    names = [name for name, _ in LAWN.present_objects]
     alone = nominal.without(*(name for name in names if name != "person-1"))
     start = start_genes("person-1", (4.0, 0.0), LAWN)
     scenario = alone.replace({**start, "person-1.velocity": 0.5, "marker.x": 0.0, "marker.y": 0.0})

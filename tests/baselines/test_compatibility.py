@@ -7,7 +7,7 @@ from pytest_garl.baselines.compatibility import environment_changes, incompatibi
 from pytest_garl.baselines.file import (
     Baseline,
 )
-from pytest_garl.cpu_dispatch import of_children
+from pytest_garl.cpu_dispatch import cpu_class_of_flights
 from pytest_garl.execution.reference import Reference
 from pytest_garl.verdicts.verdict import Limits
 from tests.baselines.samples import baseline, baseline_set, job
@@ -37,6 +37,6 @@ def test_environment_changes_name_cpu_and_versions() -> None:
     assert "numpy was 2.0.0, is " in " ".join(environment_changes(baseline()))
     gone = Baseline(cpu="z80", versions=(("no-such-package", "1"),), sets=())
     assert environment_changes(gone) == (
-        f"the CPU was z80, is {of_children()}",
+        f"the CPU was z80, is {cpu_class_of_flights()}",
         "no-such-package was 1, is absent",
     )

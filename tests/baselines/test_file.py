@@ -98,7 +98,7 @@ def test_the_error_of_a_missing_file_names_the_command_that_writes_one(tmp_path:
 
 def test_save_refuses_sets_that_no_file_can_hold(tmp_path: Path) -> None:
     each = baseline_set()
-    dog = next(name for name, kind in LAWN.object_names if kind == "dog")
+    dog = next(name for name, kind in LAWN.present_objects if kind == "dog")
     small = dataclasses.replace(each.flights[0], scenario=each.flights[0].scenario.without(dog))
     mixed = dataclasses.replace(each, flights=(*each.flights[1:], small))
     for wrong, words in (

@@ -42,7 +42,7 @@ def broken_lander() -> Case:
     """Return a case in which the lander raises at once, in fog that has nothing to do with it."""
     genome = genome_for(LAWN)
     scenario = repair(decode(genome.nominal, genome, map="lawn", seed=3), LAWN)
-    names = [name for name, _ in LAWN.object_names]
+    names = [name for name, _ in LAWN.present_objects]
     return Case(
         system="stack_of_test:Lander",
         status="open",

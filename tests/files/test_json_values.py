@@ -57,7 +57,7 @@ def test_a_dataclass_survives_json_to_the_byte() -> None:
         ({"inner": [{"kind": [], "pair": [1, 2]}]}, r"inner\[0\].kind: found \[\], expected one"),
         ({"maybe": {"kind": "a", "pair": [1]}}, r"maybe.pair: found \[1\], expected a list of 2"),
         ({"maybe": {"kind": "a"}}, "maybe: found other keys than expected: pair"),
-        ({"more": 1}, "the whole: found other keys than expected: more"),
+        ({"more": 1}, "the value: found other keys than expected: more"),
     ],
 )
 def test_a_wrong_field_is_named(change: dict[str, object], words: str) -> None:

@@ -84,7 +84,7 @@ def test_property_of_the_page_fails_as_one_of_the_user(pytester: pytest.Pytester
 def test_map_of_the_page_is_read(tmp_path: Path) -> None:
     write_page(tmp_path)
     map = load_map("helipad", (tmp_path / "scenarios" / "maps",))
-    assert [name for name, _ in map.object_names] == ["person-1", "person-2", "dog-1"]
+    assert [name for name, _ in map.present_objects] == ["person-1", "person-2", "dog-1"]
 
 
 @pytest.mark.sim

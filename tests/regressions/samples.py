@@ -23,7 +23,7 @@ from pytest_garl.verdicts.verdict import Limits
 from tests.support.results import flight_result
 
 LAWN = load_map("lawn")
-NAMES = [name for name, _ in LAWN.object_names]
+NAMES = [name for name, _ in LAWN.present_objects]
 COLLIDING_OBJECT = NAMES[0]
 SYSTEM = "stack.landing:Lander"
 

@@ -70,7 +70,7 @@ def test_a_missing_gene_is_named() -> None:
 def test_absent_objects_survive_the_file_and_have_no_genes() -> None:
     genome = genome_for(COURT)
     whole = repair(decode(genome.nominal, genome, map="court", seed=4), COURT)
-    name = COURT.object_names[0][0]
+    name = COURT.present_objects[0][0]
     fewer = whole.without(name)
     assert not any(key.startswith(f"{name}.") for key, _ in fewer.genes)
     assert loads(dumps(fewer), COURT) == fewer

@@ -216,5 +216,5 @@ def _renderer(scenario: Scenario) -> Renderer:
 
 def _frame(renderer: Renderer) -> np.ndarray:
     x, y = renderer.marker_m
-    poses = [((x + n, y + 1.0, 0.0), 0.3 * n) for n in range(len(LAWN.object_names))]
+    poses = [((x + n, y + 1.0, 0.0), 0.3 * n) for n in range(len(LAWN.present_objects))]
     return np.asarray(renderer.render((x, y, 5.0), LEVEL, 1.0, poses).image)

@@ -45,7 +45,9 @@ def _track(length: int = 3) -> Track:
 
 def flight() -> Flight:
     seen = Detection(marker_id=3, confidence=0.5, position_m=(1.0, 2.0, 0.0))
-    thoughts = Diagnostics(phase="descend", detections=(seen,), planned_path_m=((0.0, 1.0, 2.0),))
+    diagnostics = Diagnostics(
+        phase="descend", detections=(seen,), planned_path_m=((0.0, 1.0, 2.0),)
+    )
     return Flight(
         outcome="collision",
         final_distance_m=2.5,
@@ -83,7 +85,7 @@ def flight() -> Flight:
                 marker_visible=0.5,
                 marker_px=20.0,
                 objects_visible=("dog-1",),
-                diagnostics=thoughts,
+                diagnostics=diagnostics,
             ),
         ),
         decoys=(("marker-3", 1.0, 2.0),),
@@ -139,7 +141,7 @@ def _array(key: str, value: Any) -> Callable[[dict[str, Any], Any], None]:
 @pytest.mark.parametrize(
     ("change", "words"),
     [
-        (lambda _, header: header.pop("steps"), "the whole: found other keys .*: steps"),
+        (lambda _, header: header.pop("steps"), "the value: found other keys .*: steps"),
         (_set("outcome", "gone"), "outcome: found 'gone', expected one of 'landed'"),
         (_set("elapsed_s", "x" * 9000), "elapsed_s: found 'xxx.* expected a finite number"),
         (_set("marker_position_m", [1]), "marker_position_m: found .1., expected a list of 2"),

@@ -99,7 +99,7 @@ def test_the_same_scenario_flies_the_same_bytes() -> None:
 
 def test_removing_an_npc_changes_nothing_for_the_others() -> None:
     scenario = propose(LAWN, genome_for(LAWN), 3, 0, 1)[0]
-    names = [name for name, _ in LAWN.object_names]
+    names = [name for name, _ in LAWN.present_objects]
     alone = scenario.without(*names[:-1])
     first, second = (
         fly(each, ReferencePilot, policy_spec("waypoint"), time_limit_s=3.0)

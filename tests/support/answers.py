@@ -44,5 +44,5 @@ def seen(**changes: Any) -> Diagnostics:
     return Diagnostics(detections=(Detection(**sighting),))
 
 
-def told(**diagnostics: Any) -> Land:
+def land_with(**diagnostics: Any) -> Land:
     return Land(diagnostics=Diagnostics(**diagnostics))

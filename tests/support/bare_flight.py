@@ -67,7 +67,7 @@ def fly_bare(
     modes: list[str] = []
     try:
         for tick in range(round(duration_s * PHYSICS_RATE_HZ)):
-            position, attitude, velocity, spin = world.uav()
+            position, attitude, velocity, spin = world.uav_state()
             x, y, z, w = attitude
             rates = rotate((-x, -y, -z, w), spin)
             state = VehicleState(

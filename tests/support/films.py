@@ -56,13 +56,13 @@ class Hovers:
 
     def step(self, observation: Observation) -> Command:
         self.seen.append(observation.image.copy())
-        thoughts = None
+        diagnostics = None
         if observation.time_s >= SPEAKS_FROM_S:
             found = Detection(marker_id=0, confidence=0.9, position_m=TARGET, corners_px=CORNERS)
-            thoughts = Diagnostics(
+            diagnostics = Diagnostics(
                 phase="hover", detections=(found,), target_m=TARGET, planned_path_m=PLAN
             )
-        return PositionSetpoint(position_m=(*self.home[:2], 3.0), diagnostics=thoughts)
+        return PositionSetpoint(position_m=(*self.home[:2], 3.0), diagnostics=diagnostics)
 
 
 @dataclasses.dataclass(frozen=True, slots=True, kw_only=True, eq=False)

@@ -8,11 +8,11 @@ from landing_systems.modules.control_ardupilot.parameters import ArduPilotParame
 from landing_systems.modules.control_ardupilot.rotations import (
     Quaternion,
     Vector,
-    between,
     heading_quaternion,
-    rotated,
+    integrate_rates,
+    rotate,
+    rotation_between,
     tilt_and_turn,
-    turned,
     yaw_of,
 )
 from landing_systems.modules.control_ardupilot.shaping import clamped, sqrt_controller
@@ -56,18 +56,18 @@ class AttitudeControl:
     def rates(self, thrust: Vector, yaw_rad: float, attitude: Quaternion) -> Vector:
         """Return wanted body rates for a thrust direction (world) and a heading."""
         self._shape(heading_quaternion(thrust, yaw_rad))
-        error = between(attitude, self.target)
+        error = rotation_between(attitude, self.target)
         ex, ey, ez = tilt_and_turn(error)
         if abs(ez) > MAX_YAW_ERROR_RAD:
             excess = ez - math.copysign(MAX_YAW_ERROR_RAD, ez)
-            self.target = turned(self.target, (0.0, 0.0, -excess), 1.0)
+            self.target = integrate_rates(self.target, (0.0, 0.0, -excess), 1.0)
             ez -= excess
         tilt = math.sqrt(ex * ex + ey * ey)
         self.tilt_error_rad = tilt
         correct_x, correct_y, correct_z = self._correct
         wx, wy, wz = correct_x(ex), correct_y(ey), correct_z(ez)
         if self._p.atc_rate_ff_enab:
-            fx, fy, fz = rotated(error, self._rates)
+            fx, fy, fz = rotate(error, self._rates)
             wx, wy, wz = wx + fx, wy + fy, wz + fz
         if tilt > LARGE_TILT_ERROR_RAD:
             wz *= max(0.0, 2 - tilt / LARGE_TILT_ERROR_RAD)
@@ -79,7 +79,7 @@ class AttitudeControl:
         if not p.atc_rate_ff_enab:
             self.target, self._rates = wanted, (0.0, 0.0, 0.0)
             return
-        ex, ey, ez = tilt_and_turn(between(self.target, wanted))
+        ex, ey, ez = tilt_and_turn(rotation_between(self.target, wanted))
         wx, wy, wz = self._rates
         approach_x, approach_y, approach_z = self._approach
         slew, change = p.atc_slew_yaw, p.atc_accel_r_max * dt
@@ -89,4 +89,4 @@ class AttitudeControl:
         change = p.atc_accel_y_max * dt
         z = clamped(clamped(approach_z(ez), -slew, slew), wz - change, wz + change)
         self._rates = x, y, z
-        self.target = turned(self.target, self._rates, dt)
+        self.target = integrate_rates(self.target, self._rates, dt)

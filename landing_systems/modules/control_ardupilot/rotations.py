@@ -8,7 +8,7 @@ Vector = tuple[float, float, float]
 Quaternion = tuple[float, float, float, float]
 
 
-def between(a: Quaternion, b: Quaternion) -> Quaternion:
+def rotation_between(a: Quaternion, b: Quaternion) -> Quaternion:
     """Return the rotation from a to b as seen in a's body frame: inverse of a, times b."""
     ax, ay, az, aw = a
     bx, by, bz, bw = b
@@ -20,7 +20,7 @@ def between(a: Quaternion, b: Quaternion) -> Quaternion:
     )
 
 
-def rotated(q: Quaternion, v: Vector) -> Vector:
+def rotate(q: Quaternion, v: Vector) -> Vector:
     """Return q applied to v."""
     x, y, z, w = q
     vx, vy, vz = v
@@ -32,7 +32,7 @@ def rotated(q: Quaternion, v: Vector) -> Vector:
     )
 
 
-def turned(q: Quaternion, rates: Vector, dt_s: float) -> Quaternion:
+def integrate_rates(q: Quaternion, rates: Vector, dt_s: float) -> Quaternion:
     """Return q after turning with body rates for a short time, normalised."""
     half = 0.5 * dt_s
     qx, qy, qz, qw = q

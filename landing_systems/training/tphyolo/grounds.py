@@ -9,7 +9,7 @@ import numpy as np
 from pytest_garl.scenarios.bodies import Body
 from pytest_garl.scenarios.maps.map import Ground, Layer, LayerKind, Map, Texture
 from pytest_garl.scenarios.placement import MARKER_SIDE_M
-from pytest_garl.scenarios.static_bodies import FURNITURE
+from pytest_garl.scenarios.static_bodies import STATIC_BODIES
 
 HALF_M = 8.0
 """Half the side of a place: the disc of 7.5 m in which the marker lies, and a little more."""
@@ -167,7 +167,7 @@ def _bodies(rng: np.random.Generator, court: bool) -> tuple[Body, ...]:
             Body(
                 name=f"{kind}-{index}",
                 kind=kind,
-                parts=FURNITURE[kind](**sizes),
+                parts=STATIC_BODIES[kind](**sizes),
                 position_m=(x, y, 0.0),
                 yaw_rad=float(rng.uniform(0, 2 * math.pi)),
             )

@@ -221,7 +221,7 @@ def _objects(
     """Put each object on or beside what is looked at, or somewhere."""
     x_min, x_max, y_min, y_max = map.bounds_m
     placed = []
-    for _, kind in map.object_names:
+    for _, kind in map.present_objects:
         if rng.random() < 0.3:
             x, y = rng.normal(aim, 0.8)
         else:

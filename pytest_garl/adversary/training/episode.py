@@ -117,7 +117,7 @@ def draw_episode(map: Map, types: Sequence[str], rng: np.random.Generator) -> tu
     genome = genome_for(place)
     scenario = decode(genome.nominal, genome, map=map.name, seed=int(rng.integers(2**32)))
     x_min, x_max, y_min, y_max = map.bounds_m
-    for name, _ in place.object_names:
+    for name, _ in place.present_objects:
         start = (float(rng.uniform(x_min, x_max)), float(rng.uniform(y_min, y_max)))
         low, high = next((p.low, p.high) for p in genome.properties if p.key == f"{name}.velocity")
         scenario = scenario.replace(

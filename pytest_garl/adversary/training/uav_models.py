@@ -15,7 +15,11 @@ from pytest_garl.landing_system import (
     PositionSetpoint,
     VelocitySetpoint,
 )
-from pytest_garl.simulation.system_under_test.descent import COLUMN_M, centring, descend
+from pytest_garl.simulation.system_under_test.descent import (
+    CENTRED_WITHIN_M,
+    centring_velocity,
+    descend,
+)
 from pytest_garl.simulation.system_under_test.ground_truth import Truth, TruthObject
 
 
@@ -93,7 +97,7 @@ class StraightPilot:
         self._up |= z > style.cruise_m - 1.0
         if not self._up:
             return PositionSetpoint(position_m=(*self._home[:2], style.cruise_m))
-        self._there |= offset < COLUMN_M
+        self._there |= offset < CENTRED_WITHIN_M
         if not self._there:
             return PositionSetpoint(position_m=(*goal, style.cruise_m), speed_mps=style.speed_mps)
         return descend(goal, (x, y, z), style.descent_mps)
@@ -134,7 +138,7 @@ class AvoidingPilot(StraightPilot):
             x, y, z = place
             climb = avoidance.climb_mps if z < self._style.cruise_m else 0.0
             goal = truth.marker_m if self._there else (x, y)
-            return VelocitySetpoint(velocity_mps=(*centring(goal, (x, y)), climb))
+            return VelocitySetpoint(velocity_mps=(*centring_velocity(goal, (x, y)), climb))
         return super().step(observation)
 
     def _is_close_below(self, item: TruthObject, place: tuple[float, ...]) -> bool:

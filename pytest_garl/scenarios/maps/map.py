@@ -42,7 +42,7 @@ class Layer:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Ground:
-    """The planar ground: a procedural base texture of its own seed, and layers over it."""
+    """The planar ground: a procedural base texture with its own seed, and the layers over it."""
 
     texture: Texture
     texture_seed: int
@@ -52,11 +52,12 @@ class Ground:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Map:
-    """One place: ground, static bodies, the objects that live there, bounds and mission.
+    """One place: ground, static bodies, dynamic objects, bounds, GPS position and start.
 
-    ``bounds_m`` is (x_min, x_max, y_min, y_max); ``objects`` are (type, count) pairs;
-    ``sha256`` is that of the file, part of a run's identity.  ``removed_objects`` are those that
-    one scenario flies without; the file names none.
+    ``bounds_m`` is (x_min, x_max, y_min, y_max); ``objects`` are (type, count) pairs
+    of the dynamic objects; ``sha256`` is the hash of the file and part of a run's identity.
+    ``removed_objects`` are the names of objects that one scenario leaves out; a map file removes
+    none.
     """
 
     name: str
@@ -72,7 +73,7 @@ class Map:
 
     @property
     def all_objects(self) -> tuple[tuple[str, str], ...]:
-        """(name, type) of each dynamic object, removed or not, in order."""
+        """(name, type) of each dynamic object in order, including the removed ones."""
         return tuple(
             (f"{kind}-{index}", kind)
             for kind, count in self.objects
@@ -80,8 +81,8 @@ class Map:
         )
 
     @property
-    def object_names(self) -> tuple[tuple[str, str], ...]:
-        """(name, type) of each dynamic object there is: ``("person-1", "person")``, in order."""
+    def present_objects(self) -> tuple[tuple[str, str], ...]:
+        """(name, type) of the objects that are not removed, such as ``("person-1", "person")``."""
         return tuple(pair for pair in self.all_objects if pair[0] not in self.removed_objects)
 
     def without(self, removed: Iterable[str]) -> Map:
@@ -118,27 +119,27 @@ def load_map(name: str, search_path: Sequence[Path] = ()) -> Map:
     for folder in _folders(search_path):
         file = folder / f"{name}.toml"
         if file in _maps_in(folder):
-            return _read(file, _changed(file))
+            return _read(file, _modified_ns(file))
     raise ScenarioError(
         f"unknown map {shown(name)}; expected one of {listed(map_names(search_path))}. "
         "A map of your own is a file scenarios/maps/<name>.toml"
     )
 
 
-def _changed(file: Path) -> int:
+def _modified_ns(file: Path) -> int:
     try:
         return file.stat().st_mtime_ns
     except OSError as error:
-        # A link to nothing, or to itself.
+        # A link whose target is missing, or a link to itself.
         raise ScenarioError(f"{file}: cannot be read: {error.strerror}") from error
 
 
 @functools.lru_cache(maxsize=64)
-def _read(file: Path, changed: int) -> Map:
-    """Read a file once, until it changes."""
+def _read(file: Path, modified_ns: int) -> Map:
+    """Read a file; the cache reads it again if its modification time has changed."""
     from pytest_garl.scenarios.maps.reader import read_map
 
-    del changed
+    del modified_ns
     return read_map(file)
 
 

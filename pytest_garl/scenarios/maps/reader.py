@@ -15,7 +15,7 @@ from pytest_garl.messages import printable, shown
 from pytest_garl.scenarios.bodies import Body
 from pytest_garl.scenarios.maps.map import Ground, Layer, LayerKind, Map, Texture
 from pytest_garl.scenarios.object_types import OBJECT_TYPES
-from pytest_garl.scenarios.static_bodies import FURNITURE
+from pytest_garl.scenarios.static_bodies import STATIC_BODIES
 
 _GPS_DISC_M = 7.5
 LARGEST_AREA_M2 = 10_000.0
@@ -48,7 +48,7 @@ def read_map(file: Path) -> Map:
     except UnicodeDecodeError as error:
         raise ScenarioError(f"{file}: cannot be read: {error}") from error
     top = Table(parse(text, str(file)), str(file))
-    top.only(
+    top.refuse_unknown(
         {
             "title",
             "bounds_m",
@@ -72,7 +72,7 @@ def read_map(file: Path) -> Map:
     bodies = _bodies(top)
     return Map(
         name=file.stem,
-        title=top.text("title", file.stem),
+        title=top.string("title", file.stem),
         bounds_m=(x_min, x_max, y_min, y_max),
         gps_position_m=(gps_x, gps_y),
         uav_start_m=(start_x, start_y, start_z),
@@ -111,8 +111,8 @@ def _bounds(top: Table) -> tuple[float, float, float, float]:
 
 def _ground(top: Table) -> Ground:
     ground = top.table("ground")
-    ground.only({"texture", "seed", "colour"})
-    texture = ground.text("texture", among=get_args(Texture))
+    ground.refuse_unknown({"texture", "seed", "colour"})
+    texture = ground.string("texture", allowed=get_args(Texture))
     return Ground(
         texture=cast(Texture, texture),
         texture_seed=ground.integer("seed"),
@@ -122,7 +122,7 @@ def _ground(top: Table) -> Ground:
 
 
 def _layer(table: Table) -> Layer:
-    table.only(
+    table.refuse_unknown(
         {
             "kind",
             "points_m",
@@ -135,7 +135,7 @@ def _layer(table: Table) -> Layer:
             "name",
         }
     )
-    kind = table.text("kind", among=get_args(LayerKind))
+    kind = table.string("kind", allowed=get_args(LayerKind))
     start, end = table.numbers("angles_deg", 2, (0.0, 0.0), high=_FULL_TURN_DEG)
     low, high = _POINTS.get(kind, (1, 1))
     marker_id = (
@@ -151,7 +151,7 @@ def _layer(table: Table) -> Layer:
         angles_rad=(math.radians(start), math.radians(end)),
         yaw_rad=_yaw(table),
         marker_id=marker_id,
-        name=table.text("name", f"marker-{marker_id}" if kind == "marker" else kind),
+        name=table.string("name", f"marker-{marker_id}" if kind == "marker" else kind),
     )
 
 
@@ -163,10 +163,10 @@ def _bodies(top: Table) -> tuple[Body, ...]:
     counts: dict[str, int] = {}
     bodies = []
     for table in top.tables("bodies", most=_MOST_BODIES):
-        kind = table.text("kind", among=FURNITURE)
-        build = FURNITURE[kind]
+        kind = table.string("kind", allowed=STATIC_BODIES)
+        build = STATIC_BODIES[kind]
         arguments = set(inspect.signature(build).parameters)
-        table.only({"kind", "position_m", "yaw_deg"} | arguments)
+        table.refuse_unknown({"kind", "position_m", "yaw_deg"} | arguments)
         values = {
             key: table.integer(key, low=1, high=_MOST_BRANCHES)
             if key == "branches"
@@ -190,5 +190,5 @@ def _bodies(top: Table) -> tuple[Body, ...]:
 
 def _objects(top: Table) -> tuple[tuple[str, int], ...]:
     objects = top.table("objects")
-    objects.only(OBJECT_TYPES)
+    objects.refuse_unknown(OBJECT_TYPES)
     return tuple((kind, objects.integer(kind, high=_MOST_OBJECTS)) for kind in objects.values)

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 Image = NDArray[np.uint8]
-Box = tuple[float, float, float, float]
+Bounds = tuple[float, float, float, float]
 """A piece of ground in metres: x_min, x_max, y_min, y_max."""
 
 _CELLS = 7
@@ -23,13 +23,13 @@ _SHIFT = 4
 class Canvas:
     """Draws world shapes onto an image of a piece of ground."""
 
-    def __init__(self, image: Image, box: Box, resolution: float) -> None:
-        self.image, self.box, self.resolution = image, box, resolution
+    def __init__(self, image: Image, bounds_m: Bounds, resolution: float) -> None:
+        self.image, self.bounds_m, self.resolution = image, bounds_m, resolution
 
     def _points(self, world: NDArray[np.float64]) -> NDArray[np.int32]:
         pixels = np.empty_like(world)
-        pixels[:, 0] = (world[:, 0] - self.box[0]) / self.resolution - 0.5
-        pixels[:, 1] = (self.box[3] - world[:, 1]) / self.resolution - 0.5
+        pixels[:, 0] = (world[:, 0] - self.bounds_m[0]) / self.resolution - 0.5
+        pixels[:, 1] = (self.bounds_m[3] - world[:, 1]) / self.resolution - 0.5
         fixed: NDArray[np.int32] = np.round(pixels * 2**_SHIFT).astype(np.int32)
         return fixed
 

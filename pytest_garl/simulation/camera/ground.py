@@ -13,7 +13,7 @@ from pytest_garl.scenarios.maps.map import Map
 from pytest_garl.scenarios.placement import MARKER_SIDE_M, TARGET_MARKER_ID, marker_position_m
 from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.simulation.camera import map_texture
-from pytest_garl.simulation.camera.canvas import Box, Canvas, Image
+from pytest_garl.simulation.camera.canvas import Bounds, Canvas, Image
 from pytest_garl.simulation.camera.ground_cover import TILE_M, cover
 from pytest_garl.simulation.camera.map_texture import RESOLUTION_M
 from pytest_garl.simulation.camera.meshes import mesh_of, placed_hulls
@@ -131,14 +131,14 @@ def _painted(
     """Paint both pieces, with the marker and what lies about."""
     half = _INSET_HALF_M
     inset_box = (marker[0] - half, marker[0] + half, marker[1] - half, marker[1] + half)
-    wide = Canvas(map_texture.picture(map).copy(), map_texture.box_of(map), RESOLUTION_M)
+    wide = Canvas(map_texture.picture(map).copy(), map_texture.bounds_of(map), RESOLUTION_M)
     inset = Canvas(map_texture.detail(map, inset_box, _INSET_M), inset_box, _INSET_M)
     for canvas in (wide, inset):
         canvas.marker(marker, MARKER_SIDE_M, 0.0, marker_id)
         if conditions.wetness > 0:
             alpha = 1 - WET_ALBEDO_LOSS * conditions.wetness
             cv2.convertScaleAbs(canvas.image, canvas.image, alpha)
-        cover(canvas.image, canvas.box, canvas.resolution, shift, conditions)
+        cover(canvas.image, canvas.bounds_m, canvas.resolution, shift, conditions)
     return wide, inset
 
 
@@ -149,18 +149,19 @@ def _lit(
     shift: NDArray[np.float64],
 ) -> PaintedGround:
     wide, inset = (
-        _raster(_light(canvas, map, conditions), canvas.box, canvas.resolution) for canvas in unlit
+        _raster(_light(canvas, map, conditions), canvas.bounds_m, canvas.resolution)
+        for canvas in unlit
     )
     return PaintedGround(wide=wide, inset=inset, cover_shift_m=shift, unlit=unlit)
 
 
-def _raster(image: Image, box: Box, resolution: float) -> Raster:
+def _raster(image: Image, bounds_m: Bounds, resolution: float) -> Raster:
     levels = [np.asarray(cv2.cvtColor(image, cv2.COLOR_RGB2RGBA), dtype=np.uint8)]
     for _ in range(_LEVELS - 1):
         rows, columns = levels[-1].shape[:2]
         size = (max(1, columns // 2), max(1, rows // 2))
         levels.append(cv2.resize(levels[-1], size, interpolation=cv2.INTER_AREA).astype(np.uint8))
-    return Raster(levels=tuple(levels), m_per_px=resolution, x_min=box[0], y_max=box[3])
+    return Raster(levels=tuple(levels), m_per_px=resolution, x_min=bounds_m[0], y_max=bounds_m[3])
 
 
 def _light(canvas: Canvas, map: Map, conditions: Conditions) -> Image:
@@ -169,7 +170,7 @@ def _light(canvas: Canvas, map: Map, conditions: Conditions) -> Image:
         return canvas.image
     image = canvas.image.copy()
     mask = np.zeros(image.shape[:2], np.uint8)
-    shade = Canvas(mask, canvas.box, canvas.resolution)
+    shade = Canvas(mask, canvas.bounds_m, canvas.resolution)
     for body in map.bodies:
         for hull in placed_hulls(mesh_of(body.parts), body.position_m, body.yaw_rad):
             outline = cv2.convexHull(shadow_of(hull, conditions.sun).astype(np.float32))

@@ -9,7 +9,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from pytest_garl.simulation.camera.canvas import Box, Image
+from pytest_garl.simulation.camera.canvas import Bounds, Image
 from pytest_garl.simulation.camera.weather import Conditions
 
 TILE_M = 8.0
@@ -69,7 +69,7 @@ def _ranks(values: NDArray[np.float32]) -> NDArray[np.float32]:
 
 def cover(
     image: Image,
-    box: Box,
+    bounds_m: Bounds,
     resolution: float,
     shift_m: NDArray[np.float64],
     conditions: Conditions,
@@ -80,10 +80,12 @@ def cover(
     leaves, colours, snow = _tiles()
     size = leaves.shape[0]
     rows, columns = image.shape[:2]
-    x = ((box[0] - shift_m[0] + (np.arange(columns) + 0.5) * resolution) / _CELL_M).astype(
+    x = ((bounds_m[0] - shift_m[0] + (np.arange(columns) + 0.5) * resolution) / _CELL_M).astype(
         int
     ) % size
-    y = ((shift_m[1] - box[3] + (np.arange(rows) + 0.5) * resolution) / _CELL_M).astype(int) % size
+    y = ((shift_m[1] - bounds_m[3] + (np.arange(rows) + 0.5) * resolution) / _CELL_M).astype(
+        int
+    ) % size
     grid = np.ix_(y, x)
     if conditions.leaf_cover > 0:
         here = leaves[grid] <= conditions.leaf_cover

@@ -12,13 +12,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pytest_garl.scenarios.maps.map import Layer, Map
-from pytest_garl.simulation.camera.canvas import Box, Canvas, Image
+from pytest_garl.simulation.camera.canvas import Bounds, Canvas, Image
 
 RESOLUTION_M = 0.04
 _MARGIN_M = 15.0
 
 
-def box_of(map: Map) -> Box:
+def bounds_of(map: Map) -> Bounds:
     """Return the piece of ground that a map's picture shows: its bounds and a margin."""
     x_min, x_max, y_min, y_max = map.bounds_m
     return x_min - _MARGIN_M, x_max + _MARGIN_M, y_min - _MARGIN_M, y_max + _MARGIN_M
@@ -27,11 +27,14 @@ def box_of(map: Map) -> Box:
 @functools.lru_cache(maxsize=4)
 def picture(map: Map) -> Image:
     """Paint a map at RESOLUTION_M, read-only; the same for all its scenarios."""
-    box = box_of(map)
+    bounds_m = bounds_of(map)
     rng = np.random.default_rng(map.ground.texture_seed)
-    rows, columns = round((box[3] - box[2]) / RESOLUTION_M), round((box[1] - box[0]) / RESOLUTION_M)
+    rows, columns = (
+        round((bounds_m[3] - bounds_m[2]) / RESOLUTION_M),
+        round((bounds_m[1] - bounds_m[0]) / RESOLUTION_M),
+    )
     image = _texture(map, rows, columns, rng)
-    canvas = Canvas(image, box, RESOLUTION_M)
+    canvas = Canvas(image, bounds_m, RESOLUTION_M)
     for layer in map.ground.layers:
         _paint_layer(canvas, layer, rng)
     image.flags.writeable = False
@@ -118,7 +121,7 @@ def _patches(
 ) -> None:
     """Draw mottled wear: many small translucent blobs, so that no patch has a hard edge."""
     layer = canvas.image.copy()
-    over = Canvas(layer, canvas.box, canvas.resolution)
+    over = Canvas(layer, canvas.bounds_m, canvas.resolution)
     for _ in range(60):
         at = centre + rng.normal(0, spread_m / 3, 2)
         angles = np.linspace(0, 2 * math.pi, 13)[:-1]
@@ -129,13 +132,13 @@ def _patches(
     cv2.addWeighted(canvas.image, 0.6, layer, 0.4, 0.0, canvas.image)
 
 
-def detail(map: Map, box: Box, resolution: float) -> Image:
+def detail(map: Map, bounds_m: Bounds, resolution: float) -> Image:
     """Enlarge a square piece of a map and add the grain that its picture cannot hold."""
-    painted, wide_box = picture(map), box_of(map)
-    size = round((box[1] - box[0]) / resolution)
+    painted, wide_box = picture(map), bounds_of(map)
+    size = round((bounds_m[1] - bounds_m[0]) / resolution)
     zoom = resolution / RESOLUTION_M
-    x = (box[0] - wide_box[0]) / RESOLUTION_M + zoom / 2 - 0.5
-    y = (wide_box[3] - box[3]) / RESOLUTION_M + zoom / 2 - 0.5
+    x = (bounds_m[0] - wide_box[0]) / RESOLUTION_M + zoom / 2 - 0.5
+    y = (wide_box[3] - bounds_m[3]) / RESOLUTION_M + zoom / 2 - 0.5
     piece = cv2.warpAffine(
         painted,
         np.array([[zoom, 0.0, x], [0.0, zoom, y]]),

@@ -92,7 +92,7 @@ class Renderer:
         self.marker_m = marker_position_m(scenario, map)
         self._map, self._marker_id = map, marker_id
         names = ["ground", "marker", *(body.name for body in map.bodies)]
-        names += [name for name, _ in map.object_names]
+        names += [name for name, _ in map.present_objects]
         self.segment_ids: Mapping[str, int] = {name: index for index, name in enumerate(names)}
         self._ground = paint_ground(scenario, map, conditions, rng, marker_id) if colour else None
         width, height = camera.width_px, camera.height_px
@@ -180,7 +180,7 @@ class Renderer:
         if scene.sky is not None:
             image[scene.sky] = look.air
         for layer in scene.layers:
-            layer.put_on(image)
+            layer.paint_onto(image)
         look.particles.draw(image, scene.depth_m, view, scene.time_s)
         _fog(image, scene.depth_m, look)
         return look.sensor.expose(image, scene.time_s)

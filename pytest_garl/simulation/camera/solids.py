@@ -76,7 +76,7 @@ class PaintedSolid:
     covered: NDArray[np.bool_]
     drawn: Array
 
-    def put_on(self, image: NDArray[np.uint8]) -> None:
+    def paint_onto(self, image: NDArray[np.uint8]) -> None:
         """Put them over what the image shows."""
         window = image[self.rows, self.columns]
         cv2.copyTo(cv2.convertScaleAbs(self.drawn), self.covered.view(np.uint8), window)
@@ -105,7 +105,7 @@ class Solids:
             solid.put((body.position_m, body.yaw_rad), conditions)
         self._moving = [
             _Solid(segment=segment_ids[name], meshes=_levels(OBJECT_TYPES[kind].parts))
-            for name, kind in map.object_names
+            for name, kind in map.present_objects
         ]
         self._segments = len(segment_ids)
         self._settings = cv2.TriangleRasterizeSettings()

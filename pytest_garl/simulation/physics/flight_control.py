@@ -56,7 +56,7 @@ class FlightControl:
         self._command: Command | None = None
         self._yaw_rad = 0.0
 
-    def take(self, command: Command) -> None:
+    def remember_yaw(self, command: Command) -> None:
         """Note a command's yaw: what lands or aborts keeps the one that was commanded last.
 
         It is told of every command, also while a landing system flies the motors itself.

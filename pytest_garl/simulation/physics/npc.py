@@ -31,7 +31,7 @@ class Npc:
     """One dynamic object of one flight."""
 
     def __init__(self, scenario: Scenario, map: Map, name: str, policy: NpcPolicy) -> None:
-        kind = dict(map.object_names)[name]
+        kind = dict(map.present_objects)[name]
         self.name = name
         self.type = OBJECT_TYPES[kind]
         self.policy = policy

@@ -51,7 +51,7 @@ _RANGE_M = 3.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Touch:
+class HullContact:
     """A contact of the UAV's hull with a body, or with "ground"."""
 
     body: str
@@ -102,7 +102,7 @@ class World:
         pybullet.applyExternalTorque(uav, -1, torque, pybullet.WORLD_FRAME, client)
         pybullet.stepSimulation(client)
 
-    def uav(self) -> tuple[Vector, Quaternion, Vector, Vector]:
+    def uav_state(self) -> tuple[Vector, Quaternion, Vector, Vector]:
         """Position, attitude, velocity and angular velocity of the UAV, in the world frame."""
         position, attitude = pybullet.getBasePositionAndOrientation(self._uav, self._client)
         velocity, spin = pybullet.getBaseVelocity(self._uav, self._client)
@@ -116,18 +116,18 @@ class World:
         self._p.resetBaseVelocity(body, velocity, (0, 0, 0), **self._call)
         self._spheres[body] = (position_m, self._spheres[body][1])
 
-    def touches(self) -> tuple[Touch, ...]:
+    def hull_contacts(self) -> tuple[HullContact, ...]:
         """Return the UAV's present contacts, one per body."""
         contacts = self._p.getContactPoints(self._uav, **self._call)
         if not contacts:
             return ()
-        found: dict[str, Touch] = {}
+        found: dict[str, HullContact] = {}
         for contact in contacts:
             # Bullet pushes bodies apart a step before they overlap: force without overlap is
             # a contact as well.
             if contact[8] <= 0 or contact[9] > 0:
                 name = self._names[contact[2]]
-                found.setdefault(name, Touch(body=name, position_m=contact[6]))
+                found.setdefault(name, HullContact(body=name, position_m=contact[6]))
         return tuple(found.values())
 
     def separations(self) -> dict[str, float]:

@@ -14,10 +14,10 @@ from pytest_garl.simulation.system_under_test.reading import NonsenseError
 from pytest_garl.simulation.system_under_test.texts import (
     MESSAGE_CHARS,
     TRACEBACK_CHARS,
-    as_word,
-    middle_cut,
-    name_of,
-    told,
+    class_name,
+    cut_middle,
+    identifier_from,
+    text_from,
 )
 
 _SIMULATION = Path(__file__).parents[1]
@@ -35,7 +35,7 @@ class StepGuard(Protocol):
         """User code has returned or raised."""
 
 
-class BrokenError(Exception):
+class SystemFailedError(Exception):
     """The landing system broke down; carries what the flight records."""
 
     def __init__(self, crash: Crash) -> None:
@@ -43,7 +43,7 @@ class BrokenError(Exception):
 
 
 class SystemCalls:
-    """Calls a landing system under a guard; whatever it raises becomes a BrokenError.
+    """Calls a landing system under a guard; whatever it raises becomes a SystemFailedError.
 
     That holds for its SystemExit too.  KeyboardInterrupt passes, it is the user's, and so does what
     a signal of the machine raises in this package.
@@ -71,14 +71,14 @@ class SystemCalls:
             if _is_asked_to_end(error):
                 raise
             # Not ours to name: whatever a landing system raises is how it fails, and a finding.
-            raise BrokenError(crash_of(error, method)) from error
+            raise SystemFailedError(crash_of(error, method)) from error
         finally:
             if self._guard:
                 self._guard.step_ends()
 
-    def nonsense(self, error: str, message: str, method: str) -> BrokenError:
+    def nonsense(self, error: str, message: str, method: str) -> SystemFailedError:
         """Return what ends the flight where the system made a value that nobody can fly."""
-        return BrokenError(
+        return SystemFailedError(
             Crash(
                 kind="nonsense",
                 error=error,
@@ -110,25 +110,27 @@ def crash_of(error: BaseException, method: str) -> Crash:
 
     A message is cut after 1,000 characters, a traceback in the middle, to 20,000.
     """
-    kind = name_of(type(error))
+    kind = class_name(type(error))
     try:
         frames = traceback.extract_tb(error.__traceback__)
         theirs = [frame for frame in frames if Path(frame.filename).resolve() not in _OURS]
         lines = traceback.format_list(theirs) + traceback.format_exception_only(error)
-        text = middle_cut("".join(lines), TRACEBACK_CHARS)
+        text = cut_middle("".join(lines), TRACEBACK_CHARS)
     except Exception as second:  # noqa: BLE001 (an exception's own code may raise what it likes)
-        theirs, text = [], f"{kind}, whose traceback raised {name_of(type(second))}"
+        theirs, text = [], f"{kind}, whose traceback raised {class_name(type(second))}"
     where = (
-        f"{as_word(Path(theirs[-1].filename).stem)}.{as_word(theirs[-1].name)}" if theirs else ""
+        f"{identifier_from(Path(theirs[-1].filename).stem)}.{identifier_from(theirs[-1].name)}"
+        if theirs
+        else ""
     )
     return Crash(
         kind="raised",
         error=kind,
-        message=told(lambda: str(error), MESSAGE_CHARS, f"<{kind}>, whose str()"),
+        message=text_from(lambda: str(error), MESSAGE_CHARS, f"<{kind}>, whose str()"),
         where=where or method,
         traceback=text,
     )
 
 
 def _name(system: Callable[[], Any]) -> str:
-    return name_of(system) if isinstance(system, type) else "system"
+    return class_name(system) if isinstance(system, type) else "system"

@@ -10,9 +10,9 @@ import math
 from pytest_garl.landing_system import Command, Land, VelocitySetpoint
 
 LAND_BELOW_M = 0.35
-LAND_MPS = 0.4
+LANDING_SPEED_MPS = 0.4
 SLOW_BELOW_M = 1.5
-COLUMN_M = 0.3
+CENTRED_WITHIN_M = 0.3
 """A pilot descends only this near to the line above the marker's centre."""
 
 
@@ -22,13 +22,15 @@ def descend(
     """Return the next command on the way down: at half the speed near the ground, then land."""
     x, y, height = position_m
     if height < LAND_BELOW_M:
-        return Land(speed_mps=LAND_MPS)
+        return Land(speed_mps=LANDING_SPEED_MPS)
     rate = descent_mps if height > SLOW_BELOW_M else 0.5 * descent_mps
-    climb = -rate if math.dist((x, y), marker_m) < COLUMN_M else 0.0
-    return VelocitySetpoint(velocity_mps=(*centring(marker_m, (x, y)), climb))
+    climb = -rate if math.dist((x, y), marker_m) < CENTRED_WITHIN_M else 0.0
+    return VelocitySetpoint(velocity_mps=(*centring_velocity(marker_m, (x, y)), climb))
 
 
-def centring(marker_m: tuple[float, float], at_m: tuple[float, float]) -> tuple[float, float]:
+def centring_velocity(
+    marker_m: tuple[float, float], at_m: tuple[float, float]
+) -> tuple[float, float]:
     """Return the velocity (x, y) towards the line above the marker, at most 1 m/s an axis."""
     vx, vy = (
         max(-1.0, min(1.0, 1.2 * (aim - own))) for aim, own in zip(marker_m, at_m, strict=True)

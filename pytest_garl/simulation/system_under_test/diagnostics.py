@@ -36,38 +36,38 @@ _NUMBER_BYTES, _KEYS_BYTES = 26, 80
 MOST_MARKER_ID = 2**31
 
 
-class Room:
+class DiagnosticsQuota:
     """How much of a landing system's diagnostics the record of one flight still takes."""
 
     def __init__(self) -> None:
         self._left = MOST_BYTES
 
-    def take(self, thoughts: Diagnostics, field: str) -> Diagnostics:
-        """Return what is recorded: only what verdicts need, once a quarter of the room is used."""
+    def shorten(self, diagnostics: Diagnostics, field: str) -> Diagnostics:
+        """Return what is recorded: only what verdicts need, once a quarter of the quota is used."""
         if self._left < (1 - FULL_SHARE) * MOST_BYTES:
-            thoughts = dataclasses.replace(
-                thoughts,
+            diagnostics = dataclasses.replace(
+                diagnostics,
                 detections=tuple(
-                    dataclasses.replace(seen, corners_px=()) for seen in thoughts.detections
+                    dataclasses.replace(seen, corners_px=()) for seen in diagnostics.detections
                 ),
                 planned_path_m=(),
                 note="",
             )
-        self._left -= _bytes_of(thoughts)
+        self._left -= _bytes_of(diagnostics)
         if self._left < 0:
             raise NonsenseError(
                 f"{field}: those of this flight fill more than {MOST_BYTES} bytes; expected fewer "
                 "detections in each frame",
                 "BadDiagnostics",
             )
-        return thoughts
+        return diagnostics
 
 
-def _bytes_of(thoughts: Diagnostics) -> int:
-    corners = sum(2 * len(seen.corners_px) for seen in thoughts.detections)
-    numbers = 3 * len(thoughts.planned_path_m) + 5 * len(thoughts.detections) + corners + 3
-    texts = len(json.dumps(thoughts.phase)) + len(json.dumps(thoughts.note))
-    return _NUMBER_BYTES * numbers + texts + _KEYS_BYTES * (1 + len(thoughts.detections))
+def _bytes_of(diagnostics: Diagnostics) -> int:
+    corners = sum(2 * len(seen.corners_px) for seen in diagnostics.detections)
+    numbers = 3 * len(diagnostics.planned_path_m) + 5 * len(diagnostics.detections) + corners + 3
+    texts = len(json.dumps(diagnostics.phase)) + len(json.dumps(diagnostics.note))
+    return _NUMBER_BYTES * numbers + texts + _KEYS_BYTES * (1 + len(diagnostics.detections))
 
 
 def read_diagnostics(value: Any, field: str) -> Diagnostics | None:

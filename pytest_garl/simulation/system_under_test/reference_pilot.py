@@ -16,7 +16,7 @@ from pytest_garl.landing_system import (
     PositionSetpoint,
     VelocitySetpoint,
 )
-from pytest_garl.simulation.system_under_test.descent import centring, descend
+from pytest_garl.simulation.system_under_test.descent import centring_velocity, descend
 from pytest_garl.simulation.system_under_test.ground_truth import Truth
 
 CRUISE_M = 10.0
@@ -67,7 +67,7 @@ class ReferencePilot:
             last = self._mission.time_limit_s - ABORT_TAKES_S
             if observation.time_s > min(self._arrived_s + PATIENCE_S, last):
                 return Abort()
-            return VelocitySetpoint(velocity_mps=(*centring(goal, (x, y)), 1.0))
+            return VelocitySetpoint(velocity_mps=(*centring_velocity(goal, (x, y)), 1.0))
         return descend(goal, (x, y, z), DESCENT_MPS)
 
     def _blocked(self, truth: Truth, height_m: float) -> bool:

@@ -15,18 +15,18 @@ from pytest_garl.landing_system import (
 )
 from pytest_garl.simulation.physics.vehicle import Thrusts
 from pytest_garl.simulation.system_under_test.calls import (
-    BrokenError,
     StepGuard,
     SystemCalls,
+    SystemFailedError,
     read_airframe,
 )
-from pytest_garl.simulation.system_under_test.diagnostics import Room
+from pytest_garl.simulation.system_under_test.diagnostics import DiagnosticsQuota
 from pytest_garl.simulation.system_under_test.ground_truth import Truth
 from pytest_garl.simulation.system_under_test.validation import read_command, read_thrusts
 
 
 class SystemUnderTest:
-    """A landing system under way; every call may raise BrokenError, which ends the flight.
+    """A landing system under way; every call may raise SystemFailedError, which ends the flight.
 
     ``needs_camera`` and ``observes_truth`` are known once it has started.  ``gave_up`` tells that
     it has answered ``Abort()``.
@@ -35,16 +35,16 @@ class SystemUnderTest:
     def __init__(self, make_system: Callable[[], Any], guard: StepGuard | None) -> None:
         self._make_system = make_system
         self._calls = SystemCalls(make_system, guard)
-        self._room = Room()
+        self._quota = DiagnosticsQuota()
         self.airframe, self._no_airframe = self._read_airframe()
         self.needs_camera, self.observes_truth = True, False
         self.gave_up = False
 
-    def _read_airframe(self) -> tuple[Airframe, BrokenError | None]:
+    def _read_airframe(self) -> tuple[Airframe, SystemFailedError | None]:
         """Return the airframe, or the default and what ends the flight when it has begun."""
         try:
             return self._calls.ask("airframe", lambda: read_airframe(self._make_system)), None
-        except BrokenError as broken:
+        except SystemFailedError as broken:
             return Airframe(), broken
 
     def start(self, mission: Mission) -> None:
@@ -67,7 +67,7 @@ class SystemUnderTest:
     def step(self, observation: Observation) -> Command:
         """Return the checked command for one camera frame."""
         command: Command = self._calls.ask(
-            "step", lambda: read_command(self._system.step(observation), self._room)
+            "step", lambda: read_command(self._system.step(observation), self._quota)
         )
         self.gave_up = isinstance(command, Abort)
         return command
@@ -79,7 +79,7 @@ class SystemUnderTest:
         )
         return thrusts
 
-    def not_finite(self, time_s: float) -> BrokenError:
+    def not_finite_error(self, time_s: float) -> SystemFailedError:
         """Return what ends a flight whose state is no longer finite."""
         return self._calls.nonsense(
             "NotFinite",

@@ -29,7 +29,7 @@ def cut(text: str, limit: int) -> str:
     return _ADDRESS.sub("at 0x...", kept) + note
 
 
-def middle_cut(text: str, limit: int) -> str:
+def cut_middle(text: str, limit: int) -> str:
     """Cut a text in its middle: of a traceback both ends matter."""
     if len(text) <= limit:
         return cut(text, limit)
@@ -38,27 +38,27 @@ def middle_cut(text: str, limit: int) -> str:
     return cut(text[:half], half) + note + cut(text[-half:], half)
 
 
-def name_of(kind: type) -> str:
+def class_name(kind: type) -> str:
     """Return the name of a class as part of a signature: a word of at most 80 characters."""
     name: str = type.__dict__["__name__"].__get__(kind)
-    return as_word(name)
+    return identifier_from(name)
 
 
-def as_word(name: str) -> str:
+def identifier_from(name: str) -> str:
     """Return a name without what no identifier has, cut where a file's name would be too long."""
     return re.sub(r"[^\w.<>-]", "_", cut(name, NAME_CHARS))[:NAME_CHARS]
 
 
-def told(tell: Callable[[], str], limit: int, otherwise: str) -> str:
+def text_from(tell: Callable[[], str], limit: int, otherwise: str) -> str:
     """Return what ``tell`` returns, cut; ``otherwise`` and the error's name if it raises."""
     try:
         return cut(tell(), limit)
     except Exception as error:  # noqa: BLE001 (code of a landing system, which raises what it likes)
-        return f"{otherwise} raised {name_of(type(error))}"
+        return f"{otherwise} raised {class_name(type(error))}"
 
 
 def shown(value: object) -> str:
     """Return the start of a value's repr, whatever the value is and whatever its repr raises."""
-    name = name_of(type(value))
-    text = told(lambda: brief(value), 10 * SHOWN, f"<{name}>, whose repr()")
+    name = class_name(type(value))
+    text = text_from(lambda: brief(value), 10 * SHOWN, f"<{name}>, whose repr()")
     return text if len(text) <= SHOWN else text[: SHOWN - 3] + "..."

@@ -16,7 +16,7 @@ from pytest_garl.landing_system import (
     PositionSetpoint,
     VelocitySetpoint,
 )
-from pytest_garl.simulation.system_under_test.diagnostics import Room, read_diagnostics
+from pytest_garl.simulation.system_under_test.diagnostics import DiagnosticsQuota, read_diagnostics
 from pytest_garl.simulation.system_under_test.reading import NonsenseError, number, numbers, vector
 from pytest_garl.simulation.system_under_test.texts import shown
 
@@ -30,10 +30,10 @@ what it has is no mixer's answer."""
 _Thrusts = tuple[float, float, float, float]
 
 
-def read_command(answer: Any, room: Room) -> Command:
+def read_command(answer: Any, quota: DiagnosticsQuota) -> Command:
     """Return the answer of ``step`` rebuilt from plain floats, or raise NonsenseError.
 
-    Each field is read once, so what comes back later is what was checked.  ``room`` is what the
+    Each field is read once, so what comes back later is what was checked.  ``quota`` is what the
     flight's record still takes of diagnostics.
     """
     kind = next((kind for kind in COMMANDS if isinstance(answer, kind)), None)
@@ -41,30 +41,30 @@ def read_command(answer: Any, room: Room) -> Command:
         names = ", ".join(kind.__name__ for kind in COMMANDS)
         raise NonsenseError(f"step returned {shown(answer)}; expected one of {names}")
     at = f"step returned {kind.__name__} with "
-    thoughts = read_diagnostics(answer.diagnostics, f"{at}diagnostics")
-    if thoughts is not None:
-        thoughts = room.take(thoughts, f"{at}diagnostics")
+    diagnostics = read_diagnostics(answer.diagnostics, f"{at}diagnostics")
+    if diagnostics is not None:
+        diagnostics = quota.shorten(diagnostics, f"{at}diagnostics")
     if kind is Abort:
-        return Abort(diagnostics=thoughts)
+        return Abort(diagnostics=diagnostics)
     if kind is Land:
-        return Land(speed_mps=_speed(answer, at), diagnostics=thoughts)
+        return Land(speed_mps=_speed(answer, at), diagnostics=diagnostics)
     if kind is AttitudeSetpoint:
         return AttitudeSetpoint(
             attitude=_quaternion(answer.attitude, f"{at}attitude"),
             thrust=number(answer.thrust, f"{at}thrust", 0.0, 1.0, "of the maximum"),
-            diagnostics=thoughts,
+            diagnostics=diagnostics,
         )
     if kind is VelocitySetpoint:
         return VelocitySetpoint(
             velocity_mps=vector(answer.velocity_mps, f"{at}velocity_mps", MAX_SPEED_MPS, "m/s"),
             yaw_rad=number(answer.yaw_rad, f"{at}yaw_rad"),
-            diagnostics=thoughts,
+            diagnostics=diagnostics,
         )
     return PositionSetpoint(
         position_m=vector(answer.position_m, f"{at}position_m", WORLD_M, "m"),
         speed_mps=_speed(answer, at),
         yaw_rad=number(answer.yaw_rad, f"{at}yaw_rad"),
-        diagnostics=thoughts,
+        diagnostics=diagnostics,
     )
 
 

@@ -12,7 +12,7 @@ from pytest_garl.simulation.fly import fly
 from pytest_garl.simulation.system_under_test.reference_pilot import ReferencePilot
 from tests.support.situations import MAP
 
-NAMES = [name for name, _ in MAP.object_names]
+NAMES = [name for name, _ in MAP.present_objects]
 
 
 @pytest.mark.sim

@@ -10,9 +10,9 @@ from landing_systems.modules.control_ardupilot import (
 )
 from landing_systems.modules.control_ardupilot.attitude import AttitudeControl
 from landing_systems.modules.control_ardupilot.rotations import (
-    between,
     heading_quaternion,
-    rotated,
+    rotate,
+    rotation_between,
     tilt_and_turn,
     yaw_of,
 )
@@ -29,15 +29,15 @@ def test_a_rotation_splits_into_tilt_and_turn() -> None:
     assert tilt_and_turn(lean) == pytest.approx((0.0, 0.2, 0.0))
     both = heading_quaternion((math.sin(0.2), 0.0, math.cos(0.2)), 0.7)
     assert tilt_and_turn(both) == pytest.approx((0.0, 0.2, 0.7))
-    assert rotated(both, (0.0, 0.0, 1.0)) == pytest.approx((math.sin(0.2), 0.0, math.cos(0.2)))
+    assert rotate(both, (0.0, 0.0, 1.0)) == pytest.approx((math.sin(0.2), 0.0, math.cos(0.2)))
     assert yaw_of(yaw) == pytest.approx(0.7)
-    assert between(both, both) == pytest.approx((0.0, 0.0, 0.0, 1.0))
+    assert rotation_between(both, both) == pytest.approx((0.0, 0.0, 0.0, 1.0))
 
 
 def test_a_turn_goes_the_short_way_round() -> None:
     a = heading_quaternion((0.0, 0.0, 1.0), math.radians(170))
     b = heading_quaternion((0.0, 0.0, 1.0), math.radians(-170))
-    assert tilt_and_turn(between(a, b))[2] == pytest.approx(math.radians(20))
+    assert tilt_and_turn(rotation_between(a, b))[2] == pytest.approx(math.radians(20))
 
 
 def test_the_attitude_target_turns_no_faster_than_it_may() -> None:

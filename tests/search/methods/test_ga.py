@@ -10,7 +10,7 @@ from pytest_garl.search.catalogue import make_method
 from pytest_garl.search.methods.ga import polynomial_mutation
 from tests.search.searches import MAP, bred, plan
 
-NAMES = [name for name, _ in MAP.object_names]
+NAMES = [name for name, _ in MAP.present_objects]
 
 
 def test_every_npc_of_every_scenario_has_a_destination() -> None:

@@ -42,7 +42,7 @@ def _bullet_frame(map: Any, objects: Any, eye: Any, q: Any) -> tuple[Any, Any]:
     try:
         numbers = {}
         bodies = [(b.name, mesh_of(b.parts), b.position_m, b.yaw_rad) for b in map.bodies]
-        for (name, kind), (at, yaw) in zip(map.object_names, objects, strict=True):
+        for (name, kind), (at, yaw) in zip(map.present_objects, objects, strict=True):
             bodies.append((name, mesh_of(OBJECT_TYPES[kind].parts), at, yaw))
         for name, mesh, at, yaw in bodies:
             corners, _ = placed(mesh, at, yaw)

@@ -60,8 +60,8 @@ def test_abort_keeps_the_yaw_that_a_system_with_its_own_control_was_flying() -> 
     control = FlightControl(vehicle_model(Airframe()))
     half = math.sin(0.5), math.cos(0.5)
     turned = Motion((0.0, 0.0, 5.0), (0.0, 0.0, 0.0), (0.0, 0.0, *half), (0.0, 0.0, 0.0))
-    control.take(PositionSetpoint(position_m=(0.0, 0.0, 5.0), yaw_rad=1.0))
-    control.take(Abort())
+    control.remember_yaw(PositionSetpoint(position_m=(0.0, 0.0, 5.0), yaw_rad=1.0))
+    control.remember_yaw(Abort())
     fl, fr, rr, rl = control.thrusts(turned, Abort(), 1 / 240)
     assert fl + rr == pytest.approx(fr + rl)
 

@@ -3,7 +3,7 @@ from __future__ import annotations
 import pytest
 
 from pytest_garl.landing_system import Land, VelocitySetpoint
-from pytest_garl.simulation.system_under_test.descent import centring, descend
+from pytest_garl.simulation.system_under_test.descent import centring_velocity, descend
 
 MARKER_M = (3.0, 1.0)
 
@@ -28,4 +28,4 @@ def test_a_pilot_lands_just_above_the_ground() -> None:
 
 
 def test_the_velocity_towards_the_marker_is_limited() -> None:
-    assert centring(MARKER_M, (-9.0, 30.0)) == (1.0, -1.0)
+    assert centring_velocity(MARKER_M, (-9.0, 30.0)) == (1.0, -1.0)

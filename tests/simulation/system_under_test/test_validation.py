@@ -22,9 +22,9 @@ from pytest_garl import (
     VelocitySetpoint,
 )
 from pytest_garl.simulation.flight_file import load, save
-from pytest_garl.simulation.system_under_test.diagnostics import Room
+from pytest_garl.simulation.system_under_test.diagnostics import DiagnosticsQuota
 from pytest_garl.simulation.system_under_test.validation import read_command, read_thrusts
-from tests.support.answers import HUGE, INF, NAN, flight_of, flight_with, seen, told
+from tests.support.answers import HUGE, INF, NAN, flight_of, flight_with, land_with, seen
 from tests.support.flights import Scripted
 
 
@@ -66,22 +66,30 @@ def to(*position: Any, **more: Any) -> PositionSetpoint:
 WRONG: list[tuple[Callable[[], Any], str, str]] = [
     # Diagnostics.
     (lambda: Land(diagnostics=seen(confidence=NAN)), "BadDiagnostics", "detections[0].confidence"),
-    (lambda: told(planned_path_m=((0.0, NAN, 0.0),)), "BadDiagnostics", "planned_path_m[0]"),
+    (
+        lambda: land_with(planned_path_m=((0.0, NAN, 0.0),)),
+        "BadDiagnostics",
+        "planned_path_m[0]",
+    ),
     (
         lambda: Land(diagnostics=seen(corners_px=((INF, 0.0),))),
         "BadDiagnostics",
         "detections[0].corners_px[0]",
     ),
-    (lambda: told(planned_path_m=((0.0, 1.0),)), "BadDiagnostics", "planned_path_m[0]"),
-    (lambda: told(planned_path_m=itertools.repeat((0.0, 0.0, 0.0))), "BadDiagnostics", "1000"),
-    (lambda: told(detections=5), "BadDiagnostics", "detections = 5"),
-    (lambda: told(detections=(5,)), "BadDiagnostics", "detections[0] = 5"),
+    (lambda: land_with(planned_path_m=((0.0, 1.0),)), "BadDiagnostics", "planned_path_m[0]"),
+    (
+        lambda: land_with(planned_path_m=itertools.repeat((0.0, 0.0, 0.0))),
+        "BadDiagnostics",
+        "1000",
+    ),
+    (lambda: land_with(detections=5), "BadDiagnostics", "detections = 5"),
+    (lambda: land_with(detections=(5,)), "BadDiagnostics", "detections[0] = 5"),
     (lambda: Land(diagnostics=seen(marker_id=INF)), "BadDiagnostics", "marker_id = inf"),
     (lambda: Land(diagnostics=seen(marker_id=2.5)), "BadDiagnostics", "marker_id = 2.5"),
-    (lambda: told(target_m=(0.0, 0.0, NAN)), "BadDiagnostics", "target_m"),
+    (lambda: land_with(target_m=(0.0, 0.0, NAN)), "BadDiagnostics", "target_m"),
     (lambda: Land(diagnostics="low"), "BadDiagnostics", "diagnostics = 'low'"),  # type: ignore[arg-type]
-    (lambda: told(phase=Raises()), "RuntimeError", "no text"),
-    (lambda: told(note=Raises()), "RuntimeError", "no text"),
+    (lambda: land_with(phase=Raises()), "RuntimeError", "no text"),
+    (lambda: land_with(note=Raises()), "RuntimeError", "no text"),
     # Commands.
     (lambda: to(HUGE, 0.0, 2.0), "BadCommand", "position_m"),
     (lambda: to(1e9, 0.0, 2.0), "BadCommand", "expected each from -1000 to 1000 m"),
@@ -140,8 +148,8 @@ HARMLESS: list[Callable[[], Any]] = [
     lambda: PositionSetpoint(position_m=[np.int64(0), np.float16(-16), True]),  # type: ignore[arg-type]
     lambda: VelocitySetpoint(velocity_mps=(Changes(), Changes(), Changes())),
     lambda: AttitudeSetpoint(attitude=(0.0, 0.0, 0.0, 1.04), thrust=np.float32(0.5)),  # type: ignore[arg-type]
-    lambda: told(phase="x" * 10**6, note="\ud800" * 10**6),
-    lambda: told(phase=object(), detections=[], planned_path_m=np.zeros((5, 3))),
+    lambda: land_with(phase="x" * 10**6, note="\ud800" * 10**6),
+    lambda: land_with(phase=object(), detections=[], planned_path_m=np.zeros((5, 3))),
     lambda: Land(diagnostics=seen(marker_id=np.int32(3), corners_px=np.zeros((4, 2)))),
 ]
 
@@ -160,13 +168,15 @@ def test_command_is_rebuilt_from_plain_floats() -> None:
     class Own(PositionSetpoint):
         pass
 
-    command = read_command(Own(position_m=np.zeros(3), speed_mps=Changes(2.0)), Room())  # type: ignore[arg-type]
+    command = read_command(Own(position_m=np.zeros(3), speed_mps=Changes(2.0)), DiagnosticsQuota())  # type: ignore[arg-type]
     assert type(command) is PositionSetpoint
     assert {type(value) for value in (*command.position_m, command.speed_mps)} == {float}
 
 
 def test_quaternion_is_made_one_of_length_one() -> None:
-    command = read_command(AttitudeSetpoint(attitude=(0.0, 0.0, 0.54, 0.9), thrust=0.5), Room())
+    command = read_command(
+        AttitudeSetpoint(attitude=(0.0, 0.0, 0.54, 0.9), thrust=0.5), DiagnosticsQuota()
+    )
     assert isinstance(command, AttitudeSetpoint)
     assert math.hypot(*command.attitude) == pytest.approx(1.0)
 
@@ -208,7 +218,7 @@ def test_physics_without_finite_numbers_end_the_flight_as_a_finding(
 ) -> None:
     from pytest_garl.simulation.physics.world import World
 
-    where, step = World.uav, World.step
+    where, step = World.uav_state, World.step
     steps = itertools.count()
     broken: list[int] = []
 
@@ -221,7 +231,7 @@ def test_physics_without_finite_numbers_end_the_flight_as_a_finding(
         return ((NAN, *position[1:]) if broken else position), *rest
 
     monkeypatch.setattr(World, "step", steps_on)
-    monkeypatch.setattr(World, "uav", nowhere)
+    monkeypatch.setattr(World, "uav_state", nowhere)
     flight = flight_with(lambda: Land())
     assert (flight.crash.kind, flight.crash.error) == ("nonsense", "NotFinite")
     save(flight, tmp_path / "flight.npz")
