@@ -29,7 +29,7 @@ from pytest_garl.adversary.catalogue import policy_spec
 from pytest_garl.landing_system import Camera
 from pytest_garl.scenarios.genes import genome_for
 from pytest_garl.scenarios.maps.map import load_map
-from pytest_garl.search.methods.random import propose
+from pytest_garl.search.methods.random import random_scenarios
 from pytest_garl.simulation.camera.renderer import Renderer
 from pytest_garl.simulation.fly import fly
 from pytest_garl.simulation.physics.npc import Npc
@@ -53,7 +53,7 @@ REST = "rest of the flight"
 def frames() -> None:
     """Print the median time of a frame, clear and with all weather, at both sizes."""
     map = load_map("lawn")
-    scenario = propose(map, genome_for(map), 0, 0, 1)[0]
+    scenario = random_scenarios(map, genome_for(map), 0, 0, 1)[0]
     weather = [key for key, _ in scenario.genes if key.startswith("environment.")][:-1]
     for label, value in (("clear", 0.0), ("all genes 0.15", 0.15), ("all genes 1", 1.0)):
         case = scenario.replace({**dict.fromkeys(weather, value), "environment.sun_position": 0.4})
@@ -77,7 +77,7 @@ def flights() -> None:
     for name in ("court", "lawn"):
         map = load_map(name)
         simulated = wall = 0.0
-        for scenario in propose(map, genome_for(map), 0, 0, 6):
+        for scenario in random_scenarios(map, genome_for(map), 0, 0, 6):
             began = time.perf_counter()
             flight = fly(scenario, OpenCvLandingSystem, policy_spec("waypoint"), map=map)
             wall += time.perf_counter() - began
@@ -135,7 +135,7 @@ def shares(count: int = 4) -> None:
         simulated = 0.0
         for name in ("court", "lawn"):
             map = load_map(name)
-            for scenario in propose(map, genome_for(map), 0, 0, count):
+            for scenario in random_scenarios(map, genome_for(map), 0, 0, count):
                 flown = spent.fly(
                     functools.partial(fly, scenario, system, policy_spec("dqn-paper"), map=map)
                 )

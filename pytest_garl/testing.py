@@ -23,7 +23,7 @@ from pytest_garl.scenarios.genes import genome_for
 from pytest_garl.scenarios.maps.map import Map, load_map
 from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.scenarios.validity import repair
-from pytest_garl.search.methods.random import propose
+from pytest_garl.search.methods.random import random_scenarios
 from pytest_garl.simulation.flight import Flight
 from pytest_garl.simulation.flight_file import divergence_time_s
 from pytest_garl.simulation.fly import fly
@@ -249,7 +249,7 @@ def _scenarios(map: Map) -> tuple[Scenario, Scenario]:
     genome = genome_for(map)
     names = [name for name, _ in map.present_objects]
     calm = repair(decode(genome.nominal, genome, map=map.name, seed=1), map)
-    drawn = propose(map, genome, 1, 0, 1)[0]
+    drawn = random_scenarios(map, genome, 1, 0, 1)[0]
     return calm.without(*names), drawn.without(*names)
 
 

@@ -30,7 +30,7 @@ from pytest_garl.scenarios.genes import genome_for
 from pytest_garl.scenarios.maps.map import load_map
 from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.search.catalogue import default_policy, find_method
-from pytest_garl.search.method import Flown, Method, SearchPlan
+from pytest_garl.search.method import FlownScenario, Method, SearchPlan
 from pytest_garl.search.methods.garl import Garl, GarlParameters
 from pytest_garl.simulation.fly import fly
 from pytest_garl.verdicts.paper_metrics import mean_distance, top_k
@@ -108,7 +108,9 @@ def search(key: Key, pool: Executor) -> dict[str, Any]:
     for _ in range(BUDGET // POPULATION):
         scenarios = method.ask()
         results = list(pool.map(flown, scenarios))
-        method.tell([Flown(scenario=s, result=r) for s, r in zip(scenarios, results, strict=True)])
+        method.tell(
+            [FlownScenario(scenario=s, result=r) for s, r in zip(scenarios, results, strict=True)]
+        )
         verdicts += [result.verdict for result in results]
         chromosomes += [plan.genome.normalise(encode(each, plan.genome)) for each in scenarios]
     return {

@@ -20,7 +20,7 @@ from pytest_garl.adversary.catalogue import policy_spec
 from pytest_garl.scenarios.genes import WEATHER, genome_for
 from pytest_garl.scenarios.maps.map import load_map
 from pytest_garl.scenarios.scenario import Scenario
-from pytest_garl.search.methods.random import propose
+from pytest_garl.search.methods.random import random_scenarios
 from pytest_garl.simulation.npc_policy import PolicySpec
 from studies.oracle import oracle_spec
 from studies.table import Key, ResultTable, Row, run_study, share
@@ -73,7 +73,10 @@ def scenarios(map: str, chunk: int) -> list[Scenario]:
     """Return a chunk's scenarios: random, repaired, in clear weather."""
     place = load_map(map)
     clear = {f"environment.{name}": 0.0 for name, _ in WEATHER}
-    return [each.replace(clear) for each in propose(place, genome_for(place), SEED, chunk, CHUNK)]
+    return [
+        each.replace(clear)
+        for each in random_scenarios(place, genome_for(place), SEED, chunk, CHUNK)
+    ]
 
 
 def fly_one(job: tuple[Scenario, str, str]) -> tuple[str, str, bool]:

@@ -24,7 +24,7 @@ from pytest_garl.scenarios.genes import genome_for
 from pytest_garl.scenarios.maps.map import Map, load_map
 from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.scenarios.validity import UAV_CLEARANCE_M, repair
-from pytest_garl.search.methods.random import propose
+from pytest_garl.search.methods.random import random_scenarios
 from pytest_garl.simulation.fly import fly
 
 SEED = 1
@@ -51,7 +51,7 @@ def scenario_of(task: Task) -> tuple[Map, Scenario]:
     who, name, index = task
     map = load_map(name)
     if who == "pilot":
-        return map, propose(map, genome_for(map, weather="full"), SEED, index, 1)[0]
+        return map, random_scenarios(map, genome_for(map, weather="full"), SEED, index, 1)[0]
     rng = np.random.default_rng([SEED, index])
     map = dataclasses.replace(map, objects=())
     values = genome_for(map).nominal

@@ -45,7 +45,7 @@ from pytest_garl.adversary.training.uav_models import (
 from pytest_garl.scenarios.genes import WEATHER, genome_for
 from pytest_garl.scenarios.maps.map import Map, load_map
 from pytest_garl.scenarios.scenario import Scenario
-from pytest_garl.search.methods.random import propose
+from pytest_garl.search.methods.random import random_scenarios
 from pytest_garl.simulation.npc_policy import Move, PolicySpec, Situation
 from studies.adversary import CHUNK, MAPS, SYSTEMS
 from studies.table import Key, ResultTable, Row, run_study, share
@@ -184,7 +184,7 @@ def scenarios(name: str, count: int, chunk: int) -> list[tuple[Scenario, Map]]:
         kinds = [KINDS[int(kind)] for kind in rng.integers(3, size=count)]
         counts = tuple((kind, kinds.count(kind)) for kind in dict.fromkeys(kinds))
         map = dataclasses.replace(load_map(name), objects=counts)
-        scenario = propose(map, genome_for(map), SEED + chunk, index, 1)[0]
+        scenario = random_scenarios(map, genome_for(map), SEED + chunk, index, 1)[0]
         found.append((scenario.replace(clear), map))
     return found
 

@@ -20,7 +20,7 @@ from pytest_garl.landing_system import Camera
 from pytest_garl.scenarios.genes import WEATHER, genome_for
 from pytest_garl.scenarios.maps.map import Map, load_map
 from pytest_garl.scenarios.scenario import Scenario
-from pytest_garl.search.methods.random import propose
+from pytest_garl.search.methods.random import random_scenarios
 from pytest_garl.simulation.camera.renderer import Renderer
 from pytest_garl.simulation.flight import Flight
 from pytest_garl.simulation.fly import fly
@@ -37,7 +37,7 @@ SEED = 99
 def first_hit(map: Map, policy: str) -> tuple[Scenario, Flight] | None:
     """Return the first of the scenarios in which the object is hit, and its flight."""
     clear = {f"environment.{name}": 0.0 for name, _ in WEATHER}
-    for drawn in propose(map, genome_for(map), SEED, 0, TRIES):
+    for drawn in random_scenarios(map, genome_for(map), SEED, 0, TRIES):
         scenario = drawn.replace(clear)
         flight = fly(scenario, OpenCvLandingSystem, policy_spec(policy), map=map)
         if flight.outcome == "collision" and flight.contacts[-1].body_class == "dynamic":

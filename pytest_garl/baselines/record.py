@@ -24,7 +24,7 @@ from pytest_garl.scenarios.files import parse_scenario
 from pytest_garl.scenarios.genes import WeatherRange, genome_for
 from pytest_garl.scenarios.maps.map import Map, load_map
 from pytest_garl.scenarios.scenario import Scenario
-from pytest_garl.search.methods.random import propose
+from pytest_garl.search.methods.random import random_scenarios
 from pytest_garl.simulation.npc_policy import PolicySpec
 from pytest_garl.verdicts.verdict import Limits
 
@@ -48,7 +48,7 @@ class BaselineSpec:
     def scenarios(self, map: Map) -> Sequence[Scenario]:
         """Return the random scenarios on a map: the first generation of random search."""
         genome = genome_for(map, weather=self.weather)
-        return propose(map, genome, self.seed, 0, self.count)
+        return random_scenarios(map, genome, self.seed, 0, self.count)
 
 
 def fly_baseline(

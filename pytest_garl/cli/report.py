@@ -11,7 +11,7 @@ import click
 from pytest_garl.cli.cases import FOLDER
 from pytest_garl.files.atomic import write_text_atomically
 from pytest_garl.regressions.corpus import Corpus
-from pytest_garl.reports.run_report import report_of
+from pytest_garl.reports.run_report import run_report_as_json
 
 
 @click.command()
@@ -34,7 +34,7 @@ def report(ledger: Path, as_json: bool, out: Path | None, folder: Path) -> None:
 
     Use it while the run goes on, or after a run was killed.
     """
-    found = report_of(ledger, Corpus(folder, (Path.cwd() / "scenarios" / "maps",)))
+    found = run_report_as_json(ledger, Corpus(folder, (Path.cwd() / "scenarios" / "maps",)))
     text = json.dumps(found, indent=2) + "\n" if as_json else _text(found)
     if out is None:
         click.echo(text, nl=False)

@@ -12,7 +12,7 @@ KEY_DIGITS = 16
 """Hexadecimal digits of a search's key: 64 bits, so that two searches never have the same."""
 NAME_DIGITS = 8
 """Digits of the key that a record's name repeats, to be short."""
-FIRST = Slot(generation=0, index=0)
+FIRST_SLOT = Slot(generation=0, index=0)
 """The only slot of a search that flies once."""
 
 
@@ -27,7 +27,7 @@ class FlightId:
 
     search: str
     map: str
-    slot: Slot = FIRST
+    slot: Slot = FIRST_SLOT
 
     @property
     def key(self) -> tuple[str, int, int]:

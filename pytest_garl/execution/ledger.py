@@ -140,17 +140,20 @@ class Ledger:
         return rows.fetchall()
 
     def add_slots(
-        self, search: str, generation: int, scenarios: Mapping[int, str], after: str = ""
+        self, search: str, generation: int, scenarios: Mapping[int, str], earlier_exits: str = ""
     ) -> None:
         """Add a generation's slots; raise LedgerError if they are there with other scenarios.
 
-        ``after`` says how earlier flights of the slots ended, as in a Claim.
+        ``earlier_exits`` says how earlier flights of the slots ended, as in a Claim.
         """
         with self.database.transaction():
             self.database.executemany(
                 "INSERT OR IGNORE INTO slot (search, generation, slot, scenario, after) "
                 "VALUES (?, ?, ?, ?, ?)",
-                [(search, generation, slot, text, after) for slot, text in scenarios.items()],
+                [
+                    (search, generation, slot, text, earlier_exits)
+                    for slot, text in scenarios.items()
+                ],
             )
             rows = self.database.execute(
                 "SELECT slot, scenario FROM slot WHERE search = ? AND generation = ?",
@@ -192,11 +195,13 @@ class Ledger:
             )
 
     def add_flight(
-        self, flight: FlightId, system: str, job: str, scenario: str, after: str = ""
+        self, flight: FlightId, system: str, job: str, scenario: str, earlier_exits: str = ""
     ) -> None:
         """Add one flight on demand, as a search of its own, unless it is there already."""
         self.add_search(flight.search, system, flight.map, 1, job, "on_demand")
-        self.add_slots(flight.search, flight.slot.generation, {flight.slot.index: scenario}, after)
+        self.add_slots(
+            flight.search, flight.slot.generation, {flight.slot.index: scenario}, earlier_exits
+        )
 
     def completed(self, flight: FlightId, folder: Path) -> CompletedFlight | None:
         """Return a flight whose record is in a folder, or None if it has no result."""

@@ -24,7 +24,7 @@ class SearchProgress:
     system: str
     map: str
     flown: int
-    all: int
+    total: int
     generation: int
 
 
@@ -64,7 +64,7 @@ class LedgerQueries:
             "GROUP BY search.id ORDER BY system, map"
         )
         return [
-            SearchProgress(system=system, map=map, flown=flown, all=wanted, generation=generation)
+            SearchProgress(system=system, map=map, flown=flown, total=wanted, generation=generation)
             for system, map, flown, wanted, generation in rows
         ]
 

@@ -29,14 +29,14 @@ pool that watches it.  A process that nobody watches may be another with the sam
 class Claim:
     """One slot that the process ``pid`` flies, or has another process fly.
 
-    ``after`` says how earlier flights of the slot ended their workers, such as "hung" or
+    ``earlier_exits`` says how earlier flights of the slot ended their workers, such as "hung" or
     "hung killed"; if it is set, no other slot flies meanwhile.  ``attempt`` counts from 1.
     """
 
     flight: FlightId
     scenario: str
     job: str
-    after: str
+    earlier_exits: str
     attempt: int
     pid: int
 
@@ -91,7 +91,7 @@ class WorkQueue:
             flight=FlightId(search=row[0], map=map, slot=Slot(generation=row[1], index=row[2])),
             scenario=row[3],
             job=job,
-            after=row[4],
+            earlier_exits=row[4],
             attempt=row[5] + 1,
             pid=self._pid,
         )
@@ -148,7 +148,7 @@ class WorkQueue:
             flight=FlightId(search=row[0], map=row[7], slot=Slot(generation=row[1], index=row[2])),
             scenario=row[3],
             job=row[4],
-            after=row[5],
+            earlier_exits=row[5],
             attempt=row[6],
             pid=pid,
         )
@@ -163,17 +163,17 @@ class WorkQueue:
 
     def give_back(self, claim: Claim) -> None:
         """Give back one slot, as if it had not been claimed."""
-        self._hand_out(claim, claim.attempt - 1, claim.after)
+        self._hand_out(claim, claim.attempt - 1, claim.earlier_exits)
 
-    def fly_alone(self, claim: Claim, after: str) -> None:
-        """Have a slot flown once more, alone; ``after`` says how its flights ended."""
-        self._hand_out(claim, claim.attempt, after)
+    def fly_alone(self, claim: Claim, earlier_exits: str) -> None:
+        """Have a slot flown once more, alone; ``earlier_exits`` says how its flights ended."""
+        self._hand_out(claim, claim.attempt, earlier_exits)
 
-    def _hand_out(self, claim: Claim, attempts: int, after: str) -> None:
+    def _hand_out(self, claim: Claim, attempts: int, earlier_exits: str) -> None:
         self._database.execute(
             "UPDATE slot SET state = 'waiting', pid = NULL, lease = NULL, attempts = ?, after = ? "
             "WHERE search = ? AND generation = ? AND slot = ? AND state = 'claimed' AND pid = ?",
-            (attempts, after, *claim.flight.key, claim.pid),
+            (attempts, earlier_exits, *claim.flight.key, claim.pid),
         )
 
     def reset(self) -> None:

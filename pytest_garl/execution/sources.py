@@ -24,7 +24,7 @@ _HERE = Path(__file__).resolve().parents[1]
 
 def sources_sha256(system: Any, files: Mapping[str, Path] | None = None) -> str:
     """Hash the project's modules that a landing system imports, and data files."""
-    return combined_sha256(sources_of(system, files))
+    return combined_sha256(source_hashes(system, files))
 
 
 def combined_sha256(sources: Iterable[tuple[str, str]]) -> str:
@@ -35,7 +35,9 @@ def combined_sha256(sources: Iterable[tuple[str, str]]) -> str:
     return digest.hexdigest()
 
 
-def sources_of(thing: Any, files: Mapping[str, Path] | None = None) -> tuple[tuple[str, str], ...]:
+def source_hashes(
+    thing: Any, files: Mapping[str, Path] | None = None
+) -> tuple[tuple[str, str], ...]:
     """Return the sources of a class or function: names of files with their hashes.
 
     The name of a module's file is relative to the folder from which it is imported.

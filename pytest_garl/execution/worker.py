@@ -122,8 +122,8 @@ class Worker:
         job, scenario = parse_job(claim.job), parse_scenario(claim.scenario)
         if not job.system.module.startswith(_TRUSTED):
             self._system = job.system.name
-        limit_s = job.timeout_s * (RETRY_LIMIT_FACTOR if claim.after else 1.0)
-        if "failed" in claim.after:
+        limit_s = job.timeout_s * (RETRY_LIMIT_FACTOR if claim.earlier_exits else 1.0)
+        if "failed" in claim.earlier_exits:
             self._prove_simulator(claim)
         try:
             self._monitor.flight_begins(limit_s)

@@ -49,7 +49,7 @@ class WorkerExit:
 
 def retry_or_record(queue: WorkQueue, claim: Claim, ended: WorkerExit) -> None:
     """Hand a worker's slot out once more, or record a violation or an inconclusive flight."""
-    earlier = claim.after.split()
+    earlier = claim.earlier_exits.split()
     if ended.cause == "died" or ended.cause in earlier or len(earlier) + 1 == ATTEMPTS:
         repeated = ended.cause in earlier
         inconclusive = ended.cause != "died" and not repeated

@@ -45,7 +45,7 @@ class RunProgress:
     @property
     def total(self) -> float:
         """How many flights of searches and beside them are expected."""
-        needed = max(self.selected, sum(each.all for each in self.searches))
+        needed = max(self.selected, sum(each.total for each in self.searches))
         return needed + max(self.expected_after, self.flown_after)
 
     @property
@@ -59,10 +59,10 @@ class RunProgress:
             phrases.append(f"{duration(left_s)} left")
         if self.kinds:
             phrases.append(" ".join(f"{kind}:{count}" for kind, count in self.kinds.items()))
-        flying = next((each for each in self.searches if each.flown < each.all), None)
+        flying = next((each for each in self.searches if each.flown < each.total), None)
         if flying:
             where = f"{flying.system.split(':')[-1]} on {flying.map}"
-            phrases.append(f"{where} g{flying.generation:02d} {flying.flown}/{flying.all}")
+            phrases.append(f"{where} g{flying.generation:02d} {flying.flown}/{flying.total}")
         elif self.left_s is not None:
             phrases.append("confirming and shrinking")
         if self.flown and self.seconds > 0:

@@ -47,7 +47,7 @@ def may_save(run: Run, session: pytest.Session) -> bool:
     if options.repeat or not options.shrink:
         return False
     # After a second Ctrl-C pytest still has the status with which it began.
-    return all(each.flown >= each.all for each in run.ledger.queries.progress())
+    return all(each.flown >= each.total for each in run.ledger.queries.progress())
 
 
 def save_cases(run: Run, session: pytest.Session) -> None:

@@ -17,7 +17,7 @@ from pytest_garl.execution.job import FlightJob, parse_job
 from pytest_garl.execution.ledger import Ledger
 from pytest_garl.execution.reference import BUILT_IN, Reference, reference_to
 from pytest_garl.execution.slot import Slot
-from pytest_garl.execution.sources import combined_sha256, data_files, sources_of
+from pytest_garl.execution.sources import combined_sha256, data_files, source_hashes
 from pytest_garl.plugin.options import Options
 from pytest_garl.plugin.target import Target
 from pytest_garl.scenarios.files import load
@@ -82,7 +82,7 @@ class Searches:
     def job(self, target: Target, npcs: PolicySpec) -> FlightJob:
         """Return what a worker must know to fly a target."""
         sources = self.sources(target)
-        simulator = sources_of(self.simulator.load()) if self.simulator != BUILT_IN else ()
+        simulator = source_hashes(self.simulator.load()) if self.simulator != BUILT_IN else ()
         return FlightJob.for_system(
             reference_to(target.system),
             load_map(target.map, self.options.map_folders),
@@ -98,7 +98,7 @@ class Searches:
 
     def sources(self, target: Target) -> tuple[tuple[str, str], ...]:
         """Return name and hash of everything that a target's landing system consists of."""
-        return sources_of(target.system, data_files(target.files, self.options.root))
+        return source_hashes(target.system, data_files(target.files, self.options.root))
 
     def _register(self, search: str, wanted: Mapping[Slot, Target], npcs: PolicySpec) -> None:
         target = next(iter(wanted.values()))

@@ -23,7 +23,7 @@ from pytest_garl.execution.stored_ledger import check_stored, stored_flight_s
 from pytest_garl.plugin.keys import RUN, is_xdist_worker
 from pytest_garl.plugin.options import Options
 from pytest_garl.plugin.run import FLIGHT_S, Run
-from pytest_garl.reports.run_report import BEGAN, utc
+from pytest_garl.reports.run_report import BEGAN, utc_now
 
 EARLIER_FLIGHT_S = "seconds_per_flight"
 """The ledger's fact: wall time of a flight in the run before, for the forecast."""
@@ -74,7 +74,7 @@ def _open_ledger(config: pytest.Config, options: Options) -> tuple[Ledger, TextI
         check_stored(ledger)
     else:
         ledger = Ledger.create(path, _facts(options))
-        ledger.note_fact(BEGAN, utc())
+        ledger.note_fact(BEGAN, utc_now())
     if earlier_s:
         ledger.note_fact(EARLIER_FLIGHT_S, earlier_s)
     return ledger, lock

@@ -14,7 +14,7 @@ from pytest_garl.plugin.search_table import repeat_kind_command, search_table
 from pytest_garl.plugin.session_status import notes
 from pytest_garl.plugin.tally import Tally
 from pytest_garl.plugin.terminal_text import width_of, wrapped
-from pytest_garl.reports.run_report import ENDED, USER_FAILURES, utc
+from pytest_garl.reports.run_report import ENDED, USER_FAILURES, utc_now
 from pytest_garl.reports.search_summary import SearchSummary, legend
 
 _UNDECIDED = "Skipped: not decided:"
@@ -75,7 +75,7 @@ def _write_searches(reporter: Any, run: Run, tally: Tally) -> None:
     if run.options.searches_or_repeats:
         failures = [dataclasses.asdict(each) for each in tally.user_failures]
         run.ledger.note_fact(USER_FAILURES, failures)
-        run.ledger.note_fact(ENDED, utc())
+        run.ledger.note_fact(ENDED, utc_now())
     config = reporter.config
     commands = [
         [repeat_kind_command(search, kind, config) for kind in search.kinds] for search in searches
@@ -94,7 +94,7 @@ def _lines_about(searches: list[SearchSummary], run: Run, reporter: Any) -> list
     types = legend(kind for search in searches for kind in search.kinds)
     lines += [wrapped(text, width) for text in (types, _costs(run)) if text]
     progress = run.ledger.queries.progress()
-    done, total = sum(each.flown for each in progress), sum(each.all for each in progress)
+    done, total = sum(each.flown for each in progress), sum(each.total for each in progress)
     if done < total and not run.options.repeat:
         lines.append(
             f"not finished: {done} of {total} flown; the same command with --garl-resume goes on"

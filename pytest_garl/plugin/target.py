@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from pytest_garl.execution.flight_id import FIRST, FlightId, search_key
+from pytest_garl.execution.flight_id import FIRST_SLOT, FlightId, search_key
 from pytest_garl.execution.reference import reference_to
 from pytest_garl.execution.slot import Slot
 
@@ -27,7 +27,7 @@ class Target:
     limits: Limits
     map: str = ""
     """Empty for a saved case whose file cannot be read."""
-    slot: Slot = FIRST
+    slot: Slot = FIRST_SLOT
     deterministic: bool = True
     """Whether the marker says that the system repeats its flights exactly."""
     files: tuple[str, ...] = ()

@@ -31,12 +31,12 @@ BEGAN, ENDED = "began", "ended"
 _RUN = ("seed", "budget", "method", "population", "weather", "npcs", "python")
 
 
-def utc() -> str:
+def utc_now() -> str:
     """Return the time in the form of the facts."""
     return datetime.now(UTC).isoformat(timespec="seconds")
 
 
-def report_of(path: Path, corpus: Corpus) -> dict[str, Any]:
+def run_report_as_json(path: Path, corpus: Corpus) -> dict[str, Any]:
     """Return the run in a ledger, finished or not, with the saved cases of its systems.
 
     Raises LedgerError if there is no ledger.
@@ -50,7 +50,7 @@ def report_of(path: Path, corpus: Corpus) -> dict[str, Any]:
         progress = ledger.queries.progress()
         wanted: Counter[tuple[str, str]] = Counter()
         for each in progress:
-            wanted[each.system, each.map] += each.all
+            wanted[each.system, each.map] += each.total
         saved = _cases(corpus, {summary.system for summary in summaries})
         searches = [_search(each, wanted[each.system, each.map], saved, path) for each in summaries]
         meters = ledger.queries.meters()
@@ -60,7 +60,7 @@ def report_of(path: Path, corpus: Corpus) -> dict[str, Any]:
             "pytest_garl": ledger.fact("version") or version("pytest-garl"),
             "ledger": str(path),
             "complete": ledger.fact(ENDED) is not None
-            and all(each.flown == each.all for each in progress),
+            and all(each.flown == each.total for each in progress),
             "run": {key: ledger.fact(key) for key in _RUN},
             "results_sha256": ledger.queries.result_hash(),
             "time": {
@@ -70,7 +70,7 @@ def report_of(path: Path, corpus: Corpus) -> dict[str, Any]:
                 "idle_s": meters.get("idle_s", 0.0),
             },
             "flights": {
-                "wanted": sum(each.all for each in progress),
+                "wanted": sum(each.total for each in progress),
                 "flown": sum(each.flown for each in progress),
                 "flown_again": int(meters.get("retried", 0)),
                 "beside": int(meters.get("on_demand", 0)),

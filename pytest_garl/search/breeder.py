@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 
 from pytest_garl.execution.ledger import Ledger
 from pytest_garl.scenarios.files import dump_scenario, parse_scenario
-from pytest_garl.search.method import Flown, Method
+from pytest_garl.search.method import FlownScenario, Method
 
 
 class Breeder:
@@ -50,7 +50,7 @@ class Breeder:
         if not self._method.learns:
             return
         flown = [
-            Flown(scenario=parse_scenario(text), result=result)
+            FlownScenario(scenario=parse_scenario(text), result=result)
             for text, result in self._ledger.generation(self._search, generation)
             if result is not None
         ]

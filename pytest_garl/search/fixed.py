@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 
 from pytest_garl.execution.slot import Slot
 from pytest_garl.scenarios.scenario import Scenario
-from pytest_garl.search.method import Flown
+from pytest_garl.search.method import FlownScenario
 
 
 class FixedScenarios:
@@ -25,6 +25,6 @@ class FixedScenarios:
         slots = [Slot(generation=self._generation, index=index) for index in range(size)]
         return [self._scenarios.get(slot, first) for slot in slots]
 
-    def tell(self, flown: Sequence[Flown]) -> Sequence[tuple[float, ...]]:
+    def tell(self, flown: Sequence[FlownScenario]) -> Sequence[tuple[float, ...]]:
         """Learn nothing."""
         return ()

@@ -23,7 +23,7 @@ class SearchPlan:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Flown:
+class FlownScenario:
     """A scenario with the result of its flight."""
 
     scenario: Scenario
@@ -44,7 +44,7 @@ class Method(Protocol):
     def ask(self) -> Sequence[Scenario]:
         """Return the next generation: ``population`` scenarios, all of them new."""
 
-    def tell(self, flown: Sequence[Flown]) -> Sequence[tuple[float, ...]]:
+    def tell(self, flown: Sequence[FlownScenario]) -> Sequence[tuple[float, ...]]:
         """Learn from the generation; return each flight's objectives, for the ledger."""
 
 

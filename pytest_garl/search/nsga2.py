@@ -16,11 +16,11 @@ from pymoo.operators.survival.rank_and_crowding import RankAndCrowding
 from pytest_garl.scenarios.chromosome import decode, encode
 from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.scenarios.validity import repair
-from pytest_garl.search.method import Flown, SearchPlan
+from pytest_garl.search.method import FlownScenario, SearchPlan
 from pytest_garl.search.operators import Matrix, nuclear_gene_crossover
 from pytest_garl.search.seeding import seed_sequence
 
-Objectives = Callable[[Matrix, Sequence[Flown]], Matrix]
+Objectives = Callable[[Matrix, Sequence[FlownScenario]], Matrix]
 """From normalised chromosomes (k, d) and their flights to objectives (k, m), all maximised."""
 Mutation = Callable[[Matrix, Matrix, Matrix, np.random.Generator], Matrix]
 """From offspring (n, d), lower and upper bounds (d,) and a generator to mutated offspring."""
@@ -43,7 +43,7 @@ class Nsga2:
         variation, survival = seed_sequence(name, plan.map.name, plan.seed).spawn(2)
         self._rng = np.random.default_rng(variation)
         self._seeds: dict[bytes, int] = {}
-        self._flown: dict[bytes, Flown] = {}
+        self._flown: dict[bytes, FlownScenario] = {}
         self._generation: Any = None
         genome = plan.genome
         first = np.array(
@@ -76,7 +76,7 @@ class Nsga2:
             for row in self._generation.get("X")
         ]
 
-    def tell(self, flown: Sequence[Flown]) -> Sequence[tuple[float, ...]]:
+    def tell(self, flown: Sequence[FlownScenario]) -> Sequence[tuple[float, ...]]:
         """Learn from the generation: the best of parents and offspring survive."""
         rows = self._generation.get("X")
         for row, item in zip(rows, flown, strict=True):

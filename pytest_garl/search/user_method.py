@@ -12,7 +12,7 @@ from typing import NoReturn, TypeVar
 
 from pytest_garl.errors import GarlError
 from pytest_garl.scenarios.scenario import Scenario
-from pytest_garl.search.method import Flown, Method, SearchPlan
+from pytest_garl.search.method import FlownScenario, Method, SearchPlan
 
 T = TypeVar("T")
 
@@ -43,7 +43,7 @@ class UserMethod:
             self._refuse("ask()", found, f"a list of {self._population} pytest_garl scenarios")
         return found
 
-    def tell(self, flown: Sequence[Flown]) -> Sequence[tuple[float, ...]]:
+    def tell(self, flown: Sequence[FlownScenario]) -> Sequence[tuple[float, ...]]:
         """Let the method learn; return its objectives."""
         told = self._call("tell()", lambda: self._method.tell(flown))
         try:

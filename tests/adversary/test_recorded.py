@@ -13,7 +13,7 @@ from pytest_garl.scenarios.chromosome import decode
 from pytest_garl.scenarios.genes import genome_for
 from pytest_garl.scenarios.maps.map import load_map
 from pytest_garl.scenarios.placement import start_genes
-from pytest_garl.search.methods.random import propose
+from pytest_garl.search.methods.random import random_scenarios
 from pytest_garl.simulation.fly import fly
 from pytest_garl.simulation.npc_policy import DECISION_STEP_S, Situation
 from pytest_garl.simulation.physics.npc import Npc
@@ -100,7 +100,7 @@ def test_the_way_out_repeats() -> None:
     assert walked(((0.6, 0.8),), (-1.0, 0.0)) == walked(((0.6, 0.8),), (-1.0, 0.0))
 
 
-SCENARIO = propose(LAWN, genome_for(LAWN), 5, 0, 1)[0]
+SCENARIO = random_scenarios(LAWN, genome_for(LAWN), 5, 0, 1)[0]
 
 
 @pytest.mark.sim

@@ -21,7 +21,7 @@ from pytest_garl.messages import printable
 from pytest_garl.scenarios.extra_genes import WIND
 from pytest_garl.scenarios.genes import genome_for, with_destinations
 from pytest_garl.scenarios.maps.map import load_map
-from pytest_garl.search.methods.random import propose
+from pytest_garl.search.methods.random import random_scenarios
 from tests.baselines.samples import COURT, DOG, LANDED, LAWN, baseline, baseline_set
 
 
@@ -54,14 +54,14 @@ def test_any_signature_survives_the_file(signature: str, name: str) -> None:
 
 
 def test_the_file_keeps_extra_genes() -> None:
-    scenarios = propose(LAWN, genome_for(LAWN, extras=(WIND,)), 0, 0, 2)
+    scenarios = random_scenarios(LAWN, genome_for(LAWN, extras=(WIND,)), 0, 0, 2)
     samples = tuple(BaselineFlight(scenario=each, summary=LANDED) for each in scenarios)
     windy = baseline(dataclasses.replace(baseline_set(), flights=samples))
     assert parse_baseline(dump_baseline(windy), load_map) == windy
 
 
 def test_the_file_keeps_destinations() -> None:
-    scenarios = propose(LAWN, with_destinations(genome_for(LAWN)), 0, 0, 2)
+    scenarios = random_scenarios(LAWN, with_destinations(genome_for(LAWN)), 0, 0, 2)
     samples = tuple(BaselineFlight(scenario=each, summary=LANDED) for each in scenarios)
     bound = baseline(dataclasses.replace(baseline_set(), flights=samples))
     assert parse_baseline(dump_baseline(bound), load_map) == bound

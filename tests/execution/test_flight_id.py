@@ -6,7 +6,7 @@ from pathlib import Path
 from hypothesis import given
 from hypothesis import strategies as st
 
-from pytest_garl.execution.flight_id import FIRST, FlightId, search_key
+from pytest_garl.execution.flight_id import FIRST_SLOT, FlightId, search_key
 from pytest_garl.execution.slot import Slot
 
 
@@ -23,7 +23,7 @@ def test_record_is_named_after_search_and_slot() -> None:
 
 def test_search_of_one_flight_has_the_first_slot() -> None:
     flight = FlightId(search=search_key("once"), map="lawn")
-    assert flight.slot == FIRST == Slot(generation=0, index=0)
+    assert flight.slot == FIRST_SLOT == Slot(generation=0, index=0)
 
 
 @given(st.lists(st.tuples(st.integers(0, 200), st.integers(0, 99)), unique=True, max_size=20))

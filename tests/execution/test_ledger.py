@@ -33,7 +33,7 @@ def test_resumed_ledger_gives_back_slots_in_flight(tmp_path: Path) -> None:
     assert result_of(ledger, FlightId(search="s", map="court")) == flight_result()
     again = ledger.queue.claim()
     assert again is not None
-    assert (again.flight.slot.index, again.after) == (1, "")
+    assert (again.flight.slot.index, again.earlier_exits) == (1, "")
 
 
 def test_new_run_keeps_the_previous_ledger(tmp_path: Path) -> None:

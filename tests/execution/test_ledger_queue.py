@@ -78,7 +78,7 @@ def test_no_slot_flies_beside_a_repeated_one(tmp_path: Path) -> None:
     ledger.queue.fly_alone(first, "died")
     again = ledger.queue.claim()
     assert again is not None
-    assert (again.flight.slot.index, again.after, again.attempt) == (
+    assert (again.flight.slot.index, again.earlier_exits, again.attempt) == (
         first.flight.slot.index,
         "died",
         2,

@@ -11,7 +11,7 @@ from typing import Any
 
 import pytest
 
-from pytest_garl.execution.sources import data_files, sources_of, sources_sha256
+from pytest_garl.execution.sources import data_files, source_hashes, sources_sha256
 
 _NUMBERS = itertools.count()
 STACK = {
@@ -60,7 +60,7 @@ def lander(name: str) -> Any:
 
 def test_sources_follow_imports_anywhere_in_a_module(make: Make) -> None:
     _, name = make()
-    assert {file for file, _ in sources_of(lander(name))} == {f"{name}/{file}" for file in OWN}
+    assert {file for file, _ in source_hashes(lander(name))} == {f"{name}/{file}" for file in OWN}
     assert f"{name}.late" not in sys.modules
 
 
@@ -94,7 +94,7 @@ def test_sources_include_modules_of_the_same_folder(
     helper = tmp_path / "alone_helper.py"
     helper.write_text("speed = 1\n")
     system = importlib.import_module("alone_landing").Alone
-    assert [file for file, _ in sources_of(system)] == ["alone_helper.py", "alone_landing.py"]
+    assert [file for file, _ in source_hashes(system)] == ["alone_helper.py", "alone_landing.py"]
     before = sources_sha256(system)
     helper.write_text("speed = 2\n")
     assert sources_sha256(system) != before

@@ -12,7 +12,7 @@ import pytest
 
 from pytest_garl.errors import PoolError
 from pytest_garl.execution.flight import fly_job
-from pytest_garl.execution.flight_id import FIRST, FlightId
+from pytest_garl.execution.flight_id import FIRST_SLOT, FlightId
 from pytest_garl.execution.ledger import Ledger
 from pytest_garl.execution.local_pool import FlightWorkers
 from pytest_garl.execution.pool import wait_for
@@ -59,7 +59,7 @@ class Flown:
         return self.result.signature
 
 
-def flight_of(search: str, slot: Slot = FIRST) -> FlightId:
+def flight_of(search: str, slot: Slot = FIRST_SLOT) -> FlightId:
     return FlightId(search=search, map="lawn", slot=slot)
 
 

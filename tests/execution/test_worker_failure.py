@@ -59,7 +59,7 @@ def test_exit_that_the_machine_may_have_caused_is_flown_again_alone(
     assert ledger.queue.claim(flown="m:Class") is None
     assert ledger.queue.alone_waits()
     again = claimed(ledger)
-    assert (again.flight.slot.index, again.after, again.attempt) == (0, after, 2)
+    assert (again.flight.slot.index, again.earlier_exits, again.attempt) == (0, after, 2)
     assert not ledger.queue.alone_waits()
     assert ledger.queries.meters()["retried"] == 1
 
@@ -106,7 +106,7 @@ def test_three_flights_with_different_exits_are_inconclusive(ledger: Ledger) -> 
     retry_or_record(ledger.queue, first, HUNG)
     retry_or_record(ledger.queue, claimed(ledger), KILLED)
     third = claimed(ledger)
-    assert (third.after, third.attempt) == ("hung killed", 3)
+    assert (third.earlier_exits, third.attempt) == ("hung killed", 3)
     retry_or_record(ledger.queue, third, BROKE)
     result = result_of(ledger, FIRST_FLIGHT)
     assert result is not None
@@ -129,7 +129,7 @@ def test_slot_that_is_given_back_counts_no_attempt(ledger: Ledger) -> None:
     ledger.queue.record(claimed(ledger), flight_result(), "", 0.0)
     retry_or_record(ledger.queue, first, HUNG)
     alone = claimed(ledger)
-    assert (alone.after, alone.attempt) == ("hung", 2)
+    assert (alone.earlier_exits, alone.attempt) == ("hung", 2)
     ledger.queue.give_back(alone)
     assert claimed(ledger) == alone
     ledger.queue.release(alone.pid)

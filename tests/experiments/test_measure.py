@@ -6,7 +6,7 @@ import pytest
 from pytest_garl.experiments.measure import chromosomes
 from pytest_garl.scenarios.genes import genome_for, with_destinations
 from pytest_garl.scenarios.maps.map import load_map
-from pytest_garl.search.methods.random import propose
+from pytest_garl.search.methods.random import random_scenarios
 
 MAP = load_map("lawn")
 
@@ -14,7 +14,7 @@ MAP = load_map("lawn")
 @pytest.mark.parametrize("weather", ["confined", "full"])
 def test_distances_leave_out_the_destinations_of_npcs(weather: str) -> None:
     genome = genome_for(MAP, weather="full" if weather == "full" else "confined")
-    bound = propose(MAP, with_destinations(genome), 3, 0, 5)
+    bound = random_scenarios(MAP, with_destinations(genome), 3, 0, 5)
     raw, genes = chromosomes(bound, MAP, weather)
     assert raw.shape == (5, 8)
     assert genes.shape == (5, genome.size)

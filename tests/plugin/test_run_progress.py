@@ -16,8 +16,8 @@ from pytest_garl.plugin.run_progress import ProgressReader, RunProgress, progres
 from pytest_garl.regressions.forecast import RemainingWork
 
 TWO = (
-    SearchProgress(system="m:A", map="court", flown=3, all=4, generation=1),
-    SearchProgress(system="m:A", map="lawn", flown=1, all=4, generation=0),
+    SearchProgress(system="m:A", map="court", flown=3, total=4, generation=1),
+    SearchProgress(system="m:A", map="lawn", flown=1, total=4, generation=0),
 )
 
 
@@ -71,7 +71,7 @@ def test_narrow_terminal_gets_whole_phrases(width: int) -> None:
 
 
 def test_line_follows_the_forecast_once_there_is_one() -> None:
-    done = SearchProgress(system="m:A", map="court", flown=4, all=4, generation=0)
+    done = SearchProgress(system="m:A", map="court", flown=4, total=4, generation=0)
     shrinking = RunProgress(
         searches=[done],
         kinds={"IV": 3},

@@ -13,12 +13,12 @@ from pytest_garl.regressions.move_reduction import _round, shorter_records
 from pytest_garl.scenarios.genes import genome_for
 from pytest_garl.scenarios.maps.map import load_map
 from pytest_garl.scenarios.validity import problems
-from pytest_garl.search.methods.random import propose
+from pytest_garl.search.methods.random import random_scenarios
 from pytest_garl.simulation.fly import fly
 from pytest_garl.simulation.system_under_test.reference_pilot import ReferencePilot
 
 LAWN = load_map("lawn")
-SCENARIO = propose(LAWN, genome_for(LAWN), 5, 0, 1)[0]
+SCENARIO = random_scenarios(LAWN, genome_for(LAWN), 5, 0, 1)[0]
 
 
 @given(st.floats(0, 1), st.floats(0, 2 * math.pi))

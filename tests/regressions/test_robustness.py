@@ -6,10 +6,10 @@ from pytest_garl.regressions.robustness import neighbours
 from pytest_garl.scenarios.genes import genome_for
 from pytest_garl.scenarios.maps.map import load_map
 from pytest_garl.scenarios.validity import problems
-from pytest_garl.search.methods.random import propose
+from pytest_garl.search.methods.random import random_scenarios
 
 LAWN = load_map("lawn")
-SCENARIO = propose(LAWN, genome_for(LAWN), 5, 0, 1)[0]
+SCENARIO = random_scenarios(LAWN, genome_for(LAWN), 5, 0, 1)[0]
 
 
 def test_neighbours_are_near_valid_and_always_the_same() -> None:

@@ -6,7 +6,7 @@ from pytest_garl.execution.result import FlightResult
 from pytest_garl.scenarios.genes import genome_for
 from pytest_garl.scenarios.maps.map import load_map
 from pytest_garl.scenarios.scenario import Scenario
-from pytest_garl.search.method import Flown, Method, SearchPlan
+from pytest_garl.search.method import FlownScenario, Method, SearchPlan
 from pytest_garl.verdicts.verdict import Margin
 from tests.support.results import flight_result
 
@@ -39,5 +39,5 @@ def bred(method: Method, generations: int) -> list[list[Scenario]]:
     made = []
     for _ in range(generations):
         made.append(list(method.ask()))
-        method.tell([Flown(scenario=each, result=result(each)) for each in made[-1]])
+        method.tell([FlownScenario(scenario=each, result=result(each)) for each in made[-1]])
     return made

@@ -2,12 +2,12 @@ from __future__ import annotations
 
 from pytest_garl.execution.slot import Slot
 from pytest_garl.search.fixed import FixedScenarios
-from pytest_garl.search.methods.random import propose
+from pytest_garl.search.methods.random import random_scenarios
 from tests.search.searches import GENOME, MAP
 
 
 def test_each_scenario_comes_in_its_slot() -> None:
-    first, second = propose(MAP, GENOME, 0, 0, 2)
+    first, second = random_scenarios(MAP, GENOME, 0, 0, 2)
     slots = {Slot(generation=0, index=1): first, Slot(generation=2, index=0): second}
     method = FixedScenarios(slots)
     assert [list(method.ask()) for _ in range(3)] == [

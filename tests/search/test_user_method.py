@@ -9,7 +9,7 @@ from pytest_garl.errors import GarlError
 from pytest_garl.scenarios.genes import genome_for
 from pytest_garl.scenarios.maps.map import load_map
 from pytest_garl.search.catalogue import make_method
-from pytest_garl.search.method import Flown, SearchPlan
+from pytest_garl.search.method import FlownScenario, SearchPlan
 from pytest_garl.search.methods.random import RandomSearch
 from tests.support.results import flight_result
 
@@ -66,6 +66,6 @@ def test_objectives_other_than_numbers_are_refused(
 ) -> None:
     monkeypatch.setattr(Own, "tell", lambda self, flown: nonsense, raising=False)
     method = make_method("my_method:make", PLAN)
-    flown = [Flown(scenario=each, result=flight_result()) for each in method.ask()]
+    flown = [FlownScenario(scenario=each, result=flight_result()) for each in method.ask()]
     with pytest.raises(GarlError, match=r"tell\(\) returned .*, expected a list of 2 tuples"):
         method.tell(flown)

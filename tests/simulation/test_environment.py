@@ -17,7 +17,7 @@ from pytest_garl.regressions.recorded_behaviour import recorded_behaviour
 from pytest_garl.scenarios.genes import ENVIRONMENT, genome_for
 from pytest_garl.scenarios.maps.map import load_map
 from pytest_garl.scenarios.scenario import Scenario
-from pytest_garl.search.methods.random import propose
+from pytest_garl.search.methods.random import random_scenarios
 from pytest_garl.simulation.camera.renderer import Renderer
 from pytest_garl.simulation.environment import changed, environment_at
 from pytest_garl.simulation.flight import Flight
@@ -28,7 +28,7 @@ from pytest_garl.simulation.randomness import generator
 from tests.support.results import flight_result
 
 LAWN = load_map("lawn")
-SCENARIO = propose(LAWN, genome_for(LAWN), 3, 0, 1)[0]
+SCENARIO = random_scenarios(LAWN, genome_for(LAWN), 3, 0, 1)[0]
 SMALL = Camera(width_px=160, height_px=120)
 LEVEL = (0.0, 0.0, 0.0, 1.0)
 

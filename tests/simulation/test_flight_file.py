@@ -14,7 +14,7 @@ from pytest_garl.adversary.catalogue import policy_spec
 from pytest_garl.errors import GarlError
 from pytest_garl.landing_system import Detection, Diagnostics
 from pytest_garl.scenarios.genes import genome_for
-from pytest_garl.search.methods.random import propose
+from pytest_garl.search.methods.random import random_scenarios
 from pytest_garl.simulation import flight_file
 from pytest_garl.simulation.flight import (
     Contact,
@@ -206,7 +206,7 @@ def test_a_flight_larger_than_the_memory_is_refused(
 
 
 def test_a_flight_survives_its_file(tmp_path: Path) -> None:
-    scenario = propose(LAWN, genome_for(LAWN), 3, 0, 1)[0]
+    scenario = random_scenarios(LAWN, genome_for(LAWN), 3, 0, 1)[0]
     flight = fly(scenario, ReferencePilot, policy_spec("waypoint"), time_limit_s=5)
     save(flight, tmp_path / "flight.npz")
     back = load(tmp_path / "flight.npz")

@@ -19,7 +19,7 @@ from pytest_garl import (
 )
 from pytest_garl.adversary.catalogue import policy_spec
 from pytest_garl.scenarios.genes import genome_for
-from pytest_garl.search.methods.random import propose
+from pytest_garl.search.methods.random import random_scenarios
 from pytest_garl.simulation.fly import fly
 from pytest_garl.simulation.system_under_test.reference_pilot import ReferencePilot
 from tests.support.flights import EMPTY, LAWN, STAND, Falls, HitsATree, Hovers, Scripted, nominal
@@ -90,7 +90,7 @@ def test_a_broken_system_is_recorded(system: type, kind: str, words: str) -> Non
 
 
 def test_the_same_scenario_flies_the_same_bytes() -> None:
-    scenario = propose(LAWN, genome_for(LAWN), 3, 0, 1)[0]
+    scenario = random_scenarios(LAWN, genome_for(LAWN), 3, 0, 1)[0]
     first = fly(scenario, Hops, policy_spec("random_walk"), time_limit_s=10)
     again = fly(scenario, Hops, policy_spec("random_walk"), time_limit_s=10)
     assert first.sha256 == again.sha256
@@ -98,7 +98,7 @@ def test_the_same_scenario_flies_the_same_bytes() -> None:
 
 
 def test_removing_an_npc_changes_nothing_for_the_others() -> None:
-    scenario = propose(LAWN, genome_for(LAWN), 3, 0, 1)[0]
+    scenario = random_scenarios(LAWN, genome_for(LAWN), 3, 0, 1)[0]
     names = [name for name, _ in LAWN.present_objects]
     alone = scenario.without(*names[:-1])
     first, second = (
@@ -112,13 +112,13 @@ def test_removing_an_npc_changes_nothing_for_the_others() -> None:
 def test_another_process_flies_the_same_bytes() -> None:
     code = (
         "from tests.simulation.test_loop import *\n"
-        "scenario = propose(LAWN, genome_for(LAWN), 3, 0, 1)[0]\n"
+        "scenario = random_scenarios(LAWN, genome_for(LAWN), 3, 0, 1)[0]\n"
         "print(fly(scenario, Hops, policy_spec('waypoint'), time_limit_s=10).sha256)\n"
     )
     root = Path(__file__).parents[2]
     other = subprocess.run(
         [sys.executable, "-c", code], capture_output=True, text=True, check=True, cwd=root
     )
-    scenario = propose(LAWN, genome_for(LAWN), 3, 0, 1)[0]
+    scenario = random_scenarios(LAWN, genome_for(LAWN), 3, 0, 1)[0]
     here = fly(scenario, Hops, policy_spec("waypoint"), time_limit_s=10)
     assert other.stdout.strip() == here.sha256

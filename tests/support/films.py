@@ -14,7 +14,7 @@ from pytest_garl.adversary.catalogue import policy_spec
 from pytest_garl.landing_system import Airframe, Camera, Detection, Diagnostics
 from pytest_garl.scenarios.genes import genome_for
 from pytest_garl.scenarios.maps.map import load_map
-from pytest_garl.search.methods.random import propose
+from pytest_garl.search.methods.random import random_scenarios
 from pytest_garl.simulation.flight import Flight
 from pytest_garl.simulation.fly import fly
 from pytest_garl.video import frames
@@ -23,7 +23,7 @@ from pytest_garl.video.drawing import Image
 LAWN = load_map("lawn")
 
 
-SCENARIO = propose(LAWN, genome_for(LAWN), 3, 0, 1)[0].without("bird-1")
+SCENARIO = random_scenarios(LAWN, genome_for(LAWN), 3, 0, 1)[0].without("bird-1")
 
 
 FLOWN_S, CLOSING_FRAMES = 3.0, 20

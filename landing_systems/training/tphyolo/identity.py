@@ -71,7 +71,7 @@ class IdentityNet(nn.Sequential):
         )
 
 
-class Cuttings:
+class PatchSampler:
     """Draws labelled patches from crops."""
 
     def __init__(self, shards: Sequence[Samples], plan: IdentityPlan) -> None:
@@ -149,7 +149,7 @@ def train_identity(
     ``told`` hears each step and loss.
     """
     torch.manual_seed(plan.seed)
-    cuttings = Cuttings(shards, plan)
+    patch_sampler = PatchSampler(shards, plan)
     model = IdentityNet().train().to(device)
     averaged = copy.deepcopy(model).eval().requires_grad_(False)
     optimiser = torch.optim.AdamW(
@@ -160,7 +160,7 @@ def train_identity(
     )
     for step in range(plan.steps):
         rng = np.random.default_rng(np.random.SeedSequence(plan.seed, spawn_key=(1, step)))
-        patches, classes = cuttings.draw(rng)
+        patches, classes = patch_sampler.draw(rng)
         answer: Tensor = model(torch.from_numpy(normalised(patches)).to(device))
         loss = nn.functional.cross_entropy(answer, torch.from_numpy(classes).to(device))
         optimiser.zero_grad()

@@ -83,7 +83,9 @@ class FlightActor:
         self._flown += 1
         job = dataclasses.replace(self._job(claim.job), flights=str(self._folder / "flights"))
         flight = FlightId(search=str(self._flown), map=job.map)
-        self._ledger.add_flight(flight, job.system.name, job.dumps(), claim.scenario, claim.after)
+        self._ledger.add_flight(
+            flight, job.system.name, job.dumps(), claim.scenario, claim.earlier_exits
+        )
         completed = wait_for(self._ledger, self._pool, flight, Path(job.flights), lambda: None)
         if self._ended is not None:
             ended, self._ended = self._ended, None

@@ -16,7 +16,7 @@ from pytest_garl.execution.process_pool import ProcessPool
 from pytest_garl.execution.worker_failure import WorkerExit
 
 INSTALL = "pip install 'pytest-garl[ray]'"
-REACH_S = 5.0
+CONNECT_TIMEOUT_S = 5.0
 """How long the head of a cluster may take to accept a connection."""
 
 
@@ -38,7 +38,7 @@ def check_ray(address: str) -> None:
         # Ray itself resolves "auto" and ray://…
         return
     try:
-        socket.create_connection((place["host"], int(place["port"])), REACH_S).close()
+        socket.create_connection((place["host"], int(place["port"])), CONNECT_TIMEOUT_S).close()
     except (OSError, OverflowError) as error:
         raise PoolError(
             f"RAY_ADDRESS={address}: nobody answers there ({error}). Is the cluster up (`ray "

@@ -25,7 +25,7 @@ from pytest_garl.execution.result import FlightResult
 from pytest_garl.scenarios.chromosome import decode, encode
 from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.scenarios.validity import repair
-from pytest_garl.search.method import Flown, MethodDeclaration, SearchPlan
+from pytest_garl.search.method import FlownScenario, MethodDeclaration, SearchPlan
 from pytest_garl.search.objectives import violation_proximity
 from pytest_garl.search.operators import (
     CANDIDATES,
@@ -93,7 +93,7 @@ class Garl:
     def __init__(self, plan: SearchPlan, parameters: GarlParameters | None = None) -> None:
         self._plan, self._parameters = plan, parameters or GarlParameters()
         self._rng = np.random.default_rng(seed_sequence("garl", plan.map.name, plan.seed))
-        self._cells: defaultdict[str, list[Flown]] = defaultdict(list)
+        self._cells: defaultdict[str, list[FlownScenario]] = defaultdict(list)
         self._trials: defaultdict[Arm, tuple[float, float]] = defaultdict(lambda: (0.0, 0.0))
         self._arms: dict[Genes, Arm] = {}
         self._chromosomes: list[Matrix] = []
@@ -106,7 +106,7 @@ class Garl:
         """Return the next generation."""
         return [self._new() for _ in range(self._plan.population)]
 
-    def tell(self, flown: Sequence[Flown]) -> Sequence[tuple[float, ...]]:
+    def tell(self, flown: Sequence[FlownScenario]) -> Sequence[tuple[float, ...]]:
         """Put each flight into its cell; return its proximity to a violation."""
         weight = self._parameters.trial_weight
         for item in flown:
@@ -118,7 +118,7 @@ class Garl:
             self._cells[name].append(item)
         return [(violation_proximity(item.result),) for item in flown]
 
-    def _success(self, name: str, item: Flown) -> float:
+    def _success(self, name: str, item: FlownScenario) -> float:
         """Return the success of a flight, 0 to 1."""
         signature = item.result.signature
         if signature:
@@ -207,7 +207,7 @@ class Garl:
         good = [item for item in every if item.result.outcome != "aborted"] or every
         return good[int(self._rng.integers(len(good)))].scenario
 
-    def _elite(self, name: str) -> Flown:
+    def _elite(self, name: str) -> FlownScenario:
         """Return one of a cell's flights with the highest proximity to a violation."""
         cell = self._cells[name]
         most = max(violation_proximity(item.result) for item in cell)

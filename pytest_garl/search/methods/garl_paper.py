@@ -29,7 +29,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from pytest_garl.search.method import Flown, Method, MethodDeclaration, SearchPlan
+from pytest_garl.search.method import FlownScenario, Method, MethodDeclaration, SearchPlan
 from pytest_garl.search.objectives import diversity
 from pytest_garl.search.operators import Matrix, property_mutation
 
@@ -42,7 +42,7 @@ def make(plan: SearchPlan) -> Method:
     return Nsga2("garl-paper", plan, objectives, 3, property_mutation)
 
 
-def objectives(chromosomes: Matrix, flown: Sequence[Flown]) -> Matrix:
+def objectives(chromosomes: Matrix, flown: Sequence[FlownScenario]) -> Matrix:
     """Distance to landing, time to landing and diversity, all maximised; shape (k, 3)."""
     distance = [item.result.final_distance_m for item in flown]
     elapsed = [item.result.elapsed_s for item in flown]

@@ -40,7 +40,7 @@ from pytest_garl.scenarios.genes import Genome, with_destinations
 from pytest_garl.scenarios.maps.map import Map
 from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.scenarios.validity import problems, repair
-from pytest_garl.search.method import Flown, MethodDeclaration, SearchPlan
+from pytest_garl.search.method import FlownScenario, MethodDeclaration, SearchPlan
 from pytest_garl.search.seeding import seed_sequence
 from pytest_garl.verdicts.verdict import PAPER_LIMITS
 
@@ -101,7 +101,7 @@ class OfflineRl:
             self._chains = [self._begin() for _ in range(self._population)]
         return [self._scenario(link.row, link.seed) for link in self._chains]
 
-    def tell(self, flown: Sequence[Flown]) -> Sequence[tuple[float, ...]]:
+    def tell(self, flown: Sequence[FlownScenario]) -> Sequence[tuple[float, ...]]:
         """Learn from each chain's step; return distance, time and diversity of each flight."""
         from pytest_garl.adversary.training.dqn import one_thread
 

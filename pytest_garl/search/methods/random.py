@@ -17,7 +17,7 @@ from pytest_garl.scenarios.genes import Genome
 from pytest_garl.scenarios.maps.map import Map
 from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.scenarios.validity import repair
-from pytest_garl.search.method import Flown, MethodDeclaration, SearchPlan
+from pytest_garl.search.method import FlownScenario, MethodDeclaration, SearchPlan
 from pytest_garl.search.seeding import seed_sequence
 
 
@@ -33,14 +33,18 @@ class RandomSearch:
         """Return the next generation."""
         plan = self._plan
         self._generation += 1
-        return propose(plan.map, plan.genome, plan.seed, self._generation - 1, plan.population)
+        return random_scenarios(
+            plan.map, plan.genome, plan.seed, self._generation - 1, plan.population
+        )
 
-    def tell(self, flown: Sequence[Flown]) -> Sequence[tuple[float, ...]]:
+    def tell(self, flown: Sequence[FlownScenario]) -> Sequence[tuple[float, ...]]:
         """Return each flight's distance and time to landing."""
         return [(item.result.final_distance_m, item.result.elapsed_s) for item in flown]
 
 
-def propose(map: Map, genome: Genome, seed: int, generation: int, size: int) -> Sequence[Scenario]:
+def random_scenarios(
+    map: Map, genome: Genome, seed: int, generation: int, size: int
+) -> Sequence[Scenario]:
     """Return a generation, which depends only on the seed, the map and the generation's number.
 
     All landing systems get the same scenarios, so that they can be compared.

@@ -7,7 +7,7 @@ from pytest_garl.adversary.catalogue import policy_spec
 from pytest_garl.errors import PolicyError
 from pytest_garl.scenarios.genes import genome_for, with_destinations
 from pytest_garl.scenarios.placement import object_destination_m
-from pytest_garl.search.methods.random import propose
+from pytest_garl.search.methods.random import random_scenarios
 from pytest_garl.simulation.fly import fly
 from pytest_garl.simulation.system_under_test.reference_pilot import ReferencePilot
 from tests.support.situations import MAP
@@ -17,7 +17,7 @@ NAMES = [name for name, _ in MAP.present_objects]
 
 @pytest.mark.sim
 def test_npcs_walk_to_their_destination_and_back() -> None:
-    scenario = propose(MAP, with_destinations(genome_for(MAP)), 2, 0, 1)[0]
+    scenario = random_scenarios(MAP, with_destinations(genome_for(MAP)), 2, 0, 1)[0]
     scenario = scenario.replace({f"{name}.velocity": 1.0 for name in NAMES})
     # Clear of bodies, and of each other.
     places = ((-0.8, 0.8), (0.8, 0.8), (-0.8, -0.8), (0.8, -0.8))
@@ -39,6 +39,6 @@ def test_npcs_walk_to_their_destination_and_back() -> None:
 
 
 def test_a_scenario_without_destinations_is_an_error() -> None:
-    scenario = propose(MAP, genome_for(MAP), 2, 0, 1)[0]
+    scenario = random_scenarios(MAP, genome_for(MAP), 2, 0, 1)[0]
     with pytest.raises(PolicyError, match=r"no gene 'person-1.destination_x'.*--garl-method"):
         fly(scenario, ReferencePilot, policy_spec("destination"), map=MAP, time_limit_s=1)

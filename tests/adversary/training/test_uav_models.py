@@ -11,7 +11,7 @@ from pytest_garl.adversary.training.uav_models import (
     StraightPilot,
 )
 from pytest_garl.scenarios.genes import genome_for
-from pytest_garl.search.methods.random import propose
+from pytest_garl.search.methods.random import random_scenarios
 from pytest_garl.simulation.fly import fly
 from tests.support.situations import MAP
 
@@ -25,7 +25,7 @@ def test_styles_and_parameters_are_drawn_from_the_generator_alone() -> None:
 @pytest.mark.sim
 @pytest.mark.parametrize("pilot", [StraightPilot, AvoidingPilot])
 def test_a_uav_lands_on_a_free_marker(pilot: type[StraightPilot]) -> None:
-    (scenario,) = propose(MAP, genome_for(MAP), 7, 0, 1)
+    (scenario,) = random_scenarios(MAP, genome_for(MAP), 7, 0, 1)
     flight = fly(scenario, pilot, policy_spec("stationary"), map=MAP)
     assert flight.outcome == "landed"
     assert flight.final_distance_m < 0.5

@@ -23,13 +23,13 @@ from tests.execution.flying import Exits, Good, Loud, Reports, Sleeps, Slow, job
 from tests.support.landing_project import write_project
 
 
-def claim(system: type, after: str = "", timeout_s: float = 10.0) -> Claim:
+def claim(system: type, earlier_exits: str = "", timeout_s: float = 10.0) -> Claim:
     return Claim(
         flight=FlightId(search="0123456789", map="lawn", slot=Slot(generation=3, index=7)),
         scenario=dump_scenario(scenario(0.2)),
         job=job_of(system, Path("/nowhere/flights"), timeout_s).dumps(),
-        after=after,
-        attempt=2 if after else 1,
+        earlier_exits=earlier_exits,
+        attempt=2 if earlier_exits else 1,
         pid=os.getpid(),
     )
 
@@ -72,7 +72,7 @@ def test_failure_of_the_simulator_is_no_failure_of_the_landing_system(actor: Fli
     first = actor.fly(dataclasses.replace(claim(Good), job=broken.dumps()))
     assert isinstance(first, WorkerExit)
     assert first.cause == "failed"
-    again = dataclasses.replace(claim(Good, after="failed"), job=broken.dumps())
+    again = dataclasses.replace(claim(Good, earlier_exits="failed"), job=broken.dumps())
     with pytest.raises(PoolError, match=r"^the simulator failed in a worker process:\nTraceback"):
         actor.fly(again)
 
@@ -86,7 +86,10 @@ def test_call_that_hangs_is_reported_with_its_stacks(actor: FlightActor) -> None
 
 def test_flight_that_hung_before_gets_three_times_the_limit(actor: FlightActor) -> None:
     """If a machine is slow once, the search learns the same."""
-    found, calm = actor.fly(claim(Slow, after="hung", timeout_s=1.0)), actor.fly(claim(Slow))
+    found, calm = (
+        actor.fly(claim(Slow, earlier_exits="hung", timeout_s=1.0)),
+        actor.fly(claim(Slow)),
+    )
     assert isinstance(found, FlightOutput)
     assert isinstance(calm, FlightOutput)
     assert (found.result, found.sha256) == (calm.result, calm.sha256)

@@ -181,7 +181,10 @@ def test_worker_exit_is_handled_as_in_the_local_pool(ledger: Ledger) -> None:
     result = result_of(ledger, flight_of(0))
     assert result is not None
     assert result.signature == "V:died:signal-9"
-    assert [claim.after for claim in claims if claim.flight.slot.index == 0] == ["", "killed"]
+    assert [claim.earlier_exits for claim in claims if claim.flight.slot.index == 0] == [
+        "",
+        "killed",
+    ]
     assert ledger.queries.meters()["retried"] == 1
 
 

@@ -19,9 +19,9 @@ from landing_systems.training.tphyolo.dataset import (
 )
 from landing_systems.training.tphyolo.identity import (
     OTHER,
-    Cuttings,
     IdentityNet,
     IdentityPlan,
+    PatchSampler,
     train_identity,
 )
 from landing_systems.training.tphyolo.losses import (
@@ -186,7 +186,7 @@ def test_a_few_steps_of_training_lower_the_loss_and_go_on_where_they_stopped(
 def test_cuttings_hold_the_marker_that_their_class_names() -> None:
     shards = [painted(3, (CROP_PX, CROP_PX), seed, number) for seed, number in enumerate(range(5))]
     plan = IdentityPlan(patches=40, shift=0.0, resize=0.0)
-    patches, classes = Cuttings(shards, plan).draw(np.random.default_rng(0))
+    patches, classes = PatchSampler(shards, plan).draw(np.random.default_rng(0))
     assert set(classes) == set(range(OTHER + 1))
     cell, middle = PATCH_PX / REACH / 7, PATCH_PX / 2
     for cut, number in zip(patches, classes, strict=True):

@@ -13,7 +13,7 @@ from pytest_garl.scenarios.chromosome import encode
 from pytest_garl.scenarios.genes import genome_for
 from pytest_garl.scenarios.maps.map import load_map
 from pytest_garl.scenarios.scenario import Scenario
-from pytest_garl.search.method import Flown, SearchPlan
+from pytest_garl.search.method import FlownScenario, SearchPlan
 from pytest_garl.search.methods.garl import FAR, NEAR, Garl, GarlParameters, cell_of
 from pytest_garl.search.methods.random import RandomSearch
 from pytest_garl.verdicts.paper_metrics import mean_distance
@@ -44,7 +44,7 @@ def common_and_rare(scenario: Scenario) -> FlightResult:
 def search(method: Any, generations: int) -> Counter[str]:
     found: Counter[str] = Counter()
     for _ in range(generations):
-        flown = [Flown(scenario=s, result=common_and_rare(s)) for s in method.ask()]
+        flown = [FlownScenario(scenario=s, result=common_and_rare(s)) for s in method.ask()]
         method.tell(flown)
         found.update(item.result.signature for item in flown)
     return found
@@ -62,7 +62,7 @@ def test_unknown_cells_are_chosen_equally_often() -> None:
     first = search_.ask()
     cells = ["a"] * 17 + ["b", "c", ""]
     near = [result("", cell) for cell in cells]
-    search_.tell([Flown(scenario=s, result=r) for s, r in zip(first, near, strict=True)])
+    search_.tell([FlownScenario(scenario=s, result=r) for s, r in zip(first, near, strict=True)])
     seeds = {scenario.seed: cell for scenario, cell in zip(first, cells, strict=True)}
     bred: Counter[str] = Counter()
     for _ in range(30):
@@ -82,7 +82,7 @@ def test_a_successful_cell_is_chosen_more_often() -> None:
             line = lines.setdefault(scenario.seed, "ab"[index % 2])
             # The line of b comes nearer with every child, that of a never does.
             far = 2.9 if line == "a" else 2.9 - 0.035 * bred["b"]
-            flown.append(Flown(scenario=scenario, result=result("", line, far)))
+            flown.append(FlownScenario(scenario=scenario, result=result("", line, far)))
             bred[line] += 1
         method.tell(flown)
     # Ten of each were there at first.
@@ -91,7 +91,7 @@ def test_a_successful_cell_is_chosen_more_often() -> None:
 
 def test_the_first_violation_of_a_kind_is_worth_more_than_the_fourth() -> None:
     method = Garl(PLAN)
-    items = [Flown(scenario=each, result=result("IV:dog")) for each in method.ask()]
+    items = [FlownScenario(scenario=each, result=result("IV:dog")) for each in method.ask()]
     assert [method._success("IV:dog", item) for item in items[:4]] == [1.0, 0.5**0.5, 3**-0.5, 0.5]
 
 
@@ -142,7 +142,7 @@ def test_a_far_child_keeps_the_weather_and_the_npc_that_was_hit() -> None:
     method = Garl(PLAN, GarlParameters(explore_share=0.0))
     first = method.ask()[:1]
     told = dataclasses.replace(result("IV:dog"), closest_body="dog-1")
-    method.tell([Flown(scenario=each, result=told) for each in first])
+    method.tell([FlownScenario(scenario=each, result=told) for each in first])
     (parent,) = genes(first)
     kept = WEATHER | np.array([key.startswith("dog-1.") for key in PLAN.genome.keys])
     children = genes(method._child("IV:dog", FAR) for _ in range(50))
@@ -153,7 +153,9 @@ def test_a_far_child_keeps_the_weather_and_the_npc_that_was_hit() -> None:
 def test_only_violations_are_bred_far() -> None:
     method = Garl(PLAN)
     told = [result("", "near")] * 10 + [result("hit")] * 10
-    method.tell([Flown(scenario=s, result=r) for s, r in zip(method.ask(), told, strict=True)])
+    method.tell(
+        [FlownScenario(scenario=s, result=r) for s, r in zip(method.ask(), told, strict=True)]
+    )
     chosen = {method._choose() for _ in range(200)}
     assert chosen == {("near", NEAR), ("hit", NEAR), ("hit", FAR)}
 
@@ -161,6 +163,6 @@ def test_only_violations_are_bred_far() -> None:
 def test_a_search_with_one_cell_breeds_from_it() -> None:
     method = Garl(PLAN, GarlParameters(explore_share=0.0, cell=lambda result: ""))
     first = method.ask()
-    method.tell([Flown(scenario=each, result=result("", "near")) for each in first])
+    method.tell([FlownScenario(scenario=each, result=result("", "near")) for each in first])
     seeds = {each.seed for each in first}
     assert all(child.seed in seeds for child in method.ask())

@@ -8,7 +8,7 @@ import pytest
 from pytest_garl.scenarios.chromosome import encode
 from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.search.catalogue import make_method
-from pytest_garl.search.method import Flown
+from pytest_garl.search.method import FlownScenario
 from tests.search.searches import GENOME, bred, plan, result
 
 
@@ -30,7 +30,7 @@ def test_children_inherit_the_seed_of_a_parent() -> None:
 def test_the_objectives_are_distance_time_and_diversity() -> None:
     method = make_method("garl-paper", plan())
     scenarios = method.ask()
-    values = method.tell([Flown(scenario=each, result=result(each)) for each in scenarios])
+    values = method.tell([FlownScenario(scenario=each, result=result(each)) for each in scenarios])
     rows = GENOME.normalise(np.array([encode(each, GENOME) for each in scenarios]))
     for scenario, row, (distance, elapsed, spread) in zip(scenarios, rows, values, strict=True):
         assert distance == result(scenario).final_distance_m

@@ -17,7 +17,7 @@ from pytest_garl.scenarios.chromosome import encode
 from pytest_garl.scenarios.genes import genome_for, with_destinations
 from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.search.catalogue import make_method
-from pytest_garl.search.method import Flown
+from pytest_garl.search.method import FlownScenario
 from pytest_garl.search.methods.offline_rl import OfflineRl, edits_of, reward
 from tests.search.searches import MAP, bred, plan, result
 
@@ -69,7 +69,7 @@ def test_an_edit_and_its_reverse_never_repeat_a_scenario() -> None:
 def test_a_chain_without_open_edits_starts_again() -> None:
     method = OfflineRl(plan(population=1))
     (first,) = method.ask()
-    method.tell([Flown(scenario=first, result=result(first))])
+    method.tell([FlownScenario(scenario=first, result=result(first))])
     row = encode(first, GENOME)
     for edit in edits_of(GENOME):
         near = row.copy()
@@ -79,7 +79,7 @@ def test_a_chain_without_open_edits_starts_again() -> None:
     (other,) = method.ask()
     assert other.seed != first.seed
     assert sum(other[key] != value for key, value in first.genes) > 20
-    method.tell([Flown(scenario=other, result=result(other))])
+    method.tell([FlownScenario(scenario=other, result=result(other))])
     assert method._learner.stored == 0
 
 
@@ -95,7 +95,7 @@ def test_diversity_is_measured_to_every_scenario_so_far() -> None:
     method = OfflineRl(plan(population=2))
     rows: list[Any] = []
     for _ in range(3):
-        flown = [Flown(scenario=each, result=result(each)) for each in method.ask()]
+        flown = [FlownScenario(scenario=each, result=result(each)) for each in method.ask()]
         own = [GENOME.normalise(encode(item.scenario, GENOME)) for item in flown]
         rows += own
         for row, item, told in zip(own, flown, method.tell(flown), strict=True):
@@ -112,7 +112,7 @@ def test_the_network_learns_which_edit_pays() -> None:
         covers = [each["environment.road_snow"] / 0.15 for each in scenarios]
         method.tell(
             [
-                Flown(
+                FlownScenario(
                     scenario=each,
                     result=dataclasses.replace(result(each), final_distance_m=40 * cover),
                 )

@@ -4,7 +4,7 @@ import pytest
 
 from pytest_garl.adversary.catalogue import policy_spec
 from pytest_garl.search.catalogue import make_method
-from pytest_garl.search.methods.random import propose
+from pytest_garl.search.methods.random import random_scenarios
 from pytest_garl.simulation.fly import fly
 from pytest_garl.simulation.system_under_test.reference_pilot import ReferencePilot
 from tests.search.searches import GENOME, MAP, bred, plan
@@ -16,7 +16,7 @@ def test_the_scenarios_are_those_of_random() -> None:
 
 @pytest.mark.sim
 def test_one_npc_acts_at_a_time_and_the_others_stand() -> None:
-    (scenario,) = propose(MAP, GENOME, 4, 0, 1)
+    (scenario,) = random_scenarios(MAP, GENOME, 4, 0, 1)
     flight = fly(scenario, ReferencePilot, policy_spec("online-rl"), map=MAP, time_limit_s=15)
     acted = [
         {n for n, move in enumerate(item.moves) if move.any()} | {n for n, _, _ in item.changes}

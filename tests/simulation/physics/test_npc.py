@@ -10,14 +10,14 @@ import pytest
 from pytest_garl.adversary.catalogue import policy_spec
 from pytest_garl.scenarios.genes import genome_for
 from pytest_garl.scenarios.object_types import OBJECT_TYPES
-from pytest_garl.search.methods.random import propose
+from pytest_garl.search.methods.random import random_scenarios
 from pytest_garl.simulation.fly import fly
 from tests.support.flights import LAWN, Hovers
 
 
 @pytest.mark.parametrize("policy", ["waypoint", "random_walk"])
 def test_npcs_keep_their_limits_and_out_of_bodies(policy: str) -> None:
-    scenario = propose(LAWN, genome_for(LAWN), 11, 0, 1)[0]
+    scenario = random_scenarios(LAWN, genome_for(LAWN), 11, 0, 1)[0]
     top = {key: 1.0 for key, _ in scenario.genes if key.endswith("velocity")}
     flight = fly(scenario.replace(top), Hovers, policy_spec(policy), time_limit_s=40)
     trunks = [(body.position_m, body.parts[0].size_m[0] / 2) for body in LAWN.bodies]
@@ -36,7 +36,7 @@ def test_npcs_keep_their_limits_and_out_of_bodies(policy: str) -> None:
 
 @pytest.mark.parametrize("policy", ["greedy", "stand", "dqn"])
 def test_npcs_with_one_destination_keep_out_of_each_other(policy: str) -> None:
-    scenario = propose(LAWN, genome_for(LAWN), 11, 0, 1)[0]
+    scenario = random_scenarios(LAWN, genome_for(LAWN), 11, 0, 1)[0]
     top = {key: 1.0 for key, _ in scenario.genes if key.endswith("velocity")}
     flight = fly(scenario.replace(top), Hovers, policy_spec(policy), time_limit_s=20)
     gaps = []

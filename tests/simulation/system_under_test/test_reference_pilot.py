@@ -6,7 +6,7 @@ import pytest
 
 from pytest_garl.scenarios.genes import genome_for
 from pytest_garl.scenarios.maps.map import load_map, map_names
-from pytest_garl.search.methods.random import propose
+from pytest_garl.search.methods.random import random_scenarios
 from pytest_garl.simulation.fly import fly
 from pytest_garl.simulation.system_under_test.reference_pilot import ReferencePilot
 from tests.support.flights import STAND
@@ -17,7 +17,7 @@ from tests.support.flights import STAND
 def test_the_reference_pilot_lands_where_it_can_be_done(name: str) -> None:
     map = load_map(name)
     landed = 0
-    for scenario in propose(map, genome_for(map), 21, 0, 10):
+    for scenario in random_scenarios(map, genome_for(map), 21, 0, 10):
         flight = fly(scenario, ReferencePilot, STAND)
         landed += flight.outcome == "landed" and flight.final_distance_m < 0.5
     assert landed >= 9
