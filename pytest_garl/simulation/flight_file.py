@@ -1,4 +1,4 @@
-"""Flights as files and hashes: exact, without pickles, the same bytes for equal flights."""
+"""Files and hashes of flights: exact, without pickles, equal bytes for equal flights."""
 
 from __future__ import annotations
 
@@ -36,9 +36,9 @@ LARGEST_BYTES = 32 * MEGABYTE
 LARGEST_UNPACKED_BYTES = 128 * MEGABYTE
 """The tracks of 150 objects over five minutes are 95 megabytes."""
 LARGEST_HEADER_BYTES = 32 * MEGABYTE
-"""What landing systems tell of their diagnostics is some kilobytes a frame; reading takes ten times
-as much memory."""
-_TRACK = ("time_s", "position_m", "attitude", "velocity_mps")
+"""The diagnostics of landing systems take some kilobytes per frame; reading them takes ten times as
+much memory."""
+_TRACK_FIELDS = ("time_s", "position_m", "attitude", "velocity_mps")
 
 
 def hash_of(flight: Flight) -> str:
@@ -47,7 +47,7 @@ def hash_of(flight: Flight) -> str:
     head = (flight.outcome, flight.final_distance_m, flight.elapsed_s, flight.marker_position_m)
     digest.update(repr(head).encode())
     for track in (flight.uav, *(item.track for item in flight.objects)):
-        for name in _TRACK:
+        for name in _TRACK_FIELDS:
             digest.update(np.ascontiguousarray(getattr(track, name)).tobytes())
     for item in flight.objects:
         digest.update(np.ascontiguousarray(item.moves).tobytes())
@@ -59,24 +59,24 @@ def hash_of(flight: Flight) -> str:
 
 
 def divergence_time_s(first: Flight, second: Flight) -> float:
-    """Return when two flights of the same scenario part: in a step, or else in the track."""
+    """Return the time from which two flights of a scenario differ: in a step, else in the track."""
     steps = zip(first.steps, second.steps, strict=False)
-    parted = next((a.time_s for a, b in steps if a != b), None)
-    if parted is not None:
-        return parted
+    differs_s = next((a.time_s for a, b in steps if a != b), None)
+    if differs_s is not None:
+        return differs_s
     length = min(len(first.uav.time_s), len(second.uav.time_s))
     differ = (first.uav.position_m[:length] != second.uav.position_m[:length]).any(axis=1)
     return float(first.uav.time_s[int(np.argmax(differ)) if differ.any() else length - 1])
 
 
 def save(flight: Flight, path: Path) -> None:
-    """Write the flight atomically as one .npz that holds arrays and a JSON header.
+    """Write the flight atomically as one .npz file with arrays and a JSON header.
 
-    Raises NotFiniteError for a flight that is not one of finite numbers.
+    Raises NotFiniteError if the flight holds a NaN or an infinity.
     """
     arrays: dict[str, np.ndarray[Any, Any]] = {}
     for index, track in enumerate((flight.uav, *(item.track for item in flight.objects))):
-        for name in _TRACK:
+        for name in _TRACK_FIELDS:
             arrays[f"{index}.{name}"] = getattr(track, name)
     for index, item in enumerate(flight.objects, start=1):
         arrays[f"{index}.moves"] = item.moves
@@ -111,9 +111,9 @@ def save(flight: Flight, path: Path) -> None:
     buffer = io.BytesIO()
     np.savez_compressed(buffer, allow_pickle=False, **arrays)
     path.parent.mkdir(parents=True, exist_ok=True)
-    scratch = path.with_name(f".{path.name}.{os.getpid()}")
-    scratch.write_bytes(buffer.getvalue())
-    scratch.replace(path)
+    incomplete = path.with_name(f".{path.name}.{os.getpid()}")
+    incomplete.write_bytes(buffer.getvalue())
+    incomplete.replace(path)
 
 
 def _holds_nan(value: Any) -> bool:
@@ -125,7 +125,7 @@ def _holds_nan(value: Any) -> bool:
 
 
 def load(path: Path) -> Flight:
-    """Return a saved flight; raise GarlError for a file that is none."""
+    """Return a saved flight; raise GarlError if the file is not valid."""
     content = read_bytes(path, LARGEST_BYTES, GarlError)
     try:
         arrays = unpack(content, LARGEST_UNPACKED_BYTES)
@@ -135,7 +135,7 @@ def load(path: Path) -> Flight:
                 f"header: found {header.nbytes} bytes, expected at most {LARGEST_HEADER_BYTES}"
             )
         values = parse_json(header.tobytes())
-        # Files of flights in which no policy changed the environment do not have it.
+        # The key is missing if no policy changed the environment in the flight.
         if isinstance(values, dict):
             values = {"changes": None, **values}
         return _flight(dataclass_from(_Header, values), arrays)
@@ -143,22 +143,22 @@ def load(path: Path) -> Flight:
         raise GarlError(f"{path}: not a saved flight: {error}") from error
 
 
-def _flight(told: _Header, arrays: dict[str, Array]) -> Flight:
-    count = len(told.objects)
-    changes = told.changes if told.changes is not None else ((),) * count
+def _flight(header: _Header, arrays: dict[str, Array]) -> Flight:
+    count = len(header.objects)
+    changes = header.changes if header.changes is not None else ((),) * count
     tracks = [_track(arrays, index) for index in range(count + 1)]
     moves = [_array(arrays, f"{index + 1}.moves", (-1, 2)) for index in range(count)]
     if arrays:
         raise ValueError(f"found more arrays than {count} objects have: {listed(sorted(arrays))}")
     if len(changes) != count:
         raise ValueError(f"changes: found those of {len(changes)} objects, expected {count}")
-    values = {name: getattr(told, name) for name in _SAME}
+    values = {name: getattr(header, name) for name in _COPIED_FIELDS}
     return Flight(
         uav=tracks[0],
         objects=tuple(
             ObjectRecord(name=name, type=kind, track=track, moves=own, changes=changed)
             for (name, kind), track, own, changed in zip(
-                told.objects, tracks[1:], moves, changes, strict=True
+                header.objects, tracks[1:], moves, changes, strict=True
             )
         ),
         **values,
@@ -169,7 +169,7 @@ def _track(arrays: dict[str, Array], index: int) -> Track:
     time_s = _array(arrays, f"{index}.time_s", (-1,))
     length = len(time_s)
     if not length:
-        raise ValueError(f"{index}.time_s: found no times, expected one at least")
+        raise ValueError(f"{index}.time_s: found no times, expected at least one")
     return Track(
         time_s=time_s,
         position_m=_array(arrays, f"{index}.position_m", (length, 3)),
@@ -183,10 +183,10 @@ def _array(arrays: dict[str, Array], name: str, shape: tuple[int, ...]) -> Array
     if name not in arrays:
         raise ValueError(f"{name}: missing")
     found = arrays.pop(name)
-    alike = found.ndim == len(shape) and all(
+    shape_fits = found.ndim == len(shape) and all(
         want in (-1, size) for size, want in zip(found.shape, shape, strict=True)
     )
-    if not alike or found.dtype != np.float64:
+    if not shape_fits or found.dtype != np.float64:
         words = ", ".join("any" if want == -1 else str(want) for want in shape)
         raise ValueError(
             f"{name}: found {found.dtype} of the shape {found.shape}, expected float64 of ({words})"
@@ -198,7 +198,7 @@ def _array(arrays: dict[str, Array], name: str, shape: tuple[int, ...]) -> Array
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _Header:
-    """What of a flight is no array."""
+    """The values of a flight that are not arrays."""
 
     outcome: Outcome
     final_distance_m: float
@@ -218,6 +218,6 @@ class _Header:
     changes: tuple[tuple[tuple[int, str, float], ...], ...] | None
 
 
-_SAME = tuple(
+_COPIED_FIELDS = tuple(
     field.name for field in dataclasses.fields(_Header) if field.name not in ("objects", "changes")
 )

@@ -89,11 +89,11 @@ class Loop:
             outcome = self.tick()
             while outcome is None:
                 outcome = self.tick()
-        except SystemFailedError as broken:
+        except SystemFailedError as error:
             if _is_finite(self._world):
                 self._contacts.record_pose(self.recorder.time_s)
-            self.recorder.event("crashed", broken.crash.message)
-            outcome, crash = "crashed", broken.crash
+            self.recorder.event("crashed", error.crash.message)
+            outcome, crash = "crashed", error.crash
         finally:
             self.close()
         return self.recorder.flight(outcome, crash)

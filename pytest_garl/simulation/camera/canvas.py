@@ -1,4 +1,4 @@
-"""A canvas: world shapes drawn onto the image of a piece of ground."""
+"""A canvas draws shapes in world coordinates onto an image of the ground."""
 
 from __future__ import annotations
 
@@ -13,29 +13,30 @@ from numpy.typing import NDArray
 
 Image = NDArray[np.uint8]
 Bounds = tuple[float, float, float, float]
-"""A piece of ground in metres: x_min, x_max, y_min, y_max."""
+"""A rectangle of ground in metres: x_min, x_max, y_min, y_max."""
 
-_CELLS = 7
+_MARKER_CELLS = 7
 """A DICT_5X5 marker has five data cells and a black border of one on each side."""
 _SHIFT = 4
+"""Fractional bits of the coordinates that OpenCV draws at."""
 
 
 class Canvas:
-    """Draws world shapes onto an image of a piece of ground."""
+    """Draws shapes in world coordinates onto an image of the ground within ``bounds_m``."""
 
-    def __init__(self, image: Image, bounds_m: Bounds, resolution: float) -> None:
-        self.image, self.bounds_m, self.resolution = image, bounds_m, resolution
+    def __init__(self, image: Image, bounds_m: Bounds, m_per_px: float) -> None:
+        self.image, self.bounds_m, self.m_per_px = image, bounds_m, m_per_px
 
-    def _points(self, world: NDArray[np.float64]) -> NDArray[np.int32]:
+    def _pixels(self, world: NDArray[np.float64]) -> NDArray[np.int32]:
         pixels = np.empty_like(world)
-        pixels[:, 0] = (world[:, 0] - self.bounds_m[0]) / self.resolution - 0.5
-        pixels[:, 1] = (self.bounds_m[3] - world[:, 1]) / self.resolution - 0.5
+        pixels[:, 0] = (world[:, 0] - self.bounds_m[0]) / self.m_per_px - 0.5
+        pixels[:, 1] = (self.bounds_m[3] - world[:, 1]) / self.m_per_px - 0.5
         fixed: NDArray[np.int32] = np.round(pixels * 2**_SHIFT).astype(np.int32)
         return fixed
 
     def polygon(self, world: NDArray[np.float64], colour: Sequence[float]) -> None:
         """Fill a polygon (n, 2)."""
-        cv2.fillPoly(self.image, [self._points(world)], colour, cv2.LINE_AA, _SHIFT)
+        cv2.fillPoly(self.image, [self._pixels(world)], colour, cv2.LINE_AA, _SHIFT)
 
     def stroke(self, world: NDArray[np.float64], width_m: float, colour: Sequence[float]) -> None:
         """Draw a line of straight pieces through points (n, 2)."""
@@ -49,22 +50,22 @@ class Canvas:
     def marker(
         self, centre: tuple[float, float], side_m: float, yaw_rad: float, marker_id: int
     ) -> None:
-        """Print a marker on a white board with one cell of margin; its top is north at yaw 0."""
+        """Draw a marker on a white board with a margin of one cell; its top is north at yaw 0."""
         bits = marker_bits(marker_id)
-        cell = side_m / _CELLS
+        cell = side_m / _MARKER_CELLS
         cos, sin = math.cos(yaw_rad), math.sin(yaw_rad)
-        turn = np.array([[cos, -sin], [sin, cos]])
+        rotation = np.array([[cos, -sin], [sin, cos]])
 
         def square(x: float, y: float, width: float) -> NDArray[np.float64]:
             corners = np.array([[x, y], [x + width, y], [x + width, y - width], [x, y - width]])
-            world: NDArray[np.float64] = corners @ turn.T + np.array(centre)
+            world: NDArray[np.float64] = corners @ rotation.T + np.array(centre)
             return world
 
         board = side_m + 2 * cell
         self.polygon(square(-board / 2, board / 2, board), (238, 238, 238))
         self.polygon(square(-side_m / 2, side_m / 2, side_m), (24, 24, 24))
-        for row in range(_CELLS):
-            for column in range(_CELLS):
+        for row in range(_MARKER_CELLS):
+            for column in range(_MARKER_CELLS):
                 if bits[row, column]:
                     x, y = -side_m / 2 + column * cell, side_m / 2 - row * cell
                     self.polygon(square(x, y, cell), (238, 238, 238))
@@ -74,6 +75,6 @@ class Canvas:
 def marker_bits(marker_id: int) -> NDArray[np.bool_]:
     """Return the cells (7, 7) of a DICT_5X5_50 marker; True is white."""
     dictionary = cv2.aruco.getPredefinedDictionary(cv2.aruco.DICT_5X5_50)
-    image = cv2.aruco.generateImageMarker(dictionary, marker_id, _CELLS, borderBits=1)
+    image = cv2.aruco.generateImageMarker(dictionary, marker_id, _MARKER_CELLS, borderBits=1)
     bits: NDArray[np.bool_] = np.asarray(image) > 127
     return bits

@@ -12,9 +12,9 @@ from numpy.typing import NDArray
 class Frame:
     """One picture: RGB uint8 (H, W, 3), planar depth float32 (H, W), segmentation int32 (H, W).
 
-    A ray that meets nothing has depth 100 and segment -1.  ``pixels`` counts those of each
-    segment from the marker's (1) on.  ``image`` is painted when it is first asked for, and is
-    the same whenever that is.
+    A ray that meets nothing has depth 100 and segment -1.  ``pixels`` is the
+    number of pixels of each segment; it does not count the ground, segment 0.  ``image`` is
+    painted on first access, and does not depend on the time of that access.
     """
 
     __slots__ = ("_image", "_paint", "depth_m", "pixels", "segmentation")
@@ -35,7 +35,7 @@ class Frame:
 
     @property
     def image(self) -> NDArray[np.uint8]:
-        """What the camera's sensor delivers."""
+        """The picture as the camera's sensor returns it, RGB uint8 (H, W, 3)."""
         if self._image is None:
             self._image = self._paint()
         return self._image

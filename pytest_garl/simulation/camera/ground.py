@@ -138,7 +138,7 @@ def _painted(
         if conditions.wetness > 0:
             alpha = 1 - WET_ALBEDO_LOSS * conditions.wetness
             cv2.convertScaleAbs(canvas.image, canvas.image, alpha)
-        cover(canvas.image, canvas.bounds_m, canvas.resolution, shift, conditions)
+        cover(canvas.image, canvas.bounds_m, canvas.m_per_px, shift, conditions)
     return wide, inset
 
 
@@ -149,7 +149,7 @@ def _lit(
     shift: NDArray[np.float64],
 ) -> PaintedGround:
     wide, inset = (
-        _raster(_light(canvas, map, conditions), canvas.bounds_m, canvas.resolution)
+        _raster(_light(canvas, map, conditions), canvas.bounds_m, canvas.m_per_px)
         for canvas in unlit
     )
     return PaintedGround(wide=wide, inset=inset, cover_shift_m=shift, unlit=unlit)
@@ -170,7 +170,7 @@ def _light(canvas: Canvas, map: Map, conditions: Conditions) -> Image:
         return canvas.image
     image = canvas.image.copy()
     mask = np.zeros(image.shape[:2], np.uint8)
-    shade = Canvas(mask, canvas.bounds_m, canvas.resolution)
+    shade = Canvas(mask, canvas.bounds_m, canvas.m_per_px)
     for body in map.bodies:
         for hull in placed_hulls(mesh_of(body.parts), body.position_m, body.yaw_rad):
             outline = cv2.convexHull(shadow_of(hull, conditions.sun).astype(np.float32))

@@ -121,7 +121,7 @@ def _patches(
 ) -> None:
     """Draw mottled wear: many small translucent blobs, so that no patch has a hard edge."""
     layer = canvas.image.copy()
-    over = Canvas(layer, canvas.bounds_m, canvas.resolution)
+    over = Canvas(layer, canvas.bounds_m, canvas.m_per_px)
     for _ in range(60):
         at = centre + rng.normal(0, spread_m / 3, 2)
         angles = np.linspace(0, 2 * math.pi, 13)[:-1]

@@ -29,42 +29,43 @@ Array = NDArray[np.float32]
 BodyPose = tuple[tuple[float, float, float], float]
 """Position and yaw."""
 _SHIFT = 4
+"""Fractional bits of the coordinates that OpenCV draws at."""
 _TO_GL = np.diag([1.0, -1.0, -1.0, 1.0]).astype(np.float32)
 """From camera axes (right, down, forward) to those of the rasteriser."""
 _COARSE_PX = 4.0
-"""A part of this radius in pixels is off by half a pixel if drawn with 6 sides for 10."""
+"""A part of this radius in pixels is off by half a pixel if drawn with 6 sides instead of 10."""
 _COARSE_M = (0.0, 0.12, 0.3, 1.0)
-"""Parts up to these radii are coarse in the levels of detail."""
+"""One level of detail each: the largest radius of a part that the level draws with 6 sides."""
 
 
 @dataclass(slots=True, kw_only=True, eq=False)
 class _Solid:
-    """One body as triangles, with what stays the same while it does not turn."""
+    """One body as triangles; keeps its colours and shadows until its yaw changes."""
 
     segment: int
     meshes: tuple[Mesh, ...]
-    at: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    position_m: tuple[float, float, float] = (0.0, 0.0, 0.0)
     yaw_rad: float = math.nan
-    turn: Array = field(default_factory=lambda: np.eye(3, dtype=np.float32))
-    shades: dict[int, Array] = field(default_factory=dict)
-    shadows: NDArray[np.float64] = field(default_factory=lambda: np.zeros((0, 2)))
-    """The outlines of the parts' shadows about the body's own, one after the other."""
-    lengths: list[int] = field(default_factory=list)
-    """Corners of each outline."""
+    rotation: Array = field(default_factory=lambda: np.eye(3, dtype=np.float32))
+    shaded_colours: dict[int, Array] = field(default_factory=dict)
+    shadow_outlines: NDArray[np.float64] = field(default_factory=lambda: np.zeros((0, 2)))
+    """Outlines of the parts' shadows relative to the body's position, concatenated."""
+    corner_counts: list[int] = field(default_factory=list)
+    """Number of corners of each outline."""
 
-    def put(self, place: BodyPose, conditions: Conditions) -> None:
-        at, yaw = place
-        self.at = at
+    def move_to(self, pose: BodyPose, conditions: Conditions) -> None:
+        position_m, yaw = pose
+        self.position_m = position_m
         if yaw == self.yaw_rad:
             return
-        self.yaw_rad, self.turn = yaw, yaw_matrix(yaw)
-        self.shades = {}
+        self.yaw_rad, self.rotation = yaw, yaw_matrix(yaw)
+        self.shaded_colours = {}
         if _sun_shines(conditions):
             hulls = placed_hulls(self.meshes[0], (0.0, 0.0, 0.0), yaw)
             flat = (shadow_of(hull, conditions.sun) for hull in hulls)
             outlines = [cv2.convexHull(s).reshape(-1, 2) for s in flat]
-            self.shadows = np.concatenate(outlines).astype(np.float64)
-            self.lengths = [len(outline) for outline in outlines]
+            self.shadow_outlines = np.concatenate(outlines).astype(np.float64)
+            self.corner_counts = [len(outline) for outline in outlines]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -77,18 +78,18 @@ class PaintedSolid:
     drawn: Array
 
     def paint_onto(self, image: NDArray[np.uint8]) -> None:
-        """Put them over what the image shows."""
+        """Draw these pixels over the image."""
         window = image[self.rows, self.columns]
         cv2.copyTo(cv2.convertScaleAbs(self.drawn), self.covered.view(np.uint8), window)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Shadow:
-    """A dynamic object's shadow: outlines (n, 2) on the ground about ``at``, one after another."""
+    """A dynamic object's shadow: outlines (n, 2) relative to ``position_m``, concatenated."""
 
-    at: tuple[float, float, float]
+    position_m: tuple[float, float, float]
     outlines: NDArray[np.float64]
-    lengths: tuple[int, ...]
+    corner_counts: tuple[int, ...]
     radius_m: float
 
 
@@ -102,7 +103,7 @@ class Solids:
             for body in map.bodies
         ]
         for solid, body in zip(self._static, map.bodies, strict=True):
-            solid.put((body.position_m, body.yaw_rad), conditions)
+            solid.move_to((body.position_m, body.yaw_rad), conditions)
         self._moving = [
             _Solid(segment=segment_ids[name], meshes=_levels(OBJECT_TYPES[kind].parts))
             for name, kind in map.present_objects
@@ -113,17 +114,17 @@ class Solids:
         self._settings.setCullingMode(cv2.RASTERIZE_CULLING_NONE)
 
     def place(self, objects: Sequence[BodyPose]) -> None:
-        """Put the dynamic objects, in the map's order, where they are now."""
-        for solid, place in zip(self._moving, objects, strict=True):
-            solid.put(place, self._conditions)
+        """Move the dynamic objects, in the map's order, to their present poses."""
+        for solid, pose in zip(self._moving, objects, strict=True):
+            solid.move_to(pose, self._conditions)
 
     def shadows(self) -> tuple[Shadow, ...]:
-        """Return the shadows of the dynamic objects as they stand."""
+        """Return the present shadows of the dynamic objects."""
         return tuple(
             Shadow(
-                at=solid.at,
-                outlines=solid.shadows,
-                lengths=tuple(solid.lengths),
+                position_m=solid.position_m,
+                outlines=solid.shadow_outlines,
+                corner_counts=tuple(solid.corner_counts),
                 radius_m=solid.meshes[0].radius_m,
             )
             for solid in self._moving
@@ -134,24 +135,24 @@ class Solids:
     ) -> tuple[NDArray[np.intp], list[PaintedSolid]]:
         """Draw all solids into depth and segmentation.
 
-        Returns how many pixels each segment got, and what to put on the image, in order.
+        Returns the number of pixels of each segment, and the painted solids in drawing order.
         """
         axes = view.axes.astype(np.float32)
         pixels = np.zeros(self._segments, np.intp)
         layers = []
         for solid in (*self._static, *self._moving):
-            at = np.array(solid.at)
+            at = np.array(solid.position_m)
             x, y, z = (float(value) for value in view.axes @ (at - view.eye))
             radius = solid.meshes[0].radius_m
             if not view.shows(x, y, z, radius):
                 continue
             level = _level_at(max(NEAR_M, z - radius) / view.camera.focal_px * _COARSE_PX)
             mesh = solid.meshes[level]
-            # In the solid's own frame, so that only what faces the camera is turned.
-            eye = solid.turn.T @ (view.eye - at).astype(np.float32)
+            # In the solid's own frame, so that only triangles that face the camera are rotated.
+            eye = solid.rotation.T @ (view.eye - at).astype(np.float32)
             facing = np.flatnonzero(mesh.normals @ eye > mesh.offsets)
             corners = mesh.corners[facing].reshape(-1, 3)
-            seen = corners @ (axes @ solid.turn).T + np.array([x, y, z], np.float32)
+            seen = corners @ (axes @ solid.rotation).T + np.array([x, y, z], np.float32)
             if z - radius <= NEAR_M:
                 triangles, origin = clip_near(seen.reshape(-1, 3, 3), NEAR_M)
                 seen, facing = triangles.reshape(-1, 3), facing[origin]
@@ -183,7 +184,7 @@ class Solids:
         drawn = np.zeros((height, width, 3), np.float32)
         cv2.triangleRasterize(
             sheared,
-            _order(len(paint)),
+            _triangle_indices(len(paint)),
             np.repeat(paint, 3, axis=0),
             drawn,
             depth[rows, columns],
@@ -199,25 +200,25 @@ class Solids:
     def _shade(self, solid: _Solid, level: int) -> Array:
         """Return the mesh's colours in this light, kept until the solid turns.
 
-        None is black: what is black was not drawn.
+        No colour is black, because a black pixel counts as not drawn.
         """
-        kept = solid.shades.get(level)
+        kept = solid.shaded_colours.get(level)
         if kept is None:
             mesh, conditions = solid.meshes[level], self._conditions
-            normals = mesh.normals @ solid.turn.T
+            normals = mesh.normals @ solid.rotation.T
             share = conditions.direct_share
             facing = np.clip(normals @ np.array(conditions.sun, np.float32), 0, 1)
             sky = 0.75 + 0.25 * normals[:, 2]
             light = (1 - share) * sky + share * facing / max(0.35, conditions.sun[2])
             lit = mesh.colours * np.clip(light, 0, 1.15)[:, None]
-            kept = solid.shades[level] = np.clip(np.round(lit), 1, 255).astype(np.float32)
+            kept = solid.shaded_colours[level] = np.clip(np.round(lit), 1, 255).astype(np.float32)
         return kept
 
 
 def draw_shadows(
     image: NDArray[np.uint8], view: View, shadows: Sequence[Shadow], conditions: Conditions
 ) -> None:
-    """Darken the ground where dynamic objects keep the sun from it."""
+    """Darken the ground in the shadows of the dynamic objects."""
     if not _sun_shines(conditions):
         return
     sun = conditions.sun
@@ -225,11 +226,11 @@ def draw_shadows(
     outlines: list[NDArray[np.float64]] = []
     lengths: list[int] = []
     for shadow in shadows:
-        x = shadow.at[0] - sun[0] / sun[2] * shadow.at[2]
-        y = shadow.at[1] - sun[1] / sun[2] * shadow.at[2]
+        x = shadow.position_m[0] - sun[0] / sun[2] * shadow.position_m[2]
+        y = shadow.position_m[1] - sun[1] / sun[2] * shadow.position_m[2]
         if math.hypot(x - view.eye[0], y - view.eye[1]) < reach + shadow.radius_m:
             outlines.append(shadow.outlines + np.array([x, y]))
-            lengths += shadow.lengths
+            lengths += shadow.corner_counts
     if not outlines:
         return
     points, lengths = view.ground_polygons(np.concatenate(outlines), lengths)
@@ -256,15 +257,15 @@ def _levels(parts: tuple[Part, ...]) -> tuple[Mesh, ...]:
 
 
 def _level_at(radius_m: float) -> int:
-    """Return the level of detail in which parts up to ``radius_m`` may be coarse."""
+    """Return the coarsest level of detail for which parts up to ``radius_m`` may be coarse."""
     return max(level for level, limit in enumerate(_COARSE_M) if limit <= radius_m)
 
 
 @functools.lru_cache(maxsize=4)
-def _corner_numbers(most: int) -> NDArray[np.int32]:
+def _corner_indices(most: int) -> NDArray[np.int32]:
     return np.arange(3 * most, dtype=np.int32).reshape(-1, 3)
 
 
-def _order(count: int) -> NDArray[np.int32]:
-    """Return the numbers of the corners of ``count`` triangles, one after the other."""
-    return _corner_numbers(max(4096, 1 << count.bit_length()))[:count]
+def _triangle_indices(count: int) -> NDArray[np.int32]:
+    """Return the indices (count, 3) of the corners of ``count`` triangles, in order."""
+    return _corner_indices(max(4096, 1 << count.bit_length()))[:count]

@@ -1,7 +1,7 @@
 """The simple flight control: a cascade from setpoints to motor thrusts.
 
 A cascade like AirSim's simple_flight: position P, velocity PI, attitude P, rate P; but with an
-integral on all axes of velocity, which AirSim has on the vertical one alone.
+integral on all axes of velocity; AirSim has it on the vertical axis only.
 """
 
 from __future__ import annotations
@@ -40,8 +40,8 @@ MAX_ACCELERATION_MPS2 = 4.0
 MAX_RATE_RADPS = 3.5
 MAX_CLIMB_MPS = 5.0
 MAX_DESCENT_MPS = 4.0
-"""Climb and descent are the Matrice 100's ratings; it may tilt 35 degrees, a landing
-controller keeps below it."""
+"""Climb and descent are the Matrice 100's ratings.  It may tilt 35 degrees; a landing controller
+stays below that."""
 MAX_INTEGRAL_MPS2 = 4.0
 ABORT_CLIMB_MPS = 3.0
 
@@ -57,9 +57,9 @@ class FlightControl:
         self._yaw_rad = 0.0
 
     def remember_yaw(self, command: Command) -> None:
-        """Note a command's yaw: what lands or aborts keeps the one that was commanded last.
+        """Keep the yaw of a command, because ``Land`` and ``Abort`` hold the last commanded yaw.
 
-        It is told of every command, also while a landing system flies the motors itself.
+        Called for every command, also while a landing system controls the motors itself.
         """
         if isinstance(command, PositionSetpoint | VelocitySetpoint):
             self._yaw_rad = command.yaw_rad
@@ -67,16 +67,18 @@ class FlightControl:
             self._yaw_rad = _yaw(command.attitude)
 
     def thrusts(self, motion: Motion, command: Command | None, dt_s: float) -> Thrusts:
-        """Return wanted motor thrusts (front left, front right, rear right, rear left)."""
+        """Return the wanted motor thrusts (front left, front right, rear right, rear left)."""
         if command is None:
             return 0.0, 0.0, 0.0, 0.0
         if isinstance(command, AttitudeSetpoint):
             thrust = command.thrust * 4 * self._model.max_thrust_n
-            return self._attitude(motion, _z_axis(command.attitude), _yaw(command.attitude), thrust)
+            return self._thrusts_towards(
+                motion, _z_axis(command.attitude), _yaw(command.attitude), thrust
+            )
         if type(command) is not type(self._command):
             self._hold = motion.position_m
         self._command = command
-        wanted, yaw = self._velocity(motion, command)
+        wanted, yaw = self._wanted_velocity(motion, command)
         ax, ay, az = self._acceleration(motion, wanted, dt_s)
         vertical = az + GRAVITY_MPS2
         if vertical < 2.0:
@@ -87,9 +89,9 @@ class FlightControl:
         x, y, _, _ = motion.attitude
         upright = 1 - 2 * (x * x + y * y)
         thrust = self._model.mass_kg * vertical / (0.5 if upright < 0.5 else upright)
-        return self._attitude(motion, direction, yaw, thrust)
+        return self._thrusts_towards(motion, direction, yaw, thrust)
 
-    def _velocity(self, motion: Motion, command: Command) -> tuple[Vector, float]:
+    def _wanted_velocity(self, motion: Motion, command: Command) -> tuple[Vector, float]:
         position = motion.position_m
         hold = self._hold or position
         if isinstance(command, VelocitySetpoint):
@@ -110,12 +112,12 @@ class FlightControl:
         (wx, wy, wz), (vx, vy, vz) = wanted, motion.velocity_mps
         climb = _bounded(wz, -MAX_DESCENT_MPS, MAX_CLIMB_MPS)
         return (
-            self._axis(0, wx - vx, dt_s),
-            self._axis(1, wy - vy, dt_s),
-            self._axis(2, climb - vz, dt_s),
+            self._axis_acceleration(0, wx - vx, dt_s),
+            self._axis_acceleration(1, wy - vy, dt_s),
+            self._axis_acceleration(2, climb - vz, dt_s),
         )
 
-    def _axis(self, axis: int, error: float, dt_s: float) -> float:
+    def _axis_acceleration(self, axis: int, error: float, dt_s: float) -> float:
         proportional = VELOCITY_P * error
         integral = self._integral[axis]
         # Integrating while the output is saturated would wind up and overshoot.
@@ -126,7 +128,7 @@ class FlightControl:
             return proportional + integral
         return _bounded(proportional, -MAX_ACCELERATION_MPS2, MAX_ACCELERATION_MPS2) + integral
 
-    def _attitude(
+    def _thrusts_towards(
         self, motion: Motion, direction: Vector, yaw_rad: float, thrust_n: float
     ) -> Thrusts:
         # The tilt error as a rotation vector in the body frame: z x wanted direction.

@@ -1,4 +1,4 @@
-"""Dynamic objects in motion: continuous, bounded in speed and acceleration, around bodies."""
+"""Motion of the dynamic objects: bounded in speed and acceleration, and around solid bodies."""
 
 from __future__ import annotations
 
@@ -21,10 +21,11 @@ from pytest_garl.simulation.npc_policy import (
 )
 
 _LOOK_AHEAD_M = 0.5
-_MEETING_M = 2.0
-"""More than any two bodies' radii and a sixtieth of a second's way together."""
+_CONTACT_RANGE_M = 2.0
+"""No two objects farther apart can touch in the next 1/60 s: more than the sum of two radii and of
+both ways in that time."""
 TURN_RATE_RADPS = 2 * math.pi
-"""A being turns on the spot within about a second: engineering estimate."""
+"""A person or an animal turns around on the spot in about a second: engineering estimate."""
 
 
 class Npc:
@@ -41,20 +42,20 @@ class Npc:
         self.yaw_rad = 0.0
         self.moves: list[tuple[float, float]] = []
         self.changes: list[tuple[int, str, float]] = []
-        self._wanted = (0.0, 0.0)
+        self._wanted_velocity_mps = (0.0, 0.0)
         self._bounds = map.bounds_m
         self.low_m, self.high_m = self.type.bottom_m, self.type.top_m
-        self._solids = _solids_at(map.bodies, self)
-        self._near: list[Disc] = []
+        self._solids = _solids_at_height_of(self, map.bodies)
+        self._solids_in_reach: list[Disc] = []
 
     @property
     def position_m(self) -> tuple[float, float, float]:
-        """Place of the body's frame."""
+        """Position of the body's frame in the world."""
         return self.x_m, self.y_m, self.type.altitude_m
 
     @property
     def body(self) -> Body:
-        """The body to put into the world at the start."""
+        """The body that the physics gets at the start of the flight."""
         return Body(
             name=self.name,
             kind=self.type.name,
@@ -65,7 +66,7 @@ class Npc:
 
     @property
     def state(self) -> NpcState:
-        """What a policy may know of it."""
+        """The part of its state that policies may see."""
         return NpcState(
             name=self.name,
             type=self.type,
@@ -75,30 +76,35 @@ class Npc:
         )
 
     def decide(self, situation: Situation) -> Move:
-        """Ask the policy where to go; raise PolicyError if it fails or answers nonsense."""
+        """Ask the policy where to go; raise PolicyError if it fails or returns an invalid move."""
         move = decision(self.policy, situation)
-        self.take(move)
+        self._start_move(move)
         return move
 
-    def take(self, move: Move) -> None:
-        """Go where ``move`` says until the next decision."""
+    def _start_move(self, move: Move) -> None:
+        """Set the wanted velocity until the next decision, and record the move."""
         self.changes += [(len(self.moves), key, float(by)) for key, by in move.changes]
         # Without negative zeros, so that moves that compare equal are the same to the byte.
         x, y = move.x + 0.0, move.y + 0.0
         self.moves.append((x, y))
-        self._wanted = (x * self.speed_mps, y * self.speed_mps)
-        # What it can reach before the next decision; few, and mostly none.
+        self._wanted_velocity_mps = (x * self.speed_mps, y * self.speed_mps)
+        # The few solids, mostly none, that it can reach before the next decision.
         reach = self.type.radius_m + self.speed_mps * DECISION_STEP_S + _LOOK_AHEAD_M
-        self._near = [solid for solid in self._solids if _gap(solid, self.x_m, self.y_m) < reach]
+        self._solids_in_reach = [
+            solid for solid in self._solids if _gap(solid, self.x_m, self.y_m) < reach
+        ]
 
     def advance(self, dt_s: float, others: Sequence[Npc] = ()) -> None:
-        """Move on: towards the wanted velocity, along solids and ``others``, never through them."""
-        dvx, dvy = self._wanted[0] - self.vx_mps, self._wanted[1] - self.vy_mps
+        """Accelerate towards the wanted velocity; slide along solids and ``others``."""
+        dvx, dvy = (
+            self._wanted_velocity_mps[0] - self.vx_mps,
+            self._wanted_velocity_mps[1] - self.vy_mps,
+        )
         change = math.hypot(dvx, dvy)
-        most = self.type.acceleration_mps2 * dt_s
-        share = min(1.0, most / change) if change > 0 else 0.0
+        allowed = self.type.acceleration_mps2 * dt_s
+        share = min(1.0, allowed / change) if change > 0 else 0.0
         vx, vy = self.vx_mps + share * dvx, self.vy_mps + share * dvy
-        solids = [*self._near, *self._met(others)]
+        solids = [*self._solids_in_reach, *self._objects_in_reach(others)]
         if solids:
             vx, vy = self._slide(vx, vy, dt_s, solids)
         x_min, x_max, y_min, y_max = self._bounds
@@ -108,11 +114,11 @@ class Npc:
         self.vy_mps = vy if self.y_m == y else 0.0
         if math.hypot(vx, vy) > 0.05:
             turn = math.remainder(math.atan2(vy, vx) - self.yaw_rad, 2 * math.pi)
-            most = TURN_RATE_RADPS * dt_s
-            self.yaw_rad += min(most, max(-most, turn))
+            largest_turn = TURN_RATE_RADPS * dt_s
+            self.yaw_rad += min(largest_turn, max(-largest_turn, turn))
 
-    def _met(self, others: Sequence[Npc]) -> list[Disc]:
-        """Return the others that are near enough, and as high, to be bumped into."""
+    def _objects_in_reach(self, others: Sequence[Npc]) -> list[Disc]:
+        """Return the other objects that it could touch: near enough, and of overlapping heights."""
         return [
             Disc(
                 name=other.name,
@@ -123,8 +129,8 @@ class Npc:
                 high_m=other.high_m,
             )
             for other in others
-            if abs(other.x_m - self.x_m) < _MEETING_M
-            and abs(other.y_m - self.y_m) < _MEETING_M
+            if abs(other.x_m - self.x_m) < _CONTACT_RANGE_M
+            and abs(other.y_m - self.y_m) < _CONTACT_RANGE_M
             and other is not self
             and other.low_m < self.high_m
             and self.low_m < other.high_m
@@ -153,10 +159,10 @@ def _gap(solid: Disc, x: float, y: float) -> float:
     return math.hypot(x - solid.x_m, y - solid.y_m) - solid.radius_m - 1e-9
 
 
-def _solids_at(bodies: Sequence[Body], thing: Npc) -> tuple[Disc, ...]:
+def _solids_at_height_of(npc: Npc, bodies: Sequence[Body]) -> tuple[Disc, ...]:
     return tuple(
         disc
         for body in bodies
         for disc in discs_of(body)
-        if disc.low_m < thing.high_m and thing.low_m < disc.high_m
+        if disc.low_m < npc.high_m and npc.low_m < disc.high_m
     )

@@ -20,8 +20,8 @@ from pytest_garl.simulation.physics.vehicle import (
 
 
 @contextlib.contextmanager
-def _quiet() -> Iterator[None]:
-    """Silence file descriptor 2: pybullet's C code announces its build time on import."""
+def _without_stderr() -> Iterator[None]:
+    """Redirect stderr to nothing: pybullet's C code prints its build time on import."""
     saved = os.dup(2)
     null = os.open(os.devnull, os.O_WRONLY)
     try:
@@ -33,21 +33,21 @@ def _quiet() -> Iterator[None]:
         os.close(null)
 
 
-with _quiet():
+with _without_stderr():
     import pybullet
 
 PHYSICS_RATE_HZ = 240
-_KINDS = {
+_GEOMETRIES = {
     "box": "GEOM_BOX",
     "cylinder": "GEOM_CYLINDER",
     "sphere": "GEOM_SPHERE",
     "ellipsoid": "GEOM_MESH",
 }
-_BALL = str(Path(__file__).with_name("unit_ball.obj"))
-"""The vertices of a ball of diameter 1 as the camera draws it: 10 sides, 5 rings; the engine
-takes their convex hull."""
-_RANGE_M = 3.0
-"""Distances beyond this are bounded by spheres instead of asked of the engine."""
+_BALL_FILE = str(Path(__file__).with_name("unit_ball.obj"))
+"""Vertices of a ball of diameter 1 as the camera draws it: 10 sides, 5 rings; the engine
+uses their convex hull."""
+_EXACT_RANGE_M = 3.0
+"""The engine computes distances up to this one; longer ones are those of bounding spheres."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -61,8 +61,8 @@ class HullContact:
 class World:
     """One flight's physics: ground, static bodies, dynamic objects and the UAV's hull.
 
-    A world is built for one flight and closed after it: saving and restoring a pybullet
-    state is not deterministic, building it anew is.
+    A world is built for one flight and closed after it: restoring a saved pybullet state is
+    not deterministic, but building a new world is.
     """
 
     def __init__(
@@ -73,29 +73,28 @@ class World:
         objects: Sequence[Body],
     ) -> None:
         self._client = pybullet.connect(pybullet.DIRECT)
-        self._p = pybullet
-        self._call = {"physicsClientId": self._client}
-        self._p.setGravity(0, 0, -GRAVITY_MPS2, **self._call)
-        self._p.setTimeStep(1 / PHYSICS_RATE_HZ, **self._call)
-        self._p.setPhysicsEngineParameter(deterministicOverlappingPairs=1, **self._call)
-        plane = self._p.createCollisionShape(self._p.GEOM_PLANE, **self._call)
-        ground = self._p.createMultiBody(0, plane, **self._call)
+        self._client_argument = {"physicsClientId": self._client}
+        pybullet.setGravity(0, 0, -GRAVITY_MPS2, **self._client_argument)
+        pybullet.setTimeStep(1 / PHYSICS_RATE_HZ, **self._client_argument)
+        pybullet.setPhysicsEngineParameter(deterministicOverlappingPairs=1, **self._client_argument)
+        plane = pybullet.createCollisionShape(pybullet.GEOM_PLANE, **self._client_argument)
+        ground = pybullet.createMultiBody(0, plane, **self._client_argument)
         self._names = {ground: "ground"}
         self._spheres: dict[int, tuple[Vector, float]] = {}
         self._ids: dict[str, int] = {}
         for body in (*bodies, *objects):
             self._add(body)
         self._uav = self._add_uav(model, start_m)
-        self._reach = model.size_m * 0.6
+        self._hull_radius_m = model.size_m * 0.6
 
     def close(self) -> None:
         """Free the physics client."""
-        self._p.disconnect(**self._call)
+        pybullet.disconnect(**self._client_argument)
 
     def step(self, position: Vector, force: Vector, torque: Vector) -> None:
-        """Advance by 1/240 s under a force and a torque on the UAV, which is at ``position``.
+        """Apply a force and a torque to the UAV at ``position`` and advance by 1/240 s.
 
-        All are in the world frame.
+        All three are in the world frame.
         """
         client, uav = self._client, self._uav
         pybullet.applyExternalForce(uav, -1, force, position, pybullet.WORLD_FRAME, client)
@@ -109,59 +108,64 @@ class World:
         return position, attitude, velocity, spin
 
     def move(self, name: str, position_m: Vector, yaw_rad: float, velocity: Vector) -> None:
-        """Put a dynamic object somewhere; its velocity makes contacts feel right."""
+        """Move a dynamic object to a pose; contacts depend on its velocity too."""
         body = self._ids[name]
         attitude = (0.0, 0.0, math.sin(yaw_rad / 2), math.cos(yaw_rad / 2))
-        self._p.resetBasePositionAndOrientation(body, position_m, attitude, **self._call)
-        self._p.resetBaseVelocity(body, velocity, (0, 0, 0), **self._call)
+        pybullet.resetBasePositionAndOrientation(
+            body, position_m, attitude, **self._client_argument
+        )
+        pybullet.resetBaseVelocity(body, velocity, (0, 0, 0), **self._client_argument)
         self._spheres[body] = (position_m, self._spheres[body][1])
 
     def hull_contacts(self) -> tuple[HullContact, ...]:
         """Return the UAV's present contacts, one per body."""
-        contacts = self._p.getContactPoints(self._uav, **self._call)
+        contacts = pybullet.getContactPoints(self._uav, **self._client_argument)
         if not contacts:
             return ()
         found: dict[str, HullContact] = {}
         for contact in contacts:
-            # Bullet pushes bodies apart a step before they overlap: force without overlap is
-            # a contact as well.
-            if contact[8] <= 0 or contact[9] > 0:
+            # Bullet pushes bodies apart a step before they overlap, so a force without an overlap
+            # is a contact too.
+            distance_m, force_n = contact[8], contact[9]
+            if distance_m <= 0 or force_n > 0:
                 name = self._names[contact[2]]
                 found.setdefault(name, HullContact(body=name, position_m=contact[6]))
         return tuple(found.values())
 
     def separations(self) -> dict[str, float]:
-        """Distance in metres from the UAV's hull to each body but the ground.
+        """Return the distance in metres from the UAV's hull to each body except the ground.
 
-        Exact within 3 m; beyond, the distance of bounding spheres, which is smaller.
+        Exact within 3 m; beyond that the distance of bounding spheres, which is smaller.
         """
-        x, y, z = self._p.getBasePositionAndOrientation(self._uav, **self._call)[0]
+        x, y, z = pybullet.getBasePositionAndOrientation(self._uav, **self._client_argument)[0]
         result = {}
         for name, body in self._ids.items():
             (cx, cy, cz), radius = self._spheres[body]
-            bound = math.dist((x, y, z), (cx, cy, cz)) - radius - self._reach
-            if bound < _RANGE_M:
-                points = self._p.getClosestPoints(self._uav, body, _RANGE_M, **self._call)
-                bound = min((point[8] for point in points), default=max(bound, _RANGE_M))
+            bound = math.dist((x, y, z), (cx, cy, cz)) - radius - self._hull_radius_m
+            if bound < _EXACT_RANGE_M:
+                points = pybullet.getClosestPoints(
+                    self._uav, body, _EXACT_RANGE_M, **self._client_argument
+                )
+                bound = min((point[8] for point in points), default=max(bound, _EXACT_RANGE_M))
             result[name] = bound
         return result
 
     def _add_uav(self, model: VehicleModel, start_m: Vector) -> int:
-        # The rotors' disc, and below it the landing gear on which the body stands.
+        # A cylinder for the rotors, and below it a box for the landing gear.
         disc, gear = 0.10, BODY_ABOVE_FEET_M - 0.02
-        shape = self._p.createCollisionShapeArray(
-            shapeTypes=[self._p.GEOM_CYLINDER, self._p.GEOM_BOX],
+        shape = pybullet.createCollisionShapeArray(
+            shapeTypes=[pybullet.GEOM_CYLINDER, pybullet.GEOM_BOX],
             radii=[model.size_m / 2, 0.0],
             lengths=[disc, 0.0],
             halfExtents=[[0, 0, 0], [0.18 * model.size_m, 0.18 * model.size_m, gear / 2]],
             collisionFramePositions=[[0, 0, 0.03], [0, 0, -0.02 - gear / 2]],
-            **self._call,
+            **self._client_argument,
         )
         x, y, _ = start_m
-        uav: int = self._p.createMultiBody(
-            model.mass_kg, shape, basePosition=(x, y, BODY_ABOVE_FEET_M), **self._call
+        uav: int = pybullet.createMultiBody(
+            model.mass_kg, shape, basePosition=(x, y, BODY_ABOVE_FEET_M), **self._client_argument
         )
-        self._p.changeDynamics(
+        pybullet.changeDynamics(
             uav,
             -1,
             localInertiaDiagonal=model.inertia,
@@ -169,8 +173,8 @@ class World:
             angularDamping=0,
             lateralFriction=0.5,
             restitution=0.0,
-            activationState=self._p.ACTIVATION_STATE_DISABLE_SLEEPING,
-            **self._call,
+            activationState=pybullet.ACTIVATION_STATE_DISABLE_SLEEPING,
+            **self._client_argument,
         )
         self._names[uav] = "uav"
         return uav
@@ -178,28 +182,28 @@ class World:
     def _add(self, body: Body) -> None:
         """Add a body as one compound of its parts.
 
-        A compound costs the engine a seventh of the same parts as links.
+        The engine takes seven times as long for the same parts as links.
         """
         parts = body.parts
-        shape = self._p.createCollisionShapeArray(
-            shapeTypes=[getattr(self._p, _KINDS[part.shape]) for part in parts],
+        shape = pybullet.createCollisionShapeArray(
+            shapeTypes=[getattr(pybullet, _GEOMETRIES[part.shape]) for part in parts],
             radii=[part.size_m[0] / 2 for part in parts],
             lengths=[part.size_m[2] for part in parts],
             halfExtents=[[side / 2 for side in part.size_m] for part in parts],
-            fileNames=[_BALL if part.shape == "ellipsoid" else "" for part in parts],
+            fileNames=[_BALL_FILE if part.shape == "ellipsoid" else "" for part in parts],
             meshScales=[list(part.size_m) for part in parts],
             collisionFramePositions=[part.position_m for part in parts],
             collisionFrameOrientations=[part.rotation for part in parts],
-            **self._call,
+            **self._client_argument,
         )
-        number: int = self._p.createMultiBody(
+        body_id: int = pybullet.createMultiBody(
             0,
             shape,
             basePosition=body.position_m,
             baseOrientation=(0.0, 0.0, math.sin(body.yaw_rad / 2), math.cos(body.yaw_rad / 2)),
-            **self._call,
+            **self._client_argument,
         )
         radius = max(math.hypot(*part.position_m) + math.hypot(*part.size_m) / 2 for part in parts)
-        self._ids[body.name] = number
-        self._names[number] = body.name
-        self._spheres[number] = (body.position_m, radius)
+        self._ids[body.name] = body_id
+        self._names[body_id] = body.name
+        self._spheres[body_id] = (body.position_m, radius)

@@ -1,4 +1,4 @@
-"""Calls of the landing system's code, and what is recorded where it breaks down."""
+"""Calls of the landing system's code, and the record of its errors."""
 
 from __future__ import annotations
 
@@ -21,63 +21,63 @@ from pytest_garl.simulation.system_under_test.texts import (
 )
 
 _SIMULATION = Path(__file__).parents[1]
-_OURS = {_SIMULATION.parent / "landing_system.py", *_SIMULATION.rglob("*.py")}
-"""Whose lines are no part of a landing system's traceback."""
+_SIMULATION_FILES = {_SIMULATION.parent / "landing_system.py", *_SIMULATION.rglob("*.py")}
+"""Files whose frames are left out of the traceback of a landing system."""
 
 
 class StepGuard(Protocol):
-    """Told before and after each call of the landing system's code; the pool's watchdog."""
+    """Watches calls of the landing system's code, so that a pool can end a call that hangs."""
 
     def step_begins(self) -> None:
-        """User code is about to run."""
+        """Note that user code is about to run."""
 
     def step_ends(self) -> None:
-        """User code has returned or raised."""
+        """Note that user code has returned or raised."""
 
 
 class SystemFailedError(Exception):
-    """The landing system broke down; carries what the flight records."""
+    """The landing system failed; ``crash`` is what the flight records."""
 
     def __init__(self, crash: Crash) -> None:
         self.crash = crash
 
 
 class SystemCalls:
-    """Calls a landing system under a guard; whatever it raises becomes a SystemFailedError.
+    """Calls a landing system under a guard; every error of it becomes a SystemFailedError.
 
-    That holds for its SystemExit too.  KeyboardInterrupt passes, it is the user's, and so does what
-    a signal of the machine raises in this package.
+    Its SystemExit does too.  A KeyboardInterrupt of the user passes, and so does a SystemExit that
+    this package raises on a signal.
     """
 
     def __init__(self, system: Callable[[], Any], guard: StepGuard | None) -> None:
-        self._name = _name(system)
+        self._name = _system_name(system)
         self._guard = guard
 
-    def ask(self, method: str, call: Callable[[], Any]) -> Any:
-        """Return what ``call``, of the system's ``method``, returns.
+    def run(self, method: str, code: Callable[[], Any]) -> Any:
+        """Return the result of ``code``, which calls the system's ``method``.
 
-        All that touches what the system made belongs into ``call``: a property or a generator
-        runs its code as well.
+        Every use of a value that the system returned belongs into ``code`` too, because a property
+        or a generator runs the system's code.
         """
         if self._guard:
             self._guard.step_begins()
         try:
-            return call()
+            return code()
         except KeyboardInterrupt:
             raise
         except NonsenseError as error:
-            raise self.nonsense(error.error, str(error), method) from error
+            raise self.nonsense_error(error.error, str(error), method) from error
         except BaseException as error:
-            if _is_asked_to_end(error):
+            if _is_own_system_exit(error):
                 raise
-            # Not ours to name: whatever a landing system raises is how it fails, and a finding.
+            # A landing system may raise anything; every exception is a finding.
             raise SystemFailedError(crash_of(error, method)) from error
         finally:
             if self._guard:
                 self._guard.step_ends()
 
-    def nonsense(self, error: str, message: str, method: str) -> SystemFailedError:
-        """Return what ends the flight where the system made a value that nobody can fly."""
+    def nonsense_error(self, error: str, message: str, method: str) -> SystemFailedError:
+        """Return the error for a value of the system that cannot be flown."""
         return SystemFailedError(
             Crash(
                 kind="nonsense",
@@ -89,7 +89,7 @@ class SystemCalls:
         )
 
 
-def _is_asked_to_end(error: BaseException) -> bool:
+def _is_own_system_exit(error: BaseException) -> bool:
     """Whether this package raised a SystemExit itself: a SIGTERM came during the call."""
     if not isinstance(error, SystemExit):
         return False
@@ -98,7 +98,7 @@ def _is_asked_to_end(error: BaseException) -> bool:
 
 
 def read_airframe(system: object) -> Airframe:
-    """Return a system's airframe; raise NonsenseError for what is none."""
+    """Return a system's airframe; raise NonsenseError if it is not valid."""
     try:
         return airframe_of(system)
     except LandingSystemError as error:
@@ -106,21 +106,23 @@ def read_airframe(system: object) -> Airframe:
 
 
 def crash_of(error: BaseException, method: str) -> Crash:
-    """Return the record of what a landing system raised in one of its methods.
+    """Return the record of an exception from one of a landing system's methods.
 
     A message is cut after 1,000 characters, a traceback in the middle, to 20,000.
     """
     kind = class_name(type(error))
     try:
         frames = traceback.extract_tb(error.__traceback__)
-        theirs = [frame for frame in frames if Path(frame.filename).resolve() not in _OURS]
-        lines = traceback.format_list(theirs) + traceback.format_exception_only(error)
+        system_frames = [
+            frame for frame in frames if Path(frame.filename).resolve() not in _SIMULATION_FILES
+        ]
+        lines = traceback.format_list(system_frames) + traceback.format_exception_only(error)
         text = cut_middle("".join(lines), TRACEBACK_CHARS)
-    except Exception as second:  # noqa: BLE001 (an exception's own code may raise what it likes)
-        theirs, text = [], f"{kind}, whose traceback raised {class_name(type(second))}"
+    except Exception as second:  # noqa: BLE001 (code of an exception may raise anything)
+        system_frames, text = [], f"{kind}, whose traceback raised {class_name(type(second))}"
     where = (
-        f"{identifier_from(Path(theirs[-1].filename).stem)}.{identifier_from(theirs[-1].name)}"
-        if theirs
+        f"{identifier_from(Path(system_frames[-1].filename).stem)}.{identifier_from(system_frames[-1].name)}"
+        if system_frames
         else ""
     )
     return Crash(
@@ -132,5 +134,5 @@ def crash_of(error: BaseException, method: str) -> Crash:
     )
 
 
-def _name(system: Callable[[], Any]) -> str:
+def _system_name(system: Callable[[], Any]) -> str:
     return class_name(system) if isinstance(system, type) else "system"

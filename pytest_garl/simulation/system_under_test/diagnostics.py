@@ -37,13 +37,16 @@ MOST_MARKER_ID = 2**31
 
 
 class DiagnosticsQuota:
-    """How much of a landing system's diagnostics the record of one flight still takes."""
+    """Limits the bytes of a landing system's diagnostics in the record of one flight."""
 
     def __init__(self) -> None:
         self._left = MOST_BYTES
 
     def shorten(self, diagnostics: Diagnostics, field: str) -> Diagnostics:
-        """Return what is recorded: only what verdicts need, once a quarter of the quota is used."""
+        """Return the diagnostics to record.
+
+        Once a quarter of the quota is used, these are only what verdicts need.
+        """
         if self._left < (1 - FULL_SHARE) * MOST_BYTES:
             diagnostics = dataclasses.replace(
                 diagnostics,

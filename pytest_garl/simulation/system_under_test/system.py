@@ -1,4 +1,4 @@
-"""The landing system of one flight: how it is made, and what it is asked."""
+"""The landing system of one flight: creates it and calls its methods."""
 
 from __future__ import annotations
 
@@ -26,47 +26,48 @@ from pytest_garl.simulation.system_under_test.validation import read_command, re
 
 
 class SystemUnderTest:
-    """A landing system under way; every call may raise SystemFailedError, which ends the flight.
+    """The landing system of one flight.
 
-    ``needs_camera`` and ``observes_truth`` are known once it has started.  ``gave_up`` tells that
-    it has answered ``Abort()``.
+    Every call may raise SystemFailedError, which ends the flight.
+    ``needs_camera`` and ``observes_truth`` are known after ``start``.  ``gave_up`` is whether the
+    last command was ``Abort()``.
     """
 
     def __init__(self, make_system: Callable[[], Any], guard: StepGuard | None) -> None:
         self._make_system = make_system
         self._calls = SystemCalls(make_system, guard)
         self._quota = DiagnosticsQuota()
-        self.airframe, self._no_airframe = self._read_airframe()
+        self.airframe, self._airframe_error = self._read_airframe()
         self.needs_camera, self.observes_truth = True, False
         self.gave_up = False
 
     def _read_airframe(self) -> tuple[Airframe, SystemFailedError | None]:
-        """Return the airframe, or the default and what ends the flight when it has begun."""
+        """Return the airframe; on failure the default and the error, which ``start`` raises."""
         try:
-            return self._calls.ask("airframe", lambda: read_airframe(self._make_system)), None
-        except SystemFailedError as broken:
-            return Airframe(), broken
+            return self._calls.run("airframe", lambda: read_airframe(self._make_system)), None
+        except SystemFailedError as error:
+            return Airframe(), error
 
     def start(self, mission: Mission) -> None:
-        """Make the system and reset it."""
-        if self._no_airframe:
-            raise self._no_airframe
-        self._system = self._calls.ask("reset", lambda: self._make_system())
-        self._calls.ask("reset", lambda: self._system.reset(mission))
-        self.needs_camera = self._calls.ask(
+        """Create the system and reset it."""
+        if self._airframe_error:
+            raise self._airframe_error
+        self._system = self._calls.run("reset", lambda: self._make_system())
+        self._calls.run("reset", lambda: self._system.reset(mission))
+        self.needs_camera = self._calls.run(
             "needs_camera", lambda: bool(getattr(self._system, "needs_camera", True))
         )
-        self.observes_truth = self._calls.ask(
+        self.observes_truth = self._calls.run(
             "observe_truth", lambda: getattr(self._system, "observe_truth", None) is not None
         )
 
     def observe_truth(self, truth: Truth) -> None:
-        """Show the truth to a system that asks for it: a reference pilot."""
-        self._calls.ask("observe_truth", lambda: self._system.observe_truth(truth))
+        """Pass the truth to a system that has ``observe_truth``: a reference pilot."""
+        self._calls.run("observe_truth", lambda: self._system.observe_truth(truth))
 
     def step(self, observation: Observation) -> Command:
         """Return the checked command for one camera frame."""
-        command: Command = self._calls.ask(
+        command: Command = self._calls.run(
             "step", lambda: read_command(self._system.step(observation), self._quota)
         )
         self.gave_up = isinstance(command, Abort)
@@ -74,14 +75,14 @@ class SystemUnderTest:
 
     def control(self, state: VehicleState, max_thrust_n: float) -> Thrusts:
         """Return the checked thrusts of a system that has its own flight control, in newtons."""
-        thrusts: Thrusts = self._calls.ask(
+        thrusts: Thrusts = self._calls.run(
             "control", lambda: read_thrusts(self._system.control(state), max_thrust_n)
         )
         return thrusts
 
     def not_finite_error(self, time_s: float) -> SystemFailedError:
-        """Return what ends a flight whose state is no longer finite."""
-        return self._calls.nonsense(
+        """Return the error for a flight whose state has become NaN or infinite."""
+        return self._calls.nonsense_error(
             "NotFinite",
             f"after {time_s:.2f} s the flight is no longer one of finite numbers; expected "
             "commands and an airframe that the physics can follow",
