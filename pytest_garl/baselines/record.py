@@ -15,7 +15,7 @@ from pytest_garl.baselines.gate import FlyScenarios
 from pytest_garl.baselines.pairs import summary_of
 from pytest_garl.errors import BaselineError, PolicyError
 from pytest_garl.execution.batch import fly_all, temporary_pool
-from pytest_garl.execution.checkout import Checkout, describe
+from pytest_garl.execution.checkout import Checkout, locate_system
 from pytest_garl.execution.job import FlightJob, parse_job
 from pytest_garl.execution.reference import BUILT_IN, Reference
 from pytest_garl.execution.result import CompletedFlight
@@ -59,7 +59,7 @@ def fly_baseline(
     show_progress: ShowProgress,
 ) -> Baseline:
     """Fly the scenarios with landing systems ("module:class") of one checkout."""
-    found = [describe(checkout, system) for system in systems]
+    found = [locate_system(checkout, system) for system in systems]
     npcs = policy_spec(spec.npcs)
     maps = [load_map(name, spec.map_folders) for name in spec.maps]
     for map in maps:
@@ -85,7 +85,7 @@ def neighbour_flyer(
     """Return a function that flies more scenarios with the landing system of a flown set."""
 
     def fly(scenarios: Sequence[Scenario]) -> Sequence[CompletedFlight]:
-        reference, sources = describe(checkout, flown.system)
+        reference, sources = locate_system(checkout, flown.system)
         map = load_map(flown.map, spec.map_folders)
         with temporary_pool(workers, checkout) as (ledger, pool):
             job = _job(spec, checkout, reference, sources, map, ledger.path.parent)

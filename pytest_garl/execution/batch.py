@@ -1,4 +1,4 @@
-"""Many flights of given scenarios at once, beside the searches."""
+"""Flights of many given scenarios at the same time, outside a search."""
 
 from __future__ import annotations
 
@@ -29,21 +29,21 @@ def fly_all(
     scenarios: Sequence[Scenario],
     on_wait: Callable[[], None] = lambda: None,
 ) -> Iterator[CompletedFlight]:
-    """Yield the flight of each scenario, in order; all are handed out before the first wait.
+    """Yield the flight of each scenario, in order; the pool flies them at the same time.
 
-    Raises LedgerError if the ledger has them with another job.
+    Raises LedgerError if the ledger has the same scenarios with another job.
     """
     system = job.system.name
     texts = {index: dump_scenario(scenario) for index, scenario in enumerate(scenarios)}
-    facts = [system, job.map, job.npcs.name, dataclasses.asdict(job.limits), *texts.values()]
-    search = search_key(json.dumps(facts))
-    ledger.add_search(search, system, job.map, len(texts), job.dumps(), "case")
-    known = ledger.job(search)
-    differing = job.differences(parse_job(known)) if known else ()
+    identity = [system, job.map, job.npcs.name, dataclasses.asdict(job.limits), *texts.values()]
+    search = search_key(json.dumps(identity))
+    ledger.add_search(search, system, job.map, len(texts), job.dumps(), kind="case")
+    recorded = ledger.job(search)
+    differing = job.differences(parse_job(recorded)) if recorded else ()
     if differing:
         raise LedgerError(
             f"{ledger.path}: {system} on {job.map} flew the same scenarios before, but "
-            f"{', '.join(differing)} changed; run without --garl-resume to begin anew"
+            f"{', '.join(differing)} changed; run without --garl-resume to start over"
         )
     ledger.add_slots(search, 0, texts)
     for index in texts:
@@ -53,7 +53,10 @@ def fly_all(
 
 @contextmanager
 def temporary_pool(workers: int, checkout: Checkout | None = None) -> Iterator[tuple[Ledger, Pool]]:
-    """Yield a ledger and its pool of workers, which end with the block and import one checkout."""
+    """Yield a temporary ledger and its pool of workers; both end with the ``with`` block.
+
+    The workers import landing systems from ``checkout`` only, if it is given.
+    """
     with tempfile.TemporaryDirectory(prefix="garl-") as scratch:
         ledger = Ledger.create(Path(scratch) / "ledger.sqlite", {})
         pool = local_pool(ledger.queue, workers, checkout)

@@ -74,7 +74,7 @@ class Ledger:
         if problem != "ok":
             raise LedgerError(
                 f"--garl-resume: {path} is damaged or no ledger ({problem}); run without "
-                "--garl-resume to begin anew"
+                "--garl-resume to start over"
             )
         wanted = {**run, "ledger": VERSION}
         found = {"ledger": version, **{key: ledger.fact(key) for key in run}}
@@ -85,7 +85,7 @@ class Ledger:
             )
             raise LedgerError(
                 f"--garl-resume: {path} belongs to another run: {facts}. Give the same options, or "
-                "run without --garl-resume to begin anew"
+                "run without --garl-resume to start over"
             )
         ledger.queue.reset()
         ledger.database.execute("DELETE FROM run WHERE key LIKE ?", (f"{SESSION_FACT}%",))
@@ -162,7 +162,7 @@ class Ledger:
         if any(scenarios.get(slot, text) != text for slot, text in rows):
             raise LedgerError(
                 f"{self.path}: generation {generation} was bred in another way before; run without "
-                "--garl-resume to begin anew"
+                "--garl-resume to start over"
             )
 
     def generation(self, search: str, generation: int) -> list[tuple[str, FlightResult | None]]:

@@ -2,7 +2,7 @@
 
 Imports are read from the source code, not from the loaded modules.  So an import inside a function
 counts before it runs, and imports of other code do not count.  A module whose name is only known at
-run time is not found; the marker's ``files`` can name it.
+run time is not found; the ``files`` argument of ``pytest.mark.garl`` can name it.
 """
 
 from __future__ import annotations
@@ -19,11 +19,12 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-_HERE = Path(__file__).resolve().parents[1]
+_PACKAGE_FOLDER = Path(__file__).resolve().parents[1]
+"""The folder of pytest_garl."""
 
 
 def sources_sha256(system: Any, files: Mapping[str, Path] | None = None) -> str:
-    """Hash the project's modules that a landing system imports, and data files."""
+    """Return one hash of the project's modules that a landing system imports, and of data files."""
     return combined_sha256(source_hashes(system, files))
 
 
@@ -36,28 +37,28 @@ def combined_sha256(sources: Iterable[tuple[str, str]]) -> str:
 
 
 def source_hashes(
-    thing: Any, files: Mapping[str, Path] | None = None
+    definition: Any, files: Mapping[str, Path] | None = None
 ) -> tuple[tuple[str, str], ...]:
     """Return the sources of a class or function: names of files with their hashes.
 
     The name of a module's file is relative to the folder from which it is imported.
     """
-    found = {module.label: module.file for module in _modules(thing)}
+    found = {module.source_name: module.file for module in _modules(definition)}
     found.update(files or {})
     return tuple(sorted((name, _sha256(file)) for name, file in found.items()))
 
 
 def data_files(paths: Sequence[str], root: Path) -> dict[str, Path]:
-    """Return the files at paths below ``root`` by name; a folder stands for all files in it.
+    """Return the files at paths below ``root`` by their names; a folder means all files in it.
 
     Raises FileNotFoundError, with the path as its message, if there is no such path.
     """
     found: dict[str, Path] = {}
     for path in paths:
-        place = root / path
-        if not place.exists():
+        target = root / path
+        if not target.exists():
             raise FileNotFoundError(path)
-        inside = sorted(place.rglob("*")) if place.is_dir() else [place]
+        inside = sorted(target.rglob("*")) if target.is_dir() else [target]
         found.update((_name(file, root), file) for file in inside if file.is_file())
     return found
 
@@ -67,67 +68,74 @@ def _name(file: Path, root: Path) -> str:
 
 
 def _sha256(file: Path) -> str:
-    about = file.stat()
-    return _hashed(file, about.st_mtime_ns, about.st_size, about.st_ino)
+    stat = file.stat()
+    return _cached_sha256(file, stat.st_mtime_ns, stat.st_size, stat.st_ino)
 
 
 @functools.lru_cache(maxsize=4096)
-def _hashed(file: Path, *_: int) -> str:
-    with file.open("rb") as opened:
-        return hashlib.file_digest(opened, "sha256").hexdigest()
+def _cached_sha256(file: Path, *_: int) -> str:
+    # The other arguments only belong to the key of the cache: they change with the file.
+    with file.open("rb") as stream:
+        return hashlib.file_digest(stream, "sha256").hexdigest()
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _Module:
     name: str
     file: Path
-    places: tuple[str, ...]
-    """Folders of the submodules if this is a package."""
-    package: bool
+    submodule_folders: tuple[str, ...]
+    """Where the submodules are if this is a package; empty otherwise."""
+    is_package: bool
 
     @property
-    def label(self) -> str:
+    def source_name(self) -> str:
+        """The file's path from the folder in which imports find the module."""
         path = self.name.replace(".", "/")
-        return f"{path}/{self.file.name}" if self.package else f"{path}{self.file.suffix}"
+        return f"{path}/{self.file.name}" if self.is_package else f"{path}{self.file.suffix}"
 
     def imports(self) -> frozenset[str]:
         """Return the names that it imports, of modules or of objects in modules."""
         if self.file.suffix != ".py":
             return frozenset()
-        base = self.name if self.package else self.name.rpartition(".")[0]
+        base = self.name if self.is_package else self.name.rpartition(".")[0]
         return _imports(self.file.read_bytes(), base)
 
 
-def _modules(thing: Any) -> list[_Module]:
-    """Return the module that defines ``thing``, and the project's modules that it imports."""
-    first = _defining(thing)
-    found = {first.name: first} if first else {}
-    left = list(found.values())
-    while left:
-        module = left.pop()
+def _modules(definition: Any) -> list[_Module]:
+    """Return the module that defines ``definition``, and the project's modules that it imports."""
+    start = _defining(definition)
+    found = {start.name: start} if start else {}
+    unvisited = list(found.values())
+    while unvisited:
+        module = unvisited.pop()
         # A package is imported before its modules.
         for name in {*module.imports(), *_parents(module.name)}:
-            other = None if name in found else _find(name)
-            if other is not None and _of_the_project(other.file):
-                found[name] = other
-                left.append(other)
+            imported = None if name in found else _find(name)
+            if imported is not None and _belongs_to_project(imported.file):
+                found[name] = imported
+                unvisited.append(imported)
     return [found[name] for name in sorted(found)]
 
 
-def _defining(thing: Any) -> _Module | None:
+def _defining(definition: Any) -> _Module | None:
     """Return the module of a class or function, however it was loaded."""
     try:
-        file = Path(inspect.getfile(thing)).resolve()
+        file = Path(inspect.getfile(definition)).resolve()
     except (TypeError, OSError):
         return None
-    package = file.name == "__init__.py"
-    places = (str(file.parent),) if package else ()
-    return _Module(name=thing.__module__, file=file, places=places, package=package)
+    is_package = file.name == "__init__.py"
+    folders = (str(file.parent),) if is_package else ()
+    return _Module(
+        name=definition.__module__, file=file, submodule_folders=folders, is_package=is_package
+    )
 
 
 @functools.lru_cache(maxsize=1024)
 def _imports(source: bytes, package: str) -> frozenset[str]:
-    """Return the names that a source imports, at its top level or in a function."""
+    """Return the names that source code imports, at its top level or in a function.
+
+    ``package`` is the package that relative imports start from.
+    """
     try:
         tree = ast.parse(source)
     except (SyntaxError, ValueError):
@@ -137,15 +145,17 @@ def _imports(source: bytes, package: str) -> frozenset[str]:
         if isinstance(node, ast.Import):
             found.update(alias.name for alias in node.names)
         elif isinstance(node, ast.ImportFrom):
+            # One leading dot is the package itself, each further dot the package above.
             above = package.split(".")[: len(package.split(".")) - node.level + 1]
-            words = [*(above if node.level else ()), *filter(None, [node.module])]
-            base = ".".join(words)
+            parts = [*(above if node.level else ()), *filter(None, [node.module])]
+            base = ".".join(parts)
             found.update(f"{base}.{alias.name}" for alias in node.names)
             found.add(base)
-    return frozenset(found | {above for name in found for above in _parents(name)})
+    return frozenset(found | {parent for name in found for parent in _parents(name)})
 
 
 def _parents(name: str) -> Iterator[str]:
+    """Yield the packages of a module, the innermost first."""
     while "." in name:
         name = name.rpartition(".")[0]
         yield name
@@ -159,41 +169,44 @@ def _find(name: str) -> _Module | None:
     spec = getattr(loaded, "__spec__", None) or _spec(name)
     if spec is None:
         return None
-    places = tuple(spec.submodule_search_locations or ())
+    folders = tuple(spec.submodule_search_locations or ())
     # A package without __init__.py has no file of its own.
     file = Path(spec.origin) if spec.origin else None
     if file is None or not file.is_file():
         return None
-    return _Module(name=name, file=file.resolve(), places=places, package=bool(places))
+    return _Module(
+        name=name, file=file.resolve(), submodule_folders=folders, is_package=bool(folders)
+    )
 
 
 def _spec(name: str) -> Any:
+    """Return the import specification of a module that is not loaded, or None."""
     parent = name.rpartition(".")[0]
-    places = None
+    folders = None
     if parent:
-        above = getattr(sys.modules.get(parent), "__spec__", None) or _spec(parent)
-        places = getattr(above, "submodule_search_locations", None)
-        if places is None:
+        parent_spec = getattr(sys.modules.get(parent), "__spec__", None) or _spec(parent)
+        folders = getattr(parent_spec, "submodule_search_locations", None)
+        if folders is None:
             return None
     for finder in sys.meta_path:
         find = getattr(finder, "find_spec", None)
-        spec = find(name, places, None) if find else None
+        spec = find(name, folders, None) if find else None
         if spec is not None:
             return spec
     return None
 
 
-def _of_the_project(file: Path) -> bool:
-    """Whether a file is the user's own: not Python's, not installed, not of this package."""
+def _belongs_to_project(file: Path) -> bool:
+    """Whether a file is the user's own: not Python's, not installed, not part of pytest_garl."""
     installed = {"site-packages", "dist-packages"}
     return not installed & {*file.parts} and not any(
-        file.is_relative_to(folder) for folder in _not_of_the_project()
+        file.is_relative_to(folder) for folder in _folders_outside_project()
     )
 
 
 @functools.cache
-def _not_of_the_project() -> tuple[Path, ...]:
+def _folders_outside_project() -> tuple[Path, ...]:
     paths = sysconfig.get_paths()
     folders = [paths[key] for key in ("stdlib", "platstdlib", "purelib", "platlib")]
     folders += [*site.getsitepackages(), site.getusersitepackages()]
-    return (_HERE, *(Path(folder).resolve() for folder in folders))
+    return (_PACKAGE_FOLDER, *(Path(folder).resolve() for folder in folders))

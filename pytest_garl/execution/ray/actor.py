@@ -26,13 +26,13 @@ from pytest_garl.execution.worker_failure import WorkerExit
 from pytest_garl.files.json_values import parse_json
 from pytest_garl.simulation.flight import PACKAGES, Crash
 
-_NO_RESULT = broken_result(Crash(kind="died", error="", message=""), diagonal_m=0.0)
-"""The result in the actor's own ledger for a flight whose worker ended; nobody reads it."""
+_PLACEHOLDER_RESULT = broken_result(Crash(kind="died", error="", message=""), diagonal_m=0.0)
+"""The entry in the actor's own ledger for a flight whose worker ended; nothing reads it."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FlightOutput:
-    """What a flight gave: the values for the ledger, and the bytes of its record."""
+    """The output of a flight: the values for the ledger, and the bytes of its record."""
 
     result: FlightResult
     sha256: str
@@ -57,9 +57,9 @@ class ActorWorkspace:
 class FlightActor:
     """Flies one slot after the other.
 
-    A local pool of one worker with a ledger of its own flies, so a landing system that dies or
-    hangs ends that worker alone, and its exit reads as on the local pool.  The caller decides what
-    follows from the exit.
+    It uses a local pool with one worker and its own ledger.  So a landing system that dies or
+    hangs ends only that worker, and its exit is described as on the local pool.  The caller
+    decides whether the slot is flown again.
     """
 
     def __init__(self, workspace: ActorWorkspace) -> None:
@@ -71,30 +71,32 @@ class FlightActor:
         self._pool = ProcessPool(
             self._ledger.queue, FlightWorkers(max_workers=1, on_exit=self._note_exit)
         )
-        self._flown = 0
-        self._ended: WorkerExit | None = None
+        self._flight_count = 0
+        self._worker_exit: WorkerExit | None = None
 
     def node_and_versions(self) -> tuple[str, dict[str, str]]:
-        """Return the node's name, and the versions of all that decides on a flight's bytes."""
+        """Return the node's name, and the versions that the bytes of a flight depend on."""
         return platform.node(), versions()
 
     def fly(self, claim: Claim) -> FlightOutput | WorkerExit:
         """Fly a slot once; return its output, or how its worker ended."""
-        self._flown += 1
+        self._flight_count += 1
         job = dataclasses.replace(self._job(claim.job), flights=str(self._folder / "flights"))
-        flight = FlightId(search=str(self._flown), map=job.map)
+        flight = FlightId(search=str(self._flight_count), map=job.map)
         self._ledger.add_flight(
             flight, job.system.name, job.dumps(), claim.scenario, claim.earlier_exits
         )
         completed = wait_for(self._ledger, self._pool, flight, Path(job.flights), lambda: None)
-        if self._ended is not None:
-            ended, self._ended = self._ended, None
-            error, message, text = ended.failure or ("", "", "")
+        if self._worker_exit is not None:
+            ended, self._worker_exit = self._worker_exit, None
+            error, message, traceback = ended.failure or ("", "", "")
             return dataclasses.replace(
                 ended,
                 stacks=self._to_local(ended.stacks),
                 stderr=self._to_local(ended.stderr),
-                failure=(error, self._to_local(message), self._to_local(text)) if error else None,
+                failure=(error, self._to_local(message), self._to_local(traceback))
+                if error
+                else None,
             )
         record = job.record(flight).read_bytes()
         job.record(flight).unlink()
@@ -112,19 +114,19 @@ class FlightActor:
         shutil.rmtree(self._folder, ignore_errors=True)
 
     def _job(self, text: str) -> FlightJob:
-        return self._paths.job(text) if self._paths else parse_job(text)
+        return self._paths.remote_job(text) if self._paths else parse_job(text)
 
     def _to_local(self, text: str) -> str:
         return self._paths.to_local(text) if self._paths else text
 
     def _note_exit(self, queue: WorkQueue, claim: Claim, ended: WorkerExit) -> None:
-        """Keep an exit, and take the slot out of the queue: it is flown once."""
-        self._ended = ended
-        queue.record(claim, _NO_RESULT, "", 0.0)
+        """Keep the exit, and mark the slot as flown, so that this actor flies it once."""
+        self._worker_exit = ended
+        queue.record(claim, _PLACEHOLDER_RESULT, "", 0.0)
 
 
 def versions() -> dict[str, str]:
-    """Return the versions of all that decides on a flight's bytes, and the hash of the sources."""
+    """Return the versions of all code that the bytes of a flight depend on."""
     found = {
         "sources of pytest-garl": package_sha256()[:12],
         "CPU dispatch": cpu_dispatch.expected(),

@@ -1,4 +1,4 @@
-"""Paths of a project on a node of the cluster, where its copy lies in another folder."""
+"""Translates paths of a project between pytest's machine and a copy on a node of the cluster."""
 
 from __future__ import annotations
 
@@ -18,28 +18,33 @@ class PathMapping:
     local: str
     remote: str
 
-    def job(self, text: str) -> FlightJob:
+    def remote_job(self, text: str) -> FlightJob:
         """Return the job in ``text`` with the paths of this node.
 
-        Ray copies the project alone.  Landing systems and simulators from elsewhere are imported by
-        name, from where this node has them installed.
+        Ray copies only the project.  Landing systems and simulators from outside it are imported
+        by their module's name, from where this node has them installed.
         """
-        job = parse_job(_replace_folder(text, _quoted(self.local), _quoted(self.remote)))
+        job = parse_job(
+            _replace_folder(text, _json_escaped(self.local), _json_escaped(self.remote))
+        )
         return dataclasses.replace(
-            job, system=self._by_name(job.system), simulator=self._by_name(job.simulator)
+            job,
+            system=self._importable_here(job.system),
+            simulator=self._importable_here(job.simulator),
         )
 
     def to_local(self, text: str) -> str:
         """Return a text, such as a traceback, with the paths of the machine where pytest runs."""
         return _replace_folder(text, self.remote, self.local)
 
-    def _by_name(self, reference: Reference) -> Reference:
+    def _importable_here(self, reference: Reference) -> Reference:
+        """Leave out the file of a reference from outside the project."""
         if reference.file.startswith(f"{self.remote}/"):
             return reference
         return dataclasses.replace(reference, file="")
 
 
-def _quoted(path: str) -> str:
+def _json_escaped(path: str) -> str:
     return json.dumps(path)[1:-1]
 
 

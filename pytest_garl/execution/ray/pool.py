@@ -1,4 +1,4 @@
-"""The Ray pool: flies on a Ray cluster; one child process, the driver, is connected to it."""
+"""The Ray pool flies on a Ray cluster.  One child process, the driver, is connected to it."""
 
 from __future__ import annotations
 
@@ -15,13 +15,13 @@ from pytest_garl.execution.pool import Pool
 from pytest_garl.execution.process_pool import ProcessPool
 from pytest_garl.execution.worker_failure import WorkerExit
 
-INSTALL = "pip install 'pytest-garl[ray]'"
+INSTALL_COMMAND = "pip install 'pytest-garl[ray]'"
 CONNECT_TIMEOUT_S = 5.0
 """How long the head of a cluster may take to accept a connection."""
 
 
 def ray_pool(queue: WorkQueue, workers: int | None, root: Path) -> Pool:
-    """Return a pool of ``workers`` flights at a time; None: as many as the cluster has CPUs.
+    """Return a pool that flies ``workers`` slots at a time; None means one for each CPU.
 
     If RAY_ADDRESS is set, it names the cluster, which gets a copy of the project at ``root``.  If
     not, the pool starts a cluster on this machine and ends it.
@@ -32,13 +32,15 @@ def ray_pool(queue: WorkQueue, workers: int | None, root: Path) -> Pool:
 def check_ray(address: str) -> None:
     """Raise PoolError if Ray is not installed, or if nothing answers at ``address``."""
     if importlib.util.find_spec("ray") is None:
-        raise PoolError(f"Ray is not installed; {INSTALL}, or fly with --garl-pool=local")
-    place = re.fullmatch(r"(?P<host>[^/]+):(?P<port>\d+)", address)
-    if place is None:
-        # Ray itself resolves "auto" and ray://…
+        raise PoolError(f"Ray is not installed; {INSTALL_COMMAND}, or fly with --garl-pool=local")
+    endpoint = re.fullmatch(r"(?P<host>[^/]+):(?P<port>\d+)", address)
+    if endpoint is None:
+        # Only Ray can resolve "auto" and ray://…
         return
     try:
-        socket.create_connection((place["host"], int(place["port"])), CONNECT_TIMEOUT_S).close()
+        socket.create_connection(
+            (endpoint["host"], int(endpoint["port"])), CONNECT_TIMEOUT_S
+        ).close()
     except (OSError, OverflowError) as error:
         raise PoolError(
             f"RAY_ADDRESS={address}: nobody answers there ({error}). Is the cluster up (`ray "
@@ -51,14 +53,14 @@ def check_ray(address: str) -> None:
 class RayDriver:
     """The driver of Ray, one process for all pytest processes of a run.
 
-    It claims slots and has the cluster fly them.  Ray's threads, signal handlers and warnings stay
-    in it, outside pytest's process.
+    It claims slots and sends them to the cluster.  Ray's threads, signal handlers and warnings
+    stay in the driver, outside pytest's process.
     """
 
     workers: int | None
     root: Path
     shutdown_s: float = 30.0
-    """The end of a cluster takes a second or two, and more on a busy machine."""
+    """How long the driver may take to end; shutting down a cluster takes a second or two."""
 
     @property
     def max_workers(self) -> int:
@@ -75,6 +77,6 @@ class RayDriver:
         ]
 
     def handle_exit(self, queue: WorkQueue, pid: int, ended: WorkerExit) -> bool:
-        """Give back all slots: no landing system runs in the driver, so none ended it."""
+        """Release all slots: no landing system runs in the driver, so none caused its exit."""
         queue.release(pid)
         return False

@@ -23,7 +23,7 @@ def test_job_gets_the_paths_of_the_copy() -> None:
         ),
         path=("/home/ann/stack", "/usr/lib/python3.11", "/srv/home/ann/stack", "/home/ann/stack2"),
     )
-    found = PATHS.job(job.dumps())
+    found = PATHS.remote_job(job.dumps())
     assert found.system.file == "/tmp/ray/_ray_pkg_1f/src/mine.py"
     assert found.map_folders == ("/tmp/ray/_ray_pkg_1f/scenarios/maps",)
     assert dict(found.npcs.arguments) == {"weights": "/tmp/ray/_ray_pkg_1f/a.npz"}
@@ -34,7 +34,7 @@ def test_job_gets_the_paths_of_the_copy() -> None:
 def test_files_outside_the_project_are_imported_by_name() -> None:
     job = job_of(Good, Path("flights"))
     assert job.system.file
-    found = PATHS.job(job.dumps())
+    found = PATHS.remote_job(job.dumps())
     assert found.system == dataclasses.replace(job.system, file="")
     assert found.simulator == dataclasses.replace(job.simulator, file="")
 
@@ -43,7 +43,7 @@ def test_folder_may_have_any_name() -> None:
     home = '/home/jörg/a "b" (c)+'
     job = dataclasses.replace(job_of(Good, Path("flights")), path=(home, f"{home}/src"))
     moved = PathMapping(local=home, remote="/a\\b")
-    assert moved.job(job.dumps()).path == ("/a\\b", "/a\\b/src")
+    assert moved.remote_job(job.dumps()).path == ("/a\\b", "/a\\b/src")
 
 
 @pytest.mark.parametrize(
