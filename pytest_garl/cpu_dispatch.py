@@ -127,7 +127,7 @@ def expected() -> str:
 
 
 def cpu_class_of_flights() -> str:
-    """Name the class of this machine's flying processes, whatever this one computes by."""
+    """Return the CPU class of this machine's worker processes; this process's may differ."""
     return BASELINE if has_baseline() else dispatched()
 
 

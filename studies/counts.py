@@ -1,8 +1,9 @@
-"""Counts in the remarks on the experiments that the experiments' rows do not hold.
+"""Counts for the remarks on the experiments, which the rows of the experiments do not contain.
 
 ``python -m studies.counts`` reads the ledgers below ``.garl/experiments`` and writes
 ``docs/experiments/counts.csv``: the flights of each signature, the flights in the dark, and the
-outcomes of flights in which at most one object is fast.  A search without a ledger keeps its line.
+outcomes of flights in which at most one object is fast.  The line of a search without a ledger
+stays as it is.
 """
 
 from __future__ import annotations
@@ -25,14 +26,14 @@ from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.simulation.camera.weather import conditions_of
 from studies.table import read_csv
 
-ROWS, FILE = Path("docs/experiments/rq.csv"), Path("docs/experiments/counts.csv")
-SLOW = 0.25
+ROWS_FILE, COUNTS_FILE = Path("docs/experiments/rq.csv"), Path("docs/experiments/counts.csv")
+SLOW_SHARE = 0.25
 """An object is slow if its speed lies in this lowest share of its range."""
 
 
 def count(ledger: Ledger, search: str, map: str) -> dict[str, int | str]:
     """Return a search's counts; ``kinds`` is ``signature=flights``, separated as in rows."""
-    counts, kinds = Counter[str](), Counter[str]()
+    counts, signatures = Counter[str](), Counter[str]()
     genome = genome_for(load_map(map))
     speeds = [
         (key, float(low), float(high))
@@ -42,22 +43,22 @@ def count(ledger: Ledger, search: str, map: str) -> dict[str, int | str]:
     for flight in ledger.queries.flights(search):
         scenario, outcome = parse_scenario(flight.scenario), flight.result.outcome
         if flight.signature:
-            kinds[flight.signature] += 1
+            signatures[flight.signature] += 1
         counts[outcome] += 1
         if conditions_of(scenario).sun[2] < 0:
             counts["dark"] += 1
             counts[f"dark_{outcome}"] += 1
-        if _slow(scenario, speeds):
+        if _at_most_one_is_fast(scenario, speeds):
             counts[f"slow_{outcome}"] += 1
     names = ("landed", "aborted", "dark", "dark_aborted", "slow_landed", "slow_collision")
     return {
         **{name: counts[name] for name in names},
-        "kinds": SEPARATOR.join(f"{name}={times}" for name, times in sorted(kinds.items())),
+        "kinds": SEPARATOR.join(f"{name}={times}" for name, times in sorted(signatures.items())),
     }
 
 
-def _slow(scenario: Scenario, speeds: Iterable[tuple[str, float, float]]) -> bool:
-    fast = [key for key, low, high in speeds if scenario[key] >= low + SLOW * (high - low)]
+def _at_most_one_is_fast(scenario: Scenario, speeds: Iterable[tuple[str, float, float]]) -> bool:
+    fast = [key for key, low, high in speeds if scenario[key] >= low + SLOW_SHARE * (high - low)]
     return len(fast) <= 1
 
 
@@ -66,9 +67,11 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--folder", type=Path, default=Path(".garl/experiments"))
     folder = parser.parse_args().folder
-    rows = {row.result_hash: row for row in read_rows(ROWS)}
+    rows = {row.result_hash: row for row in read_rows(ROWS_FILE)}
     lines: dict[str, dict[str, int | str]] = {
-        line["result_hash"]: dict(line) for line in read_csv(FILE) if line["result_hash"] in rows
+        line["result_hash"]: dict(line)
+        for line in read_csv(COUNTS_FILE)
+        if line["result_hash"] in rows
     }
     for path in sorted(folder.glob("*/ledger.sqlite")):
         with closing(Ledger(path)) as ledger:
@@ -85,11 +88,11 @@ def main() -> None:
                     "result_hash": row.result_hash,
                 }
     ordered = [lines[key] for key in rows if key in lines]
-    with FILE.open("w", newline="") as file:
+    with COUNTS_FILE.open("w", newline="") as file:
         writer = csv.DictWriter(file, list(ordered[0]))
         writer.writeheader()
         writer.writerows(ordered)
-    print(f"{len(ordered)} of {len(rows)} searches are counted in {FILE}")
+    print(f"{len(ordered)} of {len(rows)} searches are counted in {COUNTS_FILE}")
 
 
 if __name__ == "__main__":

@@ -1,8 +1,8 @@
-"""The learned detector compared with ArUco on the same pictures, by size, hiding and weather.
+"""The learned detector compared with ArUco on equal pictures, by size, hidden share and weather.
 
 ``python -m studies.detection`` renders both maps from seeds that training never saw, and writes
-``docs/detection.md`` and ``docs/pictures/reliability.png``.  ``--without-court`` names weights
-that were trained without any court, to report the difference.
+``docs/detection.md`` and ``docs/pictures/reliability.png``.  ``--without-court`` names the
+file of weights that were trained without any court, and reports the difference.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ from studies.detection_tables import summary, table
 
 
 def inference_ms(detector: TphYoloDetector, repeats: int) -> tuple[float, float]:
-    """Return the least and the median CPU time of a frame, networks and all."""
+    """Return the least and the median CPU time of detection in a frame, including all networks."""
     map = load_map("court")
     picture = next(pictures(np.random.default_rng(SEED), map, "confined", 1))
     observation, times = observation_of(picture), []
@@ -49,10 +49,10 @@ def inference_ms(detector: TphYoloDetector, repeats: int) -> tuple[float, float]
 
 
 def engines_ms(weights: Path, runs: int) -> tuple[float, float]:
-    """Return the median milliseconds of CPU time of the first network: PyTorch's, OpenCV's.
+    """Return the median CPU time of the first network in milliseconds: in PyTorch, in OpenCV.
 
-    Both have the network that is shipped, with batch normalisation folded in; PyTorch's has
-    random weights, which take as long.  The two are run in turn.
+    Both run the shipped network, with batch normalisation folded in.  In PyTorch it has random
+    weights, which take as long.  The two runs alternate.
     """
     import torch
 
@@ -122,11 +122,11 @@ def main() -> None:
         other = TphYoloDetector(mission(), arguments.without_court)
         detectors["TPH-YOLO, no court"] = other.detect
     results = evaluate(detectors, arguments.scenarios)
-    least, usual = inference_ms(detector, 200)
+    least, median = inference_ms(detector, 200)
     eager, opencv = engines_ms(arguments.weights, 100)
-    sure = [each for _, _, each in results.scored["TPH-YOLO"]]
+    scored = [each for _, _, each in results.scored["TPH-YOLO"]]
     bins = reliability(
-        [each.detection.confidence for each in sure], [each.kind == "right" for each in sure]
+        [each.detection.confidence for each in scored], [each.kind == "right" for each in scored]
     )
     draw_reliability(bins, arguments.docs / "pictures" / "reliability.png")
     names = list(detectors)
@@ -138,7 +138,7 @@ def main() -> None:
         table="\n".join(table(results, names)),
         error=f"{calibration_error(bins):.3f}",
         least=f"{least:.1f}",
-        usual=f"{usual:.1f}",
+        median=f"{median:.1f}",
         eager=f"{eager:.1f}",
         opencv=f"{opencv:.1f}",
     )
@@ -171,7 +171,7 @@ it is off by {error} on average (expected calibration error over ten bins).
 
 ## Time
 
-A frame of 320x240 takes {least} ms of CPU time at best and {usual} ms in the median, in total (one
+A frame of 320x240 takes {least} ms of CPU time at best and {median} ms in the median, in total (one
 thread; OpenCV's DNN, classic engine). The first network alone takes {opencv} ms, and {eager} ms in
 PyTorch's eager mode.
 

@@ -1,7 +1,8 @@
 """Several objects: copies of one policy compared with objects trained together.
 
 ``python -m studies.team --train`` trains two objects together.  They share weights, start with
-those of the shipped policy, see their nearest fellow and are rewarded for a collision of either.
+those of the shipped policy, see the nearest other object and are
+rewarded for a collision of either.
 ``python -m studies.team`` flies both policies with one, two and three objects, and appends the
 chunks of fifty flights that ``docs/team.csv`` lacks; ``--report`` prints the table.
 """
@@ -50,8 +51,8 @@ from pytest_garl.simulation.npc_policy import Move, PolicySpec, Situation
 from studies.adversary import CHUNK, MAPS, SYSTEMS
 from studies.table import Key, ResultTable, Row, run_study, share
 
-TOGETHER = Path(".garl/team/together.npz")
-KINDS = ("person", "dog", "bird")
+JOINT_WEIGHTS = Path(".garl/team/together.npz")
+TYPES = ("person", "dog", "bird")
 SEED = 5151
 COUNTS = (1, 2, 3)
 TABLE = ResultTable(
@@ -61,10 +62,10 @@ TABLE = ResultTable(
 )
 
 
-def fellow(situation: Situation) -> State:
-    """Return the relative state and where the nearest fellow is, (12,).
+def state_with_nearest_object(situation: Situation) -> State:
+    """Return the relative state and the offset of the nearest other object, (12,).
 
-    Fellow - object in the object's frame; one 20 m behind if there is none.
+    The offset is in the object's own frame; without another object it is 20 m behind.
     """
     x, y, _ = situation.self.position_m
     near = min(
@@ -77,10 +78,10 @@ def fellow(situation: Situation) -> State:
     return np.concatenate([relative(situation), np.clip(offset, -LIMIT, LIMIT)])
 
 
-ENCODING = Encoding(size=12, state=fellow, moves=relative_moves)
+ENCODING = Encoding(size=12, state=state_with_nearest_object, moves=relative_moves)
 
 
-class Together:
+class JointlyTrainedPolicy:
     """The policy of objects that were trained together."""
 
     def reset(self, situation: Situation, rng: np.random.Generator) -> None:
@@ -95,7 +96,7 @@ class Together:
 
 @functools.cache
 def _network() -> Network:
-    with np.load(TOGETHER) as arrays:
+    with np.load(JOINT_WEIGHTS) as arrays:
         layers = [
             (
                 arrays[f"weight_{index}"].astype(np.float64),
@@ -107,7 +108,7 @@ def _network() -> Network:
 
 
 def warm_learner(training: Training) -> Learner:
-    """Return a learner that begins as the shipped policy and is blind to fellows."""
+    """Return a learner that begins as the shipped policy and ignores other objects."""
     learner = Learner(ENCODING.size, 5, training)
     with np.load(WEIGHTS / "dqn.npz") as arrays, torch.no_grad():
         linear = [layer for layer in learner.network if isinstance(layer, torch.nn.Linear)]
@@ -129,13 +130,13 @@ def train_together(training: Training, count: int) -> Learner:
         task = bar.add_task("together", total=training.episodes)
         for number in range(training.episodes):
             rng = np.random.default_rng([training.seed, number])
-            kinds = [KINDS[int(index)] for index in rng.integers(3, size=count)]
-            scenario, place = draw_episode(maps[int(rng.integers(2))], kinds, rng)
+            types = [TYPES[int(index)] for index in rng.integers(3, size=count)]
+            scenario, place = draw_episode(maps[int(rng.integers(2))], types, rng)
             pilot = functools.partial(
                 AvoidingPilot, FlightStyle.drawn(rng), AvoidanceParameters.drawn(rng)
             )
             episode = Episode(scenario, place, pilot)
-            experiences = [Experience(learner) for _ in kinds]
+            experiences = [Experience(learner) for _ in types]
             epsilon = max(training.epsilon_least, training.epsilon * training.epsilon_decay**number)
             while episode.outcome is None:
                 _decide(episode, learner, experiences, epsilon)
@@ -176,13 +177,13 @@ def _decide(
 
 
 def scenarios(name: str, count: int, chunk: int) -> list[tuple[Scenario, Map]]:
-    """Return fresh scenarios with so many objects of random types, in clear weather."""
+    """Return random scenarios with ``count`` objects of random types, in clear weather."""
     rng = np.random.default_rng([SEED, count, chunk])
     clear = {f"environment.{each}": 0.0 for each, _ in WEATHER}
     found = []
     for index in range(CHUNK):
-        kinds = [KINDS[int(kind)] for kind in rng.integers(3, size=count)]
-        counts = tuple((kind, kinds.count(kind)) for kind in dict.fromkeys(kinds))
+        types = [TYPES[int(index)] for index in rng.integers(3, size=count)]
+        counts = tuple((type_name, types.count(type_name)) for type_name in dict.fromkeys(types))
         map = dataclasses.replace(load_map(name), objects=counts)
         scenario = random_scenarios(map, genome_for(map), SEED + chunk, index, 1)[0]
         found.append((scenario.replace(clear), map))
@@ -190,7 +191,7 @@ def scenarios(name: str, count: int, chunk: int) -> list[tuple[Scenario, Map]]:
 
 
 def fly_one(job: tuple[Scenario, Map, str, str]) -> tuple[bool, bool]:
-    """Return whether the UAV hit an object, and whether it was kept from landing."""
+    """Return whether the UAV hit an object, and whether it aborted or did not land."""
     import cv2
 
     from landing_systems.opencv_mls import OpenCvLandingSystem
@@ -200,7 +201,7 @@ def fly_one(job: tuple[Scenario, Map, str, str]) -> tuple[bool, bool]:
     cv2.setNumThreads(1)
     scenario, map, mover, system = job
     made: Any = {"opencv": OpenCvLandingSystem, "avoiding": AvoidingLandingSystem}[system]
-    spec = PolicySpec(name="together", factory="studies.team:Together")
+    spec = PolicySpec(name="together", factory="studies.team:JointlyTrainedPolicy")
     if mover == "copies":
         spec = policy_spec("dqn")
     flight = fly(scenario, made, spec, map=map)
@@ -233,9 +234,12 @@ def report(rows: list[Row]) -> str:
 def row_of(key: Key, pool: Executor) -> dict[str, Any]:
     """Fly one chunk; return its row."""
     mover, count, system, map, chunk = key
-    jobs = [(each, at, mover, system) for each, at in scenarios(map, int(count), int(chunk))]
-    ends = list(pool.map(fly_one, jobs))
-    figures = (len(ends), sum(hit for hit, _ in ends), sum(blocked for _, blocked in ends))
+    jobs = [
+        (each, map_with_objects, mover, system)
+        for each, map_with_objects in scenarios(map, int(count), int(chunk))
+    ]
+    results = list(pool.map(fly_one, jobs))
+    figures = (len(results), sum(hit for hit, _ in results), sum(blocked for _, blocked in results))
     return dict(zip(TABLE.columns, (*key, *figures), strict=True))
 
 
@@ -252,7 +256,7 @@ def train_or_fly(arguments: argparse.Namespace) -> None:
     """Train two objects together, or fly the chunks that the table lacks."""
     if arguments.train:
         training = Training(episodes=arguments.episodes, epsilon=0.3)
-        save(TOGETHER, train_together(training, 2).policy("fellow"), {"policy": "together"})
+        save(JOINT_WEIGHTS, train_together(training, 2).policy("fellow"), {"policy": "together"})
         return
     chunks = range(-(-arguments.flights // CHUNK // len(MAPS)))
     keys = (

@@ -1,7 +1,7 @@
 """Draw the last seconds of a saved case as a small GIF, such as the one in the README.
 
-``python -m tools.flight_gif CASE docs/pictures/flight.gif`` flies the case first.  Left is the
-camera's view, below it the height, right the map from above: the pictures of ``--video``.
+``python -m tools.flight_gif CASE docs/pictures/flight.gif`` flies the case first.  The pictures
+are those of ``--video``: the camera's view and the height on the left, the map on the right.
 """
 
 from __future__ import annotations
@@ -20,11 +20,11 @@ from pytest_garl.video import drawing, frames, rate_hz
 from pytest_garl.video.camera_pane import HEIGHT, WIDTH
 
 WIDTH_PX = 600
-COLOURS = 24
-"""Of the palette, besides the fixed colours of the drawing."""
+PALETTE_COLOURS = 24
+"""Number of palette colours besides the fixed colours of the drawing."""
 HOLD_MS = 3000
-"""How long the last picture, with the outcome, stands still."""
-FIXED = (
+"""How long the last picture, which shows the outcome, is shown."""
+FIXED_COLOURS = (
     drawing.BACKGROUND,
     drawing.INK,
     drawing.FAINT,
@@ -37,32 +37,32 @@ FIXED = (
 )
 
 
-def small(picture: drawing.Image) -> Image.Image:
-    """Return a picture of the film in the GIF's size, its camera view without sensor noise."""
-    quiet = picture.copy()
-    view = quiet[:HEIGHT, :WIDTH]
+def shrink(picture: drawing.Image) -> Image.Image:
+    """Return a picture of the video in the GIF's size, its camera view without sensor noise."""
+    denoised = picture.copy()
+    view = denoised[:HEIGHT, :WIDTH]
     view[:] = cv2.bilateralFilter(cv2.medianBlur(view, 5), 9, 40, 9)
     height = round(WIDTH_PX * picture.shape[0] / picture.shape[1])
-    return Image.fromarray(cv2.resize(quiet, (WIDTH_PX, height), interpolation=cv2.INTER_AREA))
+    return Image.fromarray(cv2.resize(denoised, (WIDTH_PX, height), interpolation=cv2.INTER_AREA))
 
 
 def palette_of(pictures: list[Image.Image]) -> Image.Image:
-    """Return one palette for all pictures, so that a still background costs nothing."""
+    """Return one palette for all pictures, so that an unchanged background takes no bytes."""
     sheet = Image.fromarray(np.vstack([np.asarray(each) for each in pictures]))
-    found = sheet.quantize(COLOURS, method=Image.Quantize.MEDIANCUT).getpalette() or []
-    fixed = [value for colour in FIXED for value in colour]
+    found = sheet.quantize(PALETTE_COLOURS, method=Image.Quantize.MEDIANCUT).getpalette() or []
+    fixed = [value for colour in FIXED_COLOURS for value in colour]
     palette = Image.new("P", (1, 1))
-    palette.putpalette(fixed + found[: 3 * COLOURS])
+    palette.putpalette(fixed + found[: 3 * PALETTE_COLOURS])
     return palette
 
 
 def save(pictures: list[Image.Image], path: Path, spacing_s: float) -> None:
     """Write pictures as an endless GIF."""
     palette = palette_of(pictures)
-    flat = [each.quantize(palette=palette, dither=Image.Dither.NONE) for each in pictures]
-    durations = [round(1000 * spacing_s)] * (len(flat) - 1) + [HOLD_MS]
-    flat[0].save(
-        path, save_all=True, append_images=flat[1:], duration=durations, loop=0, optimize=True
+    indexed = [each.quantize(palette=palette, dither=Image.Dither.NONE) for each in pictures]
+    durations = [round(1000 * spacing_s)] * (len(indexed) - 1) + [HOLD_MS]
+    indexed[0].save(
+        path, save_all=True, append_images=indexed[1:], duration=durations, loop=0, optimize=True
     )
 
 
@@ -79,12 +79,12 @@ def main() -> None:
     if result.flight is None:
         parser.error(f"{arguments.case}: the flight was not recorded")
     camera = airframe_of(system_of(case, Path.cwd())).camera
-    film = list(frames(result.flight, case.scenario, result.map, camera, result.signature))
+    video = list(frames(result.flight, case.scenario, result.map, camera, result.signature))
     rate = rate_hz(result.flight, camera)
     end = len(result.flight.steps)
     first = max(0, end - round(arguments.seconds * rate))
-    shown = [*film[first : end - 1 : round(arguments.spacing * rate)], film[-1]]
-    save([small(each) for each in shown], arguments.gif, arguments.spacing)
+    shown = [*video[first : end - 1 : round(arguments.spacing * rate)], video[-1]]
+    save([shrink(each) for each in shown], arguments.gif, arguments.spacing)
     print(f"{arguments.gif}: {len(shown)} pictures, {arguments.gif.stat().st_size / 1000:.0f} kB")
 
 

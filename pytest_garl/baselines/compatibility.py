@@ -1,4 +1,4 @@
-"""Whether a session may be compared with a baseline, and what else has changed since."""
+"""Checks whether a session is comparable with a baseline, and lists changes of the environment."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from pytest_garl.verdicts.verdict import Limits
 
 
 def incompatibilities(base: BaselineSet, job: FlightJob) -> tuple[str, ...]:
-    """Return conditions that differ from those of the set; with any, rates are not comparable."""
+    """Return the conditions that differ from the set's; rates are comparable if there are none."""
     conditions = (
         ("limits", _limits_text(base.limits), _limits_text(job.limits)),
         (f"map {base.map}", base.map_sha256[:12], job.map_sha256[:12]),
@@ -18,9 +18,9 @@ def incompatibilities(base: BaselineSet, job: FlightJob) -> tuple[str, ...]:
         (f"weights of {base.npcs}", base.npcs_sha256[:12], job.npcs.sha256[:12]),
     )
     return tuple(
-        f"{what}: saved with {then}, found {today}"
-        for what, then, today in conditions
-        if then != today
+        f"{what}: saved with {saved}, found {found}"
+        for what, saved, found in conditions
+        if saved != found
     )
 
 
@@ -33,12 +33,12 @@ def environment_changes(base: Baseline) -> tuple[str, ...]:
     from pytest_garl.cpu_dispatch import cpu_class_of_flights
 
     cpu = cpu_class_of_flights()
-    found = [] if base.cpu == cpu else [f"the CPU was {base.cpu}, is {cpu}"]
-    for name, then in base.versions:
+    changes = [] if base.cpu == cpu else [f"the CPU was {base.cpu}, is {cpu}"]
+    for name, saved in base.versions:
         try:
-            today = version(name)
+            present = version(name)
         except PackageNotFoundError:
-            today = "absent"
-        if then != today:
-            found.append(f"{name} was {then}, is {today}")
-    return tuple(found)
+            present = "absent"
+        if saved != present:
+            changes.append(f"{name} was {saved}, is {present}")
+    return tuple(changes)

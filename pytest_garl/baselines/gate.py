@@ -1,4 +1,4 @@
-"""The gate: compares flights with a baseline set, and flies neighbours of new violation types."""
+"""The gate compares flights with a baseline set; it flies neighbours of new violation types."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ def compare_flights(
     level: float = LEVEL,
     expected_signatures: Collection[str] = (),
 ) -> Comparison:
-    """Return how flights of the set's scenarios, in its order, compare with the set.
+    """Return the comparison of a set with new flights of its scenarios, in the set's order.
 
     ``fly`` flies neighbours of the scenarios that show a new violation type.
     """
@@ -37,7 +37,7 @@ def compare_flights(
 def compare_sets(
     base: BaselineSet, head: BaselineSet, map: Map, fly: FlyScenarios, *, level: float = LEVEL
 ) -> Comparison:
-    """Return how two sets compare; raise BaselineError unless their scenarios are the same."""
+    """Return the comparison of two sets; raise BaselineError unless their scenarios are equal."""
     if [each.scenario for each in base.flights] != [each.scenario for each in head.flights]:
         raise BaselineError(f"{base.title}: the two landing systems did not fly the same scenarios")
     return _compare(base, [each.summary for each in head.flights], map, fly, level, ())
@@ -62,8 +62,8 @@ def _compare(
     scenarios = {
         base.scenario_name(index): each.scenario for index, each in enumerate(base.flights)
     }
-    flown = fly([each for name in names for each in neighbours(scenarios[name], map)])
-    summaries = [summary_of(done.result, done.sha256) for done in flown]
+    neighbour_results = fly([each for name in names for each in neighbours(scenarios[name], map)])
+    summaries = [summary_of(done.result, done.sha256) for done in neighbour_results]
     neighbour_flights = {
         name: summaries[index * NEIGHBOURS : (index + 1) * NEIGHBOURS]
         for index, name in enumerate(names)

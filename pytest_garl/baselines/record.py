@@ -59,34 +59,34 @@ def fly_baseline(
     show_progress: ShowProgress,
 ) -> Baseline:
     """Fly the scenarios with landing systems ("module:class") of one checkout."""
-    found = [locate_system(checkout, system) for system in systems]
+    located = [locate_system(checkout, system) for system in systems]
     npcs = policy_spec(spec.npcs)
     maps = [load_map(name, spec.map_folders) for name in spec.maps]
     for map in maps:
         check_policy(npcs, map)
     sets = []
     with temporary_pool(workers, checkout) as (ledger, pool):
-        for (reference, sources), map in itertools.product(found, maps):
+        for (reference, sources), map in itertools.product(located, maps):
             job = _job(spec, checkout, reference, sources, map, ledger.path.parent)
             scenarios = spec.scenarios(map)
             title = f"{checkout.folder}: {reference.qualname} on {map.name}"
             flights = show_progress(fly_all(ledger, pool, job, scenarios), title, len(scenarios))
-            sets.append(_set(job, zip(scenarios, flights, strict=True), "random"))
+            sets.append(_baseline_set(job, zip(scenarios, flights, strict=True), "random"))
     return _baseline(sets)
 
 
 def neighbour_flyer(
     spec: BaselineSpec,
     checkout: Checkout,
-    flown: BaselineSet,
+    baseline_set: BaselineSet,
     workers: int,
     show_progress: ShowProgress,
 ) -> FlyScenarios:
-    """Return a function that flies more scenarios with the landing system of a flown set."""
+    """Return a function that flies more scenarios with the landing system of a set."""
 
     def fly(scenarios: Sequence[Scenario]) -> Sequence[CompletedFlight]:
-        reference, sources = locate_system(checkout, flown.system)
-        map = load_map(flown.map, spec.map_folders)
+        reference, sources = locate_system(checkout, baseline_set.system)
+        map = load_map(baseline_set.map, spec.map_folders)
         with temporary_pool(workers, checkout) as (ledger, pool):
             job = _job(spec, checkout, reference, sources, map, ledger.path.parent)
             title = f"{checkout.folder}: neighbours"
@@ -130,14 +130,14 @@ def baseline_from_ledger(path: Path) -> Baseline:
         _check_npcs(path, job.npcs)
         flights = [(parse_scenario(row.scenario), row.completed(Path(job.flights))) for row in rows]
         if flights:
-            sets.append(_set(job, flights, method))
+            sets.append(_baseline_set(job, flights, method))
     if not sets:
         raise BaselineError(f"{path}: no search has flown anything yet")
     return _baseline(sets)
 
 
 def _check_npcs(path: Path, npcs: PolicySpec) -> None:
-    """Refuse an NPC policy that cannot be made again from its name alone."""
+    """Refuse an NPC policy that its name alone does not reproduce."""
     try:
         same = policy_spec(npcs.name) == npcs
     except PolicyError:
@@ -149,7 +149,7 @@ def _check_npcs(path: Path, npcs: PolicySpec) -> None:
         )
 
 
-def _set(
+def _baseline_set(
     job: FlightJob, flights: Iterable[tuple[Scenario, CompletedFlight]], method: str
 ) -> BaselineSet:
     return BaselineSet(

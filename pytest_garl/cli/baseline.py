@@ -1,4 +1,4 @@
-"""``garl baseline`` and ``garl diff``: save the present rates of a stack, and compare a change."""
+"""``garl baseline`` saves verdicts of a landing system; ``garl diff`` compares two checkouts."""
 
 from __future__ import annotations
 
@@ -132,7 +132,7 @@ def save(
     from pytest_garl.execution.checkout import Checkout
 
     if ledger is not None:
-        made = baseline_from_ledger(ledger)
+        recorded = baseline_from_ledger(ledger)
     elif not systems:
         raise OptionError(
             "garl baseline save: found neither --system nor --from-ledger, expected one of them, "
@@ -140,9 +140,9 @@ def save(
         )
     else:
         checkout = Checkout(folder=Path.cwd())
-        made = fly_baseline(_spec(**chosen), checkout, systems, workers, _progress)
-    save_baseline(out, made)
-    for each in made.sets:
+        recorded = fly_baseline(_spec(**chosen), checkout, systems, workers, _progress)
+    save_baseline(out, recorded)
+    for each in recorded.sets:
         violations = sum(flight.summary.violated for flight in each.flights)
         aborts = sum(flight.summary.aborted for flight in each.flights)
         inconclusive = sum(not flight.summary.decided for flight in each.flights)
@@ -265,7 +265,7 @@ def _maps_folder() -> Path:
 def _progress(
     flights: Iterator[CompletedFlight], title: str, total: int
 ) -> Iterable[CompletedFlight]:
-    """Show the progress of flights on a terminal, on stderr, because stdout takes the result."""
+    """Show the progress of flights on a terminal; on stderr, because the result goes to stdout."""
     console = Console(stderr=True)
     hidden = not console.is_terminal
     return track(flights, title, total, console=console, disable=hidden, transient=True)
@@ -285,7 +285,7 @@ def _show(title: str, found: Comparison) -> None:
     console = Console()
     if table.row_count:
         console.print(table)
-    answer, *figures = found.summary_lines()
-    click.secho(f"{title}: {answer}", bold=True, fg="green" if found.passed else "red")
-    for line in figures:
+    verdict, *details = found.summary_lines()
+    click.secho(f"{title}: {verdict}", bold=True, fg="green" if found.passed else "red")
+    for line in details:
         click.echo(f"    {line}")

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from pytest_garl.experiments.spec import ExperimentRun
 
 INTERRUPTED = 130
-"""Exit status after Ctrl-C, as shells have it: 128 and the signal's number."""
+"""Exit status after Ctrl-C as in shells: 128 plus the signal's number."""
 REFERENCE_FLIGHTS = "the reference pilot flies violating scenarios"
 _FOLDER = click.Path(path_type=Path, file_okay=False)
 
@@ -84,7 +84,7 @@ class _ProgressDisplay:
             MofNCompleteColumn(),
             TimeRemainingColumn(),
             console=Console(highlight=False),
-            # Without a refreshing thread: processes are forked from this one.
+            # No thread for refreshing, because this process is forked.
             auto_refresh=False,
             transient=True,
         )

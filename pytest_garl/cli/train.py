@@ -23,7 +23,8 @@ from pytest_garl.scenarios.object_types import OBJECT_TYPES
 if TYPE_CHECKING:
     from pytest_garl.adversary.training.selection import TrainingPlan
 
-RECENT = 50
+RECENT_EPISODES = 50
+"""Number of episodes over which the progress bar averages."""
 
 
 @click.command(epilog="Example: garl train --map=court --type=dog --out=scenarios/dogs.npz")
@@ -121,7 +122,7 @@ def train(**options: Any) -> None:
     cpu_dispatch.check()
     plan = _plan(options)
     with _Progress(plan) as progress:
-        result = train_best(plan, progress.episode, progress.validated)
+        result = train_best(plan, progress.on_episode, progress.on_validation)
     rates = ", ".join(f"seed {seed}: {100 * rate:.0f} %" for seed, rate in result.rates.items())
     click.echo(f"collisions in {plan.validation} validation episodes: {rates}")
     click.echo(
@@ -134,7 +135,7 @@ def _plan(options: dict[str, Any]) -> TrainingPlan:
     from pytest_garl.adversary.training.selection import TrainingPlan
     from pytest_garl.scenarios.maps.map import load_map
 
-    types = _words(options["types"])
+    types = _names(options["types"])
     for type_name in types:
         if type_name not in OBJECT_TYPES:
             raise GarlError(
@@ -147,7 +148,7 @@ def _plan(options: dict[str, Any]) -> TrainingPlan:
         name=options["policy"],
         surrogate=dataclasses.replace(
             preset.surrogate,
-            maps=tuple(load_map(name, folders) for name in _words(options["maps"])),
+            maps=tuple(load_map(name, folders) for name in _names(options["maps"])),
             types=types,
             airframe=_airframe(options["system"]),
             **overrides,
@@ -161,11 +162,11 @@ def _plan(options: dict[str, Any]) -> TrainingPlan:
     )
 
 
-def _words(text: str) -> tuple[str, ...]:
-    words = tuple(part.strip() for part in text.split(",") if part.strip())
-    if not words:
+def _names(text: str) -> tuple[str, ...]:
+    names = tuple(part.strip() for part in text.split(",") if part.strip())
+    if not names:
         raise GarlError(f"found {text!r}, expected names separated by commas")
-    return words
+    return names
 
 
 def _airframe(reference: str | None) -> Airframe:
@@ -185,7 +186,7 @@ def _airframe(reference: str | None) -> Airframe:
 
 
 class _Progress:
-    """A bar per seed with the recent reward and collision rate."""
+    """One progress bar per seed, with the mean reward and the collision rate of recent episodes."""
 
     def __init__(self, plan: TrainingPlan) -> None:
         from rich.progress import (
@@ -205,7 +206,7 @@ class _Progress:
             TimeRemainingColumn(elapsed_when_finished=True),
         )
         self._tasks: dict[int, Any] = {}
-        self._recent: deque[Any] = deque(maxlen=RECENT)
+        self._recent: deque[Any] = deque(maxlen=RECENT_EPISODES)
 
     def __enter__(self) -> _Progress:
         self._bar.start()
@@ -214,7 +215,7 @@ class _Progress:
     def __exit__(self, *_: object) -> None:
         self._bar.stop()
 
-    def episode(self, seed: int, record: Any) -> None:
+    def on_episode(self, seed: int, record: Any) -> None:
         """Show the result of an episode."""
         if seed not in self._tasks:
             self._recent.clear()
@@ -227,7 +228,7 @@ class _Progress:
         note = f"reward {reward:.2f}, collisions {100 * hits:.0f} %"
         self._bar.update(self._tasks[seed], completed=record.episode + 1, note=note)
 
-    def validated(self, seed: int, rate: float) -> None:
+    def on_validation(self, seed: int, rate: float) -> None:
         """Show the result of a trained policy in validation."""
         note = f"validated: collisions {100 * rate:.0f} %"
         done = self._plan.training.episodes

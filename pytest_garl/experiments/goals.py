@@ -25,7 +25,7 @@ GoalStatus = Literal["met", "missed", "not run"]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Goal:
-    """A metric should be ``factor`` times that of random search, or better than all baselines'.
+    """A metric should be ``factor`` times that of random search, or better than every baseline's.
 
     If ``factor`` is None, the metric should be strictly better than that of every baseline.  If
     ``less`` is true, less is better, and ``factor`` is the largest allowed ratio.
@@ -37,13 +37,13 @@ class Goal:
 
     @property
     def text(self) -> str:
-        """The goal in words, to follow the metric's title."""
+        """The goal in words, which stand after the metric's title; "chance" is random search."""
         if self.factor is None:
             return "below every baseline" if self.less else "above every baseline"
         return f"at {'most' if self.less else 'least'} {self.factor:g} × chance"
 
     def holds(self, own: float, other: float) -> bool:
-        """Whether the method's mean reaches the goal, given another method's."""
+        """Whether the method's mean ``own`` reaches the goal against the mean of another method."""
         if self.factor is None:
             return own < other if self.less else own > other
         wanted = self.factor * other
@@ -107,8 +107,8 @@ def _goal_result(goal: Goal, own: MethodSearches, others: Sequence[MethodSearche
             reached.append(None)
             texts.append(f"{other.method} {NOT_RUN}")
             continue
-        theirs = other.mean(goal.metric, common)
-        reached.append(goal.holds(own.mean(goal.metric, common), theirs))
+        other_mean = other.mean(goal.metric, common)
+        reached.append(goal.holds(own.mean(goal.metric, common), other_mean))
         text = f"{other.method} {mean_text(other, goal.metric, common)}"
         if common != sorted(own.seeds):
             text += f" (to {mean_text(own, goal.metric, common)})"

@@ -26,41 +26,44 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 SEARCHES_FOR_A_BOX = 3
-"""With fewer searches a line shows points alone."""
-COLOUR, PAPER = "#1f77b4", "#d95f02"
+"""A method with fewer searches is shown as points without a box."""
+COLOUR, PUBLISHED_COLOUR = "#1f77b4", "#d95f02"
 COLOURS = 64
 """Number of colours of a picture."""
 
 
 def draw_grid(experiment: Experiment, grid: Grid, rows: Sequence[ResultRow], path: Path) -> bool:
-    """Draw a grid into a PNG file, equal bytes for equal rows; return False if there is no row."""
+    """Draw a grid into a PNG file; return False if there is no row.
+
+    Equal rows give equal bytes.
+    """
     from matplotlib.figure import Figure
 
     found = searches_in_grid(experiment, grid, rows)
     if not any(each.rows for each in found):
         return False
-    lines = len(grid.systems) * len(grid.methods)
-    size = (8.0, len(METRICS) * (0.75 + 0.19 * lines))
+    row_count = len(grid.systems) * len(grid.methods)
+    size = (8.0, len(METRICS) * (0.75 + 0.19 * row_count))
     figure = Figure(figsize=size, dpi=100, layout="constrained")
     panels = figure.subplots(len(METRICS), len(grid.maps), squeeze=False, sharey=True)
     for column, map in enumerate(grid.maps):
-        here = [each for each in found if each.map == map]
+        on_map = [each for each in found if each.map == map]
         for axes, metric in zip(panels[:, column], METRICS, strict=True):
-            _panel(axes, experiment, grid, here, metric)
+            _panel(axes, experiment, grid, on_map, metric)
     _save(figure, path)
     return True
 
 
 def _save(figure: Figure, path: Path) -> None:
-    """Write the picture with few colours, which takes a quarter of the bytes."""
+    """Write the picture with :data:`COLOURS` colours, which takes a quarter of the bytes."""
     from PIL import Image
 
     buffer = io.BytesIO()
     figure.savefig(buffer, format="png")
     path.parent.mkdir(parents=True, exist_ok=True)
     with Image.open(buffer) as image:
-        few = image.convert("RGB").quantize(COLOURS, dither=Image.Dither.NONE)
-    few.save(path, optimize=True)
+        reduced = image.convert("RGB").quantize(COLOURS, dither=Image.Dither.NONE)
+    reduced.save(path, optimize=True)
 
 
 def _panel(
@@ -79,7 +82,7 @@ def _panel(
                 medianprops={"color": COLOUR},
             )
         if values:
-            # Not clipped, and above the axis, for values of 0.
+            # Points at 0 lie on the axis, so they are not clipped and drawn above it.
             axes.plot(
                 values,
                 [place] * len(values),
@@ -89,9 +92,9 @@ def _panel(
                 clip_on=False,
                 zorder=3,
             )
-        theirs = _published_value(experiment, each, metric)
-        if theirs is not None:
-            axes.plot([theirs], [place], "x", color=PAPER, markersize=5, zorder=3)
+        published = _published_value(experiment, each, metric)
+        if published is not None:
+            axes.plot([published], [place], "x", color=PUBLISHED_COLOUR, markersize=5, zorder=3)
     single = len(grid.systems) == 1
     names = [each.method if single else f"{each.system} {each.method}" for each in found]
     axes.set_yticks(range(len(found)), names, fontsize="x-small")
@@ -108,9 +111,11 @@ def _panel(
 
 def _published_value(experiment: Experiment, each: MethodSearches, metric: Metric) -> float | None:
     """Return the published value of a metric; None if there is none of the same definition."""
-    theirs = published_for(experiment, each)
-    if theirs is None:
+    published = published_for(experiment, each)
+    if published is None:
         return None
     if metric is TOP10:
-        return theirs.top10 or None
-    return {VIOLATIONS.title: theirs.violations, COVERAGE.title: theirs.coverage}.get(metric.title)
+        return published.top10 or None
+    return {VIOLATIONS.title: published.violations, COVERAGE.title: published.coverage}.get(
+        metric.title
+    )

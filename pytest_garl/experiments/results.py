@@ -1,4 +1,4 @@
-"""Finished searches as rows of a CSV file, which grows over days and is committed."""
+"""Results of finished searches, one row each in a CSV file that is committed."""
 
 from __future__ import annotations
 
@@ -87,7 +87,7 @@ def _number(cell: str) -> float:
     return value
 
 
-def _whole(cell: str) -> int:
+def _whole_number(cell: str) -> int:
     value = int(cell)
     if not 0 <= value <= _LARGEST:
         raise ValueError(cell)
@@ -104,9 +104,9 @@ def _optional(kind: Callable[[str], Any]) -> Callable[[str], Any]:
 _READERS: Mapping[str, Callable[[str], Any]] = MappingProxyType(
     {
         "str": printable,
-        "int": _whole,
+        "int": _whole_number,
         "float": _number,
-        "int | None": _optional(_whole),
+        "int | None": _optional(_whole_number),
         "float | None": _optional(_number),
         "tuple[str, ...]": lambda cell: tuple(printable(cell).split(SEPARATOR)) if cell else (),
     }
@@ -116,12 +116,12 @@ _FIELDS = {field.name: str(field.type) for field in dataclasses.fields(ResultRow
 
 
 def read_rows(path: Path) -> tuple[ResultRow, ...]:
-    """Return the rows in a file; none if there is no file.
+    """Return the rows in a file, or no rows if the file does not exist.
 
     Raises ExperimentError that names file, line and column.
     """
-    there = path.exists() or path.is_symlink()
-    text = read_text(path, LARGEST_BYTES, ExperimentError) if there else ""
+    exists = path.exists() or path.is_symlink()
+    text = read_text(path, LARGEST_BYTES, ExperimentError) if exists else ""
     if not text:
         return ()
     lines = csv.DictReader(io.StringIO(text, newline=""), strict=True)
@@ -164,7 +164,7 @@ def _row(path: Path, line: int, cells: Mapping[str, str | None]) -> ResultRow:
 
 
 def append_rows(path: Path, rows: Iterable[ResultRow]) -> None:
-    """Add rows at once; a row that another process has added meanwhile is kept."""
+    """Add rows to the file; rows that another process has added meanwhile are kept."""
     with locked(path.parent):
         known = read_rows(path)
         keys = {row.key for row in known}

@@ -29,16 +29,16 @@ from pytest_garl.verdicts.wording import compass_point
 
 ON_GROUND_M = 0.02
 """After its first contact with the ground, the UAV counts as on the ground up to this much above
-its height at the contact: the feet spring a little."""
+its height at the contact, because it may rebound a little."""
 LOST_AFTER_S = 3.0
-"""A marker not seen for this long before the end is lost."""
+"""A marker counts as lost if it was not seen for this long before the end."""
 MESSAGE_CHARS = 300
 """Length of an exception's message in a description; the flight's record has 1,000 characters."""
 SAME_PLACE_M = 1.5
 """A target and a decoy, or a target and the marker, within this distance are the same place: the
 length of the marker's side."""
 CLOSE_CALL_M = 3.0
-"""A body farther away than this is no close call; exact separations end here too."""
+"""A close call is within this distance; exact separations end here too."""
 TILTED_RAD = math.radians(20)
 """A touchdown beyond this angle is called tilted."""
 RECENT_S = 2.0
@@ -52,8 +52,8 @@ OVER_MARKER_M = 0.3
 def judge(flight: Flight, limits: Limits) -> Verdict:
     """Return the verdict: the first violation of the flight, or none.
 
-    A touchdown off the marker before an abort is a violation.  It is no violation by the paper's
-    definition, which measures the distance of landings alone.
+    A touchdown off the marker before an abort is a violation, but not by the paper's definition,
+    which measures the distance of landings only.
     """
     mechanism = _mechanism(flight, limits)
     far = flight.final_distance_m > PAPER_LIMITS.distance_m
@@ -106,17 +106,25 @@ def why_undecided(flight: Flight) -> str:
 def off_marker_m(flight: Flight, limits: Limits) -> float | None:
     """Return the distance from the marker at which the UAV came down; None if it did not.
 
-    An aborted flight came down if it touched the ground beyond the limit: it took a wrong place
-    for the marker, whatever it did next.
+    An aborted flight came down if it touched the ground beyond the limit, because it mistook
+    another place for the marker.
     """
     if flight.outcome == "landed":
         return flight.final_distance_m
-    touch = _touch_off_marker(flight, limits)
-    return touch[0] if touch else None
+    touchdown = _touchdown_off_marker(flight, limits)
+    return touchdown.distance_m if touchdown else None
 
 
-def _touch_off_marker(flight: Flight, limits: Limits) -> tuple[float, float] | None:
-    """Return distance and time of an aborted flight's first touchdown beyond the limit, or None.
+@dataclass(frozen=True, slots=True)
+class _Touchdown:
+    """A touchdown away from the marker."""
+
+    distance_m: float
+    time_s: float
+
+
+def _touchdown_off_marker(flight: Flight, limits: Limits) -> _Touchdown | None:
+    """Return an aborted flight's first touchdown beyond the limit, or None.
 
     The record holds only the first contact with the ground; later ones follow from the height.
     """
@@ -132,7 +140,7 @@ def _touch_off_marker(flight: Flight, limits: Limits) -> tuple[float, float] | N
         x, y, z = (float(value) for value in track.position_m[index])
         off = math.hypot(x - mx, y - my)
         if (index == start or z <= height) and off > limits.distance_m:
-            return off, max(first.time_s, float(track.time_s[index]))
+            return _Touchdown(off, max(first.time_s, float(track.time_s[index])))
     return None
 
 
@@ -140,11 +148,11 @@ def _margins(flight: Flight, limits: Limits) -> tuple[Margin, ...]:
     reason = why_undecided(flight)
     landed = flight.outcome == "landed"
     off = off_marker_m(flight, limits)
-    timed = landed or flight.outcome == "not_landed"
+    time_decided = landed or flight.outcome == "not_landed"
     left_s = limits.time_s - flight.elapsed_s
-    solid = [gap.distance_m for gap in flight.separations if gap.body_class != "ground"]
+    distances_m = [gap.distance_m for gap in flight.separations if gap.body_class != "ground"]
     hit = flight.outcome == "collision"
-    nearest = 0.0 if hit else min(solid, default=math.hypot(*flight.marker_position_m) + 1e3)
+    nearest = 0.0 if hit else min(distances_m, default=math.hypot(*flight.marker_position_m) + 1e3)
     return (
         Margin(
             property="distance",
@@ -157,8 +165,8 @@ def _margins(flight: Flight, limits: Limits) -> tuple[Margin, ...]:
             property="time",
             value=left_s if landed else min(0.0, left_s),
             unit="s",
-            decided=timed,
-            reason="" if timed else reason,
+            decided=time_decided,
+            reason="" if time_decided else reason,
         ),
         Margin(property="collision", value=nearest, unit="m"),
         Margin(property="crash", value=0.0 if flight.outcome == "crashed" else 1.0, unit="1"),
@@ -186,8 +194,8 @@ def _mechanism(flight: Flight, limits: Limits) -> _Mechanism:
     if flight.outcome == "not_landed":
         return _not_landed(flight)
     if flight.final_distance_m > limits.distance_m:
-        off = f"Landed {flight.final_distance_m:.1f} m off the marker"
-        return _missed(flight, flight.elapsed_s, off)
+        beginning = f"Landed {flight.final_distance_m:.1f} m off the marker"
+        return _missed(flight, flight.elapsed_s, beginning)
     if flight.elapsed_s > limits.time_s:
         phase = landing_phase(flight, limits.time_s)
         sentence = f"Landed late, after {flight.elapsed_s:.1f} s."
@@ -220,19 +228,21 @@ def _collision(flight: Flight, contact: Contact) -> _Mechanism:
     return _Mechanism("collision", "IV", signature, f"Collided with {contact.body} {speed}. {view}")
 
 
-def _collision_signature(flight: Flight, met: Contact | Separation) -> str:
-    phase = landing_phase(flight, met.time_s)
-    if met.body_class == "static":
-        return f"III:{met.kind}:{phase}"
-    sight = "seen" if was_in_view(flight, met.body, met.time_s) else "unseen"
-    return f"IV:{met.kind}:{phase}:{sight}"
+def _collision_signature(flight: Flight, body: Contact | Separation) -> str:
+    phase = landing_phase(flight, body.time_s)
+    if body.body_class == "static":
+        return f"III:{body.kind}:{phase}"
+    sight = "seen" if was_in_view(flight, body.body, body.time_s) else "unseen"
+    return f"IV:{body.kind}:{phase}:{sight}"
 
 
 def _abort(flight: Flight, limits: Limits) -> _Mechanism:
-    touch = _touch_off_marker(flight, limits)
-    if touch:
-        off = f"Touched the ground {touch[0]:.1f} m off the marker before it gave up"
-        return _missed(flight, touch[1], off)
+    touchdown = _touchdown_off_marker(flight, limits)
+    if touchdown:
+        beginning = (
+            f"Touched the ground {touchdown.distance_m:.1f} m off the marker before it gave up"
+        )
+        return _missed(flight, touchdown.time_s, beginning)
     if limits.abort == "violation":
         phase = landing_phase(flight, _abort_time(flight))
         return _Mechanism("abort", "abort", f"abort:{phase}", "The landing was aborted.")
@@ -240,9 +250,9 @@ def _abort(flight: Flight, limits: Limits) -> _Mechanism:
 
 
 def _not_landed(flight: Flight) -> _Mechanism:
-    """Distinguish a marker never seen or lost (II) from one seen to the end (late)."""
+    """Distinguish a marker that was never seen or was lost (II) from one seen to the end (late)."""
     phase = landing_phase(flight, flight.elapsed_s)
-    # Without diagnostics nobody knows whether the system detected the marker in the picture.
+    # Without diagnostics it is unknown whether the system detected the marker in the picture.
     seen = "detected" if reports_detections(flight) or reports_targets(flight) else "in view"
     last = last_sighting_s(flight)
     if last is None:
@@ -255,25 +265,26 @@ def _not_landed(flight: Flight) -> _Mechanism:
     return _Mechanism("time", "late", f"late:not-landed:{phase}", text)
 
 
-def _missed(flight: Flight, time_s: float, off: str) -> _Mechanism:
-    """Return the violation of a touchdown elsewhere at ``time_s``: what was taken for the marker.
+def _missed(flight: Flight, time_s: float, beginning: str) -> _Mechanism:
+    """Return the violation of a touchdown off the marker: what the system mistook for the marker.
 
-    ``off`` is the beginning of the sentence, with the distance from the marker.
+    ``time_s`` is the time of the touchdown.  ``beginning`` is the beginning of the sentence, with
+    the distance from the marker.
     """
     target = _last_target(flight, time_s)
     if target is not None and math.dist(target, flight.marker_position_m) <= SAME_PLACE_M:
-        sentence = f"{off}, though its target was right."
+        sentence = f"{beginning}, though its target was right."
         return _Mechanism("distance", "off", "off:knew-better", sentence)
     place = target or _position(flight, time_s)
     decoys = [(math.dist(place, (x, y)), name) for name, x, y in flight.decoys]
     distance_m, name = min(decoys, default=(math.inf, ""))
     if distance_m <= SAME_PLACE_M:
-        signature = f"I:{name}:{_taken_at(flight, place, time_s)}"
-        return _Mechanism("distance", "I", signature, f"{off}, on {name}.")
+        signature = f"I:{name}:{_phase_of_first_target(flight, place, time_s)}"
+        return _Mechanism("distance", "I", signature, f"{beginning}, on {name}.")
     if target is None:
-        return _Mechanism("distance", "I", "I?:unknown", f"{off}; it does not say on what.")
-    signature = f"I:phantom:{_taken_at(flight, place, time_s)}"
-    sentence = f"{off}, on something that it took for the marker."
+        return _Mechanism("distance", "I", "I?:unknown", f"{beginning}; it does not say on what.")
+    signature = f"I:phantom:{_phase_of_first_target(flight, place, time_s)}"
+    sentence = f"{beginning}, on something that it took for the marker."
     return _Mechanism("distance", "I", signature, sentence)
 
 
@@ -293,7 +304,7 @@ def _position(flight: Flight, time_s: float) -> tuple[float, float]:
     return x, y
 
 
-def _taken_at(flight: Flight, place: tuple[float, float], end_s: float) -> str:
+def _phase_of_first_target(flight: Flight, place: tuple[float, float], end_s: float) -> str:
     """Return the phase in which the system first reported a place as its target."""
     for step in flight.steps:
         target = step.diagnostics.target_m if step.diagnostics else None

@@ -1,4 +1,4 @@
-"""Intervals of shares, and tests whether two methods differ over repeated searches."""
+"""Confidence intervals of shares, and tests whether two samples differ."""
 
 from __future__ import annotations
 
@@ -24,10 +24,11 @@ def share_interval(count: int, total: int, level: float = 0.95) -> tuple[float, 
 
 
 def vargha_delaney(first: Sequence[float], second: Sequence[float]) -> float:
-    """Return A12: the probability that a value of the first is larger; a tie counts half.
+    """Return A12: the probability that a value of ``first`` is larger than one of ``second``.
 
-    0.5 means no difference.  Vargha and Delaney (2000) call 0.56 a small effect, 0.64 a medium one
-    and 0.71 a large one, and likewise below 0.5.
+    A tie counts half.  0.5 means no difference.  Vargha and Delaney (2000) call 0.56 a small
+    effect, 0.64 a medium one and 0.71 a large one.  Below 0.5 the second sample is larger, by the
+    same scale.
     """
     a, b = np.asarray(first)[:, None], np.asarray(second)[None, :]
     return float((a > b).mean() + (a == b).mean() / 2)
@@ -41,8 +42,8 @@ def mann_whitney(first: Sequence[float], second: Sequence[float]) -> tuple[float
     """
     from scipy.stats import PermutationMethod, mannwhitneyu
 
-    ways = math.comb(len(first) + len(second), len(first))
+    partitions = math.comb(len(first) + len(second), len(first))
     exact = PermutationMethod(n_resamples=MOST_PARTITIONS)
-    method = exact if ways <= MOST_PARTITIONS else "asymptotic"
+    method = exact if partitions <= MOST_PARTITIONS else "asymptotic"
     found = mannwhitneyu(first, second, alternative="two-sided", method=method)
     return float(found.statistic), float(found.pvalue)

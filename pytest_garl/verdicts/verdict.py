@@ -14,19 +14,20 @@ LONGEST_S = 300.0
 """The largest limit of time, in seconds: more than twice the paper's two minutes, and short enough
 that a landing system that hovers does not hold up a search."""
 FARTHEST_M = 1000.0
-"""The largest limit of distance: no map is that wide."""
+"""The largest limit of distance, wider than any map."""
 PropertyName = Literal["distance", "time", "collision", "crash", "abort", "own"]
 ViolationType = Literal["I", "II", "III", "IV", "V", "late", "off", "hard", "abort", "own"]
-"""The paper's five types and ours; "own" is the type of a property that a user's test asserts."""
+"""The paper's five types, and further ones; "own" is a property that a user's test asserts."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Limits:
     """Limits beyond which a flight violates a property; the defaults are the paper's.
 
-    ``distance_m`` 1.5: surely outside of the 1.5 m marker, and more than the GPS error (paper,
-    RQ1).  ``time_s`` 120: the Wingcopter's two minutes in multi-copter mode.  ``abort``: "ok"
-    reports aborted landings as a share of their own, "violation" counts them as violations.
+    ``distance_m`` is 1.5: certainly outside of the 1.5 m marker, and more than the GPS error
+    (paper, RQ1).  ``time_s`` is 120, the Wingcopter's two minutes in multi-copter mode.  ``abort``
+    is "ok" if aborted landings are reported as a share of their own, "violation" if they count as
+    violations.
     """
 
     distance_m: float = 1.5
@@ -48,7 +49,7 @@ class Limits:
 
 
 def limits(**given: Any) -> Limits:
-    """Return the limits of a marker; raise OptionError for a name that is none of them."""
+    """Return the limits of a marker; raise OptionError for an unknown name."""
     known = [field.name for field in dataclasses.fields(Limits)]
     unknown = [name for name in given if name not in known]
     if unknown:
@@ -104,7 +105,7 @@ class Verdict:
 
 
 def count_decided(verdicts: Sequence[Verdict], name: PropertyName) -> int:
-    """Return the number of flights that decided a property: it surely held, or was violated."""
+    """Return the number of flights that decided a property: it held, or it was violated."""
     return sum(
         margin.decided
         for verdict in verdicts

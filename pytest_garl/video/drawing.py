@@ -1,4 +1,4 @@
-"""Pens and letters: how a film's pictures are drawn, and what its colours mean."""
+"""Functions that draw lines, areas and texts, and the colours of a video."""
 
 from __future__ import annotations
 
@@ -23,12 +23,12 @@ SYSTEM, HIT = (240, 120, 0), (206, 22, 22)
 OBJECTS: Mapping[str, Colour] = MappingProxyType(
     {"person": (158, 26, 44), "dog": (112, 66, 18), "bird": (0, 112, 122)}
 )
-"""Of the dynamic objects by type; another type is drawn in ``INK``."""
+"""Colours of the dynamic objects by type; other types are drawn in ``INK``."""
 _SHIFT = 4
 """Fractional bits of the coordinates that OpenCV draws at."""
 
 
-def sheet(width: int, height: int) -> Image:
+def blank_picture(width: int, height: int) -> Image:
     """Return an empty picture, RGB uint8 (height, width, 3)."""
     return np.full((height, width, 3), BACKGROUND, np.uint8)
 
@@ -73,27 +73,27 @@ def text(
     size: int = 14,
     *,
     bold: bool = False,
-    most_px: float | None = None,
+    max_width_px: float | None = None,
 ) -> float:
-    """Write words with the baseline's left end at ``at``; return where they end.
+    """Write words with the baseline's left end at ``at``; return the x coordinate of their end.
 
-    Words that are wider than ``most_px`` are cut and end in an ellipsis.
+    Words wider than ``max_width_px`` are cut and end in an ellipsis.
     """
-    if most_px is not None:
-        words = _cut(words, size, bold, most_px)
+    if max_width_px is not None:
+        words = _cut(words, size, bold, max_width_px)
     x, y = round(at[0]), round(at[1])
     cv2.putText(image, words, (x, y), colour, _font(), size, _weight(bold))
     return x + width_of(words, size, bold=bold)
 
 
 def label(image: Image, words: str, at: Point, colour: Colour, size: int = 13) -> None:
-    """Write words on a light plate that keeps them readable, wholly inside the picture."""
+    """Write readable words on a light background, completely inside the picture."""
     height, width = image.shape[:2]
     wide = width_of(words, size)
     x = round(min(max(at[0], 3), width - wide - 4))
     y = round(min(max(at[1], size + 3), height - 6))
-    plate = image[y - size - 1 : y + 5, max(0, x - 3) : x + round(wide) + 4]
-    plate[:] = (plate // 4 + np.array(BACKGROUND, np.uint8) // 4 * 3).astype(np.uint8)
+    background = image[y - size - 1 : y + 5, max(0, x - 3) : x + round(wide) + 4]
+    background[:] = (background // 4 + np.array(BACKGROUND, np.uint8) // 4 * 3).astype(np.uint8)
     text(image, words, (x, y), colour, size)
 
 
@@ -105,10 +105,10 @@ def width_of(words: str, size: int, *, bold: bool = False) -> float:
     return float(cv2.getTextSize((0, 0), words, (0, 0), _font(), size, _weight(bold))[2])
 
 
-def _cut(words: str, size: int, bold: bool, most_px: float) -> str:
-    if width_of(words, size, bold=bold) <= most_px:
+def _cut(words: str, size: int, bold: bool, max_width_px: float) -> str:
+    if width_of(words, size, bold=bold) <= max_width_px:
         return words
-    while words and width_of(words + "…", size, bold=bold) > most_px:
+    while words and width_of(words + "…", size, bold=bold) > max_width_px:
         words = words[:-1]
     return words + "…"
 

@@ -16,7 +16,7 @@ from pytest_garl.video.drawing import Image
 _QUALITY = 27
 """x264's constant rate factor: letters and one-pixel lines stay clear, sensor noise goes."""
 _TOP_KBPS = 350
-"""Bounds a film of 60 s to 2.6 MB in whatever weather."""
+"""Bounds a video of 60 s to 2.6 MB in whatever weather."""
 _BUFFER_KBIT = 1400
 
 
@@ -30,7 +30,7 @@ def write(frames: Iterable[Image], path: Path, rate_hz: float) -> None:
     pictures = iter(frames)
     first = next(pictures, None)
     if first is None:
-        raise GarlError(f"{path}: a film needs at least one picture; the flight gave none")
+        raise GarlError(f"{path}: a video needs at least one picture; the flight gave none")
     height, width = first.shape[:2]
     if height % 2 or width % 2:
         raise GarlError(
@@ -60,7 +60,7 @@ def _encode(command: Sequence[str], pictures: Iterable[Image], path: Path) -> No
                         if picture.shape != shape:
                             raise GarlError(
                                 f"{path}: a picture of shape {picture.shape} among pictures of "
-                                f"{shape}; a film has one size"
+                                f"{shape}; a video has one size"
                             )
                         pipe.write(picture.tobytes())
             except BaseException:

@@ -27,14 +27,14 @@ from pytest_garl.video.pose import Poses, path_until
 
 WIDTH, HEIGHT = 384, 656
 MARGIN_M = 2.0
-"""How much is shown beyond the map's bounds."""
+"""Width of the strip around the map's bounds that the pane also shows."""
 _UAV_RADIUS_M = 0.5
-_WASH = 0.62
-"""Share of white in the painted ground, so that paths stand out from it."""
+_WHITE_SHARE = 0.62
+"""Share of white that is mixed into the painted ground, so that paths stand out."""
 
 
 class MapPane:
-    """Draws the map of one flight; what never moves is drawn once."""
+    """Draws the map of one flight; the parts that do not change are drawn once."""
 
     def __init__(self, flight: Flight, scenario: Scenario, map: Map, camera: Camera) -> None:
         self._flight, self._map, self._camera = flight, map, camera
@@ -68,10 +68,10 @@ class MapPane:
         self._draw_diagnostics(pane, step)
         self._write_names(pane, poses)
         for item, (place, yaw) in zip(self._flight.objects, poses.objects, strict=True):
-            self._draw_mover(pane, place, yaw, _radius_m(item), _colour(item))
+            self._draw_disc_with_heading(pane, place, yaw, _radius_m(item), _colour(item))
         nose = rotate(poses.attitude, (1.0, 0.0, 0.0))
         yaw = math.atan2(nose[1], nose[0])
-        self._draw_mover(pane, poses.position_m, yaw, _UAV_RADIUS_M, drawing.UAV)
+        self._draw_disc_with_heading(pane, poses.position_m, yaw, _UAV_RADIUS_M, drawing.UAV)
         if ended:
             for contact in self._flight.contacts[-1:]:
                 drawing.cross(pane, self._pixel(contact.position_m), 9, drawing.HIT)
@@ -82,12 +82,12 @@ class MapPane:
         return float(x), float(y)
 
     def _ground(self, scenario: Scenario) -> drawing.Image:
-        """Return the ground as it was painted for the flight, washed out."""
+        """Return the ground as it was painted for the flight, mixed with white."""
         rng = generator(scenario.seed, "sensor")
         wide = paint_ground(scenario, self._map, conditions_of(scenario), rng).wide
-        wanted = round(math.log2(max(1.0, 1 / self._scale / wide.m_per_px)))
-        level = min(wanted, len(wide.levels) - 1)
-        world = np.array(
+        coarseness = round(math.log2(max(1.0, 1 / self._scale / wide.m_per_px)))
+        level = min(coarseness, len(wide.levels) - 1)
+        world_of_pane = np.array(
             [
                 [1 / self._scale, 0.0, -self._left / self._scale],
                 [0.0, -1 / self._scale, self._bottom / self._scale],
@@ -96,13 +96,15 @@ class MapPane:
         )
         painted = cv2.warpPerspective(
             wide.levels[level],
-            wide.pixel_of_world(level) @ world,
+            wide.pixel_of_world(level) @ world_of_pane,
             (WIDTH, HEIGHT),
             flags=cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP,
             borderMode=cv2.BORDER_REFLECT_101,
         )
         rgb = cv2.cvtColor(painted, cv2.COLOR_RGBA2RGB)
-        return np.asarray(cv2.addWeighted(rgb, 1 - _WASH, rgb, 0.0, 255 * _WASH), np.uint8)
+        return np.asarray(
+            cv2.addWeighted(rgb, 1 - _WHITE_SHARE, rgb, 0.0, 255 * _WHITE_SHARE), np.uint8
+        )
 
     def _draw_background(self) -> None:
         image = self._background
@@ -138,7 +140,7 @@ class MapPane:
         drawing.line(self._background, arrow, drawing.INK, 2)
 
     def _draw_footprint(self, pane: drawing.Image, poses: Poses) -> None:
-        """Outline the ground in view, its upper edge thick, unless the horizon is in view."""
+        """Outline the ground in view, with a thick upper edge, unless the horizon is in view."""
         view = View.of(self._camera, poses.eye_m, poses.attitude)
         right, low = self._camera.width_px - 0.5, self._camera.height_px - 0.5
         corners = np.array([[-0.5, -0.5, 1], [right, -0.5, 1], [right, low, 1], [-0.5, low, 1]])
@@ -170,7 +172,7 @@ class MapPane:
         for name, place, radius, colour in names:
             labels.write(name, self._pixel(place), radius * self._scale, colour)
 
-    def _draw_mover(
+    def _draw_disc_with_heading(
         self,
         pane: drawing.Image,
         place_m: tuple[float, float, float],
@@ -178,7 +180,7 @@ class MapPane:
         radius_m: float,
         colour: drawing.Colour,
     ) -> None:
-        """Draw a disc with a nose."""
+        """Draw a disc with a line from its centre that shows the heading."""
         at, radius = self._pixel(place_m), max(4.0, radius_m * self._scale)
         drawing.disc(pane, at, radius + 1.5, drawing.BACKGROUND)
         drawing.disc(pane, at, radius, colour)

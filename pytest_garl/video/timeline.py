@@ -14,7 +14,7 @@ from pytest_garl.video.pose import Poses
 
 WIDTH, HEIGHT = 640, 176
 _LEFT, _RIGHT, _TOP, _BOTTOM = 44, WIDTH - 14, 62, 134
-_STEPS = (0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0, 200.0, 500.0)
+_TICK_SPACINGS = (0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0, 200.0, 500.0)
 _LEGEND = (
     (drawing.UAV, "UAV, its path, view (thick edge: top)"),
     (drawing.MARKER, "marker"),
@@ -23,7 +23,7 @@ _LEGEND = (
 
 
 class Timeline:
-    """Draws the strip of one flight; what never moves is drawn once."""
+    """Draws the timeline of one flight; the parts that do not change are drawn once."""
 
     def __init__(self, flight: Flight, signature: str) -> None:
         self._flight, self._signature = flight, signature or "no violation"
@@ -31,30 +31,34 @@ class Timeline:
         self._heights = np.array([up_m(height) for height in flight.uav.position_m[:, 2].tolist()])
         self._longest = max(float(flight.elapsed_s), 1.0)
         self._highest = max(float(self._heights.max()), 1.0)
-        self._background = drawing.sheet(WIDTH, HEIGHT)
+        self._background = drawing.blank_picture(WIDTH, HEIGHT)
         self._draw_background()
 
     def draw(self, poses: Poses, step: Step | None, *, ended: bool = False) -> drawing.Image:
         """Return the timeline at one moment; an ``ended`` flight shows its outcome."""
-        strip = self._background.copy()
+        picture = self._background.copy()
         height = up_m(float(poses.position_m[2]))
         past = self._times < poses.time_s
         line = self._pixels(self._times[past], self._heights[past])
         present = self._pixels(np.array([poses.time_s]), np.array([height]))
-        drawing.line(strip, np.vstack([line, present]), drawing.UAV, 2)
+        drawing.line(picture, np.vstack([line, present]), drawing.UAV, 2)
         at = (float(present[0, 0]), float(present[0, 1]))
-        drawing.disc(strip, at, 4.5, drawing.UAV)
+        drawing.disc(picture, at, 4.5, drawing.UAV)
         clock = f"{poses.time_s:.1f} s of {self._flight.elapsed_s:.1f} s"
-        drawing.text(strip, clock, (_RIGHT - drawing.width_of(clock, 16), 24), size=16)
+        drawing.text(picture, clock, (_RIGHT - drawing.width_of(clock, 16), 24), size=16)
         if ended:
-            drawing.text(strip, self._outcome(), (14, 48), drawing.HIT, 15, bold=True, most_px=470)
+            drawing.text(
+                picture, self._outcome(), (14, 48), drawing.HIT, 15, bold=True, max_width_px=470
+            )
             if self._flight.outcome == "collision":
-                drawing.cross(strip, at, 6, drawing.HIT, 2)
+                drawing.cross(picture, at, 6, drawing.HIT, 2)
         elif step and step.diagnostics and step.diagnostics.phase:
-            drawing.text(strip, f"phase: {step.diagnostics.phase}", (14, 48), size=15, most_px=470)
+            drawing.text(
+                picture, f"phase: {step.diagnostics.phase}", (14, 48), size=15, max_width_px=470
+            )
         words = f"height {height:.1f} m"
-        drawing.text(strip, words, (_RIGHT - drawing.width_of(words, 15), 48), size=15)
-        return strip
+        drawing.text(picture, words, (_RIGHT - drawing.width_of(words, 15), 48), size=15)
+        return picture
 
     def _outcome(self) -> str:
         flight = self._flight
@@ -74,7 +78,7 @@ class Timeline:
 
     def _draw_background(self) -> None:
         image = self._background
-        drawing.text(image, self._signature, (14, 24), size=17, bold=True, most_px=450)
+        drawing.text(image, self._signature, (14, 24), size=17, bold=True, max_width_px=450)
         for value in _ticks(self._highest, 4):
             _, y = self._pixels(np.zeros(1), np.array([value]))[0]
             drawing.line(image, np.array([[_LEFT, y], [_RIGHT, y]]), drawing.RULE, 1)
@@ -96,7 +100,7 @@ class Timeline:
             x = drawing.text(image, words, (x + 14, HEIGHT - 8), drawing.INK, 13) + 20
 
 
-def _ticks(most: float, count: int) -> list[float]:
-    """Return round values from 0 to ``most``, about ``count`` of them at most."""
-    step = next((each for each in _STEPS if most / each <= count), most)
-    return [index * step for index in range(math.floor(most / step + 1e-9) + 1)]
+def _ticks(highest: float, most_ticks: int) -> list[float]:
+    """Return round values from 0 to ``highest``, about ``most_ticks`` of them at most."""
+    spacing = next((each for each in _TICK_SPACINGS if highest / each <= most_ticks), highest)
+    return [index * spacing for index in range(math.floor(highest / spacing + 1e-9) + 1)]

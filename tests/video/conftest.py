@@ -1,3 +1,3 @@
-from tests.support.films import film
+from tests.support.videos import video
 
-__all__ = ["film"]
+__all__ = ["video"]

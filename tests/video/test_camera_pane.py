@@ -14,15 +14,15 @@ from pytest_garl.simulation.fly import fly
 from pytest_garl.video import frames
 from pytest_garl.video.drawing import MARKER
 from tests.simulation.test_environment import WEATHERMAKER
-from tests.support.films import CAMERA_PART, FLOWN_S, LAWN, SCENARIO, Film, Hovers, painted
+from tests.support.videos import CAMERA_PART, FLOWN_S, LAWN, SCENARIO, Hovers, Video, painted
 
 
-def test_the_camera_pane_shows_the_systems_image(film: Film) -> None:
+def test_the_camera_pane_shows_the_systems_image(video: Video) -> None:
     # Every fifth frame falls on a recorded pose; between two the pose is interpolated.
     for index, most in ((5, 0.01), (10, 0.01), (12, 3.0), (14, 3.0)):
-        shown = film.pictures[index][CAMERA_PART].astype(int)
-        assert np.abs(shown - film.seen[index]).mean() <= most
-    assert np.abs(film.seen[5].astype(int) - film.seen[10]).mean() > 3.0
+        shown = video.pictures[index][CAMERA_PART].astype(int)
+        assert np.abs(shown - video.seen[index]).mean() <= most
+    assert np.abs(video.seen[5].astype(int) - video.seen[10]).mean() > 3.0
 
 
 def test_the_camera_part_shows_the_environment_as_it_was_changed() -> None:
@@ -54,9 +54,9 @@ def test_the_marker_is_outlined_where_the_camera_has_it() -> None:
 
 
 @pytest.mark.parametrize("shape", [(160, 120), (1280, 720), (200, 200)])
-def test_any_camera_fits(film: Film, shape: tuple[int, int]) -> None:
+def test_any_camera_fits(video: Video, shape: tuple[int, int]) -> None:
     camera = Camera(width_px=shape[0], height_px=shape[1])
-    picture = next(frames(film.flight, SCENARIO, LAWN, camera))
+    picture = next(frames(video.flight, SCENARIO, LAWN, camera))
     assert picture.shape == (656, 1024, 3)
     lit = np.argwhere(picture[CAMERA_PART].any(axis=-1))
     height, width = lit.max(axis=0) - lit.min(axis=0) + 1

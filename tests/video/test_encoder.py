@@ -15,12 +15,12 @@ import pytest
 from pytest_garl.errors import GarlError
 from pytest_garl.video import save_video, write
 from pytest_garl.video.drawing import Image
-from tests.support.films import FLOWN_S, LAWN, SCENARIO, Film, Hovers
+from tests.support.videos import FLOWN_S, LAWN, SCENARIO, Hovers, Video
 
 
-def test_browsers_play_the_file_at_the_flights_own_speed(film: Film, tmp_path: Path) -> None:
+def test_browsers_play_the_file_at_the_flights_own_speed(video: Video, tmp_path: Path) -> None:
     path = tmp_path / "new" / "flight.mp4"
-    save_video(path, film.flight, SCENARIO, LAWN, Hovers.airframe.camera, "II:lost:descent")
+    save_video(path, video.flight, SCENARIO, LAWN, Hovers.airframe.camera, "II:lost:descent")
     assert list(path.parent.iterdir()) == [path]
     meta = described(path)
     assert (meta["codec"], meta["size"], meta["fps"]) == ("h264", (1024, 656), 10.0)
@@ -30,9 +30,9 @@ def test_browsers_play_the_file_at_the_flights_own_speed(film: Film, tmp_path: P
     assert content.index(b"moov") < content.index(b"mdat"), "plays only when wholly loaded"
     assert len(content) < 3e6 / 60 * meta["duration"]
     shown = list(decoded(path))
-    assert len(shown) == len(film.pictures)
+    assert len(shown) == len(video.pictures)
     for index in (0, 10, 29, 40):
-        assert np.abs(shown[index].astype(int) - film.pictures[index]).mean() < 6
+        assert np.abs(shown[index].astype(int) - video.pictures[index]).mean() < 6
     assert np.abs(shown[5].astype(int) - shown[25]).mean() > 1
 
 
@@ -70,8 +70,8 @@ def test_an_encoder_that_fails_is_quoted_and_leaves_nothing(
     monkeypatch.setattr(imageio_ffmpeg, "get_ffmpeg_exe", lambda: str(broken))
     pictures = [np.zeros((656, 1024, 3), np.uint8)] * 5
     with pytest.raises(GarlError, match=r"exit status 3\): Unknown encoder"):
-        write(pictures, tmp_path / "films" / "a.mp4", 10.0)
-    assert not list((tmp_path / "films").iterdir())
+        write(pictures, tmp_path / "videos" / "a.mp4", 10.0)
+    assert not list((tmp_path / "videos").iterdir())
 
 
 @pytest.mark.parametrize(
@@ -79,10 +79,10 @@ def test_an_encoder_that_fails_is_quoted_and_leaves_nothing(
     [
         ([], "at least one picture"),
         ([(15, 16, 3)], "16x15 pixels"),
-        ([(16, 16, 3), (16, 32, 3)], "a film has one size"),
+        ([(16, 16, 3), (16, 32, 3)], "a video has one size"),
     ],
 )
-def test_pictures_that_make_no_film_are_refused(
+def test_pictures_that_make_no_video_are_refused(
     tmp_path: Path, shapes: list[tuple[int, ...]], words: str
 ) -> None:
     with pytest.raises(GarlError, match=words):

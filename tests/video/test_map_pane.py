@@ -8,28 +8,28 @@ import math
 from pytest_garl.simulation.flight import Contact
 from pytest_garl.video import frames
 from pytest_garl.video.drawing import HIT, MARKER, OBJECTS, UAV
-from tests.support.films import LAWN, MAP_PART, SCENARIO, Film, Hovers, on_the_map, painted
+from tests.support.videos import LAWN, MAP_PART, SCENARIO, Hovers, Video, on_the_map, painted
 
 
-def test_the_marker_is_drawn_at_its_place_on_the_map(film: Film) -> None:
-    places = painted(film.pictures[0][MAP_PART], MARKER)
+def test_the_marker_is_drawn_at_its_place_on_the_map(video: Video) -> None:
+    places = painted(video.pictures[0][MAP_PART], MARKER)
     middle = (places.min(axis=0) + places.max(axis=0)) / 2
-    assert math.dist(middle, on_the_map(*film.flight.marker_position_m)) < 1.0
+    assert math.dist(middle, on_the_map(*video.flight.marker_position_m)) < 1.0
 
 
-def test_the_uav_is_drawn_where_it_is_on_the_map(film: Film) -> None:
-    places = painted(film.pictures[-1][MAP_PART], UAV)
-    x, y, _ = film.flight.uav.position_m[-1]
+def test_the_uav_is_drawn_where_it_is_on_the_map(video: Video) -> None:
+    places = painted(video.pictures[-1][MAP_PART], UAV)
+    x, y, _ = video.flight.uav.position_m[-1]
     assert math.dist(places.mean(axis=0), on_the_map(x, y)) < 3.0
 
 
-def test_a_removed_npc_is_not_drawn(film: Film) -> None:
-    assert len(painted(film.pictures[-1][MAP_PART], OBJECTS["dog"])) > 20
-    assert len(painted(film.pictures[-1][MAP_PART], OBJECTS["person"])) > 20
-    assert len(painted(film.pictures[-1][MAP_PART], OBJECTS["bird"])) == 0
+def test_a_removed_npc_is_not_drawn(video: Video) -> None:
+    assert len(painted(video.pictures[-1][MAP_PART], OBJECTS["dog"])) > 20
+    assert len(painted(video.pictures[-1][MAP_PART], OBJECTS["person"])) > 20
+    assert len(painted(video.pictures[-1][MAP_PART], OBJECTS["bird"])) == 0
 
 
-def test_the_end_of_a_collision_is_crossed_out(film: Film) -> None:
+def test_the_end_of_a_collision_is_crossed_out(video: Video) -> None:
     hit = Contact(
         time_s=3.0,
         body="dog-1",
@@ -39,8 +39,8 @@ def test_the_end_of_a_collision_is_crossed_out(film: Film) -> None:
         speed_mps=1.0,
         tilt_rad=0.0,
     )
-    flight = dataclasses.replace(film.flight, outcome="collision", contacts=(hit,))
+    flight = dataclasses.replace(video.flight, outcome="collision", contacts=(hit,))
     *_, last = frames(flight, SCENARIO, LAWN, Hovers.airframe.camera)
     crossed = painted(last[MAP_PART], HIT)
     assert math.dist(crossed.mean(axis=0), on_the_map(-5.0, 5.0)) < 1.0
-    assert len(painted(film.pictures[-1][MAP_PART], HIT)) == 0
+    assert len(painted(video.pictures[-1][MAP_PART], HIT)) == 0

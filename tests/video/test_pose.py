@@ -10,10 +10,10 @@ import pytest
 
 from pytest_garl.simulation.flight import Track
 from pytest_garl.video.pose import path_until, poses_at
-from tests.support.films import Film
+from tests.support.videos import Video
 
 
-def test_poses_between_two_samples_are_interpolated(film: Film) -> None:
+def test_poses_between_two_samples_are_interpolated(video: Video) -> None:
     uav = Track(
         time_s=np.array([0.0, 1.0]),
         position_m=np.array([[0.0, 0.0, 1.0], [2.0, 4.0, 1.0]]),
@@ -21,7 +21,7 @@ def test_poses_between_two_samples_are_interpolated(film: Film) -> None:
         attitude=np.array([[0.0, 0.0, 0.0, 1.0], [0.0, 0.0, -(0.5**0.5), -(0.5**0.5)]]),
         velocity_mps=np.zeros((2, 3)),
     )
-    flight = dataclasses.replace(film.flight, uav=uav, objects=())
+    flight = dataclasses.replace(video.flight, uav=uav, objects=())
     middle = poses_at(flight, 0.5)
     assert middle.position_m == pytest.approx((1.0, 2.0, 1.0))
     assert middle.attitude == pytest.approx((0, 0, math.sin(math.pi / 8), math.cos(math.pi / 8)))

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from pytest_garl.video import frames
-from tests.support.films import CAMERA_PART, LAWN, SCENARIO, STRIP, Film, Hovers
+from tests.support.videos import CAMERA_PART, LAWN, SCENARIO, STRIP, Hovers, Video
 
 
-def test_the_strip_shows_the_signature(film: Film) -> None:
+def test_the_strip_shows_the_signature(video: Video) -> None:
     camera = Hovers.airframe.camera
-    other = next(frames(film.flight, SCENARIO, LAWN, camera, "IV:dog:last-metre:seen"))
-    assert (film.pictures[0][STRIP] != other[STRIP]).any()
-    assert (film.pictures[0][CAMERA_PART] == other[CAMERA_PART]).all()
+    other = next(frames(video.flight, SCENARIO, LAWN, camera, "IV:dog:last-metre:seen"))
+    assert (video.pictures[0][STRIP] != other[STRIP]).any()
+    assert (video.pictures[0][CAMERA_PART] == other[CAMERA_PART]).all()

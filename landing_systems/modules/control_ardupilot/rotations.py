@@ -1,4 +1,4 @@
-"""Quaternions x, y, z, w in plain floats; a quaternion turns body vectors into world vectors."""
+"""Quaternions (x, y, z, w) as plain floats; a quaternion turns body vectors into world vectors."""
 
 from __future__ import annotations
 
@@ -64,17 +64,17 @@ def heading_quaternion(thrust: Vector, yaw_rad: float) -> Quaternion:
 
 
 def tilt_and_turn(q: Quaternion) -> tuple[float, float, float]:
-    """Split a rotation into a turn about z, made first, and a tilt; return tilt x, y and turn.
+    """Split a rotation into a turn about z followed by a tilt; return tilt x, tilt y and turn.
 
-    The tilt (rotation vector in the frame that q starts from) brings the z axes together; the
-    turn is what is left of the heading, in (-pi, pi].
+    The tilt is a rotation vector in the frame in which q starts; it aligns the z axes.  The turn
+    is the remaining change of heading, in (-pi, pi].
     """
     x, y, z, w = q
     if w < 0:
         x, y, z, w = -x, -y, -z, -w
     n = math.sqrt(z * z + w * w)
     if n < 1e-9:
-        return math.pi, 0.0, 0.0  # upside down: any way round is as short
+        return math.pi, 0.0, 0.0  # upside down: a tilt about any horizontal axis is as short
     ux, uy = (x * w - y * z) / n, (x * z + y * w) / n
     s = math.sqrt(ux * ux + uy * uy)
     factor = 2 * math.atan2(s, n) / s if s > 1e-9 else 2.0

@@ -1,4 +1,4 @@
-"""A* on the inflated grid: the guide that shows on which side to pass an obstacle."""
+"""A* on the inflated grid: its path guides the trajectory to one side of an obstacle."""
 
 from __future__ import annotations
 
@@ -27,22 +27,22 @@ def find_guide(
 ) -> Array | None:
     """Return the centres (n, 3) of free cells from start to goal, or None.
 
-    26 neighbours, ``step`` cells away with all between them free; Euclidean lengths and
-    heuristic.  ``weight`` on the heuristic makes the search greedy: paths are at most so
-    many times too long.  No cell lies below ``lowest_m``, unless at the start's or the
-    goal's height.  None also if start or goal are occupied or ``max_nodes`` cells have been
-    expanded.  Ties go to the cell of the smaller index, so that equal grids give equal
-    paths.
+    Each cell has 26 neighbours, which are ``step`` cells away with only free cells in between.
+    Lengths and the heuristic are Euclidean.  The heuristic is multiplied by ``weight``, so a path
+    is at most ``weight`` times as long as the shortest one.  No cell lies below the lowest
+    of ``lowest_m``, the start and the goal.  The result is also None if start or goal are
+    occupied, or once ``max_nodes`` cells have been expanded.  Ties go to the smaller index, so
+    that equal grids give equal paths.
     """
     start, goal = (int(cell) for cell in grid.index(np.stack([start_m, goal_m])))
     occupied = grid.occupancy.data
     if occupied[start] or occupied[goal]:
         return None
-    lines, line = (int(stride) for stride in grid.strides[:2])
-    floor = int(grid.index(np.array([[start_m[0], start_m[1], lowest_m]]))[0]) % line
-    lowest = min(floor, start % line, goal % line)
-    goal_x, goal_y, goal_z = goal // lines, goal % lines // line, goal % line
-    neighbours = _neighbours(lines, line, step)
+    x_stride, y_stride = (int(stride) for stride in grid.strides[:2])
+    floor = int(grid.index(np.array([[start_m[0], start_m[1], lowest_m]]))[0]) % y_stride
+    lowest = min(floor, start % y_stride, goal % y_stride)
+    goal_x, goal_y, goal_z = goal // x_stride, goal % x_stride // y_stride, goal % y_stride
+    neighbours = _neighbours(x_stride, y_stride, step)
     costs = {start: 0.0}
     came_from: dict[int, int] = {}
     done: set[int] = set()
@@ -51,7 +51,11 @@ def find_guide(
         _, cell = heapq.heappop(queue)
         if cell in done:
             continue
-        x, y, z = cell // lines - goal_x, cell % lines // line - goal_y, cell % line - goal_z
+        x, y, z = (
+            cell // x_stride - goal_x,
+            cell % x_stride // y_stride - goal_y,
+            cell % y_stride - goal_z,
+        )
         if -step < x < step and -step < y < step and -step < z < step:
             return grid.centres(_path(came_from, cell, goal))
         done.add(cell)
@@ -59,31 +63,35 @@ def find_guide(
             return None
         cost = costs[cell]
         for offset, between, length, rise in neighbours:
-            near = cell + offset
-            if occupied[near] or near in done:
+            neighbour = cell + offset
+            if occupied[neighbour] or neighbour in done:
                 continue
-            there = cost + length
-            if there >= costs.get(near, math.inf) or goal_z + z + rise < lowest:
+            new_cost = cost + length
+            if new_cost >= costs.get(neighbour, math.inf) or goal_z + z + rise < lowest:
                 continue
             if any(occupied[cell + part] for part in between):
                 continue
-            costs[near] = there
-            came_from[near] = cell
-            dx, dy, dz = near // lines - goal_x, near % lines // line - goal_y, z + rise
-            ahead = math.sqrt(dx * dx + dy * dy + dz * dz)
-            heapq.heappush(queue, (there + weight * ahead, near))
+            costs[neighbour] = new_cost
+            came_from[neighbour] = cell
+            dx, dy, dz = (
+                neighbour // x_stride - goal_x,
+                neighbour % x_stride // y_stride - goal_y,
+                z + rise,
+            )
+            heuristic = math.sqrt(dx * dx + dy * dy + dz * dz)
+            heapq.heappush(queue, (new_cost + weight * heuristic, neighbour))
     return None
 
 
 @lru_cache(maxsize=4)
 def _neighbours(
-    lines: int, line: int, step: int
+    x_stride: int, y_stride: int, step: int
 ) -> tuple[tuple[int, tuple[int, ...], float, int], ...]:
-    """Of each neighbour: flat offset, offsets of the cells between, distance and rise in cells."""
+    """Return flat offset, offsets of cells in between, distance and rise of each neighbour."""
     found = []
     for x, y, z in itertools.product((-1, 0, 1), repeat=3):
         if x or y or z:
-            unit = x * lines + y * line + z
+            unit = x * x_stride + y * y_stride + z
             between = tuple(unit * share for share in range(1, step))
             length = step * math.sqrt(x * x + y * y + z * z)
             found.append((unit * step, between, length, z * step))

@@ -1,13 +1,13 @@
-"""Why the planner has no trajectory; upstream only prints these."""
+"""Errors of the planner; ego-planner, which this reimplements, only prints them."""
 
 from __future__ import annotations
 
 
 class PlannerError(Exception):
-    """Base of what keeps the planner from planning.
+    """The planner has no trajectory.
 
-    A setpoint carries it and a landing system may raise it; the planner itself goes on
-    trying, as upstream does.
+    The planner does not raise it but stores it in the setpoint, and tries again in the next step,
+    as ego-planner does.  A landing system may raise it.
     """
 
 

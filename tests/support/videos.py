@@ -1,4 +1,4 @@
-"""A recorded flight, its film, and how its pictures are read."""
+"""A recorded flight, its video, and how its pictures are read."""
 
 from __future__ import annotations
 
@@ -66,17 +66,17 @@ class Hovers:
 
 
 @dataclasses.dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Film:
+class Video:
     flight: Flight
     seen: list[Image]
     pictures: list[Image]
 
 
 @pytest.fixture(scope="package")
-def film() -> Film:
+def video() -> Video:
     flight = fly(SCENARIO, Hovers, policy_spec("waypoint"), time_limit_s=FLOWN_S)
     pictures = frames(flight, SCENARIO, LAWN, Hovers.airframe.camera, "II:lost:descent")
-    return Film(flight=flight, seen=list(Hovers.seen), pictures=list(pictures))
+    return Video(flight=flight, seen=list(Hovers.seen), pictures=list(pictures))
 
 
 def painted(picture: Image, colour: tuple[int, int, int]) -> NDArray[np.int64]:

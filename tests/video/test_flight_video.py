@@ -1,4 +1,4 @@
-"""A film has a picture for each frame, and an end."""
+"""A video has a picture for each frame, and an end."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from pytest_garl.landing_system import Camera
 from pytest_garl.simulation.fly import fly
 from pytest_garl.video import frames, rate_hz
 from pytest_garl.video.drawing import SYSTEM
-from tests.support.films import (
+from tests.support.videos import (
     CAMERA_PART,
     CLOSING_FRAMES,
     LAWN,
@@ -25,8 +25,8 @@ from tests.support.films import (
     SCENARIO,
     STRIP,
     TARGET,
-    Film,
     Hovers,
+    Video,
     on_the_map,
     painted,
 )
@@ -37,15 +37,15 @@ class NeverBegins(Hovers):
         raise ZeroDivisionError("no plan")
 
 
-def test_there_is_a_picture_for_each_camera_frame_and_two_seconds_of_the_end(film: Film) -> None:
-    assert len(film.flight.steps) == 30
-    assert len(film.pictures) == 30 + CLOSING_FRAMES
-    assert {(each.shape, each.dtype.name) for each in film.pictures} == {((656, 1024, 3), "uint8")}
-    assert all((each == film.pictures[-1]).all() for each in film.pictures[-CLOSING_FRAMES:])
+def test_there_is_a_picture_for_each_camera_frame_and_two_seconds_of_the_end(video: Video) -> None:
+    assert len(video.flight.steps) == 30
+    assert len(video.pictures) == 30 + CLOSING_FRAMES
+    assert {(each.shape, each.dtype.name) for each in video.pictures} == {((656, 1024, 3), "uint8")}
+    assert all((each == video.pictures[-1]).all() for each in video.pictures[-CLOSING_FRAMES:])
 
 
-def test_a_systems_beliefs_are_drawn_from_their_step_on(film: Film) -> None:
-    silent, speaking = film.pictures[14], film.pictures[16]
+def test_a_systems_beliefs_are_drawn_from_their_step_on(video: Video) -> None:
+    silent, speaking = video.pictures[14], video.pictures[16]
     for part in (CAMERA_PART, MAP_PART):
         assert len(painted(silent[part], SYSTEM)) == 0
     outline = painted(speaking[CAMERA_PART], SYSTEM)
@@ -56,9 +56,9 @@ def test_a_systems_beliefs_are_drawn_from_their_step_on(film: Film) -> None:
         assert any(math.dist(each, on_the_map(*place[:2])) < 2 for each in beliefs)
 
 
-def test_the_pictures_change_as_time_goes_by(film: Film) -> None:
+def test_the_pictures_change_as_time_goes_by(video: Video) -> None:
     for part in (CAMERA_PART, STRIP, MAP_PART):
-        assert (film.pictures[5][part] != film.pictures[25][part]).any()
+        assert (video.pictures[5][part] != video.pictures[25][part]).any()
 
 
 def test_a_flight_that_never_began_has_an_end() -> None:
@@ -68,24 +68,24 @@ def test_a_flight_that_never_began_has_an_end() -> None:
     assert len(pictures) == CLOSING_FRAMES
 
 
-def test_a_flight_of_another_scenario_is_refused(film: Film) -> None:
+def test_a_flight_of_another_scenario_is_refused(video: Video) -> None:
     camera = Hovers.airframe.camera
     elsewhere = SCENARIO.replace({"marker.x": -SCENARIO["marker.x"]})
     with pytest.raises(GarlError, match=r"its marker lay at .* take the scenario and the map"):
-        next(frames(film.flight, elsewhere, LAWN, camera))
+        next(frames(video.flight, elsewhere, LAWN, camera))
     fewer = SCENARIO.without("dog-1")
     with pytest.raises(GarlError, match=r"it has the objects .*dog-1.* map 'lawn' has person-1"):
-        next(frames(film.flight, fewer, LAWN, camera))
+        next(frames(video.flight, fewer, LAWN, camera))
 
 
-def test_the_rate_is_the_recorded_one(film: Film) -> None:
+def test_the_rate_is_the_recorded_one(video: Video) -> None:
     camera = Camera(rate_hz=50.0)
     steps = tuple(
         dataclasses.replace(step, time_s=index * 5 / 240)
-        for index, step in enumerate(film.flight.steps)
+        for index, step in enumerate(video.flight.steps)
     )
-    assert rate_hz(dataclasses.replace(film.flight, steps=steps), camera) == 48.0
-    assert rate_hz(dataclasses.replace(film.flight, steps=()), camera) == 50.0
+    assert rate_hz(dataclasses.replace(video.flight, steps=steps), camera) == 48.0
+    assert rate_hz(dataclasses.replace(video.flight, steps=()), camera) == 50.0
 
 
 def test_drawing_needs_neither_the_encoder_nor_pytest_nor_the_physics() -> None:

@@ -1,4 +1,4 @@
-"""From a recorded flight to the film's pictures."""
+"""From a recorded flight to the video's pictures."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ CLOSING_S = 2.0
 def save_video(
     path: Path, flight: Flight, scenario: Scenario, map: Map, camera: Camera, signature: str = ""
 ) -> None:
-    """Write the film of a flight to ``path`` (.mp4); it plays at the flight's own speed.
+    """Write the video of a flight to ``path`` (.mp4); it plays at the flight's own speed.
 
     Raises GarlError where the flight is not one of this scenario, or imageio-ffmpeg is missing.
     """
@@ -41,7 +41,7 @@ def save_video(
 def frames(
     flight: Flight, scenario: Scenario, map: Map, camera: Camera, signature: str = ""
 ) -> Iterator[Image]:
-    """Yield the film's pictures, RGB uint8 (656, 1024, 3): one per camera frame, then the end.
+    """Yield the video's pictures, RGB uint8 (656, 1024, 3): one per camera frame, then the end.
 
     ``map`` is the scenario's, with or without its removed objects; ``camera`` the one that
     flew; ``signature`` the verdict's, empty for a flight without violation.  The end is the
