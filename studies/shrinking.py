@@ -111,7 +111,7 @@ def shrink_one(violation: Violation, fly: FlyFunction) -> list[dict[str, Any]]:
     known: dict[Scenario, bool] = {}
 
     def fails(scenario: Scenario) -> bool:
-        # What one pass has flown the next need not fly again; it counts for both.
+        # The next pass need not repeat a flight of an earlier pass; it counts for both.
         if scenario not in known:
             known[scenario] = fly(violation.job, scenario).signature == violation.signature
         return known[scenario]

@@ -60,7 +60,7 @@ class DecisionParameters:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Decision:
-    """What to do: a phase, where to (x, y), how high, and a reason for a reader."""
+    """A decision: a phase, a goal (x, y), a height, and a reason in words."""
 
     phase: Phase
     goal_m: tuple[float, float, float]
@@ -192,7 +192,7 @@ class DecisionModule:
         return self._go("search", (*self._searched[0], mission.search_altitude_m))
 
     def _pattern(self) -> list[GroundPoint]:
-        """Rings about the told coordinate, out to where the marker may lie at most."""
+        """Rings about the given GPS position, out to the largest distance of the marker."""
         gps_x, gps_y = self._mission.gps_position_m
         places = []
         for radius in self._p.search_rings_m:

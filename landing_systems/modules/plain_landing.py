@@ -1,4 +1,4 @@
-"""What OpenCV-MLS and TPHYolo-MLS share: they differ in the detector alone."""
+"""Common parts of OpenCV-MLS and TPHYolo-MLS, which differ only in the detector."""
 
 from __future__ import annotations
 

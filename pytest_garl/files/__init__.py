@@ -1,1 +1,1 @@
-"""How files are read and written: atomic writes and locks, strict TOML, bounded reads."""
+"""Reading and writing of files: atomic writes and locks, strict TOML, bounded reads."""

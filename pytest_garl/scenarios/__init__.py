@@ -1,1 +1,1 @@
-"""What is flown: genes, chromosomes, scenarios, maps and their files."""
+"""Inputs of a flight: genes, chromosomes, scenarios, maps and their files."""

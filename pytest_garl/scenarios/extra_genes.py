@@ -31,7 +31,7 @@ TOP_GPS_ERROR_M = 2.5
 """Horizontal accuracy (CEP) that u-blox states for its M8 receivers; here a bound per axis."""
 GPS_ERROR = CompositeGene(
     name="gps_error",
-    genes=(place_gene("gps_error", "gps_error", "error of the told coordinate, share of 2.5 m"),),
+    genes=(place_gene("gps_error", "gps_error", "error of the GPS position, share of 2.5 m"),),
 )
 
 EXTRAS = {gene.name: gene for gene in (WIND, GPS_ERROR)}

@@ -11,7 +11,7 @@ from pytest_garl.scenarios.scenario import Scenario
 MARKER_SIDE_M = 1.5
 MARKER_RADIUS_M = 7.5
 TARGET_MARKER_ID = 0
-"""Paper, section 4.2: marker of 1.5 m, id 0, up to 7.5 m off the told coordinate."""
+"""Paper, section 4.2: marker of 1.5 m, id 0, up to 7.5 m off the given GPS position."""
 MARKER_DICTIONARY = "DICT_5X5_50"
 
 
@@ -62,12 +62,12 @@ def marker_genes(position_m: tuple[float, float], map: Map) -> dict[str, float]:
 
 
 def object_start_m(scenario: Scenario, map: Map, name: str) -> tuple[float, float]:
-    """Where an object starts: its genes stretched over the map's bounds."""
+    """Return the start of an object: its genes scaled to the map's bounds."""
     return _over_bounds(scenario, map, f"{name}.start")
 
 
 def object_destination_m(scenario: Scenario, map: Map, name: str) -> tuple[float, float] | None:
-    """Where an object is bound for, or None where the genome has no destinations."""
+    """Return the destination of an object, or None if the genome has no destinations."""
     bound = any(key == f"{name}.destination_x" for key, _ in scenario.genes)
     return _over_bounds(scenario, map, f"{name}.destination") if bound else None
 
@@ -92,6 +92,6 @@ def start_genes(name: str, position_m: tuple[float, float], map: Map) -> dict[st
 
 
 def object_speed_mps(scenario: Scenario, map: Map, name: str) -> float:
-    """How fast an object may move: its velocity gene times its type's top speed."""
+    """Return the largest speed of an object: its velocity gene times its type's top speed."""
     kind = dict(map.present_objects)[name]
     return scenario[f"{name}.velocity"] * OBJECT_TYPES[kind].top_speed_mps

@@ -1,4 +1,4 @@
-"""What is flown: one point of the search space, with everything that it needs to repeat."""
+"""A scenario: one point of the search space, with everything that repeats its flight."""
 
 from __future__ import annotations
 

@@ -32,7 +32,7 @@ _DIRECTIONS = 32
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Disc:
-    """What a part covers, seen from above: a bounding disc, with its height band."""
+    """The bounding disc of a part seen from above, with its range of heights."""
 
     name: str
     x_m: float

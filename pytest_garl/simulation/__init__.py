@@ -1,1 +1,1 @@
-"""Where a landing is flown: the flight loop, its recorder and its record."""
+"""Simulation of one flight: the flight loop, its recorder and its record."""

@@ -1,4 +1,4 @@
-"""What contacts mean: the UAV has landed, has collided, or is still flying."""
+"""Outcome of contacts: the UAV has landed, has collided, or is still flying."""
 
 from __future__ import annotations
 
@@ -20,12 +20,12 @@ HARD_TOUCHDOWN_MPS = 2.0
 ABORT_CLEAR_M = 2.0
 ABORT_HEIGHT_M = 5.0
 CLEAR_OF_CONTACT_M = 2.0
-"""What is that far off is not touched before the next sample of the track: the engine need not be
-asked.  To meet within 10 steps the two would have to close at 48 m/s."""
+"""A body this far away cannot be touched before the next sample of the track, so the engine is not
+queried: within 10 steps the two would have to approach at 48 m/s."""
 
 
 class Contacts:
-    """Watches what the UAV touches and how far it is from everything.
+    """Watches the contacts of the UAV and its distance from every body.
 
     ``landed_since`` is when the UAV came to rest on the ground, None while it moves.
     """
@@ -87,7 +87,7 @@ class Contacts:
         return "landed"
 
     def _is_collision(self, touch: HullContact, velocity: Vector, tilt_rad: float) -> bool:
-        """Record the contact if it is the first with that body; tell whether it ends the flight."""
+        """Record the first contact with a body; return whether the contact ends the flight."""
         if touch.body != "ground":
             approach = self._approach_mps(touch.body, velocity)
             self._recorder.contact(touch.body, touch.position_m, approach, tilt_rad)
@@ -100,7 +100,7 @@ class Contacts:
         return sink_mps > HARD_TOUCHDOWN_MPS or tilt_rad > LANDED_TILT_RAD
 
     def _approach_mps(self, body: str, velocity: Vector) -> float:
-        """Return the UAV's speed relative to a body: what walks may hit what hovers."""
+        """Return the UAV's speed relative to a body: a moving one may hit a hovering UAV."""
         moving = next((npc for npc in self._npcs if npc.name == body), None)
         vx, vy = (moving.vx_mps, moving.vy_mps) if moving else (0.0, 0.0)
         return math.dist(velocity, (vx, vy, 0.0))

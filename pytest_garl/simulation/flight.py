@@ -17,7 +17,7 @@ BodyClass = Literal["static", "dynamic", "ground"]
 TRACK_RATE_HZ = 24.0
 """Rate of the recorded tracks: every tenth physics step."""
 PACKAGES = ("pytest-garl", "numpy", "opencv-python-headless", "pybullet")
-"""Whose versions decide on a flight's bytes."""
+"""Packages whose versions determine the bytes of a flight."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -35,7 +35,7 @@ class Track:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class ObjectRecord:
-    """What one dynamic object did: its track and its moves, one (x, y) per 0.5 s, (k, 2).
+    """Motion of one dynamic object: its track and its moves, one (x, y) per 0.5 s, (k, 2).
 
     ``changes`` are those of the environment that its policy asked for: the number of the
     decision, the gene, what was added to it.
@@ -105,7 +105,7 @@ class Step:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Crash:
-    """How a landing system broke down.
+    """An error of a landing system.
 
     ``kind`` is "raised", "nonsense" (a wrong return value), "died" (its process ended), "hung" or
     "broke" (the simulator fails with it and with no other); ``error`` the exception's type or the

@@ -47,7 +47,7 @@ TICKS_PER_NPC_STEP = 4
 
 
 class Loop:
-    """One flight under way; ``begin`` it, then ``tick`` until there is an outcome."""
+    """One flight; call ``begin``, then ``tick`` until it returns an outcome."""
 
     def __init__(
         self,
@@ -100,7 +100,7 @@ class Loop:
 
     def begin(self) -> None:
         """Reset the NPCs' policies and the landing system."""
-        # By its place among all NPCs of the map: removing one changes nothing for the others.
+        # By the index among all NPCs of the map, so that removing one does not change the others.
         numbers = {name: index for index, (name, _) in enumerate(self.map.all_objects)}
         for npc in self.npcs:
             rng = generator(self.scenario.seed, "objects", numbers[npc.name])
@@ -118,7 +118,7 @@ class Loop:
 
     @property
     def out_of_time(self) -> bool:
-        """Whether the next ``tick`` is the one that says so."""
+        """Whether the next ``tick`` returns "not_landed"."""
         return self._ticks >= self._last_tick
 
     def tick(self) -> Outcome | None:
@@ -159,7 +159,7 @@ class Loop:
         self._world.step(motion.position_m, (fx + dx, fy + dy, fz + dz), rotate(attitude, torque))
 
     def _thrusts_wanted(self, tick: int, motion: Motion) -> Thrusts:
-        """Return what the motors are asked for: by the system's own control, or by ours."""
+        """Return the wanted thrusts of the system's own flight control, or of the simulated one."""
         if isinstance(self._command, Land) and self._contacts.landed_since is not None:
             return NO_THRUST
         if not self._system.airframe.control_rate_hz or isinstance(self._command, Abort):
@@ -225,7 +225,7 @@ class Loop:
             camera = airframe.camera
             frame, visible = blank_frame(camera.height_px, camera.width_px), (0.0, 0.0, ())
         if self._system.gave_up:
-            # What there was to see explains a collision on the way up.
+            # The recorded view explains a collision during the climb.
             self.recorder.step(Abort(), visible)
             return
         observation = observe(

@@ -1,1 +1,1 @@
-"""What went wrong: properties and margins, violation types, signatures, metrics."""
+"""Judgement of flights: properties and margins, violation types, signatures, metrics."""

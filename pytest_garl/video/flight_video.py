@@ -25,7 +25,7 @@ from pytest_garl.video.pose import poses_at
 from pytest_garl.video.timeline import Timeline
 
 CLOSING_S = 2.0
-"""How long the last moment, with the outcome, stands still."""
+"""How long the last picture, with the outcome, is shown."""
 
 
 def save_video(

@@ -1,4 +1,4 @@
-"""Where everything was at one time of a recorded flight."""
+"""Poses of the UAV and of all objects at one time of a recorded flight."""
 
 from __future__ import annotations
 

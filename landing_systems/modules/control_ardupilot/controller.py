@@ -70,7 +70,7 @@ class ArduPilotControl:
 
     @property
     def precision(self) -> PrecisionLanding:
-        """What LAND makes of the measured landing target."""
+        """The landing target as LAND uses it."""
         return self._landing.precision
 
     @property
@@ -136,7 +136,8 @@ class ArduPilotControl:
     def landing_target(self, position_m: Vector, time_s: float) -> None:
         """Take a detector's measurement of the target's place in the world, as of ``time_s``.
 
-        It is told before and during LAND; what counts is known 2 s after the first.
+        It may be called before and during LAND; LAND uses the estimate from 2 s after the
+        first call on.
         """
         if self._state is not None:
             self._landing.measure(position_m, time_s, self._state)

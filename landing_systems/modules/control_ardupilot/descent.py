@@ -1,4 +1,4 @@
-"""How fast LAND descends."""
+"""Descent speed of LAND."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Where GUIDED and LAND want the vehicle to be: the setpoints and how they move the targets."""
+"""Targets of GUIDED and LAND: the setpoints and how they move the targets."""
 
 from __future__ import annotations
 

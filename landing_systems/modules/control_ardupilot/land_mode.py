@@ -1,4 +1,4 @@
-"""Where LAND wants the vehicle to be, and how fast it lets it come down."""
+"""Target position and descent of LAND."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Where the landing target is: ArduPilot's precision landing estimator, in the world frame.
+"""Position of the landing target: ArduPilot's precision landing estimator, in the world frame.
 
 ArduPilot measures the target relative to the vehicle and moves the estimate with its inertial
 sensors.  Here a measurement is a place in the world, made with the vehicle's pose at the time
@@ -82,7 +82,7 @@ class LandingTarget:
         self._acquired = False
         self._filtered_s = 0.0
         self.measured_s: float | None = None
-        """When it was last measured and believed."""
+        """Time of the last accepted measurement."""
 
     def measure(self, place: Pair, time_s: float, height_m: float, rate_radps: float) -> bool:
         """Take a measurement (x, y) in the world; return whether it was believed.

@@ -14,7 +14,7 @@ Shares = tuple[float, float, float, float]
 
 
 class MotorLimits(NamedTuple):
-    """What a mix could not give; integrators look at it."""
+    """The limits that a mix has reached; the integrators use them."""
 
     tilt: bool = False
     yaw: bool = False

@@ -32,7 +32,7 @@ class RatePid:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ArduPilotParameters:
-    """What an operator of ArduPilot would set; the defaults are ArduPilot's."""
+    """Parameters that an operator of ArduPilot can set; the defaults are ArduPilot's."""
 
     psc_posxy_p: float = 1.0
     """1/s."""

@@ -31,7 +31,7 @@ how long a failed landing stops, and when a lost target is no longer a recent on
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Instruction:
-    """What to do in this step.
+    """The decision for one step.
 
     "land on target": descend while going to ``target_m`` (x, y); "descend": straight down;
     "retry": fly to ``goal_m`` (x, y, z); "hold": stop.
@@ -67,7 +67,7 @@ class PrecisionLanding:
 
     @property
     def status(self) -> str:
-        """What precision landing is doing, for a reader."""
+        """The state of precision landing in words."""
         if self._failed_s is not None:
             return "failed"
         if self._retry:

@@ -1,4 +1,4 @@
-"""What the controller knows of the vehicle that it flies."""
+"""Properties of the vehicle that the controller uses."""
 
 from __future__ import annotations
 

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float32]
 CLASS_IDS = (0, 1, 2, 3)
-"""The ids that are told apart, as in the paper's published detector (marker0 to marker3); a
+"""Ids that the network distinguishes as in the paper's published detector (marker0 to marker3); a
 marker of another id belongs to no class and is not reported."""
 STRIDES = (4, 8, 16, 32)
 CHANNELS = 5

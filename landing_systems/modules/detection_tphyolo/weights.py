@@ -67,10 +67,10 @@ def read_weights(file: Path) -> Weights:
         raise _wrong(file, f"cannot be read with its networks ({error})") from error
     if not isinstance(manifest, dict) or manifest.get("format") != FORMAT:
         raise _wrong(file, f"is not a manifest of format {FORMAT}")
-    told = manifest.get("sha256")
+    hashes = manifest.get("sha256")
     for name, content in contents.items():
         found = hashlib.sha256(content).hexdigest()
-        expected = str(told.get(name)) if isinstance(told, dict) else "nothing"
+        expected = str(hashes.get(name)) if isinstance(hashes, dict) else "nothing"
         if found != expected:
             raise _wrong(
                 network_file(file, name),

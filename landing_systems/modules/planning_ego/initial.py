@@ -1,4 +1,4 @@
-"""Where a trajectory goes before it is optimised: its path, its timing, its end."""
+"""Initial trajectory before the optimisation: its path, its timing, its end."""
 
 from __future__ import annotations
 

@@ -16,7 +16,7 @@ MAX_HALVINGS = 12
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Minimum:
-    """Where a minimisation ended: the variables, and the iterations that it took."""
+    """Result of a minimisation: the variables, and the number of iterations."""
 
     x: Array
     iterations: int

@@ -26,7 +26,7 @@ PATH_STEP_S = 0.2
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Setpoint:
-    """Where to be, how fast, and what the planner thinks.
+    """Wanted position and velocity, and the planner's state.
 
     ``path_m`` are points of the trajectory still to fly, for ``Diagnostics``.  ``error``
     says why the last planning failed; the setpoint then follows the trajectory that there

@@ -1,6 +1,6 @@
 """The second network, which reads the id: TPH-YOLOv5's classifier of cut-outs, much smaller.
 
-A cell of the first network, told only which of four ids is right, was still at chance after 1,750
+A cell of the first network, trained only with the right one of four ids, was at chance after 1,750
 steps: the codes may be turned by any angle.  A classifier of cut-outs learns it in some hundred.
 """
 
@@ -141,12 +141,12 @@ def _legible(row: NDArray[np.float32], region: NDArray[np.float32], size: int) -
 def train_identity(
     plan: IdentityPlan,
     shards: Sequence[Samples],
-    told: Callable[[int, float], None],
+    on_step: Callable[[int, float], None],
     device: str = "cpu",
 ) -> IdentityNet:
     """Train on crops and return the averaged network, on the CPU.
 
-    ``told`` hears each step and loss.
+    ``on_step`` is called with each step and loss.
     """
     torch.manual_seed(plan.seed)
     patch_sampler = PatchSampler(shards, plan)
@@ -168,5 +168,5 @@ def train_identity(
         optimiser.step()
         schedule.step()
         follow(averaged, model, step, plan.average)
-        told(step + 1, float(loss.detach()))
+        on_step(step + 1, float(loss.detach()))
     return averaged.cpu()

@@ -137,12 +137,12 @@ def train(
     plan: TrainPlan,
     data: Path,
     shards: int,
-    told: Callable[[int, float], None],
+    on_step: Callable[[int, float], None],
     device: str = "cpu",
 ) -> TphYolo:
     """Train on the shards in ``data`` and return the averaged network, on the CPU.
 
-    ``told`` hears each step's number and loss.  A checkpoint in ``data`` is continued.
+    ``on_step`` is called with each step's number and loss.  A checkpoint in ``data`` is continued.
     """
     crops = [load_shard(data, index, "crops") for index in range(shards)]
     frames = [load_shard(data, index, "frames") for index in range(shards)]
@@ -150,7 +150,7 @@ def train(
     file = data / f"finder-{plan.seed}-{plan.steps}-{shards}.pt"
     trainer.load(file)
     while trainer.step < plan.steps:
-        told(trainer.step + 1, trainer.advance())
+        on_step(trainer.step + 1, trainer.advance())
         if trainer.step % plan.checkpoint_steps == 0 or trainer.step == plan.steps:
             trainer.save(file)
     return trainer.averaged.cpu()

@@ -36,7 +36,7 @@ _LARGEST_MARKER_ID = 49
 """The last one of the dictionary DICT_5X5_50."""
 _FULL_TURN_DEG = 360.0
 _POINTS = {"rectangle": (2, 2), "line": (2, _MOST_POINTS), "polygon": (3, _MOST_POINTS)}
-"""How many points a kind of layer has, at least and at most; the others have one."""
+"""Smallest and largest number of points of a kind of layer; the others have one."""
 
 
 def read_map(file: Path) -> Map:

@@ -1,1 +1,1 @@
-"""What the camera sees: renderer, projection, ground, bodies, weather."""
+"""The simulated camera: renderer, projection, ground, bodies, weather."""

@@ -1,4 +1,4 @@
-"""What falls on the ground and stays: leaves and snow, as a pattern of 8 m that repeats."""
+"""Leaves and snow that lie on the ground, as a pattern that repeats every 8 m."""
 
 from __future__ import annotations
 

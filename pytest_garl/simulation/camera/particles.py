@@ -1,4 +1,4 @@
-"""What falls between the camera and the ground: rain, snow and maple leaves."""
+"""Particles in the air between the camera and the ground: rain, snow and maple leaves."""
 
 from __future__ import annotations
 
@@ -79,7 +79,7 @@ class Particles:
         view: View,
         time_s: float,
     ) -> None:
-        """Draw what falls in front of what the frame shows."""
+        """Draw the particles that are in front of the objects in the frame."""
         if not self._clouds:
             return
         width, height = self._camera.width_px, self._camera.height_px

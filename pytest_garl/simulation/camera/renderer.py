@@ -43,7 +43,7 @@ engineering estimate."""
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class _Look:
-    """What the environment makes of a picture; another environment has another."""
+    """The effects of one environment on pictures."""
 
     conditions: Conditions
     sensor: Sensor
@@ -55,7 +55,7 @@ class _Look:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class _Scene:
-    """What there is to paint in one frame."""
+    """Everything that is painted in one frame."""
 
     view: View
     time_s: float

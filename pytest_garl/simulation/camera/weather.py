@@ -1,4 +1,4 @@
-"""What each environment gene means physically, with sources; fixed before anything is judged."""
+"""Physical meaning of each environment gene, with sources; fixed before any flight is judged."""
 
 from __future__ import annotations
 

@@ -1,1 +1,1 @@
-"""How bodies move: the pybullet world, the vehicle and its control, the NPCs' bodies."""
+"""Motion of bodies: the pybullet world, the vehicle and its control, the NPCs' bodies."""

@@ -39,7 +39,7 @@ class VehicleModel:
     mass_kg: float
     size_m: float
     lever_m: float
-    """How far a motor is from the roll axis, and from the pitch axis."""
+    """Distance of a motor from the roll axis, and from the pitch axis."""
     inertia: tuple[float, float, float]
     max_thrust_n: float
     drag_n_per_mps: float
@@ -80,7 +80,7 @@ Quaternion = tuple[float, float, float, float]
 
 
 class Motion(NamedTuple):
-    """Where the vehicle is and how it moves: world frame, but the spin (rad/s) in the body's.
+    """Pose and motion of the vehicle in the world frame, but the spin (rad/s) in the body's.
 
     A named tuple, since one is made 240 times a second.
     """

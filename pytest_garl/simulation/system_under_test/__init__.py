@@ -1,1 +1,1 @@
-"""What the landing system is shown and asked, and what is accepted of its answers."""
+"""The landing system in a flight: its inputs, its calls, and the validation of its commands."""

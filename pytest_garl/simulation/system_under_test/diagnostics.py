@@ -28,11 +28,11 @@ MOST_POINTS = 1_000
 POINTS_KEPT = 100
 """A flight has 1,200 frames at the default rate, and its record keeps the path of each."""
 MOST_BYTES = 24_000_000
-"""Of all diagnostics of a flight: a record of 32 MB is not loaded again (``flight_file.py``)."""
+"""Largest size of all diagnostics of a flight; ``flight_file.py`` loads records up to 32 MB."""
 FULL_SHARE = 0.25
-"""Of these bytes, for paths, corners and notes too; the rest is for what verdicts need."""
+"""Share of these bytes in which paths, corners and notes are recorded too."""
 _NUMBER_BYTES, _KEYS_BYTES = 26, 80
-"""What they take at most in a record, which is JSON in ASCII."""
+"""Largest size in a record, which is JSON in ASCII."""
 MOST_MARKER_ID = 2**31
 
 

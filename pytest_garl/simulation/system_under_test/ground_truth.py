@@ -1,4 +1,4 @@
-"""What a reference pilot is told: where everything is."""
+"""Ground truth for a reference pilot: the positions of the marker and of all objects."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ class TruthObject:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Truth:
-    """The world at one camera frame; told to systems that have ``observe_truth(truth)``."""
+    """The world at one camera frame; passed to systems that have ``observe_truth(truth)``."""
 
     marker_m: tuple[float, float]
     objects: tuple[TruthObject, ...]

@@ -1,4 +1,4 @@
-"""The mission of the paper: fly to the told coordinate, find the marker, land on it."""
+"""The mission of the paper: fly to the given GPS position, find the marker, land on it."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ SEARCH_ALTITUDE_M = 10.0
 
 
 def mission_for(scenario: Scenario, map: Map, airframe: Airframe, time_limit_s: float) -> Mission:
-    """Return what the landing system is told before take-off."""
+    """Return the mission that the landing system gets before take-off."""
     error_x, error_y = gps_error_m(scenario)
     gps_x, gps_y = map.gps_position_m
     return Mission(

@@ -1,4 +1,4 @@
-"""What a flight shows the landing system at a camera frame."""
+"""Observation that the landing system gets at a camera frame."""
 
 from __future__ import annotations
 

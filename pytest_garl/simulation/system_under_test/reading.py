@@ -51,7 +51,7 @@ def numbers(
 
 
 def are_floats(value: object, count: int) -> bool:
-    """Whether a value is a tuple of so many finite floats: the usual case, told in no time."""
+    """Whether a value is a tuple of ``count`` finite floats: a fast test of the usual case."""
     return (
         type(value) is tuple
         and len(value) == count
@@ -67,9 +67,9 @@ def vector(value: object, field: str, most: float = math.inf, unit: str = "") ->
 
 
 def items(value: object, most: int) -> list[Any] | None:
-    """Return the items of a sequence, ``most`` and one at the most; None for what is none.
+    """Return at most ``most + 1`` items of an iterable; None for other values.
 
-    It is read once, so that a generator may be passed, even one without end.
+    The value is read once, so it may be a generator, even an endless one.
     """
     if isinstance(value, str | bytes | dict | set | frozenset):
         return None

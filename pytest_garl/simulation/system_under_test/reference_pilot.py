@@ -45,7 +45,7 @@ class ReferencePilot:
         self._arrived_s: float | None = None
 
     def observe_truth(self, truth: Truth) -> None:
-        """Be told where everything is."""
+        """Store the ground truth."""
         self._truth = truth
 
     def step(self, observation: Observation) -> Command:

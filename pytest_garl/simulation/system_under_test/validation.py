@@ -22,7 +22,7 @@ from pytest_garl.simulation.system_under_test.texts import shown
 
 COMMANDS = (PositionSetpoint, VelocitySetpoint, AttitudeSetpoint, Land, Abort)
 QUATERNION_SLACK = 0.1
-"""How far from 1 a quaternion's length may be: rounding in float16 stays far below."""
+"""Largest deviation of a quaternion's length from 1: rounding in float16 stays far below."""
 MAX_THRUST_FACTOR = 10.0
 """A mixer may ask a saturated motor for more than there is, and for less than nothing; ten times
 what it has is no mixer's answer."""

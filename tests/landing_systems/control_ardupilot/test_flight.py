@@ -39,7 +39,7 @@ STANDING_M = 0.2
 
 
 class Lands:
-    """Takes off, goes to above the told coordinate and lands; told where the marker is.
+    """Takes off, flies over the given GPS position and lands; it knows where the marker is.
 
     Orders take effect ``latency_s`` after the image, as commands do.
     """
