@@ -81,12 +81,12 @@ def pin() -> bool:
     It does not where a library was loaded earlier and has chosen something else.
     """
     os.environ.update(environment())
-    return not disobeying()
+    return not libraries_off_baseline()
 
 
 def check() -> None:
     """Raise DispatchError where a library that is loaded has not chosen the baseline."""
-    wrong = disobeying()
+    wrong = libraries_off_baseline()
     if wrong:
         raise DispatchError(
             f"this process would not fly as others do: found {', '.join(wrong)}, expected "
@@ -97,7 +97,7 @@ def check() -> None:
         )
 
 
-def disobeying() -> list[str]:
+def libraries_off_baseline() -> list[str]:
     """Return what is loaded and has chosen something else than the baseline, in words."""
     if not has_baseline():
         return []

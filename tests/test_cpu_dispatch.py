@@ -63,7 +63,7 @@ def test_a_machine_without_avx2_is_left_as_it_is(
     cpu(monkeypatch, flags, machine)
     assert cpu_dispatch.environment() == cpu_dispatch.THREADS
     assert cpu_dispatch.expected() != cpu_dispatch.BASELINE
-    assert not cpu_dispatch.disobeying()
+    assert not cpu_dispatch.libraries_off_baseline()
     cpu_dispatch.check()
 
 

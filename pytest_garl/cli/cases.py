@@ -25,8 +25,8 @@ DEFAULT_FOLDER = Path("scenarios/regressions")
 NO_PROOF = 3
 """Exit status of a replay that proves nothing."""
 EXIT_STATUS = {"FIXED": 0, "FAILED": 1, "STALE": NO_PROOF, "UNDECIDED": NO_PROOF}
-LEAST_FLIGHTS = 9
-"""``reshrink.LEAST_FLIGHTS``, whose module takes long to import."""
+MINIMUM_RESHRINK_FLIGHTS = 9
+"""``reshrink.MINIMUM_RESHRINK_FLIGHTS``, whose module takes long to import."""
 
 
 @dataclasses.dataclass(frozen=True, slots=True, kw_only=True)
@@ -226,7 +226,7 @@ def _refusal(replayed: Replay, how: str) -> str:
 @FILE
 @click.option(
     "--flights",
-    type=click.IntRange(min=LEAST_FLIGHTS),
+    type=click.IntRange(min=MINIMUM_RESHRINK_FLIGHTS),
     default=40,
     show_default=True,
     help="Maximal number of flights.",

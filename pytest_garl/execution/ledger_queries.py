@@ -131,7 +131,7 @@ class LedgerQueries:
         )
         return dict(rows.fetchall())
 
-    def seconds_by_kind(self) -> dict[tuple[str, str], float]:
+    def seconds_by_signature(self) -> dict[tuple[str, str], float]:
         """Return the mean wall time of violations by search and signature."""
         rows = self._database.execute(
             "SELECT search.id, json_extract(result, '$.verdict.signature') AS signature, "

@@ -14,7 +14,7 @@ from pytest_garl.execution.sources import data_files
 from pytest_garl.plugin.keys import target_of
 from pytest_garl.plugin.user_assertions import ItemAssertion
 from pytest_garl.regressions.case import Case
-from pytest_garl.regressions.case_test_run import corpus_of_one, pytest_arguments
+from pytest_garl.regressions.case_test_run import pytest_arguments, single_case_corpus
 from pytest_garl.regressions.reshrink import CaseSetup
 
 _IGNORE_IMPORTED = "ignore::pytest.PytestAssertRewriteWarning"
@@ -40,7 +40,7 @@ def case_setup(case: Case, root: Path) -> CaseSetup:
     if not case.test:
         return CaseSetup()
     collector = _Collector()
-    with corpus_of_one(case, live=False) as folder, contextlib.chdir(root):
+    with single_case_corpus(case, live=False) as folder, contextlib.chdir(root):
         output = io.StringIO()
         with contextlib.redirect_stdout(output), contextlib.redirect_stderr(output):
             options = ["--collect-only", "-q", "--capture=no", f"-W{_IGNORE_IMPORTED}"]
@@ -55,7 +55,7 @@ def case_setup(case: Case, root: Path) -> CaseSetup:
     if status not in (pytest.ExitCode.OK, pytest.ExitCode.NO_TESTS_COLLECTED):
         raise GarlError(f"pytest could not collect {case.test}:\n{output.getvalue()}")
     for item, target in tests:
-        if case.own_test and item.originalname != case.own_test:
+        if case.asserting_test and item.originalname != case.asserting_test:
             continue
         return CaseSetup(
             user_assertion=ItemAssertion(item, target) if case.assertion else None,

@@ -60,7 +60,7 @@ def _saved_targets(marked: MarkerArguments, options: Options, test: str) -> Iter
         if header is None or header.map not in there:
             yield replace(marked.target, entry=entry)
             continue
-        if header.map not in marked.maps or header.own_test not in ("", test):
+        if header.map not in marked.maps or header.asserting_test not in ("", test):
             continue
         target = replace(marked.target, map=header.map, entry=entry)
         yield target

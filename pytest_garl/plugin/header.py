@@ -5,7 +5,7 @@ from __future__ import annotations
 from pytest_garl import cpu_dispatch
 from pytest_garl.plugin.run import Run
 from pytest_garl.plugin.terminal_text import counted, duration
-from pytest_garl.regressions.forecast import seconds_of_kind
+from pytest_garl.regressions.forecast import seconds_per_new_signature
 
 
 def header(run: Run) -> str:
@@ -35,7 +35,7 @@ def acceptance_warning(run: Run) -> list[str]:
 
 def cpu_dispatch_warning(run: Run) -> list[str]:
     """Return what follows if a library was loaded before its instructions could be chosen."""
-    libraries, options = cpu_dispatch.disobeying(), run.options
+    libraries, options = cpu_dispatch.libraries_off_baseline(), run.options
     effects = []
     if options.workers == 0:
         effects.append("flown in a worker process, not inside pytest")
@@ -79,5 +79,5 @@ def _time_of(run: Run, flights: int) -> str:
 def _time_per_kind(run: Run) -> str:
     if not run.options.shrink:
         return ""
-    seconds = seconds_of_kind(run.options.shrink, run.flight_s, run.options.workers or 1)
+    seconds = seconds_per_new_signature(run.options.shrink, run.flight_s, run.options.workers or 1)
     return f", then about {duration(seconds)} per new kind of violation"

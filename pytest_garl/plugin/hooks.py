@@ -128,7 +128,7 @@ def pytest_runtestloop(session: pytest.Session) -> Generator[None, object, objec
     run = session.config.stash.get(RUN, None)
     if run is None:
         return (yield)
-    from pytest_garl.plugin.progress import show_progress
+    from pytest_garl.plugin.progress_display import show_progress
 
     with show_progress(run, session.config):
         result = yield

@@ -9,7 +9,7 @@ import pytest
 from pytest_garl.plugin.keys import is_landing_item
 from pytest_garl.plugin.options import Options
 
-OF_A_SEARCH = ("seed", "method", "population", "weather", "duplicates", "shrink", "resume")
+SEARCH_OPTIONS = ("seed", "method", "population", "weather", "duplicates", "shrink", "resume")
 """Options that only a search uses."""
 
 
@@ -47,7 +47,7 @@ def _without_effect(options: Options) -> Iterator[str]:
             "of them"
         )
     searches = options.budget > 0 and not options.repeat
-    for name in OF_A_SEARCH:
+    for name in SEARCH_OPTIONS:
         if name in given and not searches:
             reason = "beside --garl-repeat" if options.repeat else "without --garl-budget"
             yield f"--garl-{name} has no effect {reason}: only a search uses it"

@@ -29,8 +29,8 @@ SMALLEST_POPULATION = 8
 SHRINK = 12
 """Flights for each new kind of violation: enough for the barest scenario, its neighbours, the
 reference pilot and a shorter record of moves."""
-LEAST_SHRINK = 8
-"""``investigation.LEAST_FLIGHTS``, whose module takes long to import."""
+MINIMUM_SHRINK = 8
+"""``investigation.MINIMUM_CASE_FLIGHTS``, whose module takes long to import."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -189,8 +189,8 @@ def _shrink(text: str) -> int:
     if not text:
         return SHRINK
     number = _integer("shrink", text, 0)
-    if 0 < number < LEAST_SHRINK:
-        raise _wrong("shrink", text, f"0, or at least {LEAST_SHRINK} flights per new kind")
+    if 0 < number < MINIMUM_SHRINK:
+        raise _wrong("shrink", text, f"0, or at least {MINIMUM_SHRINK} flights per new kind")
     return number
 
 

@@ -14,7 +14,7 @@ import pytest
 from pytest_garl.errors import GarlError
 from pytest_garl.plugin.keys import is_xdist_worker
 from pytest_garl.plugin.options import SHRINK
-from pytest_garl.plugin.progress import show_progress
+from pytest_garl.plugin.progress_display import show_progress
 from pytest_garl.plugin.run import Run
 from pytest_garl.plugin.suggested_commands import shown_path
 from pytest_garl.plugin.terminal_text import begin_line, counted, duration, width_of, wrapped
@@ -103,7 +103,7 @@ def _saver(run: Run) -> Callable[[Case], Path | None]:
 
 def _flight_s(run: Run, requests: Sequence[CaseRequest]) -> dict[str, float]:
     """Return how long a flight of each signature took in the search."""
-    known = run.ledger.queries.seconds_by_kind()
+    known = run.ledger.queries.seconds_by_signature()
     any_s = run.ledger.queries.seconds_per_flight() or run.flight_s
     return {each.name: known.get((each.search, each.signature)) or any_s for each in requests}
 

@@ -1,7 +1,7 @@
 """Avoidability: the reference pilot flies the scenario of a violation.
 
 The reference pilot knows where everything is, and it may abort.  If it violates a property as well,
-no landing system can be asked to avoid the violation.
+no landing system can be expected to avoid the violation.
 """
 
 from __future__ import annotations
@@ -27,9 +27,10 @@ def avoidability(
     *,
     fails: Callable[[Scenario, CompletedFlight], bool],
 ) -> Avoidable:
-    """Return among which objects the reference pilot violates nothing.
+    """Let the reference pilot fly a scenario; return whether it can avoid the violation.
 
-    ``fails`` says whether a flight without built-in violation fails a test of the user.
+    "live": even if the policy steers the objects; "recorded": only if they repeat their moves;
+    "no": never.  ``fails`` says whether a flight without built-in violation fails a user's test.
     """
 
     def survives(npcs: PolicySpec) -> bool:
@@ -42,15 +43,15 @@ def avoidability(
     return "live" if not behaviour.moves or survives(job.npcs) else "recorded"
 
 
-def assumed_avoidability(behaviour: RecordedBehaviour) -> Avoidable:
-    """Return what a case says that the reference pilot has not flown."""
+def avoidability_without_pilot(behaviour: RecordedBehaviour) -> Avoidable:
+    """Return the avoidability that a case gets if the reference pilot does not fly it."""
     return "recorded" if behaviour.moves else "live"
 
 
 def survives_recorded_moves(
     job: FlightJob, scenario: Scenario, behaviour: RecordedBehaviour, fly: FlyFunction
 ) -> bool:
-    """Return whether the reference pilot violates nothing among objects that repeat their moves."""
+    """Return whether the reference pilot violates nothing while objects repeat their moves."""
     return not fly_reference_pilot(job, scenario, behaviour.policy, fly).signature
 
 

@@ -125,9 +125,9 @@ class Case:
         return RecordedBehaviour(moves=self.moves, changes=self.changes)
 
     @property
-    def own_test(self) -> str:
+    def asserting_test(self) -> str:
         """The name of the test whose own assertion failed; empty for the built-in verdict."""
-        return own_test(self.test, self.assertion)
+        return asserting_test(self.test, self.assertion)
 
     @property
     def edge(self) -> bool:
@@ -142,7 +142,7 @@ class Case:
         facts = (
             f"({self.system!r}, Scenario(map={scenario.map!r}, seed={scenario.seed!r}, "
             f"genes={scenario.genes!r}, absent={scenario.removed_objects!r}), "
-            f"{self.violation.signature!r}, {self.moves!r}, {self.own_test!r})"
+            f"{self.violation.signature!r}, {self.moves!r}, {self.asserting_test!r})"
         )
         # Empty without changes, so that cases from before they were recorded keep their names.
         changes = repr(self.changes) if self.changes else ""
@@ -153,7 +153,7 @@ class Case:
         return f"{self.scenario.map}-{subject[:60]}-{digest[:6]}"
 
 
-def own_test(test: str, assertion: str) -> str:
+def asserting_test(test: str, assertion: str) -> str:
     """Return the function's name in a test's node id if the failure is its own assertion."""
     return test.rpartition("::")[2] if assertion else ""
 

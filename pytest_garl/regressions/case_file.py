@@ -22,7 +22,14 @@ from pytest_garl.regressions.behaviour_toml import (
     read_changes,
     read_moves,
 )
-from pytest_garl.regressions.case import Avoidable, Case, Evidence, Status, Violation, own_test
+from pytest_garl.regressions.case import (
+    Avoidable,
+    Case,
+    Evidence,
+    Status,
+    Violation,
+    asserting_test,
+)
 from pytest_garl.scenarios.files import gene_lines, read_genes
 from pytest_garl.scenarios.maps.map import Map, load_map
 from pytest_garl.verdicts.verdict import (
@@ -48,7 +55,7 @@ class CaseHeader:
     status: Status
     avoidable: Avoidable
     map: str
-    own_test: str
+    asserting_test: str
 
 
 def load_case(path: Path, map_folders: tuple[Path, ...] = ()) -> Case:
@@ -157,7 +164,7 @@ def _read_header(top: Table) -> CaseHeader:
         status=cast(Status, top.string("status", allowed=get_args(Status))),
         avoidable=cast(Avoidable, top.string("avoidable", allowed=get_args(Avoidable))),
         map=top.string("map"),
-        own_test=own_test(top.string("test", ""), top.string("assertion", "")),
+        asserting_test=asserting_test(top.string("test", ""), top.string("assertion", "")),
     )
 
 

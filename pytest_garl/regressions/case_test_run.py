@@ -39,7 +39,7 @@ class CaseTestResult:
     message: str
     properties: dict[str, str]
 
-    def is_of(self, test: str) -> bool:
+    def is_result_of(self, test: str) -> bool:
         """Return whether it is of the test with a node id, or with a function's name."""
         path, _, rest = test.partition("::") if "::" in test else ("", "", test)
         dotted = path.removesuffix(".py").replace("/", ".")
@@ -56,7 +56,7 @@ def run_case_tests(
     pytest runs in ``root`` on the file of the test that found the case, or on all files if no test
     is known.  The case counts as fixed, so that no failure is expected.
     """
-    with corpus_of_one(case, live=live) as folder:
+    with single_case_corpus(case, live=live) as folder:
         report = folder / "report.xml"
         done = subprocess.run(
             [
@@ -78,7 +78,7 @@ def run_case_tests(
 
 
 @contextmanager
-def corpus_of_one(case: Case, *, live: bool) -> Iterator[Path]:
+def single_case_corpus(case: Case, *, live: bool) -> Iterator[Path]:
     """Give a folder with a corpus of this one case, marked as fixed, so that it must pass."""
     with tempfile.TemporaryDirectory(prefix="garl-") as scratch:
         flown = dataclasses.replace(

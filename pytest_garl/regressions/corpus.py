@@ -239,6 +239,6 @@ def _failure(case: Case) -> tuple[str, ...]:
         case.system,
         case.scenario.map,
         case.violation.signature,
-        case.own_test,
+        case.asserting_test,
         case.assertion,
     )

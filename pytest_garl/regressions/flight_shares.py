@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 
 from pytest_garl.regressions.case_flights import PILOT_FLIGHTS
 from pytest_garl.regressions.case_request import CaseRequest, CaseResult
-from pytest_garl.regressions.investigation import EXCEPTION_FLIGHTS, LEAST_FLIGHTS
+from pytest_garl.regressions.investigation import EXCEPTION_FLIGHTS, MINIMUM_CASE_FLIGHTS
 
 
 def divide_flights(
@@ -50,7 +50,7 @@ def _divide(most: Sequence[int], flights: int) -> list[int]:
     """
     given = []
     for wanted in most:
-        least = min(wanted, LEAST_FLIGHTS - PILOT_FLIGHTS)
+        least = min(wanted, MINIMUM_CASE_FLIGHTS - PILOT_FLIGHTS)
         given.append(least if least <= flights else 0)
         flights -= given[-1]
     if sum(map(bool, given)) == 1:

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from pytest_garl.regressions.case_flights import PILOT_FLIGHTS
 from pytest_garl.regressions.case_request import CaseRequest
 from pytest_garl.regressions.flight_shares import divide_flights
-from pytest_garl.regressions.investigation import LEAST_FLIGHTS
+from pytest_garl.regressions.investigation import MINIMUM_CASE_FLIGHTS
 
 SPENT_SHARE = 0.85
 """Share of its flights that a kind of violation spends: many need fewer than they may have.  With
@@ -33,14 +33,14 @@ def flights_after_search(kinds: int, each: int, cap: int | None) -> float:
     if not kinds or not each:
         return 0.0
     own = SPENT_SHARE * (each - PILOT_FLIGHTS)
-    least = SPENT_SHARE * (LEAST_FLIGHTS - PILOT_FLIGHTS)
+    least = SPENT_SHARE * (MINIMUM_CASE_FLIGHTS - PILOT_FLIGHTS)
     if cap is None or kinds * own <= cap:
         return kinds * (1 + own + USUAL_PILOT_FLIGHTS)
     reached = max(1, min(kinds, int(cap / least)))
     return kinds + max(own, min(reached * own, cap)) + reached * USUAL_PILOT_FLIGHTS
 
 
-def seconds_of_kind(each: int, flight_s: float, workers: int) -> float:
+def seconds_per_new_signature(each: int, flight_s: float, workers: int) -> float:
     """Return how long one of several new kinds of violation takes."""
     own = SPENT_SHARE * (each - PILOT_FLIGHTS)
     flights = 1 + own + USUAL_PILOT_FLIGHTS * PILOT_TIME_SHARE
@@ -56,9 +56,9 @@ def remaining_work(
     divided = divide_flights(requests)
     for request in sorted(divided, key=lambda each: not each.budget):
         budget = request.budget
-        if not budget and left[request.search] >= LEAST_FLIGHTS - PILOT_FLIGHTS:
+        if not budget and left[request.search] >= MINIMUM_CASE_FLIGHTS - PILOT_FLIGHTS:
             # It gets the flights that others do not need.
-            budget = LEAST_FLIGHTS
+            budget = MINIMUM_CASE_FLIGHTS
         if not budget:
             continue
         own = 1.0 if request.is_exception else SPENT_SHARE * (budget - PILOT_FLIGHTS)

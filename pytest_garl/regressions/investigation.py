@@ -5,15 +5,15 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from pytest_garl.execution.on_demand import FlyFunction
-from pytest_garl.regressions.avoidability import assumed_avoidability
+from pytest_garl.regressions.avoidability import avoidability_without_pilot
 from pytest_garl.regressions.case import RecordedBehaviour
 from pytest_garl.regressions.case_flights import PILOT_FLIGHTS, CaseFlights
 from pytest_garl.regressions.case_request import CaseRequest, CaseResult, FailingScenario
 from pytest_garl.regressions.new_case import new_case
 from pytest_garl.regressions.recorded_behaviour import find_colliding_object
-from pytest_garl.regressions.reduction import simplest_robust, with_shorter_record
 from pytest_garl.regressions.robustness import NEIGHBOURS
 from pytest_garl.regressions.shrink import shrink
+from pytest_garl.regressions.simplest_robust import simplest_robust, with_shorter_record
 from pytest_garl.regressions.simplification import (
     bare_scenario,
     bare_scenario_around_marker,
@@ -22,7 +22,7 @@ from pytest_garl.regressions.simplification import (
 )
 from pytest_garl.scenarios.scenario import Scenario
 
-LEAST_FLIGHTS = 2 + NEIGHBOURS + PILOT_FLIGHTS
+MINIMUM_CASE_FLIGHTS = 2 + NEIGHBOURS + PILOT_FLIGHTS
 """The fewest flights that can confirm a violation: one of the scenario without all that the failure
 should not need, one of the scenario as found, its neighbours, the reference pilot."""
 EXCEPTION_FLIGHTS = 2
@@ -77,7 +77,9 @@ class CaseBuilder:
                 failing = FailingScenario(
                     origin=first, scenario=scenario, behaviour=behaviour, flight=flight
                 )
-                return flights.result(new_case(request, failing, assumed_avoidability(behaviour)))
+                return flights.result(
+                    new_case(request, failing, avoidability_without_pilot(behaviour))
+                )
         return flights.result(None, NOT_REPRODUCED)
 
     def _confirm_bare(self, first: Scenario) -> FailingScenario | None:
@@ -126,7 +128,7 @@ class CaseBuilder:
         """Return the first violation all of whose neighbours fail, or the best of those tried."""
         flights = self._flights
         for number, scenario in enumerate(scenarios):
-            needed = 1 + NEIGHBOURS + (LEAST_FLIGHTS if number and best is not None else 0)
+            needed = 1 + NEIGHBOURS + (MINIMUM_CASE_FLIGHTS if number and best is not None else 0)
             if flights.left < needed:
                 break
             found = flights.confirm(scenario, scenario, flights.live_behaviour(scenario))

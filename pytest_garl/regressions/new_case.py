@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pytest_garl.execution.reference import simulator_sha256
-from pytest_garl.regressions.avoidability import assumed_avoidability
+from pytest_garl.regressions.avoidability import avoidability_without_pilot
 from pytest_garl.regressions.case import Avoidable, Case, Evidence, Violation
 from pytest_garl.regressions.case_request import CaseRequest, CaseResult, FailingScenario
 from pytest_garl.regressions.complexity import complexity, genome_of
@@ -27,7 +27,7 @@ def case_without_flights(request: CaseRequest) -> CaseResult:
         behaviour=recorded_behaviour(flight, scenario, request.map),
         flight=flight,
     )
-    case = new_case(request, failing, assumed_avoidability(failing.behaviour))
+    case = new_case(request, failing, avoidability_without_pilot(failing.behaviour))
     return CaseResult(signature=request.signature, case=case, flights=0)
 
 

@@ -76,7 +76,7 @@ def replay(
     if not case.test:
         return _by_verdict(case, folder, map, f"{BUILT_IN_VERDICT}: the case names no test", live)
     with run_case_tests(case, folder, live=live) as (results, flights):
-        finder = next((each for each in results if each.is_of(case.test)), None)
+        finder = next((each for each in results if each.is_result_of(case.test)), None)
         if finder is not None:
             return _by_tests(case, map, results, finder, flights, live)
     if case.assertion:

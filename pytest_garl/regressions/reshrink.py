@@ -20,21 +20,21 @@ from pytest_garl.execution.reference import (
 )
 from pytest_garl.execution.sources import sources_sha256
 from pytest_garl.regressions.case import Avoidable, Case, RecordedBehaviour
+from pytest_garl.regressions.case_comparison import is_simpler
 from pytest_garl.regressions.case_flights import PILOT_FLIGHTS, CaseFlights
 from pytest_garl.regressions.case_request import CaseRequest, CaseResult, FailingScenario
 from pytest_garl.regressions.new_case import new_case
 from pytest_garl.regressions.recorded_behaviour import find_colliding_object
-from pytest_garl.regressions.reduction import simplest_robust, with_shorter_record
 from pytest_garl.regressions.replay import system_of
 from pytest_garl.regressions.robustness import NEIGHBOURS
 from pytest_garl.regressions.shrink import shrink
-from pytest_garl.regressions.simplicity import is_simpler
+from pytest_garl.regressions.simplest_robust import simplest_robust, with_shorter_record
 from pytest_garl.regressions.staleness import SourceHashes
 from pytest_garl.regressions.user_failure import UserAssertion
 from pytest_garl.scenarios.maps.map import load_map
 from pytest_garl.scenarios.scenario import Scenario
 
-LEAST_FLIGHTS = 1 + 1 + 1 + NEIGHBOURS + PILOT_FLIGHTS
+MINIMUM_RESHRINK_FLIGHTS = 1 + 1 + 1 + NEIGHBOURS + PILOT_FLIGHTS
 """The fewest flights that can improve a case: one of the case as it is, one of a simpler scenario,
 one of that scenario with recorded moves, its neighbours, the reference pilot."""
 NOT_REPRODUCED = "it does not fail in the same way any more with its recorded moves"

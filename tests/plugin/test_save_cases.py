@@ -151,7 +151,7 @@ def test_own_property_is_shrunk_and_saved_for_its_test(
     result.stdout.fnmatch_lines(["own:test_own:*: a property of your own"])
     (own,) = [path for path in cases(pytester) if "-own-" in path.name]
     case = load_case(own)
-    assert (case.test, case.own_test) == ("test_it.py::test_own", "test_own")
+    assert (case.test, case.asserting_test) == ("test_it.py::test_own", "test_own")
     assert case.violation.type == "own"
     assert case.violation.description.startswith("test_own: too much snow")
     assert len(case.scenario.removed_objects) == 4

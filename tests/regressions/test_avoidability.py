@@ -7,8 +7,8 @@ import pytest
 from pytest_garl.execution.job import FlightJob
 from pytest_garl.execution.result import CompletedFlight
 from pytest_garl.regressions.avoidability import (
-    assumed_avoidability,
     avoidability,
+    avoidability_without_pilot,
     survives_recorded_moves,
 )
 from pytest_garl.regressions.case import Avoidable, RecordedBehaviour
@@ -57,5 +57,5 @@ def test_pilot_survives_recorded_moves_without_a_violation() -> None:
 
 
 def test_case_without_flights_of_the_pilot_assumes_recorded_moves() -> None:
-    assert assumed_avoidability(MOVES) == "recorded"
-    assert assumed_avoidability(NOTHING) == "live"
+    assert avoidability_without_pilot(MOVES) == "recorded"
+    assert avoidability_without_pilot(NOTHING) == "live"

@@ -27,5 +27,5 @@ def test_case_of_an_own_assertion_belongs_to_its_test_in_any_file() -> None:
     old = dataclasses.replace(case(), test="test_own", assertion="12345678")
     told = dataclasses.replace(old, test="tests/test_it.py::test_own")
     assert parse_case(dump_case(old), load_map) == old
-    assert (told.own_test, told.id) == ("test_own", old.id)
+    assert (told.asserting_test, told.id) == ("test_own", old.id)
     assert told.id != case().id

@@ -81,7 +81,7 @@ def test_file_keeps_the_test_and_the_hashes_of_the_sources() -> None:
     told = dataclasses.replace(plain, test="tests/test_it.py::TestIt::test_a", evidence=evidence)
     assert parse_case(dump_case(told), load_map) == told
     assert told.id == plain.id
-    assert told.own_test == ""
+    assert told.asserting_test == ""
 
 
 @pytest.mark.parametrize(

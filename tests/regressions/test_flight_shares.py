@@ -9,7 +9,7 @@ from pytest_garl.execution.result import CompletedFlight
 from pytest_garl.regressions.case_flights import PILOT_FLIGHTS
 from pytest_garl.regressions.case_request import CaseRequest, CaseResult
 from pytest_garl.regressions.flight_shares import divide_flights
-from pytest_garl.regressions.investigation import EXCEPTION_FLIGHTS, LEAST_FLIGHTS
+from pytest_garl.regressions.investigation import EXCEPTION_FLIGHTS, MINIMUM_CASE_FLIGHTS
 from pytest_garl.scenarios.chromosome import decode
 from pytest_garl.scenarios.genes import genome_for
 from pytest_garl.scenarios.maps.map import load_map
@@ -47,11 +47,11 @@ def test_each_kind_has_all_its_flights_under_a_high_cap(cap: int | None) -> None
 
 
 def test_low_cap_reaches_as_many_kinds_as_possible_and_keeps_the_rest() -> None:
-    own = LEAST_FLIGHTS - PILOT_FLIGHTS
+    own = MINIMUM_CASE_FLIGHTS - PILOT_FLIGHTS
     cap = 2 * own + 1
     assert budgets(*(kind(number, cap=cap) for number in range(4))) == [
-        LEAST_FLIGHTS,
-        LEAST_FLIGHTS,
+        MINIMUM_CASE_FLIGHTS,
+        MINIMUM_CASE_FLIGHTS,
         0,
         0,
     ]
@@ -68,16 +68,16 @@ def test_lowest_cap_reaches_one_kind() -> None:
 
 
 def test_exceptions_leave_flights_for_other_kinds() -> None:
-    own = LEAST_FLIGHTS - PILOT_FLIGHTS
+    own = MINIMUM_CASE_FLIGHTS - PILOT_FLIGHTS
     cap = 2 * EXCEPTION_FLIGHTS + own
     kinds = [kind(n, cap=cap, crash="nonsense" if n < 2 else "") for n in range(3)]
-    assert budgets(*kinds) == [EXCEPTION_FLIGHTS, EXCEPTION_FLIGHTS, LEAST_FLIGHTS]
+    assert budgets(*kinds) == [EXCEPTION_FLIGHTS, EXCEPTION_FLIGHTS, MINIMUM_CASE_FLIGHTS]
 
 
 def test_unspent_flights_reach_other_kinds_without_those_of_the_pilot() -> None:
-    own = LEAST_FLIGHTS - PILOT_FLIGHTS
+    own = MINIMUM_CASE_FLIGHTS - PILOT_FLIGHTS
     wanted = [kind(number, cap=2 * own) for number in range(3)]
-    assert budgets(*wanted) == [LEAST_FLIGHTS, LEAST_FLIGHTS, 0]
+    assert budgets(*wanted) == [MINIMUM_CASE_FLIGHTS, MINIMUM_CASE_FLIGHTS, 0]
     spent = CaseResult(
         signature="0", case=None, flights=4 + PILOT_FLIGHTS, pilot_flights=PILOT_FLIGHTS
     )

@@ -4,7 +4,7 @@ import random
 
 import pytest
 
-from pytest_garl.regressions.investigation import LEAST_FLIGHTS, CaseBuilder
+from pytest_garl.regressions.investigation import MINIMUM_CASE_FLIGHTS, CaseBuilder
 from pytest_garl.scenarios.scenario import Scenario
 from tests.regressions.samples import (
     FIRST,
@@ -17,7 +17,7 @@ from tests.regressions.samples import (
 @pytest.mark.parametrize("seed", range(40))
 def test_case_builder_keeps_its_budget(seed: int) -> None:
     chance = random.Random(seed)
-    share, budget = chance.random(), chance.randrange(LEAST_FLIGHTS, 40)
+    share, budget = chance.random(), chance.randrange(MINIMUM_CASE_FLIGHTS, 40)
     fly = FakeFlights(lambda *_: chance.random() < share)
     scenarios = [violation(seed=100 * seed + number) for number in range(4)]
     result = CaseBuilder(request(budget, *scenarios), fly).build()

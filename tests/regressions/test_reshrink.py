@@ -10,12 +10,11 @@ from pytest_garl.cli import cases
 from pytest_garl.execution.reference import BUILT_IN, simulator_sha256
 from pytest_garl.plugin import options
 from pytest_garl.regressions.case import Case
+from pytest_garl.regressions.case_comparison import no_worse, simplicity
 from pytest_garl.regressions.case_file import size_of
-from pytest_garl.regressions.investigation import LEAST_FLIGHTS
-from pytest_garl.regressions.reshrink import LEAST_FLIGHTS as LEAST_RESHRINK_FLIGHTS
-from pytest_garl.regressions.reshrink import CaseReshrinker, _all_removed
+from pytest_garl.regressions.investigation import MINIMUM_CASE_FLIGHTS
+from pytest_garl.regressions.reshrink import MINIMUM_RESHRINK_FLIGHTS, CaseReshrinker, _all_removed
 from pytest_garl.regressions.robustness import neighbours
-from pytest_garl.regressions.simplicity import no_worse, simplicity
 from pytest_garl.scenarios.scenario import Scenario
 from tests.regressions.samples import (
     COLLIDING_OBJECT,
@@ -94,7 +93,7 @@ def test_reshrinker_makes_a_case_worse_in_no_respect(seed: int) -> None:
         return scenario == FIRST or answers.setdefault((scenario, npcs), likely)
 
     case = saved(FIRST, neighbours_failed=chance.randrange(4))
-    better, flights = shrunk(case, fails, chance.randrange(LEAST_RESHRINK_FLIGHTS, 50))
+    better, flights = shrunk(case, fails, chance.randrange(MINIMUM_RESHRINK_FLIGHTS, 50))
     assert flights >= 1
     if better is not None:
         one, other = simplicity(better, LAWN), simplicity(case, LAWN)
@@ -131,5 +130,5 @@ def test_removed_objects_and_genes_add_up() -> None:
 
 
 def test_options_require_the_least_flights_of_their_modules() -> None:
-    assert cases.LEAST_FLIGHTS == LEAST_RESHRINK_FLIGHTS
-    assert options.LEAST_SHRINK == LEAST_FLIGHTS
+    assert cases.MINIMUM_RESHRINK_FLIGHTS == MINIMUM_RESHRINK_FLIGHTS
+    assert options.MINIMUM_SHRINK == MINIMUM_CASE_FLIGHTS

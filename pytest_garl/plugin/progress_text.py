@@ -133,7 +133,7 @@ class ProgressReader:
         if remaining is None:
             options = self._run.options
             cap = options.budget if options.shrink_capped else None
-            new_kinds = Counter(search for search, _ in ledger.queries.seconds_by_kind())
+            new_kinds = Counter(search for search, _ in ledger.queries.seconds_by_signature())
             self._expected_after = sum(
                 flights_after_search(kinds, options.shrink, cap) for kinds in new_kinds.values()
             )

@@ -3,8 +3,8 @@ from __future__ import annotations
 from pytest_garl.regressions.case import RecordedBehaviour
 from pytest_garl.regressions.case_flights import CaseFlights
 from pytest_garl.regressions.case_request import FailingScenario
-from pytest_garl.regressions.reduction import simplest_robust, with_shorter_record
 from pytest_garl.regressions.robustness import NEIGHBOURS, neighbours
+from pytest_garl.regressions.simplest_robust import simplest_robust, with_shorter_record
 from pytest_garl.scenarios.scenario import Scenario
 from tests.regressions.samples import FIRST, LAWN, NAMES, FakeFlights, request
 

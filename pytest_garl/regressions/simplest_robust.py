@@ -7,9 +7,9 @@ from collections.abc import Callable, Iterator, Sequence
 from pytest_garl.regressions.case import RecordedBehaviour
 from pytest_garl.regressions.case_flights import CaseFlights
 from pytest_garl.regressions.case_request import FailingScenario
-from pytest_garl.regressions.move_reduction import shorter_records
 from pytest_garl.regressions.recorded_behaviour import find_colliding_object
 from pytest_garl.regressions.robustness import NEIGHBOURS
+from pytest_garl.regressions.shorter_records import shorter_records
 from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.simulation.flight_file import load
 

@@ -17,8 +17,8 @@ import pytest
 from pytest_garl.errors import LedgerError
 from pytest_garl.execution.ledger import Ledger
 from pytest_garl.plugin.keys import is_xdist_worker
+from pytest_garl.plugin.progress_text import ProgressReader, RunProgress, progress_line
 from pytest_garl.plugin.run import Run
-from pytest_garl.plugin.run_progress import ProgressReader, RunProgress, progress_line
 from pytest_garl.plugin.terminal_text import begin_line, width_of
 
 REFRESH_S = 0.5

@@ -10,9 +10,9 @@ import pytest
 
 from pytest_garl.execution.ledger import Ledger
 from pytest_garl.execution.ledger_queries import SearchProgress
-from pytest_garl.plugin import run_progress
+from pytest_garl.plugin import progress_text
+from pytest_garl.plugin.progress_text import ProgressReader, RunProgress, progress_line
 from pytest_garl.plugin.run import Run
-from pytest_garl.plugin.run_progress import ProgressReader, RunProgress, progress_line
 from pytest_garl.regressions.forecast import RemainingWork
 
 TWO = (
@@ -45,7 +45,7 @@ def test_first_log_line_counts_the_time_before_it(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     clock = [100.0]
-    monkeypatch.setattr(run_progress, "time", SimpleNamespace(monotonic=lambda: clock[0]))
+    monkeypatch.setattr(progress_text, "time", SimpleNamespace(monotonic=lambda: clock[0]))
     reader = ProgressReader(
         cast(Run, SimpleNamespace(remaining=RemainingWork(at_most=0, flights=0.0, seconds=0.0))),
         30.0,

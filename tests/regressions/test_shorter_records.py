@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from pytest_garl.adversary.catalogue import policy_spec
 from pytest_garl.adversary.recorded import recorded_spec
-from pytest_garl.regressions.move_reduction import _round, shorter_records
+from pytest_garl.regressions.shorter_records import _round, shorter_records
 from pytest_garl.scenarios.genes import genome_for
 from pytest_garl.scenarios.maps.map import load_map
 from pytest_garl.scenarios.validity import problems

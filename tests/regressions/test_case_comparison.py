@@ -2,7 +2,7 @@ from __future__ import annotations
 
 import dataclasses
 
-from pytest_garl.regressions.simplicity import is_simpler, no_worse, simplicity
+from pytest_garl.regressions.case_comparison import is_simpler, no_worse, simplicity
 from tests.regressions.samples import LAWN, NAMES, case
 
 SAVED = case()
