@@ -170,8 +170,8 @@ def _decide(
             int(actions[index]),
             reward,
             ENCODING.state(after[index]),
-            ended=ended,
-            cut=cut,
+            terminated=ended,
+            truncated=cut,
         )
         learner.update()
 

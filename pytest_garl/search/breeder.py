@@ -1,4 +1,4 @@
-"""Breeds the generations of a search, each as soon as its parents are flown."""
+"""Adds the generations of a search to the ledger, each as soon as its parents are flown."""
 
 from __future__ import annotations
 
@@ -10,10 +10,10 @@ from pytest_garl.search.method import FlownScenario, Method
 
 
 class Breeder:
-    """One search in one pytest process; all processes of a run breed the same scenarios.
+    """Runs the method of one search; all pytest processes of a run compute the same scenarios.
 
-    ``wanted`` are the slots of each generation that are to be flown.  A method that learns needs
-    all slots of every generation but the last.
+    ``wanted`` has the slots to fly of each generation.  A method that learns needs all slots of
+    every generation but the last.
     """
 
     def __init__(
@@ -25,26 +25,26 @@ class Breeder:
     ) -> None:
         self._ledger, self._search, self._method = ledger, search, method
         self._wanted = dict(wanted)
-        self._last = max(wanted)
-        self._next = 0
+        self._last_generation = max(wanted)
+        self._next_generation = 0
 
     def advance(self) -> None:
-        """Put every generation that can be bred now into the ledger."""
-        while self._next <= self._last and self._parents_are_flown():
-            if self._next > 0:
-                self._learn(self._next - 1)
+        """Add every generation whose parents are flown to the ledger."""
+        while self._next_generation <= self._last_generation and self._parents_are_flown():
+            if self._next_generation > 0:
+                self._learn(self._next_generation - 1)
             scenarios = self._method.ask()
-            slots = self._wanted.get(self._next, ())
-            if self._method.learns and self._next < self._last:
+            slots = self._wanted.get(self._next_generation, ())
+            if self._method.learns and self._next_generation < self._last_generation:
                 slots = range(len(scenarios))
             texts = {slot: dump_scenario(scenarios[slot]) for slot in slots}
-            self._ledger.add_slots(self._search, self._next, texts)
-            self._next += 1
+            self._ledger.add_slots(self._search, self._next_generation, texts)
+            self._next_generation += 1
 
     def _parents_are_flown(self) -> bool:
-        if self._next == 0 or not self._method.learns:
+        if self._next_generation == 0 or not self._method.learns:
             return True
-        return self._ledger.unflown(self._search, self._next - 1) == 0
+        return self._ledger.unflown(self._search, self._next_generation - 1) == 0
 
     def _learn(self, generation: int) -> None:
         if not self._method.learns:

@@ -1,4 +1,4 @@
-"""NSGA-II by pymoo's ask and tell, with the operators of the paper (Algorithm 1)."""
+"""NSGA-II with pymoo, by ask and tell, and with the crossover of the paper's Algorithm 1."""
 
 from __future__ import annotations
 
@@ -21,23 +21,28 @@ from pytest_garl.search.operators import Matrix, nuclear_gene_crossover
 from pytest_garl.search.seeding import seed_sequence
 
 Objectives = Callable[[Matrix, Sequence[FlownScenario]], Matrix]
-"""From normalised chromosomes (k, d) and their flights to objectives (k, m), all maximised."""
+"""Takes normalised chromosomes (k, d) and their flights; returns objectives (k, m) to maximise."""
 Mutation = Callable[[Matrix, Matrix, Matrix, np.random.Generator], Matrix]
-"""From offspring (n, d), lower and upper bounds (d,) and a generator to mutated offspring."""
-_TRIES = 100
+"""Takes offspring (n, d), lower and upper bounds (d,), a generator; returns mutated offspring."""
+_MAX_MUTATIONS = 100
 
 
 class Nsga2:
     """A genetic search, defined by its objectives and its mutation.
 
-    ``width`` is the number of objectives.  A child inherits the scenario's seed with the tail of
-    the chromosome, which holds the NPCs: their random moves are part of the parent's success.
+    A chromosome ends with the NPCs.  A child inherits the scenario's seed with this end, because
+    the NPCs' random moves, which follow from the seed, are part of the parent's success.
     """
 
     learns = True
 
     def __init__(
-        self, name: str, plan: SearchPlan, objectives: Objectives, width: int, mutation: Mutation
+        self,
+        name: str,
+        plan: SearchPlan,
+        objectives: Objectives,
+        objective_count: int,
+        mutation: Mutation,
     ) -> None:
         self._plan, self._objectives, self._mutation = plan, objectives, mutation
         variation, survival = seed_sequence(name, plan.map.name, plan.seed).spawn(2)
@@ -48,7 +53,7 @@ class Nsga2:
         genome = plan.genome
         first = np.array(
             [
-                self._valid(genome.random(self._rng), int(self._rng.integers(2**32)))
+                self._valid_and_new(genome.random(self._rng), int(self._rng.integers(2**32)))
                 for _ in range(plan.population)
             ]
         )
@@ -60,7 +65,9 @@ class Nsga2:
             eliminate_duplicates=NoDuplicateElimination(),
             advance_after_initial_infill=True,
         )
-        problem = Problem(n_var=genome.size, n_obj=width, xl=genome.lower, xu=genome.upper)
+        problem = Problem(
+            n_var=genome.size, n_obj=objective_count, xl=genome.lower, xu=genome.upper
+        )
         self._algorithm.setup(problem, seed=int(survival.generate_state(1)[0]), verbose=False)
 
     def ask(self) -> Sequence[Scenario]:
@@ -87,19 +94,19 @@ class Nsga2:
         return [tuple(float(value) for value in row) for row in values]
 
     def values(self, rows: Matrix) -> Matrix:
-        """Return the objectives of flown chromosomes, measured among each other."""
+        """Return the objectives of flown chromosomes, with diversity measured within these rows."""
         flown = [self._flown[row.tobytes()] for row in rows]
         return self._objectives(self._plan.genome.normalise(rows), flown)
 
     def offspring(self, parents: Matrix) -> Matrix:
         """Return as many valid, new chromosomes as there are parents."""
         seeds = np.array([[self._seeds[row.tobytes()]] for row in parents], dtype=np.float64)
-        whole = np.concatenate([parents, seeds], axis=1)
-        crossed = nuclear_gene_crossover(whole, self._plan.genome.borders, self._rng)
+        with_seeds = np.concatenate([parents, seeds], axis=1)
+        crossed = nuclear_gene_crossover(with_seeds, self._plan.genome.borders, self._rng)
         children = self._mutate(crossed[:, :-1])
         return np.array(
             [
-                self._valid(row, int(seed))
+                self._valid_and_new(row, int(seed))
                 for row, seed in zip(children, crossed[:, -1], strict=True)
             ]
         )
@@ -108,20 +115,22 @@ class Nsga2:
         genome = self._plan.genome
         return self._mutation(rows, genome.lower, genome.upper, self._rng)
 
-    def _valid(self, row: Matrix, seed: int) -> Matrix:
-        """Repair a chromosome; mutate a known one until it is new."""
+    def _valid_and_new(self, row: Matrix, seed: int) -> Matrix:
+        """Repair a chromosome, and mutate it until it differs from all earlier ones."""
         genome, map = self._plan.genome, self._plan.map
-        for _ in range(_TRIES):
+        for _ in range(_MAX_MUTATIONS):
             repaired = encode(repair(decode(row, genome, map=map.name, seed=0), map), genome)
             key = repaired.tobytes()
             if key not in self._seeds:
                 self._seeds[key] = seed
                 return repaired
             row = self._mutate(row[None])[0]
-        return self._valid(genome.random(self._rng), seed)
+        return self._valid_and_new(genome.random(self._rng), seed)
 
 
 class _Mating(InfillCriterion):  # type: ignore[misc]
+    """Has pymoo take the offspring of Nsga2."""
+
     def __init__(self, search: Nsga2) -> None:
         super().__init__()
         self._search = search
@@ -131,7 +140,7 @@ class _Mating(InfillCriterion):  # type: ignore[misc]
 
 
 class _Survival(RankAndCrowding):  # type: ignore[misc]
-    """Rank and crowding by objectives that are measured again in the union of P and O."""
+    """Rank and crowding by objectives measured again among parents and offspring together."""
 
     def __init__(self, search: Nsga2) -> None:
         super().__init__()

@@ -16,7 +16,7 @@ def test_survivors_are_measured_against_parents_and_offspring_together() -> None
         widths.append(len(chromosomes))
         return np.column_stack([chromosomes[:, 0], chromosomes[:, 1]])
 
-    method = Nsga2("test", plan(), objectives, 2, property_mutation)
+    method = Nsga2("test", plan(), objectives, objective_count=2, mutation=property_mutation)
     bred(method, 2)
     # The first generation, alone twice; then the offspring alone, then the union.
     assert widths == [8, 8, 8, 16]

@@ -1,4 +1,4 @@
-"""DQN, readable from top to bottom (Mnih et al. 2015; double: van Hasselt et al. 2016)."""
+"""Deep Q-learning: DQN (Mnih et al. 2015) and double DQN (van Hasselt et al. 2016)."""
 
 from __future__ import annotations
 
@@ -30,13 +30,16 @@ class EpisodeRecord:
 
 
 class Learner:
-    """The network, its target, its memory: ``act``, ``remember``, ``update``."""
+    """A Q-network, its target network and its replay memory.
+
+    ``size`` is the length of a state, ``actions`` the number of actions.
+    """
 
     def __init__(self, size: int, actions: int, training: Training) -> None:
-        self.choices, self.training = actions, training
+        self.action_count, self.training = actions, training
         self.history: list[EpisodeRecord] = []
         self.rng = np.random.default_rng(training.seed)
-        # Others in this process may draw from torch's global generator.
+        # Other code in this process may draw from torch's global generator.
         with torch.random.fork_rng(devices=[]):
             torch.manual_seed(training.seed)
             self.network, self.target = (_mlp(size, training.hidden, actions) for _ in range(2))
@@ -44,11 +47,12 @@ class Learner:
         self.weights, self.gradient = _one_vector(self.network)
         self.optimiser = torch.optim.Adam([self.weights], lr=training.learning_rate, foreach=False)
         self.updates = 0
-        # Ring buffers: state, action, sum of rewards, the state after, its discount (0: ended).
-        room = training.replay
-        self.states, self.afters = (np.zeros((room, size), np.float32) for _ in range(2))
-        self.actions = np.zeros(room, np.int64)
-        self.sums, self.discounts = (np.zeros(room, np.float32) for _ in range(2))
+        # The replay memory, as ring buffers: state, action, sum of rewards, the state after them,
+        # and the discount of that state's value, 0 if the episode ended.
+        capacity = training.replay
+        self.states, self.afters = (np.zeros((capacity, size), np.float32) for _ in range(2))
+        self.actions = np.zeros(capacity, np.int64)
+        self.sums, self.discounts = (np.zeros(capacity, np.float32) for _ in range(2))
         self.stored = 0
 
     def act(self, states: Array, epsilon: float) -> NDArray[np.int64]:
@@ -56,8 +60,8 @@ class Learner:
         with torch.no_grad():
             best = self.network(torch.from_numpy(states)).argmax(dim=1).numpy()
         explores = self.rng.random(len(states)) < epsilon
-        chance = self.rng.integers(self.choices, size=len(states))
-        return np.where(explores, chance, best)
+        random = self.rng.integers(self.action_count, size=len(states))
+        return np.where(explores, random, best)
 
     def remember(
         self, state: Array, action: int, total: float, after: Array, discount: float
@@ -77,13 +81,14 @@ class Learner:
         states, afters = (torch.from_numpy(each[chosen]) for each in (self.states, self.afters))
         actions = torch.from_numpy(self.actions[chosen])
         with torch.no_grad():
-            judged = self.target(afters)
-            picks = (self.network(afters) if training.double else judged).argmax(dim=1)
-            rest = judged.gather(1, picks[:, None]).squeeze(1)
-            wanted = torch.from_numpy(self.sums[chosen])
-            wanted = wanted + torch.from_numpy(self.discounts[chosen]) * rest
+            target_values = self.target(afters)
+            next_values = self.network(afters) if training.double else target_values
+            next_actions = next_values.argmax(dim=1)
+            remaining = target_values.gather(1, next_actions[:, None]).squeeze(1)
+            expected = torch.from_numpy(self.sums[chosen])
+            expected = expected + torch.from_numpy(self.discounts[chosen]) * remaining
         values = self.network(states).gather(1, actions[:, None]).squeeze(1)
-        loss = torch.nn.functional.smooth_l1_loss(values, wanted)
+        loss = torch.nn.functional.smooth_l1_loss(values, expected)
         self.gradient.zero_()
         torch.autograd.backward(loss)
         self.optimiser.step()
@@ -92,7 +97,7 @@ class Learner:
             self.target.load_state_dict(self.network.state_dict())
 
     def policy(self, state: str) -> Network:
-        """Return the network as NumPy arrays; ``state`` is the name of its encoding."""
+        """Return the network as NumPy arrays; ``state`` names the encoding of its input."""
         linear = [layer for layer in self.network if isinstance(layer, torch.nn.Linear)]
         return Network(
             state=state,
@@ -107,34 +112,44 @@ class Learner:
 
 
 class Experience:
-    """Sums the rewards of several steps of one episode before the learner stores them."""
+    """Turns the steps of one episode into n-step experiences, which the learner stores."""
 
     def __init__(self, learner: Learner) -> None:
         self._learner = learner
-        self._open: deque[tuple[Array, int, float]] = deque()
+        self._pending: deque[tuple[Array, int, float]] = deque()
 
     def add(
-        self, state: Array, action: int, reward: float, after: Array, *, ended: bool, cut: bool
+        self,
+        state: Array,
+        action: int,
+        reward: float,
+        after: Array,
+        *,
+        terminated: bool,
+        truncated: bool,
     ) -> None:
-        """Take in one step; ``ended`` means that no reward follows, ``cut`` is a time-out."""
+        """Add one step; after ``terminated`` no reward follows, ``truncated`` is a time-out."""
         training = self._learner.training
-        self._open.append((state, action, reward))
-        if len(self._open) == training.steps or ended or cut:
-            self._close(after, ended)
-        while self._open and (ended or cut):
-            self._close(after, ended)
+        self._pending.append((state, action, reward))
+        if len(self._pending) == training.steps or terminated or truncated:
+            self._store_oldest(after, terminated)
+        while self._pending and (terminated or truncated):
+            self._store_oldest(after, terminated)
 
-    def _close(self, after: Array, ended: bool) -> None:
+    def _store_oldest(self, after: Array, terminated: bool) -> None:
         gamma = self._learner.training.discount
-        total = sum(gamma**index * reward for index, (_, _, reward) in enumerate(self._open))
-        discount = 0.0 if ended else gamma ** len(self._open)
-        state, action, _ = self._open.popleft()
+        total = sum(gamma**index * reward for index, (_, _, reward) in enumerate(self._pending))
+        discount = 0.0 if terminated else gamma ** len(self._pending)
+        state, action, _ = self._pending.popleft()
         self._learner.remember(state, action, total, after, discount)
 
 
 @contextlib.contextmanager
 def one_thread() -> Iterator[None]:
-    """Let torch compute on one thread: the cores fly, and sums do not depend on their number."""
+    """Let torch compute on one thread, so that its sums do not depend on the number of cores.
+
+    The other cores fly.
+    """
     threads = torch.get_num_threads()
     torch.set_num_threads(1)
     try:
@@ -144,24 +159,26 @@ def one_thread() -> Iterator[None]:
 
 
 def _one_vector(network: torch.nn.Module) -> tuple[torch.nn.Parameter, torch.Tensor]:
-    """Make a network's parameters pieces of one vector, and their gradients pieces of another.
+    """Make a network's parameters views of one vector, and their gradients views of another.
 
-    The optimiser then steps once instead of once for each parameter, with the same bits.  That
+    The optimiser then steps once instead of once for each parameter, to the same bits.  That
     saves a third of an update's time in a network this small.
     """
     parts = list(network.parameters())
     weights = torch.nn.Parameter(torch.cat([part.detach().flatten() for part in parts]))
     weights.grad = gradient = torch.zeros_like(weights)
     sizes = [part.numel() for part in parts]
-    owns, slopes = torch.split(weights.detach(), sizes), torch.split(gradient, sizes)
-    for part, own, slope in zip(parts, owns, slopes, strict=True):
-        part.data, part.grad = own.view_as(part), slope.view_as(part)
+    weight_views, gradient_views = (
+        torch.split(vector, sizes) for vector in (weights.detach(), gradient)
+    )
+    for part, weight, slope in zip(parts, weight_views, gradient_views, strict=True):
+        part.data, part.grad = weight.view_as(part), slope.view_as(part)
     return weights, gradient
 
 
 def _mlp(size: int, hidden: tuple[int, ...], actions: int) -> torch.nn.Sequential:
     sizes = (size, *hidden)
     layers: list[torch.nn.Module] = []
-    for wide, narrow in itertools.pairwise(sizes):
-        layers += [torch.nn.Linear(wide, narrow), torch.nn.ReLU()]
+    for inputs, outputs in itertools.pairwise(sizes):
+        layers += [torch.nn.Linear(inputs, outputs), torch.nn.ReLU()]
     return torch.nn.Sequential(*layers, torch.nn.Linear(sizes[-1], actions))

@@ -1,4 +1,4 @@
-"""What can be trained against what: the settings of ``garl train``, without PyTorch."""
+"""The settings of ``garl train`` and the presets of the shipped policies, without PyTorch."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ Reward = Literal["collision-first", "paper"]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Training:
-    """Every hyper-parameter; the paper's where it gives one (its supplement, table 1)."""
+    """All hyper-parameters, with the paper's values where it gives any (supplement, table 1)."""
 
     seed: int = 0
     episodes: int = 800
@@ -35,7 +35,7 @@ class Training:
     """Updates after which the target network becomes a copy of the network."""
     double: bool = True
     steps: int = 3
-    """Rewards that are summed before a value stands for the rest."""
+    """n of the n-step returns: rewards that are summed before the network estimates the rest."""
     environments: int = 2
     """Episodes flown at the same time, each in its own process."""
 
@@ -44,7 +44,7 @@ class Training:
 class Surrogate:
     """The environment of a training: maps, types of NPCs, UAV, state, reward.
 
-    ``uav`` is "straight", the paper's, "avoiding", or "both" for half of the episodes each.
+    ``uav`` is "straight" (as in the paper), "avoiding", or "both", each in half of the episodes.
     ``discount`` is part of the potential-based reward.  With ``environment`` "drawn" an episode
     begins in any weather and light of a search and with the marker anywhere; with "clear" it begins
     in clear weather with the marker at a fixed place.
@@ -64,7 +64,7 @@ class Surrogate:
 class Preset:
     """How a shipped policy was trained; ``garl train`` fills in the maps.
 
-    ``help`` continues "The policy learns".
+    ``help`` ends a sentence that begins with "The policy learns".
     """
 
     help: str

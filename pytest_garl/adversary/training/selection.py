@@ -1,4 +1,4 @@
-"""Several trainings from different seeds, of which the best in validation is kept."""
+"""Trains from several seeds, and keeps the weights with the best validation."""
 
 from __future__ import annotations
 
@@ -32,16 +32,20 @@ class TrainingPlan:
     training: Training
     seeds: tuple[int, ...]
     validation: int
+    """Episodes of each validation."""
     folder: Path
+    """Where checkpoints are kept."""
     out: Path
+    """The file of the weights; manifest and curves are written beside it."""
     processes: int = 1
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class TrainingResult:
-    """The seed that was kept, and collision rates.
+    """The best seed, and collision rates.
 
-    ``rates`` are those of each seed in validation, ``report`` is of the kept one on other episodes.
+    ``rates`` has the rate of each seed in validation, ``report`` the score of the best seed on
+    other episodes.
     """
 
     best: int
@@ -51,10 +55,10 @@ class TrainingResult:
 
 def train_best(
     plan: TrainingPlan,
-    episode: Callable[[int, EpisodeRecord], None] = lambda seed, record: None,
-    validated: Callable[[int, float], None] = lambda seed, rate: None,
+    on_episode: Callable[[int, EpisodeRecord], None] = lambda seed, record: None,
+    on_validation: Callable[[int, float], None] = lambda seed, rate: None,
 ) -> TrainingResult:
-    """Train every seed, validate, write the best weights, its manifest and all curves.
+    """Train and validate every seed; write the best weights, their manifest and all curves.
 
     An interrupted call continues from the checkpoints in the plan's folder.
     """
@@ -63,21 +67,21 @@ def train_best(
     for seed in plan.seeds:
         training = dataclasses.replace(plan.training, seed=seed)
         checkpoint = plan.folder / f"{plan.name}-{identity_of(plan.surrogate, training)[:12]}.pt"
-        learner = train(plan.surrogate, training, checkpoint, functools.partial(episode, seed))
+        learner = train(plan.surrogate, training, checkpoint, functools.partial(on_episode, seed))
         curves[seed], networks[seed] = learner.history, learner.policy(plan.surrogate.state)
         scores[seed] = validate(networks[seed], plan.surrogate, plan.validation, plan.processes)
-        validated(seed, scores[seed].rate)
+        on_validation(seed, scores[seed].rate)
     best = max(plan.seeds, key=lambda seed: (scores[seed].rate, -seed))
     report = validate(
         networks[best], plan.surrogate, plan.validation, plan.processes, REPORT_SEEDS_FROM
     )
-    save(plan.out, networks[best], _about(plan, best, curves[best], scores, report))
+    save(plan.out, networks[best], _manifest(plan, best, curves[best], scores, report))
     draw_curves(curves, plan.out.with_suffix(".png"))
     rates = {seed: score.rate for seed, score in scores.items()}
     return TrainingResult(best=best, rates=rates, report=report)
 
 
-def _about(
+def _manifest(
     plan: TrainingPlan,
     best: int,
     curve: Sequence[EpisodeRecord],
@@ -120,11 +124,11 @@ def draw_curves(curves: Mapping[int, Sequence[EpisodeRecord]], path: Path) -> No
     for seed, curve in curves.items():
         window = min(50, len(curve))
         kernel = np.ones(window) / window
-        places = np.arange(window - 1, len(curve))
+        episodes = np.arange(window - 1, len(curve))
         rewards = np.convolve([record.reward for record in curve], kernel, "valid")
-        hits = np.convolve([float(record.collided) for record in curve], kernel, "valid")
-        left.plot(places, rewards, label=f"seed {seed}")
-        right.plot(places, 100 * hits, label=f"seed {seed}")
+        collisions = np.convolve([float(record.collided) for record in curve], kernel, "valid")
+        left.plot(episodes, rewards, label=f"seed {seed}")
+        right.plot(episodes, 100 * collisions, label=f"seed {seed}")
     left.set(xlabel="episode", ylabel="reward per episode (mean of 50)")
     right.set(xlabel="episode", ylabel="collisions, % (of 50)", ylim=(0, 100))
     for axes in (left, right):

@@ -1,4 +1,4 @@
-"""One training: episodes of the surrogate, several at a time, and a learner."""
+"""Trains one learner on episodes of the surrogate, several at a time."""
 
 from __future__ import annotations
 
@@ -25,14 +25,14 @@ def train(
     surrogate: Surrogate,
     training: Training,
     checkpoint: Path | None = None,
-    report: Callable[[EpisodeRecord], None] = lambda record: None,
-    every: int = 50,
+    on_episode: Callable[[EpisodeRecord], None] = lambda record: None,
+    checkpoint_interval: int = 50,
 ) -> Learner:
-    """Train and return the learner; call ``report`` after each episode.
+    """Train and return the learner; call ``on_episode`` after each episode.
 
-    Episodes are flown in rounds of ``environments``, each from its own seed.  So a training that
-    continues from its ``checkpoint``, which is written about every ``every`` episodes, ends with
-    the same weights as one without interruption.
+    Episodes are flown in rounds of ``training.environments``, each from its own seed.  The file
+    ``checkpoint`` is written about every ``checkpoint_interval`` episodes.  A training that
+    continues from it ends with the same weights as one without interruption.
     """
     envs: Any = gymnasium.vector.AsyncVectorEnv(
         [functools.partial(SurrogateEnv, surrogate)] * training.environments,
@@ -45,21 +45,21 @@ def train(
         learner = Learner(size, int(actions), training)
         if checkpoint and checkpoint.exists():
             restore_checkpoint(learner, checkpoint, identity)
-        kept = len(learner.history)
+        saved = len(learner.history)
         while len(learner.history) < training.episodes:
-            for record in _round(envs, learner, len(learner.history)):
+            for record in _fly_round(envs, learner, len(learner.history)):
                 # The last round may fly more episodes than the training has.
                 if record.episode < training.episodes:
-                    report(record)
+                    on_episode(record)
                     learner.history.append(record)
             done = len(learner.history)
-            if checkpoint and (done - kept >= every or done >= training.episodes):
+            if checkpoint and (done - saved >= checkpoint_interval or done >= training.episodes):
                 save_checkpoint(learner, checkpoint, identity)
-                kept = done
+                saved = done
     return learner
 
 
-def _round(envs: Any, learner: Learner, first: int) -> Iterator[EpisodeRecord]:
+def _fly_round(envs: Any, learner: Learner, first: int) -> Iterator[EpisodeRecord]:
     """Fly one episode per environment to its end, and learn meanwhile."""
     training, count = learner.training, learner.training.environments
     decayed = training.epsilon * training.epsilon_decay**first
@@ -76,7 +76,7 @@ def _round(envs: Any, learner: Learner, first: int) -> Iterator[EpisodeRecord]:
         # Learn once for each decision while the simulator flies in other processes.
         for _ in range(int(flying.sum())):
             learner.update()
-        afters, rewards, ended, cut, info = envs.step_wait()
+        afters, rewards, terminated, truncated, info = envs.step_wait()
         for index in range(count):
             if not flying[index]:
                 continue
@@ -85,13 +85,13 @@ def _round(envs: Any, learner: Learner, first: int) -> Iterator[EpisodeRecord]:
                 int(actions[index]),
                 float(rewards[index]),
                 afters[index],
-                ended=bool(ended[index]),
-                cut=bool(cut[index]),
+                terminated=bool(terminated[index]),
+                truncated=bool(truncated[index]),
             )
             totals[index] += rewards[index]
             decisions[index] += 1
             collided[index] = bool(info["collided"][index])
-        flying &= ~(ended | cut)
+        flying &= ~(terminated | truncated)
         states = afters
     for index in range(count):
         yield EpisodeRecord(

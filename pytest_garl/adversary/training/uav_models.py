@@ -1,4 +1,4 @@
-"""The UAVs of the surrogate: they know the place of the marker and land on it."""
+"""The UAVs of the surrogate: they know the position of the marker and land on it."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ from pytest_garl.simulation.system_under_test.ground_truth import Truth, TruthOb
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FlightStyle:
-    """How a UAV flies: cruise height, speeds over ground and downwards."""
+    """How a UAV flies: cruise height, horizontal speed and descent speed."""
 
     cruise_m: float = 10.0
     speed_mps: float = 3.0
@@ -33,7 +33,7 @@ class FlightStyle:
 
     @classmethod
     def drawn(cls, rng: np.random.Generator) -> FlightStyle:
-        """Draw a style; styles differ as much as those of landing systems."""
+        """Draw a random style, in the range of real landing systems."""
         return cls(
             cruise_m=float(rng.uniform(8.0, 12.0)),
             speed_mps=float(rng.uniform(2.0, 4.0)),
@@ -43,10 +43,10 @@ class FlightStyle:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class AvoidanceParameters:
-    """When a UAV climbs away from NPCs that its depth camera shows.
+    """When a UAV climbs away from NPCs below it.
 
-    It climbs from an NPC that is within ``radius_m`` of its column and ``below_m`` under it, after
-    ``delay_s``, at ``climb_mps``, until there was none for ``clear_s``.
+    It starts to climb, at ``climb_mps``, if an NPC stays for ``delay_s`` within ``radius_m``
+    horizontally and less than ``below_m`` below.  It stops when no NPC was there for ``clear_s``.
     """
 
     radius_m: float = 2.0
@@ -57,7 +57,7 @@ class AvoidanceParameters:
 
     @classmethod
     def drawn(cls, rng: np.random.Generator) -> AvoidanceParameters:
-        """Draw parameters, because those of a landing system are unknown."""
+        """Draw random parameters, because those of a landing system are unknown."""
         return cls(
             radius_m=float(rng.uniform(1.5, 3.0)),
             below_m=float(rng.uniform(2.5, 6.0)),
@@ -68,7 +68,10 @@ class AvoidanceParameters:
 
 
 class StraightPilot:
-    """The paper's: it "flies directly to the marker without any additional trajectory planning"."""
+    """The paper's UAV.
+
+    It "flies directly to the marker without any additional trajectory planning".
+    """
 
     airframe = Airframe()
     needs_camera = False
@@ -80,25 +83,25 @@ class StraightPilot:
         """Start on the ground."""
         self._home = mission.home_m
         self._truth: Truth | None = None
-        self._up = self._there = False
+        self._at_cruise_height = self._above_marker = False
 
     def observe_truth(self, truth: Truth) -> None:
-        """Take in where everything is."""
+        """Keep the positions of marker and objects."""
         self._truth = truth
 
     def step(self, observation: Observation) -> Command:
-        """Climb, cross, descend, land."""
+        """Climb, fly to the marker, descend, land."""
         x, y, z = (float(value) for value in observation.position_m)
         style = self._style
         if self._truth is None:
             return PositionSetpoint(position_m=(x, y, style.cruise_m))
         goal = self._truth.marker_m
         offset = math.dist((x, y), goal)
-        self._up |= z > style.cruise_m - 1.0
-        if not self._up:
+        self._at_cruise_height |= z > style.cruise_m - 1.0
+        if not self._at_cruise_height:
             return PositionSetpoint(position_m=(*self._home[:2], style.cruise_m))
-        self._there |= offset < CENTRED_WITHIN_M
-        if not self._there:
+        self._above_marker |= offset < CENTRED_WITHIN_M
+        if not self._above_marker:
             return PositionSetpoint(position_m=(*goal, style.cruise_m), speed_mps=style.speed_mps)
         return descend(goal, (x, y, z), style.descent_mps)
 
@@ -125,8 +128,8 @@ class AvoidingPilot(StraightPilot):
         now, avoidance, truth = observation.time_s, self._avoidance, self._truth
         if truth is None:
             return super().step(observation)
-        place = tuple(float(value) for value in observation.position_m)
-        if any(self._is_close_below(item, place) for item in truth.objects):
+        position = tuple(float(value) for value in observation.position_m)
+        if any(self._is_close_below(item, position) for item in truth.objects):
             self._clear_since = now
             if self._seen_since is None:
                 self._seen_since = now
@@ -135,24 +138,24 @@ class AvoidingPilot(StraightPilot):
             self._seen_since = None
             self._climbing &= now - self._clear_since < avoidance.clear_s
         if self._climbing:
-            x, y, z = place
+            x, y, z = position
             climb = avoidance.climb_mps if z < self._style.cruise_m else 0.0
-            goal = truth.marker_m if self._there else (x, y)
+            goal = truth.marker_m if self._above_marker else (x, y)
             return VelocitySetpoint(velocity_mps=(*centring_velocity(goal, (x, y)), climb))
         return super().step(observation)
 
-    def _is_close_below(self, item: TruthObject, place: tuple[float, ...]) -> bool:
-        """Whether an NPC is near the column below, and inside the camera's view."""
-        below = place[2] - item.type.top_m
-        dx, dy = abs(item.position_m[0] - place[0]), abs(item.position_m[1] - place[1])
+    def _is_close_below(self, item: TruthObject, position: tuple[float, ...]) -> bool:
+        """Whether an NPC is closely below, and inside the camera's view."""
+        below = position[2] - item.type.top_m
+        dx, dy = abs(item.position_m[0] - position[0]), abs(item.position_m[1] - position[1])
         reach = item.type.radius_m
         if not 0 < below < self._avoidance.below_m:
             return False
         if math.hypot(dx, dy) - reach > self._avoidance.radius_m:
             return False
-        # On a level UAV with its nose east the frame is as high as it reaches along x, and as
-        # wide as it reaches along y.
+        # The image's height shows the x axis and its width the y axis: the UAV is level, and its
+        # nose points east.
         camera = self._camera
-        wide = math.tan(camera.field_of_view_rad / 2)
-        high = wide * camera.height_px / camera.width_px
-        return dx - reach < below * high and dy - reach < below * wide
+        half_width = math.tan(camera.field_of_view_rad / 2)
+        half_height = half_width * camera.height_px / camera.width_px
+        return dx - reach < below * half_height and dy - reach < below * half_width

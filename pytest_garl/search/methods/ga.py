@@ -41,7 +41,7 @@ def make(plan: SearchPlan) -> Method:
     from pytest_garl.search.nsga2 import Nsga2
 
     plan = dataclasses.replace(plan, genome=with_destinations(plan.genome))
-    return Nsga2("ga", plan, objectives, 3, polynomial_mutation)
+    return Nsga2("ga", plan, objectives, objective_count=3, mutation=polynomial_mutation)
 
 
 def polynomial_mutation(

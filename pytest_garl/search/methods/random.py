@@ -2,8 +2,9 @@
 
 The paper's first baseline: "all the static environments are randomly generated", and so are the
 starts and destinations of NPCs.  In its code the NPCs never move.  This method follows the paper:
-the policy ``waypoint`` walks each NPC to a random place.  Then, which the paper does not mention,
-it walks to the next: NPCs that stand at their first destination would be the weaker rival.
+the policy ``waypoint`` walks each NPC to a random place.  The paper does not say what happens then;
+here the NPC walks on to the next random place, because NPCs that stand still would make the
+baseline weaker.
 """
 
 from __future__ import annotations
@@ -53,8 +54,8 @@ def random_scenarios(
     scenarios = []
     for _ in range(size):
         chromosome = genome.random(rng)
-        own_seed = int(rng.integers(2**32))
-        scenarios.append(repair(decode(chromosome, genome, map=map.name, seed=own_seed), map))
+        scenario_seed = int(rng.integers(2**32))
+        scenarios.append(repair(decode(chromosome, genome, map=map.name, seed=scenario_seed), map))
     return scenarios
 
 

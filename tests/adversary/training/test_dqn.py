@@ -13,16 +13,16 @@ def test_experience_sums_the_rewards_of_several_steps_up_to_the_end() -> None:
     step = Experience(learner)
     states = [np.full(10, index, np.float32) for index in range(6)]
     for index in range(4):
-        step.add(states[index], index, 1.0, states[index + 1], ended=False, cut=False)
+        step.add(states[index], index, 1.0, states[index + 1], terminated=False, truncated=False)
     assert learner.stored == 2
-    step.add(states[4], 4, 8.0, states[5], ended=True, cut=False)
+    step.add(states[4], 4, 8.0, states[5], terminated=True, truncated=False)
     assert learner.stored == 5
-    # 1 + 1/2 + 1/4; then with the last 8; what ended has no rest.
+    # 1 + 1/2 + 1/4; then with the last 8; a terminated episode has no further reward.
     assert learner.sums[:5] == pytest.approx([1.75, 1.75, 1.5 + 2.0, 1.0 + 4.0, 8.0])
     assert learner.discounts[:5] == pytest.approx([0.125, 0.125, 0, 0, 0])
     assert [int(state[0]) for state in learner.afters[:2]] == [3, 4]
-    cut = Experience(learner)
-    cut.add(states[0], 0, 1.0, states[1], ended=False, cut=True)
+    timed_out = Experience(learner)
+    timed_out.add(states[0], 0, 1.0, states[1], terminated=False, truncated=True)
     assert learner.discounts[5] == pytest.approx(0.5)
 
 

@@ -16,7 +16,7 @@ class _StopError(Exception):
 
 
 @pytest.mark.sim
-def test_a_killed_training_goes_on_to_the_same_weights(tmp_path: Path) -> None:
+def test_a_killed_training_continues_to_the_same_weights(tmp_path: Path) -> None:
     training = Training(episodes=6, warm_up=64)
     whole = train(OURS, training)
 
@@ -26,8 +26,8 @@ def test_a_killed_training_goes_on_to_the_same_weights(tmp_path: Path) -> None:
 
     checkpoint = tmp_path / "half.pt"
     with pytest.raises(_StopError):
-        train(OURS, training, checkpoint, stop, every=2)
-    resumed = train(OURS, training, checkpoint, every=2)
+        train(OURS, training, checkpoint, stop, checkpoint_interval=2)
+    resumed = train(OURS, training, checkpoint, checkpoint_interval=2)
     assert whole.updates == resumed.updates > 0
     assert whole.history == resumed.history
     for ours, theirs in zip(

@@ -47,7 +47,7 @@ def test_each_scenario_differs_from_the_one_before_in_its_column_by_one_action()
 
 def test_every_property_but_the_speeds_can_be_edited_both_ways() -> None:
     edits = edits_of(GENOME)
-    ways = {(GENOME.keys[edit.column], edit.by > 0) for edit in edits}
+    ways = {(GENOME.keys[edit.column], edit.step > 0) for edit in edits}
     wanted = [key for key in GENOME.keys if not key.endswith(".velocity")]
     assert ways == {(key, up) for key in wanted for up in (True, False)}
     # Eight weathers and the sun, the marker, four starts and four ends of two coordinates.
@@ -74,7 +74,7 @@ def test_a_chain_without_open_edits_starts_again() -> None:
     for edit in edits_of(GENOME):
         near = row.copy()
         low, high = GENOME.lower[edit.column], GENOME.upper[edit.column]
-        near[edit.column] = np.clip(near[edit.column] + edit.by, low, high)
+        near[edit.column] = np.clip(near[edit.column] + edit.step, low, high)
         method._is_new(near)
     (other,) = method.ask()
     assert other.seed != first.seed
