@@ -52,7 +52,7 @@ class Contacts:
         self._recorder.pose(time_s, position, attitude, velocity, gaps)
 
     def clear_of_everything(self, position: Vector) -> bool:
-        """Whether a UAV that gave up has climbed out of reach of everything."""
+        """Whether an aborting UAV has climbed clear of every body."""
         return position[2] >= ABORT_HEIGHT_M and all(
             gap >= ABORT_CLEAR_M for gap in self._gaps.values()
         )

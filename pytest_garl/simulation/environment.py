@@ -1,4 +1,4 @@
-"""The environment of a flight under way: what policies change of it, and when."""
+"""Changes that policies make to the environment during a flight."""
 
 from __future__ import annotations
 
@@ -10,14 +10,14 @@ from pytest_garl.simulation.npc_policy import DECISION_STEP_S, GeneChange
 
 
 def changed(scenario: Scenario, changes: Iterable[GeneChange]) -> Scenario:
-    """Return the scenario after changes, made one after the other, each clipped to 0 to 1."""
+    """Return the scenario after the changes in order, each clipped to 0 to 1."""
     for key, by in changes:
         scenario = scenario.replace({key: min(1.0, max(0.0, scenario[key] + by))})
     return scenario
 
 
 def environment_at(scenario: Scenario, flight: Flight, time_s: float) -> Scenario:
-    """Return the scenario with all that was changed of it up to a time of its flight."""
+    """Return the scenario with all changes up to a time of its flight."""
     made = [
         (decision, (key, by))
         for item in flight.objects

@@ -1,4 +1,4 @@
-"""Gathers a flight's record while it is flown."""
+"""Recorder of a flight: collects poses, contacts, events and steps while it is flown."""
 
 from __future__ import annotations
 
@@ -51,7 +51,7 @@ class Recorder:
         self._phase = ""
 
     def begin(self, position: Vector, attitude: Quaternion, velocity: Vector) -> None:
-        """Note the pose at time zero, so that even a flight that never began has a track."""
+        """Record the pose at time zero, so a flight that fails at its start has a track too."""
         self.pose(0.0, position, attitude, velocity, {})
 
     def pose(
@@ -78,7 +78,7 @@ class Recorder:
                 self._nearest[name] = (gap, time_s)
 
     def contact(self, body: str, position_m: Vector, speed_mps: float, tilt_rad: float) -> None:
-        """Note a contact; the flight's loop decides what it means."""
+        """Record a contact; ``Contacts`` decides whether it ends the flight."""
         kind, body_class = self._kinds[body]
         self.touched_ground |= body == "ground"
         self._contacts.append(
@@ -100,11 +100,11 @@ class Recorder:
         return self._contacts[-1].body if self._contacts else None
 
     def event(self, name: str, text: str) -> None:
-        """Note something worth telling."""
+        """Record an event."""
         self._events.append(Event(time_s=self.time_s, name=name, text=text))
 
     def sight(self, frame: Frame, renderer: Renderer, eye: Vector, attitude: Quaternion) -> Sight:
-        """Work out what of the marker and the objects a frame shows."""
+        """Return the visible share and the side of the marker, and the names of visible objects."""
         ids = renderer.segment_ids
         area = renderer.marker_area_px(eye, attitude)
         share = min(1.0, float(frame.pixels[ids["marker"]]) / area) if area >= 1 else 0.0
@@ -114,7 +114,7 @@ class Recorder:
         return share, side, seen
 
     def step(self, command: Command, sight: Sight) -> None:
-        """Note one answer of the landing system with what there was to see."""
+        """Record one command of the landing system, with what its frame shows."""
         diagnostics = command.diagnostics
         if diagnostics and diagnostics.phase != self._phase:
             self._phase = diagnostics.phase

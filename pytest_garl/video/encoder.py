@@ -16,7 +16,7 @@ from pytest_garl.video.drawing import Image
 _QUALITY = 27
 """x264's constant rate factor: letters and one-pixel lines stay clear, sensor noise goes."""
 _TOP_KBPS = 350
-"""Bounds a video of 60 s to 2.6 MB in whatever weather."""
+"""Limits a video of 60 s to 2.6 MB in any weather."""
 _BUFFER_KBIT = 1400
 
 

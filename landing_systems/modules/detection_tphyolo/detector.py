@@ -34,7 +34,7 @@ WHOLE_BELOW_M = 2.0
 """Lower than this, where it is landed on, a marker counts only if the frame does not cut it: the
 middle of one that is cut is a guess, off by up to 0.4 m.  From higher up it shows the way."""
 MAX_MARKERS = 6
-"""At most so many are read, so that a strange frame takes no longer than others."""
+"""Largest number that is read, so that an unusual frame takes no longer than others."""
 _EDGE_PX = 1.0
 
 

@@ -159,7 +159,7 @@ class _Rebound:
 
 
 class _Solver:
-    """Minimises over the movable control points, with so many iterations for all its calls."""
+    """Minimises over the movable control points; limits the iterations of all its calls."""
 
     def __init__(self, task: Task, parameters: EgoParameters) -> None:
         self._p = parameters

@@ -83,7 +83,7 @@ class EgoParameters:
     max_ray_m: float = 4.5
     """Longer rays say nothing but that they are free up to here. [L] grid_map/max_ray_length."""
     pixel_step: int = 2
-    """One row and column of so many gives rays. [L] grid_map/skip_pixel."""
+    """Every n-th row and column gives rays. [L] grid_map/skip_pixel."""
     pixel_margin: int = 1
     """Pixels left out at the image's border. [L] grid_map/depth_filter_margin."""
     camera_offset_m: tuple[float, float, float] = (0.0, 0.0, 0.0)

@@ -1,4 +1,4 @@
-"""The physical world: the only module that knows pybullet."""
+"""The physics of one flight, the only module that imports pybullet."""
 
 from __future__ import annotations
 

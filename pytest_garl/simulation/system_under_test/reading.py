@@ -38,7 +38,7 @@ def number(
 def numbers(
     value: object, field: str, count: int, most: float = math.inf, unit: str = ""
 ) -> tuple[float, ...]:
-    """Return so many finite Python floats of any sequence, none beyond ``most`` or ``-most``."""
+    """Return ``count`` finite Python floats of any sequence, none beyond ``most`` or ``-most``."""
     found = [finite(item) for item in items(value, count) or ()]
     if len(found) != count or None in found:
         raise NonsenseError(f"{field} = {shown(value)}; expected {count} finite numbers")
