@@ -1,4 +1,4 @@
-"""Milliseconds of the Ego-Planner on one core: per replan, and per frame that it observes."""
+"""Processor time of the Ego-Planner on one core: per replan, and per observed frame."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ class Times:
     frames: list[float] = field(default_factory=list)
 
 
-def scene(rng: np.random.Generator, count: int) -> list[Box]:
+def random_boxes(rng: np.random.Generator, count: int) -> list[Box]:
     """Return boxes of 1 to 7 m height on a map of 26 m by 26 m."""
     boxes: list[Box] = []
     for _ in range(count):
@@ -37,9 +37,9 @@ def scene(rng: np.random.Generator, count: int) -> list[Box]:
 
 
 def fly(seed: int, times: Times) -> int:
-    """Cross a scene at 10 m and come back at 4 m, seeing it all the time; count the failures."""
+    """Cross a scene at 10 m and come back at 4 m; return the number of frames without a plan."""
     rng = np.random.default_rng(seed)
-    boxes = scene(rng, 10)
+    boxes = random_boxes(rng, 10)
     camera = Camera()
     planner = EgoPlanner(LANDING, camera)
     position, velocity = np.array([-14.0, float(rng.uniform(-6, 6)), 10.0]), np.zeros(3)
@@ -48,9 +48,9 @@ def fly(seed: int, times: Times) -> int:
     failures = 0
     for frame in range(FRAMES):
         time_s = frame / camera.rate_hz
-        seen = observe(camera, time_s, position, boxes, offset_m=LANDING.camera_offset_m)
+        observation = observe(camera, time_s, position, boxes, offset_m=LANDING.camera_offset_m)
         began = time.process_time()
-        planner.observe(seen)
+        planner.observe(observation)
         times.frames.append(time.process_time() - began)
         planner.set_goal(goals[0])
         before, began = planner.replans, time.process_time()
@@ -67,7 +67,7 @@ def fly(seed: int, times: Times) -> int:
 
 
 def main() -> None:
-    """Print median and 95th percentile against the targets; processor time, for one thread."""
+    """Print median and 95th percentile of the times beside the targets."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--scenes", type=int, default=6, help="seeded scenes (default 6)")
     arguments = parser.parse_args()

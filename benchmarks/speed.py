@@ -1,7 +1,7 @@
-"""Milliseconds per frame, flights against real time, and where the time of a flight goes.
+"""Measures time per frame, flights against real time, and the time of each part of a flight.
 
-``python -m benchmarks.speed shares`` prints only the last: for each landing system, under the
-objects that the paper's search flies, the share of what it calls and of what the world does.
+``python -m benchmarks.speed shares`` prints only the parts: for each landing system, with objects
+that the policy ``dqn-paper`` moves, the shares of its own modules and of the simulator.
 """
 
 from __future__ import annotations
@@ -62,14 +62,14 @@ def frames() -> None:
             renderer = Renderer(case, map, camera, generator(0, "sensor"))
             x, y = renderer.marker_m
             objects = [((x + 1.0 + i, y + 1.0, 0.0), 0.3) for i in range(len(map.present_objects))]
-            for up in (10.0, 2.0):
+            for height_m in (10.0, 2.0):
                 times = []
                 for index in range(60):
                     began = time.perf_counter()
-                    renderer.render((x, y, up), (0, 0, 0, 1), index / 10, objects)
+                    renderer.render((x, y, height_m), (0, 0, 0, 1), index / 10, objects)
                     times.append(time.perf_counter() - began)
                 milliseconds = 1000 * statistics.median(times)
-                print(f"{label:15} {width}x{height} from {up:4.0f} m: {milliseconds:5.2f} ms")
+                print(f"{label:15} {width}x{height} from {height_m:4.0f} m: {milliseconds:5.2f} ms")
 
 
 def flights() -> None:
@@ -88,44 +88,45 @@ def flights() -> None:
 
 
 class Shares:
-    """CPU seconds by part; what one part calls of another counts for the other alone."""
+    """CPU seconds by part; the time of a nested call of another part counts only for that part."""
 
     def __init__(self) -> None:
         self.seconds: dict[str, float] = defaultdict(float)
-        self._open: list[str] = [REST]
+        self._active_parts: list[str] = [REST]
         self._since = time.process_time()
 
     def _switch(self) -> None:
+        """Add the time since the last switch to the part that is active now."""
         now = time.process_time()
-        self.seconds[self._open[-1]] += now - self._since
+        self.seconds[self._active_parts[-1]] += now - self._since
         self._since = now
 
     def timed(self, part: str, call: Callable[..., Any]) -> Callable[..., Any]:
-        """Return ``call``, its time noted under ``part``."""
+        """Return a function that calls ``call`` and adds its time to ``part``."""
 
         @functools.wraps(call)
         def wrapped(*args: Any, **kwargs: Any) -> Any:
             self._switch()
-            self._open.append(part)
+            self._active_parts.append(part)
             try:
                 return call(*args, **kwargs)
             finally:
                 self._switch()
-                self._open.pop()
+                self._active_parts.pop()
 
         return wrapped
 
     def fly(self, flight: Callable[[], Any]) -> Any:
-        """Fly and note where the time goes; the clock itself takes about a twentieth."""
+        """Fly, and measure the time of all parts; measuring takes about a twentieth of it."""
         with ExitStack() as patched:
             for part, owner, methods in PARTS:
                 for method in methods:
                     call = self.timed(part, getattr(owner, method))
                     patched.enter_context(patch.object(owner, method, call))
             self._since = time.process_time()
-            answer = flight()
+            result = flight()
             self._switch()
-        return answer
+        return result
 
 
 def shares(count: int = 4) -> None:

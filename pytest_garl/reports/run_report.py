@@ -25,19 +25,19 @@ from pytest_garl.verdicts.verdict import count_decided
 VERSION = 1
 SCHEMA = Path(__file__).with_name("report.schema.json")
 USER_FAILURES = "own failures"
-"""The ledger's fact with the failed assertions about users' own properties; no result has them."""
+"""The ledger's fact with the failed assertions about users' own properties."""
 BEGAN, ENDED = "began", "ended"
 """The ledger's facts: when the run began and ended, in UTC."""
-_RUN = ("seed", "budget", "method", "population", "weather", "npcs", "python")
+_RUN_FACTS = ("seed", "budget", "method", "population", "weather", "npcs", "python")
 
 
 def utc_now() -> str:
-    """Return the time in the form of the facts."""
+    """Return the present time as the ledger's facts store it."""
     return datetime.now(UTC).isoformat(timespec="seconds")
 
 
 def run_report_as_json(path: Path, corpus: Corpus) -> dict[str, Any]:
-    """Return the run in a ledger, finished or not, with the saved cases of its systems.
+    """Return the report of the run in a ledger, finished or not, with its systems' saved cases.
 
     Raises LedgerError if there is no ledger.
     """
@@ -48,11 +48,11 @@ def run_report_as_json(path: Path, corpus: Corpus) -> dict[str, Any]:
         failures = [SlotUserFailure(**each) for each in ledger.fact(USER_FAILURES) or ()]
         summaries = search_summaries(ledger, failures)
         progress = ledger.queries.progress()
-        wanted: Counter[tuple[str, str]] = Counter()
+        slots: Counter[tuple[str, str]] = Counter()
         for each in progress:
-            wanted[each.system, each.map] += each.total
+            slots[each.system, each.map] += each.total
         saved = _cases(corpus, {summary.system for summary in summaries})
-        searches = [_search(each, wanted[each.system, each.map], saved, path) for each in summaries]
+        searches = [_search(each, slots[each.system, each.map], saved, path) for each in summaries]
         meters = ledger.queries.meters()
         return {
             "schema": "pytest-garl-report",
@@ -61,7 +61,7 @@ def run_report_as_json(path: Path, corpus: Corpus) -> dict[str, Any]:
             "ledger": str(path),
             "complete": ledger.fact(ENDED) is not None
             and all(each.flown == each.total for each in progress),
-            "run": {key: ledger.fact(key) for key in _RUN},
+            "run": {key: ledger.fact(key) for key in _RUN_FACTS},
             "results_sha256": ledger.queries.result_hash(),
             "time": {
                 "began": ledger.fact(BEGAN),
@@ -83,14 +83,14 @@ def run_report_as_json(path: Path, corpus: Corpus) -> dict[str, Any]:
 
 
 def _search(
-    summary: SearchSummary, wanted: int, cases: list[dict[str, Any]], path: Path
+    summary: SearchSummary, slots: int, cases: list[dict[str, Any]], path: Path
 ) -> dict[str, Any]:
     total, verdicts = len(summary.verdicts), summary.verdicts
     low, high = share_interval(summary.violating, total)
     return {
         "system": summary.system,
         "map": summary.map,
-        "wanted": wanted,
+        "wanted": slots,
         "flown": total,
         "violating": summary.violating,
         "violating_interval_95": [low, high],
@@ -143,7 +143,7 @@ def _repeat_command(summary: SearchSummary, slot: str, path: Path) -> str:
 
 
 def _cases(corpus: Corpus, systems: set[str]) -> list[dict[str, Any]]:
-    """Return the saved cases of systems; leave broken files to `garl cases check`."""
+    """Return the saved cases of systems, without broken files; ``garl cases check`` lists those."""
     found = []
     for entry in corpus.all_entries():
         case = entry.case

@@ -1,4 +1,4 @@
-"""The violations of a search, kind by kind: for the terminal, GitHub and ``garl report``."""
+"""The violations of a search by signature, for the terminal, GitHub and ``garl report``."""
 
 from __future__ import annotations
 
@@ -13,9 +13,9 @@ from pytest_garl.verdicts.wording import headline
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SlotUserFailure:
-    """A failed assertion about a user's own property, on a slot.
+    """A failed assertion about a user's own property, in the flight of a slot.
 
-    The ledger holds these fields under their names.
+    The ledger stores these fields as JSON with these names.
     """
 
     system: str
@@ -27,7 +27,11 @@ class SlotUserFailure:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ViolationKind:
-    """One signature: how many flights have it, the first of them, and what happened in that one."""
+    """All violations with one signature.
+
+    ``count`` is the number of flights, ``first`` the slot of the first one, ``story`` what happened
+    in it, and ``headline`` the story in short.
+    """
 
     signature: str
     count: int
@@ -43,6 +47,7 @@ class SearchSummary:
     system: str
     map: str
     files: tuple[str, ...]
+    """The test files of the system."""
     flights: tuple[LedgerFlight, ...]
     kinds: tuple[ViolationKind, ...]
     violating: int
@@ -68,13 +73,13 @@ class SearchSummary:
 
     @property
     def crashes(self) -> Mapping[str, int]:
-        """How often the landing system crashed, by the way it did; without inconclusive flights."""
+        """How often the landing system crashed, by kind of crash; without inconclusive flights."""
         counts: dict[str, int] = {}
         for each in self.flights:
             if each.result.verdict.violation_type == "V":
                 kind = each.result.crash.kind if each.result.crash else "raised"
-                word = kind if kind in ("died", "hung", "broke") else "Python error"
-                counts[word] = counts.get(word, 0) + 1
+                name = kind if kind in ("died", "hung", "broke") else "Python error"
+                counts[name] = counts.get(name, 0) + 1
         return counts
 
 
@@ -101,23 +106,24 @@ def _summary(
     flights: list[LedgerFlight],
     user_failures: list[SlotUserFailure],
 ) -> SearchSummary:
-    slots: dict[str, list[tuple[str, str]]] = {}
+    # (slot, story) of all violations, by signature.
+    violations: dict[str, list[tuple[str, str]]] = {}
     for flight in flights:
         verdict = flight.result.verdict
         if verdict.violation:
             violation = flight.id.slot_id, verdict.story
-            slots.setdefault(verdict.signature, []).append(violation)
+            violations.setdefault(verdict.signature, []).append(violation)
     for each in sorted(user_failures, key=lambda each: each.slot):
-        slots.setdefault(each.signature, []).append((each.slot, each.message))
+        violations.setdefault(each.signature, []).append((each.slot, each.message))
     kinds = [
         ViolationKind(
             signature=signature,
-            count=len({slot for slot, _ in those}),
-            first=those[0][0],
-            story=those[0][1],
-            headline=headline(those[0][1]),
+            count=len({slot for slot, _ in items}),
+            first=items[0][0],
+            story=items[0][1],
+            headline=headline(items[0][1]),
         )
-        for signature, those in slots.items()
+        for signature, items in violations.items()
     ]
     files = str(ledger.fact(f"files of {system} on {map}") or "")
     return SearchSummary(
@@ -126,7 +132,7 @@ def _summary(
         files=tuple(files.split()),
         flights=tuple(flights),
         kinds=tuple(sorted(kinds, key=lambda each: (-each.count, each.signature))),
-        violating=len({slot for those in slots.values() for slot, _ in those}),
+        violating=len({slot for items in violations.values() for slot, _ in items}),
     )
 
 
@@ -143,9 +149,10 @@ LEGEND = {
     "abort": "gave up",
     "own": "an assertion of a test",
 }
+"""Meanings of the types: the part of a signature before the first colon."""
 
 
 def legend(kinds: Iterable[ViolationKind]) -> str:
-    """Return what the types of these kinds mean, in one line."""
+    """Return the meanings of the types of these kinds, in one line."""
     types = {kind.signature.partition(":")[0] for kind in kinds}
-    return "; ".join(f"{name}: {words}" for name, words in LEGEND.items() if name in types)
+    return "; ".join(f"{name}: {meaning}" for name, meaning in LEGEND.items() if name in types)

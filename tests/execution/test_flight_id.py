@@ -27,8 +27,8 @@ def test_search_of_one_flight_has_the_first_slot() -> None:
 
 
 @given(st.lists(st.tuples(st.integers(0, 200), st.integers(0, 99)), unique=True, max_size=20))
-def test_flights_of_one_search_have_different_records(places: list[tuple[int, int]]) -> None:
+def test_flights_of_one_search_have_different_records(slots: list[tuple[int, int]]) -> None:
     names = {
-        FlightId(search="s", map="lawn", slot=Slot(generation=g, index=i)).name for g, i in places
+        FlightId(search="s", map="lawn", slot=Slot(generation=g, index=i)).name for g, i in slots
     }
-    assert len(names) == len(places)
+    assert len(names) == len(slots)

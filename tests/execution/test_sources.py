@@ -1,4 +1,4 @@
-"""What belongs to a landing system, read from its imports, whoever has imported what."""
+"""The sources of a landing system are read from its imports, not from the loaded modules."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ STACK = {
     "other.py": "class Other: pass\n",
     "test_lander.py": "from {0}.lander import Lander\n",
 }
-OWN = {
+SOURCES = {
     "__init__.py",
     "lander.py",
     "planning/__init__.py",
@@ -34,14 +34,14 @@ OWN = {
     "late.py",
     "deep/deeper.py",
 }
-Make = Callable[[], tuple[Path, str]]
+MakePackage = Callable[[], tuple[Path, str]]
 
 
 @pytest.fixture
-def make(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Make:
-    """Make a package of a name that was never used, and return its folder and name."""
+def make_package(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> MakePackage:
+    """Return a function that writes STACK as a new package, and returns its folder and name."""
 
-    def made() -> tuple[Path, str]:
+    def make() -> tuple[Path, str]:
         name = f"stack_{next(_NUMBERS)}"
         folder = tmp_path / name
         for file, text in STACK.items():
@@ -51,22 +51,24 @@ def make(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Make:
         monkeypatch.syspath_prepend(str(tmp_path))
         return folder, name
 
-    return made
+    return make
 
 
 def lander(name: str) -> Any:
     return importlib.import_module(f"{name}.lander").Lander
 
 
-def test_sources_follow_imports_anywhere_in_a_module(make: Make) -> None:
-    _, name = make()
-    assert {file for file, _ in source_hashes(lander(name))} == {f"{name}/{file}" for file in OWN}
+def test_sources_follow_imports_anywhere_in_a_module(make_package: MakePackage) -> None:
+    _, name = make_package()
+    assert {file for file, _ in source_hashes(lander(name))} == {
+        f"{name}/{file}" for file in SOURCES
+    }
     assert f"{name}.late" not in sys.modules
 
 
-@pytest.mark.parametrize("file", sorted(OWN))
-def test_each_source_changes_the_hash(make: Make, file: str) -> None:
-    folder, name = make()
+@pytest.mark.parametrize("file", sorted(SOURCES))
+def test_each_source_changes_the_hash(make_package: MakePackage, file: str) -> None:
+    folder, name = make_package()
     system = lander(name)
     before = sources_sha256(system)
     assert sources_sha256(system) == before
@@ -75,8 +77,8 @@ def test_each_source_changes_the_hash(make: Make, file: str) -> None:
 
 
 @pytest.mark.parametrize("file", ["other.py", "test_lander.py"])
-def test_hash_ignores_modules_that_are_not_imported(make: Make, file: str) -> None:
-    folder, name = make()
+def test_hash_ignores_modules_that_are_not_imported(make_package: MakePackage, file: str) -> None:
+    folder, name = make_package()
     system = lander(name)
     before = sources_sha256(system)
     importlib.import_module(f"{name}.{file.removesuffix('.py')}")
@@ -88,7 +90,7 @@ def test_hash_ignores_modules_that_are_not_imported(make: Make, file: str) -> No
 def test_sources_include_modules_of_the_same_folder(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Without a package, as in the README."""
+    """The modules are in no package, as in the README."""
     monkeypatch.syspath_prepend(str(tmp_path))
     (tmp_path / "alone_landing.py").write_text("import alone_helper\nclass Alone: pass\n")
     helper = tmp_path / "alone_helper.py"
@@ -100,7 +102,7 @@ def test_sources_include_modules_of_the_same_folder(
     assert sources_sha256(system) != before
 
 
-def test_folder_of_data_stands_for_all_its_files(tmp_path: Path) -> None:
+def test_data_folder_means_all_files_in_it(tmp_path: Path) -> None:
     for name in ("model/a.bin", "model/deep/b.bin", "one.txt", "another.txt"):
         (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
         (tmp_path / name).write_text(name)

@@ -19,7 +19,7 @@ from pytest_garl.search.catalogue import (
 from tests.search.searches import bred, plan
 
 
-def test_each_file_of_a_method_declares_one() -> None:
+def test_each_method_file_declares_its_method() -> None:
     assert DEFAULT_METHOD in method_names()
     for name in method_names():
         declared = declaration_of(name)
@@ -27,7 +27,7 @@ def test_each_file_of_a_method_declares_one() -> None:
         assert declared.policy in policy_names()
 
 
-def test_a_method_brings_its_policy_and_a_users_method_the_default() -> None:
+def test_a_method_declares_its_policy_and_a_users_method_gets_the_default() -> None:
     assert default_policy("ga") == "destination"
     assert default_policy("online-rl") == "online-rl"
     assert default_policy("my_search:Hill") == DEFAULT_POLICY == default_policy(DEFAULT_METHOD)
@@ -44,8 +44,8 @@ def test_the_catalogue_imports_no_method_and_no_numpy() -> None:
 
 
 def test_a_users_method_is_named_by_its_module() -> None:
-    own = make_method("pytest_garl.search.methods.garl_paper:make", plan())
-    assert bred(own, 2) == bred(make_method("garl-paper", plan()), 2)
+    users = make_method("pytest_garl.search.methods.garl_paper:make", plan())
+    assert bred(users, 2) == bred(make_method("garl-paper", plan()), 2)
     with pytest.raises(GarlError, match=r"'nowhere:method'.*cannot be loaded.*one of .*garl, "):
         make_method("nowhere:method", plan())
 

@@ -1,4 +1,4 @@
-"""Flights of landing systems that answer what a test wants."""
+"""Flights of landing systems whose ``step`` returns a given value."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ NAN, INF, HUGE = math.nan, math.inf, 10**400
 
 
 class Answers(Scripted):
-    """Returns what a test puts here."""
+    """Its ``step`` returns the result of ``answer``, which a test replaces."""
 
     answer: Callable[[], Any]
 

@@ -1,4 +1,4 @@
-"""A project with saved cases, for tests of sessions that save cases or fly them."""
+"""A project with saved cases, for tests that save cases or fly them."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ def test_own(landing, scenario):
 
 
 def run(pytester: pytest.Pytester, *args: str) -> pytest.RunResult:
-    """Run pytest in a project, by default on its saved cases alone."""
+    """Run pytest in a project, by default without a search: it flies only the saved cases."""
     return pytester.runpytest_subprocess("-p", "no:cacheprovider", *(args or CASES))
 
 
@@ -56,5 +56,5 @@ def change(path: Path, old: str, new: str) -> None:
 
 
 def dodge(project: Path) -> None:
-    """Repair the landing system: it avoids the dog."""
+    """Fix the landing system: it avoids the dog."""
     change(project / "systems.py", "class Good:\n", "class Good:\n    dodges = True\n")

@@ -1,4 +1,4 @@
-"""A project with landing tests and a simulator that flies in no time, for tests of sessions."""
+"""A project with landing tests and a very fast simulator, for tests that run pytest."""
 
 from __future__ import annotations
 
@@ -66,10 +66,10 @@ def project(pytester: pytest.Pytester, system: str = "Good", maps: str = "['lawn
 
 
 def run(pytester: pytest.Pytester, *args: str) -> pytest.RunResult:
-    """Run pytest; what a search finds is saved only where a test asks for it."""
+    """Run pytest; a search saves no cases unless the arguments have ``--garl-shrink``."""
     searches = any(arg.startswith("--garl-budget") for arg in args)
-    off = ("--garl-shrink=0",) if searches else ()
-    return pytester.runpytest_subprocess("-p", "no:cacheprovider", *off, *args)
+    save_no_cases = ("--garl-shrink=0",) if searches else ()
+    return pytester.runpytest_subprocess("-p", "no:cacheprovider", *save_no_cases, *args)
 
 
 def result_hash(pytester: pytest.Pytester) -> str:

@@ -1,4 +1,4 @@
-"""From trained networks to the ONNX files that fly."""
+"""Exports trained networks to the ONNX files that the landing system uses."""
 
 from __future__ import annotations
 
@@ -14,8 +14,8 @@ OPSET = 18
 
 
 def onnx_bytes(model: nn.Module, shape: tuple[int, ...]) -> bytes:
-    """Return a network as ONNX, for inputs of one shape."""
-    # The exporter remarks on packages that it would like to have and on its own future.
+    """Return the content of an ONNX file with a network, for inputs of one shape."""
+    # The exporter warns of optional packages and of its own deprecations.
     logging.getLogger("torch.onnx").setLevel(logging.ERROR)
     with warnings.catch_warnings(), torch.no_grad():
         warnings.simplefilter("ignore")
@@ -29,9 +29,9 @@ def onnx_bytes(model: nn.Module, shape: tuple[int, ...]) -> bytes:
             verbose=False,
         )
     if program is None:
-        raise RuntimeError("torch.onnx.export gave no program")
+        raise RuntimeError("torch.onnx.export returned no program")
     for node in program.model.graph:
-        # Traces of the exporter's source files have no place in a shipped file.
+        # Remove references to the source files of this machine: the file is published.
         node.metadata_props.clear()
         node.doc_string = None
     content: bytes = program.model_proto.SerializeToString()

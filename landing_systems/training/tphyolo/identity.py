@@ -1,7 +1,8 @@
-"""The second network, which reads the id: TPH-YOLOv5's classifier of cut-outs, much smaller.
+"""The second network reads a marker's id from a patch: a smaller form of TPH-YOLOv5's classifier.
 
-A cell of the first network, trained only with the right one of four ids, was at chance after 1,750
-steps: the codes may be turned by any angle.  A classifier of cut-outs learns it in some hundred.
+The first network could not learn ids: with four of them it was no better than chance after 1,750
+steps, because markers are rotated by any angle.  A classifier of patches learns ids in a few
+hundred steps.
 """
 
 from __future__ import annotations
@@ -22,40 +23,41 @@ from landing_systems.training.tphyolo.losses import (
     MIN_CONTRAST,
     MIN_SEEN,
     MIN_SIDE_PX,
-    seen_part,
+    visible_part,
 )
 from landing_systems.training.tphyolo.model import Convolution, follow
 
 OTHER = len(CLASS_IDS)
-"""The class of markers with another id, and of what is no marker."""
+"""The class of markers with another id, and of patches without a marker."""
 _CELLS = PATCH_PX // 8
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class IdentityPlan:
-    """How to learn to read ids."""
+    """The settings of the training of the second network."""
 
     steps: int = 9000
     seed: int = 0
     patches: int = 64
     nothing: float = 0.15
-    """Share of cut-outs from anywhere, mostly of no marker."""
+    """Share of patches from anywhere, without the middle of a marker."""
     mirrored: float = 0.1
-    """Share of mirror images of known markers, which look like them and are none."""
+    """Share of mirror images of known markers.  They look like markers, but belong to OTHER."""
     others: float = 0.3
-    """Share of markers with another id: there are 46 of them, and to be taken for the wanted
-    one is the worst that can happen."""
+    """Share of markers with another id.  There are 46 other ids, and the worst error is to take one
+    for the id of the target."""
     shift: float = 0.06
     resize: float = 0.08
-    """Spread of errors of the middle in sides, and of the size in its logarithm: the first
-    network's are about that large."""
+    """Standard deviations of the errors of a patch, about those of the first network: ``shift`` of
+    its middle as a share of the marker's side, ``resize`` of the logarithm of its size."""
     learning_rate: float = 2e-3
     weight_decay: float = 1e-2
     average: float = 0.998
+    """Decay of the moving average of the weights."""
 
 
 class IdentityNet(nn.Sequential):
-    """Maps patches (n, 3, P, P) to logits (n, ids + 1), the last of "another or none"."""
+    """Maps patches (n, 3, P, P) to logits (n, ids + 1); the last class is ``OTHER``."""
 
     def __init__(self) -> None:
         super().__init__(
@@ -72,7 +74,7 @@ class IdentityNet(nn.Sequential):
 
 
 class PatchSampler:
-    """Draws labelled patches from crops."""
+    """Draws random patches, with their classes, from the crops of the data set."""
 
     def __init__(self, shards: Sequence[Samples], plan: IdentityPlan) -> None:
         self._shards, self._plan = shards, plan
@@ -95,26 +97,26 @@ class PatchSampler:
         for _ in range(plan.patches):
             chance = rng.random()
             if chance < plan.nothing:
-                patches.append(self._nothing(rng))
+                patches.append(self._patch_without_marker(rng))
                 classes.append(OTHER)
                 continue
             mirrored = chance < plan.nothing + plan.mirrored
-            other = not mirrored and chance < plan.nothing + plan.mirrored + plan.others
-            number = OTHER if other else int(rng.integers(OTHER))
-            kind = self._by_class[number]
-            shard, picture, row = kind[rng.integers(len(kind))]
+            has_other_id = not mirrored and chance < plan.nothing + plan.mirrored + plan.others
+            number = OTHER if has_other_id else int(rng.integers(OTHER))
+            markers = self._by_class[number]
+            shard, picture, row = markers[rng.integers(len(markers))]
             x, y, _, _, _, _, _, side = self._shards[shard].labels[picture, row]
             across, down = rng.normal(0, plan.shift * side, 2)
             middle = (float(x + across), float(y + down))
             size = float(side) * float(np.exp(rng.normal(0, plan.resize)))
-            turn = float(rng.uniform(0, 2 * np.pi))
-            cut = patch(self._shards[shard].images[picture], middle, size, turn)
+            angle = float(rng.uniform(0, 2 * np.pi))
+            cut = patch(self._shards[shard].images[picture], middle, size, angle)
             patches.append(cut[:, ::-1] if mirrored else cut)
             classes.append(OTHER if mirrored else number)
         return np.stack(patches), np.array(classes, np.int64)
 
-    def _nothing(self, rng: np.random.Generator) -> NDArray[np.uint8]:
-        """Cut beside the markers: a patch that holds one's middle would not be nothing."""
+    def _patch_without_marker(self, rng: np.random.Generator) -> NDArray[np.uint8]:
+        """Return a patch from anywhere that does not contain the middle of a marker."""
         while True:
             shard = self._shards[int(rng.integers(len(self._shards)))]
             picture = int(rng.integers(len(shard.images)))
@@ -124,12 +126,12 @@ class PatchSampler:
             side = max(12.0, float(rows[:, 7].max()))
             away = np.abs(rows[:, :2] - middle).max(axis=1)
             if not ((rows[:, 2] > 0) & (away < 0.6 * rows[:, 7])).any():
-                turn = float(rng.uniform(0, 2 * np.pi))
-                return patch(shard.images[picture], middle.tolist(), side, turn)
+                angle = float(rng.uniform(0, 2 * np.pi))
+                return patch(shard.images[picture], middle.tolist(), side, angle)
 
 
 def _legible(row: NDArray[np.float32], region: NDArray[np.float32], size: int) -> bool:
-    part = seen_part(row, region, size, size)
+    part = visible_part(row, region, size, size)
     return (
         part is not None
         and part[1] * (1 - float(row[5])) >= MIN_SEEN
@@ -161,8 +163,8 @@ def train_identity(
     for step in range(plan.steps):
         rng = np.random.default_rng(np.random.SeedSequence(plan.seed, spawn_key=(1, step)))
         patches, classes = patch_sampler.draw(rng)
-        answer: Tensor = model(torch.from_numpy(normalised(patches)).to(device))
-        loss = nn.functional.cross_entropy(answer, torch.from_numpy(classes).to(device))
+        logits: Tensor = model(torch.from_numpy(normalised(patches)).to(device))
+        loss = nn.functional.cross_entropy(logits, torch.from_numpy(classes).to(device))
         optimiser.zero_grad()
         torch.autograd.backward(loss)
         optimiser.step()

@@ -16,19 +16,19 @@ from pytest_garl.execution.ray.actor import ActorWorkspace
 from pytest_garl.execution.ray.pool import check_ray
 
 
-class Ray(types.ModuleType):
-    """The part of Ray that connects; keeps the arguments of each call."""
+class FakeRay(types.ModuleType):
+    """A fake of Ray that records its connections and the arguments of ``ray.init``."""
 
     exceptions = types.SimpleNamespace(RayError=type("RayError", (Exception,), {}))
 
     def __init__(self, error: Exception | None = None) -> None:
         super().__init__("ray")
         self._error = error
-        self.given: dict[str, Any] = {}
+        self.init_arguments: dict[str, Any] = {}
         self.connections: list[bool] = []
 
-    def init(self, address: str, **given: Any) -> None:
-        self.given = {"address": address, **given}
+    def init(self, address: str, **options: Any) -> None:
+        self.init_arguments = {"address": address, **options}
         if self._error is not None:
             raise self._error
         self.connections.append(True)
@@ -41,18 +41,18 @@ class Ray(types.ModuleType):
 
 
 @pytest.fixture
-def ray(monkeypatch: pytest.MonkeyPatch) -> Ray:
-    return use(Ray(), monkeypatch)
+def ray(monkeypatch: pytest.MonkeyPatch) -> FakeRay:
+    return install(FakeRay(), monkeypatch)
 
 
-def use(ray: Ray, monkeypatch: pytest.MonkeyPatch) -> Ray:
+def install(ray: FakeRay, monkeypatch: pytest.MonkeyPatch) -> FakeRay:
     monkeypatch.setitem(sys.modules, "ray", ray)
     monkeypatch.setattr(ray_driver, "version", lambda name: "2.60.0")
     return ray
 
 
 def test_joined_cluster_gets_the_project_without_its_flights(
-    ray: Ray, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    ray: FakeRay, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     (tmp_path / "landing" / "tests").mkdir(parents=True)
     monkeypatch.chdir(tmp_path / "landing" / "tests")
@@ -66,15 +66,15 @@ def test_joined_cluster_gets_the_project_without_its_flights(
             6,
         )
     assert ray.connections == [True, False]
-    assert ray.given["address"] == "head:6379"
-    assert ray.given["runtime_env"] == {
+    assert ray.init_arguments["address"] == "head:6379"
+    assert ray.init_arguments["runtime_env"] == {
         "working_dir": str(tmp_path),
         "excludes": ["/runs/.garl"],
     }
 
 
 def test_pytest_may_run_and_fly_outside_the_project(
-    ray: Ray, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    ray: FakeRay, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(tmp_path)
     with ray_driver.joined_cluster("head:6379", tmp_path / "project", tmp_path) as (
@@ -83,11 +83,11 @@ def test_pytest_may_run_and_fly_outside_the_project(
         _,
     ):
         assert workspace.working_dir == "."
-    assert ray.given["runtime_env"]["excludes"] == []
+    assert ray.init_arguments["runtime_env"]["excludes"] == []
 
 
 def test_own_cluster_has_a_token_and_leaves_nothing(
-    ray: Ray, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    ray: FakeRay, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv("RAY_TMPDIR", str(tmp_path))
     for name in ("RAY_AUTH_MODE", "RAY_AUTH_TOKEN"):
@@ -95,10 +95,10 @@ def test_own_cluster_has_a_token_and_leaves_nothing(
         monkeypatch.setenv(name, "")
         monkeypatch.delenv(name)
     with ray_driver.own_cluster(3) as (_, workspace, cpus):
-        assert cpus == ray.given["num_cpus"] == 3
+        assert cpus == ray.init_arguments["num_cpus"] == 3
         assert [str(path) for path in tmp_path.iterdir()] == [workspace.scratch]
         assert len(os.environ["RAY_AUTH_TOKEN"]) == 64
-    assert ray.given["address"] == "local"
+    assert ray.init_arguments["address"] == "local"
     assert not list(tmp_path.iterdir())
 
 
@@ -107,13 +107,13 @@ def test_own_cluster_has_a_token_and_leaves_nothing(
     [
         ConnectionError("Failed to connect to Ray cluster at 10.0.0.1:6379"),
         RuntimeError("Version mismatch: The cluster was started with:\n    Ray: 2.40.0"),
-        Ray.exceptions.RayError("wrong token"),
+        FakeRay.exceptions.RayError("wrong token"),
     ],
 )
 def test_error_of_a_cluster_names_the_expected_versions_and_token(
     error: Exception, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    use(Ray(error), monkeypatch)
+    install(FakeRay(error), monkeypatch)
     joined = ray_driver.joined_cluster("10.0.0.1:6379", tmp_path, tmp_path)
     with pytest.raises(PoolError) as found, joined:
         pass
@@ -128,7 +128,7 @@ def test_failed_start_of_a_cluster_raises_one_error_and_leaves_no_files(
     monkeypatch.setenv("RAY_TMPDIR", str(tmp_path))
     for name in ("RAY_AUTH_MODE", "RAY_AUTH_TOKEN"):
         monkeypatch.setenv(name, "given")
-    use(Ray(OSError("timed out during startup")), monkeypatch)
+    install(FakeRay(OSError("timed out during startup")), monkeypatch)
     with pytest.raises(PoolError, match="on this machine: timed out"), ray_driver.own_cluster(1):
         pass
     assert not list(tmp_path.iterdir())
@@ -137,11 +137,11 @@ def test_failed_start_of_a_cluster_raises_one_error_and_leaves_no_files(
 def test_folder_is_removed_after_the_last_process_that_writes_there(tmp_path: Path) -> None:
     folder = tmp_path / "garl-ray-1"
     folder.mkdir()
-    writes = (
+    code = (
         "import pathlib, sys, time; print(flush=True); time.sleep(0.5); "
         "pathlib.Path(sys.argv[1], 'a').touch()"
     )
-    command = [sys.executable, "-c", writes, str(folder)]
+    command = [sys.executable, "-c", code, str(folder)]
     with subprocess.Popen(command, stdout=subprocess.PIPE) as process:
         # Right after its start a process has no command line for a moment.
         assert process.stdout is not None

@@ -18,8 +18,8 @@ def test_the_scenarios_are_those_of_random() -> None:
 def test_one_npc_acts_at_a_time_and_the_others_stand() -> None:
     (scenario,) = random_scenarios(MAP, GENOME, 4, 0, 1)
     flight = fly(scenario, ReferencePilot, policy_spec("online-rl"), map=MAP, time_limit_s=15)
-    acted = [
+    acting_npcs = [
         {n for n, move in enumerate(item.moves) if move.any()} | {n for n, _, _ in item.changes}
         for item in flight.objects
     ]
-    assert sum(map(len, acted)) == len(set().union(*acted)) > 0
+    assert sum(map(len, acting_npcs)) == len(set().union(*acting_npcs)) > 0
