@@ -18,7 +18,7 @@ NOTHING_TO_FLY = "no --garl-budget given and no saved cases; to search: pytest -
 
 
 def parametrize(metafunc: pytest.Metafunc, marker: pytest.Mark, options: Options) -> None:
-    """Make an item of each target of a marked test; without targets make one that is skipped.
+    """Make one item for each target of a marked test; without targets make one skipped item.
 
     Raises GarlError if the marker is invalid.
     """
@@ -38,37 +38,39 @@ def targets_for(marker: pytest.Mark, options: Options, test: str) -> list[Target
 
     Raises GarlError if the marker is invalid.
     """
-    marked = read_marker(marker, options)
+    arguments = read_marker(marker, options)
     if options.repeat:
-        return [each for map in marked.maps for each in _repeated_targets(marked, map, options)]
+        return [
+            each for map in arguments.maps for each in _repeated_targets(arguments, map, options)
+        ]
     searched = [
-        replace(marked.target, map=map, slot=slot)
-        for map in marked.maps
+        replace(arguments.target, map=map, slot=slot)
+        for map in arguments.maps
         for slot in slots(options.budget, options.population)
     ]
-    return [*_saved_targets(marked, options, test), *searched]
+    return [*_saved_targets(arguments, options, test), *searched]
 
 
-def _saved_targets(marked: MarkerArguments, options: Options, test: str) -> Iterator[Target]:
+def _saved_targets(arguments: MarkerArguments, options: Options, test: str) -> Iterator[Target]:
     if not options.cases.is_dir() and not options.cases.is_symlink():
         return
     from pytest_garl.scenarios.maps.map import map_names
 
-    there = map_names(options.map_folders)
-    for entry in options.corpus.entries(marked.target.system_name):
+    known_maps = map_names(options.map_folders)
+    for entry in options.corpus.entries(arguments.target.system_name):
         header = entry.header
-        if header is None or header.map not in there:
-            yield replace(marked.target, entry=entry)
+        if header is None or header.map not in known_maps:
+            yield replace(arguments.target, entry=entry)
             continue
-        if header.map not in marked.maps or header.asserting_test not in ("", test):
+        if header.map not in arguments.maps or header.asserting_test not in ("", test):
             continue
-        target = replace(marked.target, map=header.map, entry=entry)
+        target = replace(arguments.target, map=header.map, entry=entry)
         yield target
         if header.status == "fixed" and header.avoidable == "live":
             yield replace(target, live=True)
 
 
-def _repeated_targets(marked: MarkerArguments, map: str, options: Options) -> list[Target]:
+def _repeated_targets(arguments: MarkerArguments, map: str, options: Options) -> list[Target]:
     if Path(options.repeat).is_file():
         from pytest_garl.files.toml import parse
         from pytest_garl.scenarios.files import map_name_in
@@ -81,8 +83,8 @@ def _repeated_targets(marked: MarkerArguments, map: str, options: Options) -> li
             )
         if map_name_in(text, source=options.repeat) != map:
             return []
-        return [replace(marked.target, map=map, file=options.repeat)]
+        return [replace(arguments.target, map=map, file=options.repeat)]
     slot = options.repeated_slot
-    if slot is None or slot.map != map or marked.target.system_name not in slot.scenarios:
+    if slot is None or slot.map != map or arguments.target.system_name not in slot.scenarios:
         return []
-    return [replace(marked.target, map=map, slot=slot.slot)]
+    return [replace(arguments.target, map=map, slot=slot.slot)]

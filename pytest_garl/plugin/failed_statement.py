@@ -18,8 +18,8 @@ import pytest
 from pytest_garl.messages import printable
 from pytest_garl.regressions.user_failure import UserFailure
 
-FAILS: tuple[type[BaseException], ...] = (AssertionError, pytest.fail.Exception)
-"""A test raises these to say that a property does not hold; any other exception is an error."""
+FAILED_ASSERTION_TYPES: tuple[type[BaseException], ...] = (AssertionError, pytest.fail.Exception)
+"""Exceptions by which a test says that a property does not hold; all others are errors."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -31,7 +31,7 @@ class AttributeRead:
 
 
 def code_of(function: Callable[..., Any]) -> CodeType | None:
-    """Return the code of a test's own body, or None if it is no plain function."""
+    """Return the code of a test function's body, or None if the test is no plain function."""
     plain = inspect.unwrap(function)
     code: CodeType | None = getattr(getattr(plain, "__func__", plain), "__code__", None)
     return code
@@ -41,7 +41,7 @@ def failure_of(
     test: str, function: Callable[..., Any], error: BaseException, reads: Sequence[AttributeRead]
 ) -> UserFailure | None:
     """Return which assertion of a test failed, or None if the error is no failed assertion."""
-    if not isinstance(error, FAILS) or isinstance(error, pytest.xfail.Exception):
+    if not isinstance(error, FAILED_ASSERTION_TYPES) or isinstance(error, pytest.xfail.Exception):
         return None
     path, line = _location(error, code_of(function))
     statement = _statement(path, line)
@@ -55,15 +55,19 @@ def failure_of(
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _Statement:
-    """A statement: its source without layout and message, its lines, what its message reads."""
+    """A statement of a test.
+
+    ``source`` has normal layout and no assertion message; ``only_in_message`` are the attributes
+    that only the message reads.
+    """
 
     source: str
     lines: range
-    message: frozenset[str] = frozenset()
+    only_in_message: frozenset[str] = frozenset()
 
 
 def _location(error: BaseException, code: CodeType | None) -> tuple[str, int]:
-    """Return file and line in the test's own body, or the nearest place that the error passed."""
+    """Return the file and line in the test's body where the error occurred, or the nearest ones."""
     places = []
     trace = error.__traceback__
     while trace is not None:
@@ -72,8 +76,8 @@ def _location(error: BaseException, code: CodeType | None) -> tuple[str, int]:
         places.append((trace.tb_frame.f_code.co_filename, trace.tb_lineno))
         trace = trace.tb_next
     own_file = code.co_filename if code else ""
-    nearest: tuple[str, int] = ("", 0)
-    return next((place for place in places if place[0] == own_file), (*places, nearest)[0])
+    unknown: tuple[str, int] = ("", 0)
+    return next((place for place in places if place[0] == own_file), (*places, unknown)[0])
 
 
 @functools.lru_cache(maxsize=1000)
@@ -95,10 +99,10 @@ def _statement(path: str, line: int) -> _Statement:
     end = inner[0].lineno - 1 if inner else node.end_lineno or line
     lines = range(node.lineno, max(end, node.lineno) + 1)
     if isinstance(node, ast.Assert):
-        message = _attributes(node.msg) - _attributes(node.test)
+        only_in_message = _attributes(node.msg) - _attributes(node.test)
         # The message is no part of the property.
         node.msg = None
-        return _Statement(source=ast.unparse(node), lines=lines, message=message)
+        return _Statement(source=ast.unparse(node), lines=lines, only_in_message=only_in_message)
     for name in ("body", "orelse", "finalbody", "handlers", "cases"):
         if hasattr(node, name):
             setattr(node, name, [])
@@ -113,8 +117,8 @@ def _attributes(node: ast.expr | None) -> frozenset[str]:
 def _attributes_of(statement: _Statement, reads: Sequence[AttributeRead]) -> frozenset[str]:
     """Return the attributes that a statement read, or those that the last line before it read."""
 
-    def names(lines: Collection[int]) -> frozenset[str]:
+    def read_at(lines: Collection[int]) -> frozenset[str]:
         return frozenset(each.name for each in reads if each.line in lines)
 
-    last = next((each.line for each in reversed(reads) if each.line), 0)
-    return names(statement.lines) - statement.message or names({last})
+    last_line = next((each.line for each in reversed(reads) if each.line), 0)
+    return read_at(statement.lines) - statement.only_in_message or read_at({last_line})

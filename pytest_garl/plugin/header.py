@@ -9,8 +9,8 @@ from pytest_garl.regressions.forecast import seconds_per_new_signature
 
 
 def header(run: Run) -> str:
-    """Return the header: what is searched, how long it takes, and whether NumPy came too early."""
-    return "\n".join([_plan(run), *cpu_dispatch_warning(run)])
+    """Return the header: what is searched, how long it takes, and a warning, if any."""
+    return "\n".join([_search_line(run), *cpu_dispatch_warning(run)])
 
 
 def forecast(run: Run) -> list[str]:
@@ -19,7 +19,8 @@ def forecast(run: Run) -> list[str]:
     sizes = run.search_sizes
     if not options.budget or options.workers is None or len(sizes) < 2:
         return []
-    return [f"garl: {len(sizes)} searches, {_time_of(run, sum(sizes))}{_time_per_kind(run)}"]
+    time = f"{_duration_of(run, sum(sizes))}{_duration_per_new_signature(run)}"
+    return [f"garl: {len(sizes)} searches, {time}"]
 
 
 def acceptance_warning(run: Run) -> list[str]:
@@ -34,7 +35,7 @@ def acceptance_warning(run: Run) -> list[str]:
 
 
 def cpu_dispatch_warning(run: Run) -> list[str]:
-    """Return what follows if a library was loaded before its instructions could be chosen."""
+    """Return a warning if a library was loaded before its CPU instructions could be chosen."""
     libraries, options = cpu_dispatch.libraries_off_baseline(), run.options
     effects = []
     if options.workers == 0:
@@ -47,7 +48,8 @@ def cpu_dispatch_warning(run: Run) -> list[str]:
     return ["; ".join([f"garl: {cause}", *effects])]
 
 
-def _plan(run: Run) -> str:
+def _search_line(run: Run) -> str:
+    """Return what is flown: a repeated scenario, or a search with these options."""
     options = run.options
     if options.repeat:
         return f"garl: repeating {options.repeat}"
@@ -68,15 +70,17 @@ def _workers(run: Run) -> str:
     if options.workers is None:
         return f"all workers{pool}"
     workers = counted(options.workers, "worker") if options.workers else "flown inside pytest"
-    time = f"{_time_of(run, options.budget)} per system and map{_time_per_kind(run)}"
+    time = (
+        f"{_duration_of(run, options.budget)} per system and map{_duration_per_new_signature(run)}"
+    )
     return f"{workers}{pool}; {time}"
 
 
-def _time_of(run: Run, flights: int) -> str:
+def _duration_of(run: Run, flights: int) -> str:
     return f"about {duration(flights * run.flight_s / max(1, run.options.workers or 1))}"
 
 
-def _time_per_kind(run: Run) -> str:
+def _duration_per_new_signature(run: Run) -> str:
     if not run.options.shrink:
         return ""
     seconds = seconds_per_new_signature(run.options.shrink, run.flight_s, run.options.workers or 1)

@@ -35,7 +35,7 @@ def check_selection(options: Options, items: Iterable[pytest.Item]) -> None:
     if "map" in options.given:
         raise pytest.UsageError(
             f"--garl-map={','.join(options.maps)}: none of the selected tests flies there; give a "
-            "map of theirs"
+            "map that their markers name"
         )
 
 
@@ -43,8 +43,8 @@ def _without_effect(options: Options) -> Iterator[str]:
     given = options.given
     if "budget" in given and options.repeat:
         yield (
-            "--garl-budget has no effect beside --garl-repeat, which flies one scenario; give one "
-            "of them"
+            "--garl-budget has no effect beside --garl-repeat, which flies one scenario; give only "
+            "one of them"
         )
     searches = options.budget > 0 and not options.repeat
     for name in SEARCH_OPTIONS:
@@ -57,15 +57,16 @@ def _without_effect(options: Options) -> Iterator[str]:
             "baselines have objects of their own"
         )
     if "level" in given and options.baseline is None:
-        yield "--garl-level has no effect without --garl-baseline, whose gate it belongs to"
+        yield "--garl-level has no effect without --garl-baseline: only that gate uses it"
 
 
 def _unknown_maps(options: Options) -> Iterator[str]:
     from pytest_garl.scenarios.maps.map import map_names
 
-    there = map_names(options.map_folders)
-    unknown = [map for map in options.maps if map not in there]
+    known_maps = map_names(options.map_folders)
+    unknown = [map for map in options.maps if map not in known_maps]
     if unknown:
         yield (
-            f"--garl-map: found {', '.join(unknown)}, expected one or more of {', '.join(there)}"
+            f"--garl-map: found {', '.join(unknown)}, "
+            f"expected one or more of {', '.join(known_maps)}"
         )

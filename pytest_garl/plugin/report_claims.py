@@ -1,6 +1,7 @@
-"""Which item reports what: all processes of a session agree on it through the ledger.
+"""Claims of items: which item reports a slot or a failure that several items find.
 
-``Ledger`` drops these facts when a run is resumed, because its tests run again.
+The claims are facts of the ledger, so that all processes of a session agree.  ``Ledger`` drops them
+when a run is resumed, because its tests run again.
 """
 
 from __future__ import annotations
@@ -18,18 +19,21 @@ class ReportClaims:
     ledger: Ledger
 
     def claim_slot(self, target: Target, nodeid: str) -> bool:
-        """Return whether an item is the first that reports its slot."""
+        """Claim a slot for an item; return whether no other item claimed it earlier."""
         key = f"{SESSION_FACT}slot {target.search} {target.slot.id(target.map)}"
         return bool(self.ledger.first_fact(key, nodeid) == nodeid)
 
     def claim_failure(self, key: str, slot: str, nodeid: str) -> str:
-        """Claim a failure for an item; return the slot of another that was faster, or nothing."""
-        first_slot, first_nodeid = self.ledger.first_fact(_failure(key), [slot, nodeid])
+        """Claim a failure for an item; return the slot of the item that claimed it earlier, if any.
+
+        ``key`` identifies the failure in all processes.
+        """
+        first_slot, first_nodeid = self.ledger.first_fact(_failure_fact(key), [slot, nodeid])
         return "" if first_nodeid == nodeid else str(first_slot)
 
     def reporting_slot(self, key: str, nodeid: str) -> str:
-        """Return the slot of another item that reports a failure, or nothing."""
-        first = self.ledger.fact(_failure(key))
+        """Return the slot of another item that has claimed a failure; empty if there is none."""
+        first = self.ledger.fact(_failure_fact(key))
         return str(first[0]) if first is not None and first[1] != nodeid else ""
 
     def note_ran(self, nodeid: str) -> None:
@@ -41,5 +45,5 @@ class ReportClaims:
         return bool(self.ledger.fact(f"{SESSION_FACT}ran {nodeid}"))
 
 
-def _failure(key: str) -> str:
+def _failure_fact(key: str) -> str:
     return f"{SESSION_FACT}failure {key}"

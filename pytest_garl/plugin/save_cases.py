@@ -32,13 +32,13 @@ from pytest_garl.regressions.forecast import remaining_work
 _PATCH = ".patch"
 _AVOIDABLE = {
     "live": "the reference pilot violates nothing",
-    "recorded": "the reference pilot violates nothing unless it is pursued as well",
+    "recorded": "the reference pilot violates nothing unless objects pursue it too",
     "no": "UNAVOIDABLE, gates nothing",
 }
 
 
 def may_save(run: Run, session: pytest.Session) -> bool:
-    """Whether this process has seen a search to its end and may save what it found."""
+    """Return whether a search ended in this process, so that its violations may be saved."""
     options, worker = run.options, is_xdist_worker(session.config)
     ended = session.exitstatus in (pytest.ExitCode.OK, pytest.ExitCode.TESTS_FAILED)
     stopped = bool(session.shouldfail or session.shouldstop)
@@ -51,7 +51,7 @@ def may_save(run: Run, session: pytest.Session) -> bool:
 
 
 def save_cases(run: Run, session: pytest.Session) -> None:
-    """Confirm, shrink and save each new signature; ``run.investigated`` keeps what came of it."""
+    """Confirm, shrink and save each new signature; ``run.investigated`` keeps the results."""
     options, config = run.options, session.config
     reporter: Any = config.pluginmanager.get_plugin("terminalreporter")
     try:
@@ -80,7 +80,7 @@ def save_cases(run: Run, session: pytest.Session) -> None:
 
 
 def _requests(run: Run, session: pytest.Session) -> tuple[CaseRequest, ...]:
-    """Return the new signatures, those of xdist's workers among them."""
+    """Return a request for each new signature, also for those that xdist's workers found."""
     for nodeid, signature in sorted(run.reported_failures.items()):
         target, user_assertion = collect_assertion(session, nodeid)
         run.user_assertions[target.search, signature] = user_assertion
@@ -92,7 +92,7 @@ def _requests(run: Run, session: pytest.Session) -> tuple[CaseRequest, ...]:
 
 
 def _saver(run: Run) -> Callable[[Case], Path | None]:
-    """Return how to save a case: as a file, or as a patch if the tree must not change."""
+    """Return the function that saves a case: as a file, or in CI as a patch."""
     options = run.options
     if not os.environ.get("CI"):
         return options.corpus.save
@@ -103,9 +103,11 @@ def _saver(run: Run) -> Callable[[Case], Path | None]:
 
 def _flight_s(run: Run, requests: Sequence[CaseRequest]) -> dict[str, float]:
     """Return how long a flight of each signature took in the search."""
-    known = run.ledger.queries.seconds_by_signature()
-    any_s = run.ledger.queries.seconds_per_flight() or run.flight_s
-    return {each.name: known.get((each.search, each.signature)) or any_s for each in requests}
+    measured = run.ledger.queries.seconds_by_signature()
+    average_s = run.ledger.queries.seconds_per_flight() or run.flight_s
+    return {
+        each.name: measured.get((each.search, each.signature)) or average_s for each in requests
+    }
 
 
 def saved_lines(investigated: Sequence[InvestigatedSignature], config: pytest.Config) -> list[str]:
@@ -143,7 +145,7 @@ def _lines_about(each: InvestigatedSignature, config: pytest.Config, width: int)
 
 
 def _evidence(each: InvestigatedSignature, case: Case) -> list[str]:
-    """Return in words why a case may be believed, and what it cost."""
+    """Return in words how robust and how avoidable a case is, and how many flights it took."""
     evidence = case.evidence
     if not each.result.flights:
         return ["as the search found it, not shrunk"]

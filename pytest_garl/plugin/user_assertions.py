@@ -1,4 +1,4 @@
-"""Ask the assertions of users' tests about any flight."""
+"""Run the assertions of users' tests on any flight."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ import pytest
 
 from pytest_garl.errors import GarlError
 from pytest_garl.execution.result import CompletedFlight
-from pytest_garl.plugin.failed_statement import FAILS, failure_of
+from pytest_garl.plugin.failed_statement import FAILED_ASSERTION_TYPES, failure_of
 from pytest_garl.plugin.keys import target_of
 from pytest_garl.plugin.landing import Landing
 from pytest_garl.plugin.target import Target
@@ -70,6 +70,6 @@ class ItemAssertion:
         with contextlib.suppress(Exception, pytest.skip.Exception):
             try:
                 self._function(**{name: arguments[name] for name in self._parameters})
-            except FAILS as error:
+            except FAILED_ASSERTION_TYPES as error:
                 return failure_of(self.test, self._function, error, landing.reads)
         return None

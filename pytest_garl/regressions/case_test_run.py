@@ -1,4 +1,4 @@
-"""Run the tests that found a case on this one case: pytest, in a process of its own."""
+"""Run the tests that found a case on this case alone, with pytest in a separate process."""
 
 from __future__ import annotations
 
@@ -19,20 +19,20 @@ from pytest_garl.regressions.case import Case
 from pytest_garl.regressions.case_file import dump_case
 from pytest_garl.regressions.corpus import folder_of
 
-NAME = "judged"
+CASE_NAME = "judged"
 """Name of the case's file in the temporary corpus, and so part of the items' ids."""
 TestOutcome = Literal["passed", "failed", "skipped"]
-_CLEARED = ("budget", "repeat", "baseline")
-"""Options that a project's configuration may set, and that this run must not have."""
-_COMPLETED = (0, 1, 5)
-"""Exit statuses of a pytest run that came to its end; 5 says that no test flies the case."""
+_CLEARED_OPTIONS = ("budget", "repeat", "baseline")
+"""Options that a project's configuration may set, and that this run resets."""
+_COMPLETED_STATUSES = (0, 1, 5)
+"""Exit statuses of a complete pytest run; 5 says that no test flies the case."""
 _OUTPUT_LINES = 20
-"""Last lines of pytest's output that the error shows if the run did not come to its end."""
+"""Number of last lines of pytest's output in the error of an incomplete run."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class CaseTestResult:
-    """The result of one test: outcome and message, and the item's properties of its flight."""
+    """The result of one test: outcome, message, and the item's user properties about its flight."""
 
     nodeid: str
     outcome: TestOutcome
@@ -40,7 +40,7 @@ class CaseTestResult:
     properties: dict[str, str]
 
     def is_result_of(self, test: str) -> bool:
-        """Return whether it is of the test with a node id, or with a function's name."""
+        """Return whether this is the result of a test with this node id or function name."""
         path, _, rest = test.partition("::") if "::" in test else ("", "", test)
         dotted = path.removesuffix(".py").replace("/", ".")
         name = ".".join(filter(None, [dotted, *rest.split("::")]))
@@ -51,10 +51,11 @@ class CaseTestResult:
 def run_case_tests(
     case: Case, root: Path, *, live: bool
 ) -> Iterator[tuple[tuple[CaseTestResult, ...], Path]]:
-    """Give the results of the tests that fly the case, and the folder of the flight's record.
+    """Yield the results of the tests that fly the case, and the folder of the flight's record.
 
     pytest runs in ``root`` on the file of the test that found the case, or on all files if no test
-    is known.  The case counts as fixed, so that no failure is expected.
+    is known.  The case counts as fixed, so that no failure is expected.  ``live`` lets the policy
+    steer the objects; otherwise they repeat their recorded moves.
     """
     with single_case_corpus(case, live=live) as folder:
         report = folder / "report.xml"
@@ -71,7 +72,7 @@ def run_case_tests(
             check=False,
         )
         found = _read(report)
-        if done.returncode not in _COMPLETED:
+        if done.returncode not in _COMPLETED_STATUSES:
             output = "\n".join((done.stdout + done.stderr).splitlines()[-_OUTPUT_LINES:])
             raise GarlError(f"pytest could not fly the case (status {done.returncode}):\n{output}")
         yield found, folder / "garl" / "flights"
@@ -79,29 +80,29 @@ def run_case_tests(
 
 @contextmanager
 def single_case_corpus(case: Case, *, live: bool) -> Iterator[Path]:
-    """Give a folder with a corpus of this one case, marked as fixed, so that it must pass."""
+    """Yield a folder with a corpus of this one case, marked as fixed, so that it must pass."""
     with tempfile.TemporaryDirectory(prefix="garl-") as scratch:
-        flown = dataclasses.replace(
+        fixed = dataclasses.replace(
             case,
             status="fixed",
             avoidable="live" if live else "recorded",
-            # The failure of an edge case would fail no test.
+            # Without neighbours it is no edge case, whose failure would fail no test.
             evidence=dataclasses.replace(case.evidence, neighbours=0, neighbours_failed=0),
         )
         folder = folder_of(Path(scratch, "cases"), case.system)
-        write_text_atomically(folder / f"{NAME}.toml", dump_case(flown))
+        write_text_atomically(folder / f"{CASE_NAME}.toml", dump_case(fixed))
         yield Path(scratch)
 
 
 def pytest_arguments(case: Case, folder: Path, *, live: bool) -> list[str]:
     """Return pytest's arguments that select the tests of the case in ``folder``."""
     file = case.test.partition("::")[0] if "::" in case.test else ""
-    ids = f"case-{NAME}-live" if live else f"case-{NAME} and not case-{NAME}-live"
+    ids = f"case-{CASE_NAME}-live" if live else f"case-{CASE_NAME} and not case-{CASE_NAME}-live"
     overrides = {
         "garl_cases": str(folder / "cases"),
         "garl_dir": str(folder / "garl"),
         "cache_dir": str(folder / "cache"),
-        **{f"garl_{name}": "" for name in _CLEARED},
+        **{f"garl_{name}": "" for name in _CLEARED_OPTIONS},
     }
     return [
         *filter(None, [file]),

@@ -1,4 +1,4 @@
-"""Shrink a saved case further, from its own record, with a ledger and a pool of its own."""
+"""Shrink a saved case further, with a temporary ledger and pool."""
 
 from __future__ import annotations
 
@@ -44,9 +44,9 @@ _REMOVED = re.compile(r"(\d+) of (\d+) objects, (\d+) of (\d+) genes off nominal
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class CaseSetup:
-    """How the tests of a case fly and judge: with which simulator, data files and assertion.
+    """The simulator, data files and assertion with which the tests of a case fly and judge it.
 
-    ``files`` are the data files of the landing system, by the names that their hashes have.
+    ``files`` are the data files of the landing system, with the names under which they are hashed.
     """
 
     user_assertion: UserAssertion | None = None
@@ -62,9 +62,9 @@ def shrink_case(
     workers: int,
     setup: CaseSetup | None = None,
 ) -> CaseResult:
-    """Return a case that is no worse in any respect and better in one, or the reason for none.
+    """Return a case that is simpler in one respect and no worse in any, or the reason for none.
 
-    Flies at most ``flights``.
+    Flies at most ``flights`` flights.
     """
     setup = setup or CaseSetup()
     map = load_map(case.scenario.map, map_folders)
@@ -98,7 +98,7 @@ def shrink_case(
 
 
 class CaseReshrinker:
-    """Makes a simpler case of a saved one, or finds the reason why it cannot."""
+    """Makes a simpler case from a saved one, or finds the reason why it cannot."""
 
     def __init__(self, request: CaseRequest, fly: FlyFunction, case: Case) -> None:
         self._request, self._case = request, case
@@ -110,11 +110,11 @@ class CaseReshrinker:
         saved = self._reproduce()
         if saved is None:
             return flights.result(None, NOT_REPRODUCED)
-        better = self._better(saved, self._shrink_by_record(saved))
+        better = self._improved_case(saved, self._shrink_by_record(saved))
         if better is None:
-            better = self._better(saved, self._shrink_by_policy(saved))
+            better = self._improved_case(saved, self._shrink_by_policy(saved))
         if better is None and self._is_outdated():
-            better = self._successor(saved, case.avoidable)
+            better = self._replacement(saved, case.avoidable)
         return flights.result(better, "" if better else NOTHING_SIMPLER)
 
     def _reproduce(self) -> FailingScenario | None:
@@ -147,7 +147,7 @@ class CaseReshrinker:
         return today != SourceHashes.of(self._case.evidence)
 
     def _shrink_by_record(self, saved: FailingScenario) -> FailingScenario:
-        """Return the simplest failure in which the remaining objects repeat their record."""
+        """Return the simplest failure in which the remaining objects repeat their moves."""
 
         def behaviour_of(scenario: Scenario) -> RecordedBehaviour:
             return saved.behaviour.without(scenario.removed_objects)
@@ -155,9 +155,9 @@ class CaseReshrinker:
         def fails(scenario: Scenario) -> bool:
             return self._flights.fails_recorded(scenario, behaviour_of(scenario))
 
-        # If the record gives nothing simpler, the policy needs flights as well.
-        share = 2 if saved.behaviour.moves else 1
-        return self._shrink(saved, fails, behaviour_of, share)
+        # If recorded moves give nothing simpler, shrinking by the policy needs flights too.
+        divisor = 2 if saved.behaviour.moves else 1
+        return self._shrink(saved, fails, behaviour_of, divisor)
 
     def _shrink_by_policy(self, saved: FailingScenario) -> FailingScenario:
         """Return the simplest failure in which the search's policy steers the objects."""
@@ -170,28 +170,30 @@ class CaseReshrinker:
         saved: FailingScenario,
         fails: Callable[[Scenario], bool],
         behaviour_of: Callable[[Scenario], RecordedBehaviour],
-        share: int,
+        divisor: int,
     ) -> FailingScenario:
-        """Shrink with a share of the flights that are left."""
+        """Shrink with the flights that are left, divided by ``divisor``."""
         flights = self._flights
         # The last flights are for a result's neighbours and, if there are many, a shorter record.
         reserve = 1 + NEIGHBOURS if flights.left < 4 * (1 + NEIGHBOURS) else 2 * (1 + NEIGHBOURS)
-        budget = (flights.left - reserve) // share
+        budget = (flights.left - reserve) // divisor
         if budget < 1:
             return saved
-        name = find_colliding_object(saved.flight)
-        found = shrink(saved.scenario, fails, flights.map, budget, colliding_object=name)
+        colliding_object = find_colliding_object(saved.flight)
+        found = shrink(
+            saved.scenario, fails, flights.map, budget, colliding_object=colliding_object
+        )
         return simplest_robust(flights, saved, found.history[1:], behaviour_of)
 
-    def _better(self, saved: FailingScenario, simpler: FailingScenario) -> Case | None:
-        """Return a failure as a case if it is no worse than the saved one, and better in one."""
+    def _improved_case(self, saved: FailingScenario, simpler: FailingScenario) -> Case | None:
+        """Return the case of a failure, if possible with a shorter record, if it is simpler."""
         flights = self._flights
         candidates = reversed(with_shorter_record(flights, simpler))
         for failing in (each for each in candidates if each is not saved):
-            case = self._successor(failing, self._case.avoidable)
-            # The reference pilot flies only what is better in other respects.
+            case = self._replacement(failing, self._case.avoidable)
+            # The reference pilot flies only if the case is simpler in the other respects.
             if self._improves(case) and flights.flown_by_pilot + 2 <= PILOT_FLIGHTS:
-                case = self._successor(failing, flights.avoidability(failing))
+                case = self._replacement(failing, flights.avoidability(failing))
                 if self._improves(case):
                     return case
         return None
@@ -199,7 +201,7 @@ class CaseReshrinker:
     def _improves(self, case: Case) -> bool:
         return is_simpler(case, self._case, self._flights.map, outdated=self._is_outdated())
 
-    def _successor(self, failing: FailingScenario, avoidable: Avoidable) -> Case:
+    def _replacement(self, failing: FailingScenario, avoidable: Avoidable) -> Case:
         """Return a failure as the case that replaces the saved one."""
         case, found = self._case, new_case(self._request, failing, avoidable)
         removed = _all_removed(case.evidence.removed, found.evidence.removed)

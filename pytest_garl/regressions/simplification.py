@@ -11,16 +11,16 @@ from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.scenarios.validity import repair
 
 MARKER_PLACE = ("marker.x", "marker.y")
-"""The marker's place; an object that repeats its moves passes by a marker that lies elsewhere."""
+"""Keys of the marker's place; objects that repeat their moves do not follow another place."""
 Simplification = Callable[[Scenario], Scenario]
 
 
 def simplifications(
     scenario: Scenario, genome: Genome, colliding_object: str
 ) -> list[list[Simplification]]:
-    """Return ways to make a scenario simpler in groups: objects, weather, light and places.
+    """Return the ways to make a scenario simpler in groups: objects, weather, light and places.
 
-    The object that the UAV hit is never removed, and places of objects stay.
+    No way removes the object that the UAV hit, or moves an object.
     """
     removable = [
         _removal(key.partition(".")[0])
@@ -28,17 +28,17 @@ def simplifications(
         if key.endswith(".velocity") and key.partition(".")[0] != colliding_object
     ]
     weather: list[Simplification] = []
-    rest: list[Simplification] = []
+    light_and_places: list[Simplification] = []
     for gene in genome.genes:
         nominal = {item.key: item.nominal for item in gene.properties}
-        head = next(iter(nominal)).partition(".")[0]
+        subject = next(iter(nominal)).partition(".")[0]
         if any(key.endswith(".velocity") for key in nominal):
             continue
         if all(scenario[key] == value for key, value in nominal.items()):
             continue
-        is_weather = head == "environment" and "environment.sun_position" not in nominal
-        (weather if is_weather else rest).append(_reset(nominal))
-    return [group for group in (removable, weather, rest) if group]
+        is_weather = subject == "environment" and "environment.sun_position" not in nominal
+        (weather if is_weather else light_and_places).append(_reset(nominal))
+    return [group for group in (removable, weather, light_and_places) if group]
 
 
 def simplified(scenario: Scenario, steps: Sequence[Simplification]) -> Scenario:
@@ -49,10 +49,10 @@ def simplified(scenario: Scenario, steps: Sequence[Simplification]) -> Scenario:
 
 
 def bare_scenario(scenario: Scenario, map: Map, colliding_object: str) -> Scenario:
-    """Return a scenario without all that its failure should not need.
+    """Return a scenario with only those parts that its failure is likely to need.
 
-    A collision needs the object that was hit, and everything else is nominal.  Any other failure
-    has its cause in weather, light or place, and needs no object.
+    A collision needs the object that was hit; everything else is nominal.  Any other failure has
+    its cause in weather, light or place, and needs no object.
     """
     if colliding_object:
         return _nominal(scenario, map, colliding_object)
@@ -60,7 +60,7 @@ def bare_scenario(scenario: Scenario, map: Map, colliding_object: str) -> Scenar
 
 
 def bare_scenario_around_marker(scenario: Scenario, map: Map, colliding_object: str) -> Scenario:
-    """Return the bare scenario with the marker in its place, where the object moved around it."""
+    """Return the bare scenario with the marker at its old place, around which the object moved."""
     place = {key: value for key, value in scenario.genes if key in MARKER_PLACE}
     return repair(_nominal(scenario, map, colliding_object).replace(place), map)
 

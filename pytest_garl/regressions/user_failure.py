@@ -1,4 +1,4 @@
-"""A failed assertion of a user's test, and how to ask the assertion about any other flight."""
+"""A failed assertion of a user's test, and the interface to run the assertion on other flights."""
 
 from __future__ import annotations
 
@@ -8,21 +8,21 @@ from typing import Protocol
 from pytest_garl.execution.result import CompletedFlight
 from pytest_garl.scenarios.scenario import Scenario
 
-ABOUT: dict[str, frozenset[str]] = {
+ATTRIBUTES_OF_PROPERTY: dict[str, frozenset[str]] = {
     "distance": frozenset({"distance_to_landing_m", "final_distance_m"}),
     "time": frozenset({"time_to_landing_s", "elapsed_s"}),
     "collision": frozenset({"collisions"}),
 }
-"""The attributes of a landing that an assertion about a built-in property reads."""
-ALL = frozenset({"outcome", "verdict", "result"})
-"""The attributes that are about every built-in property."""
+"""The attributes of a landing that belong to each built-in property."""
+ATTRIBUTES_OF_ALL_PROPERTIES = frozenset({"outcome", "verdict", "result"})
+"""The attributes that belong to every built-in property."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class UserFailure:
     """A failed assertion of a user's test.
 
-    ``assertion`` is the hash of the statement in the test's own body, even if a function below it
+    ``assertion`` is the hash of the statement in the test's body, even if a function that it calls
     raised; ``attributes`` are the landing's attributes that the statement reads.
     """
 
@@ -37,14 +37,17 @@ class UserFailure:
         return f"own:{self.test}:{self.assertion}"
 
     def is_about(self, name: str | None) -> bool:
-        """Return whether the assertion is about the built-in property ``name``."""
+        """Return whether the assertion reads attributes of the built-in property ``name``."""
         if name is None:
             return False
-        return bool(self.attributes & (ALL | ABOUT.get(name, frozenset({name}))))
+        return bool(
+            self.attributes
+            & (ATTRIBUTES_OF_ALL_PROPERTIES | ATTRIBUTES_OF_PROPERTY.get(name, frozenset({name})))
+        )
 
 
 class UserAssertion(Protocol):
-    """A user's assertion about a flight."""
+    """A user's assertion, which can run on any flight."""
 
     def __call__(self, flight: CompletedFlight, scenario: Scenario) -> UserFailure | None:
         """Return how the test fails on a flight without built-in violation, or None."""
