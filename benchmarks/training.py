@@ -25,11 +25,11 @@ def main() -> None:
     training = dataclasses.replace(preset.training, episodes=arguments.episodes)
     began = time.perf_counter()
     learner = train(surrogate, training)
-    took = time.perf_counter() - began
+    elapsed_s = time.perf_counter() - began
     decisions = sum(record.decisions for record in learner.history)
     print(
-        f"{arguments.policy}: {arguments.episodes} episodes in {took:.0f} s, {decisions} decisions "
-        f"of {1000 * took / decisions:.1f} ms, {learner.updates} updates"
+        f"{arguments.policy}: {arguments.episodes} episodes in {elapsed_s:.0f} s, "
+        f"{decisions} decisions of {1000 * elapsed_s / decisions:.1f} ms, {learner.updates} updates"
     )
 
 

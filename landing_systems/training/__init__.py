@@ -1,1 +1,1 @@
-"""How the learned parts of the landing systems were trained; nothing here is flown."""
+"""Trains the learned parts of the landing systems; no flight uses this code."""

@@ -1,1 +1,1 @@
-"""Who interferes: the policies that move the NPCs."""
+"""The policies that move the NPCs."""

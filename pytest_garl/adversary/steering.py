@@ -1,4 +1,4 @@
-"""How scripted NPCs walk straight to a place in the plane."""
+"""Moves of scripted NPCs straight to a position in the plane."""
 
 from __future__ import annotations
 
@@ -10,13 +10,13 @@ ARRIVED_M = 0.5
 
 
 def arrived(goal: tuple[float, float], situation: Situation) -> bool:
-    """Whether a place is within half a metre, or within the stride of one decision."""
+    """Whether a position is within half a metre, or within the stride of one decision."""
     reach = max(ARRIVED_M, DECISION_STEP_S * situation.self.speed_mps)
     return math.dist(situation.self.position_m[:2], goal) < reach
 
 
 def towards(goal: tuple[float, float], situation: Situation) -> Move:
-    """Return the move straight to a place at full speed; stay for an NPC that is there."""
+    """Return the move straight to a position at full speed; stay for an NPC that is there."""
     x, y, _ = situation.self.position_m
     length = math.dist((x, y), goal)
     return Move(x=(goal[0] - x) / length, y=(goal[1] - y) / length) if length > 0 else STAY

@@ -1,1 +1,1 @@
-"""How flights get flown: jobs, the ledger with its queue, pools of processes."""
+"""Runs flights: jobs, the ledger with its queue, pools of processes."""

@@ -36,7 +36,7 @@ CREATE TABLE worker (pid INTEGER PRIMARY KEY, owner INTEGER NOT NULL);
 CREATE TABLE meter (name TEXT PRIMARY KEY, value REAL NOT NULL);
 """
 SearchKind = Literal["search", "case", "on_demand"]
-"""What flights are for: a search's budget, saved cases, or flights on demand, such as a second
+"""The purpose of flights: a search's budget, saved cases, or flights on demand, such as a second
 flight of a violation.  Figures and the result hash cover the searches alone."""
 _LONGEST = 64_000_000
 """Most bytes of one value: a damaged file may declare a value that fills the memory."""

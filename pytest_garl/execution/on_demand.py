@@ -1,11 +1,11 @@
-"""Flights beside the searches: several procedures ask for one flight at a time.
+"""Flights outside the searches: several procedures each request one flight at a time.
 
 A procedure, such as the shrinking of a case, decides on each flight by the result of the one
 before.  It is a plain function that calls ``fly``, in a thread of its own.  This module puts the
-flights that procedures ask for into the ledger, lets the pool fly them, and returns the results.
-A thread never touches the ledger.  A procedure's questions depend on its own results alone, so
-that neither the number of workers nor an interruption changes anything: a resumed run asks the
-same questions and finds the answers in the ledger.
+requested flights into the ledger, lets the pool fly them, and returns the results.
+A thread never touches the ledger.  A procedure's requests depend only on its own results, so
+neither the number of workers nor an interruption changes anything: a resumed run makes the same
+requests and finds the results in the ledger.
 """
 
 from __future__ import annotations
@@ -41,23 +41,23 @@ class _StoppedError(BaseException):
 
 @dataclass(slots=True, kw_only=True)
 class _Procedure:
-    """One procedure under way; None in a queue ends its questions, or the wait for an answer."""
+    """A running procedure; None in a queue ends its requests, or its wait for a result."""
 
     name: str
-    asked: queue.SimpleQueue[tuple[FlightJob, Scenario] | None]
-    answers: queue.SimpleQueue[CompletedFlight | None]
+    requests: queue.SimpleQueue[tuple[FlightJob, Scenario] | None]
+    results: queue.SimpleQueue[CompletedFlight | None]
     awaited: tuple[FlightId, Path] | None = None
     flown: int = 0
 
     def fly(self, job: FlightJob, scenario: Scenario) -> CompletedFlight:
-        """Ask for a flight and wait for it; the procedure calls this method as ``fly``."""
-        self.asked.put((job, scenario))
-        answer = self.answers.get()
-        if answer is None:
-            # A procedure that catches the error and asks again is ended again.
-            self.answers.put(None)
+        """Request a flight and wait for it; the procedure calls this method as ``fly``."""
+        self.requests.put((job, scenario))
+        result = self.results.get()
+        if result is None:
+            # If a procedure catches the error and requests another flight, it is stopped again.
+            self.results.put(None)
             raise _StoppedError
-        return answer
+        return result
 
 
 class OnDemandFlights:
@@ -72,7 +72,7 @@ class OnDemandFlights:
         The names are part of the flights' keys, so that a resumed run must give the same.
         """
         procedures = [
-            _Procedure(name=name, asked=queue.SimpleQueue(), answers=queue.SimpleQueue())
+            _Procedure(name=name, requests=queue.SimpleQueue(), results=queue.SimpleQueue())
             for name in functions
         ]
         with ThreadPoolExecutor(max(1, len(functions)), thread_name_prefix="garl") as threads:
@@ -84,11 +84,11 @@ class OnDemandFlights:
                 self._wait(procedures)
             finally:
                 for procedure in procedures:
-                    procedure.answers.put(None)
+                    procedure.results.put(None)
         return {name: future.result() for name, future in futures.items()}
 
     def _wait(self, procedures: Sequence[_Procedure]) -> None:
-        """Let the pool fly until no procedure asks any more."""
+        """Let the pool fly until no procedure requests a flight."""
         waiting = list(procedures)
         while waiting:
             waiting = [procedure for procedure in waiting if not self._advance(procedure)]
@@ -97,22 +97,22 @@ class OnDemandFlights:
             self._on_wait()
 
     def _advance(self, procedure: _Procedure) -> bool:
-        """Take a procedure as far as it goes without a new flight; return whether it has ended."""
+        """Continue a procedure until it waits for a flight; return whether it has ended."""
         while True:
             if procedure.awaited is not None:
                 done = self._ledger.completed(*procedure.awaited)
                 if done is None:
                     return False
                 procedure.awaited = None
-                procedure.answers.put(done)
-            wanted = procedure.asked.get()
-            if wanted is None:
+                procedure.results.put(done)
+            request = procedure.requests.get()
+            if request is None:
                 return True
-            self._ask(procedure, *wanted)
+            self._add_flight(procedure, *request)
 
-    def _ask(self, procedure: _Procedure, job: FlightJob, scenario: Scenario) -> None:
+    def _add_flight(self, procedure: _Procedure, job: FlightJob, scenario: Scenario) -> None:
         text = dump_scenario(scenario)
-        # The key holds the question: a run resumed with another budget asks other questions.
+        # The key contains the request: a run resumed with another budget requests other flights.
         key = f"on demand {procedure.name} {procedure.flown} {job.flown_facts()} {text}"
         flight = FlightId(search=search_key(key), map=job.map)
         procedure.awaited = flight, Path(job.flights)
@@ -124,5 +124,5 @@ def _begin(
     threads: ThreadPoolExecutor, procedure: _Procedure, function: Callable[[FlyFunction], T]
 ) -> Future[T]:
     future = threads.submit(function, procedure.fly)
-    future.add_done_callback(lambda _: procedure.asked.put(None))
+    future.add_done_callback(lambda _: procedure.requests.put(None))
     return future

@@ -53,7 +53,7 @@ HASHED_SUFFIXES = (".npz", ".obj", ".py", ".toml")
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Reference:
-    """Where a class or function is defined."""
+    """The module and the file that define a class or function."""
 
     module: str
     file: str
@@ -84,19 +84,22 @@ BUILT_IN = Reference(module="pytest_garl.simulation.fly", file="", qualname="fly
 """The project's own simulator."""
 
 
-def reference_to(thing: Any) -> Reference:
-    """Return where ``thing`` is defined; raise LandingSystemError if no worker can import it."""
-    qualname = getattr(thing, "__qualname__", "")
+def reference_to(definition: Any) -> Reference:
+    """Return a class's or function's reference.
+
+    Raises LandingSystemError if no worker can import it.
+    """
+    qualname = getattr(definition, "__qualname__", "")
     if not qualname or "<locals>" in qualname or "<lambda>" in qualname:
         raise LandingSystemError(
-            f"{thing!r} is defined inside a function; worker processes cannot import it. "
+            f"{definition!r} is defined inside a function; worker processes cannot import it. "
             "Move it to the top level of a module."
         )
     try:
-        file = str(Path(inspect.getfile(thing)).resolve())
+        file = str(Path(inspect.getfile(definition)).resolve())
     except (TypeError, OSError):
         file = ""
-    return Reference(module=thing.__module__, file=file, qualname=qualname)
+    return Reference(module=definition.__module__, file=file, qualname=qualname)
 
 
 @functools.cache
@@ -107,8 +110,8 @@ def package_sha256() -> str:
     """
     home = Path(__file__).parents[1]
     digest = hashlib.sha256()
-    for place in (home / name for name in HASHED):
-        for file in sorted(place.rglob("*")) if place.is_dir() else [place]:
+    for path in (home / name for name in HASHED):
+        for file in sorted(path.rglob("*")) if path.is_dir() else [path]:
             if file.suffix in HASHED_SUFFIXES:
                 digest.update(file.relative_to(home).as_posix().encode() + file.read_bytes())
     return digest.hexdigest()

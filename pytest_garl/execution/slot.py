@@ -1,4 +1,4 @@
-"""Slots: places of a search for flights, which have names before they are bred."""
+"""Slots of a search: each is flown once, and has its name before its scenario is known."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True, slots=True, kw_only=True, order=True)
 class Slot:
-    """One place in a search: ``court-g03-s17`` is slot 17 of generation 3 on the court."""
+    """One flight in a search: ``court-g03-s17`` is slot 17 of generation 3 on the court."""
 
     generation: int
     index: int

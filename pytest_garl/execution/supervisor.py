@@ -56,7 +56,7 @@ _MEMORY_BYTES = 2**16
 
 
 class FlightMonitor:
-    """What a flying process notes in memory that its supervisor reads.
+    """Notes of a flying process, in memory that its supervisor reads.
 
     Noting the begin and the end of a call takes less than a microsecond, since the flight control
     calls 240 times a second.  The limit applies to the landing system's calls alone; the

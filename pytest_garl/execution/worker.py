@@ -32,7 +32,7 @@ _TRUSTED = "pytest_garl."
 RESTART_S = 1.0
 """How long a used worker waits for a fresh one to take a slot, before it ends to make room."""
 SIMULATOR = "the simulator"
-"""What failed, in the message of an error that ends the run."""
+"""The failed component, in the message of an error that ends the run."""
 
 
 def main(parent: Parent, path: str, *checkouts: str) -> None:

@@ -1,4 +1,4 @@
-"""What follows if a worker ends during a flight: a violation, or a second flight.
+"""Decides after a worker ended during a flight: a violation, or a second flight.
 
 A busy machine may also end a worker: memory runs out, or a call takes too long.  So if a worker was
 killed or a call took too long, the slot is flown once more, with no other flight beside it and with

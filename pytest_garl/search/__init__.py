@@ -1,1 +1,1 @@
-"""Which scenario is flown next: the search methods and what they share."""
+"""The search methods, which choose the next scenarios, and the code that they share."""

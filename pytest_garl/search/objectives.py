@@ -1,4 +1,4 @@
-"""What searches maximise: the paper's diversity, and the proximity to a violation."""
+"""The objectives of searches: the paper's diversity, and the proximity to a violation."""
 
 from __future__ import annotations
 

@@ -45,15 +45,15 @@ class UserMethod:
 
     def tell(self, flown: Sequence[FlownScenario]) -> Sequence[tuple[float, ...]]:
         """Let the method learn; return its objectives."""
-        told = self._call("tell()", lambda: self._method.tell(flown))
+        objectives = self._call("tell()", lambda: self._method.tell(flown))
         try:
-            found = [tuple(float(value) for value in each) for each in told]
+            values = [tuple(float(value) for value in each) for each in objectives]
         except (TypeError, ValueError):
-            found = []
-        if len(found) != len(flown) or not all(map(math.isfinite, itertools.chain(*found))):
+            values = []
+        if len(values) != len(flown) or not all(map(math.isfinite, itertools.chain(*values))):
             expected = f"a list of {len(flown)} tuples of finite numbers, one for each flight"
-            self._refuse("tell()", told, expected)
-        return found
+            self._refuse("tell()", objectives, expected)
+        return values
 
     def _call(self, what: str, function: Callable[[], T]) -> T:
         try:

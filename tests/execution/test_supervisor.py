@@ -47,7 +47,7 @@ from tests.support import tiny_simulator
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class Flown:
-    """What a system's flight came to, and one of a good system after it."""
+    """The result of a system's flight, and of a good system's flight after it."""
 
     result: FlightResult
     sha256: str

@@ -29,7 +29,7 @@ def fly(
     del npcs, time_limit_s
     marker = marker_position_m(scenario, map)
     outcome: Any = "landed"
-    # Who is told the truth neither loses its way nor is hit.
+    # A reference pilot, which gets the true positions, neither loses its way nor is hit.
     knows = getattr(system, "needs_camera", True) is False
     off = 3.0 if scenario["environment.fog"] > 0.1 and not knows else 0.1
     off = 0.0 if knows else off

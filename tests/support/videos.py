@@ -85,6 +85,6 @@ def painted(picture: Image, colour: tuple[int, int, int]) -> NDArray[np.int64]:
 
 
 def on_the_map(x: float, y: float) -> tuple[float, float]:
-    """Where a place lies in the map's part: bounds and 2 m beyond fill its height."""
+    """Return a position's pixel on the map: the bounds and 2 m beyond fill its height."""
     scale = 656 / (40 + 2 * 2)
     return 384 / 2 + x * scale, 656 / 2 - y * scale

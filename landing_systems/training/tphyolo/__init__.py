@@ -1,1 +1,1 @@
-"""How TPHYolo-MLS's networks were trained: data, losses, export and scores."""
+"""Trains TPHYolo-MLS's networks: data, losses, export and scores."""

@@ -33,7 +33,7 @@ Array = NDArray[np.float32]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class DataPlan:
-    """What to render.
+    """The settings of a data set.
 
     One shard holds pictures of ``scenarios`` random scenarios, in as many invented places as
     ``places``; every shard is a function of the plan and its number.
@@ -68,20 +68,22 @@ class Samples:
     regions: Array
 
 
-def render_all(plan: DataPlan, folder: Path, workers: int, done: Callable[[int], None]) -> None:
-    """Render the shards that ``folder`` lacks; ``done`` hears how many there are."""
+def render_all(
+    plan: DataPlan, folder: Path, workers: int, on_progress: Callable[[int], None]
+) -> None:
+    """Render the shards that ``folder`` lacks; call ``on_progress`` with their number."""
     folder.mkdir(parents=True, exist_ok=True)
     missing = [index for index in range(plan.shards) if not _file(folder, index, "crops").exists()]
-    done(plan.shards - len(missing))
+    on_progress(plan.shards - len(missing))
     tasks = [(plan, folder, index) for index in missing]
     if workers < 2 or len(tasks) < 2:
         for count, task in enumerate(tasks, 1):
             _render_shard(task)
-            done(plan.shards - len(missing) + count)
+            on_progress(plan.shards - len(missing) + count)
         return
     with get_context("spawn").Pool(workers) as pool:
         for count, _ in enumerate(pool.imap_unordered(_render_shard, tasks), 1):
-            done(plan.shards - len(missing) + count)
+            on_progress(plan.shards - len(missing) + count)
 
 
 def load_shard(folder: Path, index: int, kind: str) -> Samples:

@@ -39,7 +39,7 @@ _PROBES = 3 * _CELLS
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Marker:
-    """What is true about a marker in a picture.
+    """The true position and visibility of a marker in a picture.
 
     ``centre_px`` is the projection of its centre, ``size_px`` the width and height of the
     outline, both in pixel edges and also beyond the frame; ``side_px`` is its side seen from

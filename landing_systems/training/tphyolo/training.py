@@ -25,7 +25,7 @@ Array = NDArray[np.float32]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class TrainPlan:
-    """How to learn; with the pictures it decides the weights, on one kind of CPU.
+    """The settings of a training; with the pictures they decide the weights, on one kind of CPU.
 
     The learning rate rises over ``warm_up`` steps and falls along a cosine.  Whole frames
     (``frames`` a step) follow on crops (``crops`` a step) for the last ``frame_share`` of the

@@ -1,1 +1,1 @@
-"""How the learned NPC policies are trained; needs the extra ``train``."""
+"""Trains the learned NPC policies; needs the extra ``train``."""

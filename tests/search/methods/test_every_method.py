@@ -1,4 +1,4 @@
-"""What holds for every shipped method."""
+"""Tests of all shipped methods."""
 
 from __future__ import annotations
 

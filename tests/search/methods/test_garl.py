@@ -141,8 +141,8 @@ def test_markers_are_put_far_from_each_other() -> None:
 def test_a_far_child_keeps_the_weather_and_the_npc_that_was_hit() -> None:
     method = Garl(PLAN, GarlParameters(explore_share=0.0))
     first = method.ask()[:1]
-    told = dataclasses.replace(result("IV:dog"), closest_body="dog-1")
-    method.tell([FlownScenario(scenario=each, result=told) for each in first])
+    near_miss = dataclasses.replace(result("IV:dog"), closest_body="dog-1")
+    method.tell([FlownScenario(scenario=each, result=near_miss) for each in first])
     (parent,) = genes(first)
     kept = WEATHER | np.array([key.startswith("dog-1.") for key in PLAN.genome.keys])
     children = genes(method._child("IV:dog", FAR) for _ in range(50))
@@ -152,9 +152,9 @@ def test_a_far_child_keeps_the_weather_and_the_npc_that_was_hit() -> None:
 
 def test_only_violations_are_bred_far() -> None:
     method = Garl(PLAN)
-    told = [result("", "near")] * 10 + [result("hit")] * 10
+    results = [result("", "near")] * 10 + [result("hit")] * 10
     method.tell(
-        [FlownScenario(scenario=s, result=r) for s, r in zip(method.ask(), told, strict=True)]
+        [FlownScenario(scenario=s, result=r) for s, r in zip(method.ask(), results, strict=True)]
     )
     chosen = {method._choose() for _ in range(200)}
     assert chosen == {("near", NEAR), ("hit", NEAR), ("hit", FAR)}

@@ -98,13 +98,13 @@ def test_diversity_is_measured_to_every_scenario_so_far() -> None:
         flown = [FlownScenario(scenario=each, result=result(each)) for each in method.ask()]
         own = [GENOME.normalise(encode(item.scenario, GENOME)) for item in flown]
         rows += own
-        for row, item, told in zip(own, flown, method.tell(flown), strict=True):
+        for row, item, objectives in zip(own, flown, method.tell(flown), strict=True):
             wanted = np.linalg.norm(np.array(rows) - row, axis=1).mean()
-            assert told == pytest.approx((item.result.final_distance_m, 30.0, wanted))
+            assert objectives == pytest.approx((item.result.final_distance_m, 30.0, wanted))
 
 
 def test_the_network_learns_which_edit_pays() -> None:
-    """Where snow on the ground keeps the UAV away, the ground gets snowy."""
+    """If snow on the ground keeps the UAV away, the network learns to add snow."""
     method = OfflineRl(plan(population=20))
     snow = []
     for _ in range(36):
