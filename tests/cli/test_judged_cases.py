@@ -14,7 +14,7 @@ from click.testing import CliRunner, Result
 from pytest_garl.cli import main
 from pytest_garl.regressions.case_file import load_case
 from pytest_garl.regressions.corpus import replace_file
-from tests.support.case_project import OWN, change, dodge
+from tests.support.case_project import USER_PROPERTY_TEST, let_system_avoid_dog, replace_text
 from tests.support.landing_project import write_project
 
 SEARCH = ("--garl-budget=24", "--garl-workers=0", "--garl-shrink=60")
@@ -31,7 +31,7 @@ def template(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("judged")
     write_project(folder)
     tests = folder / "test_it.py"
-    tests.write_text(tests.read_text() + OWN + CLOCK)
+    tests.write_text(tests.read_text() + USER_PROPERTY_TEST + CLOCK)
     command = [sys.executable, "-m", "pytest", "-p", "no:cacheprovider", *SEARCH]
     subprocess.run(command, cwd=folder, capture_output=True, check=False)
     assert len(list((folder / "scenarios/regressions/systems").glob("*.toml"))) == 3
@@ -73,7 +73,7 @@ def test_promote_accepts_a_repaired_system(project: Path) -> None:
     assert "the same flight to the byte" in failed.output
     assert failed.exit_code == 1
     assert "still fails with its recorded moves (IV:dog:" in garl("promote", dog).output
-    dodge(project)
+    let_system_avoid_dog(project)
     fixed = garl("replay", dog)
     assert fixed.output.startswith("FIXED\nno violation")
     assert "judged by test_it.py::test_collisions" in fixed.output
@@ -93,7 +93,7 @@ def test_own_test_judges_an_own_property(project: Path) -> None:
 
 def test_prune_keeps_cases_that_fail_in_their_own_test(project: Path) -> None:
     own = saved(project, "own")
-    change(own, 'map_sha256 = "', 'map_sha256 = "0')
+    replace_text(own, 'map_sha256 = "', 'map_sha256 = "0')
     before = own.read_text()
     assert "3 cases are not stale" in garl("prune", "--yes").output
     assert own.read_text() == before
@@ -101,13 +101,13 @@ def test_prune_keeps_cases_that_fail_in_their_own_test(project: Path) -> None:
 
 def test_case_of_an_older_file_finds_its_test_by_name(project: Path) -> None:
     own = saved(project, "own")
-    change(own, '"test_it.py::test_own"', '"test_own"')
+    replace_text(own, '"test_it.py::test_own"', '"test_own"')
     assert garl("replay", own).output.startswith("FAILED\n")
 
 
 def test_pass_on_a_changed_simulator_is_stale(project: Path) -> None:
     dog = saved(project, "IV-dog")
-    change(project / "tiny_simulator.py", "> 0.7 and", "> 7 and")
+    replace_text(project / "tiny_simulator.py", "> 0.7 and", "> 7 and")
     stale = garl("replay", dog)
     assert stale.output.startswith("STALE\nno violation")
     assert "the simulator has changed" in stale.output
@@ -129,7 +129,7 @@ def test_pass_on_a_changed_simulator_is_stale(project: Path) -> None:
 
 def test_weaker_test_does_not_make_a_case_fixed(project: Path) -> None:
     dog = saved(project, "IV-dog")
-    change(project / "test_it.py", "assert not landing.collisions", "assert True")
+    replace_text(project / "test_it.py", "assert not landing.collisions", "assert True")
     assert "the recorded one to the byte" in garl("replay", dog).output
     assert "is stale" in garl("promote", dog).output
     assert load_case(dog).status == "open"
@@ -137,8 +137,8 @@ def test_weaker_test_does_not_make_a_case_fixed(project: Path) -> None:
 
 def test_failure_of_another_test_of_the_file_keeps_a_case_open(project: Path) -> None:
     dog = saved(project, "IV-dog")
-    dodge(project)
-    change(project / "test_it.py", "< 100", "< 1")
+    let_system_avoid_dog(project)
+    replace_text(project / "test_it.py", "< 100", "< 1")
     assert "still fails with its recorded moves" in garl("promote", dog).output
 
 
@@ -147,18 +147,18 @@ def test_promote_reports_an_abort_and_refuses_an_undecided_case(
     project: Path, outcome: str
 ) -> None:
     dog = saved(project, "IV-dog")
-    dodge(project)
+    let_system_avoid_dog(project)
     end = "    flight = Flight(\n"
     simulator = project / "tiny_simulator.py"
     if outcome == "aborted":
-        change(simulator, end, f"    outcome = 'aborted'\n{end}")
+        replace_text(simulator, end, f"    outcome = 'aborted'\n{end}")
         simulator_is_as_it_was(dog)
         told = garl("promote", dog).output
         assert "with its recorded moves the landing system gave up; it did not land" in told
         assert load_case(dog).status == "fixed"
     else:
-        change(project / "test_it.py", "not landing.collisions", "landing.time_to_landing_s")
-        change(simulator, end, f"    outcome, contacts = 'collision', {CONTACT}\n{end}")
+        replace_text(project / "test_it.py", "not landing.collisions", "landing.time_to_landing_s")
+        replace_text(simulator, end, f"    outcome, contacts = 'collision', {CONTACT}\n{end}")
         simulator_is_as_it_was(dog)
         assert "is not decided with its recorded moves" in garl("promote", dog).output
         assert load_case(dog).status == "open"
@@ -181,13 +181,13 @@ def simulator_is_as_it_was(file: Path) -> None:
 
 def test_built_in_verdict_judges_a_case_without_its_test(project: Path) -> None:
     dog = saved(project, "IV-dog")
-    change(project / "test_it.py", "def test_collisions", "def test_hits")
+    replace_text(project / "test_it.py", "def test_collisions", "def test_hits")
     replayed = garl("replay", dog)
     assert "judged by the built-in verdict: the test test_it.py::test_collisions" in replayed.output
 
 
 def test_file_that_cannot_be_collected_gives_one_clear_error(project: Path) -> None:
-    change(project / "test_it.py", "import pytest", "import pytestt")
+    replace_text(project / "test_it.py", "import pytest", "import pytestt")
     result = garl("replay", saved(project, "IV-dog"))
     assert "pytest could not fly the case" in result.output
     assert "No module named 'pytestt'" in result.output
@@ -232,7 +232,7 @@ def test_shrink_refuses_too_few_flights(project: Path, flights: str) -> None:
 
 def test_check_names_a_test_without_file(project: Path) -> None:
     assert garl("check").exit_code == 0
-    change(saved(project, "IV-dog"), '"test_it.py::', '"test_that.py::')
+    replace_text(saved(project, "IV-dog"), '"test_it.py::', '"test_that.py::')
     checked = garl("check")
     assert "key 'test': there is no file" in checked.output
     assert checked.exit_code == 1

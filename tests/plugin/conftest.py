@@ -11,7 +11,7 @@ import pytest
 
 from tests.support.case_project import (
     SEARCH,
-    commit,
+    add_cases_to_git,
 )
 from tests.support.landing_project import write_project
 
@@ -27,7 +27,7 @@ def searched_template(tmp_path_factory: pytest.TempPathFactory) -> Path:
     assert "confirming and shrinking 2 new kinds of violation" in done.stdout
     assert "saved scenarios/regressions/systems/lawn-IV-dog-" in done.stdout
     assert "New cases fail until they are fixed, committed, or accepted" in done.stdout
-    commit(folder)
+    add_cases_to_git(folder)
     return folder
 
 

@@ -4,7 +4,7 @@ import pytest
 
 from tests.support.case_project import (
     SEARCH,
-    change,
+    replace_text,
     run,
 )
 from tests.support.landing_project import project
@@ -16,20 +16,22 @@ def hit_by_the_dog(pytester: pytest.Pytester, when: str) -> None:
     """Let the dog hit a system only in some of a scenario's flights in one process."""
     simulator = pytester.path / "tiny_simulator.py"
     # In the fog it would fail each time, in one way or the other.
-    change(simulator, '["environment.fog"] > 0.1', '["environment.fog"] > 1')
-    change(
+    replace_text(simulator, '["environment.fog"] > 0.1', '["environment.fog"] > 1')
+    replace_text(
         simulator,
         "and not knows:\n        outcome",
         f"and not knows and {when}:\n        outcome",
     )
-    change(simulator, "    contacts: tuple", "    SEEN.append(scenario.seed)\n    contacts: tuple")
-    change(simulator, "\n\ndef fly(", "\n\nSEEN = ['']\n\n\ndef fly(")
+    replace_text(
+        simulator, "    contacts: tuple", "    SEEN.append(scenario.seed)\n    contacts: tuple"
+    )
+    replace_text(simulator, "\n\ndef fly(", "\n\nSEEN = ['']\n\n\ndef fly(")
 
 
 def test_nondeterministic_system_is_reported(pytester: pytest.Pytester) -> None:
     project(pytester)
     simulator = pytester.path / "tiny_simulator.py"
-    change(simulator, "else off", "else off\n    off += 1e-6 * __import__('random').random()")
+    replace_text(simulator, "else off", "else off\n    off += 1e-6 * __import__('random').random()")
     result = run(pytester, *SEARCH, "--garl-shrink=0")
     told = ["Nondeterministic landing system: *", "*trajectories, from * s on*"]
     result.stdout.fnmatch_lines(told)
@@ -42,7 +44,7 @@ def test_violation_in_three_of_five_flights_is_flaky(
 ) -> None:
     project(pytester)
     if marked:
-        change(pytester.path / "test_it.py", "maps=", "deterministic=False, maps=")
+        replace_text(pytester.path / "test_it.py", "maps=", "deterministic=False, maps=")
     hit_by_the_dog(pytester, "SEEN.count(scenario.seed) % 2 == 1")
     result = run(pytester, *FLAKY)
     assert result.parseoutcomes()["failed"] == 1
@@ -55,7 +57,7 @@ def test_violation_in_one_of_five_flights_fails_no_item(
     pytester: pytest.Pytester,
 ) -> None:
     project(pytester)
-    change(pytester.path / "test_it.py", "maps=", "deterministic=False, maps=")
+    replace_text(pytester.path / "test_it.py", "maps=", "deterministic=False, maps=")
     hit_by_the_dog(pytester, "SEEN.count(scenario.seed) == 1")
     result = run(pytester, *FLAKY)
     assert "failed" not in result.parseoutcomes()

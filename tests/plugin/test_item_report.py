@@ -9,10 +9,10 @@ from pytest_garl.cli import main
 from tests.support.case_project import (
     CASES,
     SEARCH,
+    add_cases_to_git,
     cases,
-    change,
-    commit,
-    dodge,
+    let_system_avoid_dog,
+    replace_text,
     run,
     violations,
 )
@@ -27,7 +27,7 @@ def test_cases_fly_under_xdist(searched: pytest.Pytester) -> None:
 def test_open_case_that_passes_on_a_changed_simulator_is_stale(
     searched: pytest.Pytester,
 ) -> None:
-    change(searched.path / "tiny_simulator.py", "> 0.7 and", "> 7 and")
+    replace_text(searched.path / "tiny_simulator.py", "> 0.7 and", "> 7 and")
     result = run(searched)
     result.assert_outcomes(passed=5, xfailed=1)
     result.stdout.fnmatch_lines(["stale: *IV-dog*.toml passes, but the simulator has changed"])
@@ -35,7 +35,7 @@ def test_open_case_that_passes_on_a_changed_simulator_is_stale(
 
 
 def test_open_case_that_passes_may_be_fixed(searched: pytest.Pytester) -> None:
-    dodge(searched.path)
+    let_system_avoid_dog(searched.path)
     result = run(searched)
     result.assert_outcomes(passed=5, xfailed=1)
     result.stdout.fnmatch_lines(
@@ -54,10 +54,10 @@ def test_open_case_that_passes_may_be_fixed(searched: pytest.Pytester) -> None:
 @pytest.mark.parametrize("repaired", [False, True])
 def test_edge_case_fails_no_run(searched: pytest.Pytester, status: str, repaired: bool) -> None:
     dog = cases(searched)[1]
-    change(dog, "neighbours_failed = 3", "neighbours_failed = 2")
-    change(dog, 'status = "open"', f'status = "{status}"')
+    replace_text(dog, "neighbours_failed = 3", "neighbours_failed = 2")
+    replace_text(dog, 'status = "open"', f'status = "{status}"')
     if repaired:
-        dodge(searched.path)
+        let_system_avoid_dog(searched.path)
     result = run(searched, "--garl-workers=0", "-rx", "-o", "garl_xfail_strict=true", "-kIV")
     ends = "passes" if repaired else "fails"
     result.stdout.fnmatch_lines([f"*case-lawn-IV-dog*edge: {ends}; IV:dog:*"])
@@ -66,8 +66,8 @@ def test_edge_case_fails_no_run(searched: pytest.Pytester, status: str, repaired
 
 
 def test_edge_case_hides_no_mistake_in_a_test(searched: pytest.Pytester) -> None:
-    change(cases(searched)[1], "neighbours_failed = 3", "neighbours_failed = 2")
-    change(searched.path / "test_it.py", "not landing.collisions", "not landing.colisions")
+    replace_text(cases(searched)[1], "neighbours_failed = 3", "neighbours_failed = 2")
+    replace_text(searched.path / "test_it.py", "not landing.collisions", "not landing.colisions")
     result = run(searched, "--garl-workers=0", "-kIV")
     assert result.ret == pytest.ExitCode.TESTS_FAILED
 
@@ -75,7 +75,9 @@ def test_edge_case_hides_no_mistake_in_a_test(searched: pytest.Pytester) -> None
 def test_open_case_that_ends_in_an_abort_counts_as_passed(
     searched: pytest.Pytester,
 ) -> None:
-    change(searched.path / "tiny_simulator.py", 'outcome = "collision"', 'outcome = "aborted"')
+    replace_text(
+        searched.path / "tiny_simulator.py", 'outcome = "collision"', 'outcome = "aborted"'
+    )
     result = run(searched)
     result.assert_outcomes(passed=3, skipped=2, xfailed=1)
     result.stdout.fnmatch_lines(["stale: scenarios/*IV-dog*.toml passes, but the simulator*"])
@@ -98,9 +100,9 @@ def test_case_hides_no_other_property(searched: pytest.Pytester) -> None:
 
 
 def test_open_case_that_fails_in_another_way_fails_the_run(searched: pytest.Pytester) -> None:
-    change(searched.path / "tiny_simulator.py", 'body="dog-1"', 'body="tree-1"')
-    change(searched.path / "tiny_simulator.py", 'kind="dog"', 'kind="tree"')
-    change(searched.path / "tiny_simulator.py", '"dynamic"', '"static"')
+    replace_text(searched.path / "tiny_simulator.py", 'body="dog-1"', 'body="tree-1"')
+    replace_text(searched.path / "tiny_simulator.py", 'kind="dog"', 'kind="tree"')
+    replace_text(searched.path / "tiny_simulator.py", '"dynamic"', '"static"')
     result = run(searched)
     result.stdout.fnmatch_lines(
         ["*IV-dog*fails in another way.", "Saved: IV:dog:*", "Flown: III:tree:*", "See it: garl*"]
@@ -111,11 +113,11 @@ def test_open_case_that_fails_in_another_way_fails_the_run(searched: pytest.Pyte
 def test_fixed_case_must_pass_with_its_moves_and_with_a_live_policy(
     searched: pytest.Pytester,
 ) -> None:
-    change(cases(searched)[1], 'status = "open"', 'status = "fixed"')
+    replace_text(cases(searched)[1], 'status = "open"', 'status = "fixed"')
     broken = run(searched)
     broken.assert_outcomes(passed=2, skipped=4, xfailed=1, failed=2)
     broken.stdout.fnmatch_lines(["*case-lawn-IV-dog-*-live*", "*was fixed and fails again.*"])
-    change(searched.path / "tiny_simulator.py", "> 0.7 and", "> 7 and")
+    replace_text(searched.path / "tiny_simulator.py", "> 0.7 and", "> 7 and")
     run(searched).assert_outcomes(passed=8, xfailed=1)
 
 
@@ -123,9 +125,9 @@ def test_unavoidable_case_excuses_no_other_violation_of_its_kind(
     pytester: pytest.Pytester,
 ) -> None:
     project(pytester)
-    change(pytester.path / "tiny_simulator.py", "is False", "is None")
+    replace_text(pytester.path / "tiny_simulator.py", "is False", "is None")
     run(pytester, *SEARCH)
-    commit(pytester.path)
+    add_cases_to_git(pytester.path)
     again = run(pytester, *SEARCH, "--garl-seed=1")
     assert again.parseoutcomes()["failed"] == 2
     assert again.ret == pytest.ExitCode.TESTS_FAILED
@@ -184,7 +186,7 @@ def test_broken_case_fails_alone_and_names_file_and_key(
     searched: pytest.Pytester, old: str, new: str, words: str
 ) -> None:
     path = cases(searched)[1]
-    change(path, old, new)
+    replace_text(path, old, new)
     result = run(searched)
     result.assert_outcomes(passed=2, xfailed=1, errors=3)
     result.stdout.fnmatch_lines([f"*{path.name}*{words}*"])

@@ -8,11 +8,11 @@ import pytest
 from pytest_garl.regressions.case_file import dump_case, load_case
 from tests.support.case_project import (
     CASES,
-    OWN,
     SEARCH,
+    USER_PROPERTY_TEST,
+    add_cases_to_git,
     cases,
-    change,
-    commit,
+    replace_text,
     run,
     saved,
 )
@@ -63,7 +63,7 @@ def test_cases_of_a_search_with_destinations_keep_them(
     (dog,) = [case for case in found if case.violation.signature.startswith("IV:dog")]
     assert -1 <= dog.scenario["dog-1.destination_x"] <= 1
     assert not any(key.startswith("person-1") for key, _ in dog.scenario.genes)
-    commit(pytester.path)
+    add_cases_to_git(pytester.path)
     run(pytester, *CASES).assert_outcomes(passed=2, skipped=2, xfailed=2)
 
 
@@ -133,7 +133,7 @@ def test_ci_run_writes_patches_and_leaves_the_tree_unchanged(
     subprocess.run(["git", "apply", *map(str, patches)], check=True, cwd=pytester.path)
     for path in cases(pytester):
         assert dump_case(load_case(path)) == path.read_text()
-    commit(pytester.path)
+    add_cases_to_git(pytester.path)
     assert run(pytester).ret == 0
 
 
@@ -146,7 +146,7 @@ def test_own_property_is_shrunk_and_saved_for_its_test(
 ) -> None:
     project(pytester)
     tests = pytester.path / "test_it.py"
-    tests.write_text(tests.read_text() + OWN)
+    tests.write_text(tests.read_text() + USER_PROPERTY_TEST)
     result = run(pytester, *SEARCH, *how, "--garl-shrink=120")
     result.stdout.fnmatch_lines(["own:test_own:*: a property of your own"])
     (own,) = [path for path in cases(pytester) if "-own-" in path.name]
@@ -156,12 +156,12 @@ def test_own_property_is_shrunk_and_saved_for_its_test(
     assert case.violation.description.startswith("test_own: too much snow")
     assert len(case.scenario.removed_objects) == 4
     assert 0.1 <= case.scenario["environment.snow"] <= 0.11
-    commit(pytester.path)
+    add_cases_to_git(pytester.path)
     known = run(pytester)
     # Four tests fly each of the two built-in cases, one flies its own.
     assert sum(known.parseoutcomes().values()) == 4 * 2 + 1
     assert known.ret == 0
-    change(tests, "< 0.1,", "< 0.09,")
+    replace_text(tests, "< 0.1,", "< 0.09,")
     assert run(pytester).ret == pytest.ExitCode.TESTS_FAILED
 
 
@@ -170,26 +170,26 @@ def test_fixed_case_that_no_pilot_outruns_flies_with_recorded_moves_only(
 ) -> None:
     project(pytester)
     simulator = pytester.path / "tiny_simulator.py"
-    change(simulator, "    del npcs, time_limit_s\n", "")
+    replace_text(simulator, "    del npcs, time_limit_s\n", "")
     hit = "> 0.7 and (not knows or npcs.name != 'recorded')"
-    change(simulator, "> 0.7 and not knows", hit)
+    replace_text(simulator, "> 0.7 and not knows", hit)
     result = run(pytester, *SEARCH)
     told = " ".join(result.stdout.str().split())
     assert "the reference pilot violates nothing unless objects pursue it too" in told
     fog, dog = cases(pytester)
     assert (load_case(fog).avoidable, load_case(dog).avoidable) == ("live", "recorded")
     assert load_case(dog).status == "open"
-    change(dog, 'status = "open"', 'status = "fixed"')
-    change(simulator, hit, "> 7")
-    change(fog, 'status = "open"', 'status = "open"\naccepted = true')
+    replace_text(dog, 'status = "open"', 'status = "fixed"')
+    replace_text(simulator, hit, "> 7")
+    replace_text(fog, 'status = "open"', 'status = "open"\naccepted = true')
     run(pytester).assert_outcomes(passed=5, xfailed=1)
 
 
 def test_unavoidable_case_fails_no_run(pytester: pytest.Pytester) -> None:
     project(pytester)
-    change(pytester.path / "tiny_simulator.py", "is False", "is None")
+    replace_text(pytester.path / "tiny_simulator.py", "is False", "is None")
     result = run(pytester, *SEARCH)
     result.stdout.fnmatch_lines(["*UNAVOIDABLE, gates nothing*"])
     assert {load_case(path).status for path in cases(pytester)} == {"unavoidable"}
-    commit(pytester.path)
+    add_cases_to_git(pytester.path)
     assert run(pytester).ret == 0

@@ -35,7 +35,7 @@ def flight_with(answer: Callable[[], Any]) -> Any:
     return flight_of(type("Answers", (Answers,), {"answer": staticmethod(answer)}))
 
 
-def seen(**changes: Any) -> Diagnostics:
+def diagnostics_with_detection(**changes: Any) -> Diagnostics:
     sighting: dict[str, Any] = {
         "marker_id": 0,
         "confidence": 1.0,

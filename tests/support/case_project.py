@@ -11,7 +11,7 @@ from pytest_garl.execution.ledger import Ledger
 
 SEARCH = ("--garl-budget=24", "--garl-workers=0", "--garl-shrink=60")
 CASES = ("--garl-workers=0",)
-OWN = """
+USER_PROPERTY_TEST = """
 def test_own(landing, scenario):
     exact = landing.final_distance_m < 0.05
     assert exact or scenario["environment.snow"] < 0.1, "too much snow"
@@ -33,7 +33,7 @@ def saved(pytester: pytest.Pytester) -> dict[str, str]:
     return {path.name: path.read_text() for path in cases(pytester)}
 
 
-def commit(folder: Path) -> None:
+def add_cases_to_git(folder: Path) -> None:
     """Add the project's cases to git's index, so that they are accepted."""
     for command in (["init", "-q"], ["add", "scenarios"]):
         subprocess.run(["git", *command], check=True, cwd=folder)
@@ -48,13 +48,13 @@ def violations(pytester: pytest.Pytester) -> list[tuple[int, int, str]]:
         ledger.close()
 
 
-def change(path: Path, old: str, new: str) -> None:
+def replace_text(path: Path, old: str, new: str) -> None:
     """Replace a text in a file."""
     text = path.read_text()
     assert old in text
     path.write_text(text.replace(old, new))
 
 
-def dodge(project: Path) -> None:
+def let_system_avoid_dog(project: Path) -> None:
     """Fix the landing system: it avoids the dog."""
-    change(project / "systems.py", "class Good:\n", "class Good:\n    dodges = True\n")
+    replace_text(project / "systems.py", "class Good:\n", "class Good:\n    dodges = True\n")

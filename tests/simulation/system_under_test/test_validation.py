@@ -24,7 +24,15 @@ from pytest_garl import (
 from pytest_garl.simulation.flight_file import load, save
 from pytest_garl.simulation.system_under_test.diagnostics import DiagnosticsQuota
 from pytest_garl.simulation.system_under_test.validation import read_command, read_thrusts
-from tests.support.answers import HUGE, INF, NAN, flight_of, flight_with, land_with, seen
+from tests.support.answers import (
+    HUGE,
+    INF,
+    NAN,
+    diagnostics_with_detection,
+    flight_of,
+    flight_with,
+    land_with,
+)
 from tests.support.flights import Scripted
 
 
@@ -65,14 +73,18 @@ def to(*position: Any, **more: Any) -> PositionSetpoint:
 
 WRONG: list[tuple[Callable[[], Any], str, str]] = [
     # Diagnostics.
-    (lambda: Land(diagnostics=seen(confidence=NAN)), "BadDiagnostics", "detections[0].confidence"),
+    (
+        lambda: Land(diagnostics=diagnostics_with_detection(confidence=NAN)),
+        "BadDiagnostics",
+        "detections[0].confidence",
+    ),
     (
         lambda: land_with(planned_path_m=((0.0, NAN, 0.0),)),
         "BadDiagnostics",
         "planned_path_m[0]",
     ),
     (
-        lambda: Land(diagnostics=seen(corners_px=((INF, 0.0),))),
+        lambda: Land(diagnostics=diagnostics_with_detection(corners_px=((INF, 0.0),))),
         "BadDiagnostics",
         "detections[0].corners_px[0]",
     ),
@@ -84,8 +96,16 @@ WRONG: list[tuple[Callable[[], Any], str, str]] = [
     ),
     (lambda: land_with(detections=5), "BadDiagnostics", "detections = 5"),
     (lambda: land_with(detections=(5,)), "BadDiagnostics", "detections[0] = 5"),
-    (lambda: Land(diagnostics=seen(marker_id=INF)), "BadDiagnostics", "marker_id = inf"),
-    (lambda: Land(diagnostics=seen(marker_id=2.5)), "BadDiagnostics", "marker_id = 2.5"),
+    (
+        lambda: Land(diagnostics=diagnostics_with_detection(marker_id=INF)),
+        "BadDiagnostics",
+        "marker_id = inf",
+    ),
+    (
+        lambda: Land(diagnostics=diagnostics_with_detection(marker_id=2.5)),
+        "BadDiagnostics",
+        "marker_id = 2.5",
+    ),
     (lambda: land_with(target_m=(0.0, 0.0, NAN)), "BadDiagnostics", "target_m"),
     (lambda: Land(diagnostics="low"), "BadDiagnostics", "diagnostics = 'low'"),  # type: ignore[arg-type]
     (lambda: land_with(phase=Raises()), "RuntimeError", "no text"),
@@ -150,7 +170,9 @@ HARMLESS: list[Callable[[], Any]] = [
     lambda: AttitudeSetpoint(attitude=(0.0, 0.0, 0.0, 1.04), thrust=np.float32(0.5)),  # type: ignore[arg-type]
     lambda: land_with(phase="x" * 10**6, note="\ud800" * 10**6),
     lambda: land_with(phase=object(), detections=[], planned_path_m=np.zeros((5, 3))),
-    lambda: Land(diagnostics=seen(marker_id=np.int32(3), corners_px=np.zeros((4, 2)))),
+    lambda: Land(
+        diagnostics=diagnostics_with_detection(marker_id=np.int32(3), corners_px=np.zeros((4, 2)))
+    ),
 ]
 
 
