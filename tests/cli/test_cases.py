@@ -38,8 +38,8 @@ class Lander:
 LAWN = load_map("lawn")
 
 
-def broken_lander() -> Case:
-    """Return a case in which the lander raises at once, in fog that has nothing to do with it."""
+def case_of_broken_lander() -> Case:
+    """Return a case in which the lander raises at once, in fog that is not the cause."""
     genome = genome_for(LAWN)
     scenario = repair(decode(genome.nominal, genome, map="lawn", seed=3), LAWN)
     names = [name for name, _ in LAWN.present_objects]
@@ -74,12 +74,12 @@ def broken_lander() -> Case:
 
 @pytest.fixture
 def file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
-    """Return the file of a case in a project whose lander is broken."""
+    """Return the case file of a project whose lander is broken, relative to the project."""
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(sys, "path", [*sys.path])
     (tmp_path / "stack_of_test.py").write_text(SYSTEM)
     (tmp_path / "broken").touch()
-    path = Corpus(tmp_path / "scenarios" / "regressions").save(broken_lander())
+    path = Corpus(tmp_path / "scenarios" / "regressions").save(case_of_broken_lander())
     assert path is not None
     yield path.relative_to(tmp_path)
     sys.modules.pop("stack_of_test", None)
@@ -89,7 +89,7 @@ def garl(*args: str | Path) -> Result:
     return CliRunner().invoke(main, ["cases", *map(str, args)], env={"COLUMNS": "200"})
 
 
-def repaired() -> None:
+def repair_lander() -> None:
     Path("broken").unlink()
 
 
@@ -126,7 +126,7 @@ def test_promote_requires_a_replay_that_is_fixed(file: Path) -> None:
     refused = garl("promote", file)
     assert "still fails with its recorded moves" in refused.output
     assert load_case(file).status == "open"
-    repaired()
+    repair_lander()
     fixed = garl("replay", file)
     assert fixed.output.startswith("FIXED\nno violation")
     assert fixed.exit_code == 0
@@ -138,7 +138,7 @@ def test_prune_deletes_a_case_that_passes_on_a_changed_map(file: Path) -> None:
     file.write_text(file.read_text().replace(LAWN.sha256, "0" * 64))
     assert garl("replay", file).exit_code == 1
     assert "1 cases are not stale" in garl("prune", "--yes").output
-    repaired()
+    repair_lander()
     stale = garl("replay", file)
     assert stale.output.startswith("STALE")
     assert "the map 'lawn' has changed\njudged by the built-in verdict" in stale.output
@@ -159,9 +159,9 @@ def test_shrink_simplifies_a_saved_case(file: Path) -> None:
 
 def test_shrink_refuses_a_case_that_passes(file: Path) -> None:
     before = file.read_text()
-    repaired()
-    told = garl("shrink", file, "--workers=0").output
-    assert "does not fail in the same way any more with its recorded moves" in told
+    repair_lander()
+    output = garl("shrink", file, "--workers=0").output
+    assert "does not fail in the same way any more with its recorded moves" in output
     assert file.read_text() == before
 
 
@@ -249,9 +249,9 @@ def test_invalid_system_name_is_never_imported(
     monkeypatch.setattr("importlib.import_module", refuse)
     file.write_text(file.read_text().replace("stack_of_test:Lander", system))
     for command in (["check"], ["replay", file]):
-        told = garl(*command)
-        assert f"key 'system': found '{system}', expected 'module:class'" in told.output
-        assert told.exit_code == 1
+        result = garl(*command)
+        assert f"key 'system': found '{system}', expected 'module:class'" in result.output
+        assert result.exit_code == 1
 
 
 def test_list_in_a_pipe_keeps_whole_names(file: Path, monkeypatch: pytest.MonkeyPatch) -> None:

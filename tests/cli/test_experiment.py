@@ -41,7 +41,7 @@ SOURCES = Path(pytest_garl.__file__).parents[1]
 
 @pytest.fixture
 def project(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """Return a project of the analytic simulator, with an experiment; it is the working folder."""
+    """Return a project with an experiment on the analytic simulator; it is the working folder."""
     write_project(tmp_path, maps="['court', 'lawn']")
     (tmp_path / "toy.toml").write_text(TEXT)
     monkeypatch.chdir(tmp_path)
@@ -49,8 +49,8 @@ def project(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return tmp_path
 
 
-def garl(*words: str) -> Result:
-    return CliRunner().invoke(main, ["experiment", "toy.toml", *words], env={"COLUMNS": "120"})
+def garl(*args: str) -> Result:
+    return CliRunner().invoke(main, ["experiment", "toy.toml", *args], env={"COLUMNS": "120"})
 
 
 def change(project: Path, before: str, after: str) -> None:
@@ -58,8 +58,8 @@ def change(project: Path, before: str, after: str) -> None:
     (project / "toy.toml").write_text(TEXT.replace(before, after))
 
 
-def lasting(rows: tuple[ResultRow, ...]) -> list[tuple[object, ...]]:
-    """Return what of the rows does not depend on the time that flights took."""
+def without_times(rows: tuple[ResultRow, ...]) -> list[tuple[object, ...]]:
+    """Return the rows without the columns that depend on the duration of flights."""
     return [
         (*row.key, row.violations, row.top10, row.covered, row.unavoidable, row.result_hash)
         for row in rows
@@ -98,7 +98,7 @@ def test_rows_hold_the_figures_of_the_ledger(project: Path) -> None:
     change(project, 'methods = ["garl", "random"]', 'methods = ["garl"]')
     text = (project / "toy.toml").read_text().replace("unavoidable = 0", "unavoidable = 2")
     (project / "toy.toml").write_text(text)
-    # Killed while it was made, a ledger is an empty file.
+    # A run that is killed while it creates its ledger leaves an empty file.
     (run,) = read_experiment(Path("toy.toml")).runs
     path = project / ".garl" / "experiments" / run.folder / "ledger.sqlite"
     path.parent.mkdir(parents=True)
@@ -115,12 +115,12 @@ def test_rows_hold_the_figures_of_the_ledger(project: Path) -> None:
     assert row.violations == len(bad) > 0
     assert row.type_iv == sum(f.signature.startswith("IV:") for f in flights)
     assert set(row.signatures) == {flight.signature for flight in bad}
-    # The analytic simulator's UAV is 12 m above where it lands, then there: two cells a flight.
+    # The analytic simulator's UAV starts 12 m above its landing place: two cells in each flight.
     cells = set()
     for flight in bad:
         x, y = marker_position_m(parse_scenario(flight.scenario), map)
         off = flight.result.final_distance_m
-        # Some places lie beyond the lawn, which counts as nowhere.
+        # Places beyond the lawn are in no cell.
         if abs(x + off) < 10:
             cells |= {((x + off) // 2, y // 2, z) for z in (0, 6)}
     assert row.covered == len(cells)
@@ -182,11 +182,11 @@ def test_two_landing_systems_in_one_run_are_refused(project: Path) -> None:
 
 
 @pytest.fixture
-def slow(project: Path) -> Path:
+def slow_project(project: Path) -> Path:
     """Return a project whose flights take a while, with one run."""
     (project / "systems.py").write_text(SLOW)
-    write = (project / "test_it.py").read_text().replace("system=Good", "system=Slow")
-    (project / "test_it.py").write_text(write)
+    text = (project / "test_it.py").read_text().replace("system=Good", "system=Slow")
+    (project / "test_it.py").write_text(text)
     change(project, 'methods = ["garl", "random"]', 'methods = ["garl"]')
     return project
 
@@ -217,17 +217,17 @@ def flown(ledger: Path) -> int:
 
 
 @pytest.mark.long
-def test_an_interrupted_or_killed_run_continues(slow: Path) -> None:
+def test_an_interrupted_or_killed_run_continues(slow_project: Path) -> None:
     assert garl("--workers=2", "--out=undisturbed", "--folder=undisturbed").exit_code == 0
     stopped = start()
-    ledger = wait_for_flights(slow, 3, stopped)
+    ledger = wait_for_flights(slow_project, 3, stopped)
     stopped.send_signal(signal.SIGINT)
-    _, complaint = stopped.communicate(timeout=60)
+    _, error_output = stopped.communicate(timeout=60)
     assert stopped.returncode == 130
-    assert "interrupted; finished flights are kept, the same command continues" in complaint
+    assert "interrupted; finished flights are kept, the same command continues" in error_output
     assert 3 <= flown(ledger) < 20
     killed = start()
-    wait_for_flights(slow, flown(ledger) + 2, killed)
+    wait_for_flights(slow_project, flown(ledger) + 2, killed)
     killed.kill()
     killed.communicate()
     session = Path("/proc") / ledger.with_suffix(".lock").read_text()
@@ -235,23 +235,23 @@ def test_an_interrupted_or_killed_run_continues(slow: Path) -> None:
         if not session.exists():
             break
         time.sleep(0.01)
-    assert not (slow / "toy.csv").exists()
+    assert not (slow_project / "toy.csv").exists()
     assert flown(ledger) < 24
     resumed = garl("--workers=1")
     assert resumed.exit_code == 0, resumed.output
     assert flown(ledger) == 24
-    # Begun anew, it would have set the first one aside.
+    # A new run would have moved the earlier ledger aside.
     assert not list(ledger.parent.glob("ledger-previous*"))
-    expected = read_rows(slow / "undisturbed" / "toy.csv")
-    assert lasting(read_rows(slow / "toy.csv")) == lasting(expected)
+    expected = read_rows(slow_project / "undisturbed" / "toy.csv")
+    assert without_times(read_rows(slow_project / "toy.csv")) == without_times(expected)
 
 
-def test_a_run_of_changed_code_is_refused(slow: Path) -> None:
+def test_a_run_of_changed_code_is_refused(slow_project: Path) -> None:
     process = start()
-    wait_for_flights(slow, 1, process)
+    wait_for_flights(slow_project, 1, process)
     process.send_signal(signal.SIGINT)
     process.communicate(timeout=60)
-    (slow / "systems.py").write_text(SLOW + "\nchanged = True\n")
+    (slow_project / "systems.py").write_text(SLOW + "\nchanged = True\n")
     result = garl("--workers=2")
     assert result.exit_code == 1
     assert "systems.py changed" in result.output

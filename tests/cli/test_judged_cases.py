@@ -153,8 +153,8 @@ def test_promote_reports_an_abort_and_refuses_an_undecided_case(
     if outcome == "aborted":
         replace_text(simulator, end, f"    outcome = 'aborted'\n{end}")
         simulator_is_as_it_was(dog)
-        told = garl("promote", dog).output
-        assert "with its recorded moves the landing system gave up; it did not land" in told
+        output = garl("promote", dog).output
+        assert "with its recorded moves the landing system gave up; it did not land" in output
         assert load_case(dog).status == "fixed"
     else:
         replace_text(project / "test_it.py", "not landing.collisions", "landing.time_to_landing_s")
@@ -217,9 +217,9 @@ def test_shrink_keeps_the_simplest_case(project: Path) -> None:
     shrunk(dog, 60)
     dog = saved(project, "IV-dog")
     before = dog.read_bytes()
-    told = shrunk(dog, 30)
-    assert "nothing simpler was found" in told
-    assert told.endswith("it stays as it is\n")
+    output = shrunk(dog, 30)
+    assert "nothing simpler was found" in output
+    assert output.endswith("it stays as it is\n")
     assert saved(project, "IV-dog").read_bytes() == before
 
 

@@ -13,7 +13,7 @@ import pytest
 
 from pytest_garl.execution.processes import any_command_contains
 from pytest_garl.regressions.corpus import Corpus
-from tests.cli.test_cases import broken_lander
+from tests.cli.test_cases import case_of_broken_lander
 
 SLOW = """
 import time
@@ -34,7 +34,7 @@ def test_a_cancelled_command_leaves_no_folder_and_no_process(tmp_path: Path, num
     scratch.mkdir()
     (project / "stack_of_test").mkdir(parents=True)
     (project / "stack_of_test" / "__init__.py").write_text(SLOW)
-    file = Corpus(project / "scenarios").save(broken_lander())
+    file = Corpus(project / "scenarios").save(case_of_broken_lander())
     assert file
     start = "from pytest_garl.cli import main; main()"
     command = [sys.executable, "-c", start, "cases", "shrink", str(file), "--workers=1"]
@@ -47,8 +47,8 @@ def test_a_cancelled_command_leaves_no_folder_and_no_process(tmp_path: Path, num
             assert process.poll() is None, process.communicate()[0]
             time.sleep(0.02)
         process.send_signal(number)
-        told = process.communicate(timeout=PATIENCE_S)[0].decode()
-    assert process.returncode == (143 if number == signal.SIGTERM else 1), told
+        output = process.communicate(timeout=PATIENCE_S)[0].decode()
+    assert process.returncode == (143 if number == signal.SIGTERM else 1), output
     assert list(scratch.glob("garl-*")) == []
     while any_command_contains(str(scratch)) and time.monotonic() < until:
         time.sleep(0.02)

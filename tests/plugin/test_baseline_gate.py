@@ -127,9 +127,9 @@ def test_collisions_that_became_aborts_pass(saved: pytest.Pytester) -> None:
 
 def test_inconclusive_flight_fails_the_gate(saved: pytest.Pytester) -> None:
     change(saved.path / "base.toml", '"landed", ""', '"inconclusive", ""', count=1)
-    told = run(saved)
-    told.assert_outcomes(passed=1, skipped=3)
-    told.stdout.fnmatch_lines(
+    result = run(saved)
+    result.assert_outcomes(passed=1, skipped=3)
+    result.stdout.fnmatch_lines(
         ["*39 pairs compared, 39 of*", "*1 left out: inconclusive when the *"]
     )
     change(saved.path / "base.toml", '"landed", ""', '"inconclusive", ""')

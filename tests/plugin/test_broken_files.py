@@ -1,4 +1,4 @@
-"""Broken files in a project: each is told by its own item, and the rest is collected and runs."""
+"""Broken files in a project: one item reports each file, and all other tests run."""
 
 from __future__ import annotations
 
@@ -83,9 +83,9 @@ def test_damaged_ledger_is_one_message(pytester: pytest.Pytester, option: str) -
     database.close()
     budget = ["--garl-budget=2"] if option == "--garl-resume" else []
     result = run(pytester, "--garl-workers=0", "-k", "test_time", option, *budget)
-    told = result.stdout.str() + result.stderr.str()
-    assert "ledger.sqlite: is damaged or no ledger of this version: slot 0/1" in told
-    assert "Traceback" not in told
+    output = result.stdout.str() + result.stderr.str()
+    assert "ledger.sqlite: is damaged or no ledger of this version: slot 0/1" in output
+    assert "Traceback" not in output
     assert result.ret != 0
 
 
@@ -132,8 +132,8 @@ def test_ledger_that_breaks_in_use_is_one_message(pytester: pytest.Pytester, hoo
     result = pytester.runpytest_subprocess(
         "-p", "no:cacheprovider", "--garl-workers=0", "--garl-budget=2", "-k", "test_time"
     )
-    told = result.stdout.str() + result.stderr.str()
-    assert "ledger.sqlite: " in told
-    assert "Traceback" not in told
-    assert "INTERNALERROR" not in told
+    output = result.stdout.str() + result.stderr.str()
+    assert "ledger.sqlite: " in output
+    assert "Traceback" not in output
+    assert "INTERNALERROR" not in output
     assert result.ret == pytest.ExitCode.INTERNAL_ERROR

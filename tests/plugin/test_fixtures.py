@@ -37,7 +37,7 @@ def test_an_npc_policy_with_invalid_answers_ends_the_run_before_a_flight(
 
 
 @pytest.mark.parametrize(
-    ("fixture", "told"),
+    ("fixture", "error"),
     [
         ("return 'waypoint'", ""),
         ("return 'wayponit'", "unknown NPC policy 'wayponit'; expected one of"),
@@ -47,11 +47,11 @@ def test_an_npc_policy_with_invalid_answers_ends_the_run_before_a_flight(
         ),
     ],
 )
-def test_the_npcs_fixture_takes_a_name(pytester: pytest.Pytester, fixture: str, told: str) -> None:
+def test_the_npcs_fixture_takes_a_name(pytester: pytest.Pytester, fixture: str, error: str) -> None:
     project(pytester)
     with (pytester.path / "conftest.py").open("a") as file:
         file.write(f"import pytest\n@pytest.fixture(scope='session')\ndef npcs():\n    {fixture}\n")
     result = run(pytester, "--garl-budget=2", "--garl-workers=0")
-    both = result.stdout.str() + result.stderr.str()
-    assert (told in both) if told else (result.ret in (0, 1))
-    assert "Traceback" not in both
+    output = result.stdout.str() + result.stderr.str()
+    assert (error in output) if error else (result.ret in (0, 1))
+    assert "Traceback" not in output

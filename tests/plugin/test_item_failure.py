@@ -33,8 +33,8 @@ def test_nondeterministic_system_is_reported(pytester: pytest.Pytester) -> None:
     simulator = pytester.path / "tiny_simulator.py"
     replace_text(simulator, "else off", "else off\n    off += 1e-6 * __import__('random').random()")
     result = run(pytester, *SEARCH, "--garl-shrink=0")
-    told = ["Nondeterministic landing system: *", "*trajectories, from * s on*"]
-    result.stdout.fnmatch_lines(told)
+    lines = ["Nondeterministic landing system: *", "*trajectories, from * s on*"]
+    result.stdout.fnmatch_lines(lines)
     assert result.ret == pytest.ExitCode.TESTS_FAILED
 
 

@@ -20,7 +20,7 @@ from pytest_garl import Land
 class Tells:
     def reset(self, mission): pass
     def step(self, observation):
-        Path("told.txt").write_text(f"{os.getpid()} {cpu_dispatch.dispatched()}")
+        Path("in_system.txt").write_text(f"{os.getpid()} {cpu_dispatch.dispatched()}")
         return Land()
 """
 CONFTEST = """
@@ -29,7 +29,7 @@ from pathlib import Path
 import numpy
 import tiny_simulator
 from pytest_garl import cpu_dispatch
-Path("here.txt").write_text(f"{os.getpid()} {cpu_dispatch.dispatched()}")
+Path("in_pytest.txt").write_text(f"{os.getpid()} {cpu_dispatch.dispatched()}")
 def pytest_garl_fly(config):
     return tiny_simulator.fly
 """
@@ -52,8 +52,10 @@ def unpinned(pytester: pytest.Pytester, monkeypatch: pytest.MonkeyPatch) -> pyte
 def flown(pytester: pytest.Pytester, *args: str) -> tuple[pytest.RunResult, list[str], list[str]]:
     """Return what pytest and the landing system say of themselves: process, instructions."""
     result = pytester.runpytest_subprocess("-p", "no:cacheprovider", "--garl-shrink=0", *args)
-    here, told = (Path(pytester.path / name).read_text() for name in ("here.txt", "told.txt"))
-    return result, here.split(), told.split()
+    in_pytest, in_system = (
+        Path(pytester.path / name).read_text() for name in ("in_pytest.txt", "in_system.txt")
+    )
+    return result, in_pytest.split(), in_system.split()
 
 
 @pytest.mark.parametrize(
@@ -62,16 +64,16 @@ def flown(pytester: pytest.Pytester, *args: str) -> tuple[pytest.RunResult, list
 def test_conftest_loads_numpy_after_the_choice_of_instructions(
     unpinned: pytest.Pytester, args: tuple[str, ...]
 ) -> None:
-    result, here, told = flown(unpinned, *args)
-    assert told == here
-    assert told[1] == cpu_dispatch.BASELINE
+    result, in_pytest, in_system = flown(unpinned, *args)
+    assert in_system == in_pytest
+    assert in_system[1] == cpu_dispatch.BASELINE
     result.stdout.no_fnmatch_line("*loaded before*")
 
 
 def test_search_is_bred_with_baseline_instructions(unpinned: pytest.Pytester) -> None:
-    _, here, told = flown(unpinned, "--garl-workers=1", "--garl-budget=1")
-    assert here[1] == told[1] == cpu_dispatch.BASELINE
-    assert here[0] != told[0]
+    _, in_pytest, in_system = flown(unpinned, "--garl-workers=1", "--garl-budget=1")
+    assert in_pytest[1] == in_system[1] == cpu_dispatch.BASELINE
+    assert in_pytest[0] != in_system[0]
 
 
 def test_environment_does_not_change_what_a_search_breeds(
@@ -93,16 +95,18 @@ def test_environment_does_not_change_what_a_search_breeds(
 
 def test_other_sessions_keep_their_instructions(unpinned: pytest.Pytester) -> None:
     unpinned.runpytest_subprocess("-p", "no:cacheprovider")
-    assert (unpinned.path / "here.txt").read_text().endswith("-nehalem")
+    assert (unpinned.path / "in_pytest.txt").read_text().endswith("-nehalem")
 
 
 def test_numpy_loaded_early_sends_flights_to_a_worker(unpinned: pytest.Pytester) -> None:
     unpinned.makepyfile(early="import numpy")
     unpinned.syspathinsert()
-    result, here, told = flown(unpinned, "-p", "early", "--garl-workers=0", "--garl-budget=1")
-    assert here[1].endswith("-nehalem")
-    assert told[1] == cpu_dispatch.BASELINE
-    assert here[0] != told[0]
+    result, in_pytest, in_system = flown(
+        unpinned, "-p", "early", "--garl-workers=0", "--garl-budget=1"
+    )
+    assert in_pytest[1].endswith("-nehalem")
+    assert in_system[1] == cpu_dispatch.BASELINE
+    assert in_pytest[0] != in_system[0]
     result.stdout.fnmatch_lines(
         ["garl: loaded before*kernels for nehalem*flown in a worker process, not inside pytest;*"]
     )
@@ -140,7 +144,7 @@ from pytest_garl.testing import check_landing_system
 class Good:
     def reset(self, mission): pass
     def step(self, observation):
-        Path("told.txt").write_text(cpu_dispatch.dispatched())
+        Path("in_system.txt").write_text(cpu_dispatch.dispatched())
         return Land()
 
 class Wrong(Good):
@@ -163,5 +167,5 @@ def test_checker_flies_in_a_worker_if_numpy_was_loaded_first(
     script = unpinned.makepyfile(checked=CHECKED)
     result = unpinned.run(sys.executable, script)
     result.stdout.fnmatch_lines(["*-nehalem", "*lawn*", "LandingSystemError *down*"])
-    assert (unpinned.path / "told.txt").read_text() == cpu_dispatch.BASELINE
+    assert (unpinned.path / "in_system.txt").read_text() == cpu_dispatch.BASELINE
     assert result.ret == 0

@@ -171,7 +171,7 @@ def test_log_gets_a_line_now_and_then(pytester: pytest.Pytester, parallel: tuple
     )
     lines = [line for line in result.outlines if LINE.match(line)]
     assert len(lines) > 1
-    told = [line for line in result.outlines if re.search(r"garl(:| \[)", line)]
-    assert all(line.startswith(("garl", "---", "===")) for line in told)
+    garl_lines = [line for line in result.outlines if re.search(r"garl(:| \[)", line)]
+    assert all(line.startswith(("garl", "---", "===")) for line in garl_lines)
     assert all(len(line) <= 80 for line in lines)
     assert "\x1b" not in result.stdout.str()

@@ -1,4 +1,4 @@
-"""Flights on Ray: the same results as the local pool's, whatever is killed."""
+"""Flights on Ray give the same results as in the local pool, also after a process is killed."""
 
 from __future__ import annotations
 
@@ -34,9 +34,9 @@ needs_ray = [
     pytest.mark.ray,
     pytest.mark.skipif(importlib.util.find_spec("ray") is None, reason="needs pytest-garl[ray]"),
 ]
-ON_RAY = ("--garl-pool=ray",)
+WITH_RAY = ("--garl-pool=ray",)
 PATIENCE_S = 120.0
-"""On a busy machine Ray takes its time to start."""
+"""Ray starts slowly on a busy machine."""
 BROKEN = """
 import pytest
 from systems import Exits, Raises, Sleeps
@@ -53,7 +53,7 @@ def test_sleeps(landing): pass
 
 
 @pytest.fixture
-def place() -> Iterator[Path]:
+def short_folder() -> Iterator[Path]:
     """Return a folder whose path is short enough for Ray's sockets."""
     folder = Path(tempfile.mkdtemp(prefix="ray-", dir="/tmp"))
     yield folder
@@ -61,8 +61,8 @@ def place() -> Iterator[Path]:
 
 
 @pytest.fixture(scope="module")
-def head() -> Iterator[tuple[int, dict[str, str]]]:
-    """Start a cluster that is there before pytest; return its process, and how to find it."""
+def ray_cluster() -> Iterator[tuple[int, dict[str, str]]]:
+    """Start a Ray cluster before pytest; return its process id and the environment to find it."""
     with socket.socket() as free:
         free.bind(("127.0.0.1", 0))
         port = free.getsockname()[1]
@@ -71,13 +71,13 @@ def head() -> Iterator[tuple[int, dict[str, str]]]:
     command = [sys.executable, "-m", "ray.scripts.scripts", "start", "--head", "--block"]
     command += [f"--port={port}", "--num-cpus=2", f"--object-store-memory={2**27}"]
     command += ["--include-dashboard=false", "--disable-usage-stats", f"--temp-dir={folder}"]
-    with (folder / "said").open("w") as said:
+    with (folder / "output.txt").open("w") as output:
         process = subprocess.Popen(
-            command, env={**os.environ, **token}, stdout=said, stderr=subprocess.STDOUT
+            command, env={**os.environ, **token}, stdout=output, stderr=subprocess.STDOUT
         )
     try:
-        while "Ray runtime started" not in (folder / "said").read_text():
-            assert process.poll() is None, (folder / "said").read_text()
+        while "Ray runtime started" not in (folder / "output.txt").read_text():
+            assert process.poll() is None, (folder / "output.txt").read_text()
             time.sleep(0.1)
         yield process.pid, {**token, "RAY_ADDRESS": f"127.0.0.1:{port}"}
     finally:
@@ -87,22 +87,22 @@ def head() -> Iterator[tuple[int, dict[str, str]]]:
 
 
 @pytest.fixture
-def cluster(head: tuple[int, dict[str, str]], monkeypatch: pytest.MonkeyPatch) -> int:
-    """Let sessions find the cluster; return its process."""
-    pid, environment = head
+def cluster(ray_cluster: tuple[int, dict[str, str]], monkeypatch: pytest.MonkeyPatch) -> int:
+    """Let sessions find the cluster; return its process id."""
+    pid, environment = ray_cluster
     for name, value in environment.items():
         monkeypatch.setenv(name, value)
     return pid
 
 
-def below(pid: int) -> list[int]:
-    """Return a process's descendants."""
+def descendants_of(pid: int) -> list[int]:
+    """Return the ids of a process's children, their children and so on."""
     children = children_of(pid)
-    return children + [each for child in children for each in below(child)]
+    return children + [each for child in children for each in descendants_of(child)]
 
 
-def actors(pids: list[int]) -> list[int]:
-    """Return those that are Ray workers with a pilot."""
+def flight_actors(pids: list[int]) -> list[int]:
+    """Return the ids of the processes that are Ray actors which fly."""
     found = []
     for pid in pids:
         try:
@@ -116,7 +116,7 @@ def actors(pids: list[int]) -> list[int]:
 
 @pytest.fixture(scope="module")
 def undisturbed() -> dict[str, str]:
-    """Return the hash of the local pool's run, made by the first test that needs it."""
+    """Return a place for the result hash of the local pool, set by the first test that needs it."""
     return {}
 
 
@@ -142,7 +142,7 @@ class TestOnACluster:
         assert cases(pytester)
         shutil.rmtree(pytester.path / "scenarios")
         shutil.rmtree(pytester.path / ".garl")
-        result = run(pytester, *search, *ON_RAY)
+        result = run(pytester, *search, *WITH_RAY)
         result.stdout.fnmatch_lines(["garl: budget 24*all workers of Ray at 127.0.0.1:*"])
         assert (result_hash(pytester), saved(pytester)) == (local, files)
         kept = sorted(path.name for path in (pytester.path / ".garl" / "flights").iterdir())
@@ -153,7 +153,7 @@ class TestOnACluster:
     ) -> None:
         slow_project(pytester)
         expected = slow_hash(pytester, undisturbed)
-        result = run(pytester, *BUDGET, *ON_RAY, "-n2")
+        result = run(pytester, *BUDGET, *WITH_RAY, "-n2")
         assert result.ret in (0, 1)
         assert result_hash(pytester) == expected
 
@@ -165,7 +165,7 @@ class TestOnACluster:
         search = ("--garl-budget=2", "--garl-timeout=0.5", "--garl-workers=2")
         run(pytester, *search)
         local = result_hash(pytester)
-        result = run(pytester, *search, *ON_RAY)
+        result = run(pytester, *search, *WITH_RAY)
         result.stdout.fnmatch_lines(["*exit status 3*", "*one call took longer than 1.5 s*"])
         assert result_hash(pytester) == local
 
@@ -176,15 +176,15 @@ class TestOnACluster:
         slow_project(pytester)
         expected = slow_hash(pytester, undisturbed)
         ledger = pytester.path / ".garl" / "ledger.sqlite"
-        process = start(pytester, *ON_RAY)
+        process = start(pytester, *WITH_RAY)
         wait_for(ledger, 5, process, PATIENCE_S)
         workers = [pid for (pid,) in query(ledger, "SELECT pid FROM worker")]
-        prey = workers if victim == "driver" else actors(below(cluster))
-        os.kill(random.Random(victim).choice(prey), signal.SIGKILL)
+        pids = workers if victim == "driver" else flight_actors(descendants_of(cluster))
+        os.kill(random.Random(victim).choice(pids), signal.SIGKILL)
         output, _ = process.communicate(timeout=PATIENCE_S)
         assert process.returncode in (0, 1), output
         assert query(ledger, f"SELECT count(*) {FLOWN}") == [(30,)]
-        # What Ray loses is no death of the landing system, and is not flown alone for it.
+        # A process that Ray lost is no crash of the landing system: no flight is flown alone again.
         assert query(ledger, "SELECT value FROM meter WHERE name = 'retried'") == []
         assert result_hash(pytester) == expected
 
@@ -197,28 +197,28 @@ class TestOnAClusterOfItsOwn:
         self,
         pytester: pytest.Pytester,
         monkeypatch: pytest.MonkeyPatch,
-        place: Path,
+        short_folder: Path,
         undisturbed: dict[str, str],
         end: signal.Signals,
     ) -> None:
         slow_project(pytester)
         expected = slow_hash(pytester, undisturbed)
         monkeypatch.delenv("RAY_ADDRESS", raising=False)
-        monkeypatch.setenv("RAY_TMPDIR", str(place))
+        monkeypatch.setenv("RAY_TMPDIR", str(short_folder))
         ledger = pytester.path / ".garl" / "ledger.sqlite"
-        process = start(pytester, *ON_RAY)
+        process = start(pytester, *WITH_RAY)
         wait_for(ledger, 5, process, PATIENCE_S)
-        started = below(process.pid)
-        assert len(actors(started)) == 2
+        started = descendants_of(process.pid)
+        assert len(flight_actors(started)) == 2
         process.send_signal(end)
         output, _ = process.communicate(timeout=PATIENCE_S)
         assert "2 workers of Ray, started here" in output
         for _ in range(200):
-            if not any(alive(pid) for pid in started) and not list(place.iterdir()):
+            if not any(alive(pid) for pid in started) and not list(short_folder.iterdir()):
                 break
             time.sleep(0.1)
-        assert not any(alive(pid) for pid in started), "orphans"
-        assert not list(place.iterdir()), "litter"
+        assert not any(alive(pid) for pid in started), "orphaned processes"
+        assert not list(short_folder.iterdir()), "files left behind"
         assert 5 <= query(ledger, f"SELECT count(*) {FLOWN}")[0][0] < 30
         assert run(pytester, *BUDGET, "--garl-resume").ret in (0, 1)
         assert query(ledger, f"SELECT count(*) {FLOWN}") == [(30,)]
@@ -229,7 +229,7 @@ def test_error_without_ray_says_how_to_install_it(pytester: pytest.Pytester) -> 
     write_project(pytester.path)
     hidden = "import importlib.util\nimportlib.util.find_spec = lambda *names: None\n"
     pytester.makeconftest(hidden + CONFTEST)
-    result = run(pytester, "--garl-budget=8", *ON_RAY)
+    result = run(pytester, "--garl-budget=8", *WITH_RAY)
     assert result.ret == pytest.ExitCode.USAGE_ERROR
     result.stderr.fnmatch_lines(["*Ray is not installed; pip install 'pytest-garl[[]ray[]]'*"])
     assert not (pytester.path / ".garl").exists()
@@ -244,7 +244,7 @@ def test_missing_cluster_is_one_clear_error(
         free.bind(("127.0.0.1", 0))
         address = f"127.0.0.1:{free.getsockname()[1]}"
         monkeypatch.setenv("RAY_ADDRESS", address)
-        result = run(pytester, "--garl-budget=8", *ON_RAY)
+        result = run(pytester, "--garl-budget=8", *WITH_RAY)
     assert result.ret == pytest.ExitCode.USAGE_ERROR
     result.stderr.fnmatch_lines([f"*RAY_ADDRESS={address}: nobody answers there*"])
     assert not (pytester.path / ".garl").exists()
@@ -252,5 +252,5 @@ def test_missing_cluster_is_one_clear_error(
 
 def test_worker_of_ray_is_never_the_pytest_process(pytester: pytest.Pytester) -> None:
     project(pytester)
-    result = run(pytester, "--garl-budget=8", "--garl-workers=0", *ON_RAY)
+    result = run(pytester, "--garl-budget=8", "--garl-workers=0", *WITH_RAY)
     result.stderr.fnmatch_lines(["*--garl-workers: found '0', expected a whole number*least 1*"])

@@ -53,8 +53,10 @@ def test_verbose_report_shows_the_scenario_in_physical_units(pytester: pytest.Py
     quiet = run(pytester, *SEARCH).stdout.str()
     assert "Scenario (seed" not in quiet
     assert "environment." not in quiet
-    told = run(pytester, *SEARCH, "-v").stdout.str().replace("\n  ", " ")
-    assert re.search(r"Scenario \(seed \d+\): dust, visibility \d+ m; fog, visibility \d+ m;", told)
-    assert re.search(r"falling rain, [\d.]+ mm/h", told)
-    assert re.search(r"dog-1 a dog of up to [\d.]+ m/s, from \(-?[\d.]+, -?[\d.]+\) m", told)
-    assert "environment." not in told
+    output = run(pytester, *SEARCH, "-v").stdout.str().replace("\n  ", " ")
+    assert re.search(
+        r"Scenario \(seed \d+\): dust, visibility \d+ m; fog, visibility \d+ m;", output
+    )
+    assert re.search(r"falling rain, [\d.]+ mm/h", output)
+    assert re.search(r"dog-1 a dog of up to [\d.]+ m/s, from \(-?[\d.]+, -?[\d.]+\) m", output)
+    assert "environment." not in output

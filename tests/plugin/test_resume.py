@@ -127,13 +127,13 @@ def test_killed_run_resumes_with_the_same_results(
     wait_for(ledger, rng.randrange(28), process)
     time.sleep(rng.uniform(0, 0.1))
     workers = [pid for (pid,) in query(ledger, "SELECT pid FROM worker")]
-    prey = {
+    pids = {
         "pytest": [process.pid],
         "worker": workers,
         "xdist worker": children_of(process.pid),
     }[victim]
-    if prey and process.poll() is None:
-        os.kill(rng.choice(prey), signal.SIGKILL)
+    if pids and process.poll() is None:
+        os.kill(rng.choice(pids), signal.SIGKILL)
     # A worker that is killed does not end the run: its slot is flown once more.
     process.communicate(timeout=60)
     for _ in range(200):

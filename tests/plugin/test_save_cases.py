@@ -174,8 +174,8 @@ def test_fixed_case_that_no_pilot_outruns_flies_with_recorded_moves_only(
     hit = "> 0.7 and (not knows or npcs.name != 'recorded')"
     replace_text(simulator, "> 0.7 and not knows", hit)
     result = run(pytester, *SEARCH)
-    told = " ".join(result.stdout.str().split())
-    assert "the reference pilot violates nothing unless objects pursue it too" in told
+    output = " ".join(result.stdout.str().split())
+    assert "the reference pilot violates nothing unless objects pursue it too" in output
     fog, dog = cases(pytester)
     assert (load_case(fog).avoidable, load_case(dog).avoidable) == ("live", "recorded")
     assert load_case(dog).status == "open"

@@ -7,7 +7,7 @@ from typing import Any
 from pytest_garl.adversary.catalogue import policy_spec
 from pytest_garl.plugin.search_setup import npc_policy_of
 from pytest_garl.regressions.case import Case
-from tests.regressions.samples import NAMES, case, case_with_changes
+from tests.regressions.samples import OBJECT_NAMES, case, case_with_changes
 
 
 def test_case_flies_with_its_moves_and_changes() -> None:
@@ -17,7 +17,7 @@ def test_case_flies_with_its_moves_and_changes() -> None:
 
     changes = json.loads(arguments(case_with_changes())["changes"])
     assert changes == {
-        NAMES[-1]: [[0, "environment.fog", 0.01], [2, "environment.sun_position", -0.01]]
+        OBJECT_NAMES[-1]: [[0, "environment.fog", 0.01], [2, "environment.sun_position", -0.01]]
     }
     # So that the searches' keys of other cases stay what they were.
     assert arguments(case()).keys() == {"moves"}

@@ -144,10 +144,10 @@ def test_a_broken_users_method_is_reported_once(pytester: pytest.Pytester) -> No
     )
     method = ("--garl-method=broken_method:Broken", "-o", "pythonpath=.")
     result = run(pytester, "--garl-budget=2", "--garl-workers=0", *method)
-    both = result.stdout.str() + result.stderr.str()
-    told = "search method 'broken_method:Broken': ask() returned 3, expected a list of 2"
-    assert both.count(told) == 1
-    assert "Traceback" not in both
+    output = result.stdout.str() + result.stderr.str()
+    error = "search method 'broken_method:Broken': ask() returned 3, expected a list of 2"
+    assert output.count(error) == 1
+    assert "Traceback" not in output
 
 
 @PARALLEL

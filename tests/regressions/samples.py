@@ -23,8 +23,8 @@ from pytest_garl.verdicts.verdict import Limits
 from tests.support.results import flight_result
 
 LAWN = load_map("lawn")
-NAMES = [name for name, _ in LAWN.present_objects]
-COLLIDING_OBJECT = NAMES[0]
+OBJECT_NAMES = [name for name, _ in LAWN.present_objects]
+COLLIDING_OBJECT = OBJECT_NAMES[0]
 SYSTEM = "stack.landing:Lander"
 
 
@@ -34,7 +34,7 @@ def case(
     """Return a case in which the UAV hits a dog on the lawn."""
     genome = genome_for(LAWN)
     row = genome.random(np.random.default_rng(1))
-    scenario = repair(decode(row, genome, map="lawn", seed=9), LAWN).without(*NAMES[:-1])
+    scenario = repair(decode(row, genome, map="lawn", seed=9), LAWN).without(*OBJECT_NAMES[:-1])
     return Case(
         system=SYSTEM,
         status="open",
@@ -50,7 +50,7 @@ def case(
         ),
         policy="dqn",
         policy_sha256="ab" * 32,
-        moves=((NAMES[-1], ((0.0, 0.0), (0.0, 0.0), (0.6, -0.8))),),
+        moves=((OBJECT_NAMES[-1], ((0.0, 0.0), (0.0, 0.0), (0.6, -0.8))),),
         evidence=Evidence(
             trajectory_sha256="cd" * 32,
             cpu="x86_64-avx2",
@@ -67,17 +67,19 @@ def case(
 def case_with_changes() -> Case:
     """Return a case whose policy changed the environment."""
     changes = ((0, "environment.fog", 0.01), (2, "environment.sun_position", -0.01))
-    return dataclasses.replace(case(), policy="online-rl", changes=((NAMES[-1], changes),))
+    return dataclasses.replace(case(), policy="online-rl", changes=((OBJECT_NAMES[-1], changes),))
 
 
-def violation(seed: int = 7) -> Scenario:
+def violating_scenario(seed: int = 7) -> Scenario:
     """Return a scenario on the lawn, with all of its objects."""
     genome = genome_for(LAWN)
     row = genome.random(np.random.default_rng(seed))
     return repair(decode(row, genome, map="lawn", seed=1), LAWN)
 
 
-FIRST = violation().replace({f"{COLLIDING_OBJECT}.velocity": 0.9, "environment.fog": 0.12})
+VIOLATING_SCENARIO = violating_scenario().replace(
+    {f"{COLLIDING_OBJECT}.velocity": 0.9, "environment.fog": 0.12}
+)
 SIGNATURE = "IV:dog:last-metre:unseen"
 Fails = Callable[[Scenario, str], bool]
 JOB = FlightJob.for_system(
@@ -112,7 +114,7 @@ class FakeFlights:
         )
 
 
-def request(budget: int, *scenarios: Scenario) -> CaseRequest:
+def make_case_request(budget: int, *scenarios: Scenario) -> CaseRequest:
     """Return a request for a case of violating scenarios."""
     found = CompletedFlight(
         result=collision_result(SIGNATURE), sha256="", record=Path("/nowhere/x")

@@ -13,9 +13,16 @@ from pytest_garl.regressions.avoidability import (
 )
 from pytest_garl.regressions.case import Avoidable, RecordedBehaviour
 from pytest_garl.scenarios.scenario import Scenario
-from tests.regressions.samples import FIRST, JOB, NAMES, SIGNATURE, collision_result, request
+from tests.regressions.samples import (
+    JOB,
+    OBJECT_NAMES,
+    SIGNATURE,
+    VIOLATING_SCENARIO,
+    collision_result,
+    make_case_request,
+)
 
-MOVES = RecordedBehaviour(moves=((NAMES[0], ((0.5, 0.0),)),))
+MOVES = RecordedBehaviour(moves=((OBJECT_NAMES[0], ((0.5, 0.0),)),))
 NOTHING = RecordedBehaviour(moves=())
 
 
@@ -39,21 +46,27 @@ class ReferenceFlights:
 def test_avoidability_names_the_objects_among_which_the_pilot_succeeds(
     fatal: tuple[str, ...], expected: Avoidable
 ) -> None:
-    asked = request(10, FIRST)
+    case_request = make_case_request(10, VIOLATING_SCENARIO)
     fly = ReferenceFlights(*fatal)
-    assert avoidability(asked.job, FIRST, MOVES, fly, fails=asked.fails) == expected
+    assert (
+        avoidability(case_request.job, VIOLATING_SCENARIO, MOVES, fly, fails=case_request.fails)
+        == expected
+    )
 
 
 def test_pilot_flies_once_if_nothing_moves() -> None:
     fly = ReferenceFlights()
-    asked = request(10, FIRST)
-    assert avoidability(asked.job, FIRST, NOTHING, fly, fails=asked.fails) == "live"
+    case_request = make_case_request(10, VIOLATING_SCENARIO)
+    assert (
+        avoidability(case_request.job, VIOLATING_SCENARIO, NOTHING, fly, fails=case_request.fails)
+        == "live"
+    )
     assert fly.policies == ["recorded"]
 
 
 def test_pilot_survives_recorded_moves_without_a_violation() -> None:
-    assert survives_recorded_moves(JOB, FIRST, MOVES, ReferenceFlights())
-    assert not survives_recorded_moves(JOB, FIRST, MOVES, ReferenceFlights("recorded"))
+    assert survives_recorded_moves(JOB, VIOLATING_SCENARIO, MOVES, ReferenceFlights())
+    assert not survives_recorded_moves(JOB, VIOLATING_SCENARIO, MOVES, ReferenceFlights("recorded"))
 
 
 def test_case_without_flights_of_the_pilot_assumes_recorded_moves() -> None:

@@ -7,19 +7,19 @@ import pytest
 from pytest_garl.errors import ScenarioError
 from pytest_garl.regressions.case_file import dump_case, parse_case
 from pytest_garl.scenarios.maps.map import load_map
-from tests.regressions.samples import NAMES, case, case_with_changes
+from tests.regressions.samples import OBJECT_NAMES, case, case_with_changes
 
 TEXT = dump_case(case())
 MOVES = "[[2, 0.0, 0.0], [1, 0.6, -0.8]]"
 
 
 def test_moves_are_written_as_runs() -> None:
-    assert f"{NAMES[-1]} = [[2, 0.0, 0.0], [1, 0.6, -0.8]]" in dump_case(case())
+    assert f"{OBJECT_NAMES[-1]} = [[2, 0.0, 0.0], [1, 0.6, -0.8]]" in dump_case(case())
 
 
 def test_file_keeps_negative_zeros() -> None:
     plain = dataclasses.replace(
-        case(), moves=((NAMES[-1], ((0.0, 0.0), (0.0, -0.0), (-0.0, 0.0))),)
+        case(), moves=((OBJECT_NAMES[-1], ((0.0, 0.0), (0.0, -0.0), (-0.0, 0.0))),)
     )
     again = parse_case(dump_case(plain), load_map)
     assert repr(again.moves) == repr(plain.moves)
@@ -27,7 +27,9 @@ def test_file_keeps_negative_zeros() -> None:
 
 
 def test_changes_of_an_unknown_object_are_refused() -> None:
-    text = dump_case(case_with_changes()).replace(f'{NAMES[-1]} = [[0, "env', 'cat-1 = [[0, "env')
+    text = dump_case(case_with_changes()).replace(
+        f'{OBJECT_NAMES[-1]} = [[0, "env', 'cat-1 = [[0, "env'
+    )
     with pytest.raises(ScenarioError, match=r"'changes.cat-1': unknown key"):
         parse_case(text, load_map)
 
@@ -47,14 +49,15 @@ def test_error_of_invalid_changes_names_source_and_key(old: str, new: str) -> No
     text = dump_case(case_with_changes())
     start = text.index("[changes]")
     broken = text[:start] + text[start:].replace(old, new, 1)
-    words = rf"lawn-x.toml: key 'changes.{NAMES[-1]}': found .* expected a list of \[decision, gene"
+    key = f"changes.{OBJECT_NAMES[-1]}"
+    words = rf"lawn-x.toml: key '{key}': found .* expected a list of \[decision, gene"
     with pytest.raises(ScenarioError, match=words):
         parse_case(broken, load_map, source="lawn-x.toml")
 
 
 def test_moves_of_the_longest_flight_are_accepted() -> None:
     found = parse_case(TEXT.replace(MOVES, "[[599, 0.0, 0.0], [1, 0.6, -0.8]]"), load_map)
-    assert len(dict(found.moves)[NAMES[-1]]) == 600
+    assert len(dict(found.moves)[OBJECT_NAMES[-1]]) == 600
 
 
 def test_change_after_the_longest_flight_is_refused() -> None:

@@ -24,8 +24,8 @@ def test_id_names_map_type_and_subject_and_differs_between_scenarios() -> None:
 
 
 def test_case_of_an_own_assertion_belongs_to_its_test_in_any_file() -> None:
-    old = dataclasses.replace(case(), test="test_own", assertion="12345678")
-    told = dataclasses.replace(old, test="tests/test_it.py::test_own")
-    assert parse_case(dump_case(old), load_map) == old
-    assert (told.asserting_test, told.id) == ("test_own", old.id)
-    assert told.id != case().id
+    with_function_name = dataclasses.replace(case(), test="test_own", assertion="12345678")
+    with_node_id = dataclasses.replace(with_function_name, test="tests/test_it.py::test_own")
+    assert parse_case(dump_case(with_function_name), load_map) == with_function_name
+    assert (with_node_id.asserting_test, with_node_id.id) == ("test_own", with_function_name.id)
+    assert with_node_id.id != case().id

@@ -15,7 +15,7 @@ from pytest_garl.scenarios.chromosome import decode
 from pytest_garl.scenarios.genes import genome_for, with_destinations
 from pytest_garl.scenarios.maps.map import load_map
 from pytest_garl.scenarios.validity import repair
-from tests.regressions.samples import LAWN, NAMES, case, case_with_changes
+from tests.regressions.samples import LAWN, OBJECT_NAMES, case, case_with_changes
 
 ROOT = Path(__file__).parents[2]
 
@@ -50,14 +50,17 @@ def test_file_keeps_any_description(description: str) -> None:
 def test_file_keeps_destinations() -> None:
     genome = with_destinations(genome_for(LAWN))
     row = genome.random(np.random.default_rng(1))
-    scenario = repair(decode(row, genome, map="lawn", seed=9), LAWN).without(*NAMES[:-1])
+    scenario = repair(decode(row, genome, map="lawn", seed=9), LAWN).without(*OBJECT_NAMES[:-1])
     bound = dataclasses.replace(case(), scenario=scenario, policy="destination")
     assert parse_case(dump_case(bound), load_map) == bound
 
 
 def test_file_keeps_changes_of_the_environment() -> None:
     text = dump_case(case_with_changes())
-    assert f'{NAMES[-1]} = [[0, "environment.fog", 0.01], [2, "environment.sun_position"' in text
+    assert (
+        f'{OBJECT_NAMES[-1]} = [[0, "environment.fog", 0.01], [2, "environment.sun_position"'
+        in text
+    )
     assert parse_case(text, load_map) == case_with_changes()
     assert dump_case(parse_case(text, load_map)) == text
     assert case_with_changes().id != case().id
@@ -78,10 +81,12 @@ def test_file_keeps_the_test_and_the_hashes_of_the_sources() -> None:
     evidence = dataclasses.replace(
         plain.evidence, system_sha256="ef" * 32, simulator_sha256="12" * 32
     )
-    told = dataclasses.replace(plain, test="tests/test_it.py::TestIt::test_a", evidence=evidence)
-    assert parse_case(dump_case(told), load_map) == told
-    assert told.id == plain.id
-    assert told.asserting_test == ""
+    with_node_id = dataclasses.replace(
+        plain, test="tests/test_it.py::TestIt::test_a", evidence=evidence
+    )
+    assert parse_case(dump_case(with_node_id), load_map) == with_node_id
+    assert with_node_id.id == plain.id
+    assert with_node_id.asserting_test == ""
 
 
 @pytest.mark.parametrize(

@@ -3,17 +3,23 @@ from __future__ import annotations
 from pytest_garl.regressions.case import RecordedBehaviour
 from pytest_garl.regressions.case_flights import PILOT_FLIGHTS, CaseFlights
 from pytest_garl.regressions.robustness import NEIGHBOURS, neighbours
-from tests.regressions.samples import FIRST, LAWN, NAMES, FakeFlights, request
+from tests.regressions.samples import (
+    LAWN,
+    OBJECT_NAMES,
+    VIOLATING_SCENARIO,
+    FakeFlights,
+    make_case_request,
+)
 
-BEHAVIOUR = RecordedBehaviour(moves=((NAMES[0], ((0.5, 0.0),)),))
+BEHAVIOUR = RecordedBehaviour(moves=((OBJECT_NAMES[0], ((0.5, 0.0),)),))
 
 
 def test_flights_of_the_reference_pilot_are_reserved() -> None:
-    flights = CaseFlights(request(20, FIRST), FakeFlights(lambda *_: True))
+    flights = CaseFlights(make_case_request(20, VIOLATING_SCENARIO), FakeFlights(lambda *_: True))
     assert flights.left == 20 - PILOT_FLIGHTS
-    flights.fly_live(FIRST)
+    flights.fly_live(VIOLATING_SCENARIO)
     assert flights.left == 19 - PILOT_FLIGHTS
-    failing = flights.confirm(FIRST, FIRST, BEHAVIOUR)
+    failing = flights.confirm(VIOLATING_SCENARIO, VIOLATING_SCENARIO, BEHAVIOUR)
     assert failing is not None
     assert flights.left == 18 - NEIGHBOURS - PILOT_FLIGHTS
     flights.avoidability(failing)
@@ -23,21 +29,32 @@ def test_flights_of_the_reference_pilot_are_reserved() -> None:
 
 
 def test_confirm_counts_the_neighbours_that_fail() -> None:
-    first, *_ = neighbours(FIRST, LAWN)
-    flights = CaseFlights(request(20, FIRST), FakeFlights(lambda each, _: each in (FIRST, first)))
-    failing = flights.confirm(FIRST, FIRST, BEHAVIOUR)
+    first, *_ = neighbours(VIOLATING_SCENARIO, LAWN)
+    flights = CaseFlights(
+        make_case_request(20, VIOLATING_SCENARIO),
+        FakeFlights(lambda each, _: each in (VIOLATING_SCENARIO, first)),
+    )
+    failing = flights.confirm(VIOLATING_SCENARIO, VIOLATING_SCENARIO, BEHAVIOUR)
     assert failing is not None
     assert (failing.neighbours_failed, failing.neighbours_flown) == (1, NEIGHBOURS)
 
 
 def test_confirm_stops_when_too_few_neighbours_can_fail() -> None:
-    fly = FakeFlights(lambda each, _: each == FIRST)
-    flights = CaseFlights(request(20, FIRST), fly)
-    assert flights.confirm(FIRST, FIRST, BEHAVIOUR, at_least=NEIGHBOURS) is None
+    fly = FakeFlights(lambda each, _: each == VIOLATING_SCENARIO)
+    flights = CaseFlights(make_case_request(20, VIOLATING_SCENARIO), fly)
+    assert (
+        flights.confirm(VIOLATING_SCENARIO, VIOLATING_SCENARIO, BEHAVIOUR, at_least=NEIGHBOURS)
+        is None
+    )
     assert fly.count == 2
 
 
 def test_confirm_flies_no_neighbours_of_a_scenario_that_passes() -> None:
     fly = FakeFlights(lambda *_: False)
-    assert CaseFlights(request(20, FIRST), fly).confirm(FIRST, FIRST, BEHAVIOUR) is None
+    assert (
+        CaseFlights(make_case_request(20, VIOLATING_SCENARIO), fly).confirm(
+            VIOLATING_SCENARIO, VIOLATING_SCENARIO, BEHAVIOUR
+        )
+        is None
+    )
     assert fly.count == 1

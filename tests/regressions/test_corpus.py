@@ -16,7 +16,7 @@ from pytest_garl.regressions.case_file import dump_case, load_case
 from pytest_garl.regressions.corpus import Corpus, patch_of, replace_file
 from pytest_garl.scenarios.maps import map as package
 from pytest_garl.scenarios.maps.map import load_map
-from tests.regressions.samples import NAMES, SYSTEM, case
+from tests.regressions.samples import OBJECT_NAMES, SYSTEM, case
 
 TEXT = dump_case(case())
 
@@ -33,7 +33,7 @@ def test_corpus_saves_a_fixed_failure_again(tmp_path: Path) -> None:
     path = Corpus(tmp_path).save(case())
     assert path is not None
     replace_file(path, dataclasses.replace(case(), status="fixed"))
-    again = dataclasses.replace(case(), policy="greedy", moves=((NAMES[-1], ()),))
+    again = dataclasses.replace(case(), policy="greedy", moves=((OBJECT_NAMES[-1], ()),))
     assert Corpus(tmp_path).save(again) is not None
     found = Corpus(tmp_path).entries(SYSTEM)
     assert sorted(each.case.status for each in found if each.case) == ["fixed", "open"]

@@ -8,12 +8,18 @@ from pytest_garl.regressions.case_request import FailingScenario
 from pytest_garl.regressions.new_case import case_without_flights, new_case
 from pytest_garl.regressions.user_failure import UserFailure
 from pytest_garl.scenarios.scenario import Scenario
-from tests.regressions.samples import COLLIDING_OBJECT, FIRST, NAMES, SIGNATURE, request
+from tests.regressions.samples import (
+    COLLIDING_OBJECT,
+    OBJECT_NAMES,
+    SIGNATURE,
+    VIOLATING_SCENARIO,
+    make_case_request,
+)
 
-REQUEST = request(10, FIRST)
-SIMPLE = FIRST.without(*NAMES[1:])
+REQUEST = make_case_request(10, VIOLATING_SCENARIO)
+SIMPLE = VIOLATING_SCENARIO.without(*OBJECT_NAMES[1:])
 FAILING = FailingScenario(
-    origin=FIRST,
+    origin=VIOLATING_SCENARIO,
     scenario=SIMPLE,
     behaviour=RecordedBehaviour(moves=((COLLIDING_OBJECT, ((0.5, 0.0),)),)),
     flight=REQUEST.violations[0][1],
@@ -28,7 +34,9 @@ def test_case_holds_scenario_moves_and_evidence() -> None:
     assert (made.status, made.avoidable) == ("open", "live")
     assert made.violation.signature == SIGNATURE
     assert (made.evidence.neighbours_failed, made.evidence.neighbours) == (2, 3)
-    assert made.evidence.removed.startswith(f"{len(NAMES) - 1} of {len(NAMES)} objects, ")
+    assert made.evidence.removed.startswith(
+        f"{len(OBJECT_NAMES) - 1} of {len(OBJECT_NAMES)} objects, "
+    )
     assert made.edge
 
 
@@ -51,7 +59,7 @@ def test_case_of_an_own_assertion_describes_its_failure() -> None:
 
 
 def test_case_without_flights_is_the_simplest_violation() -> None:
-    result = case_without_flights(request(10, FIRST, SIMPLE))
+    result = case_without_flights(make_case_request(10, VIOLATING_SCENARIO, SIMPLE))
     assert result.case is not None
     assert result.case.scenario == SIMPLE
     assert (result.flights, result.case.evidence.neighbours) == (0, 0)

@@ -6,10 +6,10 @@ from pytest_garl.execution.result import CompletedFlight
 from pytest_garl.regressions.recorded_behaviour import find_colliding_object, recorded_behaviour
 from tests.regressions.samples import (
     COLLIDING_OBJECT,
-    FIRST,
     LAWN,
-    NAMES,
+    OBJECT_NAMES,
     SIGNATURE,
+    VIOLATING_SCENARIO,
     case_with_changes,
     collision_result,
 )
@@ -21,9 +21,9 @@ def flight(signature: str) -> CompletedFlight:
 
 
 def test_flight_without_a_record_has_no_moves() -> None:
-    remaining = FIRST.without(NAMES[-1])
+    remaining = VIOLATING_SCENARIO.without(OBJECT_NAMES[-1])
     found = recorded_behaviour(flight(SIGNATURE), remaining, LAWN)
-    assert found.moves == tuple((name, ()) for name in NAMES[:-1])
+    assert found.moves == tuple((name, ()) for name in OBJECT_NAMES[:-1])
 
 
 def test_collision_names_the_object_that_was_hit() -> None:

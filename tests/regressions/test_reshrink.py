@@ -18,12 +18,12 @@ from pytest_garl.regressions.robustness import neighbours
 from pytest_garl.scenarios.scenario import Scenario
 from tests.regressions.samples import (
     COLLIDING_OBJECT,
-    FIRST,
     JOB,
     LAWN,
-    NAMES,
+    OBJECT_NAMES,
+    VIOLATING_SCENARIO,
     FakeFlights,
-    request,
+    make_case_request,
 )
 from tests.regressions.samples import case as dog_case
 
@@ -36,7 +36,7 @@ def saved(scenario: Scenario, *, neighbours_failed: int = 3) -> Case:
         neighbours_failed=neighbours_failed,
         removed="0 of 4 objects, 1 of 15 genes off nominal",
     )
-    names = [name for name in NAMES if name not in scenario.removed_objects]
+    names = [name for name in OBJECT_NAMES if name not in scenario.removed_objects]
     moves = tuple((name, ((0.0, 0.0), (0.5, -0.25))) for name in names)
     return dataclasses.replace(
         dog_case(), scenario=scenario, moves=moves, evidence=evidence, policy="stationary"
@@ -47,7 +47,7 @@ def shrunk(
     case: Case, fails: Callable[[Scenario, str], bool], flights: int = 60
 ) -> tuple[Case | None, int]:
     fly = FakeFlights(fails)
-    result = CaseReshrinker(request(flights), fly, case).build()
+    result = CaseReshrinker(make_case_request(flights), fly, case).build()
     assert result.flights == fly.count <= flights
     return result.case, fly.count
 
@@ -57,10 +57,10 @@ def by_record(scenario: Scenario, npcs: str) -> bool:
 
 
 def test_reshrinker_shrinks_a_case_from_its_own_record() -> None:
-    case = saved(FIRST)
+    case = saved(VIOLATING_SCENARIO)
     better, _ = shrunk(case, by_record)
     assert better is not None
-    assert set(better.scenario.removed_objects) == {*NAMES} - {COLLIDING_OBJECT}
+    assert set(better.scenario.removed_objects) == {*OBJECT_NAMES} - {COLLIDING_OBJECT}
     assert better.moves == ((COLLIDING_OBJECT, dict(case.moves)[COLLIDING_OBJECT]),)
     assert better.scenario["environment.fog"] == 0.0
     assert better.evidence.removed.startswith("3 of 4 objects, ")
@@ -68,7 +68,7 @@ def test_reshrinker_shrinks_a_case_from_its_own_record() -> None:
 
 
 def test_reshrinker_uses_the_policy_if_the_record_gives_nothing_simpler() -> None:
-    records = {FIRST}
+    records = {VIOLATING_SCENARIO}
 
     def fails(scenario: Scenario, npcs: str) -> bool:
         # A record strikes only where it was made; a policy strikes wherever that object is.
@@ -78,9 +78,9 @@ def test_reshrinker_uses_the_policy_if_the_record_gives_nothing_simpler() -> Non
         records.add(scenario)
         return COLLIDING_OBJECT not in scenario.removed_objects
 
-    better, _ = shrunk(saved(FIRST), fails)
+    better, _ = shrunk(saved(VIOLATING_SCENARIO), fails)
     assert better is not None
-    assert set(better.scenario.removed_objects) == {*NAMES} - {COLLIDING_OBJECT}
+    assert set(better.scenario.removed_objects) == {*OBJECT_NAMES} - {COLLIDING_OBJECT}
 
 
 @pytest.mark.parametrize("seed", range(30))
@@ -90,9 +90,9 @@ def test_reshrinker_makes_a_case_worse_in_no_respect(seed: int) -> None:
 
     def fails(scenario: Scenario, npcs: str) -> bool:
         likely = chance.random() < 0.6
-        return scenario == FIRST or answers.setdefault((scenario, npcs), likely)
+        return scenario == VIOLATING_SCENARIO or answers.setdefault((scenario, npcs), likely)
 
-    case = saved(FIRST, neighbours_failed=chance.randrange(4))
+    case = saved(VIOLATING_SCENARIO, neighbours_failed=chance.randrange(4))
     better, flights = shrunk(case, fails, chance.randrange(MINIMUM_RESHRINK_FLIGHTS, 50))
     assert flights >= 1
     if better is not None:
@@ -102,14 +102,16 @@ def test_reshrinker_makes_a_case_worse_in_no_respect(seed: int) -> None:
 
 
 def test_reshrinker_keeps_a_case_that_fails_only_as_it_is() -> None:
-    better, _ = shrunk(saved(FIRST), lambda scenario, _: scenario == FIRST)
+    better, _ = shrunk(
+        saved(VIOLATING_SCENARIO), lambda scenario, _: scenario == VIOLATING_SCENARIO
+    )
     assert better is None
 
 
 def test_reshrinker_renews_evidence_of_other_sources() -> None:
-    case = saved(FIRST)
+    case = saved(VIOLATING_SCENARIO)
     old = dataclasses.replace(case.evidence, simulator_sha256="00" * 32)
-    around = (FIRST, *neighbours(FIRST, LAWN))
+    around = (VIOLATING_SCENARIO, *neighbours(VIOLATING_SCENARIO, LAWN))
     better, _ = shrunk(
         dataclasses.replace(case, evidence=old), lambda scenario, _: scenario in around
     )

@@ -11,7 +11,7 @@ from pytest_garl.scenarios.chromosome import decode
 from pytest_garl.scenarios.genes import genome_for, with_destinations
 from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.scenarios.validity import problems, repair
-from tests.regressions.samples import COLLIDING_OBJECT, FIRST, LAWN, NAMES
+from tests.regressions.samples import COLLIDING_OBJECT, LAWN, OBJECT_NAMES, VIOLATING_SCENARIO
 
 
 def fast(scenario: Scenario) -> bool:
@@ -23,25 +23,32 @@ def in_fog(scenario: Scenario) -> bool:
 
 
 def two_of_them(scenario: Scenario) -> bool:
-    return fast(scenario) and NAMES[-1] not in scenario.removed_objects
+    return fast(scenario) and OBJECT_NAMES[-1] not in scenario.removed_objects
 
 
 def test_reset_and_bisect_removes_unneeded_parts_with_few_flights() -> None:
     found = shrink(
-        FIRST, fast, LAWN, 100, colliding_object=COLLIDING_OBJECT, passes=(reset_and_bisect,)
+        VIOLATING_SCENARIO,
+        fast,
+        LAWN,
+        100,
+        colliding_object=COLLIDING_OBJECT,
+        passes=(reset_and_bisect,),
     )
-    assert set(found.simplest.removed_objects) == {*NAMES} - {COLLIDING_OBJECT}
-    assert complexity(found.simplest, genome_of(FIRST, LAWN))[1] == 1
+    assert set(found.simplest.removed_objects) == {*OBJECT_NAMES} - {COLLIDING_OBJECT}
+    assert complexity(found.simplest, genome_of(VIOLATING_SCENARIO, LAWN))[1] == 1
     assert 0.3 <= found.simplest[f"{COLLIDING_OBJECT}.velocity"] <= 0.3 + 0.9 / 8
     assert found.flights <= 6
 
 
 @pytest.mark.parametrize("fails", [in_fog, two_of_them])
 def test_shrinking_keeps_the_parts_that_a_failure_needs(fails: Callable[[Scenario], bool]) -> None:
-    found = shrink(FIRST, fails, LAWN, 100, colliding_object=COLLIDING_OBJECT)
+    found = shrink(VIOLATING_SCENARIO, fails, LAWN, 100, colliding_object=COLLIDING_OBJECT)
     assert fails(found.simplest)
     assert problems(found.simplest, LAWN) == ()
-    assert complexity(found.simplest, genome_of(FIRST, LAWN))[1] == (2 if fails is in_fog else 1)
+    assert complexity(found.simplest, genome_of(VIOLATING_SCENARIO, LAWN))[1] == (
+        2 if fails is in_fog else 1
+    )
 
 
 def test_shrinking_keeps_its_budget_and_flies_nothing_twice() -> None:
@@ -54,20 +61,23 @@ def test_shrinking_keeps_its_budget_and_flies_nothing_twice() -> None:
 
     for budget in (0, 1, 5, 40):
         seen.clear()
-        found = shrink(FIRST, fails, LAWN, budget, colliding_object=COLLIDING_OBJECT)
+        found = shrink(VIOLATING_SCENARIO, fails, LAWN, budget, colliding_object=COLLIDING_OBJECT)
         assert found.flights == len(seen) <= budget
 
 
 def test_shrinking_is_deterministic() -> None:
     one, other = (
-        shrink(FIRST, in_fog, LAWN, 60, colliding_object=COLLIDING_OBJECT) for _ in range(2)
+        shrink(VIOLATING_SCENARIO, in_fog, LAWN, 60, colliding_object=COLLIDING_OBJECT)
+        for _ in range(2)
     )
     assert one == other
 
 
 def test_history_holds_failing_scenarios_from_complex_to_simple() -> None:
-    history = shrink(FIRST, in_fog, LAWN, 60, colliding_object=COLLIDING_OBJECT).history
-    genome = genome_of(FIRST, LAWN)
+    history = shrink(
+        VIOLATING_SCENARIO, in_fog, LAWN, 60, colliding_object=COLLIDING_OBJECT
+    ).history
+    genome = genome_of(VIOLATING_SCENARIO, LAWN)
     assert all(in_fog(each) for each in history)
     sizes = [complexity(each, genome) for each in history]
     assert sizes == sorted(sizes, reverse=True)
@@ -90,5 +100,5 @@ def test_shrinking_rounds_destinations() -> None:
     assert found.simplest[f"{COLLIDING_OBJECT}.destination_y"] == pytest.approx(
         first[f"{COLLIDING_OBJECT}.destination_y"], abs=0.005
     )
-    assert set(found.simplest.removed_objects) == {*NAMES} - {COLLIDING_OBJECT}
-    assert not any(key.startswith(NAMES[-1]) for key, _ in found.simplest.genes)
+    assert set(found.simplest.removed_objects) == {*OBJECT_NAMES} - {COLLIDING_OBJECT}
+    assert not any(key.startswith(OBJECT_NAMES[-1]) for key, _ in found.simplest.genes)

@@ -6,25 +6,33 @@ from pytest_garl.regressions.case_request import FailingScenario
 from pytest_garl.regressions.robustness import NEIGHBOURS, neighbours
 from pytest_garl.regressions.simplest_robust import simplest_robust, with_shorter_record
 from pytest_garl.scenarios.scenario import Scenario
-from tests.regressions.samples import FIRST, LAWN, NAMES, FakeFlights, request
+from tests.regressions.samples import (
+    LAWN,
+    OBJECT_NAMES,
+    VIOLATING_SCENARIO,
+    FakeFlights,
+    make_case_request,
+)
 
-BEHAVIOUR = RecordedBehaviour(moves=((NAMES[0], ((0.5, 0.0),)),))
-HISTORY = [FIRST.without(*NAMES[count:]) for count in (3, 2, 1)]
+BEHAVIOUR = RecordedBehaviour(moves=((OBJECT_NAMES[0], ((0.5, 0.0),)),))
+HISTORY = [VIOLATING_SCENARIO.without(*OBJECT_NAMES[count:]) for count in (3, 2, 1)]
 
 
 def best(flights: CaseFlights) -> FailingScenario:
     return FailingScenario(
-        origin=FIRST,
-        scenario=FIRST,
+        origin=VIOLATING_SCENARIO,
+        scenario=VIOLATING_SCENARIO,
         behaviour=BEHAVIOUR,
-        flight=flights.live_flight(FIRST),
+        flight=flights.live_flight(VIOLATING_SCENARIO),
         neighbours_failed=1,
         neighbours_flown=NEIGHBOURS,
     )
 
 
 def reduce(fails: set[Scenario]) -> FailingScenario:
-    flights = CaseFlights(request(60, FIRST), FakeFlights(lambda each, _: each in fails))
+    flights = CaseFlights(
+        make_case_request(60, VIOLATING_SCENARIO), FakeFlights(lambda each, _: each in fails)
+    )
     return simplest_robust(flights, best(flights), HISTORY, lambda _: BEHAVIOUR)
 
 
@@ -37,9 +45,9 @@ def test_simplest_robust_steps_back_from_an_edge() -> None:
 
 
 def test_simplest_robust_keeps_the_best_if_all_sit_on_an_edge() -> None:
-    assert reduce({*HISTORY}).scenario == FIRST
+    assert reduce({*HISTORY}).scenario == VIOLATING_SCENARIO
 
 
 def test_flight_without_a_record_has_no_shorter_one() -> None:
-    flights = CaseFlights(request(60, FIRST), FakeFlights(lambda *_: True))
+    flights = CaseFlights(make_case_request(60, VIOLATING_SCENARIO), FakeFlights(lambda *_: True))
     assert with_shorter_record(flights, best(flights)) == (best(flights),)

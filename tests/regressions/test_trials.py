@@ -3,7 +3,7 @@ from __future__ import annotations
 from pytest_garl.regressions.trials import Trials
 from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.scenarios.validity import problems
-from tests.regressions.samples import COLLIDING_OBJECT, FIRST, LAWN, NAMES
+from tests.regressions.samples import COLLIDING_OBJECT, LAWN, OBJECT_NAMES, VIOLATING_SCENARIO
 
 
 def test_trials_fly_repaired_scenarios() -> None:
@@ -13,6 +13,10 @@ def test_trials_fly_repaired_scenarios() -> None:
         flown.append(scenario)
         return False
 
-    trials = Trials(FIRST, fails, LAWN, 10)
-    trials(FIRST.replace({f"{COLLIDING_OBJECT}.start_x": FIRST[f"{NAMES[1]}.start_x"]}))
+    trials = Trials(VIOLATING_SCENARIO, fails, LAWN, 10)
+    trials(
+        VIOLATING_SCENARIO.replace(
+            {f"{COLLIDING_OBJECT}.start_x": VIOLATING_SCENARIO[f"{OBJECT_NAMES[1]}.start_x"]}
+        )
+    )
     assert problems(flown[0], LAWN) == ()
