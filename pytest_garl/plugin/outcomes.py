@@ -17,7 +17,7 @@ from pytest_garl.regressions.case import Status
 
 Outcome = Literal["passed", "failed", "xfailed", "skipped"]
 
-LEAST_FAILURES = 2
+MINIMUM_FAILURES = 2
 """A violation repeats if at least this many of a slot's flights show it."""
 
 
@@ -70,7 +70,7 @@ class Reflights:
     @property
     def confirm(self) -> bool:
         """Whether the failure repeats; a single flight is enough if the test can judge no other."""
-        return self.flown == 1 or self.failed >= LEAST_FAILURES
+        return self.flown == 1 or self.failed >= MINIMUM_FAILURES
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
