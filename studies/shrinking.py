@@ -27,10 +27,14 @@ from pytest_garl.execution.on_demand import FlyFunction, OnDemandFlights
 from pytest_garl.execution.result import CompletedFlight
 from pytest_garl.experiments.pytest_run import run_pytest
 from pytest_garl.experiments.spec import ExperimentRun
-from pytest_garl.regressions.complexity import complexity, genome_of
-from pytest_garl.regressions.hypothesis_pass import shrink_by_hypothesis
 from pytest_garl.regressions.recorded_behaviour import find_colliding_object
-from pytest_garl.regressions.shrink import reset_and_bisect, round_values, shrink
+from pytest_garl.regressions.shrink import (
+    reset_and_bisect,
+    round_values,
+    shrink,
+    shrink_by_hypothesis,
+)
+from pytest_garl.regressions.simplification import complexity, genome_of
 from pytest_garl.scenarios.files import parse_scenario
 from pytest_garl.scenarios.maps.map import load_map
 from pytest_garl.scenarios.scenario import Scenario

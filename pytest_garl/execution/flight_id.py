@@ -1,4 +1,4 @@
-"""Flights by name: the key of the search in the ledger, the slot, the record's file."""
+"""Slots of a search, and the name of each flight: its key in the ledger, the record's file."""
 
 from __future__ import annotations
 
@@ -6,12 +6,29 @@ import hashlib
 from dataclasses import dataclass
 from pathlib import Path
 
-from pytest_garl.execution.slot import Slot
-
 KEY_DIGITS = 16
 """Hexadecimal digits of a search's key: 64 bits, so that two searches never have the same."""
 NAME_DIGITS = 8
 """Digits of the key that a record's name repeats, to be short."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, order=True)
+class Slot:
+    """One flight in a search: ``court-g03-s17`` is slot 17 of generation 3 on the court."""
+
+    generation: int
+    index: int
+
+    def id(self, map: str) -> str:
+        """Return the slot's name in item ids."""
+        return f"{map}-g{self.generation:02d}-s{self.index:02d}"
+
+
+def slots(budget: int, size: int) -> tuple[Slot, ...]:
+    """Return exactly ``budget`` slots in generations of ``size``; the last may be shorter."""
+    return tuple(Slot(generation=n // size, index=n % size) for n in range(budget))
+
+
 FIRST_SLOT = Slot(generation=0, index=0)
 """The only slot of a search that flies once."""
 

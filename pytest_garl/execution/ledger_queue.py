@@ -9,10 +9,9 @@ from pathlib import Path
 from time import monotonic
 
 from pytest_garl.execution.database import Database
-from pytest_garl.execution.flight_id import FlightId
+from pytest_garl.execution.flight_id import FlightId, Slot
 from pytest_garl.execution.processes import alive
 from pytest_garl.execution.result import FlightResult
-from pytest_garl.execution.slot import Slot
 
 _METERS = {"search": "flights", "case": "cases", "on_demand": "on_demand"}
 _NEXT, _NEXT_OF_SYSTEM = (

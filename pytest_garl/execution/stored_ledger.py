@@ -11,10 +11,10 @@ from typing import get_args
 
 from pytest_garl.errors import GarlError, LedgerError
 from pytest_garl.execution.database import VERSION, SearchKind
+from pytest_garl.execution.flight_id import Slot
 from pytest_garl.execution.job import parse_job
 from pytest_garl.execution.ledger import Ledger
 from pytest_garl.execution.result import parse_result
-from pytest_garl.execution.slot import Slot
 from pytest_garl.messages import shortened, shown
 from pytest_garl.scenarios.files import parse_scenario
 from pytest_garl.scenarios.scenario import Scenario

@@ -10,13 +10,13 @@ The modules, in the order in which a session needs them:
 3. ``collection`` makes the items of each marked test: ``marker`` reads the marker, and a ``target``
    says what one item tests.  ``baseline_gate`` adds items that compare rates with a baseline.
 4. ``search_setup`` puts the searches of the selected items into the ledger when the first of them
-   asks for its ``landing``.  ``header`` announces the flights; ``progress_display`` shows how many
-   are done, in words from ``progress_text``.
+   asks for its ``landing``.  ``header`` forecasts the flights; ``progress_display`` shows how far
+   they are, in the words of ``progress_text``.
 5. ``outcomes`` decides whether an item passes, fails, xfails or skips.  ``item_facts`` gathers the
-   facts (``item_failure``, ``failed_statement``, ``user_assertions``, ``report_claims``), and
-   ``item_report`` writes the decision into the report (``report_text``).
+   facts (with ``failed_statement`` and ``user_assertions``), and ``item_report`` writes the
+   decision into the report (``report_text``).
 6. ``tally`` counts what reports say, ``save_cases`` saves new violations, ``session_status`` sets
-   the exit status, and ``summary``, ``search_table`` and ``github_summary`` show the results.
+   the exit status, and ``summary`` and ``github_summary`` show all of it.
 
 ``hookspecs`` has the hook that users may implement, ``case_tests`` finds the tests of a saved case
 for ``garl cases``, and ``suggested_commands`` and ``terminal_text`` serve all texts.

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from pytest_garl.errors import GarlError
-from pytest_garl.execution.slot import slots
+from pytest_garl.execution.flight_id import slots
 from pytest_garl.plugin.marker import MarkerArguments, read_marker
 from pytest_garl.plugin.options import Options
 from pytest_garl.plugin.target import Target

@@ -1,16 +1,29 @@
-"""Gather the facts by which ``outcomes`` decides: from saved cases, reflights and the ledger."""
+"""Gather the facts by which ``outcomes`` decides: the failure, reflights, cases, the ledger."""
 
 from __future__ import annotations
 
 import dataclasses
 from collections.abc import Callable
+from dataclasses import dataclass
 from typing import TypeVar
 
-from pytest_garl.execution.result import FlightResult
-from pytest_garl.plugin.item_failure import ItemFailure, first_with_same_signature, refly
-from pytest_garl.plugin.outcomes import CaseState, FailedItem, Need, PassedCase, UnjudgedFlight
-from pytest_garl.plugin.run import Run
+import pytest
+
+from pytest_garl.execution.result import CompletedFlight, FlightResult
+from pytest_garl.plugin.failed_statement import failure_of
+from pytest_garl.plugin.keys import LANDING
+from pytest_garl.plugin.outcomes import (
+    CaseState,
+    FailedItem,
+    Need,
+    PassedCase,
+    Reflights,
+    UnjudgedFlight,
+)
+from pytest_garl.plugin.run import Run, test_of
 from pytest_garl.plugin.target import Target
+from pytest_garl.plugin.user_assertions import ItemAssertion
+from pytest_garl.regressions.user_failure import UserFailure
 
 F = TypeVar("F", PassedCase, UnjudgedFlight)
 
@@ -87,3 +100,124 @@ def slot_claim(run: Run, target: Target, nodeid: str) -> Callable[[Need, F], F]:
         return dataclasses.replace(facts, first=run.claims.claim_slot(target, nodeid))
 
     return claim
+
+
+REFLIGHTS = 4
+"""A violation of a system that need not be deterministic is flown so many times more."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ItemFailure:
+    """A built-in violation that an item shows, or a failed assertion about the user's own property.
+
+    ``failed_assertion`` is None if the flight let no assertion judge it.
+    """
+
+    signature: str
+    test: str
+    failed_assertion: UserFailure | None
+    user_property: bool
+    assertion: ItemAssertion
+
+    @property
+    def savable(self) -> bool:
+        """Whether a case of it can be judged: its test can run on other flights."""
+        return not self.user_property or self.assertion.runs_on_any_flight
+
+    def key(self, search: str) -> str:
+        """Return a key that is the same for all items of a search that show the same failure."""
+        if self.failed_assertion is None:
+            return f"{search} {self.signature}"
+        return f"{search} {self.signature} {self.test} {self.failed_assertion.assertion}"
+
+    def shows_in(self, run: Run, target: Target, flight: CompletedFlight) -> bool:
+        """Return whether the same assertion fails for the same reason in another flight."""
+        if not self.user_property and flight.signature != self.signature:
+            return False
+        if self.failed_assertion is None:
+            return True
+        if not self.assertion.runs_on_any_flight:
+            return False
+        found = self.assertion.failure(flight, run.scenario(target))
+        if found is None or found.assertion != self.failed_assertion.assertion:
+            return False
+        return found.is_about(flight.result.verdict.primary) is not self.user_property
+
+    def repeats_in(self, run: Run, target: Target, flight: CompletedFlight) -> bool:
+        """Return whether a reflight of the slot has the same violation."""
+        if self.user_property:
+            return self.shows_in(run, target, flight)
+        return flight.signature == self.signature
+
+
+def failure_of_item(
+    item: pytest.Function, target: Target, result: FlightResult, error: BaseException
+) -> ItemFailure | None:
+    """Return what an item's failure is about, or None if the test itself has an error."""
+    assertion, test = ItemAssertion(item, target), test_of(item)
+    landing = item.stash[LANDING]
+    failed: UserFailure | None = None
+    user_property = False
+    if not landing.unjudged:
+        failed = failure_of(item.originalname, item.obj, error, landing.reads)
+        if failed is None:
+            return None
+        user_property = not failed.is_about(result.verdict.primary)
+    return ItemFailure(
+        signature=failed.signature if failed and user_property else result.signature,
+        test=test,
+        failed_assertion=failed,
+        user_property=user_property,
+        assertion=assertion,
+    )
+
+
+def first_with_same_signature(run: Run, target: Target, failure: ItemFailure, nodeid: str) -> str:
+    """Return the slot of another item that reports the same failure, or nothing.
+
+    An item of a lower slot that has not run yet, in this process or another, counts if it can only
+    fail; ``session_status`` checks in the end that it did.
+    """
+    slot = run.claims.reporting_slot(failure.key(target.search), nodeid)
+    if slot:
+        return slot
+    for other in run.searches.lower(target):
+        waiting = [
+            item
+            for item in run.items[other.flight]
+            if item.shows
+            and (failure.failed_assertion is None or item.test == failure.test)
+            and not run.claims.has_run(item.nodeid)
+        ]
+        shows = waiting and failure.shows_in(run, other, run.flight(other))
+        if shows and refly(run, other, failure).confirm:
+            return other.name
+    return ""
+
+
+def refly(run: Run, target: Target, failure: ItemFailure) -> Reflights:
+    """Fly a slot once more; fly it some times more if the system need not be, or is not, the same.
+
+    A system that is deterministic and flies the same bytes again needs no further flight.
+    """
+    if target.deterministic:
+        (once,) = run.refly(target, 1)
+        if once.sha256 == run.flight(target).sha256:
+            return Reflights(failed=2, flown=2, same=True)
+    if failure.user_property and not failure.assertion.runs_on_any_flight:
+        # The test takes what no other flight can give it.
+        return Reflights(failed=1, flown=1)
+    flown = run.refly(target, REFLIGHTS)
+    failed = 1 + sum(failure.repeats_in(run, target, flight) for flight in flown)
+    return Reflights(failed=failed, flown=1 + REFLIGHTS)
+
+
+def divergence_s(run: Run, target: Target) -> float | None:
+    """Return when a slot's flight and its first reflight part; None if one was not recorded."""
+    from pytest_garl.simulation.flight_file import divergence_time_s, load
+
+    files = [run.flight(target).record, target.reflight(0).record(run.options.flights)]
+    if not all(file.exists() for file in files):
+        return None
+    first, second = (load(file) for file in files)
+    return divergence_time_s(first, second)

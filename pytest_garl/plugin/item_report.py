@@ -9,8 +9,14 @@ import pytest
 
 from pytest_garl.execution.result import FlightResult
 from pytest_garl.plugin import report_text
-from pytest_garl.plugin.item_facts import failed_item, failure_facts, passed_case, slot_claim
-from pytest_garl.plugin.item_failure import ItemFailure, failure_of_item
+from pytest_garl.plugin.item_facts import (
+    ItemFailure,
+    failed_item,
+    failure_facts,
+    failure_of_item,
+    passed_case,
+    slot_claim,
+)
 from pytest_garl.plugin.keys import (
     CASE,
     DUPLICATE_OF,

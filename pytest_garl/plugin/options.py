@@ -13,7 +13,7 @@ import pytest
 
 from pytest_garl.adversary.catalogue import policy_names
 from pytest_garl.errors import GarlError
-from pytest_garl.execution.slot import Slot
+from pytest_garl.execution.flight_id import Slot
 from pytest_garl.plugin.arguments import OPTIONS, Option
 from pytest_garl.search.catalogue import default_policy, find_method, method_names
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import pytest
 
-from pytest_garl.plugin.item_failure import ItemFailure, divergence_s
+from pytest_garl.plugin.item_facts import ItemFailure, divergence_s
 from pytest_garl.plugin.outcomes import CaseState, Decision, FailedItem, Reason, Reflights
 from pytest_garl.plugin.run import Run
 from pytest_garl.plugin.suggested_commands import repeat_line

@@ -19,10 +19,9 @@ from pytest_garl.execution.result import CompletedFlight
 from pytest_garl.execution.sources import combined_sha256
 from pytest_garl.plugin.keys import target_of
 from pytest_garl.plugin.options import Options
-from pytest_garl.plugin.report_claims import ReportClaims
 from pytest_garl.plugin.search_setup import Searches
 from pytest_garl.plugin.target import Target
-from pytest_garl.regressions.staleness import SourceHashes, stale_reasons
+from pytest_garl.regressions.replay import SourceHashes, stale_reasons
 from pytest_garl.scenarios.files import parse_scenario
 from pytest_garl.scenarios.maps.map import load_map
 from pytest_garl.scenarios.scenario import Scenario
@@ -32,6 +31,8 @@ if TYPE_CHECKING:
     from pytest_garl.plugin.user_assertions import ItemAssertion
     from pytest_garl.regressions.follow_up import InvestigatedSignature
     from pytest_garl.regressions.forecast import RemainingWork
+
+from pytest_garl.execution.ledger import SESSION_FACT
 
 SELECTED = "selected flights"
 """The ledger's fact: how many flights of searches the selected tests want."""
@@ -70,6 +71,47 @@ def test_of(item: pytest.Item) -> str:
     others = callspec.id.replace(target.name, "", 1).strip("-") if callspec and target else ""
     name = f"{item.nodeid.removesuffix(item.name)}{getattr(item, 'originalname', item.name)}"
     return f"{name}[{others}]" if others else name
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ReportClaims:
+    """Lets an item claim a slot or a failure that several items find, and notes which items ran.
+
+    The claims are facts of the ledger, so that all processes of a session agree.  ``Ledger`` drops
+    them when a run is resumed, because its tests run again.
+    """
+
+    ledger: Ledger
+
+    def claim_slot(self, target: Target, nodeid: str) -> bool:
+        """Claim a slot for an item; return whether no other item claimed it earlier."""
+        key = f"{SESSION_FACT}slot {target.search} {target.slot.id(target.map)}"
+        return bool(self.ledger.first_fact(key, nodeid) == nodeid)
+
+    def claim_failure(self, key: str, slot: str, nodeid: str) -> str:
+        """Claim a failure for an item; return the slot of the item that claimed it earlier, if any.
+
+        ``key`` identifies the failure in all processes.
+        """
+        first_slot, first_nodeid = self.ledger.first_fact(_failure_fact(key), [slot, nodeid])
+        return "" if first_nodeid == nodeid else str(first_slot)
+
+    def reporting_slot(self, key: str, nodeid: str) -> str:
+        """Return the slot of another item that has claimed a failure; empty if there is none."""
+        first = self.ledger.fact(_failure_fact(key))
+        return str(first[0]) if first is not None and first[1] != nodeid else ""
+
+    def note_ran(self, nodeid: str) -> None:
+        """Note that a test has run; its claims are in the ledger by then."""
+        self.ledger.note_fact(f"{SESSION_FACT}ran {nodeid}", value=True)
+
+    def has_run(self, nodeid: str) -> bool:
+        """Return whether a test has run in any process."""
+        return bool(self.ledger.fact(f"{SESSION_FACT}ran {nodeid}"))
+
+
+def _failure_fact(key: str) -> str:
+    return f"{SESSION_FACT}failure {key}"
 
 
 @dataclass(kw_only=True)

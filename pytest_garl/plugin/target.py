@@ -9,9 +9,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from pytest_garl.execution.flight_id import FIRST_SLOT, FlightId, search_key
+from pytest_garl.execution.flight_id import FIRST_SLOT, FlightId, Slot, search_key
 from pytest_garl.execution.reference import reference_to
-from pytest_garl.execution.slot import Slot
 
 if TYPE_CHECKING:
     from pytest_garl.regressions.case import Case

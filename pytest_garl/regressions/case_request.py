@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pytest_garl.execution.job import FlightJob
 from pytest_garl.execution.result import CompletedFlight
 from pytest_garl.regressions.case import Case, RecordedBehaviour
-from pytest_garl.regressions.complexity import complexity, genome_of
+from pytest_garl.regressions.simplification import complexity, genome_of
 from pytest_garl.regressions.user_failure import UserAssertion
 from pytest_garl.scenarios.maps.map import Map
 from pytest_garl.scenarios.scenario import Scenario

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from pytest_garl.regressions.complexity import genome_of
+from pytest_garl.regressions.simplification import genome_of
 from pytest_garl.scenarios.maps.map import load_map
 from pytest_garl.scenarios.placement import (
     marker_position_m,

@@ -17,7 +17,7 @@ from pytest_garl.execution.result import CompletedFlight
 from pytest_garl.regressions.case import Case
 from pytest_garl.regressions.case_request import CaseRequest, CaseResult
 from pytest_garl.regressions.corpus import Corpus
-from pytest_garl.regressions.flight_shares import divide_flights
+from pytest_garl.regressions.forecast import divide_flights
 from pytest_garl.regressions.investigation import build_case
 from pytest_garl.regressions.new_case import case_without_flights
 from pytest_garl.regressions.user_failure import UserAssertion

@@ -1,10 +1,10 @@
-"""Ways to make a scenario simpler: remove objects, reset weather, light and places to nominal."""
+"""Simpler scenarios: how to make them, how complex they are, and trials within a budget."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 
-from pytest_garl.regressions.complexity import genome_of
+from pytest_garl.scenarios.extra_genes import genome_like
 from pytest_garl.scenarios.genes import Genome
 from pytest_garl.scenarios.maps.map import Map
 from pytest_garl.scenarios.scenario import Scenario
@@ -87,3 +87,66 @@ def _removal(name: str) -> Simplification:
 
 def _reset(values: dict[str, float]) -> Simplification:
     return lambda scenario: scenario.replace(values)
+
+
+OBJECT_PLACES = ("start_x", "start_y", "destination_x", "destination_y")
+"""Genes whose distance from nominal is not counted: no place of an object is simpler than another;
+only their digits count."""
+
+
+def genome_of(scenario: Scenario, map: Map) -> Genome:
+    """Return the genome of a scenario's own genes, weather in its full range."""
+    return genome_like((key for key, _ in scenario.genes), map)
+
+
+def complexity(scenario: Scenario, genome: Genome) -> tuple[int, int, float, int]:
+    """Return the number of objects, of genes off nominal, their distance from it, and digits."""
+    present = dict(scenario.genes)
+    off, distance = 0, 0.0
+    for gene in genome.genes:
+        shares = [
+            abs(present[item.key] - item.nominal) / (item.high - item.low)
+            for item in gene.properties
+            if item.key in present and not item.key.endswith(OBJECT_PLACES)
+        ]
+        off += any(share > 0 for share in shares)
+        distance += sum(shares)
+    objects = sum(key.endswith(".velocity") for key in present)
+    digits = sum(len(repr(value)) for value in present.values())
+    return objects, off, round(distance, 2), digits
+
+
+class BudgetSpentError(Exception):
+    """The budget of flights is spent."""
+
+
+class Trials:
+    """Flies each scenario once, within a budget, and remembers the simplest that failed."""
+
+    def __init__(
+        self, first: Scenario, fails: Callable[[Scenario], bool], map: Map, budget: int
+    ) -> None:
+        self.map, self._fails, self._left = map, fails, budget
+        self.genome = genome_of(first, map)
+        self._known = {first: True}
+        self.history = [first]
+        self.flights = 0
+
+    @property
+    def best(self) -> Scenario:
+        """The simplest scenario that failed."""
+        return self.history[-1]
+
+    def __call__(self, scenario: Scenario) -> bool:
+        """Return whether a scenario fails; raise BudgetSpentError if no flight is left for it."""
+        scenario = repair(scenario, self.map)
+        if scenario not in self._known:
+            if self._left <= 0:
+                raise BudgetSpentError
+            self._left -= 1
+            self.flights += 1
+            self._known[scenario] = self._fails(scenario)
+        failed = self._known[scenario]
+        if failed and complexity(scenario, self.genome) < complexity(self.best, self.genome):
+            self.history.append(scenario)
+        return failed

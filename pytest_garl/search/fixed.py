@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
-from pytest_garl.execution.slot import Slot
+from pytest_garl.execution.flight_id import Slot
 from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.search.method import FlownScenario
 

@@ -6,8 +6,7 @@ from pathlib import Path
 from hypothesis import given
 from hypothesis import strategies as st
 
-from pytest_garl.execution.flight_id import FIRST_SLOT, FlightId, search_key
-from pytest_garl.execution.slot import Slot
+from pytest_garl.execution.flight_id import FIRST_SLOT, FlightId, Slot, search_key
 
 
 def test_key_is_a_prefix_of_the_facts_hash() -> None:

@@ -12,14 +12,13 @@ import pytest
 
 from pytest_garl.errors import PoolError
 from pytest_garl.execution.flight import fly_job
-from pytest_garl.execution.flight_id import FIRST_SLOT, FlightId
+from pytest_garl.execution.flight_id import FIRST_SLOT, FlightId, Slot
 from pytest_garl.execution.ledger import Ledger
 from pytest_garl.execution.local_pool import FlightWorkers
 from pytest_garl.execution.pool import wait_for
 from pytest_garl.execution.process_pool import MAX_IDLE_EXITS, ProcessPool
 from pytest_garl.execution.reference import reference_to
 from pytest_garl.execution.result import FlightResult
-from pytest_garl.execution.slot import Slot
 from pytest_garl.execution.supervisor import LEAST_STANDSTILL_S, FlightMonitor
 from pytest_garl.scenarios.files import dump_scenario
 from pytest_garl.simulation.flight import Crash

@@ -2,7 +2,7 @@ from __future__ import annotations
 
 import pytest
 
-from pytest_garl.execution.slot import slots
+from pytest_garl.execution.flight_id import slots
 from pytest_garl.plugin.options import population
 from tests.support.landing_project import (
     CONFTEST,

@@ -13,7 +13,7 @@ from pytest_garl.errors import CorpusError
 from pytest_garl.files import reading
 from pytest_garl.regressions.case import Status
 from pytest_garl.regressions.case_file import dump_case, load_case
-from pytest_garl.regressions.corpus import Corpus, patch_of, replace_file
+from pytest_garl.regressions.corpus import Corpus, patch_of, read_acceptance, replace_file
 from pytest_garl.scenarios.maps import map as package
 from pytest_garl.scenarios.maps.map import load_map
 from tests.regressions.samples import OBJECT_NAMES, SYSTEM, case
@@ -204,3 +204,27 @@ def test_link_to_another_file_is_ignored(tmp_path: Path) -> None:
     (tmp_path / "notes.txt").write_text("")
     (tmp_path / "link").symlink_to("notes.txt")
     assert [entry.name for entry in Corpus(tmp_path).all_entries()] == ["good"]
+
+
+def test_cases_in_the_index_of_git_are_accepted(tmp_path: Path) -> None:
+    file = tmp_path / "cases" / "landing" / "a.toml"
+    file.parent.mkdir(parents=True)
+    file.touch()
+    subprocess.run(["git", "init", "-q"], cwd=tmp_path, check=True)
+    assert not read_acceptance(tmp_path / "cases").accepts(file, case())
+    subprocess.run(["git", "add", str(file)], cwd=tmp_path, check=True)
+    assert read_acceptance(tmp_path / "cases").accepts(file, case())
+    assert not read_acceptance(tmp_path / "cases").accepts(file.with_name("b.toml"), case())
+
+
+def test_marked_cases_are_accepted_without_git(tmp_path: Path) -> None:
+    acceptance = read_acceptance(tmp_path)
+    assert "not a git repository" in acceptance.problem
+    assert not acceptance.accepts(tmp_path / "a.toml", case())
+    marked = dataclasses.replace(case(), accepted=True)
+    assert acceptance.accepts(tmp_path / "a.toml", marked)
+
+
+def test_missing_git_is_the_problem(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("PATH", str(tmp_path))
+    assert read_acceptance(tmp_path).problem.startswith("git: No such file")

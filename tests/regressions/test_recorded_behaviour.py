@@ -1,9 +1,27 @@
 from __future__ import annotations
 
+import math
 from pathlib import Path
 
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from pytest_garl.adversary.catalogue import policy_spec
+from pytest_garl.adversary.recorded import recorded_spec
 from pytest_garl.execution.result import CompletedFlight
-from pytest_garl.regressions.recorded_behaviour import find_colliding_object, recorded_behaviour
+from pytest_garl.regressions.recorded_behaviour import (
+    _round,
+    find_colliding_object,
+    recorded_behaviour,
+    shorter_records,
+)
+from pytest_garl.scenarios.genes import genome_for
+from pytest_garl.scenarios.validity import problems
+from pytest_garl.search.methods.random import random_scenarios
+from pytest_garl.simulation.fly import fly
+from pytest_garl.simulation.system_under_test.reference_pilot import ReferencePilot
 from tests.regressions.samples import (
     COLLIDING_OBJECT,
     LAWN,
@@ -41,3 +59,34 @@ def test_behaviour_of_some_objects_keeps_their_moves_and_changes() -> None:
     assert not rest.moves
     assert not rest.changes
     assert behaviour.policy.name == "recorded"
+
+
+SCENARIO = random_scenarios(LAWN, genome_for(LAWN), 5, 0, 1)[0]
+
+
+@given(st.floats(0, 1), st.floats(0, 2 * math.pi))
+def test_rounded_move_is_no_longer_than_one(length: float, angle: float) -> None:
+    move = length * math.cos(angle), length * math.sin(angle)
+    x, y = _round(*move)
+    assert math.hypot(x, y) <= 1
+    assert math.dist(move, (x, y)) < 0.03
+    assert (round(x, 2), round(y, 2)) == (x, y)
+
+
+@pytest.mark.sim
+def test_shorter_record_ends_where_the_longer_one_ends() -> None:
+    flight = fly(SCENARIO, ReferencePilot, policy_spec("waypoint"), time_limit_s=12)
+    moves = tuple(
+        (item.name, tuple((float(x), float(y)) for x, y in item.moves)) for item in flight.objects
+    )
+    name = flight.objects[1].name
+    found = list(shorter_records(SCENARIO, moves, flight, name, LAWN))
+    assert len(found) >= 2
+    waiting, shorter = found[0]
+    assert problems(waiting, LAWN) == ()
+    own = dict(shorter)[name]
+    assert len({*own[:-4]}) == 1
+    assert own[0] == (0.0, 0.0)
+    last = fly(waiting, ReferencePilot, recorded_spec(dict(shorter)), time_limit_s=12)
+    ends = [f.objects[1].track.position_m[-1, :2] for f in (flight, last)]
+    assert np.linalg.norm(ends[0] - ends[1]) < 0.6

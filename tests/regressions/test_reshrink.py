@@ -10,10 +10,16 @@ from pytest_garl.cli import cases
 from pytest_garl.execution.reference import BUILT_IN, simulator_sha256
 from pytest_garl.plugin import options
 from pytest_garl.regressions.case import Case
-from pytest_garl.regressions.case_comparison import no_worse, simplicity
 from pytest_garl.regressions.case_file import size_of
 from pytest_garl.regressions.investigation import MINIMUM_CASE_FLIGHTS
-from pytest_garl.regressions.reshrink import MINIMUM_RESHRINK_FLIGHTS, CaseReshrinker, _all_removed
+from pytest_garl.regressions.reshrink import (
+    MINIMUM_RESHRINK_FLIGHTS,
+    CaseReshrinker,
+    _all_removed,
+    is_simpler,
+    no_worse,
+    simplicity,
+)
 from pytest_garl.regressions.robustness import neighbours
 from pytest_garl.scenarios.scenario import Scenario
 from tests.regressions.samples import (
@@ -23,6 +29,7 @@ from tests.regressions.samples import (
     OBJECT_NAMES,
     VIOLATING_SCENARIO,
     FakeFlights,
+    case,
     make_case_request,
 )
 from tests.regressions.samples import case as dog_case
@@ -134,3 +141,23 @@ def test_removed_objects_and_genes_add_up() -> None:
 def test_options_require_the_least_flights_of_their_modules() -> None:
     assert cases.MINIMUM_RESHRINK_FLIGHTS == MINIMUM_RESHRINK_FLIGHTS
     assert options.MINIMUM_SHRINK == MINIMUM_CASE_FLIGHTS
+
+
+SAVED = case()
+
+
+def test_case_with_fewer_runs_is_simpler() -> None:
+    shorter = dataclasses.replace(SAVED, moves=((OBJECT_NAMES[-1], ((0.0, 0.0),)),))
+    assert is_simpler(shorter, SAVED, LAWN, outdated=False)
+    assert not is_simpler(SAVED, shorter, LAWN, outdated=False)
+    assert not is_simpler(SAVED, SAVED, LAWN, outdated=False)
+
+
+def test_case_that_is_worse_in_one_respect_is_not_simpler() -> None:
+    shorter = dataclasses.replace(SAVED, moves=((OBJECT_NAMES[-1], ((0.0, 0.0),)),), avoidable="no")
+    assert not no_worse(simplicity(shorter, LAWN), simplicity(SAVED, LAWN))
+    assert not is_simpler(shorter, SAVED, LAWN, outdated=False)
+
+
+def test_case_with_new_evidence_is_simpler_than_an_outdated_one() -> None:
+    assert is_simpler(SAVED, SAVED, LAWN, outdated=True)

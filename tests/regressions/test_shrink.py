@@ -5,8 +5,8 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from pytest_garl.regressions.complexity import complexity, genome_of
-from pytest_garl.regressions.shrink import reset_and_bisect, shrink
+from pytest_garl.regressions.shrink import reset_and_bisect, shrink, shrink_by_hypothesis
+from pytest_garl.regressions.simplification import complexity, genome_of
 from pytest_garl.scenarios.chromosome import decode
 from pytest_garl.scenarios.genes import genome_for, with_destinations
 from pytest_garl.scenarios.scenario import Scenario
@@ -102,3 +102,15 @@ def test_shrinking_rounds_destinations() -> None:
     )
     assert set(found.simplest.removed_objects) == {*OBJECT_NAMES} - {COLLIDING_OBJECT}
     assert not any(key.startswith(OBJECT_NAMES[-1]) for key, _ in found.simplest.genes)
+
+
+def test_hypothesis_lowers_genes_that_can_only_be_lowered_together() -> None:
+    def unequal(scenario: Scenario) -> bool:
+        fog, dust = scenario["environment.fog"], scenario["environment.dust"]
+        return fast(scenario) and abs(fog - dust) < 0.01
+
+    first = VIOLATING_SCENARIO.replace({"environment.dust": 0.12})
+    plain = shrink(
+        first, unequal, LAWN, 300, colliding_object=COLLIDING_OBJECT, passes=(shrink_by_hypothesis,)
+    )
+    assert plain.simplest["environment.fog"] == plain.simplest["environment.dust"] == 0

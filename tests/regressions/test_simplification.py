@@ -1,14 +1,18 @@
 from __future__ import annotations
 
-from pytest_garl.regressions.complexity import genome_of
 from pytest_garl.regressions.simplification import (
+    Trials,
     bare_scenario,
     bare_scenario_around_marker,
+    complexity,
     empty_scenario,
+    genome_of,
     simplifications,
     simplified,
     without_other_objects,
 )
+from pytest_garl.scenarios.scenario import Scenario
+from pytest_garl.scenarios.validity import problems
 from tests.regressions.samples import COLLIDING_OBJECT, LAWN, OBJECT_NAMES, VIOLATING_SCENARIO
 
 OTHERS = {*OBJECT_NAMES} - {COLLIDING_OBJECT}
@@ -52,3 +56,39 @@ def test_empty_scenario_is_nominal_without_objects() -> None:
     empty = empty_scenario(VIOLATING_SCENARIO, LAWN)
     assert {*empty.removed_objects} == {*OBJECT_NAMES}
     assert empty["environment.fog"] == 0.0
+
+
+GENOME = genome_of(VIOLATING_SCENARIO, LAWN)
+
+
+def test_complexity_counts_objects_genes_distance_and_digits() -> None:
+    objects, genes, distance, digits = complexity(VIOLATING_SCENARIO, GENOME)
+    assert objects == len(OBJECT_NAMES)
+    fewer = VIOLATING_SCENARIO.without(*OBJECT_NAMES[1:]).replace({"environment.fog": 0.0})
+    less = complexity(fewer, GENOME)
+    assert less[0] == 1
+    assert less[1] < genes
+    assert less[2] < distance
+    assert less[3] < digits
+
+
+def test_place_of_an_object_counts_by_its_digits_alone() -> None:
+    moved = VIOLATING_SCENARIO.replace({f"{COLLIDING_OBJECT}.start_x": 0.9})
+    assert complexity(moved, GENOME)[:3] == complexity(VIOLATING_SCENARIO, GENOME)[:3]
+    assert complexity(moved, GENOME) < complexity(VIOLATING_SCENARIO, GENOME)
+
+
+def test_trials_fly_repaired_scenarios() -> None:
+    flown: list[Scenario] = []
+
+    def fails(scenario: Scenario) -> bool:
+        flown.append(scenario)
+        return False
+
+    trials = Trials(VIOLATING_SCENARIO, fails, LAWN, 10)
+    trials(
+        VIOLATING_SCENARIO.replace(
+            {f"{COLLIDING_OBJECT}.start_x": VIOLATING_SCENARIO[f"{OBJECT_NAMES[1]}.start_x"]}
+        )
+    )
+    assert problems(flown[0], LAWN) == ()

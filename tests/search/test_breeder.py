@@ -4,8 +4,8 @@ from pathlib import Path
 
 import pytest
 
+from pytest_garl.execution.flight_id import Slot, slots
 from pytest_garl.execution.ledger import Ledger
-from pytest_garl.execution.slot import Slot, slots
 from pytest_garl.plugin.options import population
 from pytest_garl.scenarios.files import parse_scenario
 from pytest_garl.scenarios.genes import genome_for

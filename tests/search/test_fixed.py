@@ -1,6 +1,6 @@
 from __future__ import annotations
 
-from pytest_garl.execution.slot import Slot
+from pytest_garl.execution.flight_id import Slot
 from pytest_garl.search.fixed import FixedScenarios
 from pytest_garl.search.methods.random import random_scenarios
 from tests.search.searches import GENOME, MAP

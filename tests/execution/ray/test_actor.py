@@ -10,12 +10,11 @@ import pytest
 
 from pytest_garl.errors import PoolError
 from pytest_garl.execution.flight import fly_job
-from pytest_garl.execution.flight_id import FlightId
+from pytest_garl.execution.flight_id import FlightId, Slot
 from pytest_garl.execution.job import parse_job
 from pytest_garl.execution.ledger_queue import Claim
 from pytest_garl.execution.ray.actor import ActorWorkspace, FlightActor, FlightOutput
 from pytest_garl.execution.reference import Reference, reference_to
-from pytest_garl.execution.slot import Slot
 from pytest_garl.execution.worker_failure import WorkerExit
 from pytest_garl.scenarios.files import dump_scenario
 from pytest_garl.simulation.flight_file import load

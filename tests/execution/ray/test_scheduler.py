@@ -8,12 +8,11 @@ from typing import Any
 import pytest
 
 from pytest_garl.errors import PoolError
-from pytest_garl.execution.flight_id import FlightId
+from pytest_garl.execution.flight_id import FlightId, Slot
 from pytest_garl.execution.ledger import Ledger
 from pytest_garl.execution.ledger_queue import Claim
 from pytest_garl.execution.ray.actor import ActorWorkspace, FlightOutput, versions
 from pytest_garl.execution.ray.scheduler import RayScheduler, different_versions
-from pytest_garl.execution.slot import Slot
 from pytest_garl.execution.worker_failure import WorkerExit
 from pytest_garl.scenarios.files import dump_scenario
 from tests.execution.flying import Good, job_of, scenario
