@@ -19,15 +19,15 @@ from typing import Any
 
 import numpy as np
 
+from pytest_garl.execution.flight_id import CompletedFlight
 from pytest_garl.execution.job import FlightJob, parse_job
 from pytest_garl.execution.ledger import Ledger
 from pytest_garl.execution.ledger_queries import LedgerFlight
 from pytest_garl.execution.local_pool import local_pool
 from pytest_garl.execution.on_demand import FlyFunction, OnDemandFlights
-from pytest_garl.execution.result import CompletedFlight
 from pytest_garl.experiments.pytest_run import run_pytest
 from pytest_garl.experiments.spec import ExperimentRun
-from pytest_garl.regressions.recorded_behaviour import find_colliding_object
+from pytest_garl.regressions.case_flights import find_colliding_object
 from pytest_garl.regressions.shrink import (
     reset_and_bisect,
     round_values,

@@ -8,7 +8,7 @@ from pytest_garl.baselines.comparison import LEVEL, Comparison, compare
 from pytest_garl.baselines.file import BaselineSet
 from pytest_garl.baselines.pairs import FlightSummary, Pair, summary_of
 from pytest_garl.errors import BaselineError
-from pytest_garl.execution.result import CompletedFlight
+from pytest_garl.execution.flight_id import CompletedFlight
 from pytest_garl.regressions.robustness import NEIGHBOURS, neighbours
 from pytest_garl.scenarios.maps.map import Map
 from pytest_garl.scenarios.scenario import Scenario

@@ -16,9 +16,9 @@ from pytest_garl.baselines.pairs import summary_of
 from pytest_garl.errors import BaselineError, PolicyError
 from pytest_garl.execution.batch import fly_all, temporary_pool
 from pytest_garl.execution.checkout import Checkout, locate_system
+from pytest_garl.execution.flight_id import CompletedFlight
 from pytest_garl.execution.job import FlightJob, parse_job
 from pytest_garl.execution.reference import BUILT_IN, Reference
-from pytest_garl.execution.result import CompletedFlight
 from pytest_garl.execution.stored_ledger import checked_ledger
 from pytest_garl.scenarios.files import parse_scenario
 from pytest_garl.scenarios.genes import WeatherRange, genome_for

@@ -18,8 +18,8 @@ from pytest_garl.errors import OptionError
 if TYPE_CHECKING:
     from pytest_garl.baselines.comparison import Comparison
     from pytest_garl.baselines.record import BaselineSpec
+    from pytest_garl.execution.flight_id import CompletedFlight
     from pytest_garl.execution.reference import Reference
-    from pytest_garl.execution.result import CompletedFlight
 
 FAILED = 1
 """Exit status of a comparison that fails; a usage error is 2."""

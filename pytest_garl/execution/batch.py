@@ -11,12 +11,11 @@ from pathlib import Path
 
 from pytest_garl.errors import LedgerError
 from pytest_garl.execution.checkout import Checkout
-from pytest_garl.execution.flight_id import FlightId, Slot, search_key
+from pytest_garl.execution.flight_id import CompletedFlight, FlightId, Slot, search_key
 from pytest_garl.execution.job import FlightJob, parse_job
 from pytest_garl.execution.ledger import Ledger
 from pytest_garl.execution.local_pool import local_pool
 from pytest_garl.execution.pool import Pool, wait_for
-from pytest_garl.execution.result import CompletedFlight
 from pytest_garl.scenarios.files import dump_scenario
 from pytest_garl.scenarios.scenario import Scenario
 

@@ -1,10 +1,12 @@
-"""Slots of a search, and the name of each flight: its key in the ledger, the record's file."""
+"""Flights of a ledger: slot, key, the file of the record, and the flight once it is completed."""
 
 from __future__ import annotations
 
 import hashlib
 from dataclasses import dataclass
 from pathlib import Path
+
+from pytest_garl.execution.result import FlightResult
 
 KEY_DIGITS = 16
 """Hexadecimal digits of a search's key: 64 bits, so that two searches never have the same."""
@@ -64,3 +66,20 @@ class FlightId:
     def record(self, folder: Path) -> Path:
         """Return the file of the flight's record in a folder of flights."""
         return folder / f"{self.name}.npz"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class CompletedFlight:
+    """A flight of a ledger that has a result; ``record`` is the file of its record.
+
+    ``sha256`` is the hash of its trajectory, empty if its process did not survive.
+    """
+
+    result: FlightResult
+    sha256: str
+    record: Path
+
+    @property
+    def signature(self) -> str:
+        """The violation's signature, empty for a flight without violation."""
+        return self.result.signature

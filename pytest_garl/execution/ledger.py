@@ -18,10 +18,10 @@ from pytest_garl.execution.database import (
     SearchKind,
     set_aside,
 )
-from pytest_garl.execution.flight_id import FlightId
+from pytest_garl.execution.flight_id import CompletedFlight, FlightId
 from pytest_garl.execution.ledger_queries import LedgerQueries
 from pytest_garl.execution.ledger_queue import WorkQueue
-from pytest_garl.execution.result import CompletedFlight, FlightResult, parse_result
+from pytest_garl.execution.result import FlightResult, parse_result
 from pytest_garl.files.json_values import parse_json
 from pytest_garl.messages import shortened
 

@@ -10,8 +10,8 @@ from pathlib import Path
 from typing import Any
 
 from pytest_garl.execution.database import Database
-from pytest_garl.execution.flight_id import FlightId, Slot
-from pytest_garl.execution.result import CompletedFlight, FlightResult, parse_result
+from pytest_garl.execution.flight_id import CompletedFlight, FlightId, Slot
+from pytest_garl.execution.result import FlightResult, parse_result
 
 _ADDRESS = re.compile(r"0x[0-9a-f]+")
 

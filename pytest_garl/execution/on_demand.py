@@ -17,11 +17,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Protocol, TypeVar
 
-from pytest_garl.execution.flight_id import FlightId, search_key
+from pytest_garl.execution.flight_id import CompletedFlight, FlightId, search_key
 from pytest_garl.execution.job import FlightJob
 from pytest_garl.execution.ledger import Ledger
 from pytest_garl.execution.pool import Pool
-from pytest_garl.execution.result import CompletedFlight
 from pytest_garl.scenarios.files import dump_scenario
 from pytest_garl.scenarios.scenario import Scenario
 

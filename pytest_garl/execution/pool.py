@@ -6,9 +6,8 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Protocol
 
-from pytest_garl.execution.flight_id import FlightId
+from pytest_garl.execution.flight_id import CompletedFlight, FlightId
 from pytest_garl.execution.ledger import Ledger
-from pytest_garl.execution.result import CompletedFlight
 
 
 class Pool(Protocol):

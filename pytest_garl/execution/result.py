@@ -6,7 +6,6 @@ import dataclasses
 import json
 from collections.abc import Mapping
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any, Self
 
 from pytest_garl.errors import LedgerError
@@ -94,23 +93,6 @@ def _printable(value: Any) -> Any:
     if isinstance(value, list):
         return [_printable(item) for item in value]
     return printable(value) if isinstance(value, str) else value
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class CompletedFlight:
-    """A flight of a ledger that has a result; ``record`` is the file of its record.
-
-    ``sha256`` is the hash of its trajectory, empty if its process did not survive.
-    """
-
-    result: FlightResult
-    sha256: str
-    record: Path
-
-    @property
-    def signature(self) -> str:
-        """The violation's signature, empty for a flight without violation."""
-        return self.result.signature
 
 
 def broken_result(crash: Crash, diagonal_m: float, *, inconclusive: bool = False) -> FlightResult:

@@ -17,7 +17,7 @@ from pytest_garl.execution.local_pool import local_pool
 from pytest_garl.execution.on_demand import FlyFunction, OnDemandFlights
 from pytest_garl.experiments.measure import AvoidabilityCounts, FinishedSearch
 from pytest_garl.regressions.avoidability import survives_recorded_moves
-from pytest_garl.regressions.recorded_behaviour import recorded_behaviour
+from pytest_garl.regressions.case_flights import recorded_behaviour
 from pytest_garl.scenarios.files import parse_scenario
 
 

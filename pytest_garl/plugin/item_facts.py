@@ -9,7 +9,8 @@ from typing import TypeVar
 
 import pytest
 
-from pytest_garl.execution.result import CompletedFlight, FlightResult
+from pytest_garl.execution.flight_id import CompletedFlight
+from pytest_garl.execution.result import FlightResult
 from pytest_garl.plugin.failed_statement import failure_of
 from pytest_garl.plugin.keys import LANDING
 from pytest_garl.plugin.outcomes import (

@@ -73,11 +73,11 @@ def report_item(
     error: BaseException | None,
 ) -> None:
     """Decide the outcome of an item that asked for its landing, and write it into the report."""
-    if not isinstance(item, pytest.Function) or LANDING not in item.stash:
+    landing = item.stash.get(LANDING, None)
+    if not isinstance(item, pytest.Function) or landing is None:
         return
-    writer = _Writer(
-        report=report, item=item, run=run, target=target, result=run.flight(target).result
-    )
+    result = landing.unnoted_result
+    writer = _Writer(report=report, item=item, run=run, target=target, result=result)
     if report.failed and error is not None:
         writer.write_failure(error)
     elif report.passed:

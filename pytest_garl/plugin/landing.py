@@ -14,7 +14,8 @@ import pytest
 from pytest_garl.plugin.failed_statement import AttributeRead, code_of
 
 if TYPE_CHECKING:
-    from pytest_garl.execution.result import CompletedFlight, FlightResult
+    from pytest_garl.execution.flight_id import CompletedFlight
+    from pytest_garl.execution.result import FlightResult
     from pytest_garl.plugin.target import Target
     from pytest_garl.simulation.flight import Flight
     from pytest_garl.verdicts.verdict import Limits, Verdict
@@ -43,6 +44,11 @@ class Landing:
     def result(self) -> FlightResult:
         """The flight's result as it stands in the ledger."""
         self._note("result")
+        return self._result
+
+    @property
+    def unnoted_result(self) -> FlightResult:
+        """The same result for the plugin: its reads are no reads of the test."""
         return self._result
 
     @property

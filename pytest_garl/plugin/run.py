@@ -11,11 +11,10 @@ from typing import TYPE_CHECKING, TextIO
 import pytest
 
 from pytest_garl.execution.batch import fly_all
-from pytest_garl.execution.flight_id import FlightId
+from pytest_garl.execution.flight_id import CompletedFlight, FlightId
 from pytest_garl.execution.ledger import Ledger
 from pytest_garl.execution.pool import Pool, wait_for
 from pytest_garl.execution.reference import Reference, simulator_sha256
-from pytest_garl.execution.result import CompletedFlight
 from pytest_garl.execution.sources import combined_sha256
 from pytest_garl.plugin.keys import target_of
 from pytest_garl.plugin.options import Options

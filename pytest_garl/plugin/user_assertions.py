@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 
 from pytest_garl.errors import GarlError
-from pytest_garl.execution.result import CompletedFlight
+from pytest_garl.execution.flight_id import CompletedFlight
 from pytest_garl.plugin.failed_statement import FAILED_ASSERTION_TYPES, failure_of
 from pytest_garl.plugin.keys import target_of
 from pytest_garl.plugin.landing import Landing

@@ -9,10 +9,10 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Callable
 
+from pytest_garl.execution.flight_id import CompletedFlight
 from pytest_garl.execution.job import FlightJob
 from pytest_garl.execution.on_demand import FlyFunction
 from pytest_garl.execution.reference import reference_to
-from pytest_garl.execution.result import CompletedFlight
 from pytest_garl.regressions.case import Avoidable, RecordedBehaviour
 from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.simulation.npc_policy import PolicySpec

@@ -4,16 +4,16 @@ from __future__ import annotations
 
 import dataclasses
 
+from pytest_garl.execution.flight_id import CompletedFlight
 from pytest_garl.execution.job import FlightJob
 from pytest_garl.execution.on_demand import FlyFunction
-from pytest_garl.execution.result import CompletedFlight
 from pytest_garl.regressions.avoidability import avoidability
 from pytest_garl.regressions.case import Avoidable, Case, RecordedBehaviour
 from pytest_garl.regressions.case_request import CaseRequest, CaseResult, FailingScenario
-from pytest_garl.regressions.recorded_behaviour import recorded_behaviour
 from pytest_garl.regressions.robustness import NEIGHBOURS, neighbours
 from pytest_garl.scenarios.maps.map import Map
 from pytest_garl.scenarios.scenario import Scenario
+from pytest_garl.simulation.flight_file import load
 
 PILOT_FLIGHTS = 3
 """Flights of the reference pilot: among objects that repeat the recorded moves, among objects with
@@ -138,3 +138,24 @@ class CaseFlights:
     def _go(self, job: FlightJob, scenario: Scenario) -> CompletedFlight:
         self.flown += 1
         return self._fly(job, scenario)
+
+
+def recorded_behaviour(flight: CompletedFlight, scenario: Scenario, map: Map) -> RecordedBehaviour:
+    """Return what each object did in a flight; no moves if the flight left no record."""
+    names = [name for name, _ in map.without(scenario.removed_objects).present_objects]
+    if not flight.record.exists():
+        return RecordedBehaviour(moves=tuple((name, ()) for name in names))
+    objects = load(flight.record).objects
+    made = {item.name: item.moves for item in objects}
+    return RecordedBehaviour(
+        moves=tuple(
+            (name, tuple((float(x), float(y)) for x, y in made.get(name, ()))) for name in names
+        ),
+        changes=tuple((item.name, item.changes) for item in objects if item.changes),
+    )
+
+
+def find_colliding_object(flight: CompletedFlight) -> str:
+    """Return the moving object that the UAV hit; empty if it hit none."""
+    hit, kind = flight.result.collisions, flight.result.verdict.violation_type
+    return hit[-1] if hit and kind == "IV" else ""

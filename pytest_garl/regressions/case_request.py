@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from pytest_garl.execution.flight_id import CompletedFlight
 from pytest_garl.execution.job import FlightJob
-from pytest_garl.execution.result import CompletedFlight
 from pytest_garl.regressions.case import Case, RecordedBehaviour
 from pytest_garl.regressions.simplification import complexity, genome_of
 from pytest_garl.regressions.user_failure import UserAssertion

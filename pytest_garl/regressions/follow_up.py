@@ -8,12 +8,12 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+from pytest_garl.execution.flight_id import CompletedFlight
 from pytest_garl.execution.job import FlightJob, parse_job
 from pytest_garl.execution.ledger import Ledger
 from pytest_garl.execution.ledger_queries import LedgerFlight
 from pytest_garl.execution.on_demand import OnDemandFlights
 from pytest_garl.execution.pool import Pool
-from pytest_garl.execution.result import CompletedFlight
 from pytest_garl.regressions.case import Case
 from pytest_garl.regressions.case_request import CaseRequest, CaseResult
 from pytest_garl.regressions.corpus import Corpus

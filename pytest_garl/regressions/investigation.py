@@ -7,10 +7,10 @@ from collections.abc import Callable, Iterator, Sequence
 from pytest_garl.execution.on_demand import FlyFunction
 from pytest_garl.regressions.avoidability import avoidability_without_pilot
 from pytest_garl.regressions.case import RecordedBehaviour
-from pytest_garl.regressions.case_flights import PILOT_FLIGHTS, CaseFlights
+from pytest_garl.regressions.case_flights import PILOT_FLIGHTS, CaseFlights, find_colliding_object
 from pytest_garl.regressions.case_request import CaseRequest, CaseResult, FailingScenario
+from pytest_garl.regressions.move_reduction import shorter_records
 from pytest_garl.regressions.new_case import new_case
-from pytest_garl.regressions.recorded_behaviour import find_colliding_object, shorter_records
 from pytest_garl.regressions.robustness import NEIGHBOURS
 from pytest_garl.regressions.shrink import shrink
 from pytest_garl.regressions.simplification import (

@@ -5,9 +5,9 @@ from __future__ import annotations
 from pytest_garl.execution.reference import simulator_sha256
 from pytest_garl.regressions.avoidability import avoidability_without_pilot
 from pytest_garl.regressions.case import Avoidable, Case, Evidence, Violation
+from pytest_garl.regressions.case_flights import recorded_behaviour
 from pytest_garl.regressions.case_request import CaseRequest, CaseResult, FailingScenario
 from pytest_garl.regressions.description import describe
-from pytest_garl.regressions.recorded_behaviour import recorded_behaviour
 from pytest_garl.regressions.simplification import complexity, genome_of
 from pytest_garl.regressions.user_failure import UserFailure
 from pytest_garl.scenarios.maps.map import Map

@@ -22,11 +22,10 @@ from pytest_garl.execution.reference import (
 from pytest_garl.execution.sources import sources_sha256
 from pytest_garl.regressions.case import Avoidable, Case, RecordedBehaviour
 from pytest_garl.regressions.case_file import record_lines, size_of
-from pytest_garl.regressions.case_flights import PILOT_FLIGHTS, CaseFlights
+from pytest_garl.regressions.case_flights import PILOT_FLIGHTS, CaseFlights, find_colliding_object
 from pytest_garl.regressions.case_request import CaseRequest, CaseResult, FailingScenario
 from pytest_garl.regressions.investigation import simplest_robust, with_shorter_record
 from pytest_garl.regressions.new_case import new_case
-from pytest_garl.regressions.recorded_behaviour import find_colliding_object
 from pytest_garl.regressions.replay import SourceHashes, system_of
 from pytest_garl.regressions.robustness import NEIGHBOURS
 from pytest_garl.regressions.shrink import shrink

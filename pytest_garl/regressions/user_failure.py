@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Protocol
 
-from pytest_garl.execution.result import CompletedFlight
+from pytest_garl.execution.flight_id import CompletedFlight
 from pytest_garl.scenarios.scenario import Scenario
 
 ATTRIBUTES_OF_PROPERTY: dict[str, frozenset[str]] = {

@@ -1,7 +1,7 @@
 """Genes that are off by default: each with its range, and its meaning in physical units.
 
 A scenario without the gene has its nominal value.  A search uses an extra gene if its method puts
-it into the genome: ``genome_for(map, extras=[WIND])``.
+it into the genome: ``Genome(composites=(*plan.genome.composites, WIND))``.
 """
 
 from __future__ import annotations

@@ -165,14 +165,7 @@ class Loop:
         if not self._system.airframe.control_rate_hz or isinstance(self._command, Abort):
             return self._control.thrusts(motion, self._command, TICK_S)
         if tick % self._ticks_per_control == 0:
-            state = VehicleState(
-                time_s=tick / PHYSICS_RATE_HZ,
-                position_m=motion.position_m,
-                velocity_mps=motion.velocity_mps,
-                attitude=motion.attitude,
-                angular_velocity_radps=motion.spin_radps,
-                thrusts_n=self._thrusts,
-            )
+            state = _vehicle_state(tick, motion, self._thrusts)
             self._wanted_thrusts = self._system.control(state, self._model.max_thrust_n)
         return self._wanted_thrusts
 
@@ -246,6 +239,17 @@ class Loop:
             self.recorder.event(name, f"the system said {type(command).__name__}()")
         self._command = command
         self._control.remember_yaw(command)
+
+
+def _vehicle_state(tick: int, motion: Motion, thrusts: Thrusts) -> VehicleState:
+    return VehicleState(
+        time_s=tick / PHYSICS_RATE_HZ,
+        position_m=motion.position_m,
+        velocity_mps=motion.velocity_mps,
+        attitude=motion.attitude,
+        angular_velocity_radps=motion.spin_radps,
+        thrusts_n=thrusts,
+    )
 
 
 def _is_finite(world: World) -> bool:

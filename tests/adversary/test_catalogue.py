@@ -45,5 +45,5 @@ def test_the_catalogue_imports_no_policy_and_no_numpy() -> None:
 def test_the_page_on_policies_has_a_row_for_each() -> None:
     page = (Path(__file__).parents[2] / "docs" / "adversary.md").read_text()
     table = page[: page.index("\n## ")]
-    rows = re.findall(r"^\| `([a-z_-]+)`.* \| .+ \|$", table, re.MULTILINE)
+    rows = re.findall(r"^\| `([a-z0-9_-]+)`.* \| .+ \|$", table, re.MULTILINE)
     assert sorted(rows) == sorted(policy_names())

@@ -8,7 +8,7 @@ import pytest
 
 from pytest_garl.baselines.gate import compare_flights, compare_sets
 from pytest_garl.errors import BaselineError
-from pytest_garl.execution.result import CompletedFlight
+from pytest_garl.execution.flight_id import CompletedFlight
 from pytest_garl.regressions.robustness import neighbours
 from pytest_garl.scenarios.scenario import Scenario
 from tests.baselines.samples import DOG, LAWN, baseline_set

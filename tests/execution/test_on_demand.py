@@ -7,12 +7,12 @@ from pathlib import Path
 
 import pytest
 
+from pytest_garl.execution.flight_id import CompletedFlight
 from pytest_garl.execution.job import FlightJob
 from pytest_garl.execution.ledger import Ledger
 from pytest_garl.execution.local_pool import local_pool
 from pytest_garl.execution.on_demand import FlyFunction, OnDemandFlights
 from pytest_garl.execution.reference import reference_to
-from pytest_garl.execution.result import CompletedFlight
 from pytest_garl.simulation.system_under_test.reference_pilot import ReferencePilot
 from tests.execution.flying import Good, job_of, scenario
 

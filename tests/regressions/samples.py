@@ -9,9 +9,10 @@ from pathlib import Path
 import numpy as np
 
 from pytest_garl.adversary.catalogue import policy_spec
+from pytest_garl.execution.flight_id import CompletedFlight
 from pytest_garl.execution.job import FlightJob
 from pytest_garl.execution.reference import Reference
-from pytest_garl.execution.result import CompletedFlight, FlightResult
+from pytest_garl.execution.result import FlightResult
 from pytest_garl.regressions.case import Case, Evidence, Violation
 from pytest_garl.regressions.case_request import CaseRequest
 from pytest_garl.scenarios.chromosome import decode

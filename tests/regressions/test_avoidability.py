@@ -4,8 +4,8 @@ from pathlib import Path
 
 import pytest
 
+from pytest_garl.execution.flight_id import CompletedFlight
 from pytest_garl.execution.job import FlightJob
-from pytest_garl.execution.result import CompletedFlight
 from pytest_garl.regressions.avoidability import (
     avoidability,
     avoidability_without_pilot,

@@ -5,7 +5,7 @@ from typing import Any
 
 import pytest
 
-from pytest_garl.execution.result import CompletedFlight
+from pytest_garl.execution.flight_id import CompletedFlight
 from pytest_garl.regressions.case_flights import PILOT_FLIGHTS
 from pytest_garl.regressions.case_request import CaseRequest, CaseResult
 from pytest_garl.regressions.forecast import divide_flights, flights_after_search, remaining_work

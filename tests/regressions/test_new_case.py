@@ -2,7 +2,7 @@ from __future__ import annotations
 
 import dataclasses
 
-from pytest_garl.execution.result import CompletedFlight
+from pytest_garl.execution.flight_id import CompletedFlight
 from pytest_garl.regressions.case import RecordedBehaviour
 from pytest_garl.regressions.case_request import FailingScenario
 from pytest_garl.regressions.new_case import case_without_flights, new_case

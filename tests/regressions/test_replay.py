@@ -7,9 +7,9 @@ from pathlib import Path
 
 import pytest
 
-from pytest_garl.execution.result import CompletedFlight
+from pytest_garl.execution.flight_id import CompletedFlight
 from pytest_garl.regressions.case import Case
-from pytest_garl.regressions.recorded_behaviour import recorded_behaviour
+from pytest_garl.regressions.case_flights import recorded_behaviour
 from pytest_garl.regressions.replay import SourceHashes, replay, stale_reasons
 from pytest_garl.simulation.flight_file import save
 from pytest_garl.simulation.fly import fly

@@ -53,7 +53,7 @@ def test_a_users_method_is_named_by_its_module() -> None:
 def test_the_page_on_methods_has_a_row_for_each_with_its_policy() -> None:
     page = (Path(__file__).parents[2] / "docs" / "methods.md").read_text()
     table = page[: page.index("\n## ")]
-    rows = re.findall(r"^\| `([a-z-]+)`.* \| (.+) \| `([a-z_-]+)` \|$", table, re.MULTILINE)
+    rows = re.findall(r"^\| `([a-z0-9-]+)`.* \| (.+) \| `([a-z0-9_-]+)` \|$", table, re.MULTILINE)
     assert {name: policy for name, _, policy in rows} == {
         name: declaration_of(name).policy for name in method_names()
     }

@@ -10,10 +10,10 @@ import pytest
 from pytest_garl import Command, Mission, Observation, PositionSetpoint
 from pytest_garl.adversary.catalogue import policy_spec
 from pytest_garl.adversary.recorded import recorded_spec
-from pytest_garl.execution.result import CompletedFlight
+from pytest_garl.execution.flight_id import CompletedFlight
 from pytest_garl.landing_system import Airframe, Camera
 from pytest_garl.regressions.case import RecordedBehaviour
-from pytest_garl.regressions.recorded_behaviour import recorded_behaviour
+from pytest_garl.regressions.case_flights import recorded_behaviour
 from pytest_garl.scenarios.genes import ENVIRONMENT, genome_for
 from pytest_garl.scenarios.maps.map import load_map
 from pytest_garl.scenarios.scenario import Scenario

@@ -1,41 +1,17 @@
-"""The recorded behaviour of NPCs: they repeat it without a policy, and a short record suffices."""
+"""Shorter records of moves: whole hundredths, and an object that stands still at first."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Iterator
 
-from pytest_garl.execution.result import CompletedFlight
-from pytest_garl.regressions.case import MoveList, Moves, RecordedBehaviour
+from pytest_garl.regressions.case import MoveList, Moves
 from pytest_garl.scenarios.maps.map import Map
 from pytest_garl.scenarios.placement import start_genes
 from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.scenarios.validity import problems
 from pytest_garl.simulation.flight import Flight
-from pytest_garl.simulation.flight_file import load
 from pytest_garl.simulation.npc_policy import DECISION_STEP_S
-
-
-def recorded_behaviour(flight: CompletedFlight, scenario: Scenario, map: Map) -> RecordedBehaviour:
-    """Return what each object did in a flight; no moves if the flight left no record."""
-    names = [name for name, _ in map.without(scenario.removed_objects).present_objects]
-    if not flight.record.exists():
-        return RecordedBehaviour(moves=tuple((name, ()) for name in names))
-    objects = load(flight.record).objects
-    made = {item.name: item.moves for item in objects}
-    return RecordedBehaviour(
-        moves=tuple(
-            (name, tuple((float(x), float(y)) for x, y in made.get(name, ()))) for name in names
-        ),
-        changes=tuple((item.name, item.changes) for item in objects if item.changes),
-    )
-
-
-def find_colliding_object(flight: CompletedFlight) -> str:
-    """Return the moving object that the UAV hit; empty if it hit none."""
-    hit, kind = flight.result.collisions, flight.result.verdict.violation_type
-    return hit[-1] if hit and kind == "IV" else ""
-
 
 LAST_MOVES_S = (2.0, 4.0, 8.0)
 """Times before the end of the flight in which an object moves, tried from short to long."""

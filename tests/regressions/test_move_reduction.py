@@ -10,13 +10,9 @@ from hypothesis import strategies as st
 
 from pytest_garl.adversary.catalogue import policy_spec
 from pytest_garl.adversary.recorded import recorded_spec
-from pytest_garl.execution.result import CompletedFlight
-from pytest_garl.regressions.recorded_behaviour import (
-    _round,
-    find_colliding_object,
-    recorded_behaviour,
-    shorter_records,
-)
+from pytest_garl.execution.flight_id import CompletedFlight
+from pytest_garl.regressions.case_flights import find_colliding_object, recorded_behaviour
+from pytest_garl.regressions.move_reduction import _round, shorter_records
 from pytest_garl.scenarios.genes import genome_for
 from pytest_garl.scenarios.validity import problems
 from pytest_garl.search.methods.random import random_scenarios
