@@ -6,6 +6,7 @@ import subprocess
 import sys
 import warnings
 from collections.abc import Callable, Iterator
+from multiprocessing import resource_tracker
 from pathlib import Path
 
 import cv2
@@ -26,6 +27,8 @@ from tests.execution.flying import LAWN, Good, job_of, scenario
 
 @pytest.fixture
 def state() -> ProcessState:
+    # PyTorch, which tests of training load, starts a process that outlives them.
+    resource_tracker._resource_tracker._stop()  # type: ignore[attr-defined]
     return ProcessState()
 
 
