@@ -119,6 +119,7 @@ def test_check_names_a_missing_table(path: Path, table: str) -> None:
         _checked(path)
 
 
+@pytest.mark.long
 def test_query_on_a_damaged_page_raises_a_ledger_error(path: Path) -> None:
     ledger = Ledger(path)
     ledger.add_slots("a", 1, {slot: dump_scenario(scenario(0.1)) for slot in range(200)})

@@ -78,7 +78,7 @@ def test_the_lowest_slot_fails_whatever_the_order(pytester: pytest.Pytester) -> 
     assert len(failed(straight)) == 2
 
 
-@pytest.mark.parametrize("parallel", [(), ("-n2",)])
+@pytest.mark.parametrize("parallel", [(), pytest.param(("-n2",), marks=pytest.mark.long)])
 @pytest.mark.parametrize(
     ("system", "words", "share"),
     [

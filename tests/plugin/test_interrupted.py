@@ -65,7 +65,7 @@ def test_finished_run_resumes_with_more_or_less_shrinking(
     again.stdout.no_fnmatch_line("*bred in another way*")
 
 
-@pytest.mark.parametrize("conftest", ["", TWICE])
+@pytest.mark.parametrize("conftest", ["", pytest.param(TWICE, marks=pytest.mark.long)])
 def test_ctrl_c_saves_nothing_of_half_a_search(pytester: pytest.Pytester, conftest: str) -> None:
     slow_project(pytester)
     (pytester.path / "test_it.py").write_text(
@@ -83,7 +83,7 @@ def test_ctrl_c_saves_nothing_of_half_a_search(pytester: pytest.Pytester, confte
     assert cases(pytester.path)
 
 
-@pytest.mark.parametrize("parallel", [(), ("-n2",)])
+@pytest.mark.parametrize("parallel", [(), pytest.param(("-n2",), marks=pytest.mark.long)])
 def test_run_leaves_nothing_but_its_ledger_and_flights(
     pytester: pytest.Pytester, parallel: tuple[str, ...]
 ) -> None:

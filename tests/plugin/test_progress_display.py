@@ -93,7 +93,9 @@ def slow_project(pytester: pytest.Pytester) -> None:
     test.write_text(test.read_text().replace("from systems import *", "from slow import Slow"))
 
 
-@pytest.mark.parametrize("args", [("-q",), ("-v",), ("-q", "-n2"), ("-v", "-n2")])
+@pytest.mark.parametrize(
+    "args", [("-q",), ("-v",), ("-q", "-n2"), pytest.param(("-v", "-n2"), marks=pytest.mark.long)]
+)
 def test_progress_line_appears_and_disappears(
     pytester: pytest.Pytester, args: tuple[str, ...]
 ) -> None:

@@ -288,7 +288,7 @@ def test_budget_counts_flights_exactly(pytester: pytest.Pytester, budget: int) -
     assert counted == [(budget, budget)]
 
 
-@pytest.mark.parametrize("parallel", [(), ("-n2",)])
+@pytest.mark.parametrize("parallel", [(), pytest.param(("-n2",), marks=pytest.mark.long)])
 def test_full_disk_ends_the_run_with_one_clear_error(
     pytester: pytest.Pytester, parallel: tuple[str, ...]
 ) -> None:

@@ -45,7 +45,9 @@ def test_exit_status_is_worst_of_items_and_session(
     assert exit_status(status, facts) == decided
 
 
-PARALLEL = pytest.mark.parametrize("parallel", [(), ("-n2",)], ids=["alone", "xdist"])
+PARALLEL = pytest.mark.parametrize(
+    "parallel", [(), pytest.param(("-n2",), marks=pytest.mark.long)], ids=["alone", "xdist"]
+)
 
 
 def test_session_is_not_green_if_a_plugin_hides_the_failure_that_excuses_others(
