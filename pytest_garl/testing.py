@@ -140,7 +140,7 @@ class _Checker:
                 self._warn_of_flight(first)
                 other = self._compare(first)
                 flights.append(f"{self._map.name}, another scenario: {_ending(other.flight)}")
-                if {first.flight.outcome, other.flight.outcome} == {"aborted"}:
+                if {first.flight.outcome, other.flight.outcome} == {"gave_up"}:
                     self._warnings.append("gave up in both scenarios; a search would learn nothing")
             except OutOfTimeError:
                 self._warnings.append(
@@ -195,7 +195,7 @@ class _Checker:
         limits = Limits()
         if flight.outcome == "not_landed" and self._whole:
             warn(f"did not land within {self._seconds:.0f} s, in a calm scenario without objects")
-        if flight.outcome == "aborted":
+        if flight.outcome == "gave_up":
             warn("gave up in a calm scenario without objects")
         if flight.outcome == "collision":
             warn("collided in a calm scenario without moving objects")

@@ -109,7 +109,7 @@ def row_of(key: Key, pool: Executor) -> dict[str, Any]:
         "flights": len(ends),
         "collided": hits.total(),
         **{kind: hits[kind] for kind in KINDS},
-        "blocked": sum(outcome in ("aborted", "not_landed") for outcome, _, _ in ends),
+        "blocked": sum(outcome in ("gave_up", "not_landed") for outcome, _, _ in ends),
         "violations": sum(violation for _, _, violation in ends),
         "crashed": sum(outcome == "crashed" for outcome, _, _ in ends),
     }

@@ -27,7 +27,7 @@ BEGIN, END = "<!-- Written by `python -m studies.gate rates`: -->\n", "<!-- To h
 BUDGETS = (50, 100, 400)
 PARTS = (0.1, 0.25, 0.5, 1.0)
 LANDED = FlightSummary(outcome="landed", signature="", sha256="base")
-ABORTED = FlightSummary(outcome="aborted", signature="", sha256="base")
+ABORTED = FlightSummary(outcome="gave_up", signature="", sha256="base")
 KNOWN = FlightSummary(outcome="collision", signature="IV:person:descent:seen", sha256="head")
 NEW = FlightSummary(outcome="collision", signature="III:tree:descent", sha256="head")
 RARE = (

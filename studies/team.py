@@ -206,7 +206,7 @@ def fly_one(job: tuple[Scenario, Map, str, str]) -> tuple[bool, bool]:
         spec = policy_spec("dqn")
     flight = fly(scenario, made, spec, map=map)
     hit = flight.outcome == "collision" and flight.contacts[-1].body_class == "dynamic"
-    return hit, flight.outcome in ("aborted", "not_landed")
+    return hit, flight.outcome in ("gave_up", "not_landed")
 
 
 def report(rows: list[Row]) -> str:

@@ -36,7 +36,7 @@ _KEYS = {
     "genes",
     "flights",
 }
-_OUTCOMES = ("landed", "collision", "not_landed", "aborted", "crashed", "inconclusive")
+_OUTCOMES = ("landed", "collision", "not_landed", "gave_up", "crashed", "inconclusive")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

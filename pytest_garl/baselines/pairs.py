@@ -34,7 +34,7 @@ class FlightSummary:
     @property
     def aborted(self) -> bool:
         """Whether the landing system aborted the landing."""
-        return self.outcome == "aborted"
+        return self.outcome == "gave_up"
 
     @property
     def decided(self) -> bool:

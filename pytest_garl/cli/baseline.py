@@ -78,10 +78,11 @@ _SPEC_OPTIONS = (
     ),
     click.option(
         "--abort",
-        type=click.Choice(["ok", "violation"]),
-        default="ok",
+        type=click.Choice(["needless", "ok", "violation"]),
+        default="needless",
         show_default=True,
-        help="Whether an aborted landing is a violation.",
+        help="When a landing that is given up is a violation: unless nobody could have landed "
+        "(needless), never (ok), always (violation).",
     ),
     click.option(
         "--simulator",

@@ -205,7 +205,7 @@ def promote(project: _Project, file: Path) -> None:
         how = "a live policy" if live else "its recorded moves"
         if replayed.result != "FIXED":
             raise GarlError(f"{file}: {_refusal(replayed, how)}; it stays {case.status}")
-        if replayed.outcome == "aborted":
+        if replayed.outcome == "gave_up":
             remarks.append(f"with {how} the landing system gave up; it did not land")
         if not live:
             remarks.append(f"judged by {replayed.judged_by}")

@@ -16,7 +16,7 @@ from pytest_garl.execution.reference import BUILT_IN, Reference
 from pytest_garl.files.json_values import dataclass_from, parse_json
 from pytest_garl.scenarios.maps.map import Map, load_map
 from pytest_garl.simulation.npc_policy import PolicySpec
-from pytest_garl.verdicts.verdict import PAPER_LIMITS, Limits
+from pytest_garl.verdicts.verdict import DEFAULT_LIMITS, Limits
 
 TIMEOUT_S = 10.0
 """Wall time that one call of a landing system may take if nobody says otherwise, in seconds."""
@@ -59,7 +59,7 @@ class FlightJob:
         sources: tuple[tuple[str, str], ...] = (),
         simulator: Reference = BUILT_IN,
         map_folders: Sequence[Path] = (),
-        limits: Limits = PAPER_LIMITS,
+        limits: Limits = DEFAULT_LIMITS,
         timeout_s: float = TIMEOUT_S,
         path: Sequence[str] | None = None,
     ) -> FlightJob:

@@ -26,7 +26,8 @@ class FlightResult:
     of the bodies that the UAV hit.  ``undecided`` says why a property could not be judged.
     ``off_marker_m`` is the distance of a touchdown too far from the marker before the UAV gave up.
     ``closest_call`` is the signature that a near miss would have had, ``closest_body`` the body
-    of that near miss; both are empty without one.
+    of that near miss; both are empty without one.  ``landed_s`` is the time of the touchdown of a
+    flight that landed.
     """
 
     outcome: str
@@ -39,6 +40,7 @@ class FlightResult:
     verdict: Verdict
     crash: Crash | None
     off_marker_m: float | None = None
+    landed_s: float | None = None
 
     @property
     def signature(self) -> str:
@@ -61,9 +63,7 @@ class FlightResult:
         Raises ValueError that names the field, what was found and what was expected.
         """
         if isinstance(values, Mapping):
-            values = {"off_marker_m": None} | {
-                key: value for key, value in values.items() if key in _FIELDS
-            }
+            values = {**_DEFAULTS} | {key: value for key, value in values.items() if key in _FIELDS}
         return dataclass_from(cls, values)
 
     def dumps(self) -> str:
@@ -71,6 +71,7 @@ class FlightResult:
         return json.dumps(self.to_json(), sort_keys=True, allow_nan=False)
 
 
+_DEFAULTS: Mapping[str, Any] = {"off_marker_m": None, "landed_s": None}
 _FIELDS = frozenset(field.name for field in dataclasses.fields(FlightResult))
 
 

@@ -125,7 +125,7 @@ def _violations(search: FinishedSearch) -> dict[str, Any]:
         "violations": len(paper),
         **{f"type_{name.lower()}": types[name] for name in PAPER_TYPES},
         **{name: types[name] for name in ("late", "off", "hard")},
-        "aborted": sum(verdict.outcome == "aborted" for verdict in verdicts),
+        "aborted": sum(verdict.outcome == "gave_up" for verdict in verdicts),
         "inconclusive": sum(flight.result.inconclusive for flight in search.flights),
         "top10": top_k(verdicts),
         "signatures": tuple(sorted({verdict.signature for verdict in paper})),

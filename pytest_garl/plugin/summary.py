@@ -177,7 +177,7 @@ def _shares(search: SearchSummary) -> list[str]:
         shares.append(f"by the paper's definition {_percent(paper, total)}")
     shares += [
         f"landed {_percent(search.count('landed'), total)}",
-        f"gave up {_percent(search.count('aborted'), total)}",
+        f"gave up {_percent(search.count('gave_up'), total)}",
     ]
     late = sum(verdict.violation_type == "late" for verdict in verdicts)
     rare = {"late": late, **search.crashes}

@@ -9,7 +9,7 @@ import textwrap
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Literal, cast, get_args
+from typing import cast, get_args
 
 from pytest_garl.errors import ScenarioError
 from pytest_garl.execution.reference import SYSTEM_NAME
@@ -35,6 +35,7 @@ from pytest_garl.scenarios.maps.map import Map, load_map
 from pytest_garl.verdicts.verdict import (
     FARTHEST_M,
     LONGEST_S,
+    AbortRule,
     Limits,
     PropertyName,
     ViolationType,
@@ -204,11 +205,11 @@ def _limits_lines(limits: Limits) -> list[str]:
 def read_limits(table: Table) -> Limits:
     """Return the limits in a table of their own."""
     table.refuse_unknown({"distance_m", "time_s", "abort"})
-    abort = table.string("abort", allowed=("ok", "violation"))
+    abort = table.string("abort", allowed=("needless", "ok", "violation"))
     return Limits(
         distance_m=table.number("distance_m", low=0.0, high=FARTHEST_M),
         time_s=table.number("time_s", low=0.0, high=LONGEST_S),
-        abort=cast(Literal["ok", "violation"], abort),
+        abort=cast(AbortRule, abort),
     )
 
 

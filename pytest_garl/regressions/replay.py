@@ -106,7 +106,7 @@ def _by_tests(
     elif failed:
         result = "FAILED"
         reasons = tuple(f"{each.nodeid.rpartition('.')[2]}: {each.message}" for each in failed)
-    elif finder.outcome == "skipped" and outcome != "aborted":
+    elif finder.outcome == "skipped" and outcome != "gave_up":
         result, reasons = "UNDECIDED", (f"its test was skipped: {finder.message}",)
     elif stale := properties.get("garl.unproven", ""):
         result, reasons = "STALE", (stale,)

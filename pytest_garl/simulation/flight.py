@@ -11,7 +11,7 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
-Outcome = Literal["landed", "collision", "not_landed", "aborted", "crashed"]
+Outcome = Literal["landed", "collision", "slid", "gave_up", "not_landed", "crashed"]
 BodyClass = Literal["static", "dynamic", "ground"]
 
 TRACK_RATE_HZ = 24.0
@@ -86,13 +86,74 @@ class Event:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class MarkerView:
+    """How a picture shows the marker, from ground truth: what decides whether it can be read.
+
+    ``share_in_frame`` is the share (0..1) of the marker that lies inside the picture,
+    ``px_per_module`` the side of one module (bit) in pixels, the shorter of both axes.
+    ``border_hidden`` and ``bits_hidden`` are the shares of the black border and of the inner bits
+    that objects, leaves or snow cover.  ``contrast`` is the difference between white and black
+    modules in grey levels (0..255) as the sensor delivers them, after fog, dust, shadow and
+    exposure; ``noise`` the standard deviation of a pixel in grey levels; ``blur_px`` the length
+    of the motion blur.
+    """
+
+    share_in_frame: float
+    px_per_module: float
+    border_hidden: float
+    bits_hidden: float
+    contrast: float
+    noise: float
+    blur_px: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class NominalView:
+    """The marker as a level camera sees it from where a nominal landing looks.
+
+    ``place`` is "search" for a place of the search above the told coordinate, or "above" for a
+    place above the marker; ``height_m`` is that of the camera's UAV; ``time_s`` is when a nominal
+    flight is there, and ``duration_s`` how long it looks from there.
+    """
+
+    time_s: float
+    duration_s: float
+    place: Literal["search", "above"]
+    height_m: float
+    marker: MarkerView
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Touchdown:
+    """The touchdown of a flight: the begin of its last stay on the ground.
+
+    ``position_m`` is the body's; ``distance_m`` its horizontal distance from the marker's centre;
+    ``speed_mps`` the vertical speed; ``on`` what lies under the UAV: "marker", the name of a decoy,
+    "line", "shadow", or "nothing".  ``slid_m`` is how far the UAV moved over the ground afterwards,
+    ``stopped_s`` the time at which the motors stopped, None if they did not.
+    """
+
+    time_s: float
+    position_m: tuple[float, float, float]
+    distance_m: float
+    speed_mps: float
+    tilt_rad: float
+    on: str
+    slid_m: float = 0.0
+    stopped_s: float | None = None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Step:
     """One camera frame: what there was to see and what the landing system made of it.
 
     ``marker_visible`` is the share (0..1) of the marker's area that this frame shows
     unhidden, where 0 means outside the frame or wholly covered; ``marker_px`` the
-    side in pixels that an unhidden marker would have.  ``objects_visible`` names the
-    dynamic objects of which at least one pixel is in the frame.
+    side in pixels that an unhidden marker would have; ``marker`` what decides whether it can be
+    read, None without a camera or outside the frame.  ``objects_visible`` names the dynamic objects
+    of which at least one pixel is in the frame, and ``objects_px`` counts their pixels, in the same
+    order.  ``estimation_error_m`` is the difference between the position in the observation and the
+    true one.
     """
 
     time_s: float
@@ -101,6 +162,9 @@ class Step:
     marker_px: float
     objects_visible: tuple[str, ...]
     diagnostics: Diagnostics | None
+    marker: MarkerView | None = None
+    objects_px: tuple[int, ...] = ()
+    estimation_error_m: tuple[float, float, float] = (0.0, 0.0, 0.0)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -129,6 +193,11 @@ class Flight:
     ground that could be taken for the marker: (name, x, y).  ``sha256`` is the hash of
     the trajectories and the outcome, the same for equal flights on one CPU class;
     ``cpu`` names that class.  ``wall_s`` is what it cost and is in no hash.
+    ``touchdown`` is None for a flight that did not touch the ground after its take-off.
+    ``nominal_views`` show how a nominal landing would have seen the marker; they are empty for
+    flights that landed, hit something or crashed, and for simulators that do not record them.
+    ``nominal_arrival_s`` and ``nominal_landing_s`` are when a nominal flight is above the marker
+    and on it.
     """
 
     outcome: Outcome
@@ -143,6 +212,10 @@ class Flight:
     steps: tuple[Step, ...]
     decoys: tuple[tuple[str, float, float], ...] = ()
     crash: Crash | None = None
+    touchdown: Touchdown | None = None
+    nominal_views: tuple[NominalView, ...] = ()
+    nominal_arrival_s: float | None = None
+    nominal_landing_s: float | None = None
     sha256: str = ""
     cpu: str = ""
     versions: tuple[tuple[str, str], ...] = ()

@@ -24,10 +24,12 @@ from pytest_garl.simulation.flight import (
     Crash,
     Event,
     Flight,
+    NominalView,
     ObjectRecord,
     Outcome,
     Separation,
     Step,
+    Touchdown,
     Track,
 )
 
@@ -55,6 +57,8 @@ def hash_of(flight: Flight) -> str:
             digest.update(repr(item.changes).encode())
     for contact in flight.contacts:
         digest.update(repr(dataclasses.astuple(contact)).encode())
+    if flight.touchdown:
+        digest.update(repr(dataclasses.astuple(flight.touchdown)).encode())
     return digest.hexdigest()
 
 
@@ -95,6 +99,10 @@ def save(flight: Flight, path: Path) -> None:
         "steps": [dataclasses.asdict(item) for item in flight.steps],
         "decoys": flight.decoys,
         "crash": dataclasses.asdict(flight.crash) if flight.crash else None,
+        "touchdown": dataclasses.asdict(flight.touchdown) if flight.touchdown else None,
+        "nominal_views": [dataclasses.asdict(item) for item in flight.nominal_views],
+        "nominal_arrival_s": flight.nominal_arrival_s,
+        "nominal_landing_s": flight.nominal_landing_s,
         "sha256": flight.sha256,
         "cpu": flight.cpu,
         "versions": flight.versions,
@@ -211,6 +219,10 @@ class _Header:
     steps: tuple[Step, ...]
     decoys: tuple[tuple[str, float, float], ...]
     crash: Crash | None
+    touchdown: Touchdown | None
+    nominal_views: tuple[NominalView, ...]
+    nominal_arrival_s: float | None
+    nominal_landing_s: float | None
     sha256: str
     cpu: str
     versions: tuple[tuple[str, str], ...]

@@ -138,8 +138,8 @@ class Loop:
         if tick % TICKS_PER_TRACK_SAMPLE == 0:
             self._contacts.record_pose(now)
             if isinstance(self._command, Abort) and self._contacts.clear_of_everything(position):
-                self.recorder.event("aborted", "gave up and climbed clear of everything")
-                return "aborted"
+                self.recorder.event("gave_up", "gave up and climbed clear of everything")
+                return "gave_up"
         if tick % self._ticks_per_frame == 0:
             self._observe(tick, position, attitude, velocity)
         while self._pending and self._pending[0][0] <= tick:

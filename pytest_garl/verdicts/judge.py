@@ -96,7 +96,7 @@ def why_undecided(flight: Flight) -> str:
     when = f"at {flight.elapsed_s:.1f} s"
     if flight.outcome == "collision":
         return f"collision with {flight.contacts[-1].body} {when}"
-    if flight.outcome == "aborted":
+    if flight.outcome == "gave_up":
         return f"aborted {when}"
     if flight.outcome == "crashed":
         return f"the landing system crashed {when}"
@@ -129,7 +129,7 @@ def _touchdown_off_marker(flight: Flight, limits: Limits) -> _Touchdown | None:
     The record holds only the first contact with the ground; later ones follow from the height.
     """
     first = next((each for each in flight.contacts if each.body_class == "ground"), None)
-    if flight.outcome != "aborted" or first is None:
+    if flight.outcome != "gave_up" or first is None:
         return None
     track = flight.uav
     start = max(0, int(np.searchsorted(track.time_s, first.time_s, side="right")) - 1)
@@ -189,7 +189,7 @@ def _mechanism(flight: Flight, limits: Limits) -> _Mechanism:
         return _crash(flight.crash)
     if flight.outcome == "collision":
         return _collision(flight, flight.contacts[-1])
-    if flight.outcome == "aborted":
+    if flight.outcome == "gave_up":
         return _abort(flight, limits)
     if flight.outcome == "not_landed":
         return _not_landed(flight)

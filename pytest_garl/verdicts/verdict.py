@@ -5,34 +5,60 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, Literal
+from typing import Any, Literal, get_args
 
 from pytest_garl.errors import OptionError
 from pytest_garl.messages import shown
+from pytest_garl.scenarios.placement import MARKER_SIDE_M
 
 LONGEST_S = 300.0
 """The largest limit of time, in seconds: more than twice the paper's two minutes, and short enough
 that a landing system that hovers does not hold up a search."""
 FARTHEST_M = 1000.0
 """The largest limit of distance, wider than any map."""
+LEAST_DISTANCE_M = 0.3
+"""The smallest default limit of distance: what a landing by a camera reaches."""
 PropertyName = Literal["distance", "time", "collision", "crash", "abort", "own"]
-ViolationType = Literal["I", "II", "III", "IV", "V", "late", "off", "hard", "abort", "own"]
+"""The property that a violation is about.  A flight that gives up needlessly violates "time": it
+never lands."""
+ViolationType = Literal["I", "II", "III", "IV", "V", "late", "off", "hard", "slid", "abort", "own"]
 """The paper's five types, and further ones; "own" is a property that a user's test asserts."""
+MarginName = Literal[
+    "distance",
+    "time",
+    "collision",
+    "moving",
+    "static",
+    "touchdown_speed",
+    "touchdown_tilt",
+    "dropout",
+    "decoy",
+    "tracking",
+    "slide",
+    "mission",
+    "crash",
+    "abort",
+    "own",
+]
+Excuse = Literal["", "undetectable", "blocked"]
+"""Why nobody could have landed: the marker could not be read for long enough, or people, dogs or
+birds never left it free for long enough.  Empty if somebody could."""
+AbortRule = Literal["needless", "ok", "violation"]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Limits:
-    """Limits beyond which a flight violates a property; the defaults are the paper's.
+    """Limits beyond which a flight violates a property.
 
-    ``distance_m`` is 1.5: certainly outside of the 1.5 m marker, and more than the GPS error
-    (paper, RQ1).  ``time_s`` is 120, the Wingcopter's two minutes in multi-copter mode.  ``abort``
-    is "ok" if aborted landings are reported as a share of their own, "violation" if they count as
-    violations.
+    ``distance_m`` is half the marker's side, and at least 0.3 m: the UAV stands on the marker.
+    ``time_s`` is 120, the Wingcopter's two minutes in multi-copter mode (paper).  ``abort`` says
+    when a landing that is given up is a violation: "needless" unless nobody could have landed,
+    "violation" always, "ok" never.
     """
 
-    distance_m: float = 1.5
+    distance_m: float = max(LEAST_DISTANCE_M, MARKER_SIDE_M / 2)
     time_s: float = 120.0
-    abort: Literal["ok", "violation"] = "ok"
+    abort: AbortRule = "needless"
 
     def __post_init__(self) -> None:
         for name, high in (("distance_m", FARTHEST_M), ("time_s", LONGEST_S)):
@@ -42,9 +68,9 @@ class Limits:
                 raise OptionError(
                     f"limits: found {name}={shown(value)}, expected a number from 0 to {high:g}"
                 )
-        if self.abort not in ("ok", "violation"):
+        if self.abort not in get_args(AbortRule):
             raise OptionError(
-                f"limits: found abort={shown(self.abort)}, expected 'ok' or 'violation'"
+                f"limits: found abort={shown(self.abort)}, expected 'needless', 'ok' or 'violation'"
             )
 
 
@@ -60,8 +86,11 @@ def limits(**given: Any) -> Limits:
     return Limits(**given)
 
 
-PAPER_LIMITS = Limits()
-"""The limits of the paper's definition of a violation."""
+DEFAULT_LIMITS = Limits()
+PAPER_LIMITS = Limits(distance_m=1.5, abort="violation")
+"""The limits of the paper's definition of a violation: certainly outside of the 1.5 m marker, and
+more than the GPS error (paper, RQ1); each landing that is given up counts, since "no landing
+occurs"."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -69,14 +98,29 @@ class Margin:
     """Distance of a property from its violation: signed, negative if the property is violated.
 
     ``value`` is in ``unit``.  ``decided`` is False if the flight ended before the property was
-    decided; ``reason`` then says why.
+    decided, so that the value is an estimate; ``reason`` then says why.
     """
 
-    property: PropertyName
+    property: MarginName
     value: float
     unit: str
     decided: bool = True
     reason: str = ""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Finding:
+    """Something that had gone wrong before the event that decided the flight.
+
+    ``signature`` names it like that of a violation, such as ``off:descending-elsewhere``;
+    ``margin`` is negative, in ``unit``; ``story`` is a sentence.
+    """
+
+    signature: str
+    margin: float
+    unit: str
+    time_s: float
+    story: str
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -85,9 +129,11 @@ class Verdict:
 
     ``primary`` is the property that the flight violates first, and ``None`` if it violates none.
     ``signature`` names the mechanism and the phase of the landing, such as
-    ``IV:dog:last-metre:unseen``.  ``paper_violation`` is the paper's narrower definition
-    (collision, or not landed within 1.5 m of the marker).  ``story`` says in sentences what
-    happened, where and when.
+    ``IV:dog:last-metre:unseen``.  ``paper_violation`` is the paper's definition: a collision, a
+    landing more than 1.5 m from the marker, or no landing.  ``story`` says in sentences what
+    happened, where and when.  ``completed`` says whether the mission was: landed within the limit
+    of distance.  ``excuse`` says why nobody could have landed in a flight without landing, and
+    ``excuse_text`` says it in a sentence.  ``findings`` are what had gone wrong before.
     """
 
     outcome: str
@@ -97,11 +143,36 @@ class Verdict:
     paper_violation: bool
     margins: tuple[Margin, ...]
     story: str
+    completed: bool = False
+    excuse: Excuse = ""
+    excuse_text: str = ""
+    findings: tuple[Finding, ...] = ()
 
     @property
     def violation(self) -> bool:
         """Whether the flight violated a safety property."""
         return self.primary is not None
+
+    @property
+    def kind(self) -> str:
+        """Type and cause without phase and sight, such as ``IV:dog``; empty without a violation."""
+        return kind_of(self.signature)
+
+    @property
+    def no_landing(self) -> Literal["", "blocked", "excused", "needless"]:
+        """Why a flight that was given up or ran out of time is excused, or that it is not."""
+        if self.outcome not in ("gave_up", "not_landed"):
+            return ""
+        return {"blocked": "blocked", "undetectable": "excused", "": "needless"}[self.excuse]  # type: ignore[return-value]
+
+    def margin(self, name: MarginName) -> Margin | None:
+        """Return the margin of a property, None if the flight has none."""
+        return next((margin for margin in self.margins if margin.property == name), None)
+
+
+def kind_of(signature: str) -> str:
+    """Return the type and the cause in a signature, without phase and sight."""
+    return ":".join(signature.split(":")[:2])
 
 
 def count_decided(verdicts: Sequence[Verdict], name: PropertyName) -> int:

@@ -9,7 +9,7 @@ from pytest_garl.baselines.gate_statistics import holm_adjusted, mcnemar_p, new_
 from pytest_garl.baselines.pairs import FlightSummary, Pair, violation_type_of
 
 LANDED = FlightSummary(outcome="landed", signature="")
-ABORTED = FlightSummary(outcome="aborted", signature="")
+ABORTED = FlightSummary(outcome="gave_up", signature="")
 DOG = FlightSummary(outcome="collision", signature="IV:dog:descent:seen", paper_violation=True)
 CAT = FlightSummary(outcome="collision", signature="IV:cat:descent:seen", paper_violation=True)
 LOST = FlightSummary(outcome="not_landed", signature="II:lost:descent", paper_violation=True)
@@ -140,7 +140,7 @@ def test_collisions_in_place_of_aborts_count_as_violations_alone() -> None:
 
 
 def test_a_violating_abort_counts_as_a_violation_alone() -> None:
-    forbidden = FlightSummary(outcome="aborted", signature="abort:descent")
+    forbidden = FlightSummary(outcome="gave_up", signature="abort:descent")
     found = gate((2, LANDED, forbidden), (1, forbidden, forbidden))
     assert (found.violations.broke, found.aborts.broke) == (2, 0)
     assert (found.aborts.base, found.aborts.head) == (1, 3)

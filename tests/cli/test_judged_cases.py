@@ -142,7 +142,7 @@ def test_failure_of_another_test_of_the_file_keeps_a_case_open(project: Path) ->
     assert "still fails with its recorded moves" in garl("promote", dog).output
 
 
-@pytest.mark.parametrize("outcome", ["aborted", "inconclusive"])
+@pytest.mark.parametrize("outcome", ["gave_up", "inconclusive"])
 def test_promote_reports_an_abort_and_refuses_an_undecided_case(
     project: Path, outcome: str
 ) -> None:
@@ -150,8 +150,8 @@ def test_promote_reports_an_abort_and_refuses_an_undecided_case(
     let_system_avoid_dog(project)
     end = "    flight = Flight(\n"
     simulator = project / "tiny_simulator.py"
-    if outcome == "aborted":
-        replace_text(simulator, end, f"    outcome = 'aborted'\n{end}")
+    if outcome == "gave_up":
+        replace_text(simulator, end, f"    outcome = 'gave_up'\n{end}")
         simulator_is_as_it_was(dog)
         output = garl("promote", dog).output
         assert "with its recorded moves the landing system gave up; it did not land" in output

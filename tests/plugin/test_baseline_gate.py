@@ -16,7 +16,7 @@ BETTER = ("> 0.7 and", "> 7 and")
 WORSE = ("> 0.7 and", "> 0.3 and")
 OTHER = ('kind="dog"', 'kind="cat"')
 STATIC = ('body_class="dynamic"', 'body_class="static"')
-CAUTIOUS = ('        outcome = "collision"', '        outcome = "aborted"')
+CAUTIOUS = ('        outcome = "collision"', '        outcome = "gave_up"')
 
 
 def run(pytester: pytest.Pytester, *args: str) -> pytest.RunResult:

@@ -76,7 +76,7 @@ def test_open_case_that_ends_in_an_abort_counts_as_passed(
     searched: pytest.Pytester,
 ) -> None:
     replace_text(
-        searched.path / "tiny_simulator.py", 'outcome = "collision"', 'outcome = "aborted"'
+        searched.path / "tiny_simulator.py", 'outcome = "collision"', 'outcome = "gave_up"'
     )
     result = run(searched)
     result.assert_outcomes(passed=3, skipped=2, xfailed=1)

@@ -50,7 +50,7 @@ def test_violating_abort_fails_an_item_although_the_first_is_skipped(
     tests = pytester.path / "test_it.py"
     limited = tests.read_text().replace("maps=", "limits={'abort': 'violation'}, maps=")
     tests.write_text(limited)
-    write_simulator(pytester, "dataclasses.replace(flight, outcome='aborted')", "True")
+    write_simulator(pytester, "dataclasses.replace(flight, outcome='gave_up')", "True")
     result = run(pytester, "--garl-budget=4", "--garl-workers=0")
     assert result.parseoutcomes()["failed"] == 1
     assert "passed" not in result.parseoutcomes()
@@ -171,7 +171,7 @@ def test_ground_contact_off_the_marker_before_an_abort_fails(
 ) -> None:
     project(pytester)
     touch = (
-        "dataclasses.replace(flight, outcome='aborted', contacts=(Contact(time_s=12.0, "
+        "dataclasses.replace(flight, outcome='gave_up', contacts=(Contact(time_s=12.0, "
         "body='ground', kind='ground', body_class='ground', position_m=(40.0, 0.0, 0.0), "
         "speed_mps=0.5, tilt_rad=0.0),))"
     )
@@ -246,7 +246,7 @@ def fly(*args, **options):
         speed_mps=0.5,
         tilt_rad=0.0,
     )
-    changed = dataclasses.replace(flight, outcome="aborted", contacts=(touch,), crash=None)
+    changed = dataclasses.replace(flight, outcome="gave_up", contacts=(touch,), crash=None)
     return dataclasses.replace(changed, sha256=hash_of(changed))
 """
 

@@ -62,7 +62,7 @@ class WrongShape(Scripted):
         (Falls, "collision"),
         (HitsATree, "collision"),
         (Hovers, "not_landed"),
-        (GivesUp, "aborted"),
+        (GivesUp, "gave_up"),
         (Raises, "crashed"),
         (ReturnsNan, "crashed"),
     ],

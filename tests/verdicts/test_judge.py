@@ -67,7 +67,7 @@ from tests.verdicts.flights import CRASH, flight, gap, hit, step, touch, track
             "crash",
             "V:PlannerError@planning_ego.plan",
         ),
-        (flight("aborted", (0.0, 0.0, 8.0)), None, ""),
+        (flight("gave_up", (0.0, 0.0, 8.0)), None, ""),
     ],
 )
 def test_the_first_event_decides_the_verdict(subject: Flight, primary: Any, signature: str) -> None:
@@ -80,7 +80,7 @@ def test_the_first_event_decides_the_verdict(subject: Flight, primary: Any, sign
 def test_late_and_aborted_flights_are_no_paper_violation() -> None:
     late = judge(flight("landed", (0.0, 0.0, 0.2)), Limits(time_s=20))
     assert (late.primary, late.violation_type, late.paper_violation) == ("time", "late", False)
-    aborted = judge(flight("aborted", (0.0, 0.0, 8.0)), Limits(abort="violation"))
+    aborted = judge(flight("gave_up", (0.0, 0.0, 8.0)), Limits(abort="violation"))
     assert (aborted.primary, aborted.paper_violation) == ("abort", False)
 
 
@@ -146,7 +146,7 @@ def test_a_touchdown_off_the_marker_before_an_abort_is_judged_as_a_landing(
     target: Any, signature: str, words: str
 ) -> None:
     subject = flight(
-        "aborted",
+        "gave_up",
         (5.0, 0.0, 5.0),
         uav=track(*DESCENT_AND_CLIMB),
         contacts=touch(10.0),
@@ -166,7 +166,7 @@ def test_a_touchdown_off_the_marker_before_an_abort_is_judged_as_a_landing(
 
 def test_a_touchdown_within_the_limit_before_an_abort_is_no_violation() -> None:
     subject = flight(
-        "aborted", (5.0, 0.0, 5.0), uav=track(*DESCENT_AND_CLIMB), contacts=touch(10.0)
+        "gave_up", (5.0, 0.0, 5.0), uav=track(*DESCENT_AND_CLIMB), contacts=touch(10.0)
     )
     assert judge(subject, Limits(distance_m=5.0)).primary is None
     assert off_marker_m(subject, Limits(distance_m=5.0)) is None
@@ -177,7 +177,7 @@ def test_sliding_off_the_marker_before_an_abort_violates_and_flying_off_does_not
     touched = ((0.0, 0.0, 0.0, 8.0), (10.0, 0.0, 0.0, 0.22), (10.1, 0.5, 0.0, 0.2))
     slid = track(*touched, (12.0, 3.0, 0.0, 0.21), (14.0, 3.0, 0.0, 5.0))
     flew = track(*touched, (12.0, 3.0, 0.0, 0.3), (14.0, 3.0, 0.0, 5.0))
-    subject = flight("aborted", (3.0, 0.0, 5.0), uav=slid, contacts=touch(10.05))
+    subject = flight("gave_up", (3.0, 0.0, 5.0), uav=slid, contacts=touch(10.05))
     verdict = judge(subject, Limits())
     assert verdict.primary == "distance"
     assert "Touched the ground 3.0 m off" in verdict.story
@@ -185,7 +185,7 @@ def test_sliding_off_the_marker_before_an_abort_violates_and_flying_off_does_not
 
 
 def test_an_abort_in_the_air_leaves_the_distance_undecided() -> None:
-    subject = flight("aborted", (5.0, 0.0, 5.0))
+    subject = flight("gave_up", (5.0, 0.0, 5.0))
     margins = {each.property: each for each in judge(subject, Limits()).margins}
     assert not margins["distance"].decided
     assert margins["distance"].reason == "aborted at 30.0 s"

@@ -39,7 +39,7 @@ def test_a_system_that_touches_the_ground_far_off_and_gives_up_violates_the_dist
     (scenario,) = BaselineSpec(count=1).scenarios(map)
     flight = fly(scenario, TouchesFarOff, policy_spec("stand"), map=map)
     verdict = judge(flight, Limits())
-    assert flight.outcome == "aborted"
+    assert flight.outcome == "gave_up"
     assert [each.body for each in flight.contacts] == ["ground"]
     assert (verdict.primary, verdict.violation_type) == ("distance", "I")
     off = off_marker_m(flight, Limits())

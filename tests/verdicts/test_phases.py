@@ -9,7 +9,7 @@ from tests.verdicts.flights import flight, step, track
 def at(x: float, z: float, highest: float = 10.0, visible: float = 0.0) -> str:
     """Return the phase of a UAV that was ``highest`` and is ``x`` m off the marker, ``z`` m up."""
     path = track((0.0, -10.0, 0.0, highest), (10.0, x, 0.0, z))
-    subject = flight("aborted", (x, 0.0, z), uav=path, steps=(step(5.0, visible=visible),))
+    subject = flight("gave_up", (x, 0.0, z), uav=path, steps=(step(5.0, visible=visible),))
     return landing_phase(subject, 10.0)
 
 
@@ -40,7 +40,7 @@ def test_approach_is_nearer_than_2_5_m_to_the_marker(x: float, name: str) -> Non
 def test_transit_ends_when_the_marker_comes_into_view(visible: float, name: str) -> None:
     assert at(5.0, 8.0, visible=visible) == name
     later = flight(
-        "aborted",
+        "gave_up",
         (5.0, 0.0, 8.0),
         uav=track((0.0, -10.0, 0.0, 10.0), (10.0, 5.0, 0.0, 8.0)),
         steps=(step(10.1, visible=1.0),),

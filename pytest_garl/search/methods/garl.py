@@ -204,7 +204,7 @@ class Garl:
     def _in_other_weather(self) -> Scenario:
         """Return a scenario whose flight was not aborted, or any if all were."""
         every = [item for name in sorted(self._cells) for item in self._cells[name]]
-        good = [item for item in every if item.result.outcome != "aborted"] or every
+        good = [item for item in every if item.result.outcome != "gave_up"] or every
         return good[int(self._rng.integers(len(good)))].scenario
 
     def _elite(self, name: str) -> FlownScenario:

@@ -114,7 +114,7 @@ class StopsThinking(Scripted):
 
 def test_step_is_not_called_after_abort() -> None:
     flight = flight_of(StopsThinking, 20)
-    assert (flight.outcome, flight.crash) == ("aborted", None)
+    assert (flight.outcome, flight.crash) == ("gave_up", None)
     times = [step.time_s for step in flight.steps]
     assert times[-1] > 4
     assert {step.command for step in flight.steps if step.time_s >= 3} == {"Abort"}
