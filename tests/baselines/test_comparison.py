@@ -291,7 +291,7 @@ def test_the_report_has_the_answer_then_figures_then_a_limited_list_of_pairs() -
     )
     assert "broke    lawn-0: landed -> IV:dog:descent:seen" in lines
     assert "broke    and 5 more" in lines
-    assert f"fixed    lawn-{PAIRS_LISTED + 5}: aborted -> landed" in lines
+    assert f"fixed    lawn-{PAIRS_LISTED + 5}: gave_up -> landed" in lines
     assert (
         lines[-1] == f"changed  lawn-{PAIRS_LISTED + 6}: IV:dog:descent:seen -> IV:cat:descent:seen"
     )

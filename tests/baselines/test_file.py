@@ -75,7 +75,7 @@ def test_the_file_keeps_destinations() -> None:
         ('map = "lawn"', 'map = "moon"', r"'set\[0\].map': unknown map 'moon'"),
         ('"stack.landing:Lander"', '"Lander"', r"'set\[0\].system': found 'Lander', expected 'mod"),
         ('"environment.fog", ', "", r"'set\[0\].genes': found genes other .*\(environment.fog\)"),
-        ("distance_m = 1.5", "distance_m = -1.0", r"'set\[0\].limits.distance_m'"),
+        ("distance_m = 0.75", "distance_m = -1.0", r"'set\[0\].limits.distance_m'"),
         ('"landed", ""', '"floated", ""', r"'set\[0\].flights\[0\]': found 'floated', expected "),
         ('"landed", "", false', '"landed", "", 0', r"'set\[0\].flights\[0\]': found \[\d+, 'l"),
         (", [0.", ", [9.", r"'set\[0\].flights\[0\]': environment.dust: found 9"),

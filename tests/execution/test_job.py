@@ -14,7 +14,7 @@ from pytest_garl.execution.reference import BUILT_IN, reference_to
 from pytest_garl.plugin.arguments import OPTIONS
 from pytest_garl.scenarios.maps.map import load_map
 from pytest_garl.simulation.npc_policy import PolicySpec
-from pytest_garl.verdicts.verdict import PAPER_LIMITS, Limits
+from pytest_garl.verdicts.verdict import DEFAULT_LIMITS, Limits
 from tests.execution.flying import Good
 
 LAWN = load_map("lawn")
@@ -34,7 +34,7 @@ def job(**more: Any) -> FlightJob:
 def test_job_has_the_defaults_of_a_search() -> None:
     made = job()
     assert (made.map, made.map_sha256) == ("lawn", LAWN.sha256)
-    assert (made.limits, made.timeout_s, made.simulator) == (PAPER_LIMITS, TIMEOUT_S, BUILT_IN)
+    assert (made.limits, made.timeout_s, made.simulator) == (DEFAULT_LIMITS, TIMEOUT_S, BUILT_IN)
     assert made.path == tuple(entry for entry in sys.path if entry)
     assert made.load_map() == LAWN
 

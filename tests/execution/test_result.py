@@ -73,6 +73,7 @@ def test_text_holds_the_keys_that_stored_ledgers_have() -> None:
         "crash",
         "elapsed_s",
         "final_distance_m",
+        "landed_s",
         "off_marker_m",
         "outcome",
         "undecided",
@@ -80,6 +81,10 @@ def test_text_holds_the_keys_that_stored_ledgers_have() -> None:
     ]
     assert sorted(values["crash"]) == ["error", "kind", "message", "traceback", "where"]
     assert sorted(values["verdict"]) == [
+        "completed",
+        "excuse",
+        "excuse_text",
+        "findings",
         "margins",
         "outcome",
         "paper_violation",

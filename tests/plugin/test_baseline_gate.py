@@ -122,7 +122,7 @@ def test_collisions_that_became_aborts_pass(saved: pytest.Pytester) -> None:
     result = run(saved)
     result.assert_outcomes(passed=1, skipped=3)
     result.stdout.fnmatch_lines(["*aborts 0 -> * (0 landings lost, 0 landings won): p 1.000*"])
-    result.stdout.fnmatch_lines(["    fixed    lawn-*: IV:dog:* -> aborted"])
+    result.stdout.fnmatch_lines(["    fixed    lawn-*: IV:dog:* -> gave_up"])
 
 
 def test_inconclusive_flight_fails_the_gate(saved: pytest.Pytester) -> None:

@@ -26,7 +26,7 @@ MOVES = "[[2, 0.0, 0.0], [1, 0.6, -0.8]]"
         ("[1, 0.6", f"[0x{'f' * 5000}, 0.6", "found list too long to be shown"),
         ("margin = 0.0", f"margin = {'9' * 400}", "'violation.margin': found 999"),
         ("time_s = 120.0", "time_s = 300.5", "'limits.time_s': found 300.5, .* from 0 to 300$"),
-        ("distance_m = 1.5", "distance_m = 1001", "'limits.distance_m': found 1001"),
+        ("distance_m = 0.75", "distance_m = 1001", "'limits.distance_m': found 1001"),
         (SYSTEM, "../../x:Straight", "'system': found '../../x:Straight', expected 'module:cl"),
         (SYSTEM, ".x:Straight", "'system': found '.x:Straight', expected 'module:class'"),
         (SYSTEM, "x:Straight()", "'system': found"),

@@ -71,7 +71,7 @@ from tests.verdicts.flights import CRASH, flight, gap, hit, step, touch, track
     ],
 )
 def test_the_first_event_decides_the_verdict(subject: Flight, primary: Any, signature: str) -> None:
-    verdict = judge(subject, Limits())
+    verdict = judge(subject, Limits(distance_m=1.5))
     assert verdict.primary == primary
     assert verdict.signature == signature
     assert verdict.story
@@ -95,7 +95,10 @@ def test_why_undecided_names_the_collision() -> None:
 
 
 def test_margins_are_signed() -> None:
-    margins = {m.property: m for m in judge(flight("landed", (2.0, 0.0, 0.2)), Limits()).margins}
+    margins = {
+        m.property: m
+        for m in judge(flight("landed", (2.0, 0.0, 0.2)), Limits(distance_m=1.5)).margins
+    }
     assert margins["distance"].value == pytest.approx(-0.5)
     assert margins["time"].value == pytest.approx(90.0)
 
@@ -115,7 +118,7 @@ def test_closest_call_has_the_signature_of_the_near_collision() -> None:
     collided = dataclasses.replace(
         near, outcome="collision", contacts=hit("dog-1", "dog", "dynamic")
     )
-    assert judge(collided, Limits()).signature == closest_call(near)[0]
+    assert judge(collided, Limits(distance_m=1.5)).signature == closest_call(near)[0]
 
 
 def test_a_body_three_metres_away_is_no_close_call() -> None:
@@ -153,14 +156,14 @@ def test_a_touchdown_off_the_marker_before_an_abort_is_judged_as_a_landing(
         # What it takes for the marker after the touch is not what it came down on.
         steps=(step(10.0, target=target), step(13.0, target=(-9.0, 0.0, 0.0))),
     )
-    verdict = judge(subject, Limits())
+    verdict = judge(subject, Limits(distance_m=1.5))
     assert (verdict.primary, verdict.signature) == ("distance", signature)
     assert verdict.story.startswith("Touched the ground 5.0 m off the marker before it gave up")
     assert words in verdict.story
     margins = {each.property: each for each in verdict.margins}
     assert (margins["distance"].value, margins["distance"].decided) == (-3.5, True)
     assert not margins["time"].decided
-    assert off_marker_m(subject, Limits()) == 5.0
+    assert off_marker_m(subject, Limits(distance_m=1.5)) == 5.0
     assert not verdict.paper_violation
 
 
@@ -178,15 +181,15 @@ def test_sliding_off_the_marker_before_an_abort_violates_and_flying_off_does_not
     slid = track(*touched, (12.0, 3.0, 0.0, 0.21), (14.0, 3.0, 0.0, 5.0))
     flew = track(*touched, (12.0, 3.0, 0.0, 0.3), (14.0, 3.0, 0.0, 5.0))
     subject = flight("gave_up", (3.0, 0.0, 5.0), uav=slid, contacts=touch(10.05))
-    verdict = judge(subject, Limits())
+    verdict = judge(subject, Limits(distance_m=1.5))
     assert verdict.primary == "distance"
     assert "Touched the ground 3.0 m off" in verdict.story
-    assert judge(dataclasses.replace(subject, uav=flew), Limits()).primary is None
+    assert judge(dataclasses.replace(subject, uav=flew), Limits(distance_m=1.5)).primary is None
 
 
 def test_an_abort_in_the_air_leaves_the_distance_undecided() -> None:
     subject = flight("gave_up", (5.0, 0.0, 5.0))
-    margins = {each.property: each for each in judge(subject, Limits()).margins}
+    margins = {each.property: each for each in judge(subject, Limits(distance_m=1.5)).margins}
     assert not margins["distance"].decided
     assert margins["distance"].reason == "aborted at 30.0 s"
-    assert off_marker_m(subject, Limits()) is None
+    assert off_marker_m(subject, Limits(distance_m=1.5)) is None

@@ -36,13 +36,13 @@ def test_a_landing_at_the_limit_of_time_is_no_violation(limit_s: float, primary:
 def test_a_touchdown_beyond_twenty_degrees_is_tilted(tilt_deg: float, signature: str) -> None:
     contacts = hit("ground", "ground", "ground", math.radians(tilt_deg))
     subject = flight("collision", (0.0, 0.0, 0.2), contacts=contacts)
-    assert judge(subject, Limits()).signature == signature
+    assert judge(subject, Limits(distance_m=1.5)).signature == signature
 
 
 def test_signature_names_the_nearest_of_two_decoys() -> None:
     decoys = (("decoy-a", 4.0, 5.2), ("decoy-b", 4.0, 4.3))
     subject = flight("landed", (4.0, 4.0, 0.2), steps=(step(5.0, target=(4, 4, 0)),), decoys=decoys)
-    assert judge(subject, Limits()).signature.startswith("I:decoy-b:")
+    assert judge(subject, Limits(distance_m=1.5)).signature.startswith("I:decoy-b:")
 
 
 @pytest.mark.parametrize(("away_m", "what"), [(1.5, "decoy-a"), (1.501, "phantom")])
@@ -53,13 +53,13 @@ def test_signature_names_a_decoy_within_1_5_m_of_the_target(away_m: float, what:
         steps=(step(5.0, target=(4.0, 4.0, 0.0)),),
         decoys=(("decoy-a", 4.0 + away_m, 4.0),),
     )
-    assert judge(subject, Limits()).signature.startswith(f"I:{what}:")
+    assert judge(subject, Limits(distance_m=1.5)).signature.startswith(f"I:{what}:")
 
 
 @pytest.mark.parametrize(("away_m", "kind"), [(1.5, "off"), (1.501, "I")])
 def test_a_target_within_1_5_m_of_the_marker_is_right(away_m: float, kind: str) -> None:
     subject = flight("landed", (3.0, 0.0, 0.2), steps=(step(5.0, target=(away_m, 0.0, 0.0)),))
-    assert judge(subject, Limits()).violation_type == kind
+    assert judge(subject, Limits(distance_m=1.5)).violation_type == kind
 
 
 @pytest.mark.parametrize(
@@ -73,7 +73,9 @@ def test_a_marker_not_detected_for_three_seconds_is_lost(
     last_s: float, signature: str, words: str
 ) -> None:
     steps = (step(5.0, detected=(0.0, 0.0, 0.0)), step(last_s, detected=(0.0, 0.0, 0.0)))
-    verdict = judge(flight("not_landed", (0.0, 0.0, 10.0), steps=(*steps, step(29.9))), Limits())
+    verdict = judge(
+        flight("not_landed", (0.0, 0.0, 10.0), steps=(*steps, step(29.9))), Limits(distance_m=1.5)
+    )
     assert verdict.signature == signature
     assert words in verdict.story
 
@@ -83,7 +85,7 @@ def test_a_detection_within_1_5_m_of_the_marker_counts_as_a_sighting(
     away_m: float, kind: str
 ) -> None:
     steps = (step(29.9, detected=(away_m, 0.0, 0.0)),)
-    verdict = judge(flight("not_landed", (0.0, 0.0, 10.0), steps=steps), Limits())
+    verdict = judge(flight("not_landed", (0.0, 0.0, 10.0), steps=steps), Limits(distance_m=1.5))
     assert verdict.violation_type == kind
 
 
@@ -92,7 +94,7 @@ def test_targets_count_as_sightings_of_a_system_without_detections(
     away_m: float, kind: str
 ) -> None:
     steps = (step(29.9, target=(away_m, 0.0, 0.0)),)
-    verdict = judge(flight("not_landed", (0.0, 0.0, 10.0), steps=steps), Limits())
+    verdict = judge(flight("not_landed", (0.0, 0.0, 10.0), steps=steps), Limits(distance_m=1.5))
     assert verdict.violation_type == kind
     assert "detected" in verdict.story
 
@@ -100,7 +102,7 @@ def test_targets_count_as_sightings_of_a_system_without_detections(
 def test_a_target_is_no_sighting_of_a_system_with_detections() -> None:
     here = (0.0, 0.0, 0.0)
     steps = (step(5.0, detected=here, target=here), step(29.9, target=here))
-    verdict = judge(flight("not_landed", (0.0, 0.0, 10.0), steps=steps), Limits())
+    verdict = judge(flight("not_landed", (0.0, 0.0, 10.0), steps=steps), Limits(distance_m=1.5))
     assert verdict.signature == "II:lost:approach"
 
 
@@ -116,12 +118,12 @@ def test_without_diagnostics_the_marker_in_view_counts_as_a_sighting(
     diagnostics: Any, visible: float, kind: str, words: str
 ) -> None:
     silent = dataclasses.replace(step(29.9, visible=visible), diagnostics=diagnostics)
-    verdict = judge(flight("not_landed", (0.0, 0.0, 10.0), steps=(silent,)), Limits())
+    verdict = judge(flight("not_landed", (0.0, 0.0, 10.0), steps=(silent,)), Limits(distance_m=1.5))
     assert verdict.violation_type == kind
     assert words in verdict.story
     assert "detected" not in verdict.story
     earlier = dataclasses.replace(silent, time_s=20.0)
-    lost = judge(flight("not_landed", (0.0, 0.0, 10.0), steps=(earlier,)), Limits())
+    lost = judge(flight("not_landed", (0.0, 0.0, 10.0), steps=(earlier,)), Limits(distance_m=1.5))
     assert lost.violation_type == "II"
     assert "detected" not in lost.story
 
@@ -134,4 +136,4 @@ def test_an_object_in_view_up_to_two_seconds_before_was_seen(time_s: float, sigh
         contacts=hit("dog-1", "dog", "dynamic"),
         steps=(step(time_s, ("dog-1",)),),
     )
-    assert judge(subject, Limits()).signature.endswith(f":{sight}")
+    assert judge(subject, Limits(distance_m=1.5)).signature.endswith(f":{sight}")

@@ -45,5 +45,7 @@ def test_time_limit_has_a_maximum(value: float) -> None:
 def test_invalid_limits_are_refused() -> None:
     with pytest.raises(OptionError, match=r"found distance_m=-0.5, expected a number from 0 to 10"):
         Limits(distance_m=-0.5)
-    with pytest.raises(OptionError, match="found abort='no', expected 'ok' or 'violation'"):
+    with pytest.raises(
+        OptionError, match="found abort='no', expected 'needless', 'ok' or 'violation'"
+    ):
         Limits(abort="no")  # type: ignore[arg-type]
