@@ -19,7 +19,6 @@ if TYPE_CHECKING:
 
 INTERRUPTED = 130
 """Exit status after Ctrl-C as in shells: 128 plus the signal's number."""
-REFERENCE_FLIGHTS = "the reference pilot flies violating scenarios"
 _FOLDER = click.Path(path_type=Path, file_okay=False)
 
 
@@ -109,17 +108,12 @@ class _ProgressDisplay:
         self._bar.update(self._task, completed=sum(each.flown for each in searches))
         self._bar.refresh()
 
-    def on_reference_flights(self) -> None:
-        if self._bar.tasks[0].description != REFERENCE_FLIGHTS:
-            self._bar.update(self._task, description=REFERENCE_FLIGHTS)
-            self._bar.refresh()
-
     def on_run_end(self, rows: Sequence[ResultRow]) -> None:
         for row in rows:
             top10 = row.top10 or "not reached"
             self._print(
                 Text(
-                    f"    {row.map}: {row.violations} of {row.budget} violate, "
-                    f"{len(row.signatures)} signatures, Top-10 {top10}"
+                    f"    {row.map}: {row.landings} of {row.budget} landed, {row.violations} "
+                    f"violate, {len(row.kinds)} kinds, Top-10 {top10}"
                 )
             )

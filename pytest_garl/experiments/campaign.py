@@ -15,8 +15,7 @@ from pytest_garl.adversary.catalogue import policy_spec
 from pytest_garl.errors import ExperimentError, GarlError
 from pytest_garl.execution.ledger import Ledger
 from pytest_garl.execution.ledger_queries import SearchProgress
-from pytest_garl.experiments.avoidability import count_unavoidable
-from pytest_garl.experiments.measure import AvoidabilityCounts, finished_searches, result_row
+from pytest_garl.experiments.measure import finished_searches, result_row
 from pytest_garl.experiments.pytest_run import run_pytest
 from pytest_garl.experiments.results import ResultRow, append_rows, read_rows
 from pytest_garl.experiments.spec import Experiment, ExperimentRun
@@ -42,9 +41,6 @@ class CampaignObserver(Protocol):
 
     def on_flights(self, searches: Sequence[SearchProgress]) -> None:
         """Take note of the progress of a run; called often."""
-
-    def on_reference_flights(self) -> None:
-        """Take note that the reference pilot flies violating scenarios; called often."""
 
     def on_run_end(self, rows: Sequence[ResultRow]) -> None:
         """Take note of the saved rows of a run."""
@@ -115,7 +111,7 @@ def fly_experiment(
         # Wait for another process that flies the same run.
         with locked(folder):
             if run in missing_runs(experiment, read_rows(folders.rows)):
-                rows = _fly_run(run, folder, experiment.unavoidable, workers, observer)
+                rows = _fly_run(run, folder, workers, observer)
                 append_rows(folders.rows, rows)
                 observer.on_run_end(rows)
             _tidy(folder)
@@ -127,25 +123,10 @@ def _tidy(folder: Path) -> None:
 
 
 def _fly_run(
-    run: ExperimentRun,
-    folder: Path,
-    most_reference_flights: int,
-    workers: int,
-    observer: CampaignObserver,
+    run: ExperimentRun, folder: Path, workers: int, observer: CampaignObserver
 ) -> list[ResultRow]:
     with closing(Ledger(run_pytest(run, folder, workers, observer.on_flights))) as ledger:
-        searches = finished_searches(run, ledger)
-        avoidability: Sequence[AvoidabilityCounts | None] = [None] * len(searches)
-        if most_reference_flights:
-            avoidability = count_unavoidable(
-                searches,
-                folder / "pilot.sqlite",
-                limit=most_reference_flights,
-                seed=run.seed,
-                workers=workers,
-                on_wait=observer.on_reference_flights,
-            )
         return [
-            result_row(run, each, ledger, avoidability=counts, workers=workers)
-            for each, counts in zip(searches, avoidability, strict=True)
+            result_row(run, each, ledger, workers=workers)
+            for each in finished_searches(run, ledger)
         ]

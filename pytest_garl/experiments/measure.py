@@ -23,7 +23,7 @@ from pytest_garl.scenarios.maps.map import Map
 from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.simulation.flight_file import load
 from pytest_garl.verdicts.paper_metrics import empty_cells, mark_visited, mean_distance, top_k
-from pytest_garl.verdicts.verdict import Verdict
+from pytest_garl.verdicts.verdict import Limits, Verdict
 
 HASH_DIGITS = 12
 """Number of digits of a hash in a row."""
@@ -50,20 +50,8 @@ class FinishedSearch:
 
     @property
     def violating(self) -> tuple[LedgerFlight, ...]:
-        """The flights that are violations by the paper's definition."""
-        return tuple(
-            flight
-            for flight, verdict in zip(self.flights, self.verdicts, strict=True)
-            if verdict.paper_violation
-        )
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class AvoidabilityCounts:
-    """Violations that the reference pilot tried to avoid, and those that it could not avoid."""
-
-    tried: int
-    unavoidable: int
+        """The flights that violate a property by the limits of their run."""
+        return tuple(flight for flight in self.flights if flight.result.verdict.violation)
 
 
 def finished_searches(run: ExperimentRun, ledger: Ledger) -> tuple[FinishedSearch, ...]:
@@ -94,7 +82,6 @@ def result_row(
     search: FinishedSearch,
     ledger: Ledger,
     *,
-    avoidability: AvoidabilityCounts | None,
     workers: int,
 ) -> ResultRow:
     """Return the row of one search of a run."""
@@ -104,11 +91,12 @@ def result_row(
         method=run.method,
         seed=run.seed,
         budget=run.budget,
-        unavoidable=avoidability.unavoidable if avoidability else None,
-        piloted=avoidability.tried if avoidability else None,
+        unavoidable=None,
+        piloted=None,
         workers=workers,
         machine=cpu_class_of_flights(),
         result_hash=ledger.queries.result_hash(search.key)[:HASH_DIGITS],
+        limits=limits_text(search.job.limits),
         **_violations(search),
         **_diversity(search, str(ledger.fact("weather"))),
         **_durations(search, ledger),
@@ -119,24 +107,34 @@ def result_row(
 def _violations(search: FinishedSearch) -> dict[str, Any]:
     """Return the columns that count outcomes and violations."""
     verdicts = search.verdicts
-    paper = [verdict for verdict in verdicts if verdict.paper_violation]
-    types = Counter((each.violation_type or "").rstrip("?") for each in verdicts if each.violation)
+    types = Counter[str](each.violation_type or "" for each in verdicts if each.violation)
+    without_landing = Counter[str](each.no_landing for each in verdicts)
     return {
-        "violations": len(paper),
+        "violations": types.total(),
+        "landed": sum(verdict.completed for verdict in verdicts),
+        "paper": sum(verdict.paper_violation for verdict in verdicts),
         **{f"type_{name.lower()}": types[name] for name in PAPER_TYPES},
-        **{name: types[name] for name in ("late", "off", "hard")},
+        **{name: types[name] for name in ("late", "off", "hard", "slid")},
+        **{name: without_landing[name] for name in ("blocked", "excused", "needless")},
         "aborted": sum(verdict.outcome == "gave_up" for verdict in verdicts),
         "inconclusive": sum(flight.result.inconclusive for flight in search.flights),
-        "top10": top_k(verdicts),
-        "signatures": tuple(sorted({verdict.signature for verdict in paper})),
+        "top10": top_k(verdicts, by_the_paper=False),
+        "signatures": tuple(
+            sorted({verdict.signature for verdict in verdicts if verdict.violation})
+        ),
     }
+
+
+def limits_text(limits: Limits) -> str:
+    """Return the limits by which a row counts violations, as a table shows them."""
+    return f"{limits.distance_m:g} m, {limits.time_s:g} s, abort {limits.abort}"
 
 
 def _diversity(search: FinishedSearch, weather: str) -> dict[str, Any]:
     """Return the columns of distances between scenarios and of coverage."""
     scenarios = [parse_scenario(flight.scenario) for flight in search.flights]
     raw_weather, genes = chromosomes(scenarios, search.map, weather)
-    violating = np.array([verdict.paper_violation for verdict in search.verdicts])
+    violating = np.array([verdict.violation for verdict in search.verdicts])
     cells = covered_cells(search)
     return {
         "parameter_distance": mean_distance(genes),

@@ -27,11 +27,19 @@ def _top10(row: ResultRow) -> float:
 VIOLATIONS = Metric(
     title="violations, %", value_of=lambda row: 100 * row.violations / row.budget, digits=1
 )
+PAPER = Metric(
+    title="paper's definition, %",
+    value_of=lambda row: 100 * row.paper_violations / row.budget,
+    digits=1,
+)
 TOP10 = Metric(title="Top-10, flights", value_of=_top10, digits=0)
 DISTANCE = Metric(title="parameter distance", value_of=lambda row: row.parameter_distance, digits=2)
 COVERAGE = Metric(title="coverage, %", value_of=lambda row: 100 * row.covered / row.cells, digits=2)
+KINDS = Metric(title="kinds", value_of=lambda row: len(row.kinds), digits=1)
 SIGNATURES = Metric(title="signatures", value_of=lambda row: len(row.signatures), digits=1)
-METRICS = (VIOLATIONS, TOP10, DISTANCE, COVERAGE, SIGNATURES)
+METRICS = (VIOLATIONS, PAPER, TOP10, DISTANCE, COVERAGE, KINDS)
+OLD = "old"
+"""The definition of a row of version 0.1, which does not name its limits."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -65,13 +73,24 @@ class MethodSearches:
         )
 
     @property
+    def definitions(self) -> tuple[str, ...]:
+        """The definitions by which the rows count violations: their limits, or :data:`OLD`."""
+        return tuple(sorted({row.limits or OLD for row in self.rows}))
+
+    @property
+    def all_kinds(self) -> int:
+        """The number of distinct kinds of violation that all searches found together."""
+        return len({kind for row in self.rows for kind in row.kinds})
+
+    @property
     def all_signatures(self) -> int:
         """The number of distinct signatures that all searches found together."""
         return len({name for row in self.rows for name in row.signatures})
 
-    def total(self, count_of: Callable[[ResultRow], int]) -> int:
-        """Return the sum of a count over all searches."""
-        return sum(count_of(row) for row in self.rows)
+    def sum_of(self, count_of: Callable[[ResultRow], int | None]) -> int | None:
+        """Return the sum of a count over all searches; None if a row does not hold it."""
+        counts = [count_of(row) for row in self.rows]
+        return None if None in counts else sum(count or 0 for count in counts)
 
 
 def searches_of_method(

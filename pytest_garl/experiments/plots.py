@@ -8,14 +8,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from pytest_garl.experiments.metrics import (
-    COVERAGE,
     DISTANCE,
     METRICS,
-    TOP10,
-    VIOLATIONS,
     MethodSearches,
     Metric,
-    published_for,
     searches_in_grid,
 )
 from pytest_garl.experiments.results import ResultRow
@@ -27,7 +23,7 @@ if TYPE_CHECKING:
 
 SEARCHES_FOR_A_BOX = 3
 """A method with fewer searches is shown as points without a box."""
-COLOUR, PUBLISHED_COLOUR = "#1f77b4", "#d95f02"
+COLOUR = "#1f77b4"
 COLOURS = 64
 """Number of colours of a picture."""
 
@@ -49,7 +45,7 @@ def draw_grid(experiment: Experiment, grid: Grid, rows: Sequence[ResultRow], pat
     for column, map in enumerate(grid.maps):
         on_map = [each for each in found if each.map == map]
         for axes, metric in zip(panels[:, column], METRICS, strict=True):
-            _panel(axes, experiment, grid, on_map, metric)
+            _panel(axes, grid, on_map, metric)
     _save(figure, path)
     return True
 
@@ -66,9 +62,7 @@ def _save(figure: Figure, path: Path) -> None:
     reduced.save(path, optimize=True)
 
 
-def _panel(
-    axes: Axes, experiment: Experiment, grid: Grid, found: Sequence[MethodSearches], metric: Metric
-) -> None:
+def _panel(axes: Axes, grid: Grid, found: Sequence[MethodSearches], metric: Metric) -> None:
     for place, each in enumerate(found):
         values = each.values(metric)
         if len(values) >= SEARCHES_FOR_A_BOX:
@@ -92,9 +86,6 @@ def _panel(
                 clip_on=False,
                 zorder=3,
             )
-        published = _published_value(experiment, each, metric)
-        if published is not None:
-            axes.plot([published], [place], "x", color=PUBLISHED_COLOUR, markersize=5, zorder=3)
     single = len(grid.systems) == 1
     names = [each.method if single else f"{each.system} {each.method}" for each in found]
     axes.set_yticks(range(len(found)), names, fontsize="x-small")
@@ -107,15 +98,3 @@ def _panel(
     axes.tick_params(axis="x", labelsize="x-small")
     axes.set_title(f"{metric.title}, {found[0].map}", loc="left", fontsize="small")
     axes.grid(axis="x", alpha=0.3)
-
-
-def _published_value(experiment: Experiment, each: MethodSearches, metric: Metric) -> float | None:
-    """Return the published value of a metric; None if there is none of the same definition."""
-    published = published_for(experiment, each)
-    if published is None:
-        return None
-    if metric is TOP10:
-        return published.top10 or None
-    return {VIOLATIONS.title: published.violations, COVERAGE.title: published.coverage}.get(
-        metric.title
-    )

@@ -18,12 +18,18 @@ from pytest_garl.files.atomic import write_text_atomically
 from pytest_garl.verdicts.paper_metrics import CELL_M, HEIGHT_M
 
 HOW_TO_READ = f"""\
-- A violation is what the paper calls one: a collision, a landing more than 1.5 m off the marker, or
-  no landing in 120 s. Late landings and aborts have columns of their own. Brackets hold the exact
-  (Clopper-Pearson) 95 % interval. The flights of a search that learns are no independent sample, so
-  the difference between seeds tells more than an interval.
-- *Unavoidable*: the share of violations that the reference pilot does not avoid either, of those
-  drawn at random. This pilot knows the position of everything, and the objects repeat their moves.
+- *Landed*: within the limit of distance from the marker's centre.
+- *Violations* are counted by the limits in the column *definition*. "Old" marks rows of version
+  0.1: a violation is a collision, a landing more than 1.5 m from the marker, or no landing in
+  120 s, and a flight that gives up is none. Top-10, violating scenarios, coverage, kinds,
+  signatures and types are of the same violations. Rows of different definitions are not compared.
+- *Paper's definition*: a collision, a crash, or no landing within 1.5 m of the marker; each flight
+  that gives up counts, because the paper's type II is "no landing occurs". Old rows tell this too.
+- *Gave up*: flights that the landing system gave up, for whatever reason. *Blocked*, *excused* and
+  *needless* share out the flights that were given up or ran out of time: the marker was never free
+  for long enough, it could not be read for long enough, or neither. – if the rows do not tell.
+- Behind the mean, brackets hold the figure of each seed. There are no intervals: the flights of a
+  search that learns are no independent sample.
 - *Top-10*: flights until the tenth violation, one figure per seed; – if there were fewer than
   ten. In comparisons and means such a search counts as the budget plus one.
 - *Hours*: of one search on its workers, idle time included. After "+" the training of the
@@ -34,10 +40,11 @@ HOW_TO_READ = f"""\
   weather alone, without normalising it, so its figures stand beside that column.
 - *Coverage*: the share of cells of {CELL_M:g} m, up to {HEIGHT_M:g} m above the map, that
   violating flights pass through.
-- *Signatures*: distinct mechanisms and phases of violations, such as
-  `IV:dog:last-metre:unseen`, one count per seed.
+- *Kinds*: distinct types and causes of violations, such as `IV:dog`, one count per seed.
+  *Signatures* distinguish the phase and the sight as well, as in `IV:dog:last-metre:unseen`.
 - *Paper*: the paper's figure for its method of this name; its simulator, maps and landing systems
-  are different.
+  are different. Its shares, Top-10, coverage and types of violations do not stand here, because its
+  violations are of another definition.
 - *A12* (Vargha and Delaney): how often a search of the first method has the larger figure; 0.5
   means no difference. *p*: exact two-sided Mann-Whitney test over the seeds. Three seeds against
   three cannot reach p below 0.10."""
@@ -141,9 +148,7 @@ def _grid(experiment: Experiment, grid: Grid, rows: Sequence[ResultRow], path: P
         "Types of violations, as shares of all violations of types I to V:",
         tables.violation_types(experiment, grid, rows),
         f"![{grid.title}]({os.path.relpath(picture, path.parent)})" if drawn else "",
-        "Points are searches, boxes span the quartiles, whiskers all searches; × is the paper's."
-        if drawn
-        else "",
+        "Points are searches, boxes span the quartiles, whiskers all searches." if drawn else "",
         compared,
         grid.remarks,
     ]

@@ -16,6 +16,7 @@ from pytest_garl.errors import ExperimentError
 from pytest_garl.files.atomic import locked, write_text_atomically
 from pytest_garl.files.reading import MEGABYTE, read_text
 from pytest_garl.messages import listed, printable, shown
+from pytest_garl.verdicts.verdict import kind_of
 
 LARGEST_BYTES = 16 * MEGABYTE
 """About ten thousand searches, each a row of a kilobyte."""
@@ -28,7 +29,11 @@ class ResultRow:
     """The results of one search: a system on a map, a method, a seed, a budget.
 
     ``docs/experiments/README.md`` explains each column.  None stands for a value that does not
-    exist, such as a tenth violation after only nine.
+    exist, such as a tenth violation after only nine.  ``limits`` says what counts as a violation in
+    the row.  It is empty in a row of version 0.1, in which a violation was a collision, no landing
+    within the time limit, or a landing more than 1.5 m from the marker, and a flight that gave up
+    was none.  ``unavoidable`` and ``piloted`` are void: the pilot that they tell of, flown without
+    eyes, "avoided" as much.
     """
 
     system: str
@@ -68,6 +73,13 @@ class ResultRow:
     package_sha256: str
     machine: str
     result_hash: str
+    limits: str = ""
+    landed: int | None = None
+    paper: int | None = None
+    slid: int | None = None
+    blocked: int | None = None
+    excused: int | None = None
+    needless: int | None = None
 
     @property
     def key(self) -> tuple[str, str, str, int, int]:
@@ -78,6 +90,29 @@ class ResultRow:
     def type_counts(self) -> tuple[int, ...]:
         """Violations of the types I to V."""
         return self.type_i, self.type_ii, self.type_iii, self.type_iv, self.type_v
+
+    @property
+    def landings(self) -> int:
+        """Flights that landed within the limit of distance; in a row of version 0.1 all others."""
+        if self.landed is not None:
+            return self.landed
+        return self.budget - self.paper_violations - self.inconclusive
+
+    @property
+    def paper_violations(self) -> int:
+        """Violations by the paper's definition: collisions, crashes, no landing within 1.5 m.
+
+        A row of version 0.1 counts the flights without landing apart, those that gave up and those
+        whose landing system crashed.
+        """
+        return (
+            self.paper if self.paper is not None else self.violations + self.aborted + self.type_v
+        )
+
+    @property
+    def kinds(self) -> tuple[str, ...]:
+        """The distinct kinds of violation: type and cause, without phase and sight."""
+        return tuple(sorted({kind_of(each) for each in self.signatures}))
 
 
 def _number(cell: str) -> float:
@@ -113,6 +148,10 @@ _READERS: Mapping[str, Callable[[str], Any]] = MappingProxyType(
 )
 _EXPECTED = {"int": "a whole number from 0", "float": "a number"}
 _FIELDS = {field.name: str(field.type) for field in dataclasses.fields(ResultRow)}
+_FIRST_FIELDS = tuple(
+    field.name for field in dataclasses.fields(ResultRow) if field.default is dataclasses.MISSING
+)
+"""The columns of a file that version 0.1 wrote; the next added row adds the others, empty."""
 
 
 def read_rows(path: Path) -> tuple[ResultRow, ...]:
@@ -127,7 +166,7 @@ def read_rows(path: Path) -> tuple[ResultRow, ...]:
     lines = csv.DictReader(io.StringIO(text, newline=""), strict=True)
     try:
         _check_columns(path, lines.fieldnames or ())
-        return tuple(_row(path, lines.line_num, cells) for cells in lines)
+        return tuple(_row(path, lines.line_num, cells, lines.fieldnames or ()) for cells in lines)
     except csv.Error as error:
         raise ExperimentError(
             f"{path}, line {lines.line_num + 1}: not valid CSV: {error}"
@@ -135,7 +174,7 @@ def read_rows(path: Path) -> tuple[ResultRow, ...]:
 
 
 def _check_columns(path: Path, found: Sequence[str]) -> None:
-    if [*found] != [*_FIELDS]:
+    if tuple(found) not in (tuple(_FIELDS), _FIRST_FIELDS):
         wrong = {*found} ^ {*_FIELDS}
         raise ExperimentError(
             f"{path}: found other columns than expected"
@@ -144,19 +183,21 @@ def _check_columns(path: Path, found: Sequence[str]) -> None:
         )
 
 
-def _row(path: Path, line: int, cells: Mapping[str, str | None]) -> ResultRow:
+def _row(
+    path: Path, line: int, cells: Mapping[str, str | None], columns: Sequence[str]
+) -> ResultRow:
     values = {}
-    for name, kind in _FIELDS.items():
+    for name in columns:
         cell = cells[name]
-        if cell is None or len(cells) > len(_FIELDS):
+        if cell is None or len(cells) > len(columns):
             raise ExperimentError(
                 f"{path}, line {line}: found too {'few' if cell is None else 'many'} cells, "
-                f"expected {len(_FIELDS)}"
+                f"expected {len(columns)}"
             )
         try:
-            values[name] = _READERS[kind](cell)
+            values[name] = _READERS[_FIELDS[name]](cell)
         except ValueError as error:
-            expected = _EXPECTED[kind.partition(" ")[0]]
+            expected = _EXPECTED[_FIELDS[name].partition(" ")[0]]
             raise ExperimentError(
                 f"{path}, line {line}: column {name!r}: found {shown(cell)}, expected {expected}"
             ) from error

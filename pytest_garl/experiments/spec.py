@@ -29,7 +29,6 @@ TOP_KEYS = frozenset(
         "budget",
         "seeds",
         "maps",
-        "unavoidable",
         "systems",
         "grids",
         "goals",
@@ -99,19 +98,16 @@ class Grid:
 class Published:
     """Published figures for a system on a map, shown beside those of ``methods``.
 
-    Shares are in percent.  ``kinds`` holds the types I to V as shares of the violations.
-    ``top10`` is 0 if fewer than ten violations were found.  None means not published.
+    ``distance`` is the mean distance between the scenarios' weather genes, ``hours`` the duration
+    of a search.  None means not published.  Figures that count violations have no place here: those
+    of others are of another definition.
     """
 
     system: str
     map: str
     methods: tuple[str, ...]
-    violations: float | None
-    top10: int | None
     distance: float | None
-    coverage: float | None
     hours: float | None
-    kinds: tuple[float, ...] | None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -131,7 +127,6 @@ class Goals:
 class Experiment:
     """An experiment, as specified in its file.
 
-    ``unavoidable`` is the largest number of flights of the reference pilot per run and map.
     ``training_h`` is the time of training a method's policy, in hours, before any search.
     """
 
@@ -141,7 +136,6 @@ class Experiment:
     title: str
     text: str
     budget: int
-    unavoidable: int
     systems: Mapping[str, str]
     grids: tuple[Grid, ...]
     goals: Goals | None
@@ -197,7 +191,6 @@ def read_experiment(file: Path) -> Experiment:
         title=top.string("title"),
         text=top.string("text", "").strip(),
         budget=top.integer("budget", low=1, high=_MOST_FLIGHTS),
-        unavoidable=top.integer("unavoidable", 0),
         systems=names,
         grids=grids,
         goals=_goals(top.table("goals"), grids) if "goals" in top.values else None,
@@ -273,14 +266,12 @@ def _goals(table: Table, grids: Collection[Grid]) -> Goals:
 
 
 def _published(table: Table, systems: Collection[str]) -> Published:
-    figures = ("violations", "distance", "coverage", "hours")
-    table.refuse_unknown({"system", "map", "methods", "top10", "kinds", *figures})
+    figures = ("distance", "hours")
+    table.refuse_unknown({"system", "map", "methods", *figures})
     values = {key: table.number(key, low=0.0) if key in table.values else None for key in figures}
     return Published(
         system=table.string("system", allowed=systems),
         map=table.string("map"),
         methods=_some(table, "methods"),
-        top10=table.integer("top10") if "top10" in table.values else None,
-        kinds=table.numbers("kinds", len(PAPER_TYPES)) if "kinds" in table.values else None,
         **values,
     )

@@ -7,8 +7,11 @@ from collections.abc import Callable, Iterable, Sequence
 from pytest_garl.experiments.metrics import (
     COVERAGE,
     DISTANCE,
+    KINDS,
     METRICS,
+    PAPER,
     SIGNATURES,
+    VIOLATIONS,
     MethodSearches,
     Metric,
     published_for,
@@ -16,7 +19,7 @@ from pytest_garl.experiments.metrics import (
 )
 from pytest_garl.experiments.results import ResultRow
 from pytest_garl.experiments.spec import PAPER_TYPES, Experiment, Grid
-from pytest_garl.verdicts.statistics import mann_whitney, share_interval, vargha_delaney
+from pytest_garl.verdicts.statistics import mann_whitney, vargha_delaney
 
 NONE = "–"
 NOT_RUN = "not run"
@@ -26,12 +29,6 @@ def markdown(header: Sequence[str], lines: Iterable[Sequence[str]]) -> str:
     """Return a Markdown table."""
     rows = [header, ["---"] * len(header), *lines]
     return "\n".join(f"| {' | '.join(row)} |" for row in rows)
-
-
-def interval(count: int, total: int) -> str:
-    """Return a percentage with its exact 95 % interval."""
-    low, high = share_interval(count, total)
-    return f"{100 * count / total:.1f} [{100 * low:.1f}, {100 * high:.1f}]"
 
 
 def _table(
@@ -50,16 +47,18 @@ def _table(
 
 
 def effect(experiment: Experiment, grid: Grid, rows: Sequence[ResultRow]) -> str:
-    """Return the table of effect: how often methods find violations, how soon, at what cost."""
+    """Return the table of effect: what became of the flights, how soon, at what cost."""
     header = (
         "seeds",
+        "landed, %",
         "violations, %",
-        "paper",
-        "late, %",
-        "aborted, %",
-        "unavoidable, %",
+        PAPER.title,
+        "gave up, %",
+        "blocked, %",
+        "excused, %",
+        "needless, %",
+        "definition",
         "Top-10",
-        "paper",
         "hours",
         "paper",
     )
@@ -68,32 +67,31 @@ def effect(experiment: Experiment, grid: Grid, rows: Sequence[ResultRow]) -> str
 
 def _effect_cells(experiment: Experiment, searches: MethodSearches) -> list[str]:
     paper = published_for(experiment, searches)
-    theirs = [NONE, NONE, NONE]
-    if paper is not None:
-        top10 = "cannot find" if paper.top10 == 0 else _number(paper.top10, 0)
-        theirs = [_number(paper.violations, 2), top10, _number(paper.hours, 0)]
+    their_hours = _number(paper.hours if paper else None, 0)
     if not searches.rows:
-        return [NOT_RUN, NONE, theirs[0], *[NONE] * 4, theirs[1], NONE, theirs[2]]
-    flights = searches.total(lambda row: row.budget)
+        return [NOT_RUN, *[NONE] * 10, their_hours]
     training = experiment.training_h.get(searches.method, 0.0)
     return [
         _numbers(searches.seeds),
-        interval(searches.total(lambda row: row.violations), flights),
-        theirs[0],
-        _share(searches.total(lambda row: row.late), flights),
-        _share(searches.total(lambda row: row.aborted), flights),
-        _unavoidable(searches),
+        _share(searches, lambda row: row.landings),
+        _mean_and_values(searches, VIOLATIONS),
+        _mean_and_values(searches, PAPER),
+        _share(searches, lambda row: row.aborted),
+        _share(searches, lambda row: row.blocked),
+        _share(searches, lambda row: row.excused),
+        _share(searches, lambda row: row.needless),
+        " / ".join(searches.definitions),
         ", ".join(NONE if row.top10 is None else str(row.top10) for row in searches.rows),
-        theirs[1],
         f"{searches.hours:.2f}" + (f" + {training:.2f}" if training else ""),
-        theirs[2],
+        their_hours,
     ]
 
 
-def _unavoidable(searches: MethodSearches) -> str:
-    tried = searches.total(lambda row: row.piloted or 0)
-    found = searches.total(lambda row: row.unavoidable or 0)
-    return f"{interval(found, tried)} of {tried}" if tried else NONE
+def _mean_and_values(searches: MethodSearches, metric: Metric) -> str:
+    """Return the mean over searches and, of several, the value of each."""
+    values = searches.values(metric)
+    each = f" ({', '.join(f'{value:.1f}' for value in values)})" if len(values) > 1 else ""
+    return f"{searches.mean(metric):.1f}{each}"
 
 
 def diversity(experiment: Experiment, grid: Grid, rows: Sequence[ResultRow]) -> str:
@@ -104,7 +102,7 @@ def diversity(experiment: Experiment, grid: Grid, rows: Sequence[ResultRow]) -> 
         "of weather alone",
         "paper",
         "coverage, %",
-        "paper",
+        "kinds",
         "signatures",
     )
     return _table(header, _diversity_cells, experiment, grid, rows)
@@ -113,9 +111,8 @@ def diversity(experiment: Experiment, grid: Grid, rows: Sequence[ResultRow]) -> 
 def _diversity_cells(experiment: Experiment, searches: MethodSearches) -> list[str]:
     paper = published_for(experiment, searches)
     distance = _number(paper.distance if paper else None, 2)
-    coverage = _number(paper.coverage if paper else None, 2)
     if not searches.rows:
-        return [NOT_RUN, NONE, NONE, distance, NONE, coverage, NONE]
+        return [NOT_RUN, NONE, NONE, distance, NONE, NONE, NONE]
     violating = [
         row.violating_distance for row in searches.rows if row.violating_distance is not None
     ]
@@ -126,49 +123,47 @@ def _diversity_cells(experiment: Experiment, searches: MethodSearches) -> list[s
         f"{sum(weather) / len(weather):.3f}",
         distance,
         f"{searches.mean(COVERAGE):.2f}",
-        coverage,
-        _signatures(searches),
+        _distinct(searches, KINDS, searches.all_kinds),
+        _distinct(searches, SIGNATURES, searches.all_signatures),
     ]
 
 
-def _signatures(searches: MethodSearches) -> str:
-    counts = [int(count) for count in searches.values(SIGNATURES)]
-    return _numbers(counts) + (f" ({searches.all_signatures} in all)" if len(counts) > 1 else "")
+def _distinct(searches: MethodSearches, metric: Metric, in_all: int) -> str:
+    counts = [int(count) for count in searches.values(metric)]
+    return _numbers(counts) + (f" ({in_all} in all)" if len(counts) > 1 else "")
 
 
 def violation_types(experiment: Experiment, grid: Grid, rows: Sequence[ResultRow]) -> str:
     """Return the table of violation types: shares of the types I to V, and counts of the others."""
     header = (
         f"{' / '.join(PAPER_TYPES)}, %",
-        "paper",
         "of",
         "late",
         "off",
         "hard",
+        "slid",
         "inconclusive",
     )
     return _table(header, _violation_type_cells, experiment, grid, rows)
 
 
 def _violation_type_cells(experiment: Experiment, searches: MethodSearches) -> list[str]:
-    paper = published_for(experiment, searches)
-    theirs = " / ".join(f"{kind:g}" for kind in paper.kinds) if paper and paper.kinds else NONE
     if not searches.rows:
-        return [NOT_RUN, theirs, *[NONE] * 5]
+        return [NOT_RUN, *[NONE] * 6]
     counts = [
         sum(row.type_counts[index] for row in searches.rows) for index in range(len(PAPER_TYPES))
     ]
     total = sum(counts)
     return [
         " / ".join(f"{100 * count / total:.0f}" for count in counts) if total else NONE,
-        theirs,
         str(total),
         *(
-            str(searches.total(of))
+            _count(searches.sum_of(of))
             for of in (
                 lambda row: row.late,
                 lambda row: row.off,
                 lambda row: row.hard,
+                lambda row: row.slid,
                 lambda row: row.inconclusive,
             )
         ),
@@ -176,7 +171,10 @@ def _violation_type_cells(experiment: Experiment, searches: MethodSearches) -> l
 
 
 def comparison(experiment: Experiment, grid: Grid, rows: Sequence[ResultRow]) -> str:
-    """Return U, p and A12 of the first method against each other; empty below two seeds of each."""
+    """Return U, p and A12 of the first method against each other; empty below two seeds of each.
+
+    Searches whose rows count violations by different definitions are not compared.
+    """
     found = searches_in_grid(experiment, grid, rows)
     lines = []
     for one in found:
@@ -185,7 +183,7 @@ def comparison(experiment: Experiment, grid: Grid, rows: Sequence[ResultRow]) ->
         for other in found:
             if (other.system, other.map) != (one.system, one.map) or other is one:
                 continue
-            if len(other.rows) >= 2:
+            if len(other.rows) >= 2 and len({*one.definitions, *other.definitions}) == 1:
                 seeds = f"{len(one.rows)}, {len(other.rows)}"
                 cells = [_compared(one, other, metric) for metric in METRICS]
                 lines.append([one.map, one.system, other.method, seeds, *cells])
@@ -209,5 +207,12 @@ def _number(value: float | None, digits: int) -> str:
     return NONE if value is None else f"{value:.{digits}f}"
 
 
-def _share(count: int, total: int) -> str:
-    return f"{100 * count / total:.1f}"
+def _share(searches: MethodSearches, count_of: Callable[[ResultRow], int | None]) -> str:
+    """Return the percentage of flights; NONE if a row does not hold the count."""
+    count = searches.sum_of(count_of)
+    flights = sum(row.budget for row in searches.rows)
+    return NONE if count is None else f"{100 * count / flights:.1f}"
+
+
+def _count(count: int | None) -> str:
+    return NONE if count is None else str(count)

@@ -16,11 +16,14 @@ HEIGHT_M = 30.0
 """Height of the volume: in the paper's code both maps are 15 cells high."""
 
 
-def top_k(verdicts: Sequence[Verdict], k: int = 10) -> int | None:
-    """Return how many flights found the first ``k`` violations; None if there are fewer."""
+def top_k(verdicts: Sequence[Verdict], k: int = 10, *, by_the_paper: bool = True) -> int | None:
+    """Return how many flights found the first ``k`` violations; None if there are fewer.
+
+    Violations are those of the paper's definition, or those by the run's own limits.
+    """
     found = 0
     for index, verdict in enumerate(verdicts, start=1):
-        found += verdict.paper_violation
+        found += verdict.paper_violation if by_the_paper else verdict.violation
         if found == k:
             return index
     return None

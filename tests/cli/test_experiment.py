@@ -29,7 +29,6 @@ title = "Toy"
 budget = 12
 maps = ["lawn", "court"]
 seeds = [0]
-unavoidable = 0
 [systems]
 Good = "test_it.py"
 [[grids]]
@@ -60,10 +59,7 @@ def change(project: Path, before: str, after: str) -> None:
 
 def without_times(rows: tuple[ResultRow, ...]) -> list[tuple[object, ...]]:
     """Return the rows without the columns that depend on the duration of flights."""
-    return [
-        (*row.key, row.violations, row.top10, row.covered, row.unavoidable, row.result_hash)
-        for row in rows
-    ]
+    return [(*row.key, row.violations, row.top10, row.covered, row.result_hash) for row in rows]
 
 
 def test_each_run_is_flown_once_and_reported_from_its_rows_alone(project: Path) -> None:
@@ -75,7 +71,6 @@ def test_each_run_is_flown_once_and_reported_from_its_rows_alone(project: Path) 
     rows = read_rows(project / "out" / "toy.csv")
     order = [(row.method, row.map) for row in rows]
     assert order == [(method, map) for method in ("garl", "random") for map in ("lawn", "court")]
-    assert {row.piloted for row in rows} == {None}
     assert not list(project.rglob("*.npz"))
     shutil.rmtree(project / "runs")
     assert "run 1" not in garl("--out=out", "--folder=runs").output
@@ -96,8 +91,6 @@ def test_each_run_is_flown_once_and_reported_from_its_rows_alone(project: Path) 
 
 def test_rows_hold_the_figures_of_the_ledger(project: Path) -> None:
     change(project, 'methods = ["garl", "random"]', 'methods = ["garl"]')
-    text = (project / "toy.toml").read_text().replace("unavoidable = 0", "unavoidable = 2")
-    (project / "toy.toml").write_text(text)
     # A run that is killed while it creates its ledger leaves an empty file.
     (run,) = read_experiment(Path("toy.toml")).runs
     path = project / ".garl" / "experiments" / run.folder / "ledger.sqlite"
@@ -111,7 +104,7 @@ def test_rows_hold_the_figures_of_the_ledger(project: Path) -> None:
     search, _ = next(each for each in ledger.searches() if '"map": "lawn"' in each[1])
     flights, map = ledger.queries.flights(search), load_map("lawn")
     assert len(flights) == row.budget == 12
-    bad = [flight for flight in flights if flight.result.verdict.paper_violation]
+    bad = [flight for flight in flights if flight.result.verdict.violation]
     assert row.violations == len(bad) > 0
     assert row.type_iv == sum(f.signature.startswith("IV:") for f in flights)
     assert set(row.signatures) == {flight.signature for flight in bad}
@@ -132,8 +125,10 @@ def test_rows_hold_the_figures_of_the_ledger(project: Path) -> None:
     weather = np.array(genes)[:, :8] * 0.15
     pairs = [float(np.linalg.norm(a - b)) for a in weather for b in weather]
     assert row.weather_distance == pytest.approx(np.mean(pairs), abs=1e-4)
-    # The reference pilot neither loses its way nor is hit in this simulator.
-    assert (row.piloted, row.unavoidable) == (2, 0)
+    verdicts = [flight.result.verdict for flight in flights]
+    assert row.limits == "0.75 m, 120 s, abort needless"
+    assert row.landed == sum(verdict.completed for verdict in verdicts)
+    assert row.paper == sum(verdict.paper_violation for verdict in verdicts)
     assert row.policy == "dqn"
     assert row.landing_system == "systems:Good"
     assert row.package_sha256 == str(ledger.fact("sources of pytest-garl"))

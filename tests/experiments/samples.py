@@ -23,8 +23,8 @@ PLAIN: dict[str, Any] = {
     "hard": 0,
     "aborted": 4,
     "inconclusive": 0,
-    "unavoidable": 1,
-    "piloted": 4,
+    "unavoidable": None,
+    "piloted": None,
     "top10": 30,
     "signatures": ("II:lost:descent", "IV:dog:last-metre:seen"),
     "parameter_distance": 1.5,
@@ -44,7 +44,24 @@ PLAIN: dict[str, Any] = {
     "package_sha256": "dddddddddddd",
     "machine": "x86_64-avx2",
     "result_hash": "eeeeeeeeeeee",
+    "limits": "0.75 m, 120 s, abort needless",
+    "landed": 26,
+    "paper": 12,
+    "slid": 1,
+    "blocked": 1,
+    "excused": 1,
+    "needless": 2,
 }
+OF_VERSION_0_1: dict[str, Any] = {
+    "limits": "",
+    "landed": None,
+    "paper": None,
+    "slid": None,
+    "blocked": None,
+    "excused": None,
+    "needless": None,
+}
+"""What a row of version 0.1 does not tell."""
 
 
 def row(**values: Any) -> ResultRow:

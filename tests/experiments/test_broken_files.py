@@ -21,7 +21,7 @@ from tests.experiments.test_spec import TEXT, plan
         ("budget = 40", f"budget = {'9' * 5000}", "not valid TOML: Exceeds the limit"),
         ("seeds = [3, 4]", f"seeds = [{2**63}]", r"'seeds': found \[9223372036854775808\], exp"),
         ("seeds = [3, 4]", f"seeds = {list(range(10_000))}", "'grids': found 20008 searches"),
-        ("violations = 17.11", f"violations = {'9' * 400}", "'published.0..violations': found 99"),
+        ("hours = 12", f"hours = {'9' * 400}", "'published.0..hours': found 99"),
         ('"Two"', '"\\u001b[2J"', r"'grids\[1\].systems': found '\\\\x1b\[2J', expected some"),
         ('name = "RQ1"', f'name = "{"x" * 5000}/"', "'grids.0..xxx"),
         (

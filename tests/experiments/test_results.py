@@ -7,11 +7,9 @@ import pytest
 
 from pytest_garl.errors import ExperimentError
 from pytest_garl.experiments.results import append_rows, read_rows
-from tests.experiments.samples import PLAIN, row
+from tests.experiments.samples import OF_VERSION_0_1, PLAIN, row
 
-BARE = row(
-    seed=1, top10=None, unavoidable=None, piloted=None, signatures=(), violating_distance=None
-)
+BARE = row(seed=1, top10=None, signatures=(), violating_distance=None)
 
 
 def add(path: Path, seeds: range) -> None:
@@ -27,8 +25,32 @@ def test_read_returns_appended_rows(tmp_path: Path) -> None:
     assert read_rows(path) == (row(), BARE)
     head, first, second = path.read_text().splitlines()
     assert head.split(",") == list(PLAIN)
-    assert first.startswith("Lander,court,garl,0,40,10,1,2,0,6,1,3,1,0,4,0,1,4,30,II:lost:descent|")
+    assert first.startswith("Lander,court,garl,0,40,10,1,2,0,6,1,3,1,0,4,0,,,30,II:lost:descent|")
     assert ",,,,,1.5000,0.1250,," in second
+
+
+def test_a_file_of_version_0_1_is_read_and_gains_columns(tmp_path: Path) -> None:
+    path = tmp_path / "rows.csv"
+    old = row(**OF_VERSION_0_1, unavoidable=1, piloted=4)
+    append_rows(path, [old])
+    narrow = [line.split(",")[: -len(OF_VERSION_0_1)] for line in path.read_text().splitlines()]
+    path.write_text("".join(f"{','.join(cells)}\n" for cells in narrow))
+    assert narrow[0][-1] == "result_hash"
+    assert read_rows(path) == (old,)
+    append_rows(path, [BARE])
+    assert read_rows(path) == (old, BARE)
+    assert path.read_text().splitlines()[1] == ",".join([*narrow[1], *[""] * len(OF_VERSION_0_1)])
+
+
+def test_a_row_of_version_0_1_counts_flights_without_landing_by_the_papers_definition() -> None:
+    old = row(**OF_VERSION_0_1, violations=10, aborted=4, type_v=1, inconclusive=2)
+    assert (old.paper_violations, old.landings) == (15, 23)
+    assert (row().paper_violations, row().landings) == (12, 26)
+
+
+def test_kinds_leave_out_phase_and_sight() -> None:
+    found = row(signatures=("IV:dog:descent:seen", "IV:dog:last-metre:unseen", "off:seen"))
+    assert found.kinds == ("IV:dog", "off:seen")
 
 
 def test_a_search_has_one_row(tmp_path: Path) -> None:
@@ -64,8 +86,8 @@ def test_simultaneous_appends_lose_no_row(tmp_path: Path) -> None:
             "line 2: column 'violations': found 'ten', expected a whole number",
         ),
         (",1.5000,", ",nan,", "column 'parameter_distance': found 'nan', expected a number"),
-        (",eeeeeeeeeeee", "", "line 2: found too few cells, expected 37"),
-        (",eeeeeeeeeeee", ",e,e", "line 2: found too many cells, expected 37"),
+        (",eeeeeeeeeeee", "", "line 2: found too few cells, expected 44"),
+        (",eeeeeeeeeeee", ",e,e", "line 2: found too many cells, expected 44"),
         (",seed,", ",seeds,", "found other columns than expected: seed, seeds"),
         ("map,method", "method,map", "found other columns than expected, in another order"),
         (",40,10,", ',40,"10"0,', "line 2: not valid CSV"),
