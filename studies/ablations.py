@@ -48,14 +48,14 @@ TABLE = ResultTable(
 )
 
 
-def found(result: FlightResult) -> str:
+def found(result: FlightResult) -> tuple[str, ...]:
     """Name the cell by the violation alone: all near misses share a cell."""
-    return result.signature or result.outcome
+    return (result.signature or result.verdict.no_landing or result.outcome,)
 
 
-def one(result: FlightResult) -> str:
+def one(result: FlightResult) -> tuple[str, ...]:
     """Put all flights into one cell: the nearest to a violation is bred from."""
-    return ""
+    return ("",)
 
 
 def half_exploring(plan: SearchPlan) -> Method:
@@ -70,8 +70,8 @@ def garl_with(**parameters: Any) -> Callable[[SearchPlan], Method]:
 
 VARIANTS: dict[str, Callable[[SearchPlan], Method]] = {
     "garl": find_method("garl"),
-    "one cell": garl_with(cell=one),
-    "cells of violations only": garl_with(cell=found),
+    "one cell": garl_with(cells=one),
+    "cells of violations only": garl_with(cells=found),
     "without exploring": garl_with(explore_share=0.0),
     "half of it exploring": half_exploring,
     "cells in turn": garl_with(learns_cells=False),

@@ -6,7 +6,14 @@ from typing import Any
 
 from pytest_garl.execution.result import FlightResult
 from pytest_garl.simulation.flight import Crash
-from pytest_garl.verdicts.verdict import Margin, PropertyName, Verdict, ViolationType
+from pytest_garl.verdicts.verdict import (
+    Excuse,
+    Finding,
+    Margin,
+    PropertyName,
+    Verdict,
+    ViolationType,
+)
 
 
 def flight_result(
@@ -18,6 +25,8 @@ def flight_result(
     paper_violation: bool | None = None,
     margins: tuple[Margin, ...] = (),
     story: str = "A story.",
+    excuse: Excuse = "",
+    findings: tuple[Finding, ...] = (),
     **fields: Any,
 ) -> FlightResult:
     """Return the result of a landing, or of a collision if there is a signature."""
@@ -31,6 +40,8 @@ def flight_result(
         paper_violation=violates if paper_violation is None else paper_violation,
         margins=margins,
         story=story,
+        excuse=excuse,
+        findings=findings,
     )
     plain: dict[str, Any] = {
         "outcome": outcome,

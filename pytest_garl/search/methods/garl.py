@@ -1,10 +1,13 @@
 """garl: an archive of ways to fail, from which scenarios are bred.
 
 MAP-Elites (Mouret and Clune 2015, "Illuminating search spaces by mapping elites") with the paper's
-chromosomes and crossover.  A cell of the archive is a way to fail: the signature of a violation, or
-the signature that a near miss would have had.  Thompson sampling (Thompson 1933) chooses the cell
-to breed from by the results of its children.  The first violation of a kind counts most and the
-twentieth little, so that near misses of another kind are worth more than one more of the same.
+chromosomes and crossover.  A cell of the archive is a way to fail: the signature of a violation;
+the signature of what had gone wrong before it; the body or the property that a near miss came
+nearest to; the cause of a flight without landing that is excused.  A flight lies in all of its
+cells.  Thompson sampling (Thompson 1933) chooses the cell to breed from by the results of its
+children.  The first violation of a kind counts most and the twentieth little, so that near misses
+of another kind are worth more than one more of the same.  Nothing is bred from a flight in which
+nobody could have seen the marker.
 
 Places and speeds of NPCs are spread out as in the paper's mutation: away from all earlier ones,
 which means to the ends of their ranges.  The marker decides where the UAV flies, and is put far
@@ -26,7 +29,7 @@ from pytest_garl.scenarios.chromosome import decode, encode
 from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.scenarios.validity import repair
 from pytest_garl.search.method import FlownScenario, MethodDeclaration, SearchPlan
-from pytest_garl.search.objectives import violation_proximity
+from pytest_garl.search.objectives import BODIES, near_miss, violation_proximity
 from pytest_garl.search.operators import (
     CANDIDATES,
     CROSSOVER_PROBABILITY,
@@ -49,9 +52,33 @@ NO_PARENT: Arm = ("", "")
 """The arm of scenarios that are drawn at random."""
 
 
+EXCUSED, INCONCLUSIVE = "excused", "inconclusive"
+BARREN = frozenset({EXCUSED, INCONCLUSIVE})
+"""Cells that are not bred from: of flights that say nothing about the landing system."""
+FINDING_WORTH = 0.5
+"""Success of the first flight in which something went wrong before its end; it is no violation
+until a flight without NPCs shows it."""
+
+
 def cell_of(result: FlightResult) -> str:
-    """Return how a flight failed or nearly failed: its signature, or else its outcome."""
-    return result.signature or result.closest_call or result.outcome
+    """Return how a flight failed or nearly failed.
+
+    That is the signature of a violation, the cause of a flight without landing that violates
+    nothing, the signature of a collision with the nearest body, the property that was nearly
+    violated, or the outcome.
+    """
+    verdict = result.verdict
+    if verdict.violation or verdict.no_landing:
+        return verdict.signature or verdict.no_landing
+    name, _ = near_miss(result)
+    if not name or name in BODIES:
+        return result.closest_call or result.outcome
+    return f"near {name}"
+
+
+def cells_of(result: FlightResult) -> tuple[str, ...]:
+    """Return the cells of a flight: how it failed, and what had gone wrong before."""
+    return (cell_of(result), *(finding.signature for finding in result.verdict.findings))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -67,7 +94,8 @@ class GarlParameters:
     """Share of children bred near whose small steps change only the NPC that their parent came
     nearest to, because the last centimetres depend on that NPC."""
     other_weather_share: float = 0.5
-    """Share of aimed children that also get the weather of another flight that was not aborted."""
+    """Share of aimed children that also get the weather of another flight that did not end without
+    a landing."""
     crossover_probability: float = CROSSOVER_PROBABILITY
     """The paper's probability, for children bred near that are not aimed."""
     spread_share: float = 0.75
@@ -81,8 +109,8 @@ class GarlParameters:
     """Weight of an arm's trials after one more trial, because cells change as they are searched."""
     learns_cells: bool = True
     """Whether cells are chosen by their success; otherwise each in turn."""
-    cell: Callable[[FlightResult], str] = cell_of
-    """The name of a flight's cell, from the flight's result."""
+    cells: Callable[[FlightResult], tuple[str, ...]] = cells_of
+    """The names of a flight's cells, from the flight's result."""
 
 
 class Garl:
@@ -97,7 +125,7 @@ class Garl:
         self._trials: defaultdict[Arm, tuple[float, float]] = defaultdict(lambda: (0.0, 0.0))
         self._arms: dict[Genes, Arm] = {}
         self._chromosomes: list[Matrix] = []
-        self._signatures: Counter[str] = Counter()
+        self._seen: Counter[str] = Counter()
         keys = plan.genome.keys
         self._weather = np.array([key.startswith("environment.") for key in keys])
         self._marker = np.array([key.startswith("marker.") for key in keys])
@@ -107,30 +135,37 @@ class Garl:
         return [self._new() for _ in range(self._plan.population)]
 
     def tell(self, flown: Sequence[FlownScenario]) -> Sequence[tuple[float, ...]]:
-        """Put each flight into its cell; return its proximity to a violation."""
+        """Put each flight into its cells; return its proximity to a violation."""
         weight = self._parameters.trial_weight
         for item in flown:
-            name = self._parameters.cell(item.result)
-            success = self._success(name, item)
+            names = self._parameters.cells(item.result)
+            success = self._success(names[0], item)
             arm = self._arms[item.scenario.genes]
             wins, losses = self._trials[arm]
             self._trials[arm] = weight * wins + success, weight * losses + 1 - success
-            self._cells[name].append(item)
+            for name in names:
+                self._cells[name].append(item)
         return [(violation_proximity(item.result),) for item in flown]
 
     def _success(self, name: str, item: FlownScenario) -> float:
-        """Return the success of a flight, 0 to 1."""
-        signature = item.result.signature
-        if signature:
-            self._signatures[signature] += 1
-            return float(self._signatures[signature] ** -0.5)
-        best = max((violation_proximity(other.result) for other in self._cells[name]), default=-1.0)
-        return float(violation_proximity(item.result) > best + self._parameters.least_progress)
+        """Return the success of a flight, 0 to 1: that of the best thing which it shows."""
+        verdict = item.result.verdict
+        shown = [(finding.signature, FINDING_WORTH) for finding in verdict.findings]
+        if verdict.violation:
+            shown.append((verdict.signature, 1.0))
+        self._seen.update(signature for signature, _ in shown)
+        worths = [worth * self._seen[signature] ** -0.5 for signature, worth in shown]
+        if not verdict.violation and name not in BARREN:
+            near = violation_proximity(item.result)
+            cell = self._cells.get(name, [])
+            best = max((violation_proximity(other.result) for other in cell), default=-1.0)
+            worths.append(float(near > best + self._parameters.least_progress))
+        return max(worths, default=0.0)
 
     def _new(self) -> Scenario:
         """Return a scenario that differs from all earlier ones."""
         while True:
-            explores = not self._cells or self._rng.random() < self._parameters.explore_share
+            explores = not self._fertile() or self._rng.random() < self._parameters.explore_share
             arm = NO_PARENT if explores else self._choose()
             scenario = self._random() if arm == NO_PARENT else self._child(*arm)
             if scenario.genes not in self._arms:
@@ -138,11 +173,19 @@ class Garl:
                 self._chromosomes.append(encode(scenario, self._plan.genome))
                 return scenario
 
+    def _fertile(self) -> list[str]:
+        """Return the cells that are bred from."""
+        return sorted(name for name in self._cells if name not in BARREN)
+
     def _choose(self) -> Arm:
         """Return the arm with the best draw from the distribution of its success."""
-        arms = [(name, NEAR) for name in sorted(self._cells)]
+        arms = [(name, NEAR) for name in self._fertile()]
         # A near miss depends on all of its genes, so only violations are bred far.
-        arms += [(name, FAR) for name, _ in arms if name in self._signatures]
+        arms += [
+            (name, FAR)
+            for name, _ in arms
+            if name and self._cells[name][0].result.signature == name
+        ]
         if not self._parameters.learns_cells:
             bred = Counter(self._arms.values())
             return min(arms, key=lambda arm: bred[arm])
@@ -183,7 +226,7 @@ class Garl:
         largest = LARGEST_STEP * max(
             self._parameters.least_step_share, 1 - violation_proximity(first.result)
         )
-        body = f"{first.result.closest_body}."
+        body = f"{first.result.closest_body}." if _is_about_a_body(first.result) else "no body."
         aim = np.array([key.startswith(body) for key in genome.keys])
         if way == FAR:
             return self._scenario(self._spread(row, ~(aim | self._weather)), seed)
@@ -194,7 +237,7 @@ class Garl:
             if rng.random() < self._parameters.other_weather_share:
                 row = np.where(self._weather, encode(self._in_other_weather(), genome), row)
             return self._scenario(np.where(aim, moved, row), seed)
-        second = self._elite(str(rng.choice(sorted(self._cells)))).scenario
+        second = self._elite(str(rng.choice(self._fertile()))).scenario
         pair = np.array([[*row, seed], [*encode(second, genome), second.seed]])
         probability = self._parameters.crossover_probability
         crossed = nuclear_gene_crossover(pair, genome.borders, rng, probability)[:1]
@@ -202,9 +245,9 @@ class Garl:
         return self._scenario(moved, int(crossed[0, -1]))
 
     def _in_other_weather(self) -> Scenario:
-        """Return a scenario whose flight was not aborted, or any if all were."""
+        """Return a scenario whose flight did not end without a landing, or any if all did."""
         every = [item for name in sorted(self._cells) for item in self._cells[name]]
-        good = [item for item in every if item.result.outcome != "gave_up"] or every
+        good = [item for item in every if not item.result.verdict.no_landing] or every
         return good[int(self._rng.integers(len(good)))].scenario
 
     def _elite(self, name: str) -> FlownScenario:
@@ -217,6 +260,13 @@ class Garl:
     def _scenario(self, row: Matrix, seed: int) -> Scenario:
         plan = self._plan
         return repair(decode(row, plan.genome, map=plan.map.name, seed=seed), plan.map)
+
+
+def _is_about_a_body(result: FlightResult) -> bool:
+    """Whether a flight hit a body, or came nearer to that than to any other violation."""
+    if result.verdict.violation:
+        return result.verdict.primary == "collision"
+    return near_miss(result)[0] in BODIES
 
 
 METHOD = MethodDeclaration(make=Garl, policy="dqn")

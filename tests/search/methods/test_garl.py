@@ -6,6 +6,7 @@ from collections.abc import Iterable
 from typing import Any
 
 import numpy as np
+import pytest
 from numpy.typing import NDArray
 
 from pytest_garl.execution.result import FlightResult
@@ -14,10 +15,18 @@ from pytest_garl.scenarios.genes import genome_for
 from pytest_garl.scenarios.maps.map import load_map
 from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.search.method import FlownScenario, SearchPlan
-from pytest_garl.search.methods.garl import FAR, NEAR, Garl, GarlParameters, cell_of
+from pytest_garl.search.methods.garl import (
+    EXCUSED,
+    FAR,
+    NEAR,
+    Garl,
+    GarlParameters,
+    cell_of,
+    cells_of,
+)
 from pytest_garl.search.methods.random import RandomSearch
 from pytest_garl.verdicts.paper_metrics import mean_distance
-from pytest_garl.verdicts.verdict import Margin
+from pytest_garl.verdicts.verdict import Excuse, Finding, Margin, MarginName
 from tests.support.results import flight_result
 
 MAP = load_map("court")
@@ -27,6 +36,20 @@ PLAN = SearchPlan(map=MAP, genome=genome_for(MAP), seed=0, population=20)
 def result(signature: str, closest_call: str = "", distance_m: float = 0.0) -> FlightResult:
     margin = Margin(property="collision", value=distance_m, unit="m")
     return flight_result(signature, closest_call=closest_call, margins=(margin,))
+
+
+def given_up(excuse: Excuse, closest_call: str = "") -> FlightResult:
+    margins = (
+        Margin(property="distance", value=-4.0, unit="m", decided=False),
+        Margin(property="collision", value=0.3, unit="m"),
+    )
+    return flight_result(
+        outcome="gave_up", closest_call=closest_call, margins=margins, excuse=excuse
+    )
+
+
+def finding(signature: str) -> Finding:
+    return Finding(signature=signature, margin=-1.0, unit="m", time_s=9.0, story="A story.")
 
 
 def common_and_rare(scenario: Scenario) -> FlightResult:
@@ -95,6 +118,94 @@ def test_the_first_violation_of_a_kind_is_worth_more_than_the_fourth() -> None:
     assert [method._success("IV:dog", item) for item in items[:4]] == [1.0, 0.5**0.5, 3**-0.5, 0.5]
 
 
+def test_nothing_is_bred_from_flights_in_which_nobody_could_have_seen_the_marker() -> None:
+    method = Garl(PLAN, GarlParameters(explore_share=0.0))
+    first = method.ask()
+    results = [given_up("undetectable")] * 19 + [given_up("blocked")]
+    method.tell([FlownScenario(scenario=s, result=r) for s, r in zip(first, results, strict=True)])
+    assert {method._choose() for _ in range(50)} == {("blocked", NEAR)}
+    # The tail of a chromosome, and so the seed, may come from a second parent.
+    assert {each.seed for _ in range(5) for each in method.ask()} == {first[-1].seed}
+
+
+def test_a_search_in_which_nobody_can_see_the_marker_draws_at_random() -> None:
+    method, by_chance = Garl(PLAN), Garl(PLAN)
+    method.tell(
+        [FlownScenario(scenario=each, result=given_up("undetectable")) for each in method.ask()]
+    )
+    by_chance.ask()
+    assert method.ask() == by_chance.ask()
+
+
+def test_other_weather_is_that_of_a_flight_that_landed_or_failed() -> None:
+    method = Garl(PLAN)
+    first = method.ask()
+    results = [given_up("blocked")] * 9 + [given_up("undetectable")] * 10 + [result("")]
+    method.tell([FlownScenario(scenario=s, result=r) for s, r in zip(first, results, strict=True)])
+    assert {method._in_other_weather() for _ in range(50)} == {first[-1]}
+
+
+def test_a_needless_end_without_landing_is_bred_like_any_violation() -> None:
+    needless = flight_result("II:lost:descent", outcome="gave_up", primary="time")
+    assert cell_of(needless) == "II:lost:descent"
+    method = Garl(PLAN)
+    method.tell([FlownScenario(scenario=each, result=needless) for each in method.ask()])
+    assert {method._choose()[1] for _ in range(50)} == {NEAR, FAR}
+
+
+def test_a_child_of_a_violation_without_contact_does_not_aim_at_a_body() -> None:
+    method = Garl(PLAN, GarlParameters(aimed_share=1.0, crossover_probability=0.0))
+    first = method.ask()[:1]
+    lost = flight_result("II:lost:descent", outcome="gave_up", primary="time", closest_body="dog-1")
+    method.tell([FlownScenario(scenario=each, result=lost) for each in first])
+    (parent,) = genes(first)
+    children = genes(method._child("II:lost:descent", NEAR) for _ in range(30))
+    dog = np.array([key.startswith("dog-1.") for key in PLAN.genome.keys])
+    assert np.abs(children - parent)[:, ~dog].max() > 0.01
+
+
+def test_what_had_gone_wrong_before_is_a_cell_of_its_own_and_worth_half_a_violation() -> None:
+    method = Garl(PLAN, GarlParameters(explore_share=0.0))
+    before = finding("off:descending-elsewhere")
+    hit = flight_result("IV:bird", findings=(before,))
+    landed = flight_result(findings=(before,))
+    assert cells_of(hit) == ("IV:bird", "off:descending-elsewhere")
+    items = [FlownScenario(scenario=each, result=hit) for each in method.ask()]
+    # Each is the n-th violation of its kind and the n-th finding.
+    assert [method._success("IV:bird", item) for item in items[:2]] == [1.0, 0.5**0.5]
+    third = FlownScenario(scenario=items[2].scenario, result=landed)
+    assert method._success("landed", third) == 1.0
+    method.tell(items)
+    chosen = {method._choose() for _ in range(200)}
+    assert chosen == {
+        ("IV:bird", NEAR),
+        ("IV:bird", FAR),
+        ("off:descending-elsewhere", NEAR),
+    }
+
+
+@pytest.mark.parametrize(
+    ("margins", "name"),
+    [
+        ({"collision": 1.0, "decoy": 1.4}, "IV:person:take-off:seen"),
+        ({"collision": 2.9, "decoy": 0.2}, "near decoy"),
+        ({"collision": 2.9, "dropout": -1.0}, "near dropout"),
+        ({"collision": 9.0, "time": 90.0, "distance": 0.7, "slide": 0.5}, "landed"),
+    ],
+)
+def test_a_near_miss_is_named_by_what_was_nearest(
+    margins: dict[MarginName, float], name: str
+) -> None:
+    close = "IV:person:take-off:seen" if margins["collision"] < 3 else ""
+    found = tuple(Margin(property=key, value=value, unit="m") for key, value in margins.items())
+    assert cell_of(flight_result(closest_call=close, margins=found)) == name
+
+
+def test_a_flight_without_landing_that_is_excused_is_named_by_its_cause() -> None:
+    assert cell_of(given_up("blocked", "IV:person:descent:seen")) == "blocked"
+    assert cell_of(given_up("undetectable", "IV:person:descent:seen")) == EXCUSED
+
+
 def test_a_cell_is_named_by_signature_near_miss_or_outcome() -> None:
     assert cell_of(result("IV:dog:descent:seen", "IV:person:take-off:seen")) == (
         "IV:dog:descent:seen"
@@ -161,7 +272,7 @@ def test_only_violations_are_bred_far() -> None:
 
 
 def test_a_search_with_one_cell_breeds_from_it() -> None:
-    method = Garl(PLAN, GarlParameters(explore_share=0.0, cell=lambda result: ""))
+    method = Garl(PLAN, GarlParameters(explore_share=0.0, cells=lambda result: ("",)))
     first = method.ask()
     method.tell([FlownScenario(scenario=each, result=result("", "near")) for each in first])
     seeds = {each.seed for each in first}
