@@ -47,7 +47,7 @@ def case_of(seed: int) -> Case:
     return Case(
         system=f"systems:{NAMES[0]}",
         status="open",
-        avoidable="live",
+        live=True,
         scenario=decode(genome.random(rng), genome, map="lawn", seed=seed),
         violation=Violation(
             signature="IV:dog:descent:seen",

@@ -34,6 +34,8 @@ class Recorded:
     repeated at the same decisions.
     """
 
+    reads_uav = False
+
     def __init__(self, moves: str, changes: str = "{}") -> None:
         self._all: dict[str, list[list[float]]] = json.loads(moves)
         self._changes: dict[str, list[tuple[int, str, float]]] = json.loads(changes)

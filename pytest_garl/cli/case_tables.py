@@ -38,8 +38,8 @@ def case_table(found: Iterable[CorpusEntry]) -> Table:
         # In a plain string rich would draw ":dog:" as an emoji, and read "[red]" as a colour.
         signature = Text(printable(case.violation.signature, keep=""))
         status = Text(case.status, style=_STYLES.get(case.status, "dim"))
-        if case.edge:
-            status.append(" (edge)")
+        if not case.gates:
+            status.append(f" ({case.reason})")
         table.add_row(where, status, signature, robust, objects)
     return table
 

@@ -16,7 +16,7 @@ from pytest_garl.cli.case_tables import (
 )
 from pytest_garl.errors import GarlError
 from pytest_garl.messages import printable
-from pytest_garl.regressions.case import Case
+from pytest_garl.regressions.case import Case, NoGateReason
 from pytest_garl.regressions.case_file import load_case
 from pytest_garl.regressions.corpus import Corpus, replace_file
 from pytest_garl.regressions.replay import Replay, replay, system_of
@@ -25,6 +25,11 @@ DEFAULT_FOLDER = Path("scenarios/regressions")
 NO_PROOF = 3
 """Exit status of a replay that proves nothing."""
 EXIT_STATUS = {"FIXED": 0, "FAILED": 1, "STALE": NO_PROOF, "UNDECIDED": NO_PROOF}
+_NO_GATE = {
+    "edge": "it is an edge case, not all of its neighbours fail",
+    "sensor-limited": "an escape exists, but the camera did not show the body in time for it",
+    "unpreventable": "no landing system could have escaped",
+}
 MINIMUM_RESHRINK_FLIGHTS = 9
 """``reshrink.MINIMUM_RESHRINK_FLIGHTS``, whose module takes long to import."""
 
@@ -108,8 +113,10 @@ def show(project: _Project, file: Path) -> None:
     print_table(scenario_table(case, project.maps))
     for key, by in environment_changes(case):
         _say(f"during the flight {key} changes by {by:+.2f}")
-    if case.edge:
-        _say("\nThis is an edge case: not all of its neighbours fail, so it gates nothing.")
+    if case.prevention.text:
+        _say(f"\n{case.prevention.text}.")
+    if not case.gates:
+        _say(f"\nIt gates nothing: {_NO_GATE[case.reason]}.")
     tried = f"{evidence.neighbours_failed} of {evidence.neighbours} neighbours fail too; "
     _say(
         f"\n{tried if evidence.neighbours else ''}shrinking removed {evidence.removed}; objects "
@@ -195,21 +202,24 @@ def accept(project: _Project, files: tuple[Path, ...]) -> None:
 def promote(project: _Project, file: Path) -> None:
     """Mark a case as fixed: from now on it must pass.
 
-    The command flies the case first, with its recorded moves and, if the reference pilot can
-    avoid the violation, with a live policy too. The case stays open if it fails, if it is
-    undecided, or if nothing shows that a repair of the landing system made it pass.
+    The command flies the case first, with its recorded moves and, if an escape from a live policy
+    exists, with that policy too. The case stays open if it fails, if the landing system gives up
+    needlessly, if it is undecided, or if nothing shows that a repair of the landing system made it
+    pass.
     """
     case, remarks = project.case(file), []
-    for live in (False, True) if case.avoidable == "live" else (False,):
+    for live in (False, True) if case.live else (False,):
         replayed = replay(case, project.root, project.maps, live=live)
         how = "a live policy" if live else "its recorded moves"
         if replayed.result != "FIXED":
             raise GarlError(f"{file}: {_refusal(replayed, how)}; it stays {case.status}")
         if replayed.outcome == "gave_up":
-            remarks.append(f"with {how} the landing system gave up; it did not land")
+            remarks.append(f"with {how} the landing system gave up, which its limits allow")
         if not live:
             remarks.append(f"judged by {replayed.judged_by}")
-    replace_file(file, dataclasses.replace(case, status="fixed"))
+    # What passes is not unpreventable.
+    reason: NoGateReason = "edge" if case.edge else ""
+    replace_file(file, dataclasses.replace(case, status="fixed", reason=reason))
     _say(f"{file}: fixed; from now on it must pass")
     for line in remarks:
         _say(line)

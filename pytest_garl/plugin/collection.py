@@ -66,7 +66,7 @@ def _saved_targets(arguments: MarkerArguments, options: Options, test: str) -> I
             continue
         target = replace(arguments.target, map=header.map, entry=entry)
         yield target
-        if header.status == "fixed" and header.avoidable == "live":
+        if header.status == "fixed" and header.live:
             yield replace(target, live=True)
 
 

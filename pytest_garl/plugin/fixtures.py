@@ -61,6 +61,7 @@ def landing(request: pytest.FixtureRequest, garl_slot: Target, npcs: PolicySpec)
         (OUTCOME, result.outcome),
         (SIGNATURE, result.signature),
         ("garl.story", result.verdict.story),
+        ("garl.excuse", result.verdict.excuse_text or result.verdict.excuse),
         ("garl.final_distance_m", result.final_distance_m),
         ("garl.elapsed_s", result.elapsed_s),
         ("garl.trajectory_sha256", flight.sha256),

@@ -55,7 +55,7 @@ def case_state(run: Run, target: Target) -> CaseState | None:
     return CaseState(
         signature=entry.case.violation.signature,
         status=entry.case.status,
-        edge=entry.case.edge,
+        reason=entry.case.reason,
         accepted=run.options.corpus.is_accepted(entry),
     )
 

@@ -13,10 +13,12 @@ from dataclasses import dataclass
 from enum import Enum
 from typing import Literal, TypeVar
 
-from pytest_garl.regressions.case import Status
+from pytest_garl.regressions.case import NoGateReason, Status
 
 Outcome = Literal["passed", "failed", "xfailed", "skipped"]
 
+_MOVING_BODY = "IV:"
+"""Begin of the signatures of collisions with moving bodies."""
 MINIMUM_FAILURES = 2
 """A violation repeats if at least this many of a slot's flights show it."""
 
@@ -34,7 +36,7 @@ class Reason(Enum):
     NOT_REPEATED = "the violation did not show again"
     EDGE = "not all neighbours of the case fail, so it gates nothing"
     KNOWN_CASE = "the case is open and known"
-    UNAVOIDABLE_CASE = "the case is known, and not even the reference pilot avoids it"
+    NOT_PREVENTABLE_CASE = "the case is known, and no landing system could prevent it"
     NEW_CASE = "the case is neither committed nor accepted"
     FAILS_AGAIN = "the case was fixed"
     FAILS_DIFFERENTLY = "the case has another signature"
@@ -79,7 +81,8 @@ class CaseState:
 
     signature: str
     status: Status
-    edge: bool
+    reason: NoGateReason = ""
+    """Why it gates nothing; empty for a case that gates."""
     accepted: bool = False
     """Whether the case is known: committed, or accepted by a user."""
 
@@ -207,26 +210,26 @@ def _failed_search(facts: FailedItem) -> Decision | Need:
 def _failed_case(facts: FailedItem, case: CaseState) -> Decision:
     """Let a known open case fail as it did before, and a fixed one not at all."""
     same = facts.signature == case.signature
-    # An unavoidable failure may show in any way; that excuses nothing that the case is not about.
-    excused = same or not (facts.user_property or facts.crashed)
-    if case.edge and excused:
+    if case.reason == "edge" and (same or not (facts.user_property or facts.crashed)):
         return _xfail(Reason.EDGE)
     open_as_saved = case.status == "open" and same
-    unavoidable = case.status == "unavoidable" and excused
-    if (open_as_saved or unavoidable) and case.accepted:
-        return _xfail(Reason.KNOWN_CASE if open_as_saved else Reason.UNAVOIDABLE_CASE)
+    # Such a collision may show in another phase; that excuses nothing else.
+    not_preventable = bool(case.reason) and facts.signature.startswith(_MOVING_BODY)
+    if (open_as_saved or not_preventable) and case.accepted:
+        return _xfail(Reason.NOT_PREVENTABLE_CASE if case.reason else Reason.KNOWN_CASE)
     if facts.user_property and not same and facts.expected_by:
         return _xfail(Reason.EXPECTED)
-    if open_as_saved or unavoidable:
+    if open_as_saved or not_preventable:
         return _fail(Reason.NEW_CASE)
     return _fail(Reason.FAILS_AGAIN if case.status == "fixed" else Reason.FAILS_DIFFERENTLY)
 
 
 def _passed_case(facts: PassedCase) -> Decision | Need:
     """Note that an open case passes; with ``garl_xfail_strict`` fail its first test."""
-    if facts.case.edge:
+    case = facts.case
+    if case.reason == "edge":
         return _xfail(Reason.EDGE)
-    if facts.case.status != "open" or facts.violates:
+    if case.status != "open" or case.reason or facts.violates:
         return Decision(outcome="passed", reason=Reason.PASSES)
     reason = Reason.STALE if facts.unproven else Reason.MAYBE_FIXED
     if facts.strict:

@@ -49,8 +49,9 @@ def expected_failure(decision: Decision, facts: FailedItem, file: str) -> str:
             return f"did not repeat: {_share(facts.reflights)} ({facts.signature})"
         case Reason.EDGE:
             return f"edge: fails; {saved} ({file})"
-        case Reason.UNAVOIDABLE_CASE:
-            return f"unavoidable: {saved} ({file})"
+        case Reason.NOT_PREVENTABLE_CASE:
+            assert facts.case is not None
+            return f"{facts.case.reason}: {saved} ({file})"
     return f"known: {saved} ({file})"
 
 

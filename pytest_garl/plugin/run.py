@@ -220,7 +220,10 @@ class Run:
             simulator_sha256=simulator_sha256(self.simulator),
             map_sha256=load_map(target.map, self.options.map_folders).sha256,
         )
-        return stale_reasons(target.case, sources, self.flight(target).sha256)
+        flight = self.flight(target)
+        excuse = flight.result.verdict.excuse
+        excused = (f"nobody could have landed ({excuse})",) if excuse else ()
+        return *excused, *stale_reasons(target.case, sources, flight.sha256)
 
     def scenario(self, target: Target) -> Scenario:
         """Return the scenario of a slot."""

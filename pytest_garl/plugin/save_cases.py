@@ -30,11 +30,6 @@ from pytest_garl.regressions.follow_up import (
 from pytest_garl.regressions.forecast import remaining_work
 
 _PATCH = ".patch"
-_AVOIDABLE = {
-    "live": "the reference pilot violates nothing",
-    "recorded": "the reference pilot violates nothing unless objects pursue it too",
-    "no": "UNAVOIDABLE, gates nothing",
-}
 
 
 def may_save(run: Run, session: pytest.Session) -> bool:
@@ -145,17 +140,15 @@ def _lines_about(each: InvestigatedSignature, config: pytest.Config, width: int)
 
 
 def _evidence(each: InvestigatedSignature, case: Case) -> list[str]:
-    """Return in words how robust and how avoidable a case is, and how many flights it took."""
+    """Return in words how robust and preventable a case is, and how many flights it took."""
     evidence = case.evidence
     if not each.result.flights:
         return ["as the search found it, not shrunk"]
-    robust = [
-        f"{evidence.neighbours_failed} of {evidence.neighbours} neighbours fail too",
-        *(["EDGE, gates nothing"] if case.edge else []),
-        _AVOIDABLE[case.avoidable],
-    ]
+    robust = f"{evidence.neighbours_failed} of {evidence.neighbours} neighbours fail too"
     return [
-        *(robust if evidence.neighbours else []),
+        *([robust] if evidence.neighbours else []),
+        *([case.prevention.text] if case.prevention.text else []),
+        *([] if case.gates else [f"{case.reason.upper()}, gates nothing"]),
         f"shrinking removed {evidence.removed}",
         counted(each.result.flights, "flight"),
     ]

@@ -13,12 +13,15 @@ from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.simulation.npc_policy import PolicySpec
 from pytest_garl.verdicts.verdict import Limits, PropertyName, ViolationType
 
-Status = Literal["open", "fixed", "unavoidable"]
-"""Open: known, expected to fail.  Fixed: must pass.  Unavoidable: the reference pilot, which knows
-where everything is and may abort, violates a property as well; such a case gates nothing."""
-Avoidable = Literal["live", "recorded", "no"]
-"""The objects among which the reference pilot violates nothing: those that a live policy steers
-(and those that repeat their moves), only those that repeat their moves, or neither."""
+Status = Literal["open", "fixed"]
+"""Open: known, expected to fail.  Fixed: must pass."""
+Preventable = Literal["not asked", "preventable", "sensor-limited", "unpreventable"]
+"""Whether a collision with a moving body could have been prevented.  Preventable: an escape exists
+from the state shortly after the body was first observable.  Sensor-limited: an escape exists, but
+nothing was observable in time for it.  Unpreventable: no escape exists.  Not asked: the violation
+is another one, or no flights were left for the question."""
+NoGateReason = Literal["", "edge", "sensor-limited", "unpreventable"]
+"""Why a case gates nothing; empty for one that gates."""
 MoveList = tuple[tuple[float, float], ...]
 Moves = tuple[tuple[str, MoveList], ...]
 ChangeList = tuple[tuple[int, str, float], ...]
@@ -56,6 +59,38 @@ class Evidence:
     versions: tuple[tuple[str, str], ...]
     system_sha256: str = ""
     simulator_sha256: str = ""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Prevention:
+    """Whether a collision with a moving body could have been prevented, and until when.
+
+    ``inevitable_s`` is the time to inevitable collision: the longest time before the contact from
+    which no escape exists.  ``observed_s`` is how long before the contact the camera had shown the
+    body well enough for the first time; None if it never had.
+    """
+
+    answer: Preventable = "not asked"
+    inevitable_s: float | None = None
+    observed_s: float | None = None
+
+    @property
+    def text(self) -> str:
+        """The answer in words, with the seconds; empty if it was not asked."""
+        if self.answer == "not asked":
+            return ""
+        escape = f"collision inevitable from {self.inevitable_s:.1f} s before the contact"
+        if self.answer == "unpreventable":
+            escape = f"no escape within the last {self.inevitable_s:.1f} s"
+        seen = (
+            "the camera did not show the body before it"
+            if self.observed_s is None
+            else f"the camera showed the body {self.observed_s:.1f} s before it"
+        )
+        return f"{self.answer}: {escape}, {seen}"
+
+
+NOT_ASKED = Prevention()
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -98,15 +133,15 @@ class Case:
     that no policy is needed to fly it again; ``policy`` and ``policy_sha256`` name the policy that
     moved the objects when it was found.  ``test`` is the node id of the test that failed, without
     parameters; empty if none is known.  ``assertion`` is the hash of the assertion's source if a
-    test's own assertion failed and the built-in verdict found nothing.  ``avoidable`` limits what
-    the case asks of a repair: no landing system has to outrun an object that the reference pilot
-    cannot outrun.  ``limits`` are those of the tests when it was found; pytest flies it with those
-    of today.  ``accepted`` marks a case as known in projects without git.
+    test's own assertion failed and the built-in verdict found nothing.  ``reason`` says why the
+    case gates nothing.  ``live`` is whether a repair must also hold against objects that a live
+    policy moves: an escape from them exists.  ``limits`` are those of the tests when it was found;
+    pytest flies it with those of today.  ``accepted`` marks a case as known in projects without
+    git.
     """
 
     system: str
     status: Status
-    avoidable: Avoidable
     scenario: Scenario
     violation: Violation
     policy: str
@@ -118,6 +153,9 @@ class Case:
     test: str = ""
     assertion: str = ""
     accepted: bool = False
+    reason: NoGateReason = ""
+    live: bool = False
+    prevention: Prevention = NOT_ASKED
 
     @property
     def behaviour(self) -> RecordedBehaviour:
@@ -132,7 +170,20 @@ class Case:
     @property
     def edge(self) -> bool:
         """Whether a neighbour does not fail; such a case gates nothing."""
-        return self.evidence.neighbours_failed < self.evidence.neighbours
+        return self.reason == "edge"
+
+    @property
+    def gates(self) -> bool:
+        """Whether a failure of the case may fail a run."""
+        return not self.reason
+
+    @property
+    def expects_signature(self) -> bool:
+        """Whether it excuses other violations with its signature.
+
+        A case that nobody could prevent excuses only itself: the next one may be preventable.
+        """
+        return self.status == "open" and self.reason not in ("sensor-limited", "unpreventable")
 
     @property
     def id(self) -> str:

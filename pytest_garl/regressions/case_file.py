@@ -5,17 +5,14 @@ The sections stand in the file in the order of the functions here.
 
 from __future__ import annotations
 
-import textwrap
+import dataclasses
 from collections.abc import Callable
-from dataclasses import dataclass
 from pathlib import Path
 from typing import cast, get_args
 
 from pytest_garl.errors import ScenarioError
-from pytest_garl.execution.reference import SYSTEM_NAME
 from pytest_garl.files.reading import read_text
 from pytest_garl.files.toml import Table, parse, quoted
-from pytest_garl.messages import shown
 from pytest_garl.regressions.behaviour_toml import (
     change_lines,
     move_lines,
@@ -23,16 +20,25 @@ from pytest_garl.regressions.behaviour_toml import (
     read_moves,
 )
 from pytest_garl.regressions.case import (
-    Avoidable,
+    NOT_ASKED,
     Case,
     Evidence,
-    Status,
+    NoGateReason,
+    Preventable,
+    Prevention,
     Violation,
-    asserting_test,
+)
+from pytest_garl.regressions.case_header import (
+    FIRST_SCHEMA,
+    CaseHeader,
+    header_lines,
+    keys_of,
+    read_header,
 )
 from pytest_garl.scenarios.files import gene_lines, read_genes
 from pytest_garl.scenarios.maps.map import Map, load_map
 from pytest_garl.verdicts.verdict import (
+    DEFAULT_LIMITS,
     FARTHEST_M,
     LONGEST_S,
     AbortRule,
@@ -41,22 +47,16 @@ from pytest_garl.verdicts.verdict import (
     ViolationType,
 )
 
-SCHEMA = 1
-_WIDTH = 98
-_HEADER_KEYS = {"schema", "system", "status", "accepted", "avoidable", "map", "seed", "test"}
-_KEYS = _HEADER_KEYS | {"assertion", "absent"}
-_SECTIONS = {"violation", "limits", "genes", "policy", "moves", "changes", "evidence"}
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class CaseHeader:
-    """The facts above a file's first table, which decide the items that fly the case."""
-
-    system: str
-    status: Status
-    avoidable: Avoidable
-    map: str
-    asserting_test: str
+_SECTIONS = {
+    "violation",
+    "preventable",
+    "limits",
+    "genes",
+    "policy",
+    "moves",
+    "changes",
+    "evidence",
+}
 
 
 def load_case(path: Path, map_folders: tuple[Path, ...] = ()) -> Case:
@@ -67,14 +67,15 @@ def load_case(path: Path, map_folders: tuple[Path, ...] = ()) -> Case:
 def load_header(path: Path) -> CaseHeader:
     """Return the facts above a file's first table, in a fraction of the time of the whole case."""
     header, _, _ = read_text(path).partition("\n[")
-    return _read_header(Table(parse(header, str(path)), str(path)))
+    return read_header(Table(parse(header, str(path)), str(path)))
 
 
 def dump_case(case: Case) -> str:
     """Return the case as TOML: the same bytes for equal cases."""
     sections = [
-        _header_lines(case),
+        header_lines(case),
         _violation_lines(case.violation),
+        *_prevention_lines(case.prevention),
         _limits_lines(case.limits),
         [
             "# Weather from 0 to 1, places from -1 to 1, velocity as a share of the top speed.",
@@ -90,8 +91,8 @@ def dump_case(case: Case) -> str:
 def parse_case(text: str, load_map: Callable[[str], Map], *, source: str = "case") -> Case:
     """Return the case in ``text``; raise ScenarioError that names source and key."""
     top = Table(parse(text, source), source)
-    top.refuse_unknown(_KEYS | _SECTIONS)
-    header = _read_header(top)
+    header = read_header(top)
+    top.refuse_unknown(keys_of(header) | _SECTIONS)
     try:
         map = load_map(header.map)
     except ScenarioError as error:
@@ -101,21 +102,24 @@ def parse_case(text: str, load_map: Callable[[str], Map], *, source: str = "case
     names = [name for name, _ in map.all_objects if name not in removed]
     policy = top.table("policy")
     policy.refuse_unknown({"name", "sha256"})
+    evidence = _read_evidence(top.table("evidence"))
     return Case(
         system=header.system,
         status=header.status,
-        avoidable=header.avoidable,
         scenario=scenario,
         violation=_read_violation(top.table("violation")),
         policy=policy.string("name"),
         policy_sha256=policy.string("sha256"),
         moves=read_moves(top.table("moves"), names),
         changes=read_changes(top.table("changes"), names) if "changes" in top.values else (),
-        evidence=_read_evidence(top.table("evidence")),
-        limits=read_limits(top.table("limits")),
+        evidence=evidence,
+        limits=_read_limits_of(header.schema, top.table("limits")),
         test=top.string("test", ""),
         assertion=top.string("assertion", ""),
         accepted=top.boolean("accepted", default=False),
+        reason=_reason(header, evidence),
+        live=header.live,
+        prevention=_read_prevention(top),
     )
 
 
@@ -129,44 +133,43 @@ def size_of(case: Case) -> int:
     return sum(len(line) for line in (*gene_lines(case.scenario), *record_lines(case)))
 
 
-def _header_lines(case: Case) -> list[str]:
-    text, scenario = case.violation.description, case.scenario
-    description = "".join(char if char.isprintable() else " " for char in text)
-    lines = [
-        *(f"# {line}" for line in textwrap.wrap(description, _WIDTH)),
-        f"schema = {SCHEMA}",
-        f"system = {quoted(case.system)}",
-        f'status = "{case.status}"',
-        *(["accepted = true"] if case.accepted else []),
-        f'avoidable = "{case.avoidable}"  # among which objects the reference pilot comes through',
-        f"map = {quoted(scenario.map)}",
-        f"seed = {scenario.seed}",
-    ]
-    if case.test:
-        lines.append(f"test = {quoted(case.test)}")
-    if case.assertion:
-        lines.append(f"assertion = {quoted(case.assertion)}")
-    if scenario.removed_objects:
-        names = ", ".join(quoted(name) for name in scenario.removed_objects)
-        lines.append(f"absent = [{names}]")
-    return lines
+def _reason(header: CaseHeader, evidence: Evidence) -> NoGateReason:
+    """Return why a case gates nothing; the first schema tells an edge by the evidence alone."""
+    if header.schema == FIRST_SCHEMA and evidence.neighbours_failed < evidence.neighbours:
+        return "edge"
+    return header.reason
 
 
-def _read_header(top: Table) -> CaseHeader:
-    if top.integer("schema") != SCHEMA:
-        raise top.error("schema", f"found {shown(top.get('schema'))}, expected {SCHEMA}")
-    system = top.string("system")
-    if not SYSTEM_NAME.fullmatch(system):
-        raise top.error(
-            "system", f"found {shown(system)}, expected 'module:class', names with dots between"
-        )
-    return CaseHeader(
-        system=system,
-        status=cast(Status, top.string("status", allowed=get_args(Status))),
-        avoidable=cast(Avoidable, top.string("avoidable", allowed=get_args(Avoidable))),
-        map=top.string("map"),
-        asserting_test=asserting_test(top.string("test", ""), top.string("assertion", "")),
+def _prevention_lines(prevention: Prevention) -> list[list[str]]:
+    if prevention == NOT_ASKED:
+        return []
+    seconds = (
+        ("inevitable_s", prevention.inevitable_s, "from then on no escape exists"),
+        ("observed_s", prevention.observed_s, "the camera first showed the body well enough"),
     )
+    lines = [
+        "# Could it have been prevented? Seconds before the contact.",
+        "[preventable]",
+        f'answer = "{prevention.answer}"',
+        *(f"{key} = {value!r}  # {text}" for key, value, text in seconds if value is not None),
+    ]
+    return [lines]
+
+
+def _read_prevention(top: Table) -> Prevention:
+    if "preventable" not in top.values:
+        return NOT_ASKED
+    table = top.table("preventable")
+    table.refuse_unknown({"answer", "inevitable_s", "observed_s"})
+    seconds = {
+        key: table.number(key, low=0.0, high=LONGEST_S)
+        for key in ("inevitable_s", "observed_s")
+        if key in table.values
+    }
+    answer = cast(Preventable, table.string("answer", allowed=get_args(Preventable)[1:]))
+    if "inevitable_s" not in seconds:
+        raise table.error("inevitable_s", "found nothing, expected a number of seconds")
+    return Prevention(answer=answer, **seconds)
 
 
 def _violation_lines(violation: Violation) -> list[str]:
@@ -200,6 +203,18 @@ def _limits_lines(limits: Limits) -> list[str]:
         f"time_s = {limits.time_s!r}",
         f'abort = "{limits.abort}"',
     ]
+
+
+def _read_limits_of(schema: int, table: Table) -> Limits:
+    """Return the limits of a case.
+
+    In the first schema "ok" was the default and nobody's choice, so today's default takes its
+    place; a test that flies the case has limits of its own.
+    """
+    found = read_limits(table)
+    if schema == FIRST_SCHEMA and found.abort == "ok":
+        return dataclasses.replace(found, abort=DEFAULT_LIMITS.abort)
+    return found
 
 
 def read_limits(table: Table) -> Limits:

@@ -7,17 +7,16 @@ import dataclasses
 from pytest_garl.execution.flight_id import CompletedFlight
 from pytest_garl.execution.job import FlightJob
 from pytest_garl.execution.on_demand import FlyFunction
-from pytest_garl.regressions.avoidability import avoidability
-from pytest_garl.regressions.case import Avoidable, Case, RecordedBehaviour
+from pytest_garl.regressions.case import NOT_ASKED, Case, Prevention, RecordedBehaviour
 from pytest_garl.regressions.case_request import CaseRequest, CaseResult, FailingScenario
 from pytest_garl.regressions.robustness import NEIGHBOURS, neighbours
 from pytest_garl.scenarios.maps.map import Map
 from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.simulation.flight_file import load
 
-PILOT_FLIGHTS = 3
-"""Flights of the reference pilot: among objects that repeat the recorded moves, among objects with
-the live policy, and one more if the pilot cannot avoid the violation with the shortest record."""
+ESCAPE_FLIGHTS = 3
+"""Flights that are kept to confirm an escape from a collision with a moving body: two attempts from
+the latest state with a plan, and one from the state shortly after the body was observable."""
 
 
 class CaseFlights:
@@ -29,7 +28,7 @@ class CaseFlights:
     def __init__(self, request: CaseRequest, fly: FlyFunction) -> None:
         self.request = request
         self.flown = 0
-        self.flown_by_pilot = 0
+        self.asked_prevention = False
         self._fly = fly
         self._live: dict[Scenario, CompletedFlight] = dict(request.violations)
 
@@ -40,8 +39,9 @@ class CaseFlights:
 
     @property
     def left(self) -> int:
-        """The flights that remain, without those that are kept for the reference pilot."""
-        return self.request.budget - PILOT_FLIGHTS - (self.flown - self.flown_by_pilot)
+        """The flights that remain, without those that are kept to confirm an escape."""
+        kept = ESCAPE_FLIGHTS if self.request.asks_prevention else 0
+        return self.request.budget - kept - self.flown
 
     def live_flight(self, scenario: Scenario) -> CompletedFlight:
         """Return the flight of a scenario that the search or :meth:`fly_live` has flown."""
@@ -113,17 +113,10 @@ class CaseFlights:
             neighbours_flown=NEIGHBOURS,
         )
 
-    def avoidability(self, failing: FailingScenario) -> Avoidable:
-        """Let the reference pilot fly a scenario; return among which objects it succeeds."""
-
-        def fly(job: FlightJob, scenario: Scenario) -> CompletedFlight:
-            self.flown_by_pilot += 1
-            return self._go(job, scenario)
-
-        request = self.request
-        return avoidability(
-            request.job, failing.scenario, failing.behaviour, fly, fails=request.fails
-        )
+    def prevention(self, failing: FailingScenario) -> Prevention:
+        """Return whether the collision of a failing scenario could have been prevented."""
+        self.asked_prevention = True
+        return NOT_ASKED
 
     def result(self, case: Case | None, reason: str = "") -> CaseResult:
         """Return the end of the investigation, with the flights that it took."""
@@ -131,7 +124,6 @@ class CaseFlights:
             signature=self.request.signature,
             case=case,
             flights=self.flown,
-            pilot_flights=self.flown_by_pilot,
             reason=reason,
         )
 

@@ -51,6 +51,11 @@ class CaseRequest:
         return crash is not None and crash.kind in ("raised", "nonsense", "hung")
 
     @property
+    def asks_prevention(self) -> bool:
+        """Whether the violation is a collision with a moving body, which may be unpreventable."""
+        return self.user_assertion is None and self.signature.startswith("IV:")
+
+    @property
     def scenarios(self) -> list[Scenario]:
         """The scenarios of the violations, the simplest first."""
         return sorted(
@@ -68,16 +73,11 @@ class CaseRequest:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class CaseResult:
-    """The case that was made, or the reason why there is none.
-
-    ``pilot_flights`` are the reference pilot's among the ``flights``: it sees without a camera, so
-    that its flights take a fraction of the time.
-    """
+    """The case that was made, or the reason why there is none."""
 
     signature: str
     case: Case | None
     flights: int
-    pilot_flights: int = 0
     reason: str = ""
 
 

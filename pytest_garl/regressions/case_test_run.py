@@ -85,9 +85,9 @@ def single_case_corpus(case: Case, *, live: bool) -> Iterator[Path]:
         fixed = dataclasses.replace(
             case,
             status="fixed",
-            avoidable="live" if live else "recorded",
-            # Without neighbours it is no edge case, whose failure would fail no test.
-            evidence=dataclasses.replace(case.evidence, neighbours=0, neighbours_failed=0),
+            live=live,
+            # A case that gates nothing would fail no test.
+            reason="",
         )
         folder = folder_of(Path(scratch, "cases"), case.system)
         write_text_atomically(folder / f"{CASE_NAME}.toml", dump_case(fixed))

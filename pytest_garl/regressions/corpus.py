@@ -14,7 +14,8 @@ from pytest_garl.errors import CorpusError, ScenarioError
 from pytest_garl.files.atomic import locked, write_text_atomically
 from pytest_garl.messages import printable
 from pytest_garl.regressions.case import Case
-from pytest_garl.regressions.case_file import CaseHeader, dump_case, load_case, load_header
+from pytest_garl.regressions.case_file import dump_case, load_case, load_header
+from pytest_garl.regressions.case_header import CaseHeader
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -97,15 +98,15 @@ class Corpus:
     ) -> dict[str, CorpusEntry]:
         """Return the signatures that open cases expect of a system on a map, with their files.
 
-        An unavoidable case says nothing about other violations with its signature.  ``accepted``
-        leaves out cases that are not accepted.
+        A case that nobody could prevent says nothing about other violations with its signature.
+        ``accepted`` leaves out cases that are not accepted.
         """
         return {
             entry.case.violation.signature: entry
             for entry in self.entries(system)
             if entry.case is not None
             and entry.case.scenario.map == map
-            and entry.case.status == "open"
+            and entry.case.expects_signature
             and (not accepted or self.is_accepted(entry))
         }
 
@@ -136,12 +137,12 @@ class Corpus:
     def _find(self, case: Case) -> CorpusEntry | None:
         """Return the file that expects the same failure: system, map, signature and test.
 
-        An unavoidable case expects no failure but its own.
+        A case that nobody could prevent expects no failure but its own.
         """
         for entry in self.entries(case.system):
             if entry.case is None or _failure(entry.case) != _failure(case):
                 continue
-            if entry.case.status == "open" or entry.name == case.id:
+            if entry.case.expects_signature or entry.name == case.id:
                 return entry
         return None
 

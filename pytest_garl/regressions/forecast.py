@@ -6,17 +6,13 @@ import dataclasses
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
-from pytest_garl.regressions.case_flights import PILOT_FLIGHTS
+from pytest_garl.regressions.case_flights import ESCAPE_FLIGHTS
 from pytest_garl.regressions.case_request import CaseRequest, CaseResult
 from pytest_garl.regressions.investigation import EXCEPTION_FLIGHTS, MINIMUM_CASE_FLIGHTS
 
 SPENT_SHARE = 0.85
 """Share of its flights that a kind of violation spends: many need fewer than they may have.  With
 it the forecast was 1.07 and 1.31 times the measured time (the tutorial's system, six kinds)."""
-USUAL_PILOT_FLIGHTS = 2
-"""Flights that the reference pilot usually flies for a kind of violation."""
-PILOT_TIME_SHARE = 0.2
-"""Time of a flight of the reference pilot, as a share of another's: it needs no camera."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -32,19 +28,15 @@ def flights_after_search(kinds: int, each: int, cap: int | None) -> float:
     """Return the flights that the new kinds of a search take, with those that confirm them."""
     if not kinds or not each:
         return 0.0
-    own = SPENT_SHARE * (each - PILOT_FLIGHTS)
-    least = SPENT_SHARE * (MINIMUM_CASE_FLIGHTS - PILOT_FLIGHTS)
+    own = SPENT_SHARE * each
     if cap is None or kinds * own <= cap:
-        return kinds * (1 + own + USUAL_PILOT_FLIGHTS)
-    reached = max(1, min(kinds, int(cap / least)))
-    return kinds + max(own, min(reached * own, cap)) + reached * USUAL_PILOT_FLIGHTS
+        return kinds * (1 + own)
+    return kinds + max(own, cap)
 
 
 def seconds_per_new_signature(each: int, flight_s: float, workers: int) -> float:
     """Return how long one of several new kinds of violation takes."""
-    own = SPENT_SHARE * (each - PILOT_FLIGHTS)
-    flights = 1 + own + USUAL_PILOT_FLIGHTS * PILOT_TIME_SHARE
-    return flights * flight_s / max(1, workers)
+    return (1 + SPENT_SHARE * each) * flight_s / max(1, workers)
 
 
 def remaining_work(
@@ -56,16 +48,16 @@ def remaining_work(
     divided = divide_flights(requests)
     for request in sorted(divided, key=lambda each: not each.budget):
         budget = request.budget
-        if not budget and left[request.search] >= MINIMUM_CASE_FLIGHTS - PILOT_FLIGHTS:
+        least = least_flights(request)
+        if not budget and left[request.search] >= least:
             # It gets the flights that others do not need.
-            budget = MINIMUM_CASE_FLIGHTS
+            budget = least
         if not budget:
             continue
-        own = 1.0 if request.is_exception else SPENT_SHARE * (budget - PILOT_FLIGHTS)
-        by_pilot = 0 if request.is_exception else USUAL_PILOT_FLIGHTS
+        own = 1.0 if request.is_exception else SPENT_SHARE * budget
         left[request.search] -= own
-        flights += own + by_pilot
-        each_s.append((own + by_pilot * PILOT_TIME_SHARE) * flight_s[request.name])
+        flights += own
+        each_s.append(own * flight_s[request.name])
     # Flights of one kind follow each other; those of several kinds are flown side by side.
     seconds = max([sum(each_s) / max(1, workers), *each_s], default=0.0)
     at_most = sum(each.budget for each in divided)
@@ -85,35 +77,35 @@ def divide_flights(
     for search in dict.fromkeys(each.search for each in requests):
         before = [each for name, each in (results or {}).items() if name.startswith(f"{search} ")]
         own = [each for each in requests if each.search == search]
-        # The reference pilot's flights take a fraction of the time and are not counted.
-        most = [
-            EXCEPTION_FLIGHTS if each.is_exception else each.budget - PILOT_FLIGHTS for each in own
-        ]
+        most = [EXCEPTION_FLIGHTS if each.is_exception else each.budget for each in own]
         given = most
         if own[0].cap is not None:
-            left = own[0].cap - sum(each.flights - each.pilot_flights for each in before)
-            given = _divide(most, max(left, 0 if before else most[0]))
+            left = own[0].cap - sum(each.flights for each in before)
+            least = [min(most, least_flights(each)) for most, each in zip(most, own, strict=True)]
+            given = _divide(least, most, max(left, 0 if before else most[0]))
         divided += [
-            dataclasses.replace(each, budget=_with_pilot(each, flights))
+            dataclasses.replace(each, budget=flights)
             for each, flights in zip(own, given, strict=True)
         ]
     return tuple(divided)
 
 
-def _with_pilot(request: CaseRequest, flights: int) -> int:
-    return flights if request.is_exception or not flights else flights + PILOT_FLIGHTS
+def least_flights(request: CaseRequest) -> int:
+    """Return the fewest flights that can confirm a violation of its kind."""
+    if request.is_exception:
+        return EXCEPTION_FLIGHTS
+    return MINIMUM_CASE_FLIGHTS - (0 if request.asks_prevention else ESCAPE_FLIGHTS)
 
 
-def _divide(most: Sequence[int], flights: int) -> list[int]:
-    """Return how many of ``flights`` each has, at most what it wants.
+def _divide(least: Sequence[int], most: Sequence[int], flights: int) -> list[int]:
+    """Return how many of ``flights`` each has, from its least to its most, or none.
 
     The rest is spread evenly if all have something.  If some have nothing, the rest is kept for
     them, together with the flights that the others do not spend.
     """
     given = []
-    for wanted in most:
-        least = min(wanted, MINIMUM_CASE_FLIGHTS - PILOT_FLIGHTS)
-        given.append(least if least <= flights else 0)
+    for needed in least:
+        given.append(needed if needed <= flights else 0)
         flights -= given[-1]
     if sum(map(bool, given)) == 1:
         # A single signature is shrunk as well as possible.

@@ -1,13 +1,12 @@
-"""From a violation to a case: confirm it, shrink it, make it robust, ask if it can be avoided."""
+"""From a violation to a case: confirm, shrink, make it robust, ask if it was preventable."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 
 from pytest_garl.execution.on_demand import FlyFunction
-from pytest_garl.regressions.avoidability import avoidability_without_pilot
 from pytest_garl.regressions.case import RecordedBehaviour
-from pytest_garl.regressions.case_flights import PILOT_FLIGHTS, CaseFlights, find_colliding_object
+from pytest_garl.regressions.case_flights import ESCAPE_FLIGHTS, CaseFlights, find_colliding_object
 from pytest_garl.regressions.case_request import CaseRequest, CaseResult, FailingScenario
 from pytest_garl.regressions.move_reduction import shorter_records
 from pytest_garl.regressions.new_case import new_case
@@ -22,9 +21,9 @@ from pytest_garl.regressions.simplification import (
 from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.simulation.flight_file import load
 
-MINIMUM_CASE_FLIGHTS = 2 + NEIGHBOURS + PILOT_FLIGHTS
+MINIMUM_CASE_FLIGHTS = 2 + NEIGHBOURS + ESCAPE_FLIGHTS
 """The fewest flights that can confirm a violation: one of the scenario without all that the failure
-should not need, one of the scenario as found, its neighbours, the reference pilot."""
+should not need, one of the scenario as found, its neighbours, those that confirm an escape."""
 EXCEPTION_FLIGHTS = 2
 """Flights for a Python exception or a hang, which hardly depends on the scenario: one of the
 scenario without objects and weather, one of the scenario as found."""
@@ -58,13 +57,8 @@ class CaseBuilder:
             best = self._most_robust(scenarios[:CANDIDATES], best)
         if best is None:
             return flights.result(None, NOT_REPRODUCED)
-        *others, simplest = self._shrink(best)
-        failing, avoidable = simplest, flights.avoidability(simplest)
-        # An unavoidable case gates nothing: prefer a longer record if it can be avoided.
-        for longer in others:
-            if avoidable == "no" and (found := flights.avoidability(longer)) != "no":
-                failing, avoidable = longer, found
-        return flights.result(new_case(request, failing, avoidable))
+        failing = self._shrink(best)[-1]
+        return flights.result(new_case(request, failing, flights.prevention(failing)))
 
     def _exception(self, first: Scenario) -> CaseResult:
         """Return the case of an exception or a hang: with an empty scenario if that fails too."""
@@ -77,9 +71,7 @@ class CaseBuilder:
                 failing = FailingScenario(
                     origin=first, scenario=scenario, behaviour=behaviour, flight=flight
                 )
-                return flights.result(
-                    new_case(request, failing, avoidability_without_pilot(behaviour))
-                )
+                return flights.result(new_case(request, failing))
         return flights.result(None, NOT_REPRODUCED)
 
     def _confirm_bare(self, first: Scenario) -> FailingScenario | None:

@@ -3,8 +3,14 @@
 from __future__ import annotations
 
 from pytest_garl.execution.reference import simulator_sha256
-from pytest_garl.regressions.avoidability import avoidability_without_pilot
-from pytest_garl.regressions.case import Avoidable, Case, Evidence, Violation
+from pytest_garl.regressions.case import (
+    NOT_ASKED,
+    Case,
+    Evidence,
+    NoGateReason,
+    Prevention,
+    Violation,
+)
 from pytest_garl.regressions.case_flights import recorded_behaviour
 from pytest_garl.regressions.case_request import CaseRequest, CaseResult, FailingScenario
 from pytest_garl.regressions.description import describe
@@ -27,11 +33,15 @@ def case_without_flights(request: CaseRequest) -> CaseResult:
         behaviour=recorded_behaviour(flight, scenario, request.map),
         flight=flight,
     )
-    case = new_case(request, failing, avoidability_without_pilot(failing.behaviour))
+    case = new_case(request, failing)
     return CaseResult(signature=request.signature, case=case, flights=0)
 
 
-def new_case(request: CaseRequest, failing: FailingScenario, avoidable: Avoidable) -> Case:
+def new_case(
+    request: CaseRequest,
+    failing: FailingScenario,
+    prevention: Prevention = NOT_ASKED,
+) -> Case:
     """Return the case of a failing scenario."""
     completed, job = failing.flight, request.job
     flight = load(completed.record) if completed.record.exists() else None
@@ -39,8 +49,10 @@ def new_case(request: CaseRequest, failing: FailingScenario, avoidable: Avoidabl
     failure = ask(completed, failing.scenario) if ask else None
     return Case(
         system=job.system.name,
-        status="unavoidable" if avoidable == "no" else "open",
-        avoidable=avoidable,
+        status="open",
+        reason=_reason(failing, prevention),
+        live=prevention.answer == "preventable" and job.npcs.reads_uav,
+        prevention=prevention,
         scenario=failing.scenario,
         violation=_violation(completed.result.verdict, flight, failure),
         policy=job.npcs.name,
@@ -62,6 +74,14 @@ def new_case(request: CaseRequest, failing: FailingScenario, avoidable: Avoidabl
         test=request.test or (failure.test if failure else ""),
         assertion=failure.assertion if failure else "",
     )
+
+
+def _reason(failing: FailingScenario, prevention: Prevention) -> NoGateReason:
+    """Return why the case gates nothing; empty if it gates."""
+    if failing.neighbours_failed < failing.neighbours_flown:
+        return "edge"
+    answer = prevention.answer
+    return answer if answer in ("sensor-limited", "unpreventable") else ""
 
 
 def _violation(verdict: Verdict, flight: Flight | None, failure: UserFailure | None) -> Violation:

@@ -28,6 +28,7 @@ from pytest_garl.verdicts.judge import judge
 
 ReplayResult = Literal["FIXED", "FAILED", "STALE", "UNDECIDED"]
 BUILT_IN_VERDICT = "the built-in verdict"
+GAVE_UP = "the landing system gave up"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -106,7 +107,11 @@ def _by_tests(
     elif failed:
         result = "FAILED"
         reasons = tuple(f"{each.nodeid.rpartition('.')[2]}: {each.message}" for each in failed)
-    elif finder.outcome == "skipped" and outcome != "gave_up":
+    elif excuse := properties.get("garl.excuse", ""):
+        result, reasons = "UNDECIDED", (_excused(excuse),)
+    elif outcome == "gave_up" and properties.get("garl.signature", ""):
+        result, reasons = "FAILED", (f"{GAVE_UP} although somebody could have landed",)
+    elif finder.outcome == "skipped":
         result, reasons = "UNDECIDED", (f"its test was skipped: {finder.message}",)
     elif stale := properties.get("garl.unproven", ""):
         result, reasons = "STALE", (stale,)
@@ -141,10 +146,16 @@ def _by_verdict(case: Case, folder: Path, map: Map, judged_by: str, live: bool) 
         simulator_sha256=simulator_sha256(BUILT_IN),
         map_sha256=map.sha256,
     )
-    reasons = () if verdict.violation else stale_reasons(case, sources, flight.sha256)
-    passed: ReplayResult = "STALE" if reasons else "FIXED"
+    reasons: tuple[str, ...] = ()
+    result: ReplayResult = "FIXED"
+    if verdict.violation:
+        result = "FAILED"
+    elif verdict.excuse:
+        result, reasons = "UNDECIDED", (_excused(verdict.excuse_text or verdict.excuse),)
+    elif reasons := stale_reasons(case, sources, flight.sha256):
+        result = "STALE"
     return Replay(
-        result="FAILED" if verdict.violation else passed,
+        result=result,
         outcome=flight.outcome,
         signature=verdict.signature,
         description=verdict.story,
@@ -154,6 +165,10 @@ def _by_verdict(case: Case, folder: Path, map: Map, judged_by: str, live: bool) 
         map=map,
         same_flight=_is_same(case, flight, live),
     )
+
+
+def _excused(excuse: str) -> str:
+    return f"nobody could have landed, so it proves no repair: {excuse}"
 
 
 def _is_same(case: Case, flight: Flight | None, live: bool) -> bool | None:

@@ -20,9 +20,9 @@ from pytest_garl.execution.reference import (
     simulator_sha256,
 )
 from pytest_garl.execution.sources import sources_sha256
-from pytest_garl.regressions.case import Avoidable, Case, RecordedBehaviour
+from pytest_garl.regressions.case import NOT_ASKED, Case, Prevention, RecordedBehaviour
 from pytest_garl.regressions.case_file import record_lines, size_of
-from pytest_garl.regressions.case_flights import PILOT_FLIGHTS, CaseFlights, find_colliding_object
+from pytest_garl.regressions.case_flights import ESCAPE_FLIGHTS, CaseFlights, find_colliding_object
 from pytest_garl.regressions.case_request import CaseRequest, CaseResult, FailingScenario
 from pytest_garl.regressions.investigation import simplest_robust, with_shorter_record
 from pytest_garl.regressions.new_case import new_case
@@ -34,9 +34,9 @@ from pytest_garl.regressions.user_failure import UserAssertion
 from pytest_garl.scenarios.maps.map import Map, load_map
 from pytest_garl.scenarios.scenario import Scenario
 
-MINIMUM_RESHRINK_FLIGHTS = 1 + 1 + 1 + NEIGHBOURS + PILOT_FLIGHTS
+MINIMUM_RESHRINK_FLIGHTS = 1 + 1 + 1 + NEIGHBOURS + ESCAPE_FLIGHTS
 """The fewest flights that can improve a case: one of the case as it is, one of a simpler scenario,
-one of that scenario with recorded moves, its neighbours, the reference pilot."""
+one of that scenario with recorded moves, its neighbours, those that confirm an escape."""
 NOT_REPRODUCED = "it does not fail in the same way any more with its recorded moves"
 NOTHING_SIMPLER = "nothing simpler was found"
 _REMOVED = re.compile(r"(\d+) of (\d+) objects, (\d+) of (\d+) genes off nominal")
@@ -114,7 +114,7 @@ class CaseReshrinker:
         if better is None:
             better = self._improved_case(saved, self._shrink_by_policy(saved))
         if better is None and self._is_outdated():
-            better = self._replacement(saved, case.avoidable)
+            better = self._replacement(saved, case.prevention)
         return flights.result(better, "" if better else NOTHING_SIMPLER)
 
     def _reproduce(self) -> FailingScenario | None:
@@ -190,10 +190,10 @@ class CaseReshrinker:
         flights = self._flights
         candidates = reversed(with_shorter_record(flights, simpler))
         for failing in (each for each in candidates if each is not saved):
-            case = self._replacement(failing, self._case.avoidable)
-            # The reference pilot flies only if the case is simpler in the other respects.
-            if self._improves(case) and flights.flown_by_pilot + 2 <= PILOT_FLIGHTS:
-                case = self._replacement(failing, flights.avoidability(failing))
+            case = self._replacement(failing, self._case.prevention)
+            # Escapes are looked for only if the case is simpler in the other respects, and once.
+            if self._improves(case) and not flights.asked_prevention:
+                case = self._replacement(failing, flights.prevention(failing))
                 if self._improves(case):
                     return case
         return None
@@ -201,13 +201,14 @@ class CaseReshrinker:
     def _improves(self, case: Case) -> bool:
         return is_simpler(case, self._case, self._flights.map, outdated=self._is_outdated())
 
-    def _replacement(self, failing: FailingScenario, avoidable: Avoidable) -> Case:
+    def _replacement(self, failing: FailingScenario, prevention: Prevention) -> Case:
         """Return a failure as the case that replaces the saved one."""
-        case, found = self._case, new_case(self._request, failing, avoidable)
+        case, found = self._case, new_case(self._request, failing, prevention)
         removed = _all_removed(case.evidence.removed, found.evidence.removed)
         return dataclasses.replace(
             found,
             status=case.status,
+            live=case.live if prevention == NOT_ASKED else found.live,
             accepted=case.accepted,
             policy=case.policy,
             policy_sha256=case.policy_sha256,
@@ -225,9 +226,6 @@ def _all_removed(before: str, after: str) -> str:
         f"{objects + int(second[1])} of {all_objects} objects, "
         f"{genes + int(second[3])} of {all_genes} genes off nominal"
     )
-
-
-_EXCUSED: dict[Avoidable, int] = {"live": 0, "recorded": 1, "no": 2}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -263,9 +261,16 @@ def simplicity(case: Case, map: Map, *, outdated: bool = False) -> Simplicity:
         runs=sum(len(list(itertools.groupby(own))) for _, own in case.moves),
         characters=sum(len(line) for line in record_lines(case)),
         doubtful_neighbours=max(NEIGHBOURS, evidence.neighbours) - evidence.neighbours_failed,
-        excused=_EXCUSED[case.avoidable],
+        excused=_excused(case),
         outdated=outdated,
     )
+
+
+def _excused(case: Case) -> int:
+    """Return how much less a case asks of a repair: of recorded moves only, or nothing."""
+    if case.prevention.answer in ("sensor-limited", "unpreventable"):
+        return 2
+    return 0 if case.live else 1
 
 
 def no_worse(one: Simplicity, other: Simplicity) -> bool:

@@ -156,6 +156,7 @@ def _cases(corpus: Corpus, systems: set[str]) -> list[dict[str, Any]]:
                 "map": case.scenario.map,
                 "signature": case.violation.signature,
                 "status": case.status,
+                "reason": case.reason,
                 "known": corpus.is_accepted(entry),
                 "story": case.violation.description,
             }

@@ -5,7 +5,7 @@ from __future__ import annotations
 import importlib
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Protocol
+from typing import TYPE_CHECKING, Any, Protocol
 
 from pytest_garl.errors import PolicyError
 from pytest_garl.scenarios.genes import ENVIRONMENT
@@ -136,16 +136,24 @@ class PolicySpec:
         """The hash of a learned policy's weights; empty for the others."""
         return str(dict(self.arguments).get("sha256", ""))
 
-    def make(self) -> NpcPolicy:
-        """Return a fresh policy for one NPC; raise PolicyError if it cannot be made."""
+    @property
+    def reads_uav(self) -> bool:
+        """Whether its NPCs may react to the UAV; a class says ``reads_uav = False`` if not."""
+        return bool(getattr(self._load(), "reads_uav", True))
+
+    def _load(self) -> Any:
         module, _, attribute = self.factory.partition(":")
         try:
-            factory = getattr(importlib.import_module(module), attribute)
+            return getattr(importlib.import_module(module), attribute)
         except (ImportError, AttributeError) as error:
             raise PolicyError(
                 f"NPC policy {self.name!r}: {self.factory!r} cannot be loaded ({error}); "
                 "expected 'module:attribute' of an importable module"
             ) from error
+
+    def make(self) -> NpcPolicy:
+        """Return a fresh policy for one NPC; raise PolicyError if it cannot be made."""
+        factory = self._load()
         try:
             policy: NpcPolicy = factory(**dict(self.arguments))
         except PolicyError:

@@ -46,7 +46,7 @@ def case_of_broken_lander() -> Case:
     return Case(
         system="stack_of_test:Lander",
         status="open",
-        avoidable="live",
+        live=True,
         scenario=scenario.replace({"environment.fog": 0.1}).without(*names[1:]),
         violation=Violation(
             signature="V:ZeroDivisionError@stack_of_test.step",

@@ -153,8 +153,10 @@ def test_promote_reports_an_abort_and_refuses_an_undecided_case(
     if outcome == "gave_up":
         replace_text(simulator, end, f"    outcome = 'gave_up'\n{end}")
         simulator_is_as_it_was(dog)
+        limits = f"system=Good, {ALLOWED}, "
+        replace_text(project / "test_it.py", "system=Good, ", limits)
         output = garl("promote", dog).output
-        assert "with its recorded moves the landing system gave up; it did not land" in output
+        assert "with its recorded moves the landing system gave up, which its limits" in output
         assert load_case(dog).status == "fixed"
     else:
         replace_text(project / "test_it.py", "not landing.collisions", "landing.time_to_landing_s")
@@ -164,6 +166,7 @@ def test_promote_reports_an_abort_and_refuses_an_undecided_case(
         assert load_case(dog).status == "open"
 
 
+ALLOWED = "limits={'abort': 'ok'}"
 CONTACT = (
     "(Contact(time_s=1.0, body='tree', kind='tree', body_class='static', "
     "position_m=(0.0, 0.0, 1.0), speed_mps=1.0, tilt_rad=0.0),)"

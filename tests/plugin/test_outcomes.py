@@ -34,15 +34,15 @@ def found(**facts: Any) -> FailedItem:
     return FailedItem(**{"signature": DOG} | facts)
 
 
-def failed(status: str = "open", *, edge: bool = False, accepted: bool = True, **facts: Any) -> Any:
+def failed(status: str = "open", *, reason: str = "", accepted: bool = True, **facts: Any) -> Any:
     """Return facts about a test that failed on a saved case."""
-    case = CaseState(signature=DOG, status=status, edge=edge, accepted=accepted)  # type: ignore[arg-type]
+    case = CaseState(signature=DOG, status=status, reason=reason, accepted=accepted)  # type: ignore[arg-type]
     return found(case=case, **facts)
 
 
-def passed(status: str = "open", *, edge: bool = False, **facts: Any) -> PassedCase:
+def passed(status: str = "open", *, reason: str = "", **facts: Any) -> PassedCase:
     """Return facts about a test that passed on a saved case."""
-    case = CaseState(signature=DOG, status=status, edge=edge)  # type: ignore[arg-type]
+    case = CaseState(signature=DOG, status=status, reason=reason)  # type: ignore[arg-type]
     rest: dict[str, Any] = {"violates": False} | facts
     return PassedCase(case=case, **rest)
 
@@ -86,16 +86,19 @@ def test_search_item_fails_once_per_repeating_violation(
         (failed(), "xfailed", Reason.KNOWN_CASE),
         (failed(accepted=False), "failed", Reason.NEW_CASE),
         (failed(signature=PERSON), "failed", Reason.FAILS_DIFFERENTLY),
-        (failed(edge=True), "xfailed", Reason.EDGE),
-        (failed(edge=True, signature=PERSON), "xfailed", Reason.EDGE),
-        (failed(edge=True, signature="V:ValueError", crashed=True), "failed", None),
+        (failed(reason="edge"), "xfailed", Reason.EDGE),
+        (failed(reason="edge", signature=PERSON), "xfailed", Reason.EDGE),
+        (failed(reason="edge", signature="V:ValueError", crashed=True), "failed", None),
         (failed("fixed"), "failed", Reason.FAILS_AGAIN),
         (failed("fixed", signature=PERSON), "failed", Reason.FAILS_AGAIN),
-        (failed("unavoidable"), "xfailed", Reason.UNAVOIDABLE_CASE),
-        (failed("unavoidable", signature=PERSON), "xfailed", Reason.UNAVOIDABLE_CASE),
-        (failed("unavoidable", accepted=False), "failed", Reason.NEW_CASE),
-        (failed("unavoidable", signature="V:ValueError", crashed=True), "failed", None),
-        (failed("unavoidable", signature=OWN, user_property=True), "failed", None),
+        (failed(reason="unpreventable"), "xfailed", Reason.NOT_PREVENTABLE_CASE),
+        (failed(reason="sensor-limited"), "xfailed", Reason.NOT_PREVENTABLE_CASE),
+        (failed(reason="unpreventable", signature=PERSON), "xfailed", Reason.NOT_PREVENTABLE_CASE),
+        (failed(reason="unpreventable", signature="I:nothing:seen"), "failed", None),
+        (failed(reason="sensor-limited", signature="II:never-seen"), "failed", None),
+        (failed(reason="unpreventable", accepted=False), "failed", Reason.NEW_CASE),
+        (failed(reason="unpreventable", signature="V:ValueError", crashed=True), "failed", None),
+        (failed(reason="unpreventable", signature=OWN, user_property=True), "failed", None),
         (failed(signature=OWN, user_property=True), "failed", Reason.FAILS_DIFFERENTLY),
         (
             failed(signature=OWN, user_property=True, expected_by="own.toml"),
@@ -122,13 +125,14 @@ def test_failing_case_is_expected_only_as_known(
         (passed(unproven=True), "passed", Reason.STALE),
         (passed(violates=True), "passed", Reason.PASSES),
         (passed("fixed"), "passed", Reason.PASSES),
-        (passed("unavoidable"), "passed", Reason.PASSES),
-        (passed(edge=True), "xfailed", Reason.EDGE),
+        (passed(reason="unpreventable"), "passed", Reason.PASSES),
+        (passed(reason="edge"), "xfailed", Reason.EDGE),
         (passed(strict=True, first=True), "failed", Reason.MAYBE_FIXED),
         (passed(strict=True, first=True, unproven=True), "failed", Reason.STALE),
         (passed(strict=True, first=False), "passed", Reason.MAYBE_FIXED),
         (passed("fixed", strict=True), "passed", Reason.PASSES),
-        (passed(edge=True, strict=True), "xfailed", Reason.EDGE),
+        (passed(reason="edge", strict=True), "xfailed", Reason.EDGE),
+        (passed(reason="sensor-limited", strict=True), "passed", Reason.PASSES),
     ],
 )
 def test_passing_case_fails_only_if_strict(facts: Facts, outcome: Outcome, reason: Reason) -> None:

@@ -163,33 +163,3 @@ def test_own_property_is_shrunk_and_saved_for_its_test(
     assert known.ret == 0
     replace_text(tests, "< 0.1,", "< 0.09,")
     assert run(pytester).ret == pytest.ExitCode.TESTS_FAILED
-
-
-def test_fixed_case_that_no_pilot_outruns_flies_with_recorded_moves_only(
-    pytester: pytest.Pytester,
-) -> None:
-    project(pytester)
-    simulator = pytester.path / "tiny_simulator.py"
-    replace_text(simulator, "    del npcs, time_limit_s\n", "")
-    hit = "> 0.7 and (not knows or npcs.name != 'recorded')"
-    replace_text(simulator, "> 0.7 and not knows", hit)
-    result = run(pytester, *SEARCH)
-    output = " ".join(result.stdout.str().split())
-    assert "the reference pilot violates nothing unless objects pursue it too" in output
-    fog, dog = cases(pytester)
-    assert (load_case(fog).avoidable, load_case(dog).avoidable) == ("live", "recorded")
-    assert load_case(dog).status == "open"
-    replace_text(dog, 'status = "open"', 'status = "fixed"')
-    replace_text(simulator, hit, "> 7")
-    replace_text(fog, 'status = "open"', 'status = "open"\naccepted = true')
-    run(pytester).assert_outcomes(passed=5, xfailed=1)
-
-
-def test_unavoidable_case_fails_no_run(pytester: pytest.Pytester) -> None:
-    project(pytester)
-    replace_text(pytester.path / "tiny_simulator.py", "is False", "is None")
-    result = run(pytester, *SEARCH)
-    result.stdout.fnmatch_lines(["*UNAVOIDABLE, gates nothing*"])
-    assert {load_case(path).status for path in cases(pytester)} == {"unavoidable"}
-    add_cases_to_git(pytester.path)
-    assert run(pytester).ret == 0

@@ -39,7 +39,7 @@ def case(
     return Case(
         system=SYSTEM,
         status="open",
-        avoidable="live",
+        live=True,
         scenario=scenario,
         violation=Violation(
             signature=signature,

@@ -10,11 +10,20 @@ from hypothesis import strategies as st
 
 from pytest_garl.errors import ScenarioError
 from pytest_garl.messages import printable
+from pytest_garl.regressions.case import (
+    NOT_ASKED,
+    Case,
+    NoGateReason,
+    Preventable,
+    Prevention,
+)
 from pytest_garl.regressions.case_file import dump_case, load_case, parse_case
+from pytest_garl.regressions.case_header import SCHEMA
 from pytest_garl.scenarios.chromosome import decode
 from pytest_garl.scenarios.genes import genome_for, with_destinations
 from pytest_garl.scenarios.maps.map import load_map
 from pytest_garl.scenarios.validity import repair
+from pytest_garl.verdicts.verdict import Limits
 from tests.regressions.samples import LAWN, OBJECT_NAMES, case, case_with_changes
 
 ROOT = Path(__file__).parents[2]
@@ -34,10 +43,49 @@ COMMITTED = [
 
 
 @pytest.mark.parametrize("path", COMMITTED, ids=lambda path: path.stem)
-def test_committed_case_keeps_its_bytes_and_its_name(path: Path) -> None:
-    committed = load_case(path)
-    assert dump_case(committed) == path.read_text(encoding="utf-8")
+def test_committed_case_is_read_and_keeps_its_name(path: Path) -> None:
+    committed, text = load_case(path), path.read_text(encoding="utf-8")
     assert committed.id == path.stem
+    assert parse_case(dump_case(committed), load_map) == committed
+    if f"schema = {SCHEMA}\n" in text:
+        assert dump_case(committed) == text
+
+
+def first_schema(status: str, avoidable: str, neighbours_failed: int = 3) -> Case:
+    """Read a case as version 0.1 wrote it."""
+    text = dump_case(dataclasses.replace(case(), live=False))
+    old = text.replace("schema = 2", "schema = 1").replace('abort = "needless"', 'abort = "ok"')
+    old = old.replace('status = "open"', f'status = "{status}"\navoidable = "{avoidable}"')
+    old = old.replace("neighbours_failed = 3", f"neighbours_failed = {neighbours_failed}")
+    return parse_case(old, load_map)
+
+
+def test_words_of_the_first_schema_are_read() -> None:
+    live, recorded = first_schema("open", "live"), first_schema("fixed", "recorded")
+    assert (live.status, live.live, live.gates) == ("open", True, True)
+    assert (recorded.status, recorded.live, recorded.gates) == ("fixed", False, True)
+    unavoidable = first_schema("unavoidable", "no")
+    assert (unavoidable.status, unavoidable.gates) == ("open", False)
+    assert (unavoidable.reason, unavoidable.live) == ("unpreventable", False)
+    assert first_schema("open", "live", neighbours_failed=2).reason == "edge"
+    assert {each.prevention for each in (live, recorded, unavoidable)} == {NOT_ASKED}
+
+
+def test_allowed_abort_of_the_first_schema_is_read_as_the_default_of_today() -> None:
+    assert first_schema("open", "live").limits.abort == "needless"
+    chosen = dataclasses.replace(case(), limits=Limits(abort="ok"))
+    assert parse_case(dump_case(chosen), load_map).limits.abort == "ok"
+
+
+@pytest.mark.parametrize("answer", ["preventable", "sensor-limited", "unpreventable"])
+@pytest.mark.parametrize("observed_s", [None, 2.4])
+def test_file_keeps_what_was_preventable(answer: Preventable, observed_s: float | None) -> None:
+    reason: NoGateReason = "" if answer == "preventable" else answer  # type: ignore[assignment]
+    found = Prevention(answer=answer, inevitable_s=0.5, observed_s=observed_s)
+    judged = dataclasses.replace(case(), prevention=found, reason=reason)
+    text = dump_case(judged)
+    assert parse_case(text, load_map) == judged
+    assert ("gates = false" in text) is bool(reason)
 
 
 @settings(deadline=None)
@@ -97,6 +145,11 @@ def test_file_keeps_the_test_and_the_hashes_of_the_sources() -> None:
         ("0.6, -0.8", "0.9, -0.8", "at most 1"),
         ("0.6, -0.8", "nan, -0.8", "at most 1"),
         ('status = "open"', 'status = "known"', "'status': found 'known'"),
+        ('status = "open"', 'status = "unavoidable"', "'status': found 'unavoidable'"),
+        ('status = "open"', 'status = "open"\navoidable = "live"', "'avoidable': unknown key"),
+        ('status = "open"', 'status = "open"\nreason = "edge"', "beside 'gates = false'"),
+        ('status = "open"', 'status = "open"\ngates = false', "'reason'"),
+        ("schema = 2", "schema = 3", "expected 1 or 2"),
         ("[policy]", "[polices]", "'polices': unknown key"),
         ("neighbours = 3", "neighbours = -3", "'evidence.neighbours'"),
         ("time_s = 120.0", "time_s = -1.0", "'limits.time_s'"),

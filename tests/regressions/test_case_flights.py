@@ -1,7 +1,9 @@
 from __future__ import annotations
 
+import dataclasses
+
 from pytest_garl.regressions.case import RecordedBehaviour
-from pytest_garl.regressions.case_flights import PILOT_FLIGHTS, CaseFlights
+from pytest_garl.regressions.case_flights import ESCAPE_FLIGHTS, CaseFlights
 from pytest_garl.regressions.robustness import NEIGHBOURS, neighbours
 from tests.regressions.samples import (
     LAWN,
@@ -14,18 +16,21 @@ from tests.regressions.samples import (
 BEHAVIOUR = RecordedBehaviour(moves=((OBJECT_NAMES[0], ((0.5, 0.0),)),))
 
 
-def test_flights_of_the_reference_pilot_are_reserved() -> None:
+def test_flights_that_confirm_an_escape_are_kept() -> None:
     flights = CaseFlights(make_case_request(20, VIOLATING_SCENARIO), FakeFlights(lambda *_: True))
-    assert flights.left == 20 - PILOT_FLIGHTS
+    assert flights.left == 20 - ESCAPE_FLIGHTS
     flights.fly_live(VIOLATING_SCENARIO)
-    assert flights.left == 19 - PILOT_FLIGHTS
+    assert flights.left == 19 - ESCAPE_FLIGHTS
     failing = flights.confirm(VIOLATING_SCENARIO, VIOLATING_SCENARIO, BEHAVIOUR)
     assert failing is not None
-    assert flights.left == 18 - NEIGHBOURS - PILOT_FLIGHTS
-    flights.avoidability(failing)
-    assert flights.left == 18 - NEIGHBOURS - PILOT_FLIGHTS
+    assert flights.left == 18 - NEIGHBOURS - ESCAPE_FLIGHTS
     result = flights.result(None, "reason")
-    assert (result.flights, result.pilot_flights) == (2 + NEIGHBOURS + 2, 2)
+    assert result.flights == 2 + NEIGHBOURS
+
+
+def test_no_flight_is_kept_for_a_violation_that_is_no_collision_with_a_moving_body() -> None:
+    request = dataclasses.replace(make_case_request(20, VIOLATING_SCENARIO), signature="off:seen")
+    assert CaseFlights(request, FakeFlights(lambda *_: True)).left == 20
 
 
 def test_confirm_counts_the_neighbours_that_fail() -> None:

@@ -11,7 +11,7 @@ import pytest
 
 from pytest_garl.errors import CorpusError
 from pytest_garl.files import reading
-from pytest_garl.regressions.case import Status
+from pytest_garl.regressions.case import NoGateReason, Status
 from pytest_garl.regressions.case_file import dump_case, load_case
 from pytest_garl.regressions.corpus import Corpus, patch_of, read_acceptance, replace_file
 from pytest_garl.scenarios.maps import map as package
@@ -86,10 +86,15 @@ def test_open_case_expects_its_signature_on_its_map(tmp_path: Path) -> None:
     assert [*Corpus(tmp_path).expected_signatures(SYSTEM, "lawn", accepted=True)] == [signature]
 
 
-@pytest.mark.parametrize("status", ["fixed", "unavoidable"])
-def test_fixed_and_unavoidable_cases_expect_no_signature(tmp_path: Path, status: Status) -> None:
+@pytest.mark.parametrize(
+    ("status", "reason"),
+    [("fixed", ""), ("open", "sensor-limited"), ("open", "unpreventable")],
+)
+def test_fixed_and_unpreventable_cases_expect_no_signature(
+    tmp_path: Path, status: Status, reason: NoGateReason
+) -> None:
     corpus = Corpus(tmp_path)
-    corpus.save(dataclasses.replace(case(), status=status))
+    corpus.save(dataclasses.replace(case(), status=status, reason=reason))
     assert corpus.expected_signatures(SYSTEM, "lawn") == {}
 
 

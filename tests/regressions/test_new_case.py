@@ -2,8 +2,16 @@ from __future__ import annotations
 
 import dataclasses
 
+import pytest
+
+from pytest_garl.adversary.catalogue import policy_spec
 from pytest_garl.execution.flight_id import CompletedFlight
-from pytest_garl.regressions.case import RecordedBehaviour
+from pytest_garl.regressions.case import (
+    NOT_ASKED,
+    Preventable,
+    Prevention,
+    RecordedBehaviour,
+)
 from pytest_garl.regressions.case_request import FailingScenario
 from pytest_garl.regressions.new_case import case_without_flights, new_case
 from pytest_garl.regressions.user_failure import UserFailure
@@ -29,19 +37,38 @@ FAILING = FailingScenario(
 
 
 def test_case_holds_scenario_moves_and_evidence() -> None:
-    made = new_case(REQUEST, FAILING, "live")
+    made = new_case(REQUEST, FAILING)
     assert (made.scenario, made.moves) == (SIMPLE, FAILING.behaviour.moves)
-    assert (made.status, made.avoidable) == ("open", "live")
+    assert (made.status, made.live, made.prevention) == ("open", False, NOT_ASKED)
     assert made.violation.signature == SIGNATURE
     assert (made.evidence.neighbours_failed, made.evidence.neighbours) == (2, 3)
     assert made.evidence.removed.startswith(
         f"{len(OBJECT_NAMES) - 1} of {len(OBJECT_NAMES)} objects, "
     )
-    assert made.edge
+    assert (made.edge, made.gates, made.reason) == (True, False, "edge")
 
 
-def test_case_that_the_pilot_cannot_avoid_is_unavoidable() -> None:
-    assert new_case(REQUEST, FAILING, "no").status == "unavoidable"
+@pytest.mark.parametrize(
+    ("answer", "reason"),
+    [
+        ("preventable", ""),
+        ("sensor-limited", "sensor-limited"),
+        ("unpreventable", "unpreventable"),
+    ],
+)
+def test_case_gates_only_what_was_preventable(answer: Preventable, reason: str) -> None:
+    robust = dataclasses.replace(FAILING, neighbours_failed=3)
+    found = Prevention(answer=answer, inevitable_s=1.0)
+    made = new_case(REQUEST, robust, found)
+    assert (made.reason, made.prevention) == (reason, found)
+    assert new_case(REQUEST, FAILING, found).reason == "edge"
+
+
+def test_case_is_live_if_its_escape_holds_against_a_policy_that_reads_the_uav() -> None:
+    found = Prevention(answer="preventable", inevitable_s=1.0)
+    assert not new_case(REQUEST, FAILING, found).live
+    chased = dataclasses.replace(REQUEST.job, npcs=policy_spec("dqn"))
+    assert new_case(dataclasses.replace(REQUEST, job=chased), FAILING, found).live
 
 
 def test_case_of_an_own_assertion_describes_its_failure() -> None:
@@ -52,7 +79,7 @@ def test_case_of_an_own_assertion_describes_its_failure() -> None:
     def assertion(flight: CompletedFlight, scenario: Scenario) -> UserFailure:
         return failure
 
-    made = new_case(dataclasses.replace(REQUEST, user_assertion=assertion), FAILING, "live")
+    made = new_case(dataclasses.replace(REQUEST, user_assertion=assertion), FAILING)
     assert (made.violation.type, made.violation.signature) == ("own", "own:test_own:1234")
     assert made.violation.description.startswith("test_own: too late. ")
     assert (made.test, made.assertion) == ("test_own", "1234")

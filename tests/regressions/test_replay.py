@@ -10,7 +10,14 @@ import pytest
 from pytest_garl.execution.flight_id import CompletedFlight
 from pytest_garl.regressions.case import Case
 from pytest_garl.regressions.case_flights import recorded_behaviour
-from pytest_garl.regressions.replay import SourceHashes, replay, stale_reasons
+from pytest_garl.regressions.case_test_run import CaseTestResult
+from pytest_garl.regressions.replay import (
+    Replay,
+    SourceHashes,
+    _by_tests,
+    replay,
+    stale_reasons,
+)
 from pytest_garl.simulation.flight_file import save
 from pytest_garl.simulation.fly import fly
 from pytest_garl.simulation.system_under_test.reference_pilot import ReferencePilot
@@ -84,3 +91,24 @@ def test_case_without_a_hash_of_the_simulator_compares_versions() -> None:
     old = dataclasses.replace(PLAIN, evidence=evidence)
     (reason,) = stale_reasons(old, SourceHashes.of(evidence), "another flight")
     assert reason.startswith("pytest-garl was 0.0.1 and is ")
+
+
+def replayed(outcome: str, excuse: str = "", signature: str = "") -> Replay:
+    """Return the replay of a case whose test passed in a flight that was judged as given."""
+    properties = {"garl.outcome": outcome, "garl.excuse": excuse, "garl.signature": signature}
+    passed = CaseTestResult(nodeid="t.test", outcome="passed", message="", properties=properties)
+    return _by_tests(CASE, LAWN, (passed,), passed, Path("none"), live=False)
+
+
+@pytest.mark.parametrize("outcome", ["gave_up", "not_landed"])
+def test_excused_flight_proves_no_repair(outcome: str) -> None:
+    excused = replayed(outcome, excuse="readable for 0.4 s.")
+    assert excused.result == "UNDECIDED"
+    assert excused.reasons == (
+        "nobody could have landed, so it proves no repair: readable for 0.4 s.",
+    )
+
+
+def test_needless_giving_up_is_no_repair() -> None:
+    assert replayed("gave_up", signature="II:gave-up-in-sight:search").result == "FAILED"
+    assert replayed("gave_up").result == "FIXED"

@@ -154,7 +154,7 @@ def test_case_with_fewer_runs_is_simpler() -> None:
 
 
 def test_case_that_is_worse_in_one_respect_is_not_simpler() -> None:
-    shorter = dataclasses.replace(SAVED, moves=((OBJECT_NAMES[-1], ((0.0, 0.0),)),), avoidable="no")
+    shorter = dataclasses.replace(SAVED, moves=((OBJECT_NAMES[-1], ((0.0, 0.0),)),), live=False)
     assert not no_worse(simplicity(shorter, LAWN), simplicity(SAVED, LAWN))
     assert not is_simpler(shorter, SAVED, LAWN, outdated=False)
 

@@ -17,6 +17,8 @@ class Destination:
     the NPC turns back.
     """
 
+    reads_uav = False
+
     def reset(self, situation: Situation, rng: np.random.Generator) -> None:
         """Look the destination up; raise PolicyError if the scenario has none."""
         name = situation.self.name

@@ -16,6 +16,8 @@ class Greedy:
     A baseline for learned policies: it causes most of the violations that they cause.
     """
 
+    reads_uav = False
+
     def reset(self, situation: Situation, rng: np.random.Generator) -> None:
         """Start towards the marker."""
         self._move = towards(situation.marker_position_m, situation)

@@ -10,6 +10,8 @@ from pytest_garl.simulation.npc_policy import Move, Situation
 class RandomWalk:
     """Takes one of the paper's five actions at random at every decision."""
 
+    reads_uav = False
+
     _MOVES = ((0.0, 1.0), (0.0, -1.0), (-1.0, 0.0), (1.0, 0.0), (0.0, 0.0))
 
     def reset(self, situation: Situation, rng: np.random.Generator) -> None:

@@ -13,6 +13,8 @@ from pytest_garl.simulation.npc_policy import DECISION_STEP_S, Move, Situation
 class Stand:
     """Walks to the marker and stands on it."""
 
+    reads_uav = False
+
     def reset(self, situation: Situation, rng: np.random.Generator) -> None:
         """Do nothing."""
 

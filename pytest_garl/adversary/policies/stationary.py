@@ -10,6 +10,8 @@ from pytest_garl.simulation.npc_policy import STAY, Move, Situation
 class Stationary:
     """Stays where it starts."""
 
+    reads_uav = False
+
     def reset(self, situation: Situation, rng: np.random.Generator) -> None:
         """Do nothing."""
 

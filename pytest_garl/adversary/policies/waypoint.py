@@ -15,6 +15,8 @@ class Waypoint:
     generated randomly within the specified map range".
     """
 
+    reads_uav = False
+
     def reset(self, situation: Situation, rng: np.random.Generator) -> None:
         """Draw the first destination."""
         self._rng = rng
