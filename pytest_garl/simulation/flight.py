@@ -89,13 +89,19 @@ class Event:
 class MarkerView:
     """How a picture shows the marker, from ground truth: what decides whether it can be read.
 
-    ``share_in_frame`` is the share (0..1) of the marker that lies inside the picture,
-    ``px_per_module`` the side of one module (bit) in pixels, the shorter of both axes.
-    ``border_hidden`` and ``bits_hidden`` are the shares of the black border and of the inner bits
-    that objects, leaves or snow cover.  ``contrast`` is the difference between white and black
-    modules in grey levels (0..255) as the sensor delivers them, after fog, dust, shadow and
-    exposure; ``noise`` the standard deviation of a pixel in grey levels; ``blur_px`` the length
-    of the motion blur.
+    It is computed from the scene; no picture is painted for it.  ``share_in_frame`` is the share
+    (0..1) of the marker that lies inside the picture, ``edge_modules`` the distance from the marker
+    to the nearest edge of the picture in modules (bits), at most 1, negative where the edge cuts
+    it, and ``px_per_module`` the side of a module in pixels along the shorter axis.
+    ``border_hidden``, ``bits_hidden`` and ``margin_hidden`` are the shares of the black border, of
+    the inner bits and of the white margin that objects, leaves or snow turn into the other colour:
+    black under snow counts in full, white under snow does not count.  ``contrast`` is the
+    difference between white and black modules in grey levels (0..255) as the sensor delivers them,
+    after wetness, shadow, gloss, fog, dust and exposure; ``uneven_light`` the standard deviation of
+    the light over the marker as a share of full light, so that the edge of a shadow counts;
+    ``clutter`` the share of the picture that falling rain, snow and leaves are expected to cover
+    between camera and marker; ``noise`` the standard deviation of a channel of a pixel in grey
+    levels; ``blur_px`` the length of the motion blur, 0 for the simulator's own camera.
     """
 
     share_in_frame: float
@@ -105,6 +111,10 @@ class MarkerView:
     contrast: float
     noise: float
     blur_px: float
+    margin_hidden: float = 0.0
+    uneven_light: float = 0.0
+    clutter: float = 0.0
+    edge_modules: float = 1.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

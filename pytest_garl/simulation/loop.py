@@ -33,11 +33,11 @@ from pytest_garl.simulation.physics.vehicle import (
 )
 from pytest_garl.simulation.physics.world import PHYSICS_RATE_HZ, World
 from pytest_garl.simulation.randomness import generator
-from pytest_garl.simulation.recorder import Recorder
+from pytest_garl.simulation.recorder import Recorder, Sight
 from pytest_garl.simulation.system_under_test.calls import StepGuard, SystemFailedError
 from pytest_garl.simulation.system_under_test.ground_truth import Truth, TruthObject
 from pytest_garl.simulation.system_under_test.mission import mission_for
-from pytest_garl.simulation.system_under_test.observation import observe
+from pytest_garl.simulation.system_under_test.observation import estimation_error_m, observe
 from pytest_garl.simulation.system_under_test.system import SystemUnderTest
 
 NO_THRUST: Thrusts = (0.0, 0.0, 0.0, 0.0)
@@ -216,7 +216,7 @@ class Loop:
             visible = self.recorder.sight(frame, self._renderer, eye, attitude)
         else:
             camera = airframe.camera
-            frame, visible = blank_frame(camera.height_px, camera.width_px), (0.0, 0.0, ())
+            frame, visible = blank_frame(camera.height_px, camera.width_px), Sight()
         if self._system.gave_up:
             # The recorded view explains a collision during the climb.
             self.recorder.step(Abort(), visible)
@@ -230,7 +230,7 @@ class Loop:
             rng=self._pose_rng,
         )
         command = self._system.step(observation)
-        self.recorder.step(command, visible)
+        self.recorder.step(command, visible, estimation_error_m(observation, position))
         self._pending.append((tick + round(airframe.latency_s * PHYSICS_RATE_HZ), command))
 
     def _take(self, command: Command) -> None:

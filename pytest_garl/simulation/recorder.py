@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -18,6 +19,7 @@ from pytest_garl.simulation.flight import (
     Crash,
     Event,
     Flight,
+    MarkerView,
     ObjectRecord,
     Outcome,
     Separation,
@@ -28,7 +30,17 @@ from pytest_garl.simulation.physics.npc import Npc
 
 Vector = tuple[float, float, float]
 Quaternion = tuple[float, float, float, float]
-Sight = tuple[float, float, tuple[str, ...]]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Sight:
+    """What a frame shows: the fields of ``Step`` of the same names."""
+
+    marker_visible: float = 0.0
+    marker_px: float = 0.0
+    marker: MarkerView | None = None
+    objects_visible: tuple[str, ...] = ()
+    objects_px: tuple[int, ...] = ()
 
 
 class Recorder:
@@ -104,30 +116,40 @@ class Recorder:
         self._events.append(Event(time_s=self.time_s, name=name, text=text))
 
     def sight(self, frame: Frame, renderer: Renderer, eye: Vector, attitude: Quaternion) -> Sight:
-        """Return the visible share and the side of the marker, and the names of visible objects."""
+        """Return what a frame shows of the marker and of the objects."""
         ids = renderer.segment_ids
         area = renderer.marker_area_px(eye, attitude)
-        share = min(1.0, float(frame.pixels[ids["marker"]]) / area) if area >= 1 else 0.0
-        height = max(0.1, eye[2])
-        side = renderer.marker_side_px(height)
-        seen = tuple(item.name for item in self._objects if frame.pixels[ids[item.name]])
-        return share, side, seen
+        names = [item.name for item in self._objects if frame.pixels[ids[item.name]]]
+        return Sight(
+            marker_visible=min(1.0, float(frame.pixels[ids["marker"]]) / area)
+            if area >= 1
+            else 0.0,
+            marker_px=renderer.marker_side_px(max(0.1, eye[2])),
+            marker=frame.marker,
+            objects_visible=tuple(names),
+            objects_px=tuple(int(frame.pixels[ids[name]]) for name in names),
+        )
 
-    def step(self, command: Command, sight: Sight) -> None:
-        """Record one command of the landing system, with what its frame shows."""
+    def step(self, command: Command, sight: Sight, error_m: Vector = (0.0, 0.0, 0.0)) -> None:
+        """Record one command of the landing system, with what its frame shows.
+
+        ``error_m`` is the error of the position that the system was told.
+        """
         diagnostics = command.diagnostics
         if diagnostics and diagnostics.phase != self._phase:
             self._phase = diagnostics.phase
             self.event("phase", diagnostics.phase)
-        share, side, seen = sight
         self._steps.append(
             Step(
                 time_s=self.time_s,
                 command=type(command).__name__,
-                marker_visible=share,
-                marker_px=side,
-                objects_visible=seen,
+                marker_visible=sight.marker_visible,
+                marker_px=sight.marker_px,
+                objects_visible=sight.objects_visible,
                 diagnostics=diagnostics,
+                marker=sight.marker,
+                objects_px=sight.objects_px,
+                estimation_error_m=error_m,
             )
         )
 

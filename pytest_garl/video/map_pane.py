@@ -16,6 +16,7 @@ from pytest_garl.scenarios.object_types import OBJECT_TYPES
 from pytest_garl.scenarios.placement import MARKER_SIDE_M
 from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.simulation.camera.ground import paint_ground
+from pytest_garl.simulation.camera.ground_cover import cover_shift
 from pytest_garl.simulation.camera.meshes import mesh_of, placed_hulls
 from pytest_garl.simulation.camera.projection import View
 from pytest_garl.simulation.camera.weather import conditions_of
@@ -83,8 +84,8 @@ class MapPane:
 
     def _ground(self, scenario: Scenario) -> drawing.Image:
         """Return the ground as it was painted for the flight, mixed with white."""
-        rng = generator(scenario.seed, "sensor")
-        wide = paint_ground(scenario, self._map, conditions_of(scenario), rng).wide
+        shift = cover_shift(generator(scenario.seed, "sensor"))
+        wide = paint_ground(scenario, self._map, conditions_of(scenario), shift).wide
         coarseness = round(math.log2(max(1.0, 1 / self._scale / wide.m_per_px)))
         level = min(coarseness, len(wide.levels) - 1)
         world_of_pane = np.array(

@@ -26,14 +26,19 @@ LEVEL = (0.0, 0.0, 0.0, 1.0)
 
 
 def renderer(
-    name: str = "lawn", seed: int = 0, camera: Camera = CAMERA, genes: Mapping[str, float] = NONE
+    name: str = "lawn",
+    seed: int = 0,
+    camera: Camera = CAMERA,
+    genes: Mapping[str, float] = NONE,
+    *,
+    colour: bool = True,
 ) -> tuple[Renderer, Any]:
     map = dataclasses.replace(load_map(name), objects=(("person", 1), ("dog", 1), ("bird", 1)))
     genome = genome_for(map, weather="full")
     scenario = decode(genome.nominal, genome, map=name, seed=seed)
     scenario = repair(scenario, map)
     scenario = scenario.replace({f"environment.{key}": value for key, value in genes.items()})
-    return Renderer(scenario, map, camera, np.random.default_rng(seed)), map
+    return Renderer(scenario, map, camera, np.random.default_rng(seed), colour=colour), map
 
 
 def poses(x: float, y: float) -> list[tuple[tuple[float, float, float], float]]:

@@ -15,8 +15,11 @@ Image = NDArray[np.uint8]
 Bounds = tuple[float, float, float, float]
 """A rectangle of ground in metres: x_min, x_max, y_min, y_max."""
 
-_MARKER_CELLS = 7
+MARKER_CELLS = 7
 """A DICT_5X5 marker has five data cells and a black border of one on each side."""
+WHITE_LEVEL, BLACK_LEVEL = 238.0, 24.0
+"""Grey levels of printed white and black in full light: albedos of 0.93 and 0.09, engineering
+estimate of a print on matt foil."""
 _SHIFT = 4
 """Fractional bits of the coordinates that OpenCV draws at."""
 
@@ -52,7 +55,7 @@ class Canvas:
     ) -> None:
         """Draw a marker on a white board with a margin of one cell; its top is north at yaw 0."""
         bits = marker_bits(marker_id)
-        cell = side_m / _MARKER_CELLS
+        cell = side_m / MARKER_CELLS
         cos, sin = math.cos(yaw_rad), math.sin(yaw_rad)
         rotation = np.array([[cos, -sin], [sin, cos]])
 
@@ -62,19 +65,19 @@ class Canvas:
             return world
 
         board = side_m + 2 * cell
-        self.polygon(square(-board / 2, board / 2, board), (238, 238, 238))
-        self.polygon(square(-side_m / 2, side_m / 2, side_m), (24, 24, 24))
-        for row in range(_MARKER_CELLS):
-            for column in range(_MARKER_CELLS):
+        self.polygon(square(-board / 2, board / 2, board), (WHITE_LEVEL,) * 3)
+        self.polygon(square(-side_m / 2, side_m / 2, side_m), (BLACK_LEVEL,) * 3)
+        for row in range(MARKER_CELLS):
+            for column in range(MARKER_CELLS):
                 if bits[row, column]:
                     x, y = -side_m / 2 + column * cell, side_m / 2 - row * cell
-                    self.polygon(square(x, y, cell), (238, 238, 238))
+                    self.polygon(square(x, y, cell), (WHITE_LEVEL,) * 3)
 
 
 @functools.cache
 def marker_bits(marker_id: int) -> NDArray[np.bool_]:
     """Return the cells (7, 7) of a DICT_5X5_50 marker; True is white."""
     dictionary = cv2.aruco.getPredefinedDictionary(cv2.aruco.DICT_5X5_50)
-    image = cv2.aruco.generateImageMarker(dictionary, marker_id, _MARKER_CELLS, borderBits=1)
+    image = cv2.aruco.generateImageMarker(dictionary, marker_id, MARKER_CELLS, borderBits=1)
     bits: NDArray[np.bool_] = np.asarray(image) > 127
     return bits

@@ -8,26 +8,30 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
+from pytest_garl.simulation.flight import MarkerView
+
 
 class Frame:
     """One picture: RGB uint8 (H, W, 3), planar depth float32 (H, W), segmentation int32 (H, W).
 
     A ray that meets nothing has depth 100 and segment -1.  ``pixels`` is the
     number of pixels of each segment; it does not count the ground, segment 0.  ``image`` is
-    painted on first access, and does not depend on the time of that access.
+    painted on first access, and does not depend on the time of that access.  ``marker`` says how
+    the frame shows the marker, None where it does not; it needs no picture.
     """
 
-    __slots__ = ("_image", "_paint", "depth_m", "pixels", "segmentation")
+    __slots__ = ("_image", "_marker", "_paint", "depth_m", "pixels", "segmentation")
 
     def __init__(
         self,
         *,
         paint: Callable[[], NDArray[np.uint8]],
+        marker: Callable[[], MarkerView | None],
         depth_m: NDArray[np.float32],
         segmentation: NDArray[np.int32],
         pixels: NDArray[np.intp],
     ) -> None:
-        self._paint = paint
+        self._paint, self._marker = paint, marker
         self._image: NDArray[np.uint8] | None = None
         self.depth_m = depth_m
         self.segmentation = segmentation
@@ -40,6 +44,11 @@ class Frame:
             self._image = self._paint()
         return self._image
 
+    @property
+    def marker(self) -> MarkerView | None:
+        """How the frame shows the marker, computed at each access."""
+        return self._marker()
+
 
 @functools.cache
 def blank_frame(height_px: int, width_px: int) -> Frame:
@@ -47,6 +56,7 @@ def blank_frame(height_px: int, width_px: int) -> Frame:
     shape = height_px, width_px
     return Frame(
         paint=lambda: np.zeros((*shape, 3), np.uint8),
+        marker=lambda: None,
         depth_m=np.zeros(shape, np.float32),
         segmentation=np.zeros(shape, np.int32),
         pixels=np.zeros(2, np.intp),

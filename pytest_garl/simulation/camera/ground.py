@@ -14,7 +14,7 @@ from pytest_garl.scenarios.placement import MARKER_SIDE_M, TARGET_MARKER_ID, mar
 from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.simulation.camera import map_texture
 from pytest_garl.simulation.camera.canvas import Bounds, Canvas, Image
-from pytest_garl.simulation.camera.ground_cover import TILE_M, cover
+from pytest_garl.simulation.camera.ground_cover import cover
 from pytest_garl.simulation.camera.map_texture import RESOLUTION_M
 from pytest_garl.simulation.camera.meshes import mesh_of, placed_hulls
 from pytest_garl.simulation.camera.weather import WET_ALBEDO_LOSS, Conditions
@@ -83,11 +83,13 @@ def paint_ground(
     scenario: Scenario,
     map: Map,
     conditions: Conditions,
-    rng: np.random.Generator,
+    shift: NDArray[np.float64],
     marker_id: int = TARGET_MARKER_ID,
 ) -> PaintedGround:
-    """Paint the ground of one flight in full light; exposure comes later."""
-    shift = rng.uniform(0, TILE_M, 2)
+    """Paint the ground of one flight in full light; exposure comes later.
+
+    ``shift`` is where the pattern of fallen leaves and snow begins, as of ``cover_shift``.
+    """
     marker = marker_position_m(scenario, map)
     return _lit(_painted(marker, map, conditions, shift, marker_id), map, conditions, shift)
 
@@ -149,7 +151,7 @@ def _lit(
     shift: NDArray[np.float64],
 ) -> PaintedGround:
     wide, inset = (
-        _raster(_light(canvas, map, conditions), canvas.bounds_m, canvas.m_per_px)
+        _raster(shadowed(canvas, map, conditions), canvas.bounds_m, canvas.m_per_px)
         for canvas in unlit
     )
     return PaintedGround(wide=wide, inset=inset, cover_shift_m=shift, unlit=unlit)
@@ -164,7 +166,7 @@ def _raster(image: Image, bounds_m: Bounds, resolution: float) -> Raster:
     return Raster(levels=tuple(levels), m_per_px=resolution, x_min=bounds_m[0], y_max=bounds_m[3])
 
 
-def _light(canvas: Canvas, map: Map, conditions: Conditions) -> Image:
+def shadowed(canvas: Canvas, map: Map, conditions: Conditions) -> Image:
     """Return the piece, darker where the static bodies keep the sun from it."""
     if conditions.direct_share <= 0.01 or conditions.sun[2] <= 0.02:
         return canvas.image

@@ -67,6 +67,11 @@ def _ranks(values: NDArray[np.float32]) -> NDArray[np.float32]:
     return share.reshape(values.shape).astype(np.float32)
 
 
+def cover_shift(rng: np.random.Generator) -> NDArray[np.float64]:
+    """Draw where the pattern begins in the world, shape (2,): the first draw for a camera."""
+    return rng.uniform(0, TILE_M, 2)
+
+
 def cover(
     image: Image,
     bounds_m: Bounds,

@@ -45,6 +45,13 @@ def _flakes_per_m3(rate_mmph: float) -> float:
 _LOBES = np.linspace(0, 2 * math.pi, 10, endpoint=False)
 _LOBE_REACH = np.where(np.arange(10) % 2 == 0, 1.0, 0.55)
 """A leaf's outline: five lobes, as angles and shares of the radius."""
+_LEAF_AREA = 5 * 0.55 * math.sin(math.pi / 5) * 2 / math.pi
+"""Area of a leaf's outline for a radius of 1: ten triangles between lobes and notches, seen from a
+random side."""
+_STREAKS = ((1, 0.3, 1.5), (2, 1.5, 3.0), (4, 3.0, 5.5), (7, 5.5, 1e9))
+"""Thickness in pixels with which streaks are drawn, by their width in pixels (from, below)."""
+_DEPTHS_M = np.arange(0.15, 8.05, 0.05)
+"""Depths at which the expected cover is tabulated: from the nearest drawn to the end of a box."""
 
 
 class Particles:
@@ -71,6 +78,35 @@ class Particles:
             if count:
                 chosen = places[:count].astype(np.float32)
                 self._clouds.append((kind, chosen, angles[:count], np.array(box), speed, size))
+
+        self._expected = self._expected_cover()
+
+    def expected_cover(self, depth_m: float) -> float:
+        """Return the share of the picture that is expected to be covered nearer than a depth."""
+        return float(np.interp(depth_m, _DEPTHS_M, self._expected))
+
+    def _expected_cover(self) -> NDArray[np.float64]:
+        """Return the expected cover at each of ``_DEPTHS_M``: 1 - exp(-sum of areas per pixel)."""
+        focal, near = self._camera.focal_px, _DEPTHS_M
+        areas = np.zeros_like(near)
+        for kind, places, _, box, speed, size in self._clouds:
+            width_px = focal * size / near
+            if kind == "leaf":
+                # Drawn outlines are half a pixel wider all around.
+                area = _LEAF_AREA * (width_px / 2 + 0.5) ** 2
+            else:
+                steps = [(width_px >= low) & (width_px < high) for _, low, high in _STREAKS]
+                thickness = np.select(steps, [float(each) for each, _, _ in _STREAKS])
+                # A streak falls along the optical axis: as long as its distance from the
+                # picture's middle, here half of the height's half, times its share of the depth.
+                length = self._camera.height_px / 4 * speed * _EXPOSURE_S / near
+                # Smoothed lines are a pixel wider; only thick ones are drawn with round ends.
+                wide = np.where(thickness > 0, thickness + 1, 0.0)
+                area = wide * length + np.where(thickness > 1, math.pi / 4 * wide**2, 0.0)
+            per_m = len(places) / float(np.prod(box)) * (near / focal) ** 2
+            areas += np.where(near <= box[2], per_m * area, 0.0)
+        expected: NDArray[np.float64] = 1 - np.exp(-np.cumsum(areas) * (near[1] - near[0]))
+        return expected
 
     def draw(
         self,
@@ -117,7 +153,7 @@ class Particles:
         kind: str,
     ) -> None:
         colour = (214, 220, 226) if kind == "rain" else (240, 244, 250)
-        for thickness, low, high in ((1, 0.3, 1.5), (2, 1.5, 3.0), (4, 3.0, 5.5), (7, 5.5, 1e9)):
+        for thickness, low, high in _STREAKS:
             chosen = lines[(width_px >= low) & (width_px < high)]
             if len(chosen):
                 points = np.round(chosen * 16).astype(np.int32)

@@ -18,8 +18,11 @@ from pytest_garl.scenarios.maps.map import Map
 from pytest_garl.scenarios.placement import MARKER_SIDE_M, TARGET_MARKER_ID, marker_position_m
 from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.simulation.camera.frame import Frame
+from pytest_garl.simulation.camera.gloss import add_gloss, gloss_of
 from pytest_garl.simulation.camera.ground import PaintedGround, Raster, paint_ground, repaint
-from pytest_garl.simulation.camera.ground_cover import covered
+from pytest_garl.simulation.camera.ground_cover import cover_shift, covered
+from pytest_garl.simulation.camera.marker_patch import paint_patch
+from pytest_garl.simulation.camera.marker_sight import MarkerSight
 from pytest_garl.simulation.camera.particles import Particles
 from pytest_garl.simulation.camera.projection import FAR_M, View
 from pytest_garl.simulation.camera.sensor import Sensor
@@ -31,14 +34,12 @@ from pytest_garl.simulation.camera.solids import (
     draw_shadows,
 )
 from pytest_garl.simulation.camera.weather import Conditions, conditions_of
+from pytest_garl.simulation.flight import MarkerView
 
 Vector = tuple[float, float, float]
 Quaternion = tuple[float, float, float, float]
 Array = NDArray[np.float32]
 _SHIFT = 4
-_SPECULAR_RADIUS = 0.10
-"""Half-width, as a tangent, of the sun's smeared reflection on a wet rough ground:
-engineering estimate."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -51,6 +52,7 @@ class _Look:
     decay: Array
     air: NDArray[np.uint8]
     veil: NDArray[np.uint8]
+    sight: MarkerSight
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -66,6 +68,7 @@ class _Scene:
     layers: Sequence[PaintedSolid]
     ground: PaintedGround | None
     look: _Look
+    segmentation: NDArray[np.int32]
 
 
 class Renderer:
@@ -94,7 +97,10 @@ class Renderer:
         names = ["ground", "marker", *(body.name for body in map.bodies)]
         names += [name for name, _ in map.present_objects]
         self.segment_ids: Mapping[str, int] = {name: index for index, name in enumerate(names)}
-        self._ground = paint_ground(scenario, map, conditions, rng, marker_id) if colour else None
+        self._shift = cover_shift(rng)
+        self._ground: PaintedGround | None = None
+        if colour:
+            self._ground = paint_ground(scenario, map, conditions, self._shift, marker_id)
         width, height = camera.width_px, camera.height_px
         (cx, cy), focal = camera.centre_px, camera.focal_px
         self._columns = np.arange(width, dtype=np.float32)
@@ -129,10 +135,14 @@ class Renderer:
         self._solids = Solids(self._map, conditions, self.segment_ids)
         airlight = np.array(conditions.airlight)
         veil = (1 - np.arange(256) / 255)[:, None] * airlight
+        sensor = Sensor(self.camera, conditions, rng)
+        particles = Particles(self.camera, conditions, rng)
+        patch = paint_patch(self.marker_m, self._map, conditions, self._shift, self._marker_id)
         self._look = _Look(
             conditions=conditions,
-            sensor=Sensor(self.camera, conditions, rng),
-            particles=Particles(self.camera, conditions, rng),
+            sensor=sensor,
+            particles=particles,
+            sight=MarkerSight(self.camera, patch, self._marker_id, conditions, sensor, particles),
             decay=(-conditions.extinction_per_m * self._stretch).astype(np.float32),
             air=airlight.astype(np.uint8),
             veil=np.round(veil).astype(np.uint8).reshape(1, 256, 3),
@@ -146,7 +156,7 @@ class Renderer:
         ``objects`` are the (position, yaw) of the dynamic objects in the map's order.
         """
         view = View.of(self.camera, position_m, attitude)
-        depth, horizon = self._ground_depth(view)
+        depth, horizon = _ground_depth(view, self._columns, self._rows)
         segmentation = np.zeros(depth.shape, np.int32)
         if horizon:
             segmentation[depth >= FAR_M] = -1
@@ -167,16 +177,28 @@ class Renderer:
             layers=layers,
             ground=self._ground,
             look=self._look,
+            segmentation=segmentation,
         )
-        paint = functools.partial(self._paint, scene)
-        return Frame(paint=paint, depth_m=depth, segmentation=segmentation, pixels=pixels)
+        return Frame(
+            paint=functools.partial(self._paint, scene),
+            marker=functools.partial(self._marker_view, scene),
+            depth_m=depth,
+            segmentation=segmentation,
+            pixels=pixels,
+        )
+
+    def _marker_view(self, scene: _Scene) -> MarkerView | None:
+        gloss = gloss_of(scene.view, scene.look.conditions, self.camera.focal_px)
+        return scene.look.sight.view(
+            scene.view, scene.segmentation, scene.layers, scene.shadows, gloss
+        )
 
     def _paint(self, scene: _Scene) -> NDArray[np.uint8]:
         """Paint from the ground up, whatever the renderer has drawn since."""
         view, look = scene.view, scene.look
         image = self._ground_image(scene)
         draw_shadows(image, view, scene.shadows, look.conditions)
-        _add_gloss(image, view, look.conditions, self.camera.focal_px)
+        add_gloss(image, view, gloss_of(view, look.conditions, self.camera.focal_px))
         if scene.sky is not None:
             image[scene.sky] = look.air
         for layer in scene.layers:
@@ -194,7 +216,7 @@ class Renderer:
 
     def covered(self, places_m: NDArray[np.float64]) -> NDArray[np.bool_]:
         """Whether places (n, 2) on the ground lie under leaves or snow, shape (n,)."""
-        return covered(places_m, _painted(self._ground).cover_shift_m, self.conditions)
+        return covered(places_m, self._shift, self.conditions)
 
     def marker_area_px(self, position_m: Vector, attitude: Quaternion) -> float:
         """Projected area of the marker, clipped to the frame, with nothing in front."""
@@ -212,24 +234,6 @@ class Renderer:
     def marker_side_px(self, height_m: float) -> float:
         """Side in pixels of the marker seen from straight above."""
         return self.camera.focal_px * MARKER_SIDE_M / height_m
-
-    def _ground_depth(self, view: View) -> tuple[Array, bool]:
-        """Return the ground's planar depth, and whether some ray misses the ground."""
-        across, down, level = view.ground_of_pixel[2].astype(np.float32)
-        slope = np.add(across * self._columns, down * self._rows + level)
-        up = float(view.eye[2])
-        highest = float(max(slope[0, 0], slope[0, -1], slope[-1, 0], slope[-1, -1]))
-        horizon = highest > -up / FAR_M
-        if not horizon:
-            return np.divide(np.float32(-up), slope, out=slope), False
-        # Exactly the far plane: beyond it by a rounding the rasteriser writes no depth, and short
-        # of it the sky would be ground.
-        sky = slope >= np.float32(-up / FAR_M)
-        slope[sky] = -up / FAR_M
-        depth: Array = np.divide(np.float32(-up), slope, out=slope)
-        np.minimum(depth, np.float32(FAR_M), out=depth)
-        depth[sky] = FAR_M
-        return depth, True
 
     def _ground_image(self, scene: _Scene) -> NDArray[np.uint8]:
         view, ground, footprint = scene.view, _painted(scene.ground), scene.footprint_m
@@ -264,33 +268,29 @@ class Renderer:
         return view.box(polygon)
 
 
+def _ground_depth(view: View, columns: Array, rows: Array) -> tuple[Array, bool]:
+    """Return the ground's planar depth, and whether some ray misses the ground."""
+    across, down, level = view.ground_of_pixel[2].astype(np.float32)
+    slope = np.add(across * columns, down * rows + level)
+    up = float(view.eye[2])
+    highest = float(max(slope[0, 0], slope[0, -1], slope[-1, 0], slope[-1, -1]))
+    horizon = highest > -up / FAR_M
+    if not horizon:
+        return np.divide(np.float32(-up), slope, out=slope), False
+    # Exactly the far plane: beyond it by a rounding the rasteriser writes no depth, and short
+    # of it the sky would be ground.
+    sky = slope >= np.float32(-up / FAR_M)
+    slope[sky] = -up / FAR_M
+    depth: Array = np.divide(np.float32(-up), slope, out=slope)
+    np.minimum(depth, np.float32(FAR_M), out=depth)
+    depth[sky] = FAR_M
+    return depth, True
+
+
 def _painted(ground: PaintedGround | None) -> PaintedGround:
     if ground is None:
         raise GarlError("this renderer was made with colour=False; it has no ground to show")
     return ground
-
-
-def _add_gloss(
-    image: NDArray[np.uint8], view: View, conditions: Conditions, focal_px: float
-) -> None:
-    """Add the sun's reflection on wet ground, where the mirrored ray meets the sun."""
-    strength = 230.0 * conditions.wetness * conditions.direct_share
-    x, y, z = conditions.sun
-    mirrored = view.axes @ np.array([x, y, -z])
-    if strength < 1 or mirrored[2] < 0.3:
-        return
-    centre = view.pixels(mirrored[None])
-    sigma = _SPECULAR_RADIUS * focal_px / float(mirrored[2])
-    # Beyond 3.3 sigma 230 levels are less than one.
-    rows, columns = view.box(np.concatenate([centre - 3.3 * sigma, centre + 3.3 * sigma]))
-    part = image[rows, columns]
-    if part.size == 0:
-        return
-    u, v = centre[0]
-    across = np.exp(-(((np.arange(columns.start, columns.stop) - u) / sigma) ** 2) / 2)
-    down = np.exp(-(((np.arange(rows.start, rows.stop) - v) / sigma) ** 2) / 2)
-    glow = (strength * np.outer(down, across)).astype(np.uint8)
-    cv2.add(part, cv2.cvtColor(glow, cv2.COLOR_GRAY2RGB), part)
 
 
 def _fog(image: NDArray[np.uint8], depth: Array, look: _Look) -> None:

@@ -24,12 +24,17 @@ _SPARE = 64
 
 
 class Sensor:
-    """Turns a picture in full light into what the sensor delivers."""
+    """Turns a picture in full light into what the sensor delivers.
+
+    ``exposure`` is the factor by which a picture in full light gets darker, at most 1, and
+    ``noise_levels`` the standard deviation of each channel of a pixel.
+    """
 
     def __init__(self, camera: Camera, conditions: Conditions, rng: np.random.Generator) -> None:
         need = FULL_LIGHT_LUX / conditions.illuminance_lux
         gain = min(MAX_GAIN, max(1.0, need / MAX_EXPOSURE_STEPS))
-        exposure = min(1.0, MAX_EXPOSURE_STEPS * MAX_GAIN / need)
+        self.exposure = exposure = min(1.0, MAX_EXPOSURE_STEPS * MAX_GAIN / need)
+        self.noise_levels = NOISE_LEVELS * gain**0.5
         # The sun is warm near the horizon: blue is scattered out of its light.
         low = max(0.0, min(1.0, 1.0 - conditions.sun[2] / 0.5))
         tint = (1.0, 1.0 - 0.08 * low, 1.0 - 0.22 * low)

@@ -52,6 +52,8 @@ class _Solid:
     """Outlines of the parts' shadows relative to the body's position, concatenated."""
     corner_counts: list[int] = field(default_factory=list)
     """Number of corners of each outline."""
+    shadow_reach_m: float = 0.0
+    """How far the shadow reaches from below the body's position."""
 
     def move_to(self, pose: BodyPose, conditions: Conditions) -> None:
         position_m, yaw = pose
@@ -60,12 +62,13 @@ class _Solid:
             return
         self.yaw_rad, self.rotation = yaw, yaw_matrix(yaw)
         self.shaded_colours = {}
-        if _sun_shines(conditions):
+        if sun_shines(conditions):
             hulls = placed_hulls(self.meshes[0], (0.0, 0.0, 0.0), yaw)
             flat = (shadow_of(hull, conditions.sun) for hull in hulls)
             outlines = [cv2.convexHull(s).reshape(-1, 2) for s in flat]
             self.shadow_outlines = np.concatenate(outlines).astype(np.float64)
             self.corner_counts = [len(outline) for outline in outlines]
+            self.shadow_reach_m = float(np.hypot(*self.shadow_outlines.T).max())
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -85,12 +88,21 @@ class PaintedSolid:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Shadow:
-    """A dynamic object's shadow: outlines (n, 2) relative to ``position_m``, concatenated."""
+    """A dynamic object's shadow: outlines (n, 2) relative to ``position_m``, concatenated.
+
+    No corner of an outline is farther than ``reach_m`` from there.
+    """
 
     position_m: tuple[float, float, float]
     outlines: NDArray[np.float64]
     corner_counts: tuple[int, ...]
     radius_m: float
+    reach_m: float
+
+    def place_m(self, sun: tuple[float, float, float]) -> tuple[float, float]:
+        """Return the place on the ground to which the outlines are relative."""
+        x, y, z = self.position_m
+        return x - sun[0] / sun[2] * z, y - sun[1] / sun[2] * z
 
 
 class Solids:
@@ -126,6 +138,7 @@ class Solids:
                 outlines=solid.shadow_outlines,
                 corner_counts=tuple(solid.corner_counts),
                 radius_m=solid.meshes[0].radius_m,
+                reach_m=solid.shadow_reach_m,
             )
             for solid in self._moving
         )
@@ -219,15 +232,14 @@ def draw_shadows(
     image: NDArray[np.uint8], view: View, shadows: Sequence[Shadow], conditions: Conditions
 ) -> None:
     """Darken the ground in the shadows of the dynamic objects."""
-    if not _sun_shines(conditions):
+    if not sun_shines(conditions):
         return
     sun = conditions.sun
     reach = 3 * max(2.0, float(view.eye[2]))
     outlines: list[NDArray[np.float64]] = []
     lengths: list[int] = []
     for shadow in shadows:
-        x = shadow.position_m[0] - sun[0] / sun[2] * shadow.position_m[2]
-        y = shadow.position_m[1] - sun[1] / sun[2] * shadow.position_m[2]
+        x, y = shadow.place_m(sun)
         if math.hypot(x - view.eye[0], y - view.eye[1]) < reach + shadow.radius_m:
             outlines.append(shadow.outlines + np.array([x, y]))
             lengths += shadow.corner_counts
@@ -248,7 +260,8 @@ def draw_shadows(
     cv2.copyTo(cv2.convertScaleAbs(part, alpha=1 - share), mask, part)
 
 
-def _sun_shines(conditions: Conditions) -> bool:
+def sun_shines(conditions: Conditions) -> bool:
+    """Whether things cast shadows."""
     return conditions.direct_share > 0.01 and conditions.sun[2] > 0.02
 
 

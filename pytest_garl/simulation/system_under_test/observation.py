@@ -61,6 +61,12 @@ def observe(
     return observation
 
 
+def estimation_error_m(observation: Observation, position_m: Vector) -> Vector:
+    """Return the difference between the position that a system is told and the true one."""
+    x, y, z = (float(value) for value in observation.position_m - np.array(position_m))
+    return x, y, z
+
+
 def _frozen(array: Array) -> Array:
     array.flags.writeable = False
     # A view of what is read-only cannot be made writeable again, as its owner could.

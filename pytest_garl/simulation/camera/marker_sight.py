@@ -1,0 +1,206 @@
+"""How a camera frame shows the marker, computed from geometry and conditions without a picture."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from pytest_garl.landing_system import Camera
+from pytest_garl.simulation.camera.gloss import Gloss
+from pytest_garl.simulation.camera.marker_patch import (
+    BOARD_MODULES,
+    GREY,
+    MODULE_M,
+    PROBES,
+    PROBES_PER_MODULE,
+    MarkerPatch,
+    modules,
+)
+from pytest_garl.simulation.camera.particles import Particles
+from pytest_garl.simulation.camera.projection import NEAR_M, View
+from pytest_garl.simulation.camera.sensor import Sensor
+from pytest_garl.simulation.camera.solids import PaintedSolid, Shadow, sun_shines
+from pytest_garl.simulation.camera.weather import Conditions
+from pytest_garl.simulation.flight import MarkerView
+
+Array = NDArray[np.float32]
+_SHIFT = 4
+_LEAST_SEEN = 4
+"""So many places of white and of black must be seen for a contrast."""
+_EDGE = 0.1
+"""The painted edges of modules are a pixel wide and turn so much of the places beside them."""
+_ROUND = 4
+"""Decimals that are recorded."""
+
+
+class MarkerSight:
+    """Tells how frames under one environment show the marker; see ``MarkerView``."""
+
+    def __init__(
+        self,
+        camera: Camera,
+        patch: MarkerPatch,
+        marker_id: int,
+        conditions: Conditions,
+        sensor: Sensor,
+        particles: Particles,
+    ) -> None:
+        self._camera, self._patch, self._conditions = camera, patch, conditions
+        self._sensor, self._particles = sensor, particles
+        ones = np.ones((PROBES_PER_MODULE, PROBES_PER_MODULE), np.bool_)
+        self._white = np.kron(modules(marker_id), ones).ravel()
+        row, column = np.divmod(np.arange(PROBES**2), PROBES)
+        ring = np.minimum(
+            np.minimum(row, PROBES - 1 - row), np.minimum(column, PROBES - 1 - column)
+        )
+        ring //= PROBES_PER_MODULE
+        self._margin, self._border, self._bits = ring == 0, ring == 1, ring >= 2
+        self._on_marker = ~self._margin
+        half = MODULE_M * (BOARD_MODULES / 2 - 1)
+        x, y = patch.places_m.mean(axis=0)
+        self._middle_m = np.array([x, y])
+        signs = np.array([[-half, half], [half, half], [half, -half], [-half, -half]])
+        # The four corners of the marker, then the places: projected together.
+        self._points_m = np.concatenate([signs + self._middle_m, patch.places_m])
+        self._airlight = float(np.array(conditions.airlight) @ GREY)
+        self._errors = self._error(patch.albedo * patch.light, patch.light)
+
+    def view(
+        self,
+        view: View,
+        segmentation: NDArray[np.int32],
+        layers: Sequence[PaintedSolid],
+        shadows: Sequence[Shadow],
+        gloss: Gloss | None,
+    ) -> MarkerView | None:
+        """Return how a frame shows the marker, or None where none of it is in the frame."""
+        seen = self._points_m @ view.axes[:, :2].T - view.axes @ view.eye
+        if seen[:4, 2].min() <= NEAR_M:
+            return None
+        pixels = view.pixels(seen)
+        corners, pixels, depth = pixels[:4], pixels[4:], seen[4:, 2]
+        column, row = np.rint(pixels).astype(np.intp).T
+        height, width = segmentation.shape
+        inside = (column >= 0) & (column < width) & (row >= 0) & (row < height)
+        framed = np.count_nonzero(inside & self._on_marker) / np.count_nonzero(self._on_marker)
+        if not framed:
+            return None
+        light = self._light(shadows)
+        grey = self._patch.albedo * light
+        errors = self._errors if light is self._patch.light else self._error(grey, light)
+        hidden = np.zeros(len(grey), np.bool_)
+        hidden[inside] = segmentation[row[inside], column[inside]] > 1
+        if hidden.any():
+            grey = _behind(grey, np.flatnonzero(hidden), row, column, layers)
+            errors = self._error(grey, light)
+        return MarkerView(
+            share_in_frame=round(float(framed), _ROUND),
+            edge_modules=round(self._edge_modules(corners), _ROUND),
+            px_per_module=round(_px_per_module(corners), _ROUND),
+            border_hidden=_mean(errors, inside & self._border),
+            bits_hidden=_mean(errors, inside & self._bits),
+            margin_hidden=_mean(errors, inside & self._margin),
+            contrast=self._contrast(grey, pixels, view, depth, inside & (errors < 0.5), gloss),
+            uneven_light=round(float(light[inside].std()), _ROUND),
+            clutter=round(self._particles.expected_cover(float(depth.mean())), _ROUND),
+            noise=round(self._sensor.noise_levels, _ROUND),
+            blur_px=0.0,
+        )
+
+    def _error(self, grey: Array, light: Array) -> Array:
+        """Return how far each place is turned into the other colour, from 0 to 1."""
+        black, white = self._patch.black_level * light, self._patch.white_level * light
+        whiteness = np.clip((grey - black) / (white - black), 0, 1)
+        error = np.where(self._white, 1 - whiteness, whiteness)
+        return np.clip((error - _EDGE) / (1 - 2 * _EDGE), 0, 1)
+
+    def _light(self, shadows: Sequence[Shadow]) -> Array:
+        """Return the share of full light at each place, with the shadows of the objects."""
+        light, conditions = self._patch.light, self._conditions
+        if not sun_shines(conditions):
+            return light
+        half = MODULE_M * BOARD_MODULES / 2
+        mask: NDArray[np.uint8] | None = None
+        for shadow in shadows:
+            place = np.array(shadow.place_m(conditions.sun)) - self._middle_m
+            if math.hypot(*place) > shadow.reach_m + math.sqrt(2) * half:
+                continue
+            if mask is None:
+                mask = np.zeros((PROBES, PROBES), np.uint8)
+            corners = (shadow.outlines + place) * (1.0, -1.0) * (PROBES / 2 / half)
+            fixed = np.round((corners + (PROBES / 2 - 0.5)) * 2**_SHIFT).astype(np.int32)
+            start = 0
+            for count in shadow.corner_counts:
+                cv2.fillConvexPoly(mask, fixed[start : start + count], (1.0,), cv2.LINE_8, _SHIFT)
+                start += count
+        if mask is None or not mask.any():
+            return light
+        return np.where(mask.ravel() > 0, light * np.float32(1 - conditions.direct_share), light)
+
+    def _contrast(
+        self,
+        grey: Array,
+        pixels: Array,
+        view: View,
+        depth: NDArray[np.float64],
+        seen: NDArray[np.bool_],
+        gloss: Gloss | None,
+    ) -> float:
+        """Return the difference between white and black of the places that show their colour."""
+        white, black = seen & self._white, seen & ~self._white
+        if min(np.count_nonzero(white), np.count_nonzero(black)) < _LEAST_SEEN:
+            return 0.0
+        if gloss:
+            away = ((pixels - gloss.centre_px) ** 2).sum(axis=1)
+            grey = np.minimum(grey + gloss.strength * np.exp(-away / 2 / gloss.sigma_px**2), 255)
+        if self._conditions.extinction_per_m > 0:
+            (cx, cy), focal = self._camera.centre_px, self._camera.focal_px
+            stretch = np.sqrt(1 + ((pixels - (cx, cy)) ** 2).sum(axis=1) / focal**2)
+            through = np.exp(-self._conditions.extinction_per_m * depth * stretch)
+            grey = grey * through + self._airlight * (1 - through)
+        difference = float(grey[white].mean() - grey[black].mean())
+        return round(max(0.0, difference * self._sensor.exposure), _ROUND)
+
+    def _edge_modules(self, corners: Array) -> float:
+        """Return the distance of the nearest corner from the picture's edge, at most a module."""
+        low = float(corners.min()) + 0.5
+        right = self._camera.width_px - 0.5 - float(corners[:, 0].max())
+        bottom = self._camera.height_px - 0.5 - float(corners[:, 1].max())
+        return min(1.0, min(low, right, bottom) / max(_px_per_module(corners), 1e-3))
+
+
+def _px_per_module(corners: Array) -> float:
+    """Return the smaller singular value of the map from the ground to pixels, for a module."""
+    side = MODULE_M * (BOARD_MODULES - 2)
+    nw, ne, se, sw = corners.astype(np.float64) / side * MODULE_M
+    (a, c), (b, d) = ((ne + se) - (nw + sw)) / 2, ((nw + ne) - (sw + se)) / 2
+    total, determinant = a * a + b * b + c * c + d * d, a * d - b * c
+    root = math.sqrt(max(0.0, total * total - 4 * determinant * determinant))
+    return math.sqrt(max(0.0, (total - root) / 2))
+
+
+def _behind(
+    grey: Array,
+    hidden: NDArray[np.intp],
+    row: NDArray[np.intp],
+    column: NDArray[np.intp],
+    layers: Sequence[PaintedSolid],
+) -> Array:
+    """Return the grey of places with that of what hides them; later layers are nearer."""
+    grey = grey.copy()
+    for layer in layers:
+        rows, columns = row[hidden] - layer.rows.start, column[hidden] - layer.columns.start
+        height, width = layer.covered.shape
+        within = (rows >= 0) & (rows < height) & (columns >= 0) & (columns < width)
+        rows, columns, places = rows[within], columns[within], hidden[within]
+        drawn = layer.covered[rows, columns]
+        grey[places[drawn]] = layer.drawn[rows[drawn], columns[drawn]] @ GREY
+    return grey
+
+
+def _mean(errors: Array, chosen: NDArray[np.bool_]) -> float:
+    return round(float(errors[chosen].mean()), _ROUND) if chosen.any() else 1.0
