@@ -24,6 +24,7 @@ from pytest_garl.adversary.catalogue import policy_spec
 from pytest_garl.adversary.training.uav_models import AvoidingPilot
 from pytest_garl.execution.flight import judged
 from pytest_garl.execution.result import FlightResult
+from pytest_garl.experiments.measure import limits_text
 from pytest_garl.landing_system import Abort, Command, Observation
 from pytest_garl.scenarios.chromosome import encode
 from pytest_garl.scenarios.genes import genome_for
@@ -34,8 +35,8 @@ from pytest_garl.search.method import FlownScenario, Method, SearchPlan
 from pytest_garl.search.methods.garl import Garl, GarlParameters
 from pytest_garl.simulation.fly import fly
 from pytest_garl.verdicts.paper_metrics import mean_distance, top_k
-from pytest_garl.verdicts.verdict import PAPER_LIMITS
-from studies.table import Key, ResultTable, Row, run_study
+from pytest_garl.verdicts.verdict import DEFAULT_LIMITS
+from studies.table import Key, ResultTable, Row, definitions, run_study
 
 MAPS = ("court", "lawn")
 BUDGET, POPULATION = 400, 20
@@ -43,7 +44,20 @@ PATIENCE_S = 60.0
 """The pilot gives up after this time: twice as long as MM-MLS takes to land."""
 TABLE = ResultTable(
     file=Path("docs/ablations.csv"),
-    columns=("variant", "seed", "map", "budget", "violations", "top10", "signatures", "distance"),
+    columns=(
+        "variant",
+        "seed",
+        "map",
+        "budget",
+        "violations",
+        "top10",
+        "signatures",
+        "distance",
+        "limits",
+        "landed",
+        "paper",
+        "kinds",
+    ),
     key=("variant", "seed", "map"),
 )
 
@@ -95,7 +109,7 @@ class Pilot(AvoidingPilot):
 
 def fly_one(scenario: Scenario, policy: str) -> FlightResult:
     """Return the result of one flight."""
-    return judged(fly(scenario, Pilot, policy_spec(policy)), PAPER_LIMITS)
+    return judged(fly(scenario, Pilot, policy_spec(policy)), DEFAULT_LIMITS)
 
 
 def search(key: Key, pool: Executor) -> dict[str, Any]:
@@ -118,37 +132,48 @@ def search(key: Key, pool: Executor) -> dict[str, Any]:
         "seed": seed,
         "map": map_name,
         "budget": BUDGET,
-        "violations": sum(verdict.paper_violation for verdict in verdicts),
-        "top10": top_k(verdicts) or "",
-        "signatures": len({each.signature for each in verdicts if each.paper_violation}),
+        "violations": sum(verdict.violation for verdict in verdicts),
+        "top10": top_k(verdicts, by_the_paper=False) or "",
+        "signatures": len({each.signature for each in verdicts if each.violation}),
         "distance": f"{mean_distance(np.array(chromosomes)):.3f}",
+        "limits": limits_text(DEFAULT_LIMITS),
+        "landed": sum(verdict.completed for verdict in verdicts),
+        "paper": sum(verdict.paper_violation for verdict in verdicts),
+        "kinds": len({each.kind for each in verdicts if each.violation}),
     }
 
 
 def report(rows: list[Row]) -> str:
     """Return a Markdown table of means over searches; flights of one search are no sample."""
     lines = [
-        "| variant | searches | violations, % | Top-10 | signatures | distance |",
-        "| --- | --- | --- | --- | --- | --- |",
+        "| variant | searches | landed, % | violations, % | paper's definition, % | definition "
+        "| Top-10 | kinds | signatures | distance |",
+        "| --- | --- | --- | --- | --- | --- | --- | --- | --- | --- |",
     ]
-    for name in VARIANTS:
-        own = [row for row in rows if row["variant"] == name]
+    for name, limits in itertools.product(VARIANTS, sorted({row["limits"] for row in rows})):
+        own = [row for row in rows if (row["variant"], row["limits"]) == (name, limits)]
         if not own:
             continue
         # Top-10 of a search with fewer than ten violations counts as its budget and one more.
-        figures = (
-            [100 * int(row["violations"]) / int(row["budget"]) for row in own],
-            [float(row["top10"] or BUDGET + 1) for row in own],
-            [float(row["signatures"]) for row in own],
-            [float(row["distance"]) for row in own],
+        cells = (
+            *(_share(own, column) for column in ("landed", "violations", "paper")),
+            definitions(own),
+            _mean([float(row["top10"] or BUDGET + 1) for row in own]),
+            _mean([float(row["kinds"]) for row in own if row["kinds"]]),
+            *(_mean([float(row[column]) for row in own]) for column in ("signatures", "distance")),
         )
-        cells = " | ".join(_mean(values) for values in figures)
-        lines.append(f"| {name} | {len(own)} | {cells} |")
+        lines.append(f"| {name} | {len(own)} | {' | '.join(cells)} |")
     return "\n".join(lines)
 
 
+def _share(rows: Sequence[Row], column: str) -> str:
+    return _mean([100 * int(row[column]) / int(row["budget"]) for row in rows if row[column]])
+
+
 def _mean(values: Sequence[float]) -> str:
-    """Return the mean, from three values on with its 95 % interval (Student's t)."""
+    """Return the mean, from three values on with its 95 % interval (Student's t); – for none."""
+    if not values:
+        return "–"
     mean = float(np.mean(values))
     if len(values) < 3:
         return f"{mean:.3g}"

@@ -1,4 +1,4 @@
-"""NPC policies in full flights: collisions, blocked landings, violations.
+"""NPC policies in full flights: landings, collisions, flights without landing, violations.
 
 ``python -m studies.adversary`` flies the flights that ``docs/adversary.csv`` lacks, in chunks of
 fifty for each policy, landing system and map; it can be interrupted and started again at any time.
@@ -17,13 +17,15 @@ from pathlib import Path
 from typing import Any
 
 from pytest_garl.adversary.catalogue import policy_spec
+from pytest_garl.experiments.measure import limits_text
 from pytest_garl.scenarios.genes import WEATHER, genome_for
 from pytest_garl.scenarios.maps.map import load_map
 from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.search.methods.random import random_scenarios
 from pytest_garl.simulation.npc_policy import PolicySpec
+from pytest_garl.verdicts.verdict import DEFAULT_LIMITS, Verdict
 from studies.oracle import oracle_spec
-from studies.table import Key, ResultTable, Row, run_study, share
+from studies.table import Key, ResultTable, Row, definitions, run_study, share
 
 SEED = 4242
 CHUNK = 50
@@ -54,6 +56,10 @@ TABLE = ResultTable(
         "blocked",
         "violations",
         "crashed",
+        "limits",
+        "landed",
+        "needless",
+        "paper",
     ),
     key=("mover", "sha256", "system", "map", "chunk"),
 )
@@ -79,14 +85,13 @@ def scenarios(map: str, chunk: int) -> list[Scenario]:
     ]
 
 
-def fly_one(job: tuple[Scenario, str, str]) -> tuple[str, str, bool]:
-    """Return a flight's outcome, the kind of the object that it hit, and its verdict."""
+def fly_one(job: tuple[Scenario, str, str]) -> tuple[Verdict, str]:
+    """Return a flight's verdict and the kind of the object that it hit."""
     import cv2
 
     from landing_systems.opencv_mls import OpenCvLandingSystem
     from pytest_garl.simulation.fly import fly
     from pytest_garl.verdicts.judge import judge
-    from pytest_garl.verdicts.verdict import Limits
     from studies.avoiding import AvoidingLandingSystem
 
     cv2.setNumThreads(1)
@@ -94,8 +99,7 @@ def fly_one(job: tuple[Scenario, str, str]) -> tuple[str, str, bool]:
     made: Any = {"opencv": OpenCvLandingSystem, "avoiding": AvoidingLandingSystem}[system]
     flight = fly(scenario, made, spec_of(mover))
     hit = flight.outcome == "collision" and flight.contacts[-1].body_class == "dynamic"
-    verdict = judge(flight, Limits())
-    return flight.outcome, flight.contacts[-1].kind if hit else "", verdict.paper_violation
+    return judge(flight, DEFAULT_LIMITS), flight.contacts[-1].kind if hit else ""
 
 
 def row_of(key: Key, pool: Executor) -> dict[str, Any]:
@@ -103,23 +107,42 @@ def row_of(key: Key, pool: Executor) -> dict[str, Any]:
     mover, _, system, map, chunk = key
     jobs = [(scenario, mover, system) for scenario in scenarios(map, int(chunk))]
     ends = list(pool.map(fly_one, jobs))
-    hits = Counter(kind for _, kind, _ in ends if kind)
+    verdicts = [verdict for verdict, _ in ends]
+    hits = Counter(kind for _, kind in ends if kind)
     return {
         **dict(zip(TABLE.key, key, strict=True)),
         "flights": len(ends),
         "collided": hits.total(),
         **{kind: hits[kind] for kind in KINDS},
-        "blocked": sum(outcome in ("gave_up", "not_landed") for outcome, _, _ in ends),
-        "violations": sum(violation for _, _, violation in ends),
-        "crashed": sum(outcome == "crashed" for outcome, _, _ in ends),
+        "blocked": sum(bool(verdict.no_landing) for verdict in verdicts),
+        "violations": sum(verdict.violation for verdict in verdicts),
+        "crashed": sum(verdict.outcome == "crashed" for verdict in verdicts),
+        "limits": limits_text(DEFAULT_LIMITS),
+        "landed": sum(verdict.completed for verdict in verdicts),
+        "needless": sum(verdict.no_landing == "needless" for verdict in verdicts),
+        "paper": sum(verdict.paper_violation for verdict in verdicts),
     }
+
+
+def by_the_paper(row: Row) -> int:
+    """Return the flights without a landing within 1.5 m.
+
+    An old row counts those that ended without a collision and without a landing apart.
+    """
+    return int(row["paper"] or int(row["violations"]) + int(row["blocked"]))
+
+
+def landings(row: Row) -> int:
+    """Return the flights that landed; in an old row all that did nothing else."""
+    return int(row["landed"] or int(row["flights"]) - by_the_paper(row) - int(row["crashed"]))
 
 
 def report(rows: list[Row]) -> str:
     """Return a Markdown table: per system, both maps and each, a row for each mover."""
     lines = [
-        "| system | map | mover | flights | collided | who (p / d / b) | blocked | violations |",
-        "| --- | --- | --- | --- | --- | --- | --- | --- |",
+        "| system | map | mover | flights | landed | collided | who (p / d / b) | no landing "
+        "| violations | definition | paper's definition |",
+        "| --- | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- |",
     ]
     for system in SYSTEMS:
         for map in ("both", *MAPS):
@@ -131,15 +154,22 @@ def report(rows: list[Row]) -> str:
                 own = [row for row in own if map in ("both", row["map"])]
                 if not own:
                     continue
-                total = {name: sum(int(row[name]) for row in own) for name in TABLE.columns[5:]}
-                cells = [
-                    share(total[name], total["flights"])
-                    for name in ("collided", "blocked", "violations")
-                ]
-                kinds = " / ".join(str(total[kind]) for kind in KINDS)
+                flights = sum(int(row["flights"]) for row in own)
+                counts = (
+                    sum(landings(row) for row in own),
+                    *(
+                        sum(int(row[name]) for row in own)
+                        for name in ("collided", "blocked", "violations")
+                    ),
+                    sum(by_the_paper(row) for row in own),
+                )
+                landed, collided, no_landing, violations, paper = (
+                    share(count, flights) for count in counts
+                )
+                kinds = " / ".join(str(sum(int(row[kind]) for row in own)) for kind in KINDS)
                 lines.append(
-                    f"| {system} | {map} | {mover} | {total['flights']} | {cells[0]} | {kinds} "
-                    f"| {cells[1]} | {cells[2]} |"
+                    f"| {system} | {map} | {mover} | {flights} | {landed} | {collided} | {kinds} "
+                    f"| {no_landing} | {violations} | {definitions(own)} | {paper} |"
                 )
     return "\n".join(lines)
 

@@ -50,9 +50,16 @@ def count(ledger: Ledger, search: str, map: str) -> dict[str, int | str]:
             counts[f"dark_{outcome}"] += 1
         if _at_most_one_is_fast(scenario, speeds):
             counts[f"slow_{outcome}"] += 1
-    names = ("landed", "aborted", "dark", "dark_aborted", "slow_landed", "slow_collision")
+    names = {
+        "landed": "landed",
+        "aborted": "gave_up",
+        "dark": "dark",
+        "dark_aborted": "dark_gave_up",
+        "slow_landed": "slow_landed",
+        "slow_collision": "slow_collision",
+    }
     return {
-        **{name: counts[name] for name in names},
+        **{column: counts[name] for column, name in names.items()},
         "kinds": SEPARATOR.join(f"{name}={times}" for name, times in sorted(signatures.items())),
     }
 

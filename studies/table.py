@@ -19,7 +19,10 @@ Key = tuple[str, ...]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ResultTable:
-    """The CSV file of a study; the values in the ``key`` columns identify a row."""
+    """The CSV file of a study; the values in the ``key`` columns identify a row.
+
+    Columns that an older file lacks are empty in its rows; the next added row adds them.
+    """
 
     file: Path
     columns: tuple[str, ...]
@@ -27,7 +30,8 @@ class ResultTable:
 
     def rows(self) -> list[Row]:
         """Return the rows; none if there is no file."""
-        return read_csv(self.file)
+        empty = dict.fromkeys(self.columns, "")
+        return [{**empty, **row} for row in read_csv(self.file)]
 
     def keys(self) -> set[Key]:
         """Return the keys of all rows."""
@@ -35,14 +39,23 @@ class ResultTable:
 
     def append(self, rows: Iterable[Mapping[str, Any]]) -> None:
         """Add rows at once, so that an interruption loses no finished row, and print them."""
-        new = not self.file.exists()
+        self._add_columns()
         with self.file.open("a", newline="") as file:
             writer = csv.DictWriter(file, self.columns)
-            if new:
-                writer.writeheader()
             for row in rows:
                 writer.writerow(row)
                 print(", ".join(f"{name} {value}" for name, value in row.items()), flush=True)
+
+    def _add_columns(self) -> None:
+        """Write the header of all columns, and the rows that are there below it."""
+        header = ",".join(self.columns)
+        if self.file.exists() and self.file.read_text().splitlines()[:1] == [header]:
+            return
+        rows = self.rows()
+        with self.file.open("w", newline="") as file:
+            writer = csv.DictWriter(file, self.columns)
+            writer.writeheader()
+            writer.writerows(rows)
 
     def fly_missing(
         self,
@@ -80,6 +93,15 @@ def run_study(
         print(report(table.rows()))
     else:
         fly(arguments)
+
+
+def definitions(rows: Iterable[Row]) -> str:
+    """Return the limits by which rows count violations; "old" for rows that do not name them.
+
+    Rows of version 0.1 count a collision, a landing more than 1.5 m from the marker, or no landing
+    within two minutes; a flight that gives up is none.
+    """
+    return " / ".join(sorted({row["limits"] or "old" for row in rows}))
 
 
 def share(count: int, total: int) -> str:

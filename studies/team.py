@@ -191,7 +191,7 @@ def scenarios(name: str, count: int, chunk: int) -> list[tuple[Scenario, Map]]:
 
 
 def fly_one(job: tuple[Scenario, Map, str, str]) -> tuple[bool, bool]:
-    """Return whether the UAV hit an object, and whether it aborted or did not land."""
+    """Return whether the UAV hit an object, and whether it gave up or ran out of time."""
     import cv2
 
     from landing_systems.opencv_mls import OpenCvLandingSystem
@@ -212,7 +212,7 @@ def fly_one(job: tuple[Scenario, Map, str, str]) -> tuple[bool, bool]:
 def report(rows: list[Row]) -> str:
     """Return a Markdown table over both maps."""
     lines = [
-        "| system | objects | mover | flights | collided | blocked |",
+        "| system | objects | mover | flights | collided | no landing |",
         "| --- | --- | --- | --- | --- | --- |",
     ]
     for system in SYSTEMS:

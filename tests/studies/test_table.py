@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from studies.table import Key, ResultTable, run_study
+from studies.table import Key, ResultTable, definitions, run_study
 
 
 def squared(key: Key, pool: Executor) -> dict[str, Any]:
@@ -42,3 +42,17 @@ def test_report_prints_the_table_and_flies_nothing(
         run_study(argparse.ArgumentParser(), table, lambda rows: f"{len(rows)} rows", flown.append)
         assert capsys.readouterr().out == output
         assert len(flown) == flights
+
+
+def test_columns_that_an_older_file_lacks_are_empty_and_added_with_the_next_row(
+    table: ResultTable,
+) -> None:
+    table.file.write_text("number\n2\n")
+    assert table.rows() == [{"number": "2", "square": ""}]
+    table.append([{"number": 3, "square": 9}])
+    assert table.file.read_text().splitlines() == ["number,square", "2,", "3,9"]
+
+
+def test_rows_without_limits_are_of_the_old_definition() -> None:
+    assert definitions([{"limits": ""}]) == "old"
+    assert definitions([{"limits": "0.75 m"}, {"limits": ""}]) == "0.75 m / old"

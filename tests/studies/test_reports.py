@@ -1,0 +1,51 @@
+"""Reports of studies from rows of either definition."""
+
+from __future__ import annotations
+
+from studies import ablations, adversary
+
+OLD = {
+    "mover": "greedy",
+    "sha256": "",
+    "system": "opencv",
+    "map": "court",
+    "flights": "50",
+    "collided": "14",
+    "person": "9",
+    "dog": "1",
+    "bird": "4",
+    "blocked": "30",
+    "violations": "14",
+    "crashed": "0",
+    "limits": "",
+    "landed": "",
+    "needless": "",
+    "paper": "",
+}
+NEW = {**OLD, "limits": "0.75 m", "violations": "20", "landed": "5", "paper": "44"}
+
+
+def test_an_old_row_counts_flights_without_landing_by_the_papers_definition() -> None:
+    assert (adversary.by_the_paper(OLD), adversary.landings(OLD)) == (44, 6)
+    assert (adversary.by_the_paper(NEW), adversary.landings(NEW)) == (44, 5)
+
+
+def test_the_table_of_policies_shows_both_definitions() -> None:
+    line = adversary.report([OLD]).splitlines()[-1]
+    cells = [cell.strip().partition(" ")[0] for cell in line.strip("|").split("|")]
+    assert cells == [
+        *("opencv", "court", "greedy", "50"),
+        *("12.0", "28.0", "9", "60.0", "28.0", "old", "88.0"),
+    ]
+
+
+def test_ablations_of_different_definitions_have_different_lines() -> None:
+    common = {"variant": "garl", "budget": "400", "top10": "11", "distance": "2"}
+    old = {**common, "violations": "200", "signatures": "5", "limits": ""}
+    old |= {"landed": "", "paper": "", "kinds": ""}
+    new = {**common, "violations": "300", "signatures": "8", "limits": "0.75 m"}
+    new |= {"landed": "40", "paper": "340", "kinds": "4"}
+    assert ablations.report([old, new]).splitlines()[2:] == [
+        "| garl | 1 | – | 50 | – | old | 11 | – | 5 | 2 |",
+        "| garl | 1 | 10 | 75 | 85 | 0.75 m | 11 | 4 | 8 | 2 |",
+    ]
