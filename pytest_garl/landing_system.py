@@ -244,7 +244,7 @@ class AttitudeSetpoint:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Land:
-    """Descend straight down at ``speed_mps`` and stop the motors on the ground.
+    """Descend straight down at ``speed_mps``; the motors stop 1.4 s after the touchdown.
 
     The nose stays at the yaw that was commanded last.  More than 0 and at most 100 m/s; the
     flight control descends at 4 m/s at the most.

@@ -199,10 +199,18 @@ class _Checker:
             warn("gave up in a calm scenario without objects")
         if flight.outcome == "collision":
             warn("collided in a calm scenario without moving objects")
-        if flight.outcome == "landed" and flight.final_distance_m > limits.distance_m:
+        touchdown = flight.touchdown
+        if flight.outcome == "landed" and touchdown and touchdown.distance_m > limits.distance_m:
             warn(
-                f"landed {flight.final_distance_m:.1f} m off in a calm scenario; the limit is "
+                f"landed {touchdown.distance_m:.1f} m off in a calm scenario; the limit is "
                 f"{limits.distance_m:g} m"
+            )
+        if flight.outcome == "slid":
+            warn("slid over the ground after its touchdown in a calm scenario")
+        if touchdown and touchdown.stopped_s is None and flight.outcome == "not_landed":
+            warn(
+                "touched the ground, but its motors did not stop; that takes Land(), or a thrust "
+                "below 30 % of that of a hover for 1 s"
             )
         if not any(step.diagnostics for step in flight.steps):
             warn(
@@ -254,8 +262,9 @@ def _scenarios(map: Map) -> tuple[Scenario, Scenario]:
 
 
 def _ending(flight: Flight) -> str:
-    if flight.outcome == "landed":
-        return f"landed {flight.final_distance_m:.2f} m off after {flight.elapsed_s:.0f} s"
+    touchdown = flight.touchdown
+    if flight.outcome == "landed" and touchdown:
+        return f"landed {touchdown.distance_m:.2f} m off after {touchdown.time_s:.0f} s"
     return judge(flight, Limits()).story
 
 

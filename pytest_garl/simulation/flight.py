@@ -139,8 +139,8 @@ class Touchdown:
 
     ``position_m`` is the body's; ``distance_m`` its horizontal distance from the marker's centre;
     ``speed_mps`` the vertical speed; ``on`` what lies under the UAV: "marker", the name of a decoy,
-    "line", "shadow", or "nothing".  ``slid_m`` is how far the UAV moved over the ground afterwards,
-    ``stopped_s`` the time at which the motors stopped, None if they did not.
+    "line", "shadow", or "nothing".  ``slid_m`` is how far from there it was on the ground at most
+    afterwards, ``stopped_s`` the time at which the motors stopped, None if they did not.
     """
 
     time_s: float
@@ -203,7 +203,8 @@ class Flight:
     ground that could be taken for the marker: (name, x, y).  ``sha256`` is the hash of
     the trajectories and the outcome, the same for equal flights on one CPU class;
     ``cpu`` names that class.  ``wall_s`` is what it cost and is in no hash.
-    ``touchdown`` is None for a flight that did not touch the ground after its take-off.
+    ``touchdown`` is None for a flight that did not touch the ground after its take-off;
+    ``earlier_touchdowns`` are those after which the UAV took off again, in order.
     ``nominal_views`` show how a nominal landing would have seen the marker; they are empty for
     flights that landed, hit something or crashed, and for simulators that do not record them.
     ``nominal_arrival_s`` and ``nominal_landing_s`` are when a nominal flight is above the marker
@@ -223,6 +224,7 @@ class Flight:
     decoys: tuple[tuple[str, float, float], ...] = ()
     crash: Crash | None = None
     touchdown: Touchdown | None = None
+    earlier_touchdowns: tuple[Touchdown, ...] = ()
     nominal_views: tuple[NominalView, ...] = ()
     nominal_arrival_s: float | None = None
     nominal_landing_s: float | None = None

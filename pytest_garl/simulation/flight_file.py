@@ -57,8 +57,9 @@ def hash_of(flight: Flight) -> str:
             digest.update(repr(item.changes).encode())
     for contact in flight.contacts:
         digest.update(repr(dataclasses.astuple(contact)).encode())
-    if flight.touchdown:
-        digest.update(repr(dataclasses.astuple(flight.touchdown)).encode())
+    for touchdown in (*flight.earlier_touchdowns, flight.touchdown):
+        if touchdown:
+            digest.update(repr(dataclasses.astuple(touchdown)).encode())
     return digest.hexdigest()
 
 
@@ -100,6 +101,7 @@ def save(flight: Flight, path: Path) -> None:
         "decoys": flight.decoys,
         "crash": dataclasses.asdict(flight.crash) if flight.crash else None,
         "touchdown": dataclasses.asdict(flight.touchdown) if flight.touchdown else None,
+        "earlier_touchdowns": [dataclasses.asdict(item) for item in flight.earlier_touchdowns],
         "nominal_views": [dataclasses.asdict(item) for item in flight.nominal_views],
         "nominal_arrival_s": flight.nominal_arrival_s,
         "nominal_landing_s": flight.nominal_landing_s,
@@ -220,6 +222,7 @@ class _Header:
     decoys: tuple[tuple[str, float, float], ...]
     crash: Crash | None
     touchdown: Touchdown | None
+    earlier_touchdowns: tuple[Touchdown, ...]
     nominal_views: tuple[NominalView, ...]
     nominal_arrival_s: float | None
     nominal_landing_s: float | None

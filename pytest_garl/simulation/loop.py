@@ -18,10 +18,13 @@ from pytest_garl.simulation.camera.renderer import Renderer
 from pytest_garl.simulation.contacts import Contacts
 from pytest_garl.simulation.environment import changed
 from pytest_garl.simulation.flight import Flight, Outcome
+from pytest_garl.simulation.ground_stays import GroundStays
+from pytest_garl.simulation.landing_place import what_lies_under
 from pytest_garl.simulation.npc_policy import DECISION_STEP_S, GeneChange, NpcPolicy, Situation
-from pytest_garl.simulation.physics.flight_control import FlightControl
+from pytest_garl.simulation.physics.flight_control import NO_THRUST, FlightControl
 from pytest_garl.simulation.physics.npc import Npc
 from pytest_garl.simulation.physics.vehicle import (
+    FEET_FRICTION,
     Motion,
     Quaternion,
     Thrusts,
@@ -40,7 +43,6 @@ from pytest_garl.simulation.system_under_test.mission import mission_for
 from pytest_garl.simulation.system_under_test.observation import estimation_error_m, observe
 from pytest_garl.simulation.system_under_test.system import SystemUnderTest
 
-NO_THRUST: Thrusts = (0.0, 0.0, 0.0, 0.0)
 TICK_S = 1 / PHYSICS_RATE_HZ
 TICKS_PER_TRACK_SAMPLE = 10
 TICKS_PER_NPC_STEP = 4
@@ -60,16 +62,20 @@ class Loop:
     ) -> None:
         self.scenario, self.map = scenario, map
         self._time_limit_s = time_limit_s
-        self._last_tick = round(time_limit_s * PHYSICS_RATE_HZ)
         self._system = SystemUnderTest(system, guard)
         self._marker = marker_position_m(scenario, map)
         self._model = vehicle_model(self._system.airframe)
         self.npcs = [Npc(scenario, map, name, policy()) for name, _ in map.present_objects]
         self._world = World(
-            self._model, map.uav_start_m, map.bodies, [npc.body for npc in self.npcs]
+            self._model,
+            map.uav_start_m,
+            map.bodies,
+            [npc.body for npc in self.npcs],
+            FEET_FRICTION[map.ground.texture],
         )
         self.recorder = Recorder(map, self.npcs, self._marker)
-        self._contacts = Contacts(self._world, self.recorder, self.npcs, self._model.size_m)
+        stays = GroundStays(self.recorder, self._model, self._marker, self._under)
+        self._contacts = Contacts(self._world, self.recorder, self.npcs, self._model.size_m, stays)
         self._control = FlightControl(self._model)
         self._wind = wind_mps(scenario)
         self._pose_rng = generator(scenario.seed, "pose")
@@ -96,7 +102,7 @@ class Loop:
             outcome, crash = "crashed", error.crash
         finally:
             self.close()
-        return self.recorder.flight(outcome, crash)
+        return self.recorder.flight(outcome, crash, self._contacts.touchdowns)
 
     def begin(self) -> None:
         """Reset the NPCs' policies and the landing system."""
@@ -118,8 +124,14 @@ class Loop:
 
     @property
     def out_of_time(self) -> bool:
-        """Whether the next ``tick`` returns "not_landed"."""
-        return self._ticks >= self._last_tick
+        """Whether the next ``tick`` returns "not_landed".
+
+        A UAV that has touched down in time may come to rest.
+        """
+        limit_s = self._time_limit_s
+        if self._ticks < round(limit_s * PHYSICS_RATE_HZ):
+            return False
+        return not self._contacts.settling(self._ticks / PHYSICS_RATE_HZ, limit_s)
 
     def tick(self) -> Outcome | None:
         """Advance by 1/240 s; return the outcome once there is one."""
@@ -137,7 +149,7 @@ class Loop:
             self._move_npcs(tick)
         if tick % TICKS_PER_TRACK_SAMPLE == 0:
             self._contacts.record_pose(now)
-            if isinstance(self._command, Abort) and self._contacts.clear_of_everything(position):
+            if isinstance(self._command, Abort) and self._contacts.gave_up(position):
                 self.recorder.event("gave_up", "gave up and climbed clear of everything")
                 return "gave_up"
         if tick % self._ticks_per_frame == 0:
@@ -146,7 +158,8 @@ class Loop:
             self._take(self._pending.pop(0)[1])
         x, y, z, w = attitude
         self._actuate(tick, Motion(position, velocity, attitude, rotate((-x, -y, -z, w), spin)))
-        return self._contacts.outcome(now, position, attitude, velocity)
+        thrust_n = sum(self._thrusts)
+        return self._contacts.outcome(now, position, attitude, velocity, thrust_n)
 
     def _actuate(self, tick: int, motion: Motion) -> None:
         """Apply the thrusts and the drag of this tick, and step the physics."""
@@ -160,10 +173,11 @@ class Loop:
 
     def _thrusts_wanted(self, tick: int, motion: Motion) -> Thrusts:
         """Return the wanted thrusts of the system's own flight control, or of the simulated one."""
-        if isinstance(self._command, Land) and self._contacts.landed_since is not None:
+        if self._contacts.motors_stopped:
             return NO_THRUST
         if not self._system.airframe.control_rate_hz or isinstance(self._command, Abort):
-            return self._control.thrusts(motion, self._command, TICK_S)
+            on_ground_s = self._contacts.on_ground_s(tick / PHYSICS_RATE_HZ)
+            return self._control.thrusts(motion, self._command, TICK_S, on_ground_s)
         if tick % self._ticks_per_control == 0:
             state = _vehicle_state(tick, motion, self._thrusts)
             self._wanted_thrusts = self._system.control(state, self._model.max_thrust_n)
@@ -197,6 +211,10 @@ class Loop:
             map=self.map,
             scenario=self.scenario,
         )
+
+    def _under(self, place: tuple[float, float]) -> str:
+        bodies = (*self.map.bodies, *(npc.body for npc in self.npcs))
+        return what_lies_under(place, self._marker, self.map.ground.layers, bodies, self.scenario)
 
     def eye(self) -> tuple[Vector, Quaternion]:
         """Return the camera's place and the UAV's attitude."""

@@ -24,6 +24,7 @@ from pytest_garl.simulation.flight import (
     Outcome,
     Separation,
     Step,
+    Touchdown,
     Track,
 )
 from pytest_garl.simulation.physics.npc import Npc
@@ -48,7 +49,6 @@ class Recorder:
 
     def __init__(self, map: Map, objects: Sequence[Npc], marker: tuple[float, float]) -> None:
         self.time_s = 0.0
-        self.touched_ground = False
         self._map, self._objects, self._marker = map, objects, marker
         self._kinds: dict[str, tuple[str, BodyClass]] = {"ground": ("ground", "ground")}
         self._kinds |= {body.name: (body.kind, "static") for body in map.bodies}
@@ -92,7 +92,6 @@ class Recorder:
     def contact(self, body: str, position_m: Vector, speed_mps: float, tilt_rad: float) -> None:
         """Record a contact; ``Contacts`` decides whether it ends the flight."""
         kind, body_class = self._kinds[body]
-        self.touched_ground |= body == "ground"
         self._contacts.append(
             Contact(
                 time_s=self.time_s,
@@ -153,7 +152,9 @@ class Recorder:
             )
         )
 
-    def flight(self, outcome: Outcome, crash: Crash | None) -> Flight:
+    def flight(
+        self, outcome: Outcome, crash: Crash | None, touchdowns: Sequence[Touchdown]
+    ) -> Flight:
         """Return the record; hash, CPU and versions are added by the caller."""
         times = np.array(self._times)
         x, y = self._uav[-1][:2]
@@ -192,6 +193,8 @@ class Recorder:
                 if layer.kind == "marker"
             ),
             crash=crash,
+            touchdown=touchdowns[-1] if touchdowns else None,
+            earlier_touchdowns=tuple(touchdowns[:-1]),
         )
 
 

@@ -53,7 +53,7 @@ def test_imports_and_warning_filters_of_flights_are_no_change(
 
 
 def limits_nothing(patch: pytest.MonkeyPatch) -> None:
-    patch.setattr(contacts, "HARD_TOUCHDOWN_MPS", 100.0)
+    patch.setattr(contacts, "ABORT_HEIGHT_M", 100.0)
 
 
 def never_ends(patch: pytest.MonkeyPatch) -> None:

@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import dataclasses
 import io
 import json
 import os
@@ -24,6 +25,7 @@ from pytest_garl.simulation.flight import (
     ObjectRecord,
     Separation,
     Step,
+    Touchdown,
     Track,
 )
 from pytest_garl.simulation.flight_file import load, save
@@ -40,6 +42,19 @@ def _track(length: int = 3) -> Track:
         position_m=np.ones((length, 3)),
         attitude=np.tile([0.0, 0.0, 0.0, 1.0], (length, 1)),
         velocity_mps=np.zeros((length, 3)),
+    )
+
+
+def _touchdown(time_s: float) -> Touchdown:
+    return Touchdown(
+        time_s=time_s,
+        position_m=(1.0, 0.5, 0.2),
+        distance_m=2.5,
+        speed_mps=0.5,
+        tilt_rad=0.1,
+        on="decoy-marker-3",
+        slid_m=0.1,
+        stopped_s=time_s + 1.4,
     )
 
 
@@ -77,6 +92,8 @@ def flight() -> Flight:
         separations=(
             Separation(body="tree-1", kind="tree", body_class="static", distance_m=1.0, time_s=2.0),
         ),
+        touchdown=_touchdown(9.0),
+        earlier_touchdowns=(_touchdown(5.0), _touchdown(7.0)),
         events=(Event(time_s=1.0, name="took_off", text="left the ground"),),
         steps=(
             Step(
@@ -95,6 +112,16 @@ def flight() -> Flight:
         versions=(("numpy", "2"),),
         wall_s=1.0,
     )
+
+
+def test_hash_covers_every_touchdown() -> None:
+    whole = flight()
+    hashes = {
+        flight_file.hash_of(dataclasses.replace(whole, earlier_touchdowns=earlier, touchdown=last))
+        for earlier in ((), whole.earlier_touchdowns[:1])
+        for last in (None, whole.touchdown)
+    }
+    assert len(hashes) == 4
 
 
 @pytest.fixture
@@ -118,7 +145,8 @@ def _rewritten(file: Path, change: Callable[[dict[str, Any], Header], None]) -> 
 def test_a_flight_survives_its_file_to_the_byte(file: Path, tmp_path: Path) -> None:
     found = flight_file.load(file)
     assert flight_file.hash_of(found) == flight_file.hash_of(flight())
-    for name in ("contacts", "separations", "events", "steps", "decoys", "crash", "versions"):
+    names = ("contacts", "separations", "events", "steps", "decoys", "crash", "versions")
+    for name in (*names, "touchdown", "earlier_touchdowns"):
         assert getattr(found, name) == getattr(flight(), name)
     assert found.objects[0].changes == flight().objects[0].changes
     flight_file.save(found, tmp_path / "two.npz")

@@ -11,7 +11,14 @@ from numpy.typing import NDArray
 from landing_systems.modules.control_ardupilot import ArduPilotControl, ArduPilotParameters
 from pytest_garl import Airframe, VehicleState
 from pytest_garl.scenarios.bodies import rotate
-from pytest_garl.simulation.physics.vehicle import Thrusts, drag, lag, vehicle_model, wrench
+from pytest_garl.simulation.physics.vehicle import (
+    FEET_FRICTION,
+    Thrusts,
+    drag,
+    lag,
+    vehicle_model,
+    wrench,
+)
 from pytest_garl.simulation.physics.world import PHYSICS_RATE_HZ, World
 
 Orders = Callable[[float, ArduPilotControl], None]
@@ -59,7 +66,7 @@ def fly_bare(
     airframe = Airframe(control_rate_hz=control_rate_hz)
     control = ArduPilotControl(airframe, parameters)
     model = vehicle_model(airframe)
-    world = World(model, (0.0, 0.0, 0.0), [], [])
+    world = World(model, (0.0, 0.0, 0.0), [], [], FEET_FRICTION["concrete"])
     every = round(PHYSICS_RATE_HZ / control_rate_hz)
     thrusts: Thrusts = (0.0, 0.0, 0.0, 0.0)
     wanted = thrusts

@@ -35,6 +35,7 @@ YAW_RATE_P = 6.0
 """Bandwidths in 1/s, each loop a half to a quarter of the next inner one, the innermost close to
 the motors' 20 1/s."""
 MAX_TILT_RAD = math.radians(25)
+NO_THRUST: Thrusts = (0.0, 0.0, 0.0, 0.0)
 _MAX_SLOPE = math.tan(MAX_TILT_RAD)
 MAX_ACCELERATION_MPS2 = 4.0
 MAX_RATE_RADPS = 3.5
@@ -44,6 +45,12 @@ MAX_DESCENT_MPS = 4.0
 stays below that."""
 MAX_INTEGRAL_MPS2 = 4.0
 ABORT_CLIMB_MPS = 3.0
+STANDING_AFTER_S = 0.35
+"""PX4's documented time until ground contact counts, if a vehicle is told to descend and does not
+move vertically; from there on its position control takes the thrust away."""
+DESCENDS_MPS = 0.1
+"""A command that wants less does not mean to land: half of what a setpoint of the position at
+height 0 wants of a UAV on its feet."""
 
 
 class FlightControl:
@@ -66,10 +73,16 @@ class FlightControl:
         elif isinstance(command, AttitudeSetpoint):
             self._yaw_rad = _yaw(command.attitude)
 
-    def thrusts(self, motion: Motion, command: Command | None, dt_s: float) -> Thrusts:
-        """Return the wanted motor thrusts (front left, front right, rear right, rear left)."""
+    def thrusts(
+        self, motion: Motion, command: Command | None, dt_s: float, on_ground_s: float = 0.0
+    ) -> Thrusts:
+        """Return the wanted motor thrusts (front left, front right, rear right, rear left).
+
+        ``on_ground_s`` is for how long the UAV has been back on the ground: one that stands there
+        and shall descend gets no thrust.
+        """
         if command is None:
-            return 0.0, 0.0, 0.0, 0.0
+            return NO_THRUST
         if isinstance(command, AttitudeSetpoint):
             thrust = command.thrust * 4 * self._model.max_thrust_n
             return self._thrusts_towards(
@@ -79,6 +92,8 @@ class FlightControl:
             self._hold = motion.position_m
         self._command = command
         wanted, yaw = self._wanted_velocity(motion, command)
+        if on_ground_s >= STANDING_AFTER_S and wanted[2] <= -DESCENDS_MPS:
+            return NO_THRUST
         ax, ay, az = self._acceleration(motion, wanted, dt_s)
         vertical = az + GRAVITY_MPS2
         if vertical < 2.0:

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 from pytest_garl.landing_system import Airframe
+from pytest_garl.scenarios.maps.map import Texture
 
 GRAVITY_MPS2 = 9.81
 AIR_DENSITY_KGPM3 = 1.225
@@ -30,6 +31,22 @@ ROTOR_DRAG_PER_S = 0.10
 """Linear drag of the rotors per unit mass.  Engineering estimate, at the low end: Faessler,
 Franchi and Scaramuzza (2018) identify some 0.2 to 0.5 1/s on a small agile quadrotor."""
 BODY_ABOVE_FEET_M = 0.20
+FEET_FRICTION: dict[Texture, float] = {
+    "concrete": 0.7,
+    "asphalt": 0.65,
+    "grass": 0.35,
+    "sand": 0.45,
+    "soil": 0.5,
+}
+"""Coefficient of sliding friction between feet of rubber and a dry ground.
+
+Concrete: 0.6 to 0.85 for rubber on dry concrete (The Engineering ToolBox, "Friction coefficients"),
+at the low end because feet are harder than tyres.  Asphalt: 0.65 for tyres on dry asphaltic
+concrete (Noon, Engineering Analysis of Vehicular Accidents, 1994).  Grass: 0.35 for tyres on grass
+(The Engineering ToolBox); Noon has 0.20 for a wet field.  Sand: 0.35 to 0.55 for concrete on clean
+sand (NAVFAC DM-7.2, 1982, friction factors).  Soil: Noon's 0.35 for a dirt road and 0.60 for loose
+dirt.
+"""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -71,6 +71,7 @@ class World:
         start_m: Vector,
         bodies: Sequence[Body],
         objects: Sequence[Body],
+        ground_friction: float,
     ) -> None:
         self._client = pybullet.connect(pybullet.DIRECT)
         self._client_argument = {"physicsClientId": self._client}
@@ -79,6 +80,10 @@ class World:
         pybullet.setPhysicsEngineParameter(deterministicOverlappingPairs=1, **self._client_argument)
         plane = pybullet.createCollisionShape(pybullet.GEOM_PLANE, **self._client_argument)
         ground = pybullet.createMultiBody(0, plane, **self._client_argument)
+        # The engine multiplies the friction of the two bodies, and that of the hull is 1.
+        pybullet.changeDynamics(
+            ground, -1, lateralFriction=ground_friction, **self._client_argument
+        )
         self._names = {ground: "ground"}
         self._spheres: dict[int, tuple[Vector, float]] = {}
         self._ids: dict[str, int] = {}
@@ -171,7 +176,7 @@ class World:
             localInertiaDiagonal=model.inertia,
             linearDamping=0,
             angularDamping=0,
-            lateralFriction=0.5,
+            lateralFriction=1.0,
             restitution=0.0,
             activationState=pybullet.ACTIVATION_STATE_DISABLE_SLEEPING,
             **self._client_argument,

@@ -1,0 +1,178 @@
+"""Stays of the UAV on the ground: touchdown, land detector, slide, and whether it stayed there."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from collections.abc import Callable
+
+from pytest_garl.simulation.flight import Outcome, Touchdown
+from pytest_garl.simulation.physics.vehicle import GRAVITY_MPS2, Vector, VehicleModel
+from pytest_garl.simulation.recorder import Recorder
+
+BOUNCE_S = 0.25
+"""A shorter loss of contact does not end a stay.  A UAV that rebounds at 1 m/s, half the speed of
+a hard touchdown, is in the air for 0.2 s."""
+DETECTED_AFTER_S = 1.0
+"""PX4's three states of landing take 0.35, 0.25 and 0.3 s; ArduPilot documents 1 s for all its
+conditions."""
+LOW_THRUST_OF_HOVER = 0.3
+"""PX4's documented threshold of ground contact: MPC_THR_MIN + 0.3 (MPC_THR_HOVER - MPC_THR_MIN);
+the motors here have no minimum.  A UAV that hovers while its feet touch the ground has about 1."""
+OFF_OF_MAXIMUM = 0.05
+"""Less thrust than this share of the maximum is as good as none: a hover needs 28 %."""
+STILL_MPS = 0.2
+UPRIGHT_RAD = math.radians(20)
+WATCHED_S = 2.0
+"""The flight goes on for so long after the motors stopped, or after a slide exceeded its limit, so
+that the record shows whether the UAV still moves."""
+SLID_M = 0.5
+"""A UAV that moved farther over the ground than half its span did not stay where it landed."""
+HARD_TOUCHDOWN_MPS = 2.0
+"""Contact speed of a drop from 0.2 m: the least drop height of EASA CS 27.725."""
+
+
+class LandDetector:
+    """Says when the motors stop: after a second of low thrust on the ground without a climb.
+
+    The command makes no difference, and the horizontal speed neither.  Switched-off motors stop for
+    good after a second, whatever the vertical speed.
+    """
+
+    def __init__(self, model: VehicleModel) -> None:
+        self._low_n = LOW_THRUST_OF_HOVER * model.mass_kg * GRAVITY_MPS2
+        self._off_n = OFF_OF_MAXIMUM * 4 * model.max_thrust_n
+        self._low_since_s: float | None = None
+        self._off_since_s: float | None = None
+
+    def lands(self, time_s: float, on_ground: bool, thrust_n: float, climb_mps: float) -> bool:
+        """Take one step of the physics; return whether the motors stop."""
+        low = on_ground and thrust_n < self._low_n and abs(climb_mps) < STILL_MPS
+        off = on_ground and thrust_n < self._off_n
+        self._low_since_s = _begin(self._low_since_s, low, time_s)
+        self._off_since_s = _begin(self._off_since_s, off, time_s)
+        return any(
+            since_s is not None and time_s - since_s >= DETECTED_AFTER_S
+            for since_s in (self._low_since_s, self._off_since_s)
+        )
+
+
+def _begin(since_s: float | None, holds: bool, time_s: float) -> float | None:
+    if not holds:
+        return None
+    return time_s if since_s is None else since_s
+
+
+class GroundStays:
+    """Follows the stays of the UAV on the ground; ``touchdowns`` has one per stay, in order.
+
+    ``was_pushed`` is whether a moving body touched the UAV after its motors had stopped: how it
+    moves from then on is no longer the landing system's doing.
+    """
+
+    def __init__(
+        self,
+        recorder: Recorder,
+        model: VehicleModel,
+        marker_m: tuple[float, float],
+        surface: Callable[[tuple[float, float]], str],
+    ) -> None:
+        self._recorder, self._marker, self._surface = recorder, marker_m, surface
+        self._detector = LandDetector(model)
+        self._contact_s = -math.inf
+        self._open = self.was_pushed = False
+        self._slid_since_s: float | None = None
+        self.touchdowns: list[Touchdown] = []
+
+    @property
+    def motors_stopped(self) -> bool:
+        """Whether the motors have stopped for the rest of the flight."""
+        return bool(self.touchdowns) and self.touchdowns[-1].stopped_s is not None
+
+    @property
+    def has_slid(self) -> bool:
+        """Whether the UAV slid too far; nothing changes this outcome."""
+        return self._slid_since_s is not None
+
+    @property
+    def since_s(self) -> float | None:
+        """When the present stay began; None in the air."""
+        return self.touchdowns[-1].time_s if self._open else None
+
+    def update(
+        self,
+        time_s: float,
+        contact_m: Vector | None,
+        position: Vector,
+        velocity: Vector,
+        tilt_rad: float,
+        thrust_n: float,
+    ) -> Outcome | None:
+        """Take one step of the physics; ``contact_m`` is where the UAV touches the ground, or None.
+
+        Return the outcome of the flight once it is known.
+        """
+        if contact_m is not None:
+            begins = not self._open
+            self._contact_s = time_s
+            if begins:
+                self._begin(time_s, position, velocity, tilt_rad)
+                self._recorder.contact("ground", contact_m, abs(velocity[2]), tilt_rad)
+                if abs(velocity[2]) > HARD_TOUCHDOWN_MPS or tilt_rad > UPRIGHT_RAD:
+                    return "collision"
+        elif not self._open:
+            return None
+        elif time_s - self._contact_s > BOUNCE_S and not (self.motors_stopped or self.has_slid):
+            self._open = False
+        lands = self._detector.lands(time_s, self._open, thrust_n, velocity[2])
+        if not self._open:
+            return None
+        if lands and not self.motors_stopped:
+            self.touchdowns[-1] = dataclasses.replace(self.touchdowns[-1], stopped_s=time_s)
+            self._recorder.event("motors_stopped", "the motors stopped on the ground")
+        self._follow_slide(time_s, position, in_contact=contact_m is not None)
+        return self._outcome(time_s, position, velocity, tilt_rad)
+
+    def _begin(self, time_s: float, position: Vector, velocity: Vector, tilt_rad: float) -> None:
+        self._open = True
+        place = (position[0], position[1])
+        self.touchdowns.append(
+            Touchdown(
+                time_s=time_s,
+                position_m=position,
+                distance_m=math.dist(place, self._marker),
+                speed_mps=abs(velocity[2]),
+                tilt_rad=tilt_rad,
+                on=self._surface(place),
+            )
+        )
+
+    def _follow_slide(self, time_s: float, position: Vector, *, in_contact: bool) -> None:
+        if not in_contact or self.was_pushed:
+            return
+        touchdown = self.touchdowns[-1]
+        moved = math.dist(position[:2], touchdown.position_m[:2])
+        if moved > touchdown.slid_m:
+            self.touchdowns[-1] = dataclasses.replace(touchdown, slid_m=moved)
+        if moved > SLID_M and self._slid_since_s is None:
+            self._slid_since_s = time_s
+            motors = "stopped" if self.motors_stopped else "running"
+            text = f"moved more than {SLID_M:g} m over the ground, with the motors {motors}"
+            self._recorder.event("slid", text)
+
+    def _outcome(
+        self, time_s: float, position: Vector, velocity: Vector, tilt_rad: float
+    ) -> Outcome | None:
+        if self._slid_since_s is not None:
+            return "slid" if time_s - self._slid_since_s >= WATCHED_S else None
+        stopped_s = self.touchdowns[-1].stopped_s
+        if stopped_s is None:
+            return None
+        if tilt_rad >= UPRIGHT_RAD and not self.was_pushed:
+            self._recorder.contact("ground", position, abs(velocity[2]), tilt_rad)
+            return "collision"
+        still = math.sqrt(sum(value * value for value in velocity)) < STILL_MPS
+        if time_s - stopped_s < WATCHED_S or not (still or self.was_pushed):
+            return None
+        self._recorder.event("landed", "at rest on the ground")
+        return "landed"

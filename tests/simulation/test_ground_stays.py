@@ -1,0 +1,280 @@
+"""Stays on the ground: when the motors stop, what counts as landed, and what as slid."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from pytest_garl import (
+    Abort,
+    Airframe,
+    AttitudeSetpoint,
+    Command,
+    Land,
+    MotorThrusts,
+    Observation,
+    VehicleState,
+    VelocitySetpoint,
+)
+from pytest_garl.simulation.flight import Flight, Touchdown
+from pytest_garl.simulation.fly import fly
+from pytest_garl.simulation.ground_stays import LandDetector
+from pytest_garl.simulation.physics.vehicle import GRAVITY_MPS2, REFERENCE_MASS_KG, vehicle_model
+from tests.support.flights import EMPTY, STAND, Scripted, nominal
+
+WEIGHT_N = REFERENCE_MASS_KG * GRAVITY_MPS2
+ON_FEET_M = 0.21
+
+
+class DescendsThen(Scripted):
+    """Drifts north while it descends; what it does on the ground is ``on_ground``."""
+
+    drift_mps = 0.0
+    speed_mps = 0.5
+
+    def reset(self, mission: object) -> None:
+        super().reset(mission)  # type: ignore[arg-type]
+        self.touched_s: float | None = None
+
+    def step(self, observation: Observation) -> Command:
+        if observation.time_s < 4:
+            return self.hover(2.0)
+        if observation.position_m[2] < ON_FEET_M and self.touched_s is None:
+            self.touched_s = observation.time_s
+        if self.touched_s is not None:
+            return self.on_ground(observation.time_s - self.touched_s)
+        return VelocitySetpoint(velocity_mps=(0.0, self.drift_mps, -self.speed_mps))
+
+    def on_ground(self, after_s: float) -> Command:
+        return Land()
+
+
+class Drifts(DescendsThen):
+    drift_mps = 1.0
+
+
+class Skids(DescendsThen):
+    """Flies on along the ground, with its motors running."""
+
+    drift_mps = 2.0
+
+    def on_ground(self, after_s: float) -> Command:
+        return VelocitySetpoint(velocity_mps=(0.0, 2.0, 0.0))
+
+
+class SkidsToAStop(DescendsThen):
+    drift_mps = 2.0
+
+
+class StandsAtHeightZero(DescendsThen):
+    def on_ground(self, after_s: float) -> Command:
+        return self.hover(0.0)
+
+
+class HoversOnItsFeet(DescendsThen):
+    def on_ground(self, after_s: float) -> Command:
+        return self.hover(0.2)
+
+
+class CutsThrustByAttitude(DescendsThen):
+    def on_ground(self, after_s: float) -> Command:
+        return AttitudeSetpoint(attitude=(0.0, 0.0, 0.0, 1.0), thrust=0.02)
+
+
+class GivesUpOnTheGround(DescendsThen):
+    def on_ground(self, after_s: float) -> Command:
+        return Abort() if after_s > 0.5 else Land()
+
+
+class GivesUpAfterTheStop(DescendsThen):
+    def on_ground(self, after_s: float) -> Command:
+        return Abort() if after_s > 2.0 else Land()
+
+
+class TouchesAndGoes(DescendsThen):
+    """Touches the ground, climbs to 1.5 m, and lands a metre farther north."""
+
+    def on_ground(self, after_s: float) -> Command:
+        if after_s < 0.4:
+            return Land()
+        if after_s < 3.0:
+            return VelocitySetpoint(velocity_mps=(0.0, 0.5, 1.0))
+        return Land()
+
+
+class FallsOnTheSecondTouchdown(TouchesAndGoes):
+    def on_ground(self, after_s: float) -> Command:
+        if after_s < 3.0:
+            return super().on_ground(after_s)
+        return VelocitySetpoint(velocity_mps=(0.0, 0.0, -4.0))
+
+
+class CutsThrust:
+    """Flies the motors itself: sinks at 0.5 m/s from 1.5 m, and stops them on the ground."""
+
+    airframe = Airframe(latency_s=0.0, control_rate_hz=240)
+    needs_camera = False
+
+    def reset(self, mission: object) -> None:
+        pass
+
+    def step(self, observation: Observation) -> Command:
+        return VelocitySetpoint(velocity_mps=(0.0, 0.0, -0.5))
+
+    def control(self, state: VehicleState) -> MotorThrusts:
+        height, climb = state.position_m[2], state.velocity_mps[2]
+        if state.time_s > 4 and height < ON_FEET_M:
+            return MotorThrusts(newtons=(0.0, 0.0, 0.0, 0.0))
+        wanted = (1.5 - height) if state.time_s < 4 else -0.5
+        thrust = WEIGHT_N + REFERENCE_MASS_KG * 4 * (wanted - climb)
+        return MotorThrusts(newtons=(thrust / 4,) * 4)
+
+
+def flown(system: type, seconds: float = 20.0, **genes: float) -> tuple[Flight, Touchdown]:
+    flight = fly(nominal(**genes), system, STAND, map=EMPTY, time_limit_s=seconds)
+    assert flight.touchdown is not None
+    return flight, flight.touchdown
+
+
+@pytest.mark.parametrize(
+    "system", [DescendsThen, StandsAtHeightZero, CutsThrustByAttitude, CutsThrust]
+)
+def test_uav_lands_when_its_motors_stopped_and_it_stays_two_seconds(system: type) -> None:
+    flight, touchdown = flown(system)
+    assert flight.outcome == "landed"
+    assert touchdown.stopped_s is not None
+    assert 1.0 <= touchdown.stopped_s - touchdown.time_s < 1.5
+    assert flight.elapsed_s == pytest.approx(touchdown.stopped_s + 2.0, abs=0.01)
+    assert touchdown.speed_mps == pytest.approx(0.55, abs=0.15)
+    assert touchdown.slid_m < 0.05
+    assert [event.name for event in flight.events][-3:] == ["contact", "motors_stopped", "landed"]
+
+
+@pytest.mark.parametrize("speed_mps", [0.2, 0.5, 1.0, 1.8])
+def test_motors_stop_within_a_second_and_a_half_of_every_landing(speed_mps: float) -> None:
+    class LandsAtSpeed(DescendsThen):
+        def on_ground(self, after_s: float) -> Command:
+            return Land(speed_mps=speed_mps)
+
+    LandsAtSpeed.speed_mps = speed_mps
+    _, touchdown = flown(LandsAtSpeed)
+    assert touchdown.stopped_s is not None
+    assert touchdown.stopped_s - touchdown.time_s < 1.5
+
+
+def test_uav_that_hovers_on_its_feet_does_not_land() -> None:
+    flight, touchdown = flown(HoversOnItsFeet)
+    assert flight.outcome == "not_landed"
+    assert flight.elapsed_s == pytest.approx(20.0, abs=0.01)
+    assert touchdown.stopped_s is None
+
+
+def test_uav_that_drifts_at_touchdown_comes_to_rest_by_friction() -> None:
+    flight, touchdown = flown(Drifts)
+    assert flight.outcome == "landed"
+    assert 0.1 < touchdown.slid_m < 0.5
+    assert touchdown.stopped_s is not None
+
+
+def test_uav_that_skids_to_a_stop_has_slid() -> None:
+    flight, touchdown = flown(SkidsToAStop)
+    assert flight.outcome == "slid"
+    assert 0.5 < touchdown.slid_m < 1.2
+    assert np.linalg.norm(flight.uav.velocity_mps[-1]) < 0.2
+
+
+def test_slide_is_watched_for_two_seconds_with_motors_running() -> None:
+    flight, touchdown = flown(Skids)
+    slid_s = next(event.time_s for event in flight.events if event.name == "slid")
+    assert flight.outcome == "slid"
+    assert flight.elapsed_s == pytest.approx(slid_s + 2.0, abs=0.01)
+    assert touchdown.stopped_s is None
+    assert touchdown.slid_m > 0.5
+
+
+@pytest.mark.parametrize("wind", [0.4, 0.6, 0.8, 1.0])
+def test_wind_does_not_push_a_landed_uav(wind: float) -> None:
+    share = wind / math.sqrt(2)
+    flight, touchdown = flown(DescendsThen, wind__x=share, wind__y=share)
+    assert flight.outcome == "landed"
+    assert touchdown.slid_m < 0.3
+
+
+def test_abort_before_the_motors_stopped_takes_off() -> None:
+    flight, touchdown = flown(GivesUpOnTheGround)
+    assert flight.outcome == "gave_up"
+    assert touchdown.stopped_s is None
+
+
+def test_abort_after_the_motors_stopped_changes_nothing() -> None:
+    flight, _ = flown(GivesUpAfterTheStop)
+    assert flight.outcome == "landed"
+    assert flight.uav.position_m[-1][2] < ON_FEET_M
+
+
+def test_record_holds_every_touchdown() -> None:
+    flight, touchdown = flown(TouchesAndGoes)
+    assert flight.outcome == "landed"
+    assert [contact.body for contact in flight.contacts] == ["ground", "ground"]
+    (first,) = flight.earlier_touchdowns
+    assert first.stopped_s is None
+    assert touchdown.time_s > first.time_s + 2.5
+    assert touchdown.position_m[1] - first.position_m[1] > 0.8
+    assert first.distance_m == pytest.approx(
+        math.dist(first.position_m[:2], flight.marker_position_m)
+    )
+
+
+def test_second_touchdown_may_be_too_hard() -> None:
+    flight, touchdown = flown(FallsOnTheSecondTouchdown)
+    assert flight.outcome == "collision"
+    assert flight.contacts[-1].body == "ground"
+    assert touchdown.speed_mps > 2.0
+    assert len(flight.earlier_touchdowns) == 1
+
+
+def test_uav_that_touches_down_in_time_may_come_to_rest_after_the_limit() -> None:
+    whole, touchdown = flown(DescendsThen)
+    flight, _ = flown(DescendsThen, seconds=touchdown.time_s + 0.1)
+    assert flight.outcome == "landed"
+    assert flight.elapsed_s == whole.elapsed_s
+    late = fly(nominal(), DescendsThen, STAND, map=EMPTY, time_limit_s=touchdown.time_s - 0.1)
+    assert late.outcome == "not_landed"
+
+
+class TestLandDetector:
+    """The rules by themselves: (on the ground, thrust, climb) for each step."""
+
+    @staticmethod
+    def stop_s(on_ground: bool, thrust_n: float, climb_mps: float) -> float | None:
+        detector = LandDetector(vehicle_model(Airframe()))
+        for tick in range(1, 720):
+            if detector.lands(tick / 240, on_ground, thrust_n, climb_mps):
+                return tick / 240
+        return None
+
+    def test_low_thrust_on_the_ground_stops_the_motors_after_a_second(self) -> None:
+        assert self.stop_s(True, 0.29 * WEIGHT_N, 0.1) == pytest.approx(1.0, abs=0.01)
+
+    @pytest.mark.parametrize(
+        ("on_ground", "share", "climb_mps"),
+        [(False, 0.1, 0.0), (True, 0.31, 0.0), (True, 0.29, -0.21)],
+    )
+    def test_other_states_do_not_stop_them(
+        self, on_ground: bool, share: float, climb_mps: float
+    ) -> None:
+        assert self.stop_s(on_ground, share * WEIGHT_N, climb_mps) is None
+
+    def test_switched_off_motors_stop_whatever_the_vertical_speed(self) -> None:
+        assert self.stop_s(True, 4.0, 0.5) == pytest.approx(1.0, abs=0.01)
+        assert self.stop_s(True, 4.2, 0.5) is None
+
+    def test_interruption_begins_the_second_anew(self) -> None:
+        detector = LandDetector(vehicle_model(Airframe()))
+        assert not detector.lands(0.0, True, 0.0, 0.0)
+        assert not detector.lands(0.9, True, WEIGHT_N, 0.0)
+        assert not detector.lands(1.0, True, 0.0, 0.0)
+        assert not detector.lands(1.9, True, 0.0, 0.0)
+        assert detector.lands(2.0, True, 0.0, 0.0)
