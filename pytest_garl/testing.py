@@ -28,7 +28,7 @@ from pytest_garl.simulation.flight import Flight
 from pytest_garl.simulation.flight_file import divergence_time_s
 from pytest_garl.simulation.fly import fly
 from pytest_garl.verdicts.judge import judge
-from pytest_garl.verdicts.phases import reports_detections, reports_targets
+from pytest_garl.verdicts.sightings import reports_detections, reports_targets
 from pytest_garl.verdicts.verdict import PAPER_LIMITS, Limits
 
 FLIGHTS = 40

@@ -58,6 +58,7 @@ def time_limit_s(limits: Limits) -> float:
 def judged(flight: Flight, limits: Limits) -> FlightResult:
     """Return the result of a flight."""
     from pytest_garl.verdicts.judge import closest_call, judge, off_marker_m, why_undecided
+    from pytest_garl.verdicts.touchdowns import landed_s
 
     call, body = closest_call(flight)
     collided = flight.outcome == "collision"
@@ -72,4 +73,5 @@ def judged(flight: Flight, limits: Limits) -> FlightResult:
         closest_body=body,
         verdict=judge(flight, limits),
         crash=flight.crash,
+        landed_s=landed_s(flight) if flight.outcome == "landed" else None,
     )

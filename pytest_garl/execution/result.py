@@ -112,7 +112,7 @@ def broken_result(crash: Crash, diagonal_m: float, *, inconclusive: bool = False
             primary=None if inconclusive else "crash",
             violation_type=None if inconclusive else "V",
             signature="" if inconclusive else f"V:{crash.kind}:{crash.error}",
-            paper_violation=False,
+            paper_violation=not inconclusive,
             margins=(),
             story=f"The landing system {verb}: {crash.message}.",
         ),

@@ -1,4 +1,8 @@
-"""Judge a flight: a pure function of the flight and the limits that returns a verdict."""
+"""Judge a flight: a pure function of the flight and the limits that returns a verdict.
+
+The first event decides the outcome.  Types follow from ground truth; what a landing system reports
+about itself only adds to the text.
+"""
 
 from __future__ import annotations
 
@@ -7,36 +11,37 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pytest_garl.simulation.flight import Contact, Crash, Flight, Separation
+from pytest_garl.simulation.flight import Contact, Crash, Flight, Separation, Touchdown
 from pytest_garl.simulation.physics.vehicle import up_m
 from pytest_garl.simulation.system_under_test.texts import cut
-from pytest_garl.verdicts.phases import (
-    landing_phase,
-    last_sighting_s,
-    reports_detections,
-    reports_targets,
+from pytest_garl.verdicts.excuses import excuse
+from pytest_garl.verdicts.findings import descent_elsewhere, findings
+from pytest_garl.verdicts.margins import margins
+from pytest_garl.verdicts.phases import landing_phase
+from pytest_garl.verdicts.sightings import (
+    AT_MARKER_M,
+    last_report_s,
+    last_target,
+    readable_steps,
     was_in_view,
 )
+from pytest_garl.verdicts.touchdowns import gave_up_s, landed_s, touchdown_off_marker
 from pytest_garl.verdicts.verdict import (
     PAPER_LIMITS,
+    Excuse,
     Limits,
-    Margin,
     PropertyName,
     Verdict,
     ViolationType,
 )
 from pytest_garl.verdicts.wording import compass_point
 
-ON_GROUND_M = 0.02
-"""After its first contact with the ground, the UAV counts as on the ground up to this much above
-its height at the contact, because it may rebound a little."""
 LOST_AFTER_S = 3.0
-"""A marker counts as lost if it was not seen for this long before the end."""
+"""A marker counts as lost if it was not readable for this long before the end."""
+RESERVE_SHARE = 0.15
+"""A landing that is given up in this last share of the time limit is given up for want of time."""
 MESSAGE_CHARS = 300
 """Length of an exception's message in a description; the flight's record has 1,000 characters."""
-SAME_PLACE_M = 1.5
-"""A target and a decoy, or a target and the marker, within this distance are the same place: the
-length of the marker's side."""
 CLOSE_CALL_M = 3.0
 """A close call is within this distance; exact separations end here too."""
 TILTED_RAD = math.radians(20)
@@ -47,29 +52,32 @@ LEAST_HIDDEN_SHARE = 0.01
 """A smaller hidden share of the marker is not described."""
 OVER_MARKER_M = 0.3
 """A UAV within this horizontal distance is described as over the marker."""
+NO_LANDING = ("gave_up", "not_landed")
+"""Outcomes of flights that never came down."""
 
 
 def judge(flight: Flight, limits: Limits) -> Verdict:
     """Return the verdict: the first violation of the flight, or none.
 
-    A touchdown off the marker before an abort is a violation, but not by the paper's definition,
-    which measures the distance of landings only.
+    A touchdown off the marker before the landing is given up is a violation, but not by the paper's
+    definition, which measures the distance of landings only.
     """
-    mechanism = _mechanism(flight, limits)
+    why, why_text = _excuse(flight, limits)
+    mechanism = _mechanism(flight, limits, why, why_text)
     far = flight.final_distance_m > PAPER_LIMITS.distance_m
-    paper = (
-        flight.outcome == "collision"
-        or flight.outcome == "not_landed"
-        or (flight.outcome == "landed" and far)
-    )
+    came_down = flight.outcome in ("landed", "slid")
     return Verdict(
         outcome=flight.outcome,
         primary=mechanism.primary,
         violation_type=mechanism.violation_type,
         signature=mechanism.signature,
-        paper_violation=paper,
-        margins=_margins(flight, limits),
+        paper_violation=far if came_down else True,
+        margins=margins(flight, limits, violates_time=mechanism.primary == "time"),
         story=f"{mechanism.sentence} {_where(flight)}".strip(),
+        completed=flight.outcome == "landed" and mechanism.primary != "distance",
+        excuse=why,
+        excuse_text=why_text,
+        findings=findings(flight, limits),
     )
 
 
@@ -91,116 +99,73 @@ def closest_call(flight: Flight) -> tuple[str, str]:
 
 def why_undecided(flight: Flight) -> str:
     """Return the reason why distance and time were not decided; empty if they were."""
-    if flight.outcome == "landed":
-        return ""
     when = f"at {flight.elapsed_s:.1f} s"
-    if flight.outcome == "collision":
-        return f"collision with {flight.contacts[-1].body} {when}"
-    if flight.outcome == "gave_up":
-        return f"aborted {when}"
-    if flight.outcome == "crashed":
-        return f"the landing system crashed {when}"
+    match flight.outcome:
+        case "landed":
+            return ""
+        case "collision":
+            return f"collision with {flight.contacts[-1].body} {when}"
+        case "slid":
+            return f"the UAV slid over the ground until {flight.elapsed_s:.1f} s"
+        case "gave_up":
+            return f"gave up {when}"
+        case "crashed":
+            return f"the landing system crashed {when}"
     return f"not landed after {flight.elapsed_s:.0f} s"
 
 
 def off_marker_m(flight: Flight, limits: Limits) -> float | None:
     """Return the distance from the marker at which the UAV came down; None if it did not.
 
-    An aborted flight came down if it touched the ground beyond the limit, because it mistook
-    another place for the marker.
+    A landing that was given up came down if it touched the ground beyond the limit.
     """
     if flight.outcome == "landed":
         return flight.final_distance_m
-    touchdown = _touchdown_off_marker(flight, limits)
+    touchdown = touchdown_off_marker(flight, limits)
     return touchdown.distance_m if touchdown else None
 
 
-@dataclass(frozen=True, slots=True)
-class _Touchdown:
-    """A touchdown away from the marker."""
-
-    distance_m: float
-    time_s: float
-
-
-def _touchdown_off_marker(flight: Flight, limits: Limits) -> _Touchdown | None:
-    """Return an aborted flight's first touchdown beyond the limit, or None.
-
-    The record holds only the first contact with the ground; later ones follow from the height.
-    """
-    first = next((each for each in flight.contacts if each.body_class == "ground"), None)
-    if flight.outcome != "gave_up" or first is None:
-        return None
-    track = flight.uav
-    start = max(0, int(np.searchsorted(track.time_s, first.time_s, side="right")) - 1)
-    # The sample before a contact lies above the ground, the one after it on the ground.
-    height = float(track.position_m[start : start + 2, 2].min()) + ON_GROUND_M
-    mx, my = flight.marker_position_m
-    for index in range(start, len(track.time_s)):
-        x, y, z = (float(value) for value in track.position_m[index])
-        off = math.hypot(x - mx, y - my)
-        if (index == start or z <= height) and off > limits.distance_m:
-            return _Touchdown(off, max(first.time_s, float(track.time_s[index])))
-    return None
-
-
-def _margins(flight: Flight, limits: Limits) -> tuple[Margin, ...]:
-    reason = why_undecided(flight)
-    landed = flight.outcome == "landed"
-    off = off_marker_m(flight, limits)
-    time_decided = landed or flight.outcome == "not_landed"
-    left_s = limits.time_s - flight.elapsed_s
-    distances_m = [gap.distance_m for gap in flight.separations if gap.body_class != "ground"]
-    hit = flight.outcome == "collision"
-    nearest = 0.0 if hit else min(distances_m, default=math.hypot(*flight.marker_position_m) + 1e3)
-    return (
-        Margin(
-            property="distance",
-            value=limits.distance_m - (flight.final_distance_m if off is None else off),
-            unit="m",
-            decided=off is not None,
-            reason=reason if off is None else "",
-        ),
-        Margin(
-            property="time",
-            value=left_s if landed else min(0.0, left_s),
-            unit="s",
-            decided=time_decided,
-            reason="" if time_decided else reason,
-        ),
-        Margin(property="collision", value=nearest, unit="m"),
-        Margin(property="crash", value=0.0 if flight.outcome == "crashed" else 1.0, unit="1"),
-    )
-
-
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class _Mechanism:
     """How a flight ended: the violated property, its type and signature, and one sentence."""
 
-    primary: PropertyName | None
-    violation_type: ViolationType | None
-    signature: str
+    primary: PropertyName | None = None
+    violation_type: ViolationType | None = None
+    signature: str = ""
     sentence: str
 
 
-def _mechanism(flight: Flight, limits: Limits) -> _Mechanism:
+def _excuse(flight: Flight, limits: Limits) -> tuple[Excuse, str]:
+    """Return the excuse of a flight without landing; a touchdown elsewhere has none."""
+    if flight.outcome not in NO_LANDING or touchdown_off_marker(flight, limits):
+        return "", ""
+    return excuse(flight, gave_up_s(flight))
+
+
+def _mechanism(flight: Flight, limits: Limits, why: Excuse, why_text: str) -> _Mechanism:
     """Return the first violation of the flight, or how it ended without one."""
     if flight.outcome == "crashed" and flight.crash:
         return _crash(flight.crash)
     if flight.outcome == "collision":
-        return _collision(flight, flight.contacts[-1])
-    if flight.outcome == "gave_up":
-        return _abort(flight, limits)
-    if flight.outcome == "not_landed":
-        return _not_landed(flight)
+        return _collision(flight, flight.contacts[-1], limits)
+    if touchdown := touchdown_off_marker(flight, limits):
+        before = " before it gave up" if flight.outcome == "gave_up" else ""
+        return _missed(flight, limits, touchdown, f"Touched the ground {{}}{before}")
+    if flight.outcome == "slid":
+        return _slid(flight)
+    if flight.outcome in NO_LANDING:
+        return _no_landing(flight, limits, why, why_text)
+    at_s = landed_s(flight)
     if flight.final_distance_m > limits.distance_m:
-        beginning = f"Landed {flight.final_distance_m:.1f} m off the marker"
-        return _missed(flight, flight.elapsed_s, beginning)
-    if flight.elapsed_s > limits.time_s:
-        phase = landing_phase(flight, limits.time_s)
-        sentence = f"Landed late, after {flight.elapsed_s:.1f} s."
-        return _Mechanism("time", "late", f"late:{phase}", sentence)
-    return _Mechanism(None, None, "", f"Landed after {flight.elapsed_s:.1f} s.")
+        return _missed(flight, limits, flight.touchdown, "Landed {}")
+    if at_s > limits.time_s:
+        return _Mechanism(
+            primary="time",
+            violation_type="late",
+            signature=f"late:landed:{landing_phase(flight, limits.time_s)}",
+            sentence=f"Landed late, after {at_s:.1f} s.",
+        )
+    return _Mechanism(sentence=f"Landed after {at_s:.1f} s.")
 
 
 _VERBS = {"raised": "raised", "nonsense": "returned nonsense", "died": "died", "hung": "hung"}
@@ -209,23 +174,42 @@ _VERBS = {"raised": "raised", "nonsense": "returned nonsense", "died": "died", "
 def _crash(crash: Crash) -> _Mechanism:
     message = cut(crash.message, MESSAGE_CHARS)
     text = f"The landing system {_VERBS[crash.kind]}: {crash.error}: {message}".rstrip(": ")
-    return _Mechanism("crash", "V", f"V:{crash.error}@{crash.where}", f"{text}.")
+    return _Mechanism(
+        primary="crash",
+        violation_type="V",
+        signature=f"V:{crash.error}@{crash.where}",
+        sentence=f"{text}.",
+    )
 
 
-def _collision(flight: Flight, contact: Contact) -> _Mechanism:
+def _collision(flight: Flight, contact: Contact, limits: Limits) -> _Mechanism:
     speed = f"at {contact.speed_mps:.1f} m/s"
     if contact.body_class == "ground":
         how = "tilted" if contact.tilt_rad > TILTED_RAD else "fast"
-        return _Mechanism("collision", "hard", f"hard:{how}", f"Touched down too {how}, {speed}.")
-    signature = _collision_signature(flight, contact)
-    if contact.body_class == "static":
-        return _Mechanism("collision", "III", signature, f"Hit {contact.body} {speed}.")
-    view = (
-        "The camera had it in view within the last 2 s."
-        if was_in_view(flight, contact.body, contact.time_s)
-        else "The camera had not had it in view for 2 s."
+        return _Mechanism(
+            primary="collision",
+            violation_type="hard",
+            signature=f"hard:{how}",
+            sentence=f"Touched down too {how}, {speed}.",
+        )
+    static = contact.body_class == "static"
+    elsewhere = descent_elsewhere(flight, limits)
+    if elsewhere:
+        # A collision hides the landing that had gone wrong before it.
+        verb = f"{elsewhere.story.removesuffix('.')}, then hit"
+    else:
+        verb = "Hit" if static else "Collided with"
+    view = ""
+    if not static and was_in_view(flight, contact.body, contact.time_s):
+        view = " The camera had it in view within the last 2 s."
+    elif not static:
+        view = " The camera had not had it in view for 2 s."
+    return _Mechanism(
+        primary="collision",
+        violation_type="III" if static else "IV",
+        signature=_collision_signature(flight, contact),
+        sentence=f"{verb} {contact.body} {speed}.{view}",
     )
-    return _Mechanism("collision", "IV", signature, f"Collided with {contact.body} {speed}. {view}")
 
 
 def _collision_signature(flight: Flight, body: Contact | Separation) -> str:
@@ -236,85 +220,146 @@ def _collision_signature(flight: Flight, body: Contact | Separation) -> str:
     return f"IV:{body.kind}:{phase}:{sight}"
 
 
-def _abort(flight: Flight, limits: Limits) -> _Mechanism:
-    touchdown = _touchdown_off_marker(flight, limits)
-    if touchdown:
-        beginning = (
-            f"Touched the ground {touchdown.distance_m:.1f} m off the marker before it gave up"
+def _slid(flight: Flight) -> _Mechanism:
+    touchdown = flight.touchdown
+    if touchdown is None:
+        text, motors = "Slid over the ground after its touchdown.", "motors-on"
+    else:
+        motors = "motors-off" if touchdown.stopped_s is not None else "motors-on"
+        still = f"with the motors {'stopped' if motors == 'motors-off' else 'running'}"
+        text = (
+            f"Touched down {touchdown.distance_m:.1f} m off the marker at {touchdown.time_s:.1f} "
+            f"s, then slid {touchdown.slid_m:.1f} m over the ground {still}."
         )
-        return _missed(flight, touchdown.time_s, beginning)
-    if limits.abort == "violation":
-        phase = landing_phase(flight, _abort_time(flight))
-        return _Mechanism("abort", "abort", f"abort:{phase}", "The landing was aborted.")
-    return _Mechanism(None, None, "", "The landing was aborted and the UAV climbed clear.")
+    return _Mechanism(
+        primary="distance", violation_type="slid", signature=f"slid:{motors}", sentence=text
+    )
 
 
-def _not_landed(flight: Flight) -> _Mechanism:
-    """Distinguish a marker that was never seen or was lost (II) from one seen to the end (late)."""
-    phase = landing_phase(flight, flight.elapsed_s)
-    # Without diagnostics it is unknown whether the system detected the marker in the picture.
-    seen = "detected" if reports_detections(flight) or reports_targets(flight) else "in view"
-    last = last_sighting_s(flight)
-    if last is None:
-        text = f"Not landed; the marker was never {seen}."
-        return _Mechanism("time", "II", f"II:never-seen:{phase}", text)
-    if flight.elapsed_s - last > LOST_AFTER_S:
-        text = f"Not landed; the marker was last {seen} at {last:.1f} s."
-        return _Mechanism("time", "II", f"II:lost:{phase}", text)
-    text = f"Not landed although the marker was {seen} to the end."
-    return _Mechanism("time", "late", f"late:not-landed:{phase}", text)
+def _no_landing(flight: Flight, limits: Limits, why: Excuse, why_text: str) -> _Mechanism:
+    """Return the violation of a landing that was given up, or that ran out of time."""
+    gave_up = flight.outcome == "gave_up"
+    end = "Gave up" if gave_up else "Not landed"
+    forbidden = limits.abort == "violation" and gave_up
+    if why and forbidden:
+        return _Mechanism(
+            primary="abort",
+            violation_type="abort",
+            signature=f"abort:{why}",
+            sentence=f"{end}. {why_text}",
+        )
+    if why:
+        return _Mechanism(sentence=f"{end}, excused. {why_text}")
+    violation_type, signature, sentence = _no_landing_cause(flight, limits, end)
+    if gave_up and limits.abort == "ok":
+        return _Mechanism(sentence=sentence)
+    return _Mechanism(
+        primary="time", violation_type=violation_type, signature=signature, sentence=sentence
+    )
 
 
-def _missed(flight: Flight, time_s: float, beginning: str) -> _Mechanism:
-    """Return the violation of a touchdown off the marker: what the system mistook for the marker.
+def _no_landing_cause(flight: Flight, limits: Limits, end: str) -> tuple[ViolationType, str, str]:
+    """Distinguish a marker never seen or lost (II), one in sight, and a lack of time (late)."""
+    at_s = gave_up_s(flight)
+    phase = landing_phase(flight, at_s)
+    readable = [step.time_s for step in readable_steps(flight, at_s)]
+    report = _report_text(flight, at_s)
+    if not readable:
+        return "II", "II:never-seen", f"{end}; the marker was never in view.{report}"
+    last = readable[-1]
+    lost = at_s - last > LOST_AFTER_S
+    if flight.outcome == "not_landed" and not lost:
+        text = f"Not landed although the marker was in view to the end.{report}"
+        return "late", f"late:not-landed:{phase}", text
+    view = f"the marker was last in view at {last:.1f} s" if lost else "the marker was in view"
+    if flight.outcome == "gave_up" and at_s >= (1 - RESERVE_SHARE) * limits.time_s:
+        text = f"Gave up at {at_s:.1f} s for want of time; {view}.{report}"
+        return "late", f"late:no-time:{phase}", text
+    if lost:
+        return "II", f"II:lost:{phase}", f"{end}; {view}.{report}"
+    seen_s = len(readable) * _frame_s(flight)
+    text = f"Gave up with the marker in view, which had been readable for {seen_s:.1f} s.{report}"
+    return "II", f"II:gave-up-in-sight:{phase}", text
 
-    ``time_s`` is the time of the touchdown.  ``beginning`` is the beginning of the sentence, with
-    the distance from the marker.
+
+def _report_text(flight: Flight, until_s: float) -> str:
+    """Return a sentence about the last report of the marker by the system, if it reports any."""
+    last = last_report_s(flight, until_s)
+    if last is not None:
+        return f" The system last reported it at {last:.1f} s."
+    reports = any(
+        step.diagnostics and (step.diagnostics.detections or step.diagnostics.target_m)
+        for step in flight.steps
+    )
+    return " The system reported other places, never the marker's." if reports else ""
+
+
+def _missed(
+    flight: Flight, limits: Limits, touchdown: Touchdown | None, beginning: str
+) -> _Mechanism:
+    """Return the violation of a touchdown off the marker, with what lies under the UAV.
+
+    ``beginning`` is the beginning of the sentence, with a gap for the distance.
     """
-    target = _last_target(flight, time_s)
-    if target is not None and math.dist(target, flight.marker_position_m) <= SAME_PLACE_M:
-        sentence = f"{beginning}, though its target was right."
-        return _Mechanism("distance", "off", "off:knew-better", sentence)
-    place = target or _position(flight, time_s)
-    decoys = [(math.dist(place, (x, y)), name) for name, x, y in flight.decoys]
-    distance_m, name = min(decoys, default=(math.inf, ""))
-    if distance_m <= SAME_PLACE_M:
-        signature = f"I:{name}:{_phase_of_first_target(flight, place, time_s)}"
-        return _Mechanism("distance", "I", signature, f"{beginning}, on {name}.")
+    off_m = touchdown.distance_m if touchdown else flight.final_distance_m
+    if flight.outcome == "landed":
+        off_m = flight.final_distance_m
+    at_s = touchdown.time_s if touchdown else flight.elapsed_s
+    start = beginning.format(f"{off_m:.1f} m off the marker")
+    readable = [step.time_s for step in readable_steps(flight, at_s)]
+    target = _target_text(flight, at_s)
+    if off_m <= max(PAPER_LIMITS.distance_m, limits.distance_m):
+        recent = bool(readable) and at_s - readable[-1] <= LOST_AFTER_S
+        view = "was in view" if recent else "was not in view for the last 3 s"
+        return _Mechanism(
+            primary="distance",
+            violation_type="off",
+            signature=f"off:{'seen' if recent else 'unseen'}",
+            sentence=f"{start}, which {view}{target}.",
+        )
+    on = _ground_under(flight, touchdown)
+    seen = "seen" if readable else "unseen"
+    view = "had been in view" if readable else "was never in view"
+    what = "on open ground" if on == "nothing" else f"on a {on}" if on in _PLAIN else f"on {on}"
+    return _Mechanism(
+        primary="distance",
+        violation_type="I",
+        signature=f"I:{on}:{seen}",
+        sentence=f"{start}, {what}; the marker {view}{target}.",
+    )
+
+
+_PLAIN = ("line", "shadow")
+
+
+def _ground_under(flight: Flight, touchdown: Touchdown | None) -> str:
+    """Return what lies under the UAV; for simulators without touchdowns the decoy there."""
+    if touchdown is not None:
+        return touchdown.on
+    x, y = (float(value) for value in flight.uav.position_m[-1, :2])
+    near = [(math.dist((x, y), place), name) for name, *place in flight.decoys]
+    distance_m, name = min(near, default=(math.inf, ""))
+    return name if distance_m <= AT_MARKER_M else "nothing"
+
+
+def _target_text(flight: Flight, at_s: float) -> str:
+    """Return words about the target that the system reported last; empty without reports."""
+    target = last_target(flight, at_s)
     if target is None:
-        return _Mechanism("distance", "I", "I?:unknown", f"{beginning}; it does not say on what.")
-    signature = f"I:phantom:{_phase_of_first_target(flight, place, time_s)}"
-    sentence = f"{beginning}, on something that it took for the marker."
-    return _Mechanism("distance", "I", signature, sentence)
+        return "; it reported no target" if any(s.diagnostics for s in flight.steps) else ""
+    if math.dist(target, flight.marker_position_m) <= AT_MARKER_M:
+        return "; its target was right"
+    near = [(math.dist(target, place), name) for name, *place in flight.decoys]
+    distance_m, name = min(near, default=(math.inf, ""))
+    if distance_m <= AT_MARKER_M:
+        return f"; its target was {name}"
+    off_m = math.dist(target, flight.marker_position_m)
+    return f"; its target was {off_m:.1f} m off the marker"
 
 
-def _last_target(flight: Flight, time_s: float) -> tuple[float, float] | None:
-    """Return the last target (x, y) that the system reported up to a time."""
-    for step in reversed(flight.steps):
-        target = step.diagnostics.target_m if step.diagnostics else None
-        if step.time_s <= time_s and target:
-            return target[0], target[1]
-    return None
-
-
-def _position(flight: Flight, time_s: float) -> tuple[float, float]:
-    """Return the position (x, y) of the UAV at a time."""
-    index = int(np.searchsorted(flight.uav.time_s, time_s, side="right")) - 1
-    x, y = (float(value) for value in flight.uav.position_m[max(0, index), :2])
-    return x, y
-
-
-def _phase_of_first_target(flight: Flight, place: tuple[float, float], end_s: float) -> str:
-    """Return the phase in which the system first reported a place as its target."""
-    for step in flight.steps:
-        target = step.diagnostics.target_m if step.diagnostics else None
-        if target is not None and math.dist(target[:2], place) <= SAME_PLACE_M:
-            return landing_phase(flight, step.time_s)
-    return landing_phase(flight, end_s)
-
-
-def _abort_time(flight: Flight) -> float:
-    return next((e.time_s for e in flight.events if e.name == "abort_command"), flight.elapsed_s)
+def _frame_s(flight: Flight) -> float:
+    times = [step.time_s for step in flight.steps[:2]]
+    return times[1] - times[0] if len(times) == 2 else 0.0
 
 
 def _where(flight: Flight) -> str:
@@ -328,8 +373,8 @@ def _where(flight: Flight) -> str:
     )
     recent = [s for s in flight.steps if s.time_s > flight.elapsed_s - RECENT_S]
     hidden = ""
-    share = 1 - sum(s.marker_visible for s in recent) / len(recent) if recent else 0.0
-    if share >= LEAST_HIDDEN_SHARE and flight.outcome != "landed":
+    share = 1 - float(np.mean([s.marker_visible for s in recent])) if recent else 0.0
+    if share >= LEAST_HIDDEN_SHARE and flight.outcome not in ("landed", "slid"):
         hidden = (
             f" In the last 2 s {100 * share:.0f} % of the marker was hidden or out of the frame."
         )

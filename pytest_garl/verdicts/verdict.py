@@ -35,7 +35,6 @@ MarginName = Literal[
     "decoy",
     "tracking",
     "slide",
-    "mission",
     "crash",
     "abort",
     "own",

@@ -8,7 +8,31 @@ from typing import Any
 import numpy as np
 
 from pytest_garl.landing_system import Detection, Diagnostics
-from pytest_garl.simulation.flight import Contact, Crash, Flight, Separation, Step, Track
+from pytest_garl.simulation.flight import (
+    Contact,
+    Crash,
+    Flight,
+    MarkerView,
+    NominalView,
+    ObjectRecord,
+    Separation,
+    Step,
+    Touchdown,
+    Track,
+)
+
+CLEAR = MarkerView(
+    share_in_frame=1.0,
+    px_per_module=6.0,
+    border_hidden=0.0,
+    bits_hidden=0.0,
+    contrast=150.0,
+    noise=1.2,
+    blur_px=0.0,
+)
+"""A marker that any detector reads."""
+FOGGY = dataclasses.replace(CLEAR, contrast=0.5)
+"""A marker that no detector reads."""
 
 
 def step(
@@ -17,6 +41,7 @@ def step(
     target: Any = None,
     detected: Any = None,
     visible: float = 0.0,
+    marker: MarkerView | None = None,
 ) -> Step:
     found = () if detected is None else (detection(detected),)
     return Step(
@@ -26,6 +51,7 @@ def step(
         marker_px=24.0,
         objects_visible=seen,
         diagnostics=Diagnostics(target_m=target, detections=found),
+        marker=marker,
     )
 
 
@@ -92,4 +118,34 @@ CRASH = Crash(
 def gap(body: str, kind: str, body_class: Any, distance_m: float, time_s: float) -> Separation:
     return Separation(
         body=body, kind=kind, body_class=body_class, distance_m=distance_m, time_s=time_s
+    )
+
+
+def nominal(marker: MarkerView, duration_s: float = 10.0) -> tuple[NominalView, ...]:
+    view = NominalView(
+        time_s=10.0, duration_s=duration_s, place="above", height_m=6.0, marker=marker
+    )
+    return (view,)
+
+
+def touchdown(
+    distance_m: float, *, on: str = "nothing", time_s: float = 27.0, **changes: Any
+) -> Touchdown:
+    base = Touchdown(
+        time_s=time_s,
+        position_m=(distance_m, 0.0, 0.2),
+        distance_m=distance_m,
+        speed_mps=0.4,
+        tilt_rad=0.02,
+        on=on,
+        stopped_s=time_s + 1.0,
+    )
+    return dataclasses.replace(base, **changes)
+
+
+def person_at(times: tuple[float, ...], xs: tuple[float, ...]) -> ObjectRecord:
+    """Return a person who is at y = 0 and these x at these times, at rest in between."""
+    samples = [(time, x, 0.0, 0.0) for time, x in zip(times, xs, strict=True)]
+    return ObjectRecord(
+        name="person-1", type="person", track=track(*samples), moves=np.zeros((0, 2))
     )

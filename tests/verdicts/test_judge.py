@@ -8,7 +8,19 @@ import pytest
 from pytest_garl.simulation.flight import Flight
 from pytest_garl.verdicts.judge import closest_call, judge, off_marker_m, why_undecided
 from pytest_garl.verdicts.verdict import Limits
-from tests.verdicts.flights import CRASH, flight, gap, hit, step, touch, track
+from tests.verdicts.flights import (
+    CLEAR,
+    CRASH,
+    FOGGY,
+    flight,
+    gap,
+    hit,
+    nominal,
+    step,
+    touch,
+    touchdown,
+    track,
+)
 
 
 @pytest.mark.parametrize(
@@ -16,21 +28,31 @@ from tests.verdicts.flights import CRASH, flight, gap, hit, step, touch, track
     [
         (flight("landed", (0.2, 0.0, 0.2)), None, ""),
         (
-            flight("landed", (4.1, 4.0, 0.2), steps=(step(5.0, target=(4, 4, 0)),)),
+            flight("landed", (4.1, 4.0, 0.2), touchdown=touchdown(5.7, on="decoy-marker-3")),
             "distance",
-            "I:decoy-marker-3:transit",
+            "I:decoy-marker-3:unseen",
         ),
         (
-            flight("landed", (3.0, -4.0, 0.2), steps=(step(5.0, target=(3, -4, 0)),)),
+            flight("landed", (3.0, -4.0, 0.2), steps=(step(5.0, marker=CLEAR),)),
             "distance",
-            "I:phantom:transit",
+            "I:nothing:seen",
+        ),
+        (flight("landed", (1.0, 0.0, 0.2)), "distance", "off:unseen"),
+        (
+            flight("slid", (3.0, 0.0, 0.2), touchdown=touchdown(0.1, slid_m=2.9, stopped_s=None)),
+            "distance",
+            "slid:motors-on",
         ),
         (
-            flight("landed", (3.0, 0.0, 0.2), steps=(step(5.0, target=(0, 0, 0)),)),
+            flight("slid", (3.0, 0.0, 0.2), touchdown=touchdown(0.1, slid_m=2.9)),
             "distance",
-            "off:knew-better",
+            "slid:motors-off",
         ),
-        (flight("landed", (3.0, 0.0, 0.2)), "distance", "I?:unknown"),
+        (
+            flight("slid", (3.0, 0.0, 0.2), touchdown=touchdown(1.1, slid_m=1.9)),
+            "distance",
+            "off:unseen",
+        ),
         (
             flight("collision", (0.0, 0.0, 1.0), contacts=hit("dog-1", "dog", "dynamic")),
             "collision",
@@ -61,27 +83,74 @@ from tests.verdicts.flights import CRASH, flight, gap, hit, step, touch, track
             "collision",
             "hard:tilted",
         ),
-        (flight("not_landed", (0.0, 0.0, 10.0)), "time", "II:never-seen:approach"),
+        (flight("not_landed", (0.0, 0.0, 10.0)), "time", "II:never-seen"),
         (
             flight("crashed", (0.0, 0.0, 5.0), crash=CRASH),
             "crash",
             "V:PlannerError@planning_ego.plan",
         ),
-        (flight("gave_up", (0.0, 0.0, 8.0)), None, ""),
+        (flight("gave_up", (0.0, 0.0, 8.0)), "time", "II:never-seen"),
     ],
 )
 def test_the_first_event_decides_the_verdict(subject: Flight, primary: Any, signature: str) -> None:
-    verdict = judge(subject, Limits(distance_m=1.5))
+    verdict = judge(subject, Limits())
     assert verdict.primary == primary
     assert verdict.signature == signature
     assert verdict.story
 
 
-def test_late_and_aborted_flights_are_no_paper_violation() -> None:
+def test_the_paper_counts_no_landing_but_no_late_landing() -> None:
     late = judge(flight("landed", (0.0, 0.0, 0.2)), Limits(time_s=20))
     assert (late.primary, late.violation_type, late.paper_violation) == ("time", "late", False)
-    aborted = judge(flight("gave_up", (0.0, 0.0, 8.0)), Limits(abort="violation"))
-    assert (aborted.primary, aborted.paper_violation) == ("abort", False)
+    excused = flight("gave_up", (0.0, 0.0, 8.0), nominal_views=nominal(FOGGY))
+    verdict = judge(excused, Limits())
+    assert (verdict.primary, verdict.paper_violation, verdict.no_landing) == (None, True, "excused")
+
+
+@pytest.mark.parametrize(
+    ("rule", "excused", "primary", "signature"),
+    [
+        ("needless", True, None, ""),
+        ("needless", False, "time", "II:never-seen"),
+        ("ok", True, None, ""),
+        ("ok", False, None, ""),
+        ("violation", True, "abort", "abort:undetectable"),
+        ("violation", False, "time", "II:never-seen"),
+    ],
+)
+def test_the_limit_says_when_giving_up_is_a_violation(
+    rule: Any, excused: bool, primary: Any, signature: str
+) -> None:
+    views = nominal(FOGGY if excused else CLEAR)
+    verdict = judge(flight("gave_up", (0.0, 0.0, 8.0), nominal_views=views), Limits(abort=rule))
+    assert (verdict.primary, verdict.signature) == (primary, signature)
+    assert verdict.no_landing == ("excused" if excused else "needless")
+
+
+def test_a_system_that_gives_up_at_once_is_not_excused_by_its_own_path() -> None:
+    subject = flight("gave_up", (0.0, -10.0, 5.0), steps=(), nominal_views=nominal(CLEAR))
+    assert judge(subject, Limits()).signature == "II:never-seen"
+
+
+def test_reports_of_the_system_change_the_text_and_never_the_type() -> None:
+    here, there = (0.0, 0.0, 0.0), (9.0, 0.0, 0.0)
+    silent = flight("gave_up", (0.0, 0.0, 8.0), steps=(step(29.0, marker=CLEAR),))
+    boasts = dataclasses.replace(silent, steps=(step(29.0, marker=CLEAR, detected=here),))
+    raves = dataclasses.replace(silent, steps=(step(29.0, marker=CLEAR, detected=there),))
+    verdicts = [judge(each, Limits()) for each in (silent, boasts, raves)]
+    assert {each.signature for each in verdicts} == {"II:gave-up-in-sight:approach"}
+    assert "The system last reported it at 29.0 s." in verdicts[1].story
+    assert "The system reported other places" in verdicts[2].story
+
+
+def test_the_target_is_compared_without_the_error_of_the_position() -> None:
+    seen = step(20.0, target=(5.0, 0.0, 0.0))
+    drifted = dataclasses.replace(seen, estimation_error_m=(5.0, 0.0, 0.0))
+    wrong = judge(flight("landed", (4.0, 0.0, 0.2), steps=(seen,)), Limits())
+    right = judge(flight("landed", (4.0, 0.0, 0.2), steps=(drifted,)), Limits())
+    assert wrong.signature == right.signature == "I:nothing:unseen"
+    assert "its target was 5.0 m off the marker" in wrong.story
+    assert "its target was right" in right.story
 
 
 def test_a_late_landing_off_the_marker_violates_the_distance_alone() -> None:
@@ -137,16 +206,16 @@ DESCENT_AND_CLIMB = (
 
 
 @pytest.mark.parametrize(
-    ("target", "signature", "words"),
+    ("target", "words"),
     [
-        (None, "I?:unknown", "it does not say on what"),
-        ((0.0, 0.0, 0.0), "off:knew-better", "though its target was right"),
-        ((5.0, 0.0, 0.0), "I:phantom:last-metre", "on something that it took for the marker"),
-        ((4.0, 4.0, 0.0), "I:decoy-marker-3:last-metre", "on decoy-marker-3"),
+        (None, "it reported no target"),
+        ((0.0, 0.0, 0.0), "its target was right"),
+        ((5.0, 0.0, 0.0), "its target was 5.0 m off the marker"),
+        ((4.0, 4.0, 0.0), "its target was decoy-marker-3"),
     ],
 )
 def test_a_touchdown_off_the_marker_before_an_abort_is_judged_as_a_landing(
-    target: Any, signature: str, words: str
+    target: Any, words: str
 ) -> None:
     subject = flight(
         "gave_up",
@@ -155,23 +224,23 @@ def test_a_touchdown_off_the_marker_before_an_abort_is_judged_as_a_landing(
         contacts=touch(10.0),
         # What it takes for the marker after the touch is not what it came down on.
         steps=(step(10.0, target=target), step(13.0, target=(-9.0, 0.0, 0.0))),
+        nominal_views=nominal(FOGGY),
     )
     verdict = judge(subject, Limits(distance_m=1.5))
-    assert (verdict.primary, verdict.signature) == ("distance", signature)
+    assert (verdict.primary, verdict.signature) == ("distance", "I:nothing:unseen")
+    assert verdict.excuse == ""
     assert verdict.story.startswith("Touched the ground 5.0 m off the marker before it gave up")
     assert words in verdict.story
     margins = {each.property: each for each in verdict.margins}
     assert (margins["distance"].value, margins["distance"].decided) == (-3.5, True)
-    assert not margins["time"].decided
     assert off_marker_m(subject, Limits(distance_m=1.5)) == 5.0
-    assert not verdict.paper_violation
 
 
 def test_a_touchdown_within_the_limit_before_an_abort_is_no_violation() -> None:
     subject = flight(
         "gave_up", (5.0, 0.0, 5.0), uav=track(*DESCENT_AND_CLIMB), contacts=touch(10.0)
     )
-    assert judge(subject, Limits(distance_m=5.0)).primary is None
+    assert judge(subject, Limits(distance_m=5.0)).primary == "time"
     assert off_marker_m(subject, Limits(distance_m=5.0)) is None
     assert judge(subject, Limits(distance_m=4.99)).primary == "distance"
 
@@ -184,12 +253,36 @@ def test_sliding_off_the_marker_before_an_abort_violates_and_flying_off_does_not
     verdict = judge(subject, Limits(distance_m=1.5))
     assert verdict.primary == "distance"
     assert "Touched the ground 3.0 m off" in verdict.story
-    assert judge(dataclasses.replace(subject, uav=flew), Limits(distance_m=1.5)).primary is None
+    flown = judge(dataclasses.replace(subject, uav=flew), Limits(distance_m=1.5))
+    assert flown.primary == "time"
 
 
-def test_an_abort_in_the_air_leaves_the_distance_undecided() -> None:
+def test_an_abort_in_the_air_is_no_landing_anywhere() -> None:
     subject = flight("gave_up", (5.0, 0.0, 5.0))
-    margins = {each.property: each for each in judge(subject, Limits(distance_m=1.5)).margins}
-    assert not margins["distance"].decided
-    assert margins["distance"].reason == "aborted at 30.0 s"
-    assert off_marker_m(subject, Limits(distance_m=1.5)) is None
+    assert off_marker_m(subject, Limits()) is None
+    assert why_undecided(subject) == "gave up at 30.0 s"
+
+
+def test_a_collision_of_a_uav_that_came_down_elsewhere_says_so() -> None:
+    samples = [(t, 3.0, 0.0, 10.0) for t in (10.0, 20.0)]
+    samples += [(20.0 + t, 3.0, 0.0, 10.0 - t) for t in range(1, 8)]
+    places = track((0.0, 3.0, -10.0, 8.0), *samples)
+    subject = flight(
+        "collision",
+        (3.0, 0.0, 3.0),
+        uav=places,
+        contacts=hit("bird-1", "bird", "dynamic"),
+        elapsed_s=27.0,
+    )
+    verdict = judge(subject, Limits())
+    assert verdict.signature == "IV:bird:descent:unseen"
+    assert verdict.story.startswith(
+        "Came down 3.0 m east of the marker, which had never been in view, then hit bird-1"
+    )
+    assert [each.signature for each in verdict.findings] == ["off:descending-elsewhere"]
+    onto = judge(dataclasses.replace(subject, decoys=(("pad", 3.5, 0.5),)), Limits())
+    assert [each.signature for each in onto.findings] == ["I:pad"]
+    above = track((0.0, 0.0, -10.0, 8.0), *((t, 0.0, y, z) for t, _, y, z in samples))
+    over = judge(dataclasses.replace(subject, uav=above), Limits())
+    assert over.findings == ()
+    assert over.story.startswith("Collided with bird-1")

@@ -45,4 +45,5 @@ def test_a_system_that_touches_the_ground_far_off_and_gives_up_violates_the_dist
     off = off_marker_m(flight, Limits())
     assert off is not None
     assert f"Touched the ground {off:.1f} m off the marker before it gave up" in verdict.story
-    assert judge(flight, Limits(distance_m=off + 0.5)).primary is None
+    wide = judge(flight, Limits(distance_m=off + 0.5))
+    assert (wide.primary, wide.violation_type) == ("time", "II")

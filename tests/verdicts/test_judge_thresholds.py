@@ -2,16 +2,25 @@
 
 from __future__ import annotations
 
-import dataclasses
 import math
 from typing import Any
 
 import pytest
 
-from pytest_garl.landing_system import Diagnostics
+from pytest_garl.simulation.flight import Flight
 from pytest_garl.verdicts.judge import judge
 from pytest_garl.verdicts.verdict import Limits
-from tests.verdicts.flights import flight, hit, step
+from tests.verdicts.flights import (
+    CLEAR,
+    FOGGY,
+    flight,
+    hit,
+    nominal,
+    person_at,
+    step,
+    touchdown,
+    track,
+)
 
 
 @pytest.mark.parametrize(("distance_m", "violated"), [(1.5, False), (1.501, True)])
@@ -39,74 +48,73 @@ def test_a_touchdown_beyond_twenty_degrees_is_tilted(tilt_deg: float, signature:
     assert judge(subject, Limits(distance_m=1.5)).signature == signature
 
 
-def test_signature_names_the_nearest_of_two_decoys() -> None:
-    decoys = (("decoy-a", 4.0, 5.2), ("decoy-b", 4.0, 4.3))
-    subject = flight("landed", (4.0, 4.0, 0.2), steps=(step(5.0, target=(4, 4, 0)),), decoys=decoys)
-    assert judge(subject, Limits(distance_m=1.5)).signature.startswith("I:decoy-b:")
+@pytest.mark.parametrize(
+    ("off_m", "signature"), [(0.75, ""), (0.76, "off:unseen"), (1.5, "off:unseen")]
+)
+def test_a_landing_up_to_1_5_m_off_is_off(off_m: float, signature: str) -> None:
+    subject = flight("landed", (off_m, 0.0, 0.2), touchdown=touchdown(off_m))
+    assert judge(subject, Limits()).signature == signature
 
 
-@pytest.mark.parametrize(("away_m", "what"), [(1.5, "decoy-a"), (1.501, "phantom")])
-def test_signature_names_a_decoy_within_1_5_m_of_the_target(away_m: float, what: str) -> None:
+def test_a_landing_beyond_1_5_m_is_on_something_else() -> None:
+    subject = flight("landed", (1.51, 0.0, 0.2), touchdown=touchdown(1.51, on="line"))
+    assert judge(subject, Limits()).signature == "I:line:unseen"
+
+
+def test_a_limit_beyond_1_5_m_moves_the_border_of_type_i() -> None:
+    subject = flight("landed", (3.1, 0.0, 0.2), touchdown=touchdown(3.1))
+    assert judge(subject, Limits(distance_m=3.0)).violation_type == "I"
+    assert judge(subject, Limits(distance_m=3.1)).primary is None
+
+
+@pytest.mark.parametrize(("away_m", "what"), [(1.5, "decoy-b"), (1.51, "nothing")])
+def test_without_a_touchdown_the_nearest_decoy_within_1_5_m_lies_under_the_uav(
+    away_m: float, what: str
+) -> None:
+    decoys = (("decoy-a", 4.0, 6.0), ("decoy-b", 4.0 + away_m, 4.0))
+    subject = flight("landed", (4.0, 4.0, 0.2), decoys=decoys)
+    assert judge(subject, Limits()).signature == f"I:{what}:unseen"
+
+
+@pytest.mark.parametrize(("seen_s", "sight"), [(24.0, "seen"), (23.9, "unseen")])
+def test_a_marker_readable_in_the_last_three_seconds_was_seen(seen_s: float, sight: str) -> None:
     subject = flight(
         "landed",
-        (4.0, 4.0, 0.2),
-        steps=(step(5.0, target=(4.0, 4.0, 0.0)),),
-        decoys=(("decoy-a", 4.0 + away_m, 4.0),),
+        (1.0, 0.0, 0.2),
+        steps=(step(seen_s, marker=CLEAR),),
+        touchdown=touchdown(1.0, time_s=27.0),
     )
-    assert judge(subject, Limits(distance_m=1.5)).signature.startswith(f"I:{what}:")
-
-
-@pytest.mark.parametrize(("away_m", "kind"), [(1.5, "off"), (1.501, "I")])
-def test_a_target_within_1_5_m_of_the_marker_is_right(away_m: float, kind: str) -> None:
-    subject = flight("landed", (3.0, 0.0, 0.2), steps=(step(5.0, target=(away_m, 0.0, 0.0)),))
-    assert judge(subject, Limits(distance_m=1.5)).violation_type == kind
+    assert judge(subject, Limits()).signature == f"off:{sight}"
 
 
 @pytest.mark.parametrize(
     ("last_s", "signature", "words"),
     [
-        (27.0, "late:not-landed:approach", "although the marker was detected to the end"),
-        (26.9, "II:lost:approach", "the marker was last detected at 26.9 s"),
+        (27.0, "late:not-landed:approach", "although the marker was in view to the end"),
+        (26.9, "II:lost:approach", "the marker was last in view at 26.9 s"),
     ],
 )
-def test_a_marker_not_detected_for_three_seconds_is_lost(
+def test_a_marker_not_readable_for_three_seconds_is_lost(
     last_s: float, signature: str, words: str
 ) -> None:
-    steps = (step(5.0, detected=(0.0, 0.0, 0.0)), step(last_s, detected=(0.0, 0.0, 0.0)))
-    verdict = judge(
-        flight("not_landed", (0.0, 0.0, 10.0), steps=(*steps, step(29.9))), Limits(distance_m=1.5)
-    )
+    steps = (step(5.0, marker=CLEAR), step(last_s, marker=CLEAR), step(29.9, marker=FOGGY))
+    verdict = judge(flight("not_landed", (0.0, 0.0, 10.0), steps=steps), Limits())
     assert verdict.signature == signature
     assert words in verdict.story
 
 
-@pytest.mark.parametrize(("away_m", "kind"), [(1.5, "late"), (1.501, "II")])
-def test_a_detection_within_1_5_m_of_the_marker_counts_as_a_sighting(
-    away_m: float, kind: str
+@pytest.mark.parametrize(
+    ("limit_s", "signature"),
+    [(36.0, "II:gave-up-in-sight:approach"), (35.0, "late:no-time:approach")],
+)
+def test_giving_up_in_the_last_15_percent_of_the_time_is_for_want_of_time(
+    limit_s: float, signature: str
 ) -> None:
-    steps = (step(29.9, detected=(away_m, 0.0, 0.0)),)
-    verdict = judge(flight("not_landed", (0.0, 0.0, 10.0), steps=steps), Limits(distance_m=1.5))
-    assert verdict.violation_type == kind
+    steps = (step(29.0, marker=CLEAR), step(29.1, marker=CLEAR))
+    subject = flight("gave_up", (0.0, 0.0, 10.0), steps=steps)
+    assert judge(subject, Limits(time_s=limit_s)).signature == signature
 
 
-@pytest.mark.parametrize(("away_m", "kind"), [(1.5, "late"), (1.501, "II")])
-def test_targets_count_as_sightings_of_a_system_without_detections(
-    away_m: float, kind: str
-) -> None:
-    steps = (step(29.9, target=(away_m, 0.0, 0.0)),)
-    verdict = judge(flight("not_landed", (0.0, 0.0, 10.0), steps=steps), Limits(distance_m=1.5))
-    assert verdict.violation_type == kind
-    assert "detected" in verdict.story
-
-
-def test_a_target_is_no_sighting_of_a_system_with_detections() -> None:
-    here = (0.0, 0.0, 0.0)
-    steps = (step(5.0, detected=here, target=here), step(29.9, target=here))
-    verdict = judge(flight("not_landed", (0.0, 0.0, 10.0), steps=steps), Limits(distance_m=1.5))
-    assert verdict.signature == "II:lost:approach"
-
-
-@pytest.mark.parametrize("diagnostics", [None, Diagnostics(phase="hover")])
 @pytest.mark.parametrize(
     ("visible", "kind", "words"),
     [
@@ -114,18 +122,52 @@ def test_a_target_is_no_sighting_of_a_system_with_detections() -> None:
         (0.5, "II", "the marker was never in view"),
     ],
 )
-def test_without_diagnostics_the_marker_in_view_counts_as_a_sighting(
-    diagnostics: Any, visible: float, kind: str, words: str
+def test_without_records_of_the_marker_its_visible_share_counts(
+    visible: float, kind: str, words: str
 ) -> None:
-    silent = dataclasses.replace(step(29.9, visible=visible), diagnostics=diagnostics)
-    verdict = judge(flight("not_landed", (0.0, 0.0, 10.0), steps=(silent,)), Limits(distance_m=1.5))
+    steps = (step(29.9, visible=visible),)
+    verdict = judge(flight("not_landed", (0.0, 0.0, 10.0), steps=steps), Limits())
     assert verdict.violation_type == kind
     assert words in verdict.story
-    assert "detected" not in verdict.story
-    earlier = dataclasses.replace(silent, time_s=20.0)
-    lost = judge(flight("not_landed", (0.0, 0.0, 10.0), steps=(earlier,)), Limits(distance_m=1.5))
-    assert lost.violation_type == "II"
-    assert "detected" not in lost.story
+
+
+@pytest.mark.parametrize(("duration_s", "excuse"), [(1.9, "undetectable"), (2.1, "")])
+def test_a_marker_that_a_nominal_landing_reads_for_two_seconds_excuses_nobody(
+    duration_s: float, excuse: str
+) -> None:
+    subject = flight("gave_up", (0.0, 0.0, 8.0), nominal_views=nominal(CLEAR, duration_s))
+    verdict = judge(subject, Limits())
+    assert verdict.excuse == excuse
+    assert (verdict.primary is None) == bool(excuse)
+
+
+def _blocked(times: tuple[float, ...], xs: tuple[float, ...], arrival_s: float) -> Flight:
+    return flight(
+        "not_landed",
+        (0.0, 0.0, 8.0),
+        uav=track(*((time, 0.0, 0.0, 8.0) for time in times)),
+        objects=(person_at(times, xs),),
+        nominal_arrival_s=arrival_s,
+        elapsed_s=times[-1],
+    )
+
+
+@pytest.mark.parametrize(
+    ("away_s", "arrival_s", "excuse"),
+    [
+        (9, 10.0, "blocked"),
+        (11, 10.0, ""),  # free for ten seconds
+        (0, 40.0, ""),  # less than half a minute of waiting
+    ],
+)
+def test_a_marker_that_is_never_free_for_ten_seconds_is_blocked(
+    away_s: int, arrival_s: float, excuse: str
+) -> None:
+    times = tuple(float(second) for second in range(61))
+    xs = tuple(9.0 if 20 <= second < 20 + away_s else 0.5 for second in range(61))
+    verdict = judge(_blocked(times, xs, arrival_s), Limits())
+    assert verdict.excuse == excuse
+    assert ("was blocked" in verdict.story) == bool(excuse)
 
 
 @pytest.mark.parametrize(("time_s", "sight"), [(28.0, "seen"), (27.9, "unseen"), (30.1, "unseen")])

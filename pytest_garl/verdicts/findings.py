@@ -1,0 +1,139 @@
+"""Second reading: what had gone wrong in a flight before the event that decided it."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from pytest_garl.simulation.flight import Flight
+from pytest_garl.simulation.physics.vehicle import up_m
+from pytest_garl.verdicts.phases import LOW_M, landing_phase
+from pytest_garl.verdicts.sightings import (
+    AT_MARKER_M,
+    readable_steps,
+    reports_detections,
+    reports_marker,
+)
+from pytest_garl.verdicts.touchdowns import gave_up_s, landed_s
+from pytest_garl.verdicts.verdict import Finding, Limits
+from pytest_garl.verdicts.wording import compass_point
+
+DESCENT_WINDOW_S = 3.0
+"""Length of the last part of a flight that shows where it was coming down."""
+LEAST_SINK_M = 0.5
+"""A UAV that sinks less than this in the window is not coming down."""
+UNDETECTED_S = 3.0
+"""A marker that could be read for this long without being reported was lost."""
+SLOW_FACTOR = 3.0
+"""A landing is slow from this many times the nominal landing's time on."""
+ELSEWHERE = "off:descending-elsewhere"
+LOST = "lost-while-detectable"
+SLOW = "slow"
+REPORTED_ONLY = (SLOW,)
+"""Findings that are reported, but not flown again."""
+
+
+def findings(flight: Flight, limits: Limits) -> tuple[Finding, ...]:
+    """Return what had gone wrong before the flight's end, in the order of time."""
+    found = (
+        descent_elsewhere(flight, limits),
+        _lost_while_detectable(flight),
+        _slow(flight),
+    )
+    return tuple(sorted((each for each in found if each), key=lambda each: each.time_s))
+
+
+def descent_elsewhere(flight: Flight, limits: Limits) -> Finding | None:
+    """Return that a flight which hit something was coming down beside the marker.
+
+    Both its last place and the place at which its motion of the last seconds would have ended on
+    the ground lie beyond the limit, and by more than the marker's length.
+    """
+    if flight.outcome != "collision" or flight.contacts[-1].body_class == "ground":
+        return None
+    times, places = flight.uav.time_s, flight.uav.position_m
+    end_s = float(times[-1])
+    if landing_phase(flight, end_s) not in ("descent", "last-metre"):
+        return None
+    start = int(np.searchsorted(times, end_s - DESCENT_WINDOW_S))
+    moved = places[-1] - places[start]
+    if -float(moved[2]) < LEAST_SINK_M or places[start:, 2].max() > LOW_M + LEAST_SINK_M:
+        return None
+    # The straight line of the last seconds, down to the ground.
+    left = up_m(float(places[-1, 2])) / -float(moved[2])
+    aim = places[-1, :2] + left * moved[:2]
+    marker = flight.marker_position_m
+    off_m = min(math.dist(place, marker) for place in (tuple(places[-1, :2]), tuple(aim)))
+    if off_m <= max(AT_MARKER_M, limits.distance_m):
+        return None
+    x, y = float(places[-1, 0] - marker[0]), float(places[-1, 1] - marker[1])
+    seen = any(readable_steps(flight, end_s))
+    view = "which had been in view before" if seen else "which had never been in view"
+    near = [(math.dist(tuple(aim), place), name) for name, *place in flight.decoys]
+    distance_m, name = min(near, default=(math.inf, ""))
+    onto = f" onto {name}" if distance_m <= AT_MARKER_M else ""
+    return Finding(
+        signature=f"I:{name}" if onto else ELSEWHERE,
+        margin=limits.distance_m - off_m,
+        unit="m",
+        time_s=float(times[start]),
+        story=(
+            f"Came down{onto} {math.hypot(x, y):.1f} m {compass_point(x, y)} of the marker, {view}."
+        ),
+    )
+
+
+def undetected_s(flight: Flight) -> tuple[float, float]:
+    """Return for how long the marker could be read without being reported, and since when.
+
+    Longest span of frames in a row.  It is 0 for a system that reports no detections.
+    """
+    if not reports_detections(flight):
+        return 0.0, 0.0
+    # A system that gave up is not asked any more.
+    readable = {step.time_s for step in readable_steps(flight, gave_up_s(flight))}
+    longest, began, since = 0.0, 0.0, None
+    for step in flight.steps:
+        if step.time_s in readable and not reports_marker(flight, step):
+            since = step.time_s if since is None else since
+            if step.time_s - since > longest:
+                longest, began = step.time_s - since, since
+        else:
+            since = None
+    return longest, began
+
+
+def _lost_while_detectable(flight: Flight) -> Finding | None:
+    longest, began = undetected_s(flight)
+    if longest < UNDETECTED_S:
+        return None
+    return Finding(
+        signature=LOST,
+        margin=UNDETECTED_S - longest,
+        unit="s",
+        time_s=began,
+        story=(
+            f"From {began:.1f} s on the marker could be read for {longest:.1f} s, but the system "
+            "did not report it."
+        ),
+    )
+
+
+def _slow(flight: Flight) -> Finding | None:
+    nominal_s = flight.nominal_landing_s
+    if flight.outcome != "landed" or not nominal_s:
+        return None
+    took_s = landed_s(flight)
+    if took_s <= SLOW_FACTOR * nominal_s:
+        return None
+    return Finding(
+        signature=SLOW,
+        margin=SLOW_FACTOR * nominal_s - took_s,
+        unit="s",
+        time_s=SLOW_FACTOR * nominal_s,
+        story=(
+            f"Landed after {took_s:.1f} s, {took_s / nominal_s:.1f} times as long as a nominal "
+            "landing."
+        ),
+    )
