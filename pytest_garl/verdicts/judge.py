@@ -72,7 +72,7 @@ def judge(flight: Flight, limits: Limits) -> Verdict:
         violation_type=mechanism.violation_type,
         signature=mechanism.signature,
         paper_violation=far if came_down else True,
-        margins=margins(flight, limits, violates_time=mechanism.primary == "time"),
+        margins=margins(flight, limits, violates_time=mechanism.primary in ("time", "abort")),
         story=f"{mechanism.sentence} {_where(flight)}".strip(),
         completed=flight.outcome == "landed" and mechanism.primary != "distance",
         excuse=why,
@@ -254,7 +254,10 @@ def _no_landing(flight: Flight, limits: Limits, why: Excuse, why_text: str) -> _
     if gave_up and limits.abort == "ok":
         return _Mechanism(sentence=sentence)
     return _Mechanism(
-        primary="time", violation_type=violation_type, signature=signature, sentence=sentence
+        primary="abort" if forbidden else "time",
+        violation_type=violation_type,
+        signature=signature,
+        sentence=sentence,
     )
 
 

@@ -20,7 +20,7 @@ LEAST_DISTANCE_M = 0.3
 """The smallest default limit of distance: what a landing by a camera reaches."""
 PropertyName = Literal["distance", "time", "collision", "crash", "abort", "own"]
 """The property that a violation is about.  A flight that gives up needlessly violates "time": it
-never lands."""
+never lands.  Where the limits forbid to give up, the property is "abort", which no test asserts."""
 ViolationType = Literal["I", "II", "III", "IV", "V", "late", "off", "hard", "slid", "abort", "own"]
 """The paper's five types, and further ones; "own" is a property that a user's test asserts."""
 MarginName = Literal[

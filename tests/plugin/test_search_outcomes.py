@@ -264,5 +264,5 @@ def test_ground_contact_before_an_abort_fails_the_search(
     assert outcomes["failed"] == 1
     assert result.ret == pytest.ExitCode.TESTS_FAILED
     result.stdout.fnmatch_lines(["*Touched the ground 3.0 m off the marker before it gave up*"])
-    result.stdout.fnmatch_lines(["* I[?]:unknown * pytest test_it.py --garl-repeat=lawn-g*"])
+    result.stdout.fnmatch_lines(["* I:nothing:unseen * pytest test_it.py --garl-repeat=lawn-g*"])
     result.stdout.fnmatch_lines(["FAILED test_it.py::test_distance*"])

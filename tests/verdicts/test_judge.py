@@ -115,7 +115,7 @@ def test_the_paper_counts_no_landing_but_no_late_landing() -> None:
         ("ok", True, None, ""),
         ("ok", False, None, ""),
         ("violation", True, "abort", "abort:undetectable"),
-        ("violation", False, "time", "II:never-seen"),
+        ("violation", False, "abort", "II:never-seen"),
     ],
 )
 def test_the_limit_says_when_giving_up_is_a_violation(
