@@ -119,10 +119,10 @@ def off_marker_m(flight: Flight, limits: Limits) -> float | None:
 
     A landing that was given up came down if it touched the ground beyond the limit.
     """
-    if flight.outcome == "landed":
-        return flight.final_distance_m
     touchdown = touchdown_off_marker(flight, limits)
-    return touchdown.distance_m if touchdown else None
+    if touchdown is not None:
+        return touchdown.distance_m
+    return flight.final_distance_m if flight.outcome == "landed" else None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -146,18 +146,18 @@ def _mechanism(flight: Flight, limits: Limits, why: Excuse, why_text: str) -> _M
     """Return the first violation of the flight, or how it ended without one."""
     if flight.outcome == "crashed" and flight.crash:
         return _crash(flight.crash)
+    if touchdown := touchdown_off_marker(flight, limits):
+        beginning = f"Touched the ground {{}}{_then(flight)}"
+        return _missed(flight, limits, touchdown, touchdown.distance_m, beginning)
     if flight.outcome == "collision":
         return _collision(flight, flight.contacts[-1], limits)
-    if touchdown := touchdown_off_marker(flight, limits):
-        before = " before it gave up" if flight.outcome == "gave_up" else ""
-        return _missed(flight, limits, touchdown, f"Touched the ground {{}}{before}")
     if flight.outcome == "slid":
         return _slid(flight)
     if flight.outcome in NO_LANDING:
         return _no_landing(flight, limits, why, why_text)
     at_s = landed_s(flight)
     if flight.final_distance_m > limits.distance_m:
-        return _missed(flight, limits, flight.touchdown, "Landed {}")
+        return _missed(flight, limits, flight.touchdown, flight.final_distance_m, "Landed {}")
     if at_s > limits.time_s:
         return _Mechanism(
             primary="time",
@@ -298,15 +298,12 @@ def _report_text(flight: Flight, until_s: float) -> str:
 
 
 def _missed(
-    flight: Flight, limits: Limits, touchdown: Touchdown | None, beginning: str
+    flight: Flight, limits: Limits, touchdown: Touchdown | None, off_m: float, beginning: str
 ) -> _Mechanism:
     """Return the violation of a touchdown off the marker, with what lies under the UAV.
 
     ``beginning`` is the beginning of the sentence, with a gap for the distance.
     """
-    off_m = touchdown.distance_m if touchdown else flight.final_distance_m
-    if flight.outcome == "landed":
-        off_m = flight.final_distance_m
     at_s = touchdown.time_s if touchdown else flight.elapsed_s
     start = beginning.format(f"{off_m:.1f} m off the marker")
     readable = [step.time_s for step in readable_steps(flight, at_s)]
@@ -330,6 +327,20 @@ def _missed(
         signature=f"I:{on}:{seen}",
         sentence=f"{start}, {what}; the marker {view}{target}.",
     )
+
+
+def _then(flight: Flight) -> str:
+    """Return words about what followed a touchdown off the marker."""
+    match flight.outcome:
+        case "gave_up":
+            return " before it gave up"
+        case "collision":
+            return f" before it met {flight.contacts[-1].body}"
+        case "landed":
+            return " before it landed on the marker"
+        case "slid":
+            return " and slid on"
+    return ""
 
 
 _PLAIN = ("line", "shadow")

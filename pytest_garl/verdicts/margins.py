@@ -11,8 +11,8 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from pytest_garl.simulation.contacts import HARD_TOUCHDOWN_MPS, LANDED_TILT_RAD
 from pytest_garl.simulation.flight import Flight
+from pytest_garl.simulation.ground_stays import HARD_TOUCHDOWN_MPS, SLID_M, UPRIGHT_RAD
 from pytest_garl.simulation.physics.vehicle import BODY_ABOVE_FEET_M
 from pytest_garl.verdicts.findings import UNDETECTED_S, undetected_s
 from pytest_garl.verdicts.phases import LOW_M
@@ -26,8 +26,6 @@ CONE = 0.25
 """Weight of the height above the commit height against the distance: the slope of an approach."""
 DESCENT_MPS = 1.0
 """Speed of a nominal descent, for the time that a flight still needs."""
-SLIDE_M = 0.5
-"""A UAV that moves farther over the ground after its touchdown has slid."""
 FARTHEST_M = 10.0
 """Margins of distances to bodies and decoys that are not there."""
 
@@ -64,7 +62,7 @@ def margins(flight: Flight, limits: Limits, *, violates_time: bool) -> tuple[Mar
         margin("moving", moving, "m", known=True),
         margin("static", static, "m", known=True),
         margin("touchdown_speed", HARD_TOUCHDOWN_MPS - _sink_mps(flight, low), "m/s", known=down),
-        margin("touchdown_tilt", LANDED_TILT_RAD - _tilt_rad(flight, low), "rad", known=down),
+        margin("touchdown_tilt", UPRIGHT_RAD - _tilt_rad(flight, low), "rad", known=down),
         margin("dropout", UNDETECTED_S - undetected_s(flight)[0], "s", known=True),
         margin("decoy", _decoy_m(flight), "m", known=True),
         margin(
@@ -74,7 +72,7 @@ def margins(flight: Flight, limits: Limits, *, violates_time: bool) -> tuple[Mar
             known=reported and bool(low.any()),
             why="the system reports no target, or did not come down",
         ),
-        margin("slide", SLIDE_M - _slid_m(flight), "m", known=down),
+        margin("slide", SLID_M - _slid_m(flight), "m", known=down),
         margin("crash", 0.0 if flight.outcome == "crashed" else 1.0, "1", known=True),
     )
 

@@ -25,20 +25,21 @@ def gave_up_s(flight: Flight) -> float:
 
 
 def touchdown_off_marker(flight: Flight, limits: Limits) -> Touchdown | None:
-    """Return the first touchdown beyond the limit of a flight that did not end as a landing.
+    """Return the first touchdown beyond the limit that was not a landing; None if there was none.
 
-    Of flights that slid or gave up or ran out of time; None if there was none.
+    The UAV took off again, slid on, gave up, or was hit where it stood.
     """
-    if flight.outcome not in ("slid", "gave_up", "not_landed"):
-        return None
-    if flight.outcome == "slid" and flight.touchdown:
-        far = flight.touchdown.distance_m > limits.distance_m
-        return flight.touchdown if far else None
-    return _from_track(flight, limits)
+    found = list(flight.earlier_touchdowns)
+    hard = flight.outcome == "collision" and flight.contacts[-1].body_class == "ground"
+    if flight.touchdown and flight.outcome != "landed" and not hard:
+        found.append(flight.touchdown)
+    if not found and flight.outcome in ("gave_up", "not_landed"):
+        return _from_track(flight, limits)
+    return next((each for each in found if each.distance_m > limits.distance_m), None)
 
 
 def _from_track(flight: Flight, limits: Limits) -> Touchdown | None:
-    """Find the first place on the ground beyond the limit.
+    """Find the first place on the ground beyond the limit, for simulators without touchdowns.
 
     The record's contacts hold only the first one with the ground; later ones follow from the
     height.
@@ -55,15 +56,12 @@ def _from_track(flight: Flight, limits: Limits) -> Touchdown | None:
         x, y, z = (float(value) for value in track.position_m[index])
         off_m = math.hypot(x - mx, y - my)
         if (index == start or z <= height) and off_m > limits.distance_m:
-            time_s = max(first.time_s, float(track.time_s[index]))
-            last = flight.touchdown
-            same = last is not None and abs(last.distance_m - off_m) < 0.5
             return Touchdown(
-                time_s=time_s,
+                time_s=max(first.time_s, float(track.time_s[index])),
                 position_m=(x, y, z),
                 distance_m=off_m,
                 speed_mps=first.speed_mps,
                 tilt_rad=first.tilt_rad,
-                on=last.on if last is not None and same else "nothing",
+                on="nothing",
             )
     return None

@@ -131,7 +131,7 @@ def test_without_records_of_the_marker_its_visible_share_counts(
     assert words in verdict.story
 
 
-@pytest.mark.parametrize(("duration_s", "excuse"), [(1.9, "undetectable"), (2.1, "")])
+@pytest.mark.parametrize(("duration_s", "excuse"), [(1.9, "undetectable"), (2.4, "")])
 def test_a_marker_that_a_nominal_landing_reads_for_two_seconds_excuses_nobody(
     duration_s: float, excuse: str
 ) -> None:
