@@ -1,0 +1,285 @@
+"""How a flight ended: the first violation, its type and signature, and a sentence.
+
+Types follow from ground truth; what a landing system reports about itself only adds to the text.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from pytest_garl.simulation.flight import Contact, Crash, Flight, Separation, Touchdown
+from pytest_garl.simulation.system_under_test.texts import cut
+from pytest_garl.verdicts.findings import descent_elsewhere
+from pytest_garl.verdicts.phases import landing_phase
+from pytest_garl.verdicts.sightings import (
+    AT_MARKER_M,
+    last_report_s,
+    last_target,
+    readable_steps,
+    was_in_view,
+)
+from pytest_garl.verdicts.touchdowns import gave_up_s, landed_s, touchdown_off_marker
+from pytest_garl.verdicts.verdict import (
+    PAPER_LIMITS,
+    Excuse,
+    Limits,
+    PropertyName,
+    ViolationType,
+)
+
+LOST_AFTER_S = 3.0
+"""A marker counts as lost if it was not readable for this long before the end."""
+RESERVE_SHARE = 0.15
+"""A landing that is given up in this last share of the time limit is given up for want of time."""
+MESSAGE_CHARS = 300
+"""Length of an exception's message in a description; the flight's record has 1,000 characters."""
+TILTED_RAD = math.radians(20)
+"""A touchdown beyond this angle is called tilted."""
+NO_LANDING = ("gave_up", "not_landed")
+"""Outcomes of flights that never came down."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Mechanism:
+    """How a flight ended: the violated property, its type and signature, and one sentence."""
+
+    primary: PropertyName | None = None
+    violation_type: ViolationType | None = None
+    signature: str = ""
+    sentence: str
+
+
+def mechanism_of(flight: Flight, limits: Limits, why: Excuse, why_text: str) -> Mechanism:
+    """Return the first violation of the flight, or how it ended without one."""
+    if flight.outcome == "crashed" and flight.crash:
+        return _crash(flight.crash)
+    if touchdown := touchdown_off_marker(flight, limits):
+        beginning = f"Touched the ground {{}}{_then(flight)}"
+        return _missed(flight, limits, touchdown, touchdown.distance_m, beginning)
+    if flight.outcome == "collision":
+        return _collision(flight, flight.contacts[-1], limits)
+    if flight.outcome == "slid":
+        return _slid(flight)
+    if flight.outcome in NO_LANDING:
+        return _no_landing(flight, limits, why, why_text)
+    at_s = landed_s(flight)
+    if flight.final_distance_m > limits.distance_m:
+        return _missed(flight, limits, flight.touchdown, flight.final_distance_m, "Landed {}")
+    if at_s > limits.time_s:
+        return Mechanism(
+            primary="time",
+            violation_type="late",
+            signature=f"late:landed:{landing_phase(flight, limits.time_s)}",
+            sentence=f"Landed late, after {at_s:.1f} s.",
+        )
+    return Mechanism(sentence=f"Landed after {at_s:.1f} s.")
+
+
+_VERBS = {"raised": "raised", "nonsense": "returned nonsense", "died": "died", "hung": "hung"}
+
+
+def _crash(crash: Crash) -> Mechanism:
+    message = cut(crash.message, MESSAGE_CHARS)
+    text = f"The landing system {_VERBS[crash.kind]}: {crash.error}: {message}".rstrip(": ")
+    return Mechanism(
+        primary="crash",
+        violation_type="V",
+        signature=f"V:{crash.error}@{crash.where}",
+        sentence=f"{text}.",
+    )
+
+
+def _collision(flight: Flight, contact: Contact, limits: Limits) -> Mechanism:
+    speed = f"at {contact.speed_mps:.1f} m/s"
+    if contact.body_class == "ground":
+        how = "tilted" if contact.tilt_rad > TILTED_RAD else "fast"
+        return Mechanism(
+            primary="collision",
+            violation_type="hard",
+            signature=f"hard:{how}",
+            sentence=f"Touched down too {how}, {speed}.",
+        )
+    static = contact.body_class == "static"
+    elsewhere = descent_elsewhere(flight, limits)
+    if elsewhere:
+        # A collision hides the landing that had gone wrong before it.
+        verb = f"{elsewhere.story.removesuffix('.')}, then hit"
+    else:
+        verb = "Hit" if static else "Collided with"
+    view = ""
+    if not static and was_in_view(flight, contact.body, contact.time_s):
+        view = " The camera had it in view within the last 2 s."
+    elif not static:
+        view = " The camera had not had it in view for 2 s."
+    return Mechanism(
+        primary="collision",
+        violation_type="III" if static else "IV",
+        signature=collision_signature(flight, contact),
+        sentence=f"{verb} {contact.body} {speed}.{view}",
+    )
+
+
+def collision_signature(flight: Flight, body: Contact | Separation) -> str:
+    """Return the signature of a collision with a body, or what that of a near miss would be."""
+    phase = landing_phase(flight, body.time_s)
+    if body.body_class == "static":
+        return f"III:{body.kind}:{phase}"
+    sight = "seen" if was_in_view(flight, body.body, body.time_s) else "unseen"
+    return f"IV:{body.kind}:{phase}:{sight}"
+
+
+def _slid(flight: Flight) -> Mechanism:
+    touchdown = flight.touchdown
+    if touchdown is None:
+        text, motors = "Slid over the ground after its touchdown.", "motors-on"
+    else:
+        motors = "motors-off" if touchdown.stopped_s is not None else "motors-on"
+        still = f"with the motors {'stopped' if motors == 'motors-off' else 'running'}"
+        text = (
+            f"Touched down {touchdown.distance_m:.1f} m off the marker at {touchdown.time_s:.1f} "
+            f"s, then slid {touchdown.slid_m:.1f} m over the ground {still}."
+        )
+    return Mechanism(
+        primary="distance", violation_type="slid", signature=f"slid:{motors}", sentence=text
+    )
+
+
+def _no_landing(flight: Flight, limits: Limits, why: Excuse, why_text: str) -> Mechanism:
+    """Return the violation of a landing that was given up, or that ran out of time."""
+    gave_up = flight.outcome == "gave_up"
+    end = "Gave up" if gave_up else "Not landed"
+    forbidden = limits.abort == "violation" and gave_up
+    if why and forbidden:
+        return Mechanism(
+            primary="abort",
+            violation_type="abort",
+            signature=f"abort:{why}",
+            sentence=f"{end}. {why_text}",
+        )
+    if why:
+        return Mechanism(sentence=f"{end}, excused. {why_text}")
+    violation_type, signature, sentence = _no_landing_cause(flight, limits, end)
+    if gave_up and limits.abort == "ok":
+        return Mechanism(sentence=sentence)
+    return Mechanism(
+        primary="abort" if forbidden else "time",
+        violation_type=violation_type,
+        signature=signature,
+        sentence=sentence,
+    )
+
+
+def _no_landing_cause(flight: Flight, limits: Limits, end: str) -> tuple[ViolationType, str, str]:
+    """Distinguish a marker never seen or lost (II), one in sight, and a lack of time (late)."""
+    at_s = gave_up_s(flight)
+    phase = landing_phase(flight, at_s)
+    readable = [step.time_s for step in readable_steps(flight, at_s)]
+    report = _report_text(flight, at_s)
+    if not readable:
+        return "II", "II:never-seen", f"{end}; the marker was never in view.{report}"
+    last = readable[-1]
+    lost = at_s - last > LOST_AFTER_S
+    if flight.outcome == "not_landed" and not lost:
+        text = f"Not landed although the marker was in view to the end.{report}"
+        return "late", f"late:not-landed:{phase}", text
+    view = f"the marker was last in view at {last:.1f} s" if lost else "the marker was in view"
+    if flight.outcome == "gave_up" and at_s >= (1 - RESERVE_SHARE) * limits.time_s:
+        text = f"Gave up at {at_s:.1f} s for want of time; {view}.{report}"
+        return "late", f"late:no-time:{phase}", text
+    if lost:
+        return "II", f"II:lost:{phase}", f"{end}; {view}.{report}"
+    seen_s = len(readable) * _frame_s(flight)
+    text = f"Gave up with the marker in view, which had been readable for {seen_s:.1f} s.{report}"
+    return "II", f"II:gave-up-in-sight:{phase}", text
+
+
+def _report_text(flight: Flight, until_s: float) -> str:
+    """Return a sentence about the last report of the marker by the system, if it reports any."""
+    last = last_report_s(flight, until_s)
+    if last is not None:
+        return f" The system last reported it at {last:.1f} s."
+    reports = any(
+        step.diagnostics and (step.diagnostics.detections or step.diagnostics.target_m)
+        for step in flight.steps
+    )
+    return " The system reported other places, never the marker's." if reports else ""
+
+
+def _missed(
+    flight: Flight, limits: Limits, touchdown: Touchdown | None, off_m: float, beginning: str
+) -> Mechanism:
+    """Return the violation of a touchdown off the marker, with what lies under the UAV.
+
+    ``beginning`` is the beginning of the sentence, with a gap for the distance.
+    """
+    at_s = touchdown.time_s if touchdown else flight.elapsed_s
+    start = beginning.format(f"{off_m:.1f} m off the marker")
+    readable = [step.time_s for step in readable_steps(flight, at_s)]
+    target = _target_text(flight, at_s)
+    if off_m <= max(PAPER_LIMITS.distance_m, limits.distance_m):
+        recent = bool(readable) and at_s - readable[-1] <= LOST_AFTER_S
+        view = "was in view" if recent else "was not in view for the last 3 s"
+        return Mechanism(
+            primary="distance",
+            violation_type="off",
+            signature=f"off:{'seen' if recent else 'unseen'}",
+            sentence=f"{start}, which {view}{target}.",
+        )
+    on = _ground_under(flight, touchdown)
+    seen = "seen" if readable else "unseen"
+    view = "had been in view" if readable else "was never in view"
+    what = "on open ground" if on == "nothing" else f"on a {on}" if on in _PLAIN else f"on {on}"
+    return Mechanism(
+        primary="distance",
+        violation_type="I",
+        signature=f"I:{on}:{seen}",
+        sentence=f"{start}, {what}; the marker {view}{target}.",
+    )
+
+
+def _then(flight: Flight) -> str:
+    """Return words about what followed a touchdown off the marker."""
+    match flight.outcome:
+        case "gave_up":
+            return " before it gave up"
+        case "collision":
+            return f" before it met {flight.contacts[-1].body}"
+        case "landed":
+            return " before it landed on the marker"
+        case "slid":
+            return " and slid on"
+    return ""
+
+
+_PLAIN = ("line", "shadow")
+
+
+def _ground_under(flight: Flight, touchdown: Touchdown | None) -> str:
+    """Return what lies under the UAV; for simulators without touchdowns the decoy there."""
+    if touchdown is not None:
+        return touchdown.on
+    x, y = (float(value) for value in flight.uav.position_m[-1, :2])
+    near = [(math.dist((x, y), place), name) for name, *place in flight.decoys]
+    distance_m, name = min(near, default=(math.inf, ""))
+    return name if distance_m <= AT_MARKER_M else "nothing"
+
+
+def _target_text(flight: Flight, at_s: float) -> str:
+    """Return words about the target that the system reported last; empty without reports."""
+    target = last_target(flight, at_s)
+    if target is None:
+        return "; it reported no target" if any(s.diagnostics for s in flight.steps) else ""
+    if math.dist(target, flight.marker_position_m) <= AT_MARKER_M:
+        return "; its target was right"
+    near = [(math.dist(target, place), name) for name, *place in flight.decoys]
+    distance_m, name = min(near, default=(math.inf, ""))
+    if distance_m <= AT_MARKER_M:
+        return f"; its target was {name}"
+    off_m = math.dist(target, flight.marker_position_m)
+    return f"; its target was {off_m:.1f} m off the marker"
+
+
+def _frame_s(flight: Flight) -> float:
+    times = [step.time_s for step in flight.steps[:2]]
+    return times[1] - times[0] if len(times) == 2 else 0.0
