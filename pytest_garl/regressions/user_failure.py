@@ -14,7 +14,7 @@ ATTRIBUTES_OF_PROPERTY: dict[str, frozenset[str]] = {
     "collision": frozenset({"collisions"}),
 }
 """The attributes of a landing that belong to each built-in property."""
-ATTRIBUTES_OF_ALL_PROPERTIES = frozenset({"outcome", "verdict", "result"})
+ATTRIBUTES_OF_ALL_PROPERTIES = frozenset({"outcome", "verdict", "result", "completed", "excused"})
 """The attributes that belong to every built-in property."""
 
 
