@@ -98,6 +98,11 @@ class Tally:
         return self._searches
 
     @property
+    def without_landing(self) -> list[SearchSummary]:
+        """The searches in which no flight landed, once the summaries have been read."""
+        return [each for each in self._searches or () if not each.count("landed")]
+
+    @property
     def unasserted(self) -> Counter[str]:
         """How many flights violate without failing any selected test, by signature."""
         return Counter(
