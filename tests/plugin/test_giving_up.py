@@ -148,3 +148,20 @@ def test_giving_up_is_allowed_by_the_limits(
             "garl: HoverThenAbort on lawn: landed in none of 4 flights",
         ]
     )
+
+
+@pytest.mark.sim
+@pytest.mark.parametrize("system", REPORTS)
+def test_needless_giving_up_is_red_in_the_real_simulator(
+    pytester: pytest.Pytester, system: str
+) -> None:
+    write_four_tests(pytester, system)
+    (pytester.path / "conftest.py").unlink()
+    search = ("--garl-budget=1", "--garl-workers=0", "--garl-npcs=stationary", "-rf")
+    for index, selection in enumerate(SELECTIONS.values()):
+        # Flown once; the other selections judge the same flight.
+        resume = ("--garl-resume",) if index else ()
+        result = run(pytester, *search, *resume, *selection)
+        expected = "test_completes_the_mission" if selection == FOURTH else REPORTS[system]
+        assert failing_tests(result) == [expected]
+        assert result.ret == pytest.ExitCode.TESTS_FAILED
