@@ -199,6 +199,7 @@ def test_junit_carries_properties_of_the_flight(
             "garl.story",
             "garl.final_distance_m",
             "garl.elapsed_s",
+            "garl.excuse",
             "garl.trajectory_sha256",
         }
         assert f"[{found['garl.slot']}]" in str(case.get("name"))
