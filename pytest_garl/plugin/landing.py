@@ -98,9 +98,8 @@ class Landing:
         if verdict.primary is None and not verdict.excuse:
             # It gave up, and limits(abort="ok") allows that.
             self._undecided()
-        if verdict.primary is not None and self._is_shown_elsewhere():
-            self.left_to_another_test = True
-            pytest.skip(f"not decided: another test of this flight fails for {verdict.signature}")
+        if verdict.primary is not None:
+            self._leave_to_another_test()
         return False
 
     @property
@@ -114,18 +113,18 @@ class Landing:
     def distance_to_landing_m(self) -> float:
         """Horizontal distance from the UAV to the marker's centre where it landed.
 
-        Infinite if it slid on after its touchdown.  Where it touched the ground too far off before
-        it gave up, that place counts.
+        Infinite if it slid on after its touchdown.  If it touched the ground too far off before,
+        that place counts.
         """
         self._note("distance_to_landing_m")
         if self.outcome == "slid":
             return math.inf
-        if self.outcome == "landed":
-            return self.final_distance_m
         touched = self._result.off_marker_m
-        if touched is None:
+        if touched is not None:
+            return touched
+        if self.outcome != "landed":
             self._undecided()
-        return touched
+        return self.final_distance_m
 
     @property
     def time_to_landing_s(self) -> float:
@@ -149,6 +148,9 @@ class Landing:
     def collisions(self) -> tuple[str, ...]:
         """Names of the bodies that the UAV hit; "ground" for a hard touchdown."""
         self._note("collisions")
+        if self._result.collisions and self._result.verdict.primary == "distance":
+            # It had touched the ground off the marker before.
+            self._leave_to_another_test()
         return self._result.collisions
 
     @property
@@ -190,6 +192,13 @@ class Landing:
         from pytest_garl.simulation.flight_file import load
 
         return load(self._record)
+
+    def _leave_to_another_test(self) -> None:
+        """Skip the test if another one of the slot fails for the flight's violation."""
+        if self._is_shown_elsewhere():
+            self.left_to_another_test = True
+            signature = self._result.signature
+            pytest.skip(f"not decided: another test of this flight fails for {signature}")
 
     def _undecided(self) -> NoReturn:
         pytest.skip(f"not decided: {self.excused or self._result.undecided}")

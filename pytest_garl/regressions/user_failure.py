@@ -9,7 +9,8 @@ from pytest_garl.execution.flight_id import CompletedFlight
 from pytest_garl.scenarios.scenario import Scenario
 
 ATTRIBUTES_OF_PROPERTY: dict[str, frozenset[str]] = {
-    "distance": frozenset({"distance_to_landing_m", "final_distance_m"}),
+    # A UAV may hit something after it has touched the ground off the marker.
+    "distance": frozenset({"distance_to_landing_m", "final_distance_m", "collisions"}),
     "time": frozenset({"time_to_landing_s", "elapsed_s"}),
     "collision": frozenset({"collisions"}),
 }
