@@ -67,6 +67,35 @@ class Recorded:
         return Move(x=move[0], y=move[1], changes=changes)
 
 
+class HandedOver:
+    """Repeats an NPC's moves for some decisions; from then on another policy decides.
+
+    That policy is asked at every decision, so that it has seen the whole flight when its moves
+    count.
+    """
+
+    def __init__(self, decisions: int, live: str, moves: str, changes: str = "{}") -> None:
+        name, factory, arguments = json.loads(live)
+        self._recorded = Recorded(moves, changes)
+        self._live = PolicySpec(
+            name=name, factory=factory, arguments=tuple((key, value) for key, value in arguments)
+        ).make()
+        self._left = decisions
+
+    def reset(self, situation: Situation, rng: np.random.Generator) -> None:
+        """Begin with the first move."""
+        self._recorded.reset(situation, rng)
+        self._live.reset(situation, rng)
+
+    def decide(self, situation: Situation) -> Move:
+        """Repeat the next move, or let the other policy decide."""
+        live = self._live.decide(situation)
+        if self._left > 0:
+            self._left -= 1
+            return self._recorded.decide(situation)
+        return live
+
+
 class _Exit:
     """The way out of the landing zone: straight on, or away from the marker if the NPC stood.
 
@@ -99,6 +128,20 @@ def _away(situation: Situation) -> float:
     x, y, _ = situation.self.position_m
     mx, my = situation.marker_position_m
     return math.atan2(y - my, x - mx)
+
+
+def handed_over_spec(recorded: PolicySpec, live: PolicySpec, time_s: float) -> PolicySpec:
+    """Return the specification of NPCs that repeat ``recorded`` until a time, then follow ``live``.
+
+    Decisions before ``time_s`` are repeated.
+    """
+    decisions = math.ceil(time_s / DECISION_STEP_S - 1e-9)
+    facts = json.dumps([live.name, live.factory, [list(each) for each in live.arguments]])
+    return PolicySpec(
+        name=f"recorded, then {live.name}",
+        factory=f"{__name__}:{HandedOver.__name__}",
+        arguments=(("decisions", decisions), ("live", facts), *recorded.arguments),
+    )
 
 
 def recorded_spec(moves: Moves, changes: Changes = NONE) -> PolicySpec:

@@ -27,6 +27,7 @@ def fly_job(
     """
     from pytest_garl.errors import NotFiniteError
     from pytest_garl.simulation.flight_file import save
+    from pytest_garl.simulation.system_under_test.takeover import with_takeover
 
     record = job.record(flight)
     record.unlink(missing_ok=True)
@@ -34,9 +35,12 @@ def fly_job(
         if entry not in sys.path:
             sys.path.append(entry)
     map = job.load_map()
+    system = job.system.load()
+    if job.takeover is not None:
+        system = with_takeover(system, job.takeover)
     flown = job.simulator.load()(
         scenario,
-        job.system.load(),
+        system,
         job.npcs,
         map=map,
         time_limit_s=time_limit_s(job.limits),

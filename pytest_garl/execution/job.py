@@ -16,6 +16,7 @@ from pytest_garl.execution.reference import BUILT_IN, Reference
 from pytest_garl.files.json_values import dataclass_from, parse_json
 from pytest_garl.scenarios.maps.map import Map, load_map
 from pytest_garl.simulation.npc_policy import PolicySpec
+from pytest_garl.simulation.system_under_test.takeover import Takeover
 from pytest_garl.verdicts.verdict import DEFAULT_LIMITS, Limits
 
 TIMEOUT_S = 10.0
@@ -32,6 +33,7 @@ class FlightJob:
     ``timeout_s`` limits the wall time of one call of the landing system.  ``path`` are the folders
     that imports search, ``flights`` is the folder of the flights' records.  ``sources`` are the
     parts of the landing system by name and hash, of which ``system_sha256`` is the combined hash.
+    ``takeover`` lets another pilot take over from the landing system during the flight.
     """
 
     system: Reference
@@ -46,6 +48,7 @@ class FlightJob:
     path: tuple[str, ...]
     flights: str
     sources: tuple[tuple[str, str], ...] = ()
+    takeover: Takeover | None = None
 
     @classmethod
     def for_system(
@@ -114,6 +117,9 @@ class FlightJob:
 def parse_job(text: str) -> FlightJob:
     """Return the job in ``text``; raise LedgerError for a damaged one."""
     try:
-        return dataclass_from(FlightJob, parse_json(text))
+        values = parse_json(text)
+        # Jobs of earlier versions let nobody take over.
+        given = {"takeover": None} | values if isinstance(values, dict) else values
+        return dataclass_from(FlightJob, given)
     except ValueError as error:
         raise LedgerError(f"a job in the ledger is damaged: {error}. {REMEDY}") from error

@@ -145,7 +145,9 @@ class Worker:
         from pytest_garl.scenarios.files import parse_scenario
         from pytest_garl.simulation.system_under_test.reference_pilot import ReferencePilot
 
-        job = dataclasses.replace(parse_job(claim.job), system=reference_to(ReferencePilot))
+        job = dataclasses.replace(
+            parse_job(claim.job), system=reference_to(ReferencePilot), takeover=None
+        )
         try:
             fly_job(job, parse_scenario(claim.scenario), claim.flight, None)
         except GarlError:

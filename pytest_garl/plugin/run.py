@@ -51,7 +51,6 @@ class SelectedItem:
     nodeid: str
     test: str
     shows: bool
-    item: pytest.Item
 
 
 def selected(item: pytest.Item) -> SelectedItem:
@@ -61,7 +60,6 @@ def selected(item: pytest.Item) -> SelectedItem:
         nodeid=item.nodeid,
         test=test_of(item),
         shows=not marked and "landing" in getattr(item, "fixturenames", ()),
-        item=item,
     )
 
 

@@ -9,6 +9,7 @@ from pytest_garl.execution.job import FlightJob
 from pytest_garl.execution.on_demand import FlyFunction
 from pytest_garl.regressions.case import NOT_ASKED, Case, Prevention, RecordedBehaviour
 from pytest_garl.regressions.case_request import CaseRequest, CaseResult, FailingScenario
+from pytest_garl.regressions.prevention import collision_of, prevention_of
 from pytest_garl.regressions.robustness import NEIGHBOURS, neighbours
 from pytest_garl.scenarios.maps.map import Map
 from pytest_garl.scenarios.scenario import Scenario
@@ -116,7 +117,16 @@ class CaseFlights:
     def prevention(self, failing: FailingScenario) -> Prevention:
         """Return whether the collision of a failing scenario could have been prevented."""
         self.asked_prevention = True
-        return NOT_ASKED
+        request = self.request
+        if not request.asks_prevention:
+            return NOT_ASKED
+        collision = collision_of(
+            request.job, failing.scenario, failing.behaviour, failing.flight, request.map
+        )
+        if collision is None:
+            return NOT_ASKED
+        flights = min(ESCAPE_FLIGHTS, request.budget - self.flown)
+        return prevention_of(collision, lambda job: self._go(job, failing.scenario), flights)
 
     def result(self, case: Case | None, reason: str = "") -> CaseResult:
         """Return the end of the investigation, with the flights that it took."""

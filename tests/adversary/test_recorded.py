@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from pytest_garl.adversary.catalogue import policy_spec
-from pytest_garl.adversary.recorded import LANDING_ZONE_M, recorded_spec
+from pytest_garl.adversary.recorded import LANDING_ZONE_M, handed_over_spec, recorded_spec
 from pytest_garl.errors import PolicyError
 from pytest_garl.scenarios.chromosome import decode
 from pytest_garl.scenarios.genes import genome_for
@@ -133,3 +133,37 @@ def test_reference_pilot_waits_until_the_recorded_person_has_left() -> None:
 def test_object_without_recorded_moves_is_refused() -> None:
     with pytest.raises(PolicyError, match="recorded moves: none for"):
         fly(SCENARIO, ReferencePilot, recorded_spec({"cat-1": []}), time_limit_s=1)
+
+
+def test_policy_takes_over_from_recorded_moves_at_a_time() -> None:
+    scenario = decode(GENOME.nominal, GENOME, map="lawn", seed=1)
+    live = policy_spec("greedy")
+    recorded = recorded_spec({name: ((0.0, 1.0),) * 10 for name, _ in LAWN.present_objects})
+    npc = Npc(scenario, LAWN, "dog-1", handed_over_spec(recorded, live, 1.2).make())
+    situation = Situation(
+        time_s=0.0,
+        self=npc.state,
+        others=(),
+        uav_position_m=(0.0, 0.0, 9.0),
+        uav_velocity_mps=(0.0, 0.0, 0.0),
+        marker_position_m=(0.0, 0.0),
+        map=LAWN,
+        scenario=scenario,
+    )
+    npc.policy.reset(situation, np.random.default_rng(0))
+    moves = [npc.policy.decide(situation) for _ in range(5)]
+    # Decisions at 0, 0.5 and 1 s are repeated; that at 1.5 s is the first after 1.2 s.
+    assert [(move.x, move.y) for move in moves[:3]] == [(0.0, 1.0)] * 3
+    alone = live.make()
+    alone.reset(situation, np.random.default_rng(0))
+    expected = alone.decide(situation)
+    assert (moves[3].x, moves[3].y) == (expected.x, expected.y) != (0.0, 1.0)
+    assert handed_over_spec(recorded, live, 1.0).arguments[0] == ("decisions", 2)
+
+
+def test_scripted_and_recorded_npcs_do_not_read_the_uav() -> None:
+    blind = ("destination", "greedy", "random_walk", "stand", "stationary", "waypoint")
+    assert not any(policy_spec(name).reads_uav for name in blind)
+    assert not recorded_spec({}).reads_uav
+    assert policy_spec("dqn").reads_uav
+    assert handed_over_spec(recorded_spec({}), policy_spec("dqn"), 1.0).reads_uav

@@ -84,6 +84,7 @@ class World:
         pybullet.changeDynamics(
             ground, -1, lateralFriction=ground_friction, **self._client_argument
         )
+        self._ground = ground
         self._names = {ground: "ground"}
         self._spheres: dict[int, tuple[Vector, float]] = {}
         self._ids: dict[str, int] = {}
@@ -121,6 +122,19 @@ class World:
         )
         pybullet.resetBaseVelocity(body, velocity, (0, 0, 0), **self._client_argument)
         self._spheres[body] = (position_m, self._spheres[body][1])
+
+    def place_uav(self, position: Vector, attitude: Quaternion) -> None:
+        """Move the UAV to a pose, to measure distances there; no flight is flown after that."""
+        pybullet.resetBasePositionAndOrientation(
+            self._uav, position, attitude, **self._client_argument
+        )
+
+    def ground_gap_m(self) -> float:
+        """Return the distance in metres from the UAV's hull to the ground, up to 3 m."""
+        points = pybullet.getClosestPoints(
+            self._uav, self._ground, _EXACT_RANGE_M, **self._client_argument
+        )
+        return min((point[8] for point in points), default=_EXACT_RANGE_M)
 
     def hull_contacts(self) -> tuple[HullContact, ...]:
         """Return the UAV's present contacts, one per body."""
