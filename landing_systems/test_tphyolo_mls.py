@@ -1,4 +1,4 @@
-"""TPHYolo-MLS must land on the marker, in time, and hit nothing."""
+"""TPHYolo-MLS must land on the marker, in time, hit nothing, and not give up needlessly."""
 
 from __future__ import annotations
 
@@ -27,3 +27,8 @@ def test_lands_in_time(landing: Landing) -> None:
 def test_collides_with_nothing(landing: Landing) -> None:
     """No body but the ground, and that gently."""
     assert not landing.collisions
+
+
+def test_completes_the_mission(landing: Landing) -> None:
+    """It may give up only where nobody could land."""
+    assert landing.completed or landing.excused

@@ -146,8 +146,13 @@ def gated(
 
 def uncorrected(found: Comparison) -> bool:
     """Return whether a gate would fail that accepts each new type, whatever its p-value."""
-    rates = holm_adjusted([found.violations.p, found.aborts.p])
-    return min(rates) <= LEVEL or any(each.is_supported for each in found.new_types)
+    tests = [
+        *(change.p for change in found.rates if change.can_fail(LEVEL)),
+        *(change.p for change in found.sizes if change.can_fail(LEVEL)),
+    ]
+    return min(holm_adjusted(tests), default=1.0) <= LEVEL or any(
+        each.is_supported for each in found.new_types
+    )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

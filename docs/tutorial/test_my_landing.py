@@ -14,3 +14,7 @@ def test_lands_in_time(landing):
 
 def test_collides_with_nothing(landing):
     assert not landing.collisions
+
+
+def test_completes_the_mission(landing):
+    assert landing.completed or landing.excused

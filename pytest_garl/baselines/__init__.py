@@ -1,1 +1,1 @@
-"""Whether a changed landing stack is worse: rates of violations on the very same scenarios."""
+"""Whether a changed landing system is worse, on the very same scenarios."""

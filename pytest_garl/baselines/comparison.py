@@ -8,23 +8,20 @@ from __future__ import annotations
 
 import dataclasses
 from collections import Counter
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from types import MappingProxyType
 
-from pytest_garl.baselines.gate_statistics import (
-    CONFIRMED_PAIRS,
-    holm_adjusted,
-    mcnemar_p,
-    new_type_p,
+from pytest_garl.baselines.gate_statistics import CONFIRMED_PAIRS, holm_adjusted
+from pytest_garl.baselines.new_types import (
+    NeighbourFlights,
+    NewType,
+    new_signatures,
+    new_types,
 )
-from pytest_garl.baselines.pairs import (
-    DIFFERENT_RESULTS,
-    FlightSummary,
-    Pair,
-    PairResult,
-    violation_type_of,
-)
+from pytest_garl.baselines.pairs import Pair, PairResult
+from pytest_garl.baselines.rates import RateChange, rate_changes
+from pytest_garl.baselines.relative import RelativeChange, relative_changes
 
 LEVEL = 0.05
 """Default probability that the gate fails a landing system that is no worse, per system and map."""
@@ -33,62 +30,6 @@ LARGEST_INCONCLUSIVE_SHARE = 0.05
 RARE_FLIGHTS = 5
 """A type in more flights of the base than this is hardly missed by chance: a type expected in six
 flights occurs in none of them once in four hundred times."""
-PAIRS_LISTED = 20
-"""Number of pairs of each result that a report lists."""
-PAIRS_FOR_SUPPORT = 2
-"""A new type is supported by this number of pairs ..."""
-NEIGHBOURS_FOR_SUPPORT = 2
-"""... or by one pair of which this number of neighbours fail with the same type."""
-NeighbourFlights = Mapping[str, Sequence[FlightSummary]]
-"""Flights of the head in the neighbours of a scenario, by the name of the scenario's pair."""
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class RateChange:
-    """A rate before and after: ``base`` and ``head`` are numbers of flights.
-
-    ``broke`` counts the pairs where only the head has the event, ``fixed`` those where only the
-    base has it.  ``p`` is that of :func:`mcnemar_p`; ``adjusted`` is ``p`` after Holm's correction.
-    """
-
-    what: str
-    base: int
-    head: int
-    broke: int
-    fixed: int
-    p: float
-    adjusted: float = 1.0
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class NewType:
-    """A violation type that no flight of the base has; ``pairs`` are those whose head has it.
-
-    ``neighbours`` holds, for each pair whose neighbours were flown, the number of neighbours that
-    fail with this type and the number flown.  ``p`` is that of :func:`new_type_p`; ``adjusted`` is
-    ``p`` after Holm's correction.
-    """
-
-    type: str
-    pairs: tuple[Pair, ...]
-    neighbours: tuple[tuple[int, int], ...]
-    p: float
-    adjusted: float = 1.0
-
-    @property
-    def is_supported(self) -> bool:
-        """Whether two pairs show the type, or one pair whose neighbours fail in the same way."""
-        confirmed = any(failing >= NEIGHBOURS_FOR_SUPPORT for failing, _ in self.neighbours)
-        return confirmed or len(self.pairs) >= PAIRS_FOR_SUPPORT
-
-    @property
-    def text(self) -> str:
-        """The type, its pairs and the number of neighbours that fail in the same way."""
-        first, more = self.pairs[0], len(self.pairs) - 1
-        failing = sum(count for count, _ in self.neighbours)
-        flown = sum(count for _, count in self.neighbours)
-        neighbours = f", in {failing} of {flown} neighbours" if flown else ""
-        return f"{self.type} in {first.name}{f' and {more} more' if more else ''}{neighbours}"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -97,6 +38,7 @@ class Comparison:
 
     ``pairs`` are those that both decided.  ``undecided`` are those that only the base decided;
     ``left_out`` counts those that the base did not decide.  No figure includes these two.
+    ``rates`` are those of :func:`rate_changes`, ``sizes`` those of :func:`relative_changes`.
     ``new_signatures`` are signatures that the base lacks although it has their types, with their
     pairs.  ``unsure`` names the pairs of new types with an inconclusive neighbour.  ``tests`` is
     the number of p-values that were corrected together.
@@ -105,13 +47,28 @@ class Comparison:
     pairs: tuple[Pair, ...]
     undecided: tuple[Pair, ...]
     left_out: int
-    violations: RateChange
-    aborts: RateChange
+    rates: tuple[RateChange, RateChange, RateChange]
+    sizes: tuple[RelativeChange, ...]
     new_types: tuple[NewType, ...]
     new_signatures: tuple[tuple[str, tuple[Pair, ...]], ...]
     unsure: tuple[str, ...]
     tests: int
     level: float
+
+    @property
+    def violations(self) -> RateChange:
+        """The change of the number of flights that violate a property."""
+        return self.rates[0]
+
+    @property
+    def grave(self) -> RateChange:
+        """The change of violations other than no landing, where both flights violate."""
+        return self.rates[1]
+
+    @property
+    def safe_aborts(self) -> RateChange:
+        """The change of ends without landing or violation, where neither flight violates."""
+        return self.rates[2]
 
     @property
     def passed(self) -> bool:
@@ -131,12 +88,19 @@ class Comparison:
     def failure_reasons(self) -> tuple[str, ...]:
         """Why the gate fails; empty if it passes."""
         found = [
-            f"significantly more {change.what}: p {_p(change.adjusted)} at level {self.level:g}"
-            for change in (self.violations, self.aborts)
-            if change.adjusted <= self.level
+            f"significantly more {change.what}: {self._significance(change)}"
+            for change in self.rates
+            if self.is_significant(change)
         ]
         found += [
-            f"new type of violation: {each.text}" for each in self.new_types if self._fails(each)
+            f"landings significantly {change.limit.worse}: {self._significance(change)}"
+            for change in self.sizes
+            if self.is_significant(change)
+        ]
+        found += [
+            f"new type of violation: {each.text}"
+            for each in self.new_types
+            if each.is_supported and self.is_significant(each)
         ]
         flown = len(self.pairs) + len(self.undecided) + self.left_out
         if self.left_out > max(1, LARGEST_INCONCLUSIVE_SHARE * flown):
@@ -145,49 +109,18 @@ class Comparison:
                 "save it anew"
             )
         if self.undecided:
-            found.append(f"inconclusive: {_names(self.undecided)}")
+            found.append(f"inconclusive: {names_of(self.undecided)}")
         if self.unsure:
             found.append(f"neighbours inconclusive: {', '.join(self.unsure)}")
         return tuple(found) if self.pairs or found else ("no pair could be compared",)
 
-    def _fails(self, new: NewType) -> bool:
-        return new.is_supported and new.adjusted <= self.level
+    def is_significant(self, test: RateChange | RelativeChange | NewType) -> bool:
+        """Return whether a test fails at the gate's level, after the correction for all tests."""
+        return test.adjusted is not None and test.adjusted <= self.level
 
-    def summary_lines(self) -> Iterator[str]:
-        """Yield whether the gate passes, then lines about the rates and what is new."""
-        yield "gate passed" if self.passed else f"gate FAILED: {'; '.join(self.failure_reasons)}"
-        identical = sum(pair.identical for pair in self.pairs)
-        yield f"{len(self.pairs)} pairs compared, {identical} of them the same flight to the byte"
-        if self.left_out:
-            yield f"{self.left_out} left out: inconclusive when the baseline was saved"
-        for change, broke, fixed in (
-            (self.violations, "broke", "fixed"),
-            (self.aborts, "landings lost", "landings won"),
-        ):
-            yield (
-                f"{change.what} {change.base} -> {change.head} ({change.broke} {broke}, "
-                f"{change.fixed} {fixed}): {self._p_values(change)}"
-            )
-        for new in self.new_types:
-            doubt = "" if self._fails(new) else ": may be chance, look at it"
-            yield f"new type of violation: {new.text}: {self._p_values(new)}{doubt}"
-        for signature, pairs in self.new_signatures:
-            yield f"new kind of a known type, not gated: {signature} in {_names(pairs)}"
-
-    def _p_values(self, test: RateChange | NewType) -> str:
-        return (
-            f"p {_p(test.p)}, for all {self.tests} tests {_p(test.adjusted)}, level {self.level:g}"
-        )
-
-    def report_lines(self) -> Iterator[str]:
-        """Yield the lines of the summary, then the pairs that differ."""
-        yield from self.summary_lines()
-        for result in DIFFERENT_RESULTS:
-            pairs = self.with_result(result)
-            for pair in pairs[:PAIRS_LISTED]:
-                yield f"{result:<8} {pair.text}"
-            if len(pairs) > PAIRS_LISTED:
-                yield f"{result:<8} and {len(pairs) - PAIRS_LISTED} more"
+    def _significance(self, change: RateChange | RelativeChange) -> str:
+        assert change.adjusted is not None
+        return f"p {p_text(change.adjusted)} at level {self.level:g}"
 
 
 def compare(
@@ -199,35 +132,42 @@ def compare(
 ) -> Comparison:
     """Return how the head compares with the base.
 
-    Violations are tested on all pairs.  Aborts are tested on the pairs without a violation before
-    or after: an abort in place of a collision is an improvement, one in place of a landing is not.
     A type is new if no flight of the base and none of the ``expected_signatures`` has it.
 
-    Holm's step-down correction covers all tests: both rates and each type that is new, or rare in
-    the base.  It makes ``level`` that of the gate and not of each test (Holm 1979, Scandinavian
-    Journal of Statistics 6(2)).
+    Holm's step-down correction covers all tests: the rates, the sizes, and each type that is new,
+    or rare in the base.  It makes ``level`` that of the gate and not of each test (Holm 1979,
+    Scandinavian Journal of Statistics 6(2)).  A rate or a size in which too few pairs differ to
+    reach the level is no test.
     """
     decided = tuple(pair for pair in pairs if pair.base.decided and pair.head.decided)
     base_types = Counter(pair.base.type for pair in decided if pair.base.violated)
-    safe = [pair for pair in decided if not (pair.base.violated or pair.head.violated)]
-    violations = _rate_change("violations", "violated", decided, tested=decided)
-    aborts = _rate_change("aborts", "aborted", decided, tested=safe)
-    new_types = _new_types(decided, expected_signatures, neighbours)
+    rates, sizes = rate_changes(decided), relative_changes(decided)
+    found = new_types(decided, expected_signatures, neighbours)
     # A rare type of the base might have looked new as well, so it counts as a test that passed.
     rare = sum(count <= RARE_FLIGHTS for count in base_types.values())
-    p_values = [violations.p, aborts.p, *(each.p for each in new_types), *[1.0] * rare]
-    adjusted = holm_adjusted(p_values)
+    tested = [
+        *(change.p for change in rates if change.can_fail(level)),
+        *(change.p for change in sizes if change.can_fail(level)),
+    ]
+    p_values = [*tested, *(each.p for each in found), *[1.0] * rare]
+    adjusted = iter(holm_adjusted(p_values))
+    more, graver, safer = (
+        dataclasses.replace(change, adjusted=next(adjusted)) if change.can_fail(level) else change
+        for change in rates
+    )
+    sizes = tuple(
+        dataclasses.replace(change, adjusted=next(adjusted)) if change.can_fail(level) else change
+        for change in sizes
+    )
+    found = [dataclasses.replace(each, adjusted=next(adjusted)) for each in found]
     return Comparison(
         pairs=decided,
         undecided=tuple(pair for pair in pairs if pair.base.decided and not pair.head.decided),
         left_out=sum(not pair.base.decided for pair in pairs),
-        violations=dataclasses.replace(violations, adjusted=adjusted[0]),
-        aborts=dataclasses.replace(aborts, adjusted=adjusted[1]),
-        new_types=tuple(
-            dataclasses.replace(each, adjusted=p)
-            for each, p in zip(new_types, adjusted[2:], strict=False)
-        ),
-        new_signatures=_new_signatures(decided, expected_signatures, base_types),
+        rates=(more, graver, safer),
+        sizes=sizes,
+        new_types=tuple(found),
+        new_signatures=new_signatures(decided, expected_signatures, base_types),
         unsure=tuple(
             name for name, flown in neighbours.items() if not all(each.decided for each in flown)
         ),
@@ -236,63 +176,12 @@ def compare(
     )
 
 
-def _rate_change(
-    what: str, event: str, decided: Sequence[Pair], *, tested: Sequence[Pair]
-) -> RateChange:
-    """Count an event, a property of :class:`FlightSummary`, and test it; not yet corrected."""
-    broke = sum(getattr(pair.head, event) and not getattr(pair.base, event) for pair in tested)
-    fixed = sum(getattr(pair.base, event) and not getattr(pair.head, event) for pair in tested)
-    return RateChange(
-        what=what,
-        base=sum(getattr(pair.base, event) for pair in decided),
-        head=sum(getattr(pair.head, event) for pair in decided),
-        broke=broke,
-        fixed=fixed,
-        p=mcnemar_p(broke, fixed),
-    )
-
-
-def _new_types(
-    pairs: Sequence[Pair], expected: Collection[str], neighbours: NeighbourFlights
-) -> list[NewType]:
-    """Return the types that only the head has; their p-values are not yet corrected."""
-    old_types = {pair.base.type for pair in pairs} | {violation_type_of(each) for each in expected}
-    changed = sum(not pair.identical for pair in pairs)
-    found = []
-    for new_type in sorted({pair.head.type for pair in pairs} - old_types - {""}):
-        having = tuple(pair for pair in pairs if pair.head.type == new_type)
-        failing = tuple(
-            (sum(each.type == new_type for each in flown), len(flown))
-            for pair in having
-            if (flown := neighbours.get(pair.name))
-        )
-        p = new_type_p(
-            base=len(pairs),
-            changed=changed,
-            found=len(having),
-            neighbours_each=max((flown for _, flown in failing), default=0),
-            failing=sum(count for count, _ in failing),
-        )
-        found.append(NewType(type=new_type, pairs=having, neighbours=failing, p=p))
-    return found
-
-
-def _new_signatures(
-    pairs: Sequence[Pair], expected: Collection[str], base_types: Collection[str]
-) -> tuple[tuple[str, tuple[Pair, ...]], ...]:
-    """Return the signatures that only the head has, of types that are not new, with their pairs."""
-    old = {pair.base.signature for pair in pairs} | {*expected}
-    types = {*base_types, *(violation_type_of(each) for each in expected)}
-    found = sorted({pair.head.signature for pair in pairs if pair.head.type in types} - old)
-    return tuple(
-        (each, tuple(pair for pair in pairs if pair.head.signature == each)) for each in found
-    )
-
-
-def _names(pairs: Sequence[Pair]) -> str:
+def names_of(pairs: Sequence[Pair]) -> str:
+    """Return the names of the first three pairs, and the number of the others."""
     named = ", ".join(pair.name for pair in pairs[:3])
     return f"{named} and {len(pairs) - 3} more" if len(pairs) > 3 else named
 
 
-def _p(value: float) -> str:
+def p_text(value: float) -> str:
+    """Return a p-value with the digits that matter."""
     return f"{value:.3f}" if value >= 0.001 else f"{value:.1e}"

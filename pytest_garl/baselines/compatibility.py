@@ -12,7 +12,7 @@ from pytest_garl.verdicts.verdict import Limits
 def incompatibilities(base: BaselineSet, job: FlightJob) -> tuple[str, ...]:
     """Return the conditions that differ from the set's; rates are comparable if there are none."""
     conditions = (
-        ("limits", _limits_text(base.limits), _limits_text(job.limits)),
+        ("limits", limits_text(base.limits), limits_text(job.limits)),
         (f"map {base.map}", base.map_sha256[:12], job.map_sha256[:12]),
         ("simulator", base.simulator, job.simulator.name),
         (f"weights of {base.npcs}", base.npcs_sha256[:12], job.npcs.sha256[:12]),
@@ -24,7 +24,8 @@ def incompatibilities(base: BaselineSet, job: FlightJob) -> tuple[str, ...]:
     )
 
 
-def _limits_text(limits: Limits) -> str:
+def limits_text(limits: Limits) -> str:
+    """Return limits in a few words."""
     return f"{limits.distance_m:g} m, {limits.time_s:g} s, abort {limits.abort}"
 
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, get_args
 
-from pytest_garl.baselines.pairs import FlightSummary
+from pytest_garl.baselines.pairs import FlightSummary, NoLanding
 from pytest_garl.errors import BaselineError, GarlError, ScenarioError
 from pytest_garl.files.atomic import write_text_atomically
 from pytest_garl.files.reading import MEGABYTE, read_text
@@ -20,7 +20,9 @@ from pytest_garl.scenarios.maps.map import Map
 from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.verdicts.verdict import Limits
 
-SCHEMA = 1
+SCHEMA = 2
+"""Files of schema 1 lack why a flight ended without landing, distances and times, and they call a
+landing that was given up "aborted".  They are read too."""
 LARGEST_BYTES = 4 * MEGABYTE
 """About six thousand flights, each a line of 600 bytes.  Reading TOML takes up to a hundred times
 as much memory."""
@@ -36,7 +38,8 @@ _KEYS = {
     "genes",
     "flights",
 }
-_OUTCOMES = ("landed", "collision", "not_landed", "gave_up", "crashed", "inconclusive")
+_OUTCOMES = ("landed", "collision", "slid", "not_landed", "gave_up", "crashed", "inconclusive")
+_RENAMED = {"aborted": "gave_up"}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -132,8 +135,9 @@ def _set_lines(each: BaselineSet) -> list[str]:
         f"limits = {{ distance_m = {limits.distance_m!r}, time_s = {limits.time_s!r}, "
         f'abort = "{limits.abort}" }}',
         f"genes = [{', '.join(quoted(key) for key in keys)}]",
-        "# Each: seed, outcome, signature, violation as the paper defines it, SHA-256 of the",
-        "# trajectory, values of the genes.",
+        "# Each: seed, outcome, signature, violation as the paper defines it, why it did not land",
+        "# (blocked, excused or needless), [distance in m, time in s] of the landing, SHA-256 of",
+        "# the trajectory, values of the genes.",
         "flights = [",
         *(f"  {_row(flight)}," for flight in each.flights),
         "]",
@@ -143,9 +147,13 @@ def _set_lines(each: BaselineSet) -> list[str]:
 def _row(flight: BaselineFlight) -> str:
     scenario, summary = flight.scenario, flight.summary
     values = ", ".join(repr(value) for _, value in scenario.genes)
+    landing = ""
+    if summary.distance_m is not None and summary.time_s is not None:
+        landing = f"{summary.distance_m!r}, {summary.time_s!r}"
     return (
         f"[{scenario.seed}, {quoted(summary.outcome)}, {quoted(summary.signature)}, "
-        f"{str(summary.paper_violation).lower()}, {quoted(summary.sha256)}, [{values}]]"
+        f"{str(summary.paper_violation).lower()}, {quoted(summary.no_landing)}, [{landing}], "
+        f"{quoted(summary.sha256)}, [{values}]]"
     )
 
 
@@ -155,13 +163,14 @@ def parse_baseline(
     """Return the baseline in ``text``; raise ScenarioError that names source and key."""
     top = Table(parse(text, source), source)
     top.refuse_unknown({"schema", "cpu", "versions", "set"})
-    if top.integer("schema") != SCHEMA:
-        raise top.error("schema", f"found {shown(top.get('schema'))}, expected {SCHEMA}")
+    schema = top.integer("schema")
+    if schema not in (1, SCHEMA):
+        raise top.error("schema", f"found {shown(top.get('schema'))}, expected 1 or {SCHEMA}")
     versions = top.table("versions")
     baseline = Baseline(
         cpu=top.string("cpu"),
         versions=tuple((name, versions.string(name)) for name in versions.values),
-        sets=tuple(_read_set(table, load_map) for table in top.tables("set")),
+        sets=tuple(_read_set(table, load_map, schema) for table in top.tables("set")),
     )
     _check(baseline, lambda problem: top.error("set", problem))
     return baseline
@@ -211,7 +220,7 @@ def _check(baseline: Baseline, error: Callable[[str], GarlError]) -> None:
             )
 
 
-def _read_set(table: Table, load_map: Callable[[str], Map]) -> BaselineSet:
+def _read_set(table: Table, load_map: Callable[[str], Map], schema: int) -> BaselineSet:
     table.refuse_unknown(_KEYS)
     for key in ("system", "simulator"):
         if not all(table.string(key).partition(":")):
@@ -234,7 +243,8 @@ def _read_set(table: Table, load_map: Callable[[str], Map]) -> BaselineSet:
         method=table.string("method", ""),
         limits=read_limits(table.table("limits")),
         flights=tuple(
-            _read_row(table, index, row, map.name, properties) for index, row in enumerate(rows)
+            _read_row(table, f"flights[{index}]", _upgraded(row, schema), map.name, properties)
+            for index, row in enumerate(rows)
         ),
     )
 
@@ -253,11 +263,20 @@ def _read_genes(table: Table, map: Map) -> tuple[Property, ...]:
     return genome.properties
 
 
+def _upgraded(row: Any, schema: int) -> Any:
+    """Return a row as schema 2 has it; what is no row stays as it is."""
+    if schema == SCHEMA or not isinstance(row, list) or len(row) != 6:
+        return row
+    seed, outcome, signature, paper_violation, *rest = row
+    if isinstance(outcome, str):
+        outcome = _RENAMED.get(outcome, outcome)
+    return [seed, outcome, signature, paper_violation, "", [], *rest]
+
+
 def _read_row(
-    table: Table, index: int, row: Any, map: str, properties: tuple[Property, ...]
+    table: Table, key: str, row: Any, map: str, properties: tuple[Property, ...]
 ) -> BaselineFlight:
-    key = f"flights[{index}]"
-    kinds = (int, str, str, bool, str, list)
+    kinds = (int, str, str, bool, str, list, str, list)
     if (
         not isinstance(row, list)
         or len(row) != len(kinds)
@@ -265,17 +284,20 @@ def _read_row(
     ):
         raise table.error(
             key,
-            f"found {shown(row)}, expected "
-            "[seed, outcome, signature, true or false, hash, [genes]]",
+            f"found {shown(row)}, expected [seed, outcome, signature, true or false, why it did "
+            "not land, [distance, time] or [], hash, [genes]]",
         )
-    seed, outcome, signature, paper_violation, sha256, values = row
+    seed, outcome, signature, paper_violation, no_landing, landing, sha256, values = row
     if not 0 <= seed <= LARGEST_INTEGER:
         raise table.error(
             key,
             f"found the seed {shown(seed)}, expected a whole number from 0 to {LARGEST_INTEGER}",
         )
-    if outcome not in _OUTCOMES:
-        raise table.error(key, f"found {shown(outcome)}, expected one of {', '.join(_OUTCOMES)}")
+    for word, words in ((outcome, _OUTCOMES), (no_landing, get_args(NoLanding))):
+        if word not in words:
+            known = ", ".join(each or "nothing" for each in words)
+            raise table.error(key, f"found {shown(word)}, expected one of {known}")
+    distance_m, time_s = _read_landing(table, key, landing)
     if len(values) != len(properties):
         raise table.error(key, f"found {len(values)} values of genes, expected {len(properties)}")
     for item, value in zip(properties, values, strict=True):
@@ -291,6 +313,22 @@ def _read_row(
             outcome=outcome,
             signature=printable(signature),
             paper_violation=paper_violation,
+            no_landing=no_landing,
+            distance_m=distance_m,
+            time_s=time_s,
             sha256=printable(sha256),
         ),
     )
+
+
+def _read_landing(
+    table: Table, key: str, landing: list[Any]
+) -> tuple[float, float] | tuple[None, None]:
+    """Return distance and time of a landing, None for both without one."""
+    if not landing:
+        return None, None
+    numbers = [finite(each) for each in landing]
+    match numbers:
+        case [float(distance_m), float(time_s)] if distance_m >= 0 and time_s >= 0:
+            return distance_m, time_s
+    raise table.error(key, f"found {shown(landing)}, expected [distance in m, time in s] or []")

@@ -2,15 +2,21 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal
 
 from pytest_garl.execution.result import FlightResult
 
+NoLanding = Literal["", "blocked", "excused", "needless"]
 PairResult = Literal["same", "broke", "fixed", "changed"]
 """``broke`` and ``fixed``: the second flight ended worse or better; ``changed``: both violate, in
 different ways."""
 DIFFERENT_RESULTS: tuple[PairResult, ...] = ("broke", "fixed", "changed")
+Column = Literal["landed", "violations", "blocked", "excused", "needless", "unknown reason"]
+COLUMNS: tuple[Column, ...] = ("landed", "violations", "blocked", "excused", "needless")
+DISTANCE_DIGITS, TIME_DIGITS = 4, 3
+"""A tenth of a millimetre and a millisecond, far below what a landing repeats."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -18,12 +24,17 @@ class FlightSummary:
     """The part of a flight's result that the gate compares.
 
     ``signature`` is empty for a flight without violation.  ``paper_violation`` is the paper's
-    narrower definition, which the gate does not use.  ``sha256`` is the trajectory's hash.
+    definition, which the gate does not use.  ``no_landing`` says why a flight that was given up or
+    ran out of time is excused, or that it is not; files of schema 1 do not hold it.  ``distance_m``
+    and ``time_s`` are those of the landing, None without one.  ``sha256`` is the trajectory's hash.
     """
 
     outcome: str
     signature: str
     paper_violation: bool = False
+    no_landing: NoLanding = ""
+    distance_m: float | None = None
+    time_s: float | None = None
     sha256: str = ""
 
     @property
@@ -32,9 +43,14 @@ class FlightSummary:
         return bool(self.signature)
 
     @property
-    def aborted(self) -> bool:
-        """Whether the landing system aborted the landing."""
-        return self.outcome == "gave_up"
+    def landed(self) -> bool:
+        """Whether the flight landed within the limits, and violated no other property."""
+        return self.outcome == "landed" and not self.violated
+
+    @property
+    def not_landed(self) -> bool:
+        """Whether the landing system gave up or ran out of time."""
+        return self.outcome in ("gave_up", "not_landed")
 
     @property
     def decided(self) -> bool:
@@ -47,9 +63,41 @@ class FlightSummary:
         return violation_type_of(self.signature)
 
     @property
+    def badness(self) -> int:
+        """How bad the end was: a violation 3, a needless or forbidden giving up 2, an excused 1."""
+        if self.violated and not self.not_landed:
+            return 3
+        if self.violated or self.no_landing == "needless":
+            return 2
+        return int(self.not_landed)
+
+    @property
+    def is_grave(self) -> bool:
+        """Whether the flight violated a property in another way than by not landing."""
+        return self.badness == 3
+
+    @property
+    def is_safe_abort(self) -> bool:
+        """Whether the flight ended without a landing, and without a violation."""
+        return self.not_landed and not self.violated
+
+    def is_in(self, column: Column) -> bool:
+        """Return whether a column of a table counts the flight; violations may be needless too."""
+        if column == "landed":
+            return self.landed
+        if column == "violations":
+            return self.violated
+        if column == "unknown reason":
+            return self.is_safe_abort and not self.no_landing
+        return self.no_landing == column
+
+    @property
     def text(self) -> str:
         """The signature, or the outcome of a flight without violation."""
-        return self.signature or self.outcome
+        if self.signature or not self.not_landed:
+            return self.signature or self.outcome
+        outcome = self.outcome.replace("_", " ")
+        return f"{outcome} ({self.no_landing})" if self.no_landing else outcome
 
 
 def violation_type_of(signature: str) -> str:
@@ -58,11 +106,19 @@ def violation_type_of(signature: str) -> str:
 
 
 def summary_of(result: FlightResult, sha256: str) -> FlightSummary:
-    """Return the summary of a flight's result and the hash of its trajectory."""
+    """Return the summary of a flight's result and the hash of its trajectory.
+
+    The time is the touchdown's; a simulator that records no touchdown gives that of its end.
+    """
+    landed = result.outcome == "landed"
+    time_s = result.elapsed_s if result.landed_s is None else result.landed_s
     return FlightSummary(
         outcome=result.outcome,
         signature=result.signature,
         paper_violation=result.verdict.paper_violation,
+        no_landing=result.verdict.no_landing,
+        distance_m=round(result.final_distance_m, DISTANCE_DIGITS) if landed else None,
+        time_s=round(time_s, TIME_DIGITS) if landed else None,
         sha256=sha256,
     )
 
@@ -80,8 +136,8 @@ class Pair:
 
     @property
     def result(self) -> PairResult:
-        """How the flight of the head differs; a violation is worse than an abort."""
-        before, after = (_badness(each) for each in (self.base, self.head))
+        """How the flight of the head differs; a violation is worse than giving up needlessly."""
+        before, after = self.base.badness, self.head.badness
         if before != after:
             return "broke" if after > before else "fixed"
         return "same" if self.base.signature == self.head.signature else "changed"
@@ -97,5 +153,9 @@ class Pair:
         return f"{self.name}: {self.base.text} -> {self.head.text}"
 
 
-def _badness(flight: FlightSummary) -> int:
-    return 2 if flight.violated else int(flight.aborted)
+def column_counts(flights: Sequence[FlightSummary]) -> dict[Column, int]:
+    """Return how many of the decided flights each column counts; empty rare columns are absent."""
+    decided = [each for each in flights if each.decided]
+    counts = {name: sum(each.is_in(name) for each in decided) for name in COLUMNS}
+    unknown = sum(each.is_in("unknown reason") for each in decided)
+    return {**counts, "unknown reason": unknown} if unknown else counts

@@ -14,9 +14,11 @@ from rich.table import Table
 from rich.text import Text
 
 from pytest_garl.errors import OptionError
+from pytest_garl.verdicts.verdict import DEFAULT_LIMITS
 
 if TYPE_CHECKING:
     from pytest_garl.baselines.comparison import Comparison
+    from pytest_garl.baselines.file import BaselineSet
     from pytest_garl.baselines.record import BaselineSpec
     from pytest_garl.execution.flight_id import CompletedFlight
     from pytest_garl.execution.reference import Reference
@@ -65,14 +67,14 @@ _SPEC_OPTIONS = (
     click.option(
         "--distance-m",
         type=float,
-        default=1.5,
+        default=DEFAULT_LIMITS.distance_m,
         show_default=True,
         help="Largest allowed distance of a landing from the marker.",
     ),
     click.option(
         "--time-s",
         type=float,
-        default=120.0,
+        default=DEFAULT_LIMITS.time_s,
         show_default=True,
         help="Longest allowed time of a landing.",
     ),
@@ -144,17 +146,18 @@ def save(
         recorded = fly_baseline(_spec(**chosen), checkout, systems, workers, _progress)
     save_baseline(out, recorded)
     for each in recorded.sets:
-        violations = sum(flight.summary.violated for flight in each.flights)
-        aborts = sum(flight.summary.aborted for flight in each.flights)
-        inconclusive = sum(not flight.summary.decided for flight in each.flights)
-        count = f"{len(each.flights)} flown, {violations} violations, {aborts} aborts"
-        left_out = (
-            f", {inconclusive} inconclusive, which the gate leaves out" if inconclusive else ""
-        )
-        click.echo(f"{each.title}: {count}{left_out}")
-        if each.warning:
-            click.echo(f"    note: {each.warning}")
+        _show_set(each)
     click.echo(f"saved {out}; compare with it: pytest --garl-baseline={out}")
+
+
+@baseline.command()
+@click.argument("file", type=click.Path(path_type=Path, exists=True, dir_okay=False))
+def show(file: Path) -> None:
+    """Print how the flights of a baseline ended: landed ones first, then what went wrong."""
+    from pytest_garl.baselines.file import load_baseline
+
+    for each in load_baseline(file, (_maps_folder(),)).sets:
+        _show_set(each)
 
 
 @baseline.command()
@@ -193,10 +196,11 @@ def diff(
     systems: tuple[str, ...],
     **chosen: Any,
 ) -> None:
-    """Fly the same scenarios with two checkouts of a landing stack and compare pair by pair.
+    """Fly the same scenarios with two checkouts of a landing system and compare pair by pair.
 
     BASE and HEAD are folders, such as two git worktrees. The exit status is 1 if HEAD has a new
-    type of violation, significantly more violations or aborts, or an inconclusive flight. Both
+    type of violation, significantly more violations or aborts, landings that are significantly
+    less accurate or slower, or an inconclusive flight. Both
     use the simulator and the NPC policies of this installation, and the maps of this folder.
     """
     from pytest_garl.baselines.gate import compare_sets
@@ -272,7 +276,23 @@ def _progress(
     return track(flights, title, total, console=console, disable=hidden, transient=True)
 
 
+def _show_set(each: BaselineSet) -> None:
+    from pytest_garl.baselines.comparison_text import column_lines, size_lines
+    from pytest_garl.baselines.compatibility import limits_text
+
+    flights = [flight.summary for flight in each.flights]
+    inconclusive = sum(not flight.decided for flight in flights)
+    left_out = f", {inconclusive} inconclusive, which the gate leaves out" if inconclusive else ""
+    conditions = f"limits {limits_text(each.limits)}; NPCs {each.npcs}"
+    click.echo(f"{each.title}: {len(flights)} flown{left_out}; {conditions}")
+    for line in (*column_lines(("", flights)), *size_lines(flights)):
+        click.echo(f"    {line}")
+    if each.warning:
+        click.echo(f"    note: {each.warning}")
+
+
 def _show(title: str, found: Comparison) -> None:
+    from pytest_garl.baselines.comparison_text import summary_lines
     from pytest_garl.baselines.pairs import DIFFERENT_RESULTS
 
     table = Table(box=None, header_style="bold")
@@ -286,7 +306,7 @@ def _show(title: str, found: Comparison) -> None:
     console = Console()
     if table.row_count:
         console.print(table)
-    verdict, *details = found.summary_lines()
+    verdict, *details = summary_lines(found)
     click.secho(f"{title}: {verdict}", bold=True, fg="green" if found.passed else "red")
     for line in details:
         click.echo(f"    {line}")

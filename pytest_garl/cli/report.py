@@ -42,13 +42,19 @@ def report(ledger: Path, as_json: bool, out: Path | None, folder: Path) -> None:
         write_text_atomically(out, text)
 
 
+def _counts(counts: dict[str, int]) -> str:
+    return ", ".join(f"{name} {count}" for name, count in counts.items())
+
+
 def _text(found: dict[str, Any]) -> str:
     lines = []
     for search in found["searches"]:
         name = search["system"].split(":")[-1]
         lines.append(
             f"{name} on {search['map']}: {search['flown']} of {search['wanted']} flown, "
-            f"{search['violating']} violate"
+            f"{search['landed']} landed, {search['violating']} violate "
+            f"({search['violating_by_the_paper']} by the paper's definition, no landing counted), "
+            f"gave up: {_counts(search['gave_up'])}"
         )
         for kind in search["signatures"]:
             lines += [

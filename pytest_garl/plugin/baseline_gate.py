@@ -12,6 +12,7 @@ import pytest
 
 from pytest_garl.adversary.catalogue import policy_spec
 from pytest_garl.baselines.comparison import Comparison
+from pytest_garl.baselines.comparison_text import report_lines, summary_lines
 from pytest_garl.baselines.compatibility import environment_changes, incompatibilities
 from pytest_garl.baselines.file import Baseline, BaselineSet, load_baseline
 from pytest_garl.baselines.gate import compare_flights
@@ -71,10 +72,10 @@ class BaselineGateItem(pytest.Item):
             abort_session(self, error)
         warning = [f"note: {base.warning}"] if base.warning else []
         hint = self._hint(comparison, run.options.baseline)
-        self._report([*comparison.report_lines(), *hint, *warning])
+        self._report([*report_lines(comparison), *hint, *warning])
         if not comparison.passed:
             # The summary lists the pairs, so the failure does not.
-            pytest.fail("\n".join(comparison.summary_lines()), pytrace=False)
+            pytest.fail("\n".join(summary_lines(comparison)), pytrace=False)
 
     def _refuse(self, differing: Sequence[str]) -> NoReturn:
         """Fail because the landing system is not flown as the baseline was."""

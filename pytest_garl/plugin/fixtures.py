@@ -47,6 +47,7 @@ def npcs(request: pytest.FixtureRequest) -> PolicySpec:
 @pytest.fixture
 def landing(request: pytest.FixtureRequest, garl_slot: Target, npcs: PolicySpec) -> Landing:
     """Return the landing of the item's slot; wait until it is flown."""
+    from pytest_garl.plugin.item_facts import another_test_fails
     from pytest_garl.plugin.item_report import end_unjudged
     from pytest_garl.plugin.landing import Landing
 
@@ -55,8 +56,13 @@ def landing(request: pytest.FixtureRequest, garl_slot: Target, npcs: PolicySpec)
         flight = run.fly(garl_slot, _checked_policy(npcs))
     except GarlError as error:
         abort_session(request.node, error)
-    item = request.node
-    landing, result = Landing(garl_slot, flight, getattr(item, "obj", None)), flight.result
+    item, result = request.node, flight.result
+    landing = Landing(
+        garl_slot,
+        flight,
+        getattr(item, "obj", None),
+        is_shown_elsewhere=lambda: another_test_fails(run, garl_slot, flight),
+    )
     item.user_properties += [
         (OUTCOME, result.outcome),
         (SIGNATURE, result.signature),

@@ -10,11 +10,23 @@ from typing import Any
 import pytest
 
 from pytest_garl.plugin.keys import SIGNATURE, SLOT
-from pytest_garl.reports.search_summary import SearchSummary
+from pytest_garl.reports.search_summary import WHY_NO_LANDING, SearchSummary
+from pytest_garl.reports.shares_text import PAPER_DEFINITION, percent
 
 VARIABLE = "GITHUB_STEP_SUMMARY"
 """GitHub names in this variable the file whose text it shows on the page of the step."""
 COLUMNS = ("where", "what", "flights", "what happened", "see it")
+SHARES = (
+    "where",
+    "flown",
+    "landed",
+    "violations",
+    PAPER_DEFINITION,
+    *(f"gave up: {reason}" for reason in WHY_NO_LANDING),
+    "not landed",
+    "crashed",
+    "inconclusive",
+)
 
 Row = tuple[str, str, str, str, str]
 
@@ -22,7 +34,7 @@ Row = tuple[str, str, str, str, str]
 def write_step_summary(
     reporter: Any, searches: Sequence[SearchSummary], commands: Sequence[Sequence[str]]
 ) -> None:
-    """Append the kinds of violation and the failed cases, if GitHub names a file.
+    """Append the shares, the kinds of violation and the failed cases, if GitHub names a file.
 
     ``commands`` fly the first flight of each kind of each search again.
     """
@@ -36,7 +48,10 @@ def write_step_summary(
     ]
     rows += _failed_cases(reporter)
     flown = sum(len(search.verdicts) for search in searches)
-    text = _table(rows) if rows else f"No violation{f' in {flown} flights' if flown else ''}."
+    tables = [_table(SHARES, [_shares(search) for search in searches])] if searches else []
+    none = f"No violation{f' in {flown} flights' if flown else ''}."
+    tables.append(_table(COLUMNS, rows) if rows else none)
+    text = "\n\n".join(tables)
     try:
         with Path(path).open("a", encoding="utf-8") as file:
             file.write(f"## pytest-garl\n\n{text}\n\n")
@@ -44,10 +59,32 @@ def write_step_summary(
         reporter.write_line(f"garl: {VARIABLE}: {path}: cannot be written ({error})")
 
 
-def _table(rows: Sequence[Row]) -> str:
-    lines = [f"| {' | '.join(COLUMNS)} |", f"|{' --- |' * len(COLUMNS)}"]
-    lines += [f"| {' | '.join([*map(_escaped, row[:4]), _code(row[4])])} |" for row in rows]
+def _table(columns: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
+    """Return a table in Markdown."""
+    lines = [f"| {' | '.join(columns)} |", f"|{' --- |' * len(columns)}"]
+    for row in rows:
+        cells = [
+            _code(cell) if column == "see it" else _escaped(cell)
+            for column, cell in zip(columns, row, strict=True)
+        ]
+        lines.append(f"| {' | '.join(cells)} |")
     return "\n".join(lines)
+
+
+def _shares(search: SearchSummary) -> tuple[str, ...]:
+    """Return the shares of a search, a cell for each of ``SHARES``."""
+    total, gave_up = len(search.flights), search.without_landing("gave_up")
+    counts = [
+        search.count("landed"),
+        search.violating,
+        search.violating_by_the_paper,
+        *(gave_up[reason] for reason in WHY_NO_LANDING),
+        search.count("not_landed"),
+        sum(search.crashes.values()),
+        search.count("inconclusive"),
+    ]
+    where = f"{search.name} on {search.map}"
+    return where, str(total), *(percent(count, total) for count in counts)
 
 
 def _failed_cases(reporter: Any) -> list[Row]:

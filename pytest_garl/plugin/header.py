@@ -6,6 +6,8 @@ from pytest_garl import cpu_dispatch
 from pytest_garl.plugin.run import Run
 from pytest_garl.plugin.terminal_text import counted, duration
 from pytest_garl.regressions.forecast import seconds_per_new_signature
+from pytest_garl.reports.shares_text import limits_text
+from pytest_garl.verdicts.verdict import DEFAULT_LIMITS
 
 
 def header(run: Run) -> str:
@@ -21,6 +23,17 @@ def forecast(run: Run) -> list[str]:
         return []
     time = f"{_duration_of(run, sum(sizes))}{_duration_per_new_signature(run)}"
     return [f"garl: {len(sizes)} searches, {time}"]
+
+
+def limits_lines(run: Run) -> list[str]:
+    """Return the limits of the selected systems, if they are not the default ones."""
+    targets = [target for slots in run.searches.targets.values() for target in slots.values()]
+    given = dict.fromkeys((target.system.__qualname__, target.limits) for target in targets)
+    return [
+        f"garl: limits of {name}: {limits_text(limits)}"
+        for name, limits in given
+        if limits != DEFAULT_LIMITS
+    ]
 
 
 def acceptance_warning(run: Run) -> list[str]:

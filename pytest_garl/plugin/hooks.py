@@ -55,8 +55,11 @@ def pytest_configure(config: pytest.Config) -> None:
         "markers",
         "garl(system, maps, limits, deterministic, files): search for violations of a landing "
         "system. system is its class; maps are names (default: court and lawn); limits is "
-        "limits(distance_m=1.5, time_s=120, abort='ok'); deterministic is False if equal flights "
-        "may differ (default: True); files are its data files, which --garl-resume compares.",
+        "limits(distance_m=0.75, time_s=120, abort='needless'): how far from the marker and how "
+        "late it may land, and when giving up is a violation: if somebody could have landed "
+        "('needless'), never ('ok'), always ('violation'); deterministic is False if equal "
+        "flights may differ (default: True); files are its data files, which --garl-resume "
+        "compares.",
     )
     if not is_xdist_worker(config):
         config.stash[TALLY] = Tally()
@@ -193,13 +196,13 @@ def pytest_report_header(config: pytest.Config) -> str | None:
 
 
 def pytest_report_collectionfinish(config: pytest.Config) -> list[str]:
-    """Announce the time of all searches; warn if git cannot tell which cases are committed."""
+    """Announce time and limits; warn if git cannot tell which cases are committed."""
     run = config.stash.get(RUN, None)
     if run is None:
         return []
-    from pytest_garl.plugin.header import acceptance_warning, forecast
+    from pytest_garl.plugin.header import acceptance_warning, forecast, limits_lines
 
-    return [*forecast(run), *acceptance_warning(run)]
+    return [*forecast(run), *limits_lines(run), *acceptance_warning(run)]
 
 
 def pytest_terminal_summary(terminalreporter: Any, config: pytest.Config) -> None:

@@ -139,7 +139,9 @@ class ItemFailure:
             return True
         if not self.assertion.runs_on_any_flight:
             return False
-        found = self.assertion.failure(flight, run.scenario(target))
+        found = self.assertion.failure(
+            flight, run.scenario(target), lambda: another_test_fails(run, target, flight)
+        )
         if found is None or found.assertion != self.failed_assertion.assertion:
             return False
         return found.is_about(flight.result.verdict.primary) is not self.user_property
@@ -194,6 +196,26 @@ def first_with_same_signature(run: Run, target: Target, failure: ItemFailure, no
         if shows and refly(run, other, failure).confirm:
             return other.name
     return ""
+
+
+def another_test_fails(run: Run, target: Target, flight: CompletedFlight) -> bool:
+    """Return whether a selected test of a slot fails for the violation, ``completed`` aside.
+
+    It need not have run yet: its assertions are tried on the flight.  A test with other fixtures
+    than landing and scenario cannot be tried.
+    """
+    for selected in run.items.get(target.flight, ()):
+        if not selected.shows or not isinstance(selected.item, pytest.Function):
+            continue
+        assertion = ItemAssertion(selected.item, target)
+        if not assertion.runs_on_any_flight:
+            continue
+        # Whether the mission was completed decides nothing here: each such test would wait for
+        # the others.
+        failure = assertion.failure(flight, run.scenario(target), lambda: True)
+        if failure is not None and failure.is_about(flight.result.verdict.primary):
+            return True
+    return False
 
 
 def refly(run: Run, target: Target, failure: ItemFailure) -> Reflights:

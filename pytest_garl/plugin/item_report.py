@@ -22,10 +22,12 @@ from pytest_garl.plugin.keys import (
     DUPLICATE_OF,
     FINDING_TEST,
     LANDING,
+    LEFT_TO_ANOTHER,
     MAYBE_FIXED,
     NOT_REPEATED,
     REPORTED_FAILURE,
     RUN,
+    SHOWN_VIOLATION,
     STALE,
     UNPROVEN,
     USER_FAILURE,
@@ -82,6 +84,8 @@ def report_item(
         writer.write_failure(error)
     elif report.passed:
         writer.write_pass()
+    elif landing.left_to_another_test:
+        writer.write_left()
 
 
 @dataclasses.dataclass(frozen=True, slots=True, kw_only=True)
@@ -100,6 +104,10 @@ class _Writer:
         return self.target.entry.case if self.target.entry is not None else None
 
     @property
+    def _slot_key(self) -> str:
+        return f"{self.target.search} {self.target.name}"
+
+    @property
     def _case_file(self) -> str:
         entry = self.target.entry
         return shown_path(entry.path, self.item.config) if entry is not None else ""
@@ -110,6 +118,8 @@ class _Writer:
         if failure is not None and self.case is None and not self.result.inconclusive:
             self._note_user_failure(failure)
         facts = failed_item(self.run, self.target, self.result, failure)
+        if failure is not None and not failure.user_property:
+            self._note(SHOWN_VIOLATION, self._slot_key)
         gather = failure_facts(self.run, self.target, failure, self.item.nodeid)
         decision, facts = resolve(facts, gather)
         if decision.reason is Reason.TEST_ERROR:
@@ -122,6 +132,10 @@ class _Writer:
             self._write_failing_case(self.case, failure, decision, facts)
         elif failure is not None:
             self._write_violation(failure, decision, facts)
+
+    def write_left(self) -> None:
+        """Note that another test of the slot reports the violation; the session checks that."""
+        self._note(LEFT_TO_ANOTHER, self._slot_key)
 
     def write_pass(self) -> None:
         """Write the outcome of a test that passed; only a saved case has more to say."""

@@ -26,7 +26,8 @@ class Landing:
 
     Reading a property that the flight did not decide skips the test with the reason;
     ``final_distance_m`` and ``elapsed_s`` can always be read.  ``reads`` is what ``test`` has read
-    so far, so that a failure can be told from another property's.
+    so far, so that a failure can be told from another property's.  ``is_shown_elsewhere`` says
+    whether another test of the slot fails for the flight's violation.
     """
 
     def __init__(
@@ -34,11 +35,15 @@ class Landing:
         target: Target,
         flight: CompletedFlight,
         test: Callable[..., Any] | None = None,
+        *,
+        is_shown_elsewhere: Callable[[], bool] = lambda: False,
     ) -> None:
         self._target, self._result, self._record = target, flight.result, flight.record
         self._code = code_of(test) if test else None
+        self._is_shown_elsewhere = is_shown_elsewhere
         self.slot: str = target.name
         self.reads: list[AttributeRead] = []
+        self.left_to_another_test = False
 
     @property
     def result(self) -> FlightResult:
@@ -53,7 +58,7 @@ class Landing:
 
     @property
     def outcome(self) -> str:
-        """How the flight ended: landed, collision, not_landed, aborted."""
+        """How the flight ended: landed, collision, slid, gave_up, not_landed or crashed."""
         self._note("outcome")
         return self._result.outcome
 
@@ -80,36 +85,72 @@ class Landing:
         return self._target.limits
 
     @property
+    def completed(self) -> bool:
+        """Whether the mission was completed: landed within the limit of distance.
+
+        If another test of the slot fails for the same violation, this one is skipped: one event
+        fails one test.
+        """
+        self._note("completed")
+        verdict = self._result.verdict
+        if verdict.completed:
+            return True
+        if verdict.primary is None and not verdict.excuse:
+            # It gave up, and limits(abort="ok") allows that.
+            self._undecided()
+        if verdict.primary is not None:
+            self._leave_to_another_test()
+        return False
+
+    @property
+    def excused(self) -> str:
+        """Why nobody could have landed; empty if somebody could, or if the UAV landed."""
+        self._note("excused")
+        verdict = self._result.verdict
+        return verdict.excuse and (verdict.excuse_text or verdict.excuse)
+
+    @property
     def distance_to_landing_m(self) -> float:
         """Horizontal distance from the UAV to the marker's centre where it landed.
 
-        Where it touched the ground too far off before it gave up, that place counts.
+        Infinite if it slid on after its touchdown.  If it touched the ground too far off before,
+        that place counts.
         """
         self._note("distance_to_landing_m")
-        if self.outcome == "landed":
-            return self.final_distance_m
+        if self.outcome == "slid":
+            return math.inf
         touched = self._result.off_marker_m
-        if touched is None:
+        if touched is not None:
+            return touched
+        if self.outcome != "landed":
             self._undecided()
-        return touched
+        return self.final_distance_m
 
     @property
     def time_to_landing_s(self) -> float:
-        """Time from the mission's start to the landing; infinite if it never landed."""
+        """Time from the mission's start to the touchdown.
+
+        Infinite if the UAV never landed although somebody could have.
+        """
         self._note("time_to_landing_s")
-        if self.outcome == "not_landed":
-            return math.inf
-        if self.outcome != "landed":
+        result, verdict = self._result, self._result.verdict
+        if result.outcome != "landed":
+            if verdict.primary == "time":
+                return math.inf
             self._undecided()
-        if self.verdict.primary == "distance":
+        landed_s = result.elapsed_s if result.landed_s is None else result.landed_s
+        if verdict.primary == "distance":
             # One event, one failing test: what landed elsewhere is not late as well.
-            return min(self.elapsed_s, self.limits.time_s)
-        return self.elapsed_s
+            return min(landed_s, self.limits.time_s)
+        return landed_s
 
     @property
     def collisions(self) -> tuple[str, ...]:
         """Names of the bodies that the UAV hit; "ground" for a hard touchdown."""
         self._note("collisions")
+        if self._result.collisions and self._result.verdict.primary == "distance":
+            # It had touched the ground off the marker before.
+            self._leave_to_another_test()
         return self._result.collisions
 
     @property
@@ -131,7 +172,7 @@ class Landing:
         verdict = self._result.verdict
         if verdict.primary == "crash":
             return f"not decided: {verdict.story}"
-        return "not decided: the landing was aborted" if verdict.primary == "abort" else ""
+        return "not decided: the landing system gave up" if verdict.primary == "abort" else ""
 
     @property
     def complaint(self) -> str:
@@ -152,8 +193,15 @@ class Landing:
 
         return load(self._record)
 
+    def _leave_to_another_test(self) -> None:
+        """Skip the test if another one of the slot fails for the flight's violation."""
+        if self._is_shown_elsewhere():
+            self.left_to_another_test = True
+            signature = self._result.signature
+            pytest.skip(f"not decided: another test of this flight fails for {signature}")
+
     def _undecided(self) -> NoReturn:
-        pytest.skip(f"not decided: {self._result.undecided}")
+        pytest.skip(f"not decided: {self.excused or self._result.undecided}")
 
     def _note(self, name: str) -> None:
         """Remember what the test reads, and in which line of its own body."""

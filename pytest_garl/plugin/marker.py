@@ -52,7 +52,10 @@ def read_marker(marker: pytest.Mark, options: Options) -> MarkerArguments:
     if isinstance(given, dict):
         given = limits(**{str(name): value for name, value in given.items()})
     if not isinstance(given, Limits):
-        raise GarlError(f"mark.garl: limits={given!r}: expected pytest_garl.limits(...)")
+        raise GarlError(
+            f"mark.garl: limits={given!r}: expected pytest_garl.limits(distance_m=..., "
+            "time_s=..., abort='needless', 'ok' or 'violation')"
+        )
     deterministic = marker.kwargs.get("deterministic", True)
     if not isinstance(deterministic, bool):
         raise GarlError(f"mark.garl: deterministic={deterministic!r}: expected True or False")

@@ -51,6 +51,7 @@ class SelectedItem:
     nodeid: str
     test: str
     shows: bool
+    item: pytest.Item
 
 
 def selected(item: pytest.Item) -> SelectedItem:
@@ -60,6 +61,7 @@ def selected(item: pytest.Item) -> SelectedItem:
         nodeid=item.nodeid,
         test=test_of(item),
         shows=not marked and "landing" in getattr(item, "fixturenames", ()),
+        item=item,
     )
 
 

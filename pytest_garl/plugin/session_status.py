@@ -95,6 +95,9 @@ def notes(tally: Tally) -> Iterator[str]:
     if tally.unasserted:
         kinds = [f"{name} ({counted(n, 'flight')})" for name, n in tally.unasserted.most_common()]
         yield f"no selected test fails for these violations: {', '.join(kinds)}"
+    for search in tally.without_landing:
+        flights = counted(len(search.flights), "flight")
+        yield f"{search.name} on {search.map}: landed in none of {flights}"
     for (system, map), slots in sorted(_unrepeated_by_search(tally).items()):
         violations = counted(len(slots), "violation")
         yield f"{_search(system, map)}: {violations} did not repeat: {_names(slots)}"

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Sequence
 from typing import Any
 
 import pytest
@@ -18,9 +19,7 @@ from pytest_garl.plugin.tally import Tally
 from pytest_garl.plugin.terminal_text import width_of, wrapped
 from pytest_garl.reports.run_report import ENDED, USER_FAILURES, utc_now
 from pytest_garl.reports.search_summary import SearchSummary, ViolationKind, legend
-from pytest_garl.verdicts.paper_metrics import top_k
-from pytest_garl.verdicts.statistics import share_interval
-from pytest_garl.verdicts.wording import decided_text
+from pytest_garl.reports.shares_text import headline_shares, share_lines
 
 _UNDECIDED = "Skipped: not decided:"
 
@@ -96,7 +95,7 @@ def _write_searches(reporter: Any, run: Run, tally: Tally) -> None:
 def _lines_about(searches: list[SearchSummary], run: Run, reporter: Any) -> list[str]:
     width = width_of(reporter.config)
     lines = [line for each in searches for line in search_table(each, reporter.config, width)]
-    types = legend(kind for search in searches for kind in search.kinds)
+    types = legend(kind for search in searches for kind in (*search.kinds, *search.findings))
     lines += [wrapped(text, width) for text in (types, _costs(run)) if text]
     progress = run.ledger.queries.progress()
     done, total = sum(each.flown for each in progress), sum(each.total for each in progress)
@@ -119,7 +118,7 @@ def fold_skips(reporter: Any) -> None:
         reason = str(report.longrepr[2])
         if reason.startswith(_UNDECIDED):
             file = reporter.config.rootpath / report.nodeid.partition("::")[0]
-            folded = f"{_UNDECIDED} the flight ended before (-v tells how)"
+            folded = f"{_UNDECIDED} the flight ended before, or another test fails (-v: which)"
             report.longrepr = (str(file), None, folded)
 
 
@@ -144,13 +143,27 @@ def _costs(run: Run) -> str:
 
 
 def search_table(search: SearchSummary, config: pytest.Config, width: int) -> list[str]:
-    """Return the shares of a system on a map, then each kind of violation and how to see it."""
+    """Return the shares of a system on a map, then each kind of violation and how to see it.
+
+    What had gone wrong before another event follows; no item fails for it.
+    """
     lines = [
-        wrapped(f"{search.name} on {search.map}: {', '.join(_shares(search))}", width, others="  "),
-        wrapped(decided_text(search.verdicts), width, first="  ", others="  "),
+        wrapped(f"{search.name} on {search.map}: {headline_shares(search)}", width, others="  "),
+        *(wrapped(line, width, first="  ", others="    ") for line in share_lines(search)),
+        *_kind_lines(search, search.kinds, config, width),
     ]
-    longest = max((len(kind.signature) for kind in search.kinds), default=0)
-    for kind in search.kinds:
+    if search.findings:
+        lines.append("  before another event:")
+        lines += _kind_lines(search, search.findings, config, width)
+    return lines
+
+
+def _kind_lines(
+    search: SearchSummary, kinds: Sequence[ViolationKind], config: pytest.Config, width: int
+) -> list[str]:
+    lines = []
+    longest = max((len(kind.signature) for kind in kinds), default=0)
+    for kind in kinds:
         signature = f"  {kind.count:4d}  {kind.signature:<{longest}}"
         command = repeat_kind_command(search, kind, config)
         fits = len(signature) + 2 + len(command) <= width
@@ -163,31 +176,3 @@ def repeat_kind_command(search: SearchSummary, kind: ViolationKind, config: pyte
     """Return the command that repeats the first flight of a kind."""
     files = " ".join(shown_path(config.rootpath / file, config) for file in search.files)
     return repeat_command(config, files, kind.first)
-
-
-def _shares(search: SearchSummary) -> list[str]:
-    total, verdicts = len(search.verdicts), search.verdicts
-    low, high = share_interval(search.violating, total)
-    shares = [
-        f"{total} flown",
-        f"violations {_percent(search.violating, total)} [{100 * low:.1f}, {100 * high:.1f}]",
-    ]
-    paper = sum(verdict.paper_violation for verdict in verdicts)
-    if paper != search.violating:
-        shares.append(f"by the paper's definition {_percent(paper, total)}")
-    shares += [
-        f"landed {_percent(search.count('landed'), total)}",
-        f"gave up {_percent(search.count('gave_up'), total)}",
-    ]
-    late = sum(verdict.violation_type == "late" for verdict in verdicts)
-    rare = {"late": late, **search.crashes}
-    shares += [f"{word} {_percent(count, total)}" for word, count in rare.items() if count]
-    if inconclusive := search.count("inconclusive"):
-        shares.append(f"inconclusive {inconclusive}")
-    if tenth := top_k(verdicts):
-        shares.append(f"the tenth violation in flight {tenth}")
-    return shares
-
-
-def _percent(count: int, total: int) -> str:
-    return f"{100 * count / total:.1f} %"

@@ -10,10 +10,12 @@ import pytest
 
 from pytest_garl.plugin.keys import (
     DUPLICATE_OF,
+    LEFT_TO_ANOTHER,
     NO_FLIGHT,
     NOT_REPEATED,
     OUTCOME,
     REPORTED_FAILURE,
+    SHOWN_VIOLATION,
     SIGNATURE,
     SLOT,
     USER_FAILURE,
@@ -37,6 +39,8 @@ class Tally:
         self._failing_flights: set[tuple[str, str]] = set()
         self._failures: dict[str, str] = {}
         self._excused: dict[str, set[str]] = {}
+        self._shown: dict[str, str] = {}
+        self._left_to_others: dict[str, str] = {}
         self._user_failures: dict[str, list[str]] = {}
         self._searches: list[SearchSummary] | None = None
 
@@ -46,7 +50,8 @@ class Tally:
         if report.when == "setup":
             # A test that runs again reports anew; one with subtests reports more than once.
             self._failures.pop(report.nodeid, None)
-            self._user_failures.pop(report.nodeid, None)
+            for noted in (self._user_failures, self._shown, self._left_to_others):
+                noted.pop(report.nodeid, None)
         properties = dict(report.user_properties)
         if SLOT not in properties or report.when == "teardown":
             return
@@ -61,6 +66,10 @@ class Tally:
             self._failing_flights.add(flight)
         if REPORTED_FAILURE in properties and report.failed:
             self._failures[report.nodeid] = str(properties[REPORTED_FAILURE])
+        if SHOWN_VIOLATION in properties and (report.failed or hasattr(report, "wasxfail")):
+            self._shown[report.nodeid] = str(properties[SHOWN_VIOLATION])
+        if LEFT_TO_ANOTHER in properties and report.skipped:
+            self._left_to_others[report.nodeid] = str(properties[LEFT_TO_ANOTHER])
         if DUPLICATE_OF in properties and report.skipped:
             self._excused.setdefault(str(properties[DUPLICATE_OF]), set()).add(report.nodeid)
         if USER_FAILURE in properties:
@@ -89,6 +98,11 @@ class Tally:
         return self._searches
 
     @property
+    def without_landing(self) -> list[SearchSummary]:
+        """The searches in which no flight landed, once the summaries have been read."""
+        return [each for each in self._searches or () if not each.count("landed")]
+
+    @property
     def unasserted(self) -> Counter[str]:
         """How many flights violate without failing any selected test, by signature."""
         return Counter(
@@ -99,7 +113,9 @@ class Tally:
 
     def wrongly_excused(self) -> list[str]:
         """Return the items that are excused by a failure that no item reports."""
-        reported = set(self._failures.values())
-        return sorted(
+        reported, shown = set(self._failures.values()), set(self._shown.values())
+        excused = {
             item for key, items in self._excused.items() if key not in reported for item in items
-        )
+        }
+        left = {item for item, slot in self._left_to_others.items() if slot not in shown}
+        return sorted(excused | left)

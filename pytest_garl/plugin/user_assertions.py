@@ -60,9 +60,16 @@ class ItemAssertion:
         violates = flight.result.verdict.violation
         return None if violates else self.failure(flight, scenario)
 
-    def failure(self, flight: CompletedFlight, scenario: Scenario) -> UserFailure | None:
+    def failure(
+        self,
+        flight: CompletedFlight,
+        scenario: Scenario,
+        is_shown_elsewhere: Callable[[], bool] = lambda: False,
+    ) -> UserFailure | None:
         """Return how the test fails on a flight, or None."""
-        landing = Landing(self._target, flight, self._function)
+        landing = Landing(
+            self._target, flight, self._function, is_shown_elsewhere=is_shown_elsewhere
+        )
         if landing.unjudged:
             return None
         arguments = {"landing": landing, "scenario": scenario}

@@ -9,12 +9,13 @@ from pytest_garl.execution.flight_id import CompletedFlight
 from pytest_garl.scenarios.scenario import Scenario
 
 ATTRIBUTES_OF_PROPERTY: dict[str, frozenset[str]] = {
-    "distance": frozenset({"distance_to_landing_m", "final_distance_m"}),
+    # A UAV may hit something after it has touched the ground off the marker.
+    "distance": frozenset({"distance_to_landing_m", "final_distance_m", "collisions"}),
     "time": frozenset({"time_to_landing_s", "elapsed_s"}),
     "collision": frozenset({"collisions"}),
 }
 """The attributes of a landing that belong to each built-in property."""
-ATTRIBUTES_OF_ALL_PROPERTIES = frozenset({"outcome", "verdict", "result"})
+ATTRIBUTES_OF_ALL_PROPERTIES = frozenset({"outcome", "verdict", "result", "completed", "excused"})
 """The attributes that belong to every built-in property."""
 
 

@@ -6,6 +6,7 @@ its meaning takes a new ``version``.
 
 from __future__ import annotations
 
+import dataclasses
 from collections import Counter
 from datetime import UTC, datetime
 from importlib.metadata import version
@@ -16,7 +17,13 @@ from pytest_garl.errors import LedgerError
 from pytest_garl.execution.ledger import Ledger
 from pytest_garl.execution.ledger_queries import LedgerFlight
 from pytest_garl.regressions.corpus import Corpus
-from pytest_garl.reports.search_summary import SearchSummary, SlotUserFailure, search_summaries
+from pytest_garl.reports.search_summary import (
+    SearchSummary,
+    SlotUserFailure,
+    Spread,
+    ViolationKind,
+    search_summaries,
+)
 from pytest_garl.scenarios.files import parse_scenario
 from pytest_garl.verdicts.paper_metrics import top_k
 from pytest_garl.verdicts.statistics import share_interval
@@ -94,8 +101,17 @@ def _search(
         "flown": total,
         "violating": summary.violating,
         "violating_interval_95": [low, high],
-        "violating_by_the_paper": sum(verdict.paper_violation for verdict in verdicts),
+        "violating_by_the_paper": summary.violating_by_the_paper,
         "tenth_violation": top_k(verdicts),
+        "limits": [dataclasses.asdict(limits) for limits in summary.limits],
+        "landed": summary.count("landed"),
+        "completed": summary.completed,
+        "gave_up": dict(summary.without_landing("gave_up")),
+        "not_landed": dict(summary.without_landing("not_landed")),
+        "crashes": dict(sorted(summary.crashes.items())),
+        "inconclusive": summary.count("inconclusive"),
+        "landing_distance_m": _spread(summary.landing_distance_m),
+        "landing_time_s": _spread(summary.landing_time_s),
         "outcomes": dict(sorted(Counter(each.result.outcome for each in summary.flights).items())),
         "types": dict(
             sorted(Counter(str(v.violation_type) for v in verdicts if v.violation_type).items())
@@ -106,13 +122,7 @@ def _search(
         },
         "signatures": [
             {
-                "signature": kind.signature,
-                "type": kind.signature.partition(":")[0],
-                "count": kind.count,
-                "first": _flight(summary.flight(kind.first)),
-                "story": kind.story,
-                "headline": kind.headline,
-                "repeat": _repeat_command(summary, kind.first, path),
+                **_kind(summary, kind, path),
                 "cases": [
                     case["file"]
                     for case in cases
@@ -122,7 +132,24 @@ def _search(
             }
             for kind in summary.kinds
         ],
+        "findings": [_kind(summary, finding, path) for finding in summary.findings],
     }
+
+
+def _kind(summary: SearchSummary, kind: ViolationKind, path: Path) -> dict[str, Any]:
+    return {
+        "signature": kind.signature,
+        "type": kind.signature.partition(":")[0],
+        "count": kind.count,
+        "first": _flight(summary.flight(kind.first)),
+        "story": kind.story,
+        "headline": kind.headline,
+        "repeat": _repeat_command(summary, kind.first, path),
+    }
+
+
+def _spread(spread: Spread | None) -> dict[str, float] | None:
+    return None if spread is None else dataclasses.asdict(spread)
 
 
 def _flight(flight: LedgerFlight) -> dict[str, Any]:

@@ -2,13 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+import statistics
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from typing import Self
 
+from pytest_garl.execution.job import parse_job
 from pytest_garl.execution.ledger import Ledger
 from pytest_garl.execution.ledger_queries import LedgerFlight
-from pytest_garl.verdicts.verdict import Verdict
+from pytest_garl.verdicts.verdict import Limits, Verdict
 from pytest_garl.verdicts.wording import headline
+
+WHY_NO_LANDING = ("needless", "excused", "blocked")
+"""Columns of the flights without landing: somebody could have landed; nobody could have read the
+marker for long enough; something never left it free for long enough."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -27,7 +34,7 @@ class SlotUserFailure:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ViolationKind:
-    """All violations with one signature.
+    """All violations with one signature, or all findings that came before another event.
 
     ``count`` is the number of flights, ``first`` the slot of the first one, ``story`` what happened
     in it, and ``headline`` the story in short.
@@ -41,8 +48,25 @@ class ViolationKind:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class Spread:
+    """The median and the worst, which is the largest, of a quantity over flights that landed."""
+
+    median: float
+    worst: float
+
+    @classmethod
+    def of(cls, values: Sequence[float]) -> Self | None:
+        """Return the spread of values, None if there are none."""
+        return cls(median=statistics.median(values), worst=max(values)) if values else None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class SearchSummary:
-    """All flights of a system on a map, and their kinds of violation, the most frequent first."""
+    """All flights of a system on a map, and their kinds of violation, the most frequent first.
+
+    ``findings`` are what had gone wrong before the event that decided a flight.  ``limits`` are
+    those of the marker; there are several only if markers of one system differ.
+    """
 
     system: str
     map: str
@@ -52,6 +76,8 @@ class SearchSummary:
     kinds: tuple[ViolationKind, ...]
     violating: int
     """How many flights violate a property, built in or a user's own."""
+    findings: tuple[ViolationKind, ...] = ()
+    limits: tuple[Limits, ...] = ()
 
     @property
     def name(self) -> str:
@@ -70,6 +96,42 @@ class SearchSummary:
     def count(self, outcome: str) -> int:
         """Return how many flights had an outcome."""
         return sum(each.result.outcome == outcome for each in self.flights)
+
+    def without_landing(self, outcome: str) -> Mapping[str, int]:
+        """Return how many flights with the outcome gave_up or not_landed had which reason."""
+        reasons = [
+            each.result.verdict.no_landing
+            for each in self.flights
+            if each.result.outcome == outcome
+        ]
+        return {reason: reasons.count(reason) for reason in WHY_NO_LANDING}  # type: ignore[arg-type]
+
+    @property
+    def completed(self) -> int:
+        """How many flights landed within the limit of distance."""
+        return sum(verdict.completed for verdict in self.verdicts)
+
+    @property
+    def violating_by_the_paper(self) -> int:
+        """How many flights violate the paper's definition, by which no landing is a violation."""
+        return sum(verdict.paper_violation for verdict in self.verdicts)
+
+    @property
+    def landing_distance_m(self) -> Spread | None:
+        """The distance from the marker of the flights that landed; None if none did."""
+        return Spread.of([each.result.final_distance_m for each in self._landed])
+
+    @property
+    def landing_time_s(self) -> Spread | None:
+        """The time of the touchdown of the flights that landed; None if none did."""
+        results = [each.result for each in self._landed]
+        return Spread.of(
+            [each.elapsed_s if each.landed_s is None else each.landed_s for each in results]
+        )
+
+    @property
+    def _landed(self) -> list[LedgerFlight]:
+        return [each for each in self.flights if each.result.outcome == "landed"]
 
     @property
     def crashes(self) -> Mapping[str, int]:
@@ -115,6 +177,26 @@ def _summary(
             violations.setdefault(verdict.signature, []).append(violation)
     for each in sorted(user_failures, key=lambda each: each.slot):
         violations.setdefault(each.signature, []).append((each.slot, each.message))
+    findings: dict[str, list[tuple[str, str]]] = {}
+    for flight in flights:
+        for finding in flight.result.verdict.findings:
+            before = flight.id.slot_id, finding.story
+            findings.setdefault(finding.signature, []).append(before)
+    files = str(ledger.fact(f"files of {system} on {map}") or "")
+    return SearchSummary(
+        system=system,
+        map=map,
+        files=tuple(files.split()),
+        flights=tuple(flights),
+        kinds=_kinds(violations),
+        violating=len({slot for items in violations.values() for slot, _ in items}),
+        findings=_kinds(findings),
+        limits=_limits(ledger, flights),
+    )
+
+
+def _kinds(stories: Mapping[str, Sequence[tuple[str, str]]]) -> tuple[ViolationKind, ...]:
+    """Return the kinds in (slot, story) by signature, the most frequent first."""
     kinds = [
         ViolationKind(
             signature=signature,
@@ -123,33 +205,32 @@ def _summary(
             story=items[0][1],
             headline=headline(items[0][1]),
         )
-        for signature, items in violations.items()
+        for signature, items in stories.items()
     ]
-    files = str(ledger.fact(f"files of {system} on {map}") or "")
-    return SearchSummary(
-        system=system,
-        map=map,
-        files=tuple(files.split()),
-        flights=tuple(flights),
-        kinds=tuple(sorted(kinds, key=lambda each: (-each.count, each.signature))),
-        violating=len({slot for items in violations.values() for slot, _ in items}),
-    )
+    return tuple(sorted(kinds, key=lambda each: (-each.count, each.signature)))
+
+
+def _limits(ledger: Ledger, flights: Sequence[LedgerFlight]) -> tuple[Limits, ...]:
+    jobs = [ledger.job(search) for search in dict.fromkeys(each.id.search for each in flights)]
+    return tuple(dict.fromkeys(parse_job(job).limits for job in jobs if job is not None))
 
 
 LEGEND = {
-    "I": "landed on something else",
-    "I?": "landed elsewhere, unknown on what",
-    "II": "not landed, marker not seen",
+    "I": "came down off the marker, on something else or on nothing",
+    "II": "did not land: the marker was never seen, lost, or given up in plain sight",
     "III": "hit a fixed body",
     "IV": "hit a moving body",
     "V": "Python error, death or hang of the landing system",
-    "late": "not landed in time",
-    "off": "landed off its own right target",
+    "late": "landed too late, or did not land for want of time",
+    "off": "came down too far from the marker, up to 1.5 m",
     "hard": "touched down too fast or tilted",
-    "abort": "gave up",
+    "slid": "moved on over the ground after its touchdown",
+    "abort": 'gave up where nobody could land, with limits(abort="violation")',
     "own": "an assertion of a test",
+    "slow": "took three times as long as the reference pilot",
+    "lost-while-detectable": "did not see the marker while it could be read",
 }
-"""Meanings of the types: the part of a signature before the first colon."""
+"""Meanings of the types of violations and findings: a signature's part before the first colon."""
 
 
 def legend(kinds: Iterable[ViolationKind]) -> str:

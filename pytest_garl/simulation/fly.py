@@ -14,6 +14,7 @@ from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.simulation.flight import PACKAGES, Flight
 from pytest_garl.simulation.flight_file import hash_of
 from pytest_garl.simulation.loop import Loop
+from pytest_garl.simulation.nominal import with_nominal_landing
 from pytest_garl.simulation.npc_policy import PolicySpec
 from pytest_garl.simulation.system_under_test.calls import StepGuard
 
@@ -35,9 +36,9 @@ def fly(
     """
     began = time.perf_counter()
     place = (map or load_map(scenario.map)).without(scenario.removed_objects)
-    flight = Loop(scenario, system, npcs.make, place, time_limit_s, guard).run()
+    loop = Loop(scenario, system, npcs.make, place, time_limit_s, guard)
     flight = dataclasses.replace(
-        flight,
+        with_nominal_landing(loop.run(), scenario, place, loop.camera),
         cpu=dispatched(),
         versions=tuple((name, version(name)) for name in PACKAGES),
         wall_s=time.perf_counter() - began,

@@ -63,6 +63,7 @@ class Loop:
         self.scenario, self.map = scenario, map
         self._time_limit_s = time_limit_s
         self._system = SystemUnderTest(system, guard)
+        self.camera = self._system.airframe.camera
         self._marker = marker_position_m(scenario, map)
         self._model = vehicle_model(self._system.airframe)
         self.npcs = [Npc(scenario, map, name, policy()) for name, _ in map.present_objects]
@@ -84,7 +85,7 @@ class Loop:
         self._command: Command | None = None
         self._renderer: Renderer | None = None
         self._ticks = 0
-        self._ticks_per_frame = _ticks_per_call(self._system.airframe.camera.rate_hz)
+        self._ticks_per_frame = _ticks_per_call(self.camera.rate_hz)
         self._ticks_per_control = _ticks_per_call(self._system.airframe.control_rate_hz)
 
     def run(self) -> Flight:
@@ -233,8 +234,7 @@ class Loop:
             frame = self._renderer.render(eye, attitude, now, poses)
             visible = self.recorder.sight(frame, self._renderer, eye, attitude)
         else:
-            camera = airframe.camera
-            frame, visible = blank_frame(camera.height_px, camera.width_px), Sight()
+            frame, visible = blank_frame(self.camera.height_px, self.camera.width_px), Sight()
         if self._system.gave_up:
             # The recorded view explains a collision during the climb.
             self.recorder.step(Abort(), visible)

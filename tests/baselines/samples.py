@@ -21,7 +21,9 @@ from pytest_garl.verdicts.verdict import Limits
 from tests.support.results import flight_result
 
 LAWN, COURT = load_map("lawn"), load_map("court")
-LANDED = FlightSummary(outcome="landed", signature="", sha256="ab" * 32)
+LANDED = FlightSummary(
+    outcome="landed", signature="", distance_m=0.1, time_s=30.0, sha256="ab" * 32
+)
 DOG = FlightSummary(outcome="collision", signature="IV:dog:descent:seen", paper_violation=True)
 
 

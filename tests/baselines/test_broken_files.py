@@ -19,9 +19,26 @@ BASELINE = baselines.dump_baseline(baseline())
     [
         ("cpu = ", "\n", "[" * 3000, "nested too deeply"),
         ("distance_m = ", ",", "9" * 400, "'set.0..limits.distance_m': found 999"),
-        ("flights = ", "\n]", "[[" + "9" * 400 + ', "landed", "", false, "", []]', "the seed 99"),
+        (
+            "flights = ",
+            "\n]",
+            "[[" + "9" * 400 + ', "landed", "", false, "", [], "", []]',
+            "the seed 99",
+        ),
         ("flights = ", "\n]", '["' + "x" * 5000 + '"', r"'set\[0\].flights\[0\]': found 'xxx"),
-        ("flights = ", "\n]", '[[0, "landed", "", false, "", [1]]', "found 1 values of genes"),
+        (
+            "flights = ",
+            "\n]",
+            '[[0, "landed", "", false, "", [1], "", []]',
+            "distance in m, time in s",
+        ),
+        ("flights = ", "\n]", '[[0, "landed", "", false, "lazy", [], "", []]', "found 'lazy'"),
+        (
+            "flights = ",
+            "\n]",
+            '[[0, "landed", "", false, "", [], "", [1]]',
+            "found 1 values of genes",
+        ),
     ],
 )
 def test_broken_baseline_gives_one_short_error(start: str, end: str, new: str, words: str) -> None:
@@ -35,7 +52,7 @@ def test_broken_baseline_gives_one_short_error(start: str, end: str, new: str, w
 
 def test_gene_too_large_for_a_float_is_refused() -> None:
     row = BASELINE.index("\n  [", BASELINE.index("flights = ")) + len("\n  [")
-    value = BASELINE.index("[", row) + 1
+    value = BASELINE.index('ab", [', row) + len('ab", [')
     text = f"{BASELINE[:value]}{'9' * 400}{BASELINE[BASELINE.index(',', value) :]}"
     with pytest.raises(ScenarioError, match=r"flights\[0\]': environment.dust: found 999.* to 1$"):
         baselines.parse_baseline(text, load_map, source="base.toml")

@@ -1,15 +1,22 @@
 from __future__ import annotations
 
+import dataclasses
+import itertools
+
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from pytest_garl.baselines.comparison import PAIRS_LISTED, Comparison, compare
+from pytest_garl.baselines.comparison import Comparison, compare
+from pytest_garl.baselines.comparison_text import PAIRS_LISTED, report_lines, summary_lines
 from pytest_garl.baselines.gate_statistics import holm_adjusted, mcnemar_p, new_type_p
 from pytest_garl.baselines.pairs import FlightSummary, Pair, violation_type_of
 
 LANDED = FlightSummary(outcome="landed", signature="")
-ABORTED = FlightSummary(outcome="gave_up", signature="")
+ABORTED = FlightSummary(outcome="gave_up", signature="", no_landing="blocked")
+NEEDLESS = FlightSummary(
+    outcome="gave_up", signature="II:gave-up-in-sight:descent", no_landing="needless"
+)
 DOG = FlightSummary(outcome="collision", signature="IV:dog:descent:seen", paper_violation=True)
 CAT = FlightSummary(outcome="collision", signature="IV:cat:descent:seen", paper_violation=True)
 LOST = FlightSummary(outcome="not_landed", signature="II:lost:descent", paper_violation=True)
@@ -82,15 +89,15 @@ def test_nine_broken_against_one_fixed_fail_the_gate() -> None:
     assert not found.passed
     change = found.violations
     assert (change.base, change.head, change.broke, change.fixed) == (11, 19, 9, 1)
-    # Two tests, violations and aborts: the one type is too frequent to have been missed.
-    assert (change.p, change.adjusted) == (11 / 1024, 22 / 1024)
-    assert found.failure_reasons == ("significantly more violations: p 0.021 at level 0.05",)
-    assert gate((1, DOG, LANDED), (9, LANDED, DOG), (10, DOG, DOG), level=0.02).passed
+    # One test: nothing else differs, and the one type is too frequent to have been missed.
+    assert (change.p, change.adjusted, found.tests) == (11 / 1024, 11 / 1024, 1)
+    assert found.failure_reasons == ("significantly more violations: p 0.011 at level 0.05",)
+    assert gate((1, DOG, LANDED), (9, LANDED, DOG), (10, DOG, DOG), level=0.01).passed
 
 
 def test_a_rare_type_is_a_test_as_well() -> None:
-    assert gate((9, LANDED, DOG), (5, DOG, DOG)).violations.adjusted == 3 / 512
-    assert gate((9, LANDED, DOG), (6, DOG, DOG)).violations.adjusted == 2 / 512
+    assert gate((9, LANDED, DOG), (5, DOG, DOG)).violations.adjusted == 2 / 512
+    assert gate((9, LANDED, DOG), (6, DOG, DOG)).violations.adjusted == 1 / 512
 
 
 def test_four_broken_against_one_fixed_pass() -> None:
@@ -99,9 +106,12 @@ def test_four_broken_against_one_fixed_pass() -> None:
     assert found.violations.p == 6 / 32
 
 
-def test_six_broken_pairs_fail_and_five_pass() -> None:
+def test_six_broken_pairs_fail_beside_a_rare_type_and_five_pass() -> None:
     assert gate((5, LANDED, DOG), (1, DOG, DOG)).passed
     assert not gate((6, LANDED, DOG), (1, DOG, DOG)).passed
+    # Without a second test four cannot fail, and five do.
+    assert gate((4, LANDED, DOG), (6, DOG, DOG)).violations.adjusted is None
+    assert not gate((5, LANDED, DOG), (6, DOG, DOG)).passed
 
 
 def test_a_better_landing_system_passes() -> None:
@@ -111,39 +121,90 @@ def test_a_better_landing_system_passes() -> None:
 def test_equal_landing_systems_pass_without_discordant_pairs() -> None:
     found = gate((7, LANDED, LANDED), (3, DOG, DOG))
     assert found.passed
-    assert (found.violations.p, found.aborts.p) == (1.0, 1.0)
+    assert (found.violations.p, found.safe_aborts.p) == (1.0, 1.0)
     assert {pair.result for pair in found.pairs} == {"same"}
 
 
 def test_aborts_in_place_of_collisions_count_as_fixed_and_pass() -> None:
     found = gate((20, DOG, ABORTED), (20, LANDED, LANDED))
     assert found.passed
-    assert (found.violations.fixed, found.aborts.broke, found.aborts.p) == (20, 0, 1.0)
+    assert (found.violations.fixed, found.safe_aborts.broke, found.safe_aborts.p) == (20, 0, 1.0)
     assert len(found.with_result("fixed")) == 20
-    lines = list(found.summary_lines())
-    assert lines[2].startswith("violations 20 -> 0 (0 broke, 20 fixed): p 1.000, ")
-    assert lines[3].startswith("aborts 0 -> 20 (0 landings lost, 0 landings won): p 1.000, ")
+    lines = list(summary_lines(found))
+    assert lines[2:5] == [
+        "        landed      violations  blocked     excused     needless",
+        "before  20 (50 %)   20          0           0           0",
+        "after   20 (50 %)   0           20          0           0",
+    ]
+    assert lines[5].startswith("violations 20 -> 0 (0 broke, 20 fixed): p 1.000, level 0.05")
+    assert lines[6] == (
+        "safe aborts 0 -> 20 (0 landings lost, 0 landings won): too few pairs differ to fail"
+    )
 
 
 def test_aborts_in_place_of_landings_fail() -> None:
     found = gate((9, LANDED, ABORTED), (20, DOG, ABORTED), (1, ABORTED, LANDED), (1, DOG, DOG))
     assert not found.passed
-    assert (found.aborts.broke, found.aborts.fixed) == (9, 1)
-    assert found.aborts.p == 11 / 1024
+    assert (found.safe_aborts.broke, found.safe_aborts.fixed) == (9, 1)
+    assert found.safe_aborts.p == 11 / 1024
     assert gate((8, LANDED, ABORTED), (8, ABORTED, LANDED)).passed
 
 
 def test_collisions_in_place_of_aborts_count_as_violations_alone() -> None:
     found = gate((8, ABORTED, DOG), (1, DOG, DOG))
-    assert found.failure_reasons == ("significantly more violations: p 0.012 at level 0.05",)
-    assert (found.aborts.broke, found.aborts.fixed) == (0, 0)
+    assert found.failure_reasons == ("significantly more violations: p 0.008 at level 0.05",)
+    assert (found.safe_aborts.broke, found.safe_aborts.fixed) == (0, 0)
 
 
 def test_a_violating_abort_counts_as_a_violation_alone() -> None:
-    forbidden = FlightSummary(outcome="gave_up", signature="abort:descent")
+    forbidden = FlightSummary(outcome="gave_up", signature="abort:blocked", no_landing="blocked")
     found = gate((2, LANDED, forbidden), (1, forbidden, forbidden))
-    assert (found.violations.broke, found.aborts.broke) == (2, 0)
-    assert (found.aborts.base, found.aborts.head) == (1, 3)
+    assert (found.violations.broke, found.safe_aborts.broke) == (2, 0)
+    assert (found.safe_aborts.base, found.safe_aborts.head) == (0, 0)
+    assert (found.violations.base, found.violations.head) == (1, 3)
+
+
+def test_needless_aborts_in_place_of_landings_are_violations() -> None:
+    found = gate((9, LANDED, NEEDLESS), (6, NEEDLESS, NEEDLESS), (5, DOG, DOG))
+    assert (found.violations.broke, found.violations.fixed) == (9, 0)
+    assert not found.passed
+    assert "after   0 (0 %)     20          0           0           15" in summary_lines(found)
+
+
+def test_collisions_that_became_needless_aborts_are_fixed() -> None:
+    found = gate((20, DOG, NEEDLESS), (6, NEEDLESS, NEEDLESS), (20, LANDED, LANDED))
+    assert found.passed
+    assert len(found.with_result("fixed")) == 20
+    assert (found.violations.broke, found.violations.fixed) == (0, 0)
+    assert any(
+        line.startswith("violations other than no landing 20 -> 0 (0 graver than giving up, 20 m")
+        for line in summary_lines(found)
+    )
+
+
+def test_needless_aborts_that_became_collisions_fail_at_an_equal_number_of_violations() -> None:
+    found = gate((9, NEEDLESS, DOG), (6, DOG, DOG), (20, LANDED, LANDED))
+    assert found.failure_reasons == (
+        "significantly more violations other than no landing: p 0.002 at level 0.05",
+    )
+
+
+def test_a_system_that_always_aborts_fails_although_it_collides_with_nothing() -> None:
+    found = gate((20, DOG, NEEDLESS), (20, LANDED, NEEDLESS), (6, NEEDLESS, NEEDLESS))
+    assert found.failure_reasons[0].startswith("significantly more violations: p ")
+    excusing = dataclasses.replace(NEEDLESS, signature="")
+    found = gate((20, DOG, excusing), (20, LANDED, excusing), (6, excusing, excusing))
+    assert found.failure_reasons[0].startswith("significantly more safe aborts: p ")
+
+
+def test_pairs_are_ordered_from_landing_to_violation() -> None:
+    tolerated = dataclasses.replace(NEEDLESS, signature="")
+    ladder = (LANDED, ABORTED, NEEDLESS, DOG)
+    for before, after in itertools.pairwise(ladder):
+        assert pairs_of((1, before, after))[0].result == "broke"
+        assert pairs_of((1, after, before))[0].result == "fixed"
+    assert pairs_of((1, ABORTED, tolerated))[0].result == "broke"
+    assert pairs_of((1, NEEDLESS, NEEDLESS))[0].result == "same"
 
 
 # A type of violation that the base does not have.
@@ -183,9 +244,9 @@ def test_a_new_type_in_many_pairs_fails_without_any_neighbour() -> None:
 def test_an_insignificant_new_type_is_reported_and_passes() -> None:
     found = gate((1, LANDED, LOST), (49, LANDED, LANDED), beside=(LANDED, LANDED, LOST))
     assert found.passed
-    assert list(found.summary_lines())[4] == (
-        "new type of violation: II in lawn-0, in 1 of 3 neighbours: p 0.022, for all 3 tests "
-        "0.067, level 0.05: may be chance, look at it"
+    assert list(summary_lines(found))[-1] == (
+        "new type of violation: II in lawn-0, in 1 of 3 neighbours: p 0.022, level 0.05: may be "
+        "chance, look at it"
     )
 
 
@@ -203,7 +264,7 @@ def test_an_inconclusive_neighbour_fails_the_gate() -> None:
 def test_a_new_signature_of_a_known_type_is_reported_and_passes() -> None:
     found = gate((5, DOG, CAT), (3, DOG, DOG), (40, LANDED, LANDED))
     assert found.passed
-    assert list(found.summary_lines())[4] == (
+    assert list(summary_lines(found))[-1] == (
         "new kind of a known type, not gated: IV:cat:descent:seen in lawn-0, lawn-1, lawn-2 and 2 "
         "more"
     )
@@ -254,7 +315,7 @@ def test_a_pair_undecided_by_the_base_is_left_out_and_reported() -> None:
     found = gate((1, UNSURE, DOG), (4, LANDED, LANDED))
     assert found.passed
     assert (len(found.pairs), found.left_out) == (4, 1)
-    assert list(found.summary_lines())[2] == "1 left out: inconclusive when the baseline was saved"
+    assert list(summary_lines(found))[2] == "1 left out: inconclusive when the baseline was saved"
 
 
 def test_a_base_with_more_than_a_twentieth_undecided_fails_the_gate() -> None:
@@ -271,7 +332,8 @@ def test_the_gate_fails_without_comparable_pairs() -> None:
 
 
 def test_a_pair_with_two_different_violations_counts_as_changed() -> None:
-    found = gate((1, DOG, LOST), (1, LOST, DOG))
+    tree = FlightSummary(outcome="collision", signature="III:tree:descent", paper_violation=True)
+    found = gate((1, DOG, tree), (1, tree, DOG))
     assert [pair.result for pair in found.pairs] == ["changed", "changed"]
     assert (found.violations.broke, found.violations.fixed) == (0, 0)
     assert found.passed
@@ -279,19 +341,19 @@ def test_a_pair_with_two_different_violations_counts_as_changed() -> None:
 
 def test_the_report_has_the_answer_then_figures_then_a_limited_list_of_pairs() -> None:
     found = gate((PAIRS_LISTED + 5, LANDED, DOG), (1, ABORTED, LANDED), (1, DOG, CAT))
-    lines = list(found.report_lines())
-    assert lines[0].startswith("gate FAILED: significantly more violations: p 8.9e-08 at level")
+    lines = list(report_lines(found))
+    assert lines[0].startswith("gate FAILED: significantly more violations: p 6.0e-08 at level")
     assert lines[1] == f"{PAIRS_LISTED + 7} pairs compared, 0 of them the same flight to the byte"
-    assert lines[2].startswith(
+    assert lines[5].startswith(
         f"violations 1 -> {PAIRS_LISTED + 6} ({PAIRS_LISTED + 5} broke, 0 fixed): p "
     )
-    assert lines[3] == (
-        "aborts 1 -> 0 (0 landings lost, 1 landings won): p 1.000, for all 3 tests 1.000, level "
-        "0.05"
-    )
+    assert lines[6:8] == [
+        "safe aborts 1 -> 0 (0 landings lost, 1 landings won): too few pairs differ to fail",
+        "distance and time not compared: the baseline holds no distances; save it anew",
+    ]
     assert "broke    lawn-0: landed -> IV:dog:descent:seen" in lines
     assert "broke    and 5 more" in lines
-    assert f"fixed    lawn-{PAIRS_LISTED + 5}: gave_up -> landed" in lines
+    assert f"fixed    lawn-{PAIRS_LISTED + 5}: gave up (blocked) -> landed" in lines
     assert (
         lines[-1] == f"changed  lawn-{PAIRS_LISTED + 6}: IV:dog:descent:seen -> IV:cat:descent:seen"
     )
@@ -303,4 +365,4 @@ def test_identical_flights_are_counted() -> None:
         for digest in ("ab" * 32, "cd" * 32)
     )
     pairs = [Pair(name="a", base=one, head=one), Pair(name="b", base=one, head=other)]
-    assert "1 of them the same flight" in list(compare(pairs).summary_lines())[1]
+    assert "1 of them the same flight" in list(summary_lines(compare(pairs)))[1]

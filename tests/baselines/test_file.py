@@ -53,6 +53,43 @@ def test_any_signature_survives_the_file(signature: str, name: str) -> None:
     assert parse_baseline(dump_baseline(baseline(each)), load_map) == baseline(readable)
 
 
+def test_the_file_keeps_every_outcome_and_why_a_flight_did_not_land() -> None:
+    summaries = (
+        dataclasses.replace(LANDED, distance_m=0.0412, time_s=38.21),
+        FlightSummary(outcome="landed", signature=""),
+        FlightSummary(outcome="slid", signature="slid:motors-on", paper_violation=True),
+        FlightSummary(outcome="gave_up", signature="", no_landing="blocked"),
+        FlightSummary(outcome="not_landed", signature="", no_landing="excused"),
+        FlightSummary(outcome="gave_up", signature="II:never-seen", no_landing="needless"),
+    )
+    flights = tuple(
+        dataclasses.replace(flight, summary=summary)
+        for flight, summary in zip(baseline_set(6).flights, summaries, strict=True)
+    )
+    saved = baseline(dataclasses.replace(baseline_set(), flights=flights))
+    assert parse_baseline(dump_baseline(saved), load_map) == saved
+
+
+def test_a_file_of_schema_1_is_read_without_distances() -> None:
+    gave_up = FlightSummary(outcome="gave_up", signature="")
+    each = baseline_set(2, gave_up)
+    flights = (baseline_set(2).flights[0], each.flights[1])
+    text = dump_baseline(baseline(dataclasses.replace(each, flights=flights)))
+    old = (
+        text.replace("schema = 2", "schema = 1")
+        .replace('"", [0.1, 30.0], ', "")
+        .replace('"gave_up", "", false, "", [], ', '"aborted", "", false, ')
+    )
+    assert old.count("[]") == 0
+    (read,) = parse_baseline(old, load_map).sets
+    assert [flight.summary for flight in read.flights] == [
+        dataclasses.replace(LANDED, distance_m=None, time_s=None),
+        gave_up,
+    ]
+    with pytest.raises(ScenarioError, match="why it did not land"):
+        parse_baseline(old.replace("schema = 1", "schema = 2"), load_map)
+
+
 def test_the_file_keeps_extra_genes() -> None:
     scenarios = random_scenarios(LAWN, genome_for(LAWN, extras=(WIND,)), 0, 0, 2)
     samples = tuple(BaselineFlight(scenario=each, summary=LANDED) for each in scenarios)
@@ -70,7 +107,7 @@ def test_the_file_keeps_destinations() -> None:
 @pytest.mark.parametrize(
     ("old", "new", "words"),
     [
-        ("schema = 1", "schema = 2", "'schema': found 2, expected 1"),
+        ("schema = 2", "schema = 3", "'schema': found 3, expected 1 or 2"),
         ("[versions]", "[version]", "'version': unknown key"),
         ('map = "lawn"', 'map = "moon"', r"'set\[0\].map': unknown map 'moon'"),
         ('"stack.landing:Lander"', '"Lander"', r"'set\[0\].system': found 'Lander', expected 'mod"),
@@ -78,8 +115,12 @@ def test_the_file_keeps_destinations() -> None:
         ("distance_m = 0.75", "distance_m = -1.0", r"'set\[0\].limits.distance_m'"),
         ('"landed", ""', '"floated", ""', r"'set\[0\].flights\[0\]': found 'floated', expected "),
         ('"landed", "", false', '"landed", "", 0', r"'set\[0\].flights\[0\]': found \[\d+, 'l"),
-        (", [0.", ", [9.", r"'set\[0\].flights\[0\]': environment.dust: found 9"),
-        (", [0.", ", [nan, 0.", r"'set\[0\].flights\[0\]': found \d+ values of genes, expected "),
+        ('ab", [0.', 'ab", [9.', r"'set\[0\].flights\[0\]': environment.dust: found 9"),
+        (
+            'ab", [0.',
+            'ab", [nan, 0.',
+            r"'set\[0\].flights\[0\]': found \d+ values of genes, expected ",
+        ),
         ("flights = [", "flights = 3 # [", "not valid TOML"),
     ],
 )

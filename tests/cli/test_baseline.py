@@ -119,7 +119,7 @@ def test_equal_options_save_equal_bytes_and_scenario_prints_one_scenario(
     save = ("baseline", "save", "--system=stack.system:Lander", *TINY, "--count=4")
     first = garl(*save, "--out=one/base.toml")
     assert first.exit_code == 0, first.output
-    assert "Lander-lawn: 4 flown, " in first.output
+    assert "Lander-lawn: 4 flown; limits 0.75 m, 120 s, " in first.output
     garl(*save, "--out=two.toml", "--workers=2")
     assert Path("two.toml").read_bytes() == Path("one/base.toml").read_bytes()
     (saved,) = load_baseline(Path("two.toml")).sets
@@ -127,11 +127,15 @@ def test_equal_options_save_equal_bytes_and_scenario_prints_one_scenario(
     Path("one.toml").write_text(printed.output)
     assert load_scenario(Path("one.toml")) == saved.flights[3].scenario
     several = garl(*save, "--system=stack.system:GivesUp", "--out=three.toml")
-    assert "GivesUp-lawn: 4 flown, " in several.output
+    assert "GivesUp-lawn: 4 flown; " in several.output
     assert [each.title for each in load_baseline(Path("three.toml")).sets] == [
         "Lander-lawn",
         "GivesUp-lawn",
     ]
+    shown = garl("baseline", "show", "two.toml").output
+    assert shown == "".join(first.output.splitlines(keepends=True)[:-1])
+    assert re.search(r"landed +violations +blocked +excused +needless\n +[0-4] \(\d+ %\) ", shown)
+    assert "distance of " in shown
     missing = garl("baseline", "scenario", "two.toml", "lawn-4")
     assert "found no scenario 'lawn-4'" in missing.output
 
@@ -148,7 +152,8 @@ def test_save_records_real_flights(checkouts: Path) -> None:
     )
     result = garl(*save, "--out=base.toml", "--npcs=dqn", "--abort=violation")
     assert result.exit_code == 0, result.output
-    assert "GivesUp-lawn: 1 flown, 1 violations, 1 aborts" in result.output
+    assert "GivesUp-lawn: 1 flown; " in result.output
+    assert "0 (0 %)     1           0" in result.output
     (saved,) = load_baseline(Path("base.toml")).sets
     assert saved.npcs_sha256
     assert {flight.summary.signature.partition(":")[0] for flight in saved.flights} == {"abort"}

@@ -61,6 +61,13 @@ def test_a_report_holds_the_violations_of_the_search(searched: Path) -> None:
     assert (one["system"], one["map"], one["flown"]) == ("systems:Good", "lawn", 8)
     assert one["outcomes"] == {"collision": 3, "landed": 5}
     assert one["decided"] == {"distance": 5, "time": 5}
+    nobody = {"needless": 0, "excused": 0, "blocked": 0}
+    assert (one["landed"], one["completed"], one["inconclusive"]) == (5, 2, 0)
+    assert (one["gave_up"], one["not_landed"], one["crashes"]) == (nobody, nobody, {})
+    assert one["landing_distance_m"] == {"median": 3.0, "worst": 3.0}
+    assert one["landing_time_s"] == {"median": 14.2, "worst": 14.2}
+    assert one["limits"] == [{"distance_m": 0.75, "time_s": 120.0, "abort": "needless"}]
+    assert one["findings"] == []
     kinds = {kind["signature"]: kind for kind in one["signatures"]}
     dog = kinds["IV:dog:last-metre:unseen"]
     assert (dog["type"], dog["count"], dog["first"]["slot"]) == ("IV", 3, "lawn-g00-s01")
@@ -103,7 +110,8 @@ def test_a_report_is_written_to_a_file_or_printed_as_text(searched: Path) -> Non
     assert garl(searched, "report", "--json", "--out", "report.json") == ""
     VALIDATOR.validate(json.loads((searched / "report.json").read_text()))
     words = garl(searched, "report")
-    assert "Good on lawn: 8 of 8 flown, 8 violate" in words
+    assert "Good on lawn: 8 of 8 flown, 5 landed, 8 violate (6 by the paper's definition" in words
+    assert "gave up: needless 0, excused 0, blocked 0" in words
     assert "IV:dog:last-metre:unseen: collided with dog-1" in words
 
 

@@ -67,7 +67,9 @@ def test_summary_counts_failures_of_users_properties_as_violations(
     result.assert_outcomes(failed=1, xfailed=3)
     result.stdout.fnmatch_lines(
         [
-            "Good on lawn: 4 flown, violations 100.0 %*",
+            "Good on lawn: 4 flown, landed 100.0 %, violations 100.0 %*",
+            "  by the paper's definition, no landing counted: violations 0.0 %",
+            "  gave up: needless 0.0 %, excused 0.0 %, blocked 0.0 %; not landed 0.0 %",
             "*distance decided in 4 of 4 flights, time in 4",
             "*4  own:test_own:*",
             "*too slow for us",
@@ -87,12 +89,21 @@ def test_step_summary_holds_a_table_of_violations(
     result = run(pytester, *SEARCH, "-rs", *parallel)
     lines = page.read_text().splitlines()
     assert lines[:2] == ["before", "## pytest-garl"]
+    paper = "by the paper's definition, no landing counted"
+    gave_up = "gave up: needless | gave up: excused | gave up: blocked"
+    assert lines[3:6:2] == [
+        f"| where | flown | landed | violations | {paper} | {gave_up} "
+        "| not landed | crashed | inconclusive |",
+        "| Good on lawn | 8 | 62.5 % | 75.0 % | 75.0 % | 0.0 % | 0.0 % | 0.0 % | 0.0 % | 0.0 % "
+        "| 0.0 % |",
+    ]
     assert (
         f"| Good on lawn | IV:dog:last-metre:unseen | 3 | {HIT} | "
         "`pytest test_it.py --garl-repeat=lawn-g00-s01 -o garl_dir=elsewhere` |"
     ) in lines
     folded = [line for line in result.outlines if line.startswith("SKIPPED")]
-    assert folded == ["SKIPPED [6] test_it.py: not decided: the flight ended before (-v tells how)"]
+    reason = "not decided: the flight ended before, or another test fails (-v: which)"
+    assert folded == [f"SKIPPED [6] test_it.py: {reason}"]
 
 
 def test_command_to_keep_patches_names_those_of_this_run(
@@ -188,6 +199,7 @@ def test_junit_carries_properties_of_the_flight(
             "garl.story",
             "garl.final_distance_m",
             "garl.elapsed_s",
+            "garl.excuse",
             "garl.trajectory_sha256",
         }
         assert f"[{found['garl.slot']}]" in str(case.get("name"))

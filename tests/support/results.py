@@ -25,7 +25,9 @@ def flight_result(
     paper_violation: bool | None = None,
     margins: tuple[Margin, ...] = (),
     story: str = "A story.",
+    completed: bool = False,
     excuse: Excuse = "",
+    excuse_text: str = "",
     findings: tuple[Finding, ...] = (),
     **fields: Any,
 ) -> FlightResult:
@@ -40,7 +42,9 @@ def flight_result(
         paper_violation=violates if paper_violation is None else paper_violation,
         margins=margins,
         story=story,
+        completed=completed,
         excuse=excuse,
+        excuse_text=excuse_text,
         findings=findings,
     )
     plain: dict[str, Any] = {

@@ -20,6 +20,7 @@ from pytest_garl.simulation.system_under_test.descent import centring_velocity, 
 from pytest_garl.simulation.system_under_test.ground_truth import Truth
 
 CRUISE_M = 10.0
+CRUISE_MPS = 4.0
 CENTRED_M = 0.10
 """So near to the marker's centre the pilot ends its way across."""
 DESCENT_MPS = 1.0
@@ -62,7 +63,7 @@ class ReferencePilot:
                 return PositionSetpoint(position_m=(home_x, home_y, CRUISE_M))
             if offset < CENTRED_M:
                 self._arrived_s = observation.time_s
-            return PositionSetpoint(position_m=(*goal, CRUISE_M), speed_mps=4.0)
+            return PositionSetpoint(position_m=(*goal, CRUISE_M), speed_mps=CRUISE_MPS)
         if self._blocked(truth, z):
             last = self._mission.time_limit_s - ABORT_TAKES_S
             if observation.time_s > min(self._arrived_s + PATIENCE_S, last):

@@ -1,0 +1,166 @@
+"""How and when a nominal landing would have seen the marker, whatever path the system chose.
+
+A nominal landing climbs to the search height, crosses to the coordinate that the mission tells,
+looks for the marker from there and from a ring about it, crosses to the marker and comes down.
+Its camera is level, its nose points east.  Nothing is painted.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import itertools
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Literal
+
+from pytest_garl.landing_system import Camera
+from pytest_garl.scenarios.extra_genes import gps_error_m
+from pytest_garl.scenarios.maps.map import Map
+from pytest_garl.scenarios.placement import marker_position_m
+from pytest_garl.scenarios.scenario import Scenario
+from pytest_garl.simulation.camera.projection import eye_under
+from pytest_garl.simulation.camera.renderer import Renderer
+from pytest_garl.simulation.camera.solids import BodyPose
+from pytest_garl.simulation.environment import environment_at
+from pytest_garl.simulation.flight import Flight, NominalView, ObjectRecord
+from pytest_garl.simulation.randomness import generator
+from pytest_garl.simulation.system_under_test.descent import LAND_BELOW_M, SLOW_BELOW_M
+from pytest_garl.simulation.system_under_test.mission import SEARCH_ALTITUDE_M
+from pytest_garl.simulation.system_under_test.reference_pilot import CRUISE_MPS, DESCENT_MPS
+
+Place = tuple[float, float]
+STARTS_AND_STOPS_S = 5.1
+"""What the reference pilot takes for its climb to 10 m, at 3 m/s, and for starting and stopping on
+its way across; ``test_nominal.py`` measures it."""
+SEARCH_MPS = 2.0
+"""Speed of the search: engineering estimate, half of the reference pilot's speed on its way across,
+so that a marker stays in the frame for seconds at 10 m above the ground."""
+RING_M = 5.0
+"""Radius of the search.  A level camera with the default field of view sees 7.5 m ahead of it and
+10 m to its sides from the search height, so that ring and middle show all of the marker's disc of
+7.5 m, and 3.5 m more for the error of the coordinate."""
+RING_PLACES = 8
+SIGHT_HEIGHTS_M = (10.0, 6.0, 3.0)
+"""Heights above the marker from which the descent looks."""
+LEVEL = (0.0, 0.0, 0.0, 1.0)
+_LONGEST_LOOK_S = 1.0
+"""People, dogs and birds move on while one looks: a longer look counts as several."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Look:
+    """A look from one place, from ``time_s`` on."""
+
+    time_s: float
+    duration_s: float
+    place: Literal["search", "above"]
+    place_m: Place
+    height_m: float
+
+
+def nominal_arrival_s(scenario: Scenario, map: Map) -> float:
+    """Return when a pilot that knows the marker's place is above it: the reference pilot."""
+    return STARTS_AND_STOPS_S + _across_s(map.uav_start_m[:2], marker_position_m(scenario, map))
+
+
+def nominal_landing_s(scenario: Scenario, map: Map) -> float:
+    """Return when a pilot that knows the marker's place has landed on it without waiting."""
+    slow = (SLOW_BELOW_M - LAND_BELOW_M) / (DESCENT_MPS / 2)
+    descent_s = (SEARCH_ALTITUDE_M - SLOW_BELOW_M) / DESCENT_MPS + slow
+    return nominal_arrival_s(scenario, map) + descent_s
+
+
+def nominal_views(
+    flight: Flight, scenario: Scenario, map: Map, camera: Camera
+) -> tuple[NominalView, ...]:
+    """Return the views of a nominal landing in the scenario that was flown.
+
+    The objects are where they were at that time of the flight, or at its end if it had ended; the
+    environment is that to which NPC policies had changed it.  The UAV's own path plays no part.
+    """
+    renderer = Renderer(scenario, map, camera, generator(scenario.seed, "sensor"), colour=False)
+    shown, views = scenario, []
+    for look in _looks(scenario, map):
+        present = environment_at(scenario, flight, look.time_s)
+        if present != shown:
+            renderer.change(present)
+            shown = present
+        eye = eye_under((*look.place_m, look.height_m), LEVEL)
+        poses = [_pose(item, look.time_s) for item in flight.objects]
+        frame = renderer.render(eye, LEVEL, look.time_s, poses)
+        if (marker := frame.marker) is None:
+            continue
+        views.append(
+            NominalView(
+                time_s=look.time_s,
+                duration_s=look.duration_s,
+                place=look.place,
+                height_m=look.height_m,
+                marker=marker,
+            )
+        )
+    return tuple(views)
+
+
+def with_nominal_landing(flight: Flight, scenario: Scenario, map: Map, camera: Camera) -> Flight:
+    """Return the flight with what a nominal landing takes, and sees if this one was given up."""
+    given_up = flight.outcome in ("gave_up", "not_landed")
+    return dataclasses.replace(
+        flight,
+        nominal_views=nominal_views(flight, scenario, map, camera) if given_up else (),
+        nominal_arrival_s=nominal_arrival_s(scenario, map),
+        nominal_landing_s=nominal_landing_s(scenario, map),
+    )
+
+
+def _looks(scenario: Scenario, map: Map) -> Iterator[_Look]:
+    """Yield the looks in the order of time, none longer than ``_LONGEST_LOOK_S``."""
+    for look in _stays(scenario, map):
+        count = math.ceil(look.duration_s / _LONGEST_LOOK_S)
+        for index in range(count):
+            yield dataclasses.replace(
+                look,
+                time_s=look.time_s + (index + 0.5) * look.duration_s / count,
+                duration_s=look.duration_s / count,
+            )
+
+
+def _stays(scenario: Scenario, map: Map) -> Iterator[_Look]:
+    """Yield where a nominal landing stays, from when on, and for how long."""
+    (gps_x, gps_y), (error_x, error_y) = map.gps_position_m, gps_error_m(scenario)
+    told, marker = (gps_x + error_x, gps_y + error_y), marker_position_m(scenario, map)
+    turns = [2 * math.pi * index / RING_PLACES for index in range(RING_PLACES)]
+    ring = [(told[0] + RING_M * math.cos(a), told[1] + RING_M * math.sin(a)) for a in turns]
+    now = STARTS_AND_STOPS_S + _across_s(map.uav_start_m[:2], told)
+    stay_s = 2 * RING_M * math.sin(math.pi / RING_PLACES) / SEARCH_MPS
+    for place in (told, *ring):
+        yield _Look(
+            time_s=now,
+            duration_s=stay_s,
+            place="search",
+            place_m=place,
+            height_m=SEARCH_ALTITUDE_M,
+        )
+        now += stay_s
+    now += _across_s(ring[-1], marker)
+    # Each height stands for the way about it: from halfway above to halfway below.
+    middles = [(high + low) / 2 for high, low in itertools.pairwise(SIGHT_HEIGHTS_M)]
+    tops, ends = (SIGHT_HEIGHTS_M[0], *middles), (*middles, SLOW_BELOW_M)
+    for height, top, end in zip(SIGHT_HEIGHTS_M, tops, ends, strict=True):
+        took_s = (top - end) / DESCENT_MPS
+        yield _Look(time_s=now, duration_s=took_s, place="above", place_m=marker, height_m=height)
+        now += took_s
+
+
+def _across_s(start: Place, goal: Place) -> float:
+    return math.dist(start, goal) / CRUISE_MPS
+
+
+def _pose(item: ObjectRecord, time_s: float) -> BodyPose:
+    """Return where an object was, at the last sample that is not later than a time."""
+    track = item.track
+    index = max(0, int(track.time_s.searchsorted(time_s, side="right")) - 1)
+    x, y, z = (float(value) for value in track.position_m[index])
+    _, _, turn_z, turn_w = (float(value) for value in track.attitude[index])
+    return (x, y, z), 2 * math.atan2(turn_z, turn_w)

@@ -1,0 +1,149 @@
+"""What a nominal landing sees of the marker, whatever the system that gave up has flown."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+import pytest
+
+from pytest_garl import Abort, Command, Observation
+from pytest_garl.landing_system import Camera
+from pytest_garl.scenarios.maps.map import Map
+from pytest_garl.scenarios.object_types import OBJECT_TYPES
+from pytest_garl.scenarios.placement import marker_position_m
+from pytest_garl.simulation.flight import Flight, NominalView, ObjectRecord, Track
+from pytest_garl.simulation.fly import fly
+from pytest_garl.simulation.nominal import (
+    SIGHT_HEIGHTS_M,
+    nominal_arrival_s,
+    nominal_landing_s,
+    nominal_views,
+)
+from pytest_garl.simulation.system_under_test.reference_pilot import ReferencePilot
+from pytest_garl.verdicts.excuses import READABLE_S, expected_readable_s
+from tests.support.flights import EMPTY, LAWN, STAND, Hovers, Scripted, nominal
+
+PEOPLE = dataclasses.replace(LAWN, objects=(("person", 4),))
+
+
+class AbortsAtOnce(Scripted):
+    def step(self, observation: Observation) -> Command:
+        return Abort() if observation.time_s > 1 else self.hover(2.0)
+
+
+def track_at(place_m: tuple[float, float, float]) -> Track:
+    return Track(
+        time_s=np.zeros(1),
+        position_m=np.array([place_m]),
+        attitude=np.array([[0.0, 0.0, 0.0, 1.0]]),
+        velocity_mps=np.zeros((1, 3)),
+    )
+
+
+def given_up(map: Map, places: Mapping[str, tuple[float, float]], **genes: float) -> Flight:
+    """Return the views of a flight in which objects stand at places."""
+    scenario = nominal(**genes)
+    objects = tuple(
+        ObjectRecord(
+            name=name,
+            type=kind,
+            track=track_at((*places.get(name, (60.0, 60.0)), OBJECT_TYPES[kind].altitude_m)),
+            moves=np.zeros((0, 2)),
+        )
+        for name, kind in map.present_objects
+    )
+    empty = fly(scenario, AbortsAtOnce, STAND, map=EMPTY, time_limit_s=20)
+    moved = dataclasses.replace(empty, objects=objects)
+    views = nominal_views(moved, scenario, map, Camera())
+    return dataclasses.replace(moved, nominal_views=views)
+
+
+def above(flight: Flight) -> list[NominalView]:
+    return [view for view in flight.nominal_views if view.place == "above"]
+
+
+@pytest.mark.parametrize("genes", [{}, {"marker__x": 0.6, "marker__y": -0.6}, {"marker__y": 0.9}])
+def test_the_reference_pilot_arrives_and_lands_when_a_nominal_landing_does(genes: Any) -> None:
+    scenario = nominal(**genes)
+    flight = fly(scenario, ReferencePilot, STAND, map=EMPTY)
+    away = flight.uav.position_m[:, :2] - marker_position_m(scenario, EMPTY)
+    arrived_s = flight.uav.time_s[np.argmax(np.hypot(*away.T) < 0.1)]
+    assert flight.touchdown is not None
+    assert flight.nominal_arrival_s == pytest.approx(arrived_s, abs=0.3)
+    assert flight.nominal_landing_s == pytest.approx(flight.touchdown.time_s, abs=0.5)
+    assert flight.nominal_arrival_s == nominal_arrival_s(scenario, EMPTY)
+    assert flight.nominal_landing_s == nominal_landing_s(scenario, EMPTY)
+    assert flight.nominal_views == ()
+
+
+@pytest.mark.parametrize("system", [AbortsAtOnce, Hovers])
+def test_views_come_with_flights_that_end_without_a_landing(system: type) -> None:
+    flight = fly(nominal(), system, STAND, map=EMPTY, time_limit_s=20)
+    assert flight.outcome in ("gave_up", "not_landed")
+    assert {view.height_m for view in above(flight)} == set(SIGHT_HEIGHTS_M)
+    times = [view.time_s for view in flight.nominal_views]
+    assert times == sorted(times)
+    assert {view.place for view in flight.nominal_views} == {"search", "above"}
+
+
+def test_views_do_not_depend_on_the_path_of_the_system() -> None:
+    first, second = (
+        fly(nominal(environment__fog=0.3), system, STAND, map=EMPTY, time_limit_s=20)
+        for system in (AbortsAtOnce, Hovers)
+    )
+    assert first.elapsed_s < second.elapsed_s
+    assert first.nominal_views == second.nominal_views
+
+
+@pytest.mark.parametrize("place", [(0.0, 0.0), (0.9, 0.0), (-0.65, 0.65), (0.2, -0.95)])
+def test_the_search_shows_every_marker_of_the_disc(place: tuple[float, float]) -> None:
+    flight = given_up(EMPTY, {}, marker__x=place[0], marker__y=place[1])
+    search = [view for view in flight.nominal_views if view.place == "search"]
+    assert max(view.marker.share_in_frame for view in search) == 1.0
+    assert expected_readable_s(flight) > 5 * READABLE_S
+
+
+def test_the_search_shows_a_marker_far_from_a_wrong_coordinate() -> None:
+    genes = {"marker__y": 1.0, "gps_error__x": 0.0, "gps_error__y": -1.0}
+    flight = given_up(EMPTY, {}, **genes)
+    search = [view for view in flight.nominal_views if view.place == "search"]
+    assert max(view.marker.share_in_frame for view in search) == 1.0
+
+
+def test_a_clear_sight_can_be_read_and_thick_fog_cannot() -> None:
+    clear = expected_readable_s(given_up(EMPTY, {}))
+    foggy = given_up(EMPTY, {}, environment__fog=1.0, environment__dust=1.0)
+    far = [view.marker.contrast for view in foggy.nominal_views if view.height_m > 9]
+    assert clear > 5 * READABLE_S
+    assert max(far) < 5
+
+
+def test_a_marker_wholly_under_snow_is_hidden() -> None:
+    flight = given_up(EMPTY, {}, environment__road_snow=1.0)
+    assert all(view.marker.border_hidden > 0.95 for view in flight.nominal_views)
+    assert expected_readable_s(flight) < READABLE_S
+
+
+def test_people_who_stand_on_the_marker_hide_it() -> None:
+    marker = marker_position_m(nominal(), PEOPLE)
+    corners = [(-0.3, -0.3), (-0.3, 0.3), (0.3, -0.3), (0.3, 0.3)]
+    places = {
+        name: (marker[0] + dx, marker[1] + dy)
+        for (name, _), (dx, dy) in zip(PEOPLE.present_objects, corners, strict=True)
+    }
+    free, crowded = given_up(PEOPLE, {}), given_up(PEOPLE, places)
+    hidden = [
+        np.mean([view.marker.bits_hidden for view in above(each)]) for each in (free, crowded)
+    ]
+    assert hidden[0] < 0.05 < 0.15 < hidden[1]
+    assert expected_readable_s(crowded) < expected_readable_s(free) - 3
+
+
+def test_objects_stay_where_a_flight_that_ended_early_left_them() -> None:
+    flight = fly(nominal(), AbortsAtOnce, STAND, map=EMPTY, time_limit_s=20)
+    assert flight.elapsed_s < min(view.time_s for view in above(flight))
+    assert math.isfinite(expected_readable_s(flight))
