@@ -149,6 +149,7 @@ def _evidence(each: InvestigatedSignature, case: Case) -> list[str]:
         *([robust] if evidence.neighbours else []),
         *([case.prevention.text] if case.prevention.text else []),
         *([] if case.gates else [f"{case.reason.upper()}, gates nothing"]),
+        *([f"shown without NPCs because of {each.result.finding}"] if each.result.finding else []),
         f"shrinking removed {evidence.removed}",
         counted(each.result.flights, "flight"),
     ]

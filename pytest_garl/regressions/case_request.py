@@ -21,6 +21,8 @@ class CaseRequest:
     ``budget`` limits the flights of this request, ``cap`` those of the landing system for all
     signatures of the search together; None is no limit.  ``user_assertion`` is the test's assertion
     that failed, None for the built-in verdict; ``test`` is the node id of the test that found it.
+    ``finding`` is the signature of what had gone wrong before the end of these flights, empty for a
+    request about their violation; ``known`` are the signatures that get a case without it.
     """
 
     name: str
@@ -32,6 +34,8 @@ class CaseRequest:
     user_assertion: UserAssertion | None = None
     test: str = ""
     cap: int | None = None
+    finding: str = ""
+    known: tuple[str, ...] = ()
 
     @property
     def search(self) -> str:
@@ -45,7 +49,7 @@ class CaseRequest:
         The traceback explains more than a scenario can, and each flight that hangs costs four times
         the limit of a call.
         """
-        if self.user_assertion is not None or not self.violations:
+        if self.user_assertion is not None or self.finding or not self.violations:
             return False
         crash = self.violations[0][1].result.crash
         return crash is not None and crash.kind in ("raised", "nonsense", "hung")
@@ -73,12 +77,17 @@ class CaseRequest:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class CaseResult:
-    """The case that was made, or the reason why there is none."""
+    """The case that was made, or the reason why there is none.
+
+    ``finding`` is the signature of what had gone wrong before the end of the flights that were
+    flown again without NPCs, empty for a case of their violation.
+    """
 
     signature: str
     case: Case | None
     flights: int
     reason: str = ""
+    finding: str = ""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

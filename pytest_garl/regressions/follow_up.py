@@ -20,6 +20,7 @@ from pytest_garl.regressions.corpus import Corpus
 from pytest_garl.regressions.forecast import divide_flights
 from pytest_garl.regressions.investigation import build_case
 from pytest_garl.regressions.new_case import case_without_flights
+from pytest_garl.regressions.second_reading import case_of_finding, finding_requests
 from pytest_garl.regressions.user_failure import UserAssertion
 from pytest_garl.scenarios.files import parse_scenario
 from pytest_garl.scenarios.scenario import Scenario
@@ -61,6 +62,7 @@ def case_requests(
 ) -> tuple[CaseRequest, ...]:
     """Return a request for each signature that no saved case expects, the most frequent first.
 
+    Behind them stand requests for what had gone wrong before the end of flights.
     ``assertions`` of users' tests failed in flights without built-in violation; ``tests`` are the
     node ids of the tests that failed.
     """
@@ -91,7 +93,8 @@ def case_requests(
                     )
                 )
         requests += sorted(own, key=lambda each: (-len(each.violations), each.signature))
-    return tuple(requests)
+    findings = finding_requests(ledger, corpus, shrinking.each, capped=shrinking.capped)
+    return (*requests, *findings)
 
 
 def follow_up(
@@ -107,12 +110,23 @@ def follow_up(
     """
     results: dict[str, CaseResult] = {}
     while reached := _next_requests(requests, results):
-        procedures = {each.name: functools.partial(build_case, each) for each in reached}
+        procedures = {
+            each.name: functools.partial(case_of_finding if each.finding else build_case, each)
+            for each in reached
+        }
         results |= OnDemandFlights(ledger, pool, on_wait).run(procedures)
     for each in requests:
         if each.name not in results:
             results[each.name] = case_without_flights(each)
-    return tuple(_save(each, results[each.name], save) for each in requests)
+    saved: set[SearchSignature] = set()
+    investigated = []
+    for each in requests:
+        result = results[each.name]
+        # Two findings may be one violation.
+        if not result.finding or (each.search, result.signature) not in saved:
+            investigated.append(_save(each, result, save))
+            saved.add((each.search, result.signature))
+    return tuple(investigated)
 
 
 def _signatures(

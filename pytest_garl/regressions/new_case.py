@@ -24,7 +24,18 @@ from pytest_garl.verdicts.verdict import Verdict
 
 
 def case_without_flights(request: CaseRequest) -> CaseResult:
-    """Return the simplest violation of the search as a case, without another flight."""
+    """Return the simplest violation of the search as a case, without another flight.
+
+    What had gone wrong before a flight's end is no case until another flight shows it.
+    """
+    if request.finding:
+        return CaseResult(
+            signature=request.signature,
+            case=None,
+            flights=0,
+            reason="not flown again without people, dogs and birds: no flights are left",
+            finding=request.finding,
+        )
     scenario = request.scenarios[0]
     flight = dict(request.violations)[scenario]
     failing = FailingScenario(
