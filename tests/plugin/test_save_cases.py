@@ -21,7 +21,7 @@ from tests.support.landing_project import project, result_hash
 
 def test_search_saves_small_cases_and_later_runs_expect_them(searched: pytest.Pytester) -> None:
     fog, dog = cases(searched)
-    assert (fog.name[:14], dog.name[:11]) == ("lawn-I-unknown", "lawn-IV-dog")
+    assert (fog.name[:14], dog.name[:11]) == ("lawn-I-nothing", "lawn-IV-dog")
     found = load_case(dog)
     assert set(found.scenario.removed_objects) == {"bird-1", "person-1", "person-2"}
     assert found.scenario["environment.fog"] == 0.0
@@ -31,7 +31,7 @@ def test_search_saves_small_cases_and_later_runs_expect_them(searched: pytest.Py
     assert load_case(fog).test == "test_it.py::test_distance"
     result = run(searched, *CASES, "-rx")
     result.assert_outcomes(passed=2, skipped=2, xfailed=2)
-    result.stdout.fnmatch_lines(["*case-lawn-I*known: I?:unknown (scenarios/regressions/*"])
+    result.stdout.fnmatch_lines(["*case-lawn-I*known: I:nothing:unseen (scenarios/regressions/*"])
     assert result.ret == 0
     assert not list((searched.path / ".garl").glob("cases-*"))
 
@@ -163,3 +163,42 @@ def test_own_property_is_shrunk_and_saved_for_its_test(
     assert known.ret == 0
     replace_text(tests, "< 0.1,", "< 0.09,")
     assert run(pytester).ret == pytest.ExitCode.TESTS_FAILED
+
+
+DESCENT = """
+    track = Track(
+        time_s=np.array([0.0, 9.0, 12.0, 14.2]),
+        position_m=np.array([[marker[0] + off, marker[1], z] for z in (0.2, 10.0, 3.0, 1.0)]),
+        attitude=np.tile([0.0, 0.0, 0.0, 1.0], (4, 1)),
+        velocity_mps=np.zeros((4, 3)),
+    )
+    flight = dataclasses.replace(flight, uav=track)
+    return dataclasses.replace(flight, sha256=hash_of(flight))
+"""
+
+
+@pytest.mark.parametrize("workers", ["0", "2"])
+def test_what_a_collision_hid_is_flown_again_without_npcs_and_saved(
+    pytester: pytest.Pytester, workers: str
+) -> None:
+    project(pytester)
+    simulator = pytester.path / "tiny_simulator.py"
+    # A dog hits each flight, so that none lands beside the marker in the fog.
+    replace_text(
+        simulator, 'scenario.get("dog-1.velocity", 0.0) > 0.7', '"dog-1" in str(scenario.genes)'
+    )
+    replace_text(
+        simulator, "\n    return dataclasses.replace(flight, sha256=hash_of(flight))\n", DESCENT
+    )
+    search = ("--garl-budget=24", f"--garl-workers={workers}", "--garl-shrink=60")
+    result = run(pytester, *search)
+    off, dog = (load_case(path) for path in cases(pytester))
+    assert dog.violation.signature.startswith("IV:dog:last-metre:")
+    assert off.violation.signature == "I:nothing:unseen"
+    assert len(off.scenario.removed_objects) == 4
+    assert off.scenario["environment.fog"] < 0.12
+    result.stdout.fnmatch_lines(["*shown without NPCs because of off:descending-elsewhere*"])
+    before = saved(pytester)
+    again = run(pytester, *search)
+    again.stdout.fnmatch_lines(["*without people, dogs and birds it fails as I:nothing:unseen*"])
+    assert saved(pytester) == before
