@@ -8,7 +8,7 @@ import numpy as np
 
 from pytest_garl.simulation.flight import Flight
 from pytest_garl.simulation.physics.vehicle import up_m
-from pytest_garl.verdicts.phases import LOW_M, landing_phase
+from pytest_garl.verdicts.phases import landing_phase
 from pytest_garl.verdicts.sightings import (
     AT_MARKER_M,
     readable_steps,
@@ -58,7 +58,7 @@ def descent_elsewhere(flight: Flight, limits: Limits) -> Finding | None:
         return None
     start = int(np.searchsorted(times, end_s - DESCENT_WINDOW_S))
     moved = places[-1] - places[start]
-    if -float(moved[2]) < LEAST_SINK_M or places[start:, 2].max() > LOW_M + LEAST_SINK_M:
+    if -float(moved[2]) < LEAST_SINK_M:
         return None
     # The straight line of the last seconds, down to the ground.
     left = up_m(float(places[-1, 2])) / -float(moved[2])

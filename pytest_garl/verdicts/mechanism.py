@@ -10,6 +10,7 @@ from dataclasses import dataclass
 
 from pytest_garl.simulation.flight import Contact, Crash, Flight, Separation, Touchdown
 from pytest_garl.simulation.system_under_test.texts import cut
+from pytest_garl.verdicts.excuses import expected_readable_s
 from pytest_garl.verdicts.findings import descent_elsewhere
 from pytest_garl.verdicts.phases import landing_phase
 from pytest_garl.verdicts.sightings import (
@@ -134,8 +135,10 @@ def _slid(flight: Flight) -> Mechanism:
     if touchdown is None:
         text, motors = "Slid over the ground after its touchdown.", "motors-on"
     else:
-        motors = "motors-off" if touchdown.stopped_s is not None else "motors-on"
-        still = f"with the motors {'stopped' if motors == 'motors-off' else 'running'}"
+        slid_s = next((e.time_s for e in flight.events if e.name == "slid"), flight.elapsed_s)
+        stopped = touchdown.stopped_s is not None and touchdown.stopped_s <= slid_s
+        motors = "motors-off" if stopped else "motors-on"
+        still = f"with the motors {'stopped' if stopped else 'running'}"
         text = (
             f"Touched down {touchdown.distance_m:.1f} m off the marker at {touchdown.time_s:.1f} "
             f"s, then slid {touchdown.slid_m:.1f} m over the ground {still}."
@@ -175,9 +178,10 @@ def _no_landing_cause(flight: Flight, limits: Limits, end: str) -> tuple[Violati
     at_s = gave_up_s(flight)
     phase = landing_phase(flight, at_s)
     readable = [step.time_s for step in readable_steps(flight, at_s)]
-    report = _report_text(flight, at_s)
+    report = f"{_report_text(flight, at_s)}{_opportunity_text(flight)}"
+    when = f" at {at_s:.1f} s" if flight.outcome == "gave_up" else ""
     if not readable:
-        return "II", "II:never-seen", f"{end}; the marker was never in view.{report}"
+        return "II", "II:never-seen", f"{end}{when}; the marker was never in view.{report}"
     last = readable[-1]
     lost = at_s - last > LOST_AFTER_S
     if flight.outcome == "not_landed" and not lost:
@@ -185,12 +189,15 @@ def _no_landing_cause(flight: Flight, limits: Limits, end: str) -> tuple[Violati
         return "late", f"late:not-landed:{phase}", text
     view = f"the marker was last in view at {last:.1f} s" if lost else "the marker was in view"
     if flight.outcome == "gave_up" and at_s >= (1 - RESERVE_SHARE) * limits.time_s:
-        text = f"Gave up at {at_s:.1f} s for want of time; {view}.{report}"
+        text = f"Gave up{when} for want of time; {view}.{report}"
         return "late", f"late:no-time:{phase}", text
     if lost:
-        return "II", f"II:lost:{phase}", f"{end}; {view}.{report}"
+        return "II", f"II:lost:{phase}", f"{end}{when}; {view}.{report}"
     seen_s = len(readable) * _frame_s(flight)
-    text = f"Gave up with the marker in view, which had been readable for {seen_s:.1f} s.{report}"
+    text = (
+        f"Gave up{when} with the marker in view, which had been readable for {seen_s:.1f} s."
+        f"{report}"
+    )
     return "II", f"II:gave-up-in-sight:{phase}", text
 
 
@@ -204,6 +211,14 @@ def _report_text(flight: Flight, until_s: float) -> str:
         for step in flight.steps
     )
     return " The system reported other places, never the marker's." if reports else ""
+
+
+def _opportunity_text(flight: Flight) -> str:
+    """Return for how long a nominal landing could have read the marker."""
+    if not flight.nominal_views:
+        return ""
+    readable_s = expected_readable_s(flight)
+    return f" Where a landing looks for it, it could be read for {readable_s:.0f} s."
 
 
 def _missed(
@@ -224,7 +239,7 @@ def _missed(
             primary="distance",
             violation_type="off",
             signature=f"off:{'seen' if recent else 'unseen'}",
-            sentence=f"{start}, which {view}{target}.",
+            sentence=f"{start}; the marker {view}{target}.",
         )
     on = _ground_under(flight, touchdown)
     seen = "seen" if readable else "unseen"
