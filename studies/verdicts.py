@@ -104,8 +104,8 @@ def tables(rows: Iterable[dict[str, Any]]) -> str:
     for row in rows:
         groups.setdefault((row["system"], row["map"]), []).append(row)
     lines = [
-        "| system | map | flights | landed, % | violations, % | by the paper, % | needless | excused "
-        "| blocked | findings |",
+        "| system | map | flights | landed, % | violations, % | by the paper, % | needless "
+        "| excused | blocked | findings |",
         "| --- | --- | --- | --- | --- | --- | --- | --- | --- | --- |",
     ]
     for (system, map_name), own in groups.items():

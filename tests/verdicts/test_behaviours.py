@@ -118,9 +118,9 @@ def test_a_late_landing_completes_the_mission_and_violates_the_time() -> None:
     assert not verdict.paper_violation
 
 
-def test_a_marker_in_thick_fog_excuses_giving_up() -> None:
-    fog = scene(genes=HERE | {"environment.fog": 0.9})
-    verdict = judge(fog.fly(Route(fog.marker, last=give_up, hold_s=5.0)), Limits())
+def test_a_marker_under_snow_excuses_giving_up() -> None:
+    snow = scene(genes=HERE | {"environment.road_snow": 0.9})
+    verdict = judge(snow.fly(Route(snow.marker, last=give_up, hold_s=5.0)), Limits())
     assert (verdict.primary, verdict.excuse) == (None, "undetectable")
     assert "Nobody could see the marker" in verdict.story
 
