@@ -27,8 +27,8 @@ LARGEST_POPULATION = 20
 SMALLEST_POPULATION = 8
 """Limits of the default population."""
 SHRINK = 12
-"""Flights for each new kind of violation: enough for the barest scenario, its neighbours, the
-reference pilot and a shorter record of moves."""
+"""Flights for each new kind of violation: enough for the barest scenario, its neighbours, an escape
+and a shorter record of moves."""
 MINIMUM_SHRINK = 8
 """``investigation.MINIMUM_CASE_FLIGHTS``, whose module takes long to import."""
 

@@ -126,7 +126,10 @@ def saved_lines(investigated: Sequence[InvestigatedSignature], config: pytest.Co
 def _lines_about(each: InvestigatedSignature, config: pytest.Config, width: int) -> list[str]:
     """Return the file of a case and its description, or why nothing was saved."""
     case = each.result.case
-    name = f"{each.system.split(':')[-1]} on {each.map}: {each.result.signature}"
+    where = f"{each.system.split(':')[-1]} on {each.map}"
+    name = f"{where}: {each.result.signature}"
+    if case is None and each.result.finding:
+        return [f"not saved: {where}: {_seen(each)}; {each.result.reason}"]
     if case is None:
         return [f"not saved: {name}: {each.result.reason}"]
     if each.file is None:
@@ -139,6 +142,12 @@ def _lines_about(each: InvestigatedSignature, config: pytest.Config, width: int)
     ]
 
 
+def _seen(each: InvestigatedSignature) -> str:
+    """Return in words what had gone wrong in how many flights before another event ended them."""
+    flights = counted(each.seen, "flight")
+    return f"{each.result.finding}, seen in {flights} before another event"
+
+
 def _evidence(each: InvestigatedSignature, case: Case) -> list[str]:
     """Return in words how robust and preventable a case is, and how many flights it took."""
     evidence = case.evidence
@@ -149,7 +158,7 @@ def _evidence(each: InvestigatedSignature, case: Case) -> list[str]:
         *([robust] if evidence.neighbours else []),
         *([case.prevention.text] if case.prevention.text else []),
         *([] if case.gates else [f"{case.reason.upper()}, gates nothing"]),
-        *([f"shown without NPCs because of {each.result.finding}"] if each.result.finding else []),
+        *([f"flown without NPCs because of {_seen(each)}"] if each.result.finding else []),
         f"shrinking removed {evidence.removed}",
         counted(each.result.flights, "flight"),
     ]

@@ -45,12 +45,16 @@ class ShrinkBudget:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class InvestigatedSignature:
-    """The end of one new signature: its case and the file, or the reason for none."""
+    """The end of one new signature: its case and the file, or the reason for none.
+
+    ``seen`` is the number of flights that showed a finding before another event.
+    """
 
     system: str
     map: str
     result: CaseResult
     file: Path | None
+    seen: int = 0
 
 
 def case_requests(
@@ -206,4 +210,5 @@ def _save(
         map=request.job.map,
         result=result,
         file=save(result.case) if result.case else None,
+        seen=len(request.violations) if request.finding else 0,
     )
