@@ -148,7 +148,10 @@ def _grid(experiment: Experiment, grid: Grid, rows: Sequence[ResultRow], path: P
         "Types of violations, as shares of all violations of types I to V:",
         tables.violation_types(experiment, grid, rows),
         f"![{grid.title}]({os.path.relpath(picture, path.parent)})" if drawn else "",
-        "Points are searches, boxes span the quartiles, whiskers all searches." if drawn else "",
+        "Points are searches, boxes span the quartiles, whiskers all searches. Violations are\n"
+        "counted as in the table."
+        if drawn
+        else "",
         compared,
         grid.remarks,
     ]

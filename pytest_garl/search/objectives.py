@@ -26,6 +26,11 @@ def diversity(generation: Matrix) -> Matrix:
     return means
 
 
+def time_to_landing_s(result: FlightResult) -> float:
+    """Return the time of the touchdown, or of the end of a flight that did not land."""
+    return result.elapsed_s if result.landed_s is None else result.landed_s
+
+
 SAFE_MARGINS: Mapping[MarginName, float] = MappingProxyType(
     {
         # Landing within a quarter of a metre of the marker's centre, with the default limit.

@@ -30,7 +30,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from pytest_garl.search.method import FlownScenario, Method, MethodDeclaration, SearchPlan
-from pytest_garl.search.objectives import diversity
+from pytest_garl.search.objectives import diversity, time_to_landing_s
 from pytest_garl.search.operators import Matrix, property_mutation
 
 
@@ -45,8 +45,8 @@ def make(plan: SearchPlan) -> Method:
 def objectives(chromosomes: Matrix, flown: Sequence[FlownScenario]) -> Matrix:
     """Distance to landing, time to landing and diversity, all maximised; shape (k, 3)."""
     distance = [item.result.final_distance_m for item in flown]
-    elapsed = [item.result.elapsed_s for item in flown]
-    return np.column_stack([distance, elapsed, diversity(chromosomes)])
+    times = [time_to_landing_s(item.result) for item in flown]
+    return np.column_stack([distance, times, diversity(chromosomes)])
 
 
 METHOD = MethodDeclaration(make=make, policy="dqn-paper")

@@ -42,6 +42,7 @@ from pytest_garl.scenarios.maps.map import Map
 from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.scenarios.validity import problems, repair
 from pytest_garl.search.method import FlownScenario, MethodDeclaration, SearchPlan
+from pytest_garl.search.objectives import time_to_landing_s
 from pytest_garl.search.seeding import seed_sequence
 from pytest_garl.verdicts.verdict import PAPER_LIMITS
 
@@ -115,7 +116,7 @@ class OfflineRl:
         values = []
         with one_thread():
             for latest, row, item in zip(self._chains, rows, flown, strict=True):
-                distance, elapsed = item.result.final_distance_m, item.result.elapsed_s
+                distance, elapsed = item.result.final_distance_m, time_to_landing_s(item.result)
                 diversity = float(np.linalg.norm(self._flown_rows - row, axis=1).mean())
                 values.append((distance, elapsed, diversity))
                 if latest.state_before is not None:

@@ -128,6 +128,25 @@ def test_nothing_is_bred_from_flights_in_which_nobody_could_have_seen_the_marker
     assert {each.seed for _ in range(5) for each in method.ask()} == {first[-1].seed}
 
 
+def test_the_search_leaves_weather_in_which_nobody_could_have_landed() -> None:
+    def flown_in(scenario: Scenario) -> FlightResult:
+        if scenario["environment.fog"] > 0.075:
+            return given_up("undetectable", "IV:dog:descent:seen")
+        return common_and_rare(scenario)
+
+    def share(method: Any) -> float:
+        excused = 0
+        for _ in range(10):
+            flown = [FlownScenario(scenario=s, result=flown_in(s)) for s in method.ask()]
+            method.tell(flown)
+            excused += sum(item.result.verdict.no_landing == EXCUSED for item in flown)
+        return excused / 200
+
+    by_chance = share(RandomSearch(PLAN))
+    assert 0.4 < by_chance < 0.6
+    assert share(Garl(PLAN)) < by_chance / 2
+
+
 def test_a_search_in_which_nobody_can_see_the_marker_draws_at_random() -> None:
     method, by_chance = Garl(PLAN), Garl(PLAN)
     method.tell(

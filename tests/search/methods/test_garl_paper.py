@@ -9,7 +9,9 @@ from pytest_garl.scenarios.chromosome import encode
 from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.search.catalogue import make_method
 from pytest_garl.search.method import FlownScenario
+from pytest_garl.search.objectives import time_to_landing_s
 from tests.search.searches import GENOME, bred, plan, result
+from tests.support.results import flight_result
 
 
 def test_selection_raises_the_objective() -> None:
@@ -25,6 +27,11 @@ def test_selection_raises_the_objective() -> None:
 def test_children_inherit_the_seed_of_a_parent() -> None:
     first, second = bred(make_method("garl-paper", plan()), 2)
     assert {each.seed for each in second} <= {each.seed for each in first}
+
+
+def test_the_time_to_landing_is_that_of_the_touchdown() -> None:
+    assert time_to_landing_s(flight_result(elapsed_s=32.0, landed_s=30.0)) == 30.0
+    assert time_to_landing_s(flight_result(outcome="gave_up", elapsed_s=50.0)) == 50.0
 
 
 def test_the_objectives_are_distance_time_and_diversity() -> None:
