@@ -21,7 +21,7 @@ def test_signature_names_test_and_assertion() -> None:
         ("distance_to_landing_m", "distance", True),
         ("elapsed_s", "time", True),
         ("collisions", "collision", True),
-        ("collisions", "distance", False),
+        ("collisions", "distance", True),
         ("outcome", "distance", True),
         ("outcome", None, False),
         ("crash", "crash", True),
