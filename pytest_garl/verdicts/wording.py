@@ -21,6 +21,8 @@ _POINTS = (
     "south",
     "south-east",
 )
+_TOUCHDOWN_DETAIL = re.compile(r"; (?:the marker (?:had|was)|its target|it reported) ")
+"""Where the detail of a touchdown off the marker begins."""
 _CRASH = "The landing system "
 _RAISED = f"{_CRASH}raised: "
 
@@ -36,7 +38,12 @@ def headline(description: str) -> str:
         what = f"Python error {what.removeprefix(_RAISED)}"
     elif not what.startswith(_CRASH):
         # A landing system's message may hold anything; our own sentences end with a full stop.
-        what = re.split(r"(?<=[a-z\d%])[.;] (?=[A-Z]|it does)", what)[0]
+        what = re.split(r"(?<=[a-z\d%])\. (?=[A-Z])", what)[0]
+        if " off the marker" in what:
+            # The sentence says where the UAV came down.
+            what, where = _TOUCHDOWN_DETAIL.split(what)[0], ""
+        elif " of the marker" in what:
+            where = where.rpartition(", ")[0]
     what = what.partition("\n")[0].removesuffix(".")
     if not what.startswith("Python"):
         what = what[:1].lower() + what[1:]

@@ -165,3 +165,58 @@ def test_needless_giving_up_is_red_in_the_real_simulator(
         expected = "test_completes_the_mission" if selection == FOURTH else REPORTS[system]
         assert failing_tests(result) == [expected]
         assert result.ret == pytest.ExitCode.TESTS_FAILED
+
+
+EXCUSED = """
+import dataclasses
+import tiny_simulator
+from pytest_garl.simulation.flight import MarkerView, NominalView
+
+HIDDEN = MarkerView(share_in_frame=1.0, px_per_module=4.0, border_hidden=1.0, bits_hidden=1.0,
+                    contrast=80.0, noise=3.0, blur_px=0.0)
+
+def fly(*args, **options):
+    flight = tiny_simulator.fly(*args, **options)
+    view = NominalView(time_s=20.0, duration_s=30.0, place="search", height_m=10.0, marker=HIDDEN)
+    return dataclasses.replace(flight, nominal_views=(view,))
+
+def pytest_garl_fly(config):
+    return fly
+"""
+
+
+@pytest.mark.parametrize("selection", SELECTIONS.values(), ids=SELECTIONS)
+def test_giving_up_is_excused_where_nobody_can_read_the_marker(
+    pytester: pytest.Pytester, selection: tuple[str, ...]
+) -> None:
+    write_four_tests(pytester, "HoverThenAbort")
+    pytester.makepyfile(hidden=EXCUSED)
+    pytester.makeconftest("from hidden import pytest_garl_fly")
+    result = run(pytester, *SEARCH, "-v", *selection)
+    assert result.ret == pytest.ExitCode.OK
+    tests = {"test_completes_the_mission": "PASSED", "test_lands_in_time": "SKIPPED"}
+    unselected = {"not completes": "test_completes_the_mission", "completes": "test_lands_in_time"}
+    tests.pop(unselected.get(selection[-1] if selection else "", ""), None)
+    for test, word in tests.items():
+        result.stdout.fnmatch_lines([f"test_it.py::{test}[[]lawn-g00-s00[]] {word}*"])
+    result.stdout.fnmatch_lines(
+        [
+            "HoverThenAbort on lawn: 4 flown, landed 0.0 %, violations 0.0 % [[]0.0, 60.2[]]",
+            "  by the paper's definition, no landing counted: violations 100.0 %",
+            "  gave up: needless 0.0 %, excused 100.0 %, blocked 0.0 %; not landed 0.0 %",
+            "garl: HoverThenAbort on lawn: landed in none of 4 flights",
+        ]
+    )
+
+
+def test_test_that_accepts_no_excuse_asserts_a_property_of_the_users_own(
+    pytester: pytest.Pytester,
+) -> None:
+    write_four_tests(pytester, "HoverThenAbort")
+    pytester.makepyfile(hidden=EXCUSED)
+    pytester.makeconftest("from hidden import pytest_garl_fly")
+    tests = pytester.path / "test_it.py"
+    tests.write_text(tests.read_text().replace(" or landing.excused", ""))
+    result = run(pytester, *SEARCH)
+    assert failing_tests(result) == ["test_completes_the_mission"]
+    result.stdout.fnmatch_lines(["own:test_completes_the_mission:*: a property of your own"])

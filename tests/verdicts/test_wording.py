@@ -25,8 +25,20 @@ PLACE = "At 32.7 s the UAV was 1.4 m up, over the marker."
             "marker",
         ),
         (
-            f"Landed 3.0 m off the marker; it does not say on what. {PLACE}",
-            "landed 3.0 m off the marker, 1.4 m up, over the marker",
+            "Landed 3.0 m off the marker, on open ground; the marker had been in view; its target "
+            f"was decoy-1. {PLACE}",
+            "landed 3.0 m off the marker, on open ground",
+        ),
+        (
+            "Came down 4.2 m north of the marker, which had never been in view, then hit tree-3 at "
+            "1.2 m/s. At 30.1 s the UAV was 1.6 m up, 4.1 m north of the marker.",
+            "came down 4.2 m north of the marker, which had never been in view, then hit tree-3 at "
+            "1.2 m/s, 1.6 m up",
+        ),
+        (
+            f"Gave up at 108.0 s for want of time; the marker was last in view at 22.3 s. {PLACE}",
+            "gave up at 108.0 s for want of time; the marker was last in view at 22.3 s, 1.4 m up, "
+            "over the marker",
         ),
         (
             "Not landed; the marker was never detected. "

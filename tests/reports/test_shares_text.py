@@ -1,0 +1,119 @@
+"""The shares of a search: landed first, both definitions, no landing by its reason."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+
+from pytest_garl.execution.flight_id import FlightId, Slot
+from pytest_garl.execution.ledger_queries import LedgerFlight
+from pytest_garl.execution.result import FlightResult
+from pytest_garl.plugin.summary import search_table
+from pytest_garl.reports.search_summary import SearchSummary, Spread, _kinds, legend
+from pytest_garl.reports.shares_text import headline_shares, share_lines
+from pytest_garl.verdicts.verdict import PAPER_LIMITS, Finding, Limits
+from tests.support.results import crash, flight_result
+
+LANDED: dict[str, Any] = {"outcome": "landed", "completed": True}
+GAVE_UP: dict[str, Any] = {"outcome": "gave_up", "paper_violation": True}
+NEEDLESS: dict[str, Any] = {**GAVE_UP, "signature": "II:never-seen", "primary": "time"}
+"""Two landings, three flights that gave up, one that ran out of time, a crash and no decision."""
+RESULTS = (
+    flight_result(**LANDED, landed_s=20.0, final_distance_m=0.2),
+    flight_result(**LANDED, landed_s=40.0, final_distance_m=0.6),
+    flight_result(**NEEDLESS, violation_type="II"),
+    flight_result(**GAVE_UP, excuse="undetectable"),
+    flight_result(**GAVE_UP, excuse="blocked"),
+    flight_result(outcome="not_landed", paper_violation=True, excuse="blocked"),
+    flight_result(
+        "V:E@a.b", outcome="crashed", primary="crash", violation_type="V", crash=crash("hung")
+    ),
+    flight_result(outcome="inconclusive"),
+)
+
+
+def summary(
+    results: tuple[FlightResult, ...], limits: Limits | None = None, violating: int = 0
+) -> SearchSummary:
+    flights = tuple(
+        LedgerFlight(
+            id=FlightId(search="s", map="lawn", slot=Slot(generation=0, index=index)),
+            system="my_landing:Mine",
+            scenario="",
+            result=result,
+            sha256="",
+        )
+        for index, result in enumerate(results)
+    )
+    findings = {
+        finding.signature: [(each.id.slot_id, finding.story)]
+        for each in flights
+        for finding in each.result.verdict.findings
+    }
+    return SearchSummary(
+        system="my_landing:Mine",
+        map="lawn",
+        files=("test_it.py",),
+        flights=flights,
+        kinds=(),
+        violating=violating,
+        findings=_kinds(findings),
+        limits=(limits or Limits(),),
+    )
+
+
+def test_landed_flights_come_first_and_each_reason_has_its_share() -> None:
+    search = summary(RESULTS, violating=2)
+    assert headline_shares(search) == "8 flown, landed 25.0 %, violations 25.0 % [3.2, 65.1]"
+    assert share_lines(search)[:3] == [
+        "by the paper's definition, no landing counted: violations 62.5 %",
+        "gave up: needless 12.5 %, excused 12.5 %, blocked 12.5 %; "
+        "not landed 12.5 % (of them blocked 1); hung 12.5 %; inconclusive 1",
+        "landings: distance median 0.40 m, worst 0.60 m; time median 30.0 s, worst 40.0 s",
+    ]
+
+
+def test_search_without_landing_says_so() -> None:
+    lines = share_lines(summary(RESULTS[2:]))
+    assert "landed 0 %: no flight landed, so nothing is known of its landings" in lines
+
+
+def test_landings_beyond_the_limit_are_told_apart() -> None:
+    off = flight_result(outcome="landed", signature="off:seen", primary="distance")
+    assert "landed 100.0 %, within the limit of distance 50.0 %" in headline_shares(
+        summary((RESULTS[0], off), violating=1)
+    )
+
+
+def test_only_limits_that_are_not_the_default_ones_are_shown() -> None:
+    assert share_lines(summary(RESULTS, PAPER_LIMITS))[-1] == (
+        'limits: distance 1.5 m, time 120 s, abort="violation"'
+    )
+    assert not any(line.startswith("limits") for line in share_lines(summary(RESULTS)))
+
+
+def test_spread_of_nothing_is_none() -> None:
+    assert Spread.of([]) is None
+    assert Spread.of([3.0, 1.0, 2.0]) == Spread(median=2.0, worst=3.0)
+
+
+def test_findings_before_another_event_follow_the_violations(
+    pytestconfig: pytest.Config,
+) -> None:
+    finding = Finding(
+        signature="off:descending-elsewhere",
+        margin=-4.0,
+        unit="m",
+        time_s=20.0,
+        story="Came down 4.8 m north of the marker, which had been in view before.",
+    )
+    search = summary((RESULTS[0], flight_result("IV:dog:descent:seen", findings=(finding,))))
+    lines = search_table(search, pytestconfig, 120)
+    start = lines.index("  before another event:")
+    assert lines[start + 1].split()[:2] == ["1", "off:descending-elsewhere"]
+    assert "--garl-repeat=lawn-g00-s01" in lines[start + 1]
+    assert lines[start + 2].strip() == (
+        "came down 4.8 m north of the marker, which had been in view before"
+    )
+    assert legend(search.findings) == "off: came down too far from the marker, up to 1.5 m"
