@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
-from studies import ablations, adversary
+from collections.abc import Sequence
+
+from studies import ablations, adversary, preventability
+from studies.table import Row
 
 OLD = {
     "mover": "greedy",
@@ -49,3 +52,41 @@ def test_ablations_of_different_definitions_have_different_lines() -> None:
         "| garl | 1 | – | 50 | – | old | 11 | – | 5 | 2 |",
         "| garl | 1 | 10 | 75 | 85 | 0.75 m | 11 | 4 | 8 | 2 |",
     ]
+
+
+def collision(
+    answer: str, hold: str = "", blind: str = "", inevitable_s: str = ""
+) -> dict[str, str]:
+    return {
+        **dict.fromkeys(preventability.TABLE.columns, ""),
+        "system": "MM-MLS",
+        "answer": answer,
+        "inevitable_s": inevitable_s,
+        "observed_s": "2.0" if hold else "",
+        "hold": hold,
+        "hold_touches_nothing": hold,
+        "blind": blind,
+        "blind_touches_nothing": "1" if blind else "",
+        "reference_pilot": "1",
+    }
+
+
+def test_the_table_of_escapes_shows_the_placebos_of_those_that_were_observable() -> None:
+    rows = [
+        collision("preventable", "0", "0", "0.5"),
+        collision("preventable", "0", "1", "1.5"),
+        collision("sensor-limited", inevitable_s="1.0"),
+        collision("unpreventable", "0", "0", "5.0"),
+    ]
+    lines = [[cell.strip() for cell in line.strip("|").split("|")] for line in _table(rows)]
+    assert lines[0][:6] == ["MM-MLS", "4", "2", "1", "1", "0"]
+    assert lines[0][6] == "1.2 (0.9 to 2.4)"
+    escapes = {name: (asked, found.partition(" ")[0]) for name, asked, found in lines[-7:]}
+    assert escapes["planned escape, confirmed"] == ("4", "75.0")
+    assert escapes["planned escape, 0.3 s after first observation"] == ("3", "66.7")
+    assert escapes["placebo: last command held"] == ("3", "0.0")
+    assert escapes["placebo: blind descent"] == ("3", "33.3")
+
+
+def _table(rows: Sequence[Row]) -> list[str]:
+    return preventability.report([*rows]).splitlines()[2:]
