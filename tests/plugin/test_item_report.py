@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import shutil
+from pathlib import Path
 
 import pytest
 from click.testing import CliRunner
@@ -71,12 +72,26 @@ def test_edge_case_hides_no_mistake_in_a_test(searched: pytest.Pytester) -> None
     assert result.ret == pytest.ExitCode.TESTS_FAILED
 
 
-def test_open_case_that_ends_in_an_abort_counts_as_passed(
+def let_system_give_up(project: Path) -> None:
+    """Let the UAV give up where a dog has hit it."""
+    replace_text(project / "tiny_simulator.py", 'outcome = "collision"', 'outcome = "gave_up"')
+
+
+def test_open_case_that_gives_up_needlessly_fails_in_another_way(
     searched: pytest.Pytester,
 ) -> None:
-    replace_text(
-        searched.path / "tiny_simulator.py", 'outcome = "collision"', 'outcome = "gave_up"'
-    )
+    let_system_give_up(searched.path)
+    result = run(searched, "-kIV")
+    result.stdout.fnmatch_lines(["*IV-dog*fails in another way.", "Saved: IV:dog:*", "Flown: II:*"])
+    assert result.ret == pytest.ExitCode.TESTS_FAILED
+
+
+def test_open_case_that_gives_up_as_its_limits_allow_counts_as_passed(
+    searched: pytest.Pytester,
+) -> None:
+    let_system_give_up(searched.path)
+    allowed = "system=Good, limits={'abort': 'ok'}, "
+    replace_text(searched.path / "test_it.py", "system=Good, ", allowed)
     result = run(searched)
     result.assert_outcomes(passed=3, skipped=2, xfailed=1)
     result.stdout.fnmatch_lines(["stale: scenarios/*IV-dog*.toml passes, but the simulator*"])
