@@ -3,7 +3,8 @@
 ``python -m studies.gate`` makes thirty cases from the committed ones and their neighbours, some of
 them with the status fixed.  pytest flies them twenty times, and the study compares outcomes and
 trajectories.  Then it flies one case three hundred times and counts the distinct hashes.
-``python -m studies.gate rates`` simulates the gate against a baseline: see ``gate_rates``.
+``python -m studies.gate rates`` simulates the gate against a baseline: see ``gate_rates``, and
+``python -m studies.gate landings`` keeps the landings that it draws from: see ``gate_landings``.
 """
 
 from __future__ import annotations
@@ -87,13 +88,21 @@ def hash_of_flight(path: Path) -> str:
 def main() -> None:
     """Print times and the numbers of different results and flights; or write the rates."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("what", nargs="?", choices=("cases", "rates"), default="cases")
+    parser.add_argument("what", nargs="?", choices=("cases", "rates", "landings"), default="cases")
     parser.add_argument("--draws", type=int, default=4000, help="Of each false alarm's rate.")
+    parser.add_argument("--baseline", type=Path, help="The baseline whose landings are kept.")
     parser.add_argument("--runs", type=int, default=20)
     parser.add_argument("--replays", type=int, default=300)
     arguments = parser.parse_args()
+    if arguments.what == "landings":
+        from studies.gate_landings import write_landings
+        from studies.gate_rates import LANDINGS
+
+        if arguments.baseline is None:
+            parser.error("landings: --baseline is missing; expected a file of garl baseline save")
+        return write_landings(arguments.baseline, LANDINGS)
     if arguments.what == "rates":
-        from studies.gate_rates import write
+        from studies.gate_page import write
 
         return write(arguments.draws)
     return _cases(arguments.runs, arguments.replays)

@@ -1,13 +1,14 @@
 """How often the gate fails an unchanged landing system, and how often a worse one.
 
-``python -m studies.gate rates`` draws flights with the shares of ``docs/experiments/counts.csv``,
-and draws a part of them again as the changed system's.  The gate compares both, and the tables go
-into ``docs/gate.md``.  Nothing is flown.
+``python -m studies.gate rates`` draws flights with the shares of ``docs/experiments/counts.csv``
+and with the distances and times of ``docs/gate.csv``, and draws a part of them again as the changed
+system's.  The gate compares both, and the tables go into ``docs/gate.md``.  Nothing is flown.
 """
 
 from __future__ import annotations
 
 import dataclasses
+import functools
 from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
@@ -22,23 +23,30 @@ from pytest_garl.regressions.robustness import NEIGHBOURS
 from studies.table import read_csv, share
 
 DOCS = Path(__file__).parents[1] / "docs"
-COUNTS, PAGE = DOCS / "experiments" / "counts.csv", DOCS / "gate.md"
-BEGIN, END = "<!-- Written by `python -m studies.gate rates`: -->\n", "<!-- To here. -->\n"
-BUDGETS = (50, 100, 400)
+COUNTS, LANDINGS = DOCS / "experiments" / "counts.csv", DOCS / "gate.csv"
+BUDGETS = (50, 100, 200)
 PARTS = (0.1, 0.25, 0.5, 1.0)
 LANDED = FlightSummary(outcome="landed", signature="", sha256="base")
-ABORTED = FlightSummary(outcome="gave_up", signature="", sha256="base")
+EXCUSED = FlightSummary(outcome="gave_up", signature="", no_landing="excused", sha256="base")
+NEEDLESS = FlightSummary(
+    outcome="gave_up",
+    signature="II:gave-up-in-sight:descent",
+    no_landing="needless",
+    sha256="base",
+)
 KNOWN = FlightSummary(outcome="collision", signature="IV:person:descent:seen", sha256="head")
 NEW = FlightSummary(outcome="collision", signature="III:tree:descent", sha256="head")
 RARE = (
-    FlightSummary(outcome="not_landed", signature="II:lost:descent", sha256="base"),
-    FlightSummary(outcome="landed", signature="I:phantom:descent", sha256="base"),
-    FlightSummary(outcome="not_landed", signature="late:not-landed:search", sha256="base"),
+    FlightSummary(outcome="slid", signature="slid:motors-on", sha256="base"),
+    FlightSummary(outcome="landed", signature="I:line:unseen", sha256="base"),
+    FlightSummary(outcome="landed", signature="late:landed:descent", sha256="base"),
     FlightSummary(outcome="crashed", signature="V:ValueError@planner.plan", sha256="base"),
 )
 EXPECTED = 2.5
 """Expected number of flights of a baseline with each rare type: of 0.6 to 5, about the number at
 which four rare types cause most false alarms."""
+
+
 Random = np.random.Generator
 NeighbourOf = Callable[[FlightSummary], FlightSummary]
 """Returns the summary of a neighbour, given the summary of its flight."""
@@ -46,23 +54,33 @@ NeighbourOf = Callable[[FlightSummary], FlightSummary]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SimulatedSystem:
-    """A landing system as a distribution over summaries of flights."""
+    """A landing system as a distribution over summaries of flights.
+
+    Each landing gets distance and time of one of the ``landings``.
+    """
 
     name: str
+    landings: tuple[FlightSummary, ...]
     summaries: tuple[FlightSummary, ...]
     shares: tuple[float, ...]
 
     def draw(self, count: int, rng: Random) -> list[FlightSummary]:
         """Return the summaries of ``count`` flights."""
-        return [
+        drawn = [
             self.summaries[index] for index in rng.choice(len(self.shares), count, p=self.shares)
+        ]
+        places = rng.integers(len(self.landings), size=count)
+        return [
+            self.landings[place] if summary is LANDED else summary
+            for summary, place in zip(drawn, places, strict=True)
         ]
 
     def with_rare(self, budget: int) -> SimulatedSystem:
         """Return the same with types so rare that a baseline often misses them."""
         each = EXPECTED / budget
         left = (value * (1 - each * len(RARE)) for value in self.shares)
-        return SimulatedSystem(
+        return dataclasses.replace(
+            self,
             name=f"{self.name}, and four rare types",
             summaries=(*self.summaries, *RARE),
             shares=(*left, *[each] * len(RARE)),
@@ -70,12 +88,17 @@ class SimulatedSystem:
 
 
 def measured(system: str, method: str) -> SimulatedSystem:
-    """Return a landing system in the scenarios of a method: all its rows of the counts together."""
+    """Return a landing system in the scenarios of a method: all its rows of the counts together.
+
+    The counts do not say why a landing was given up: in the dark it counts as excused, else as
+    needless.
+    """
     counts = Counter[FlightSummary]()
     for row in read_csv(COUNTS):
         if (row["system"], row["method"]) == (system, method):
             counts[LANDED] += int(row["landed"])
-            counts[ABORTED] += int(row["aborted"])
+            counts[EXCUSED] += int(row["dark_aborted"])
+            counts[NEEDLESS] += int(row["aborted"]) - int(row["dark_aborted"])
             for kind in filter(None, row["kinds"].split("|")):
                 signature, _, count = kind.rpartition("=")
                 summary = FlightSummary(outcome="collision", signature=signature, sha256="base")
@@ -83,8 +106,30 @@ def measured(system: str, method: str) -> SimulatedSystem:
     total = counts.total()
     return SimulatedSystem(
         name=f"{system}, {method}",
+        landings=flown_landings(),
         summaries=tuple(counts),
         shares=tuple(count / total for count in counts.values()),
+    )
+
+
+@functools.cache
+def flown_landings() -> tuple[FlightSummary, ...]:
+    """Return the landings of OpenCV-MLS that were flown; the counts hold no distances."""
+    return tuple(
+        dataclasses.replace(
+            LANDED, distance_m=float(row["distance_m"]), time_s=float(row["time_s"])
+        )
+        for row in read_csv(LANDINGS)
+    )
+
+
+def landing_always() -> SimulatedSystem:
+    """Return a system that lands in each flight, so that distance and time alone can differ."""
+    return SimulatedSystem(
+        name="OpenCV-MLS, landings alone",
+        landings=flown_landings(),
+        summaries=(LANDED,),
+        shares=(1.0,),
     )
 
 
@@ -94,6 +139,7 @@ def systems() -> Iterator[SimulatedSystem]:
     yield measured("MM-MLS", "random")
     yield measured("OpenCV-MLS", "garl-paper")
     yield measured("MM-MLS", "random with dqn")
+    yield landing_always()
 
 
 def by_chance(system: SimulatedSystem, rng: Random) -> NeighbourOf:
@@ -246,18 +292,3 @@ def power_table(draws: int, rng: Random) -> Iterator[str]:
                 for _, worse, into, robust in columns
             ]
             yield f"| {budget} | {100 * part:.0f} % | {' | '.join(cells)} |"
-
-
-def write(draws: int) -> None:
-    """Write both tables into the page, between its two marks."""
-    rng = np.random.default_rng(0)
-    tables = [
-        f"False alarms in {draws} draws each:",
-        "\n".join(alarm_table(draws, rng)),
-        f"Failures of a worse landing system, MM-MLS in random scenarios, {draws // 4} draws each:",
-        "\n".join(power_table(draws // 4, rng)),
-    ]
-    text = PAGE.read_text()
-    before, _, rest = text.partition(BEGIN)
-    after = rest.partition(END)[2]
-    PAGE.write_text(before + BEGIN + "\n" + "\n\n".join(tables) + "\n\n" + END + after)
