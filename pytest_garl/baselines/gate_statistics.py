@@ -57,16 +57,24 @@ def signed_rank_p(differences: Sequence[float]) -> float:
     if len(ranks) > LARGEST_EXACT:
         spread = math.sqrt(float((ranks.astype(float) ** 2).sum())) / 2
         return 0.5 * math.erfc((observed - 1 - ranks.sum() / 2) / spread / math.sqrt(2))
-    probabilities = np.zeros(int(ranks.sum()) + 1)
-    probabilities[0] = 1.0
-    reached = 0
-    for rank in np.sort(ranks):
-        reached += int(rank)
-        shifted = probabilities[: reached + 1 - rank].copy()
-        probabilities[: reached + 1] *= 0.5
-        probabilities[rank : reached + 1] += 0.5 * shifted
-    # The small terms first, so that none is lost.
-    return min(1.0, float(probabilities[observed:][::-1].sum()))
+    # W and its complement, the sum of the other ranks, are distributed alike.
+    complement = int(ranks.sum()) - observed
+    if observed <= complement:
+        return 1.0 - _share_of_sums(ranks, observed - 1)
+    return _share_of_sums(ranks, complement)
+
+
+def _share_of_sums(ranks: NDArray[np.int64], most: int) -> float:
+    """Return the share of all subsets of ``ranks`` whose sum is at most ``most``."""
+    if most < 0:
+        return 0.0
+    shares = np.zeros(most + 1)
+    shares[0] = 1.0
+    for rank in ranks:
+        with_rank = shares[: max(0, most + 1 - int(rank))] * 0.5
+        shares *= 0.5
+        shares[int(rank) :] += with_rank
+    return float(shares.sum())
 
 
 def can_reject(differing: int, level: float) -> bool:

@@ -93,11 +93,11 @@ class BaselineGateItem(pytest.Item):
     def _hint(self, comparison: Comparison, file: Path | None) -> Iterator[str]:
         """Yield the command that flies the first pair that is worse."""
         worse: tuple[PairResult, ...] = ("broke", "changed")
-        pairs = (pair for result in worse for pair in comparison.with_result(result))
-        first = next(pairs, None)
-        if first is not None:
+        names = [pair.name for result in worse for pair in comparison.with_result(result)]
+        names += [each.worst[0] for each in comparison.sizes if comparison.is_significant(each)]
+        if names:
             yield (
-                f"fly it: garl baseline scenario {file} {first.name} > one.toml; "
+                f"fly it: garl baseline scenario {file} {names[0]} > one.toml; "
                 f"pytest --garl-repeat=one.toml --garl-npcs={self.garl_gate.npcs}"
             )
 
