@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import math
 
 import numpy as np
@@ -18,10 +19,11 @@ from pytest_garl import (
     VehicleState,
     VelocitySetpoint,
 )
-from pytest_garl.simulation.flight import Flight, Touchdown
+from pytest_garl.simulation.flight import Flight, Outcome, Touchdown
 from pytest_garl.simulation.fly import fly
-from pytest_garl.simulation.ground_stays import LandDetector
+from pytest_garl.simulation.ground_stays import GroundStays
 from pytest_garl.simulation.physics.vehicle import GRAVITY_MPS2, REFERENCE_MASS_KG, vehicle_model
+from pytest_garl.simulation.recorder import Recorder
 from tests.support.flights import EMPTY, STAND, Scripted, nominal
 
 WEIGHT_N = REFERENCE_MASS_KG * GRAVITY_MPS2
@@ -244,37 +246,73 @@ def test_uav_that_touches_down_in_time_may_come_to_rest_after_the_limit() -> Non
     assert late.outcome == "not_landed"
 
 
-class TestLandDetector:
-    """The rules by themselves: (on the ground, thrust, climb) for each step."""
+def test_contact_while_the_uav_slides_changes_nothing() -> None:
+    _, free = flown(Skids)
+    x, y, _ = free.position_m
+    tree = dataclasses.replace(EMPTY.bodies[0], position_m=(x, y + 2.0, 0.0))
+    map = dataclasses.replace(EMPTY, bodies=(tree,))
+    flight = fly(nominal(), Skids, STAND, map=map, time_limit_s=20.0)
+    assert flight.outcome == "slid"
+    assert flight.contacts[-1].body == tree.name
 
-    @staticmethod
-    def stop_s(on_ground: bool, thrust_n: float, climb_mps: float) -> float | None:
-        detector = LandDetector(vehicle_model(Airframe()))
-        for tick in range(1, 720):
-            if detector.lands(tick / 240, on_ground, thrust_n, climb_mps):
-                return tick / 240
+
+class TestGroundStays:
+    """The stays by themselves, step by step."""
+
+    def setup_method(self) -> None:
+        self.recorder = Recorder(EMPTY, (), (0.0, 0.0))
+        self.stays = GroundStays(
+            self.recorder, vehicle_model(Airframe()), (0.0, 0.0), lambda place: "nothing"
+        )
+        self.time_s = 0.0
+
+    def fly(
+        self, seconds: float, *, contact: bool = True, tilt_rad: float = 0.0, **motion: float
+    ) -> Outcome | None:
+        """Fly on, with the motors off unless ``motion`` has a thrust; stop at the outcome."""
+        x, speed = motion.get("x", 0.0), motion.get("speed", 0.0)
+        thrust_n = motion.get("thrust_n", 0.0)
+        for _ in range(round(seconds * 240)):
+            self.time_s += 1 / 240
+            place = (x, 0.0, 0.2)
+            contact_m = place if contact else None
+            velocity = (speed, 0.0, 0.0)
+            outcome = self.stays.update(self.time_s, contact_m, place, velocity, tilt_rad, thrust_n)
+            if outcome:
+                return outcome
         return None
 
-    def test_low_thrust_on_the_ground_stops_the_motors_after_a_second(self) -> None:
-        assert self.stop_s(True, 0.29 * WEIGHT_N, 0.1) == pytest.approx(1.0, abs=0.01)
+    def test_uav_that_tips_over_after_the_stop_collides_with_the_ground(self) -> None:
+        assert self.fly(1.5) is None
+        assert self.stays.motors_stopped
+        assert self.fly(0.1, tilt_rad=math.radians(21)) == "collision"
+        assert self.recorder.last_contact == "ground"
 
-    @pytest.mark.parametrize(
-        ("on_ground", "share", "climb_mps"),
-        [(False, 0.1, 0.0), (True, 0.31, 0.0), (True, 0.29, -0.21)],
-    )
-    def test_other_states_do_not_stop_them(
-        self, on_ground: bool, share: float, climb_mps: float
-    ) -> None:
-        assert self.stop_s(on_ground, share * WEIGHT_N, climb_mps) is None
+    def test_uav_that_lies_still_but_is_pushed_over_has_landed(self) -> None:
+        self.fly(1.5)
+        self.stays.was_pushed = True
+        assert self.fly(2.0, tilt_rad=1.0, x=3.0, speed=0.5) == "landed"
+        assert self.stays.touchdowns[-1].slid_m == 0.0
 
-    def test_switched_off_motors_stop_whatever_the_vertical_speed(self) -> None:
-        assert self.stop_s(True, 4.0, 0.5) == pytest.approx(1.0, abs=0.01)
-        assert self.stop_s(True, 4.2, 0.5) is None
+    def test_uav_that_still_moves_is_watched_until_it_rests(self) -> None:
+        self.fly(1.5)
+        assert self.fly(3.0, speed=0.25) is None
+        assert self.fly(0.1, speed=0.1) == "landed"
 
-    def test_interruption_begins_the_second_anew(self) -> None:
-        detector = LandDetector(vehicle_model(Airframe()))
-        assert not detector.lands(0.0, True, 0.0, 0.0)
-        assert not detector.lands(0.9, True, WEIGHT_N, 0.0)
-        assert not detector.lands(1.0, True, 0.0, 0.0)
-        assert not detector.lands(1.9, True, 0.0, 0.0)
-        assert detector.lands(2.0, True, 0.0, 0.0)
+    def test_short_bounce_belongs_to_the_stay(self) -> None:
+        self.fly(0.5, thrust_n=WEIGHT_N)
+        self.fly(0.2, contact=False, thrust_n=WEIGHT_N)
+        self.fly(0.1, thrust_n=WEIGHT_N)
+        assert len(self.stays.touchdowns) == 1
+        self.fly(0.3, contact=False, thrust_n=WEIGHT_N)
+        assert self.stays.since_s is None
+        self.fly(0.1)
+        assert len(self.stays.touchdowns) == 2
+
+    def test_way_through_the_air_is_no_slide(self) -> None:
+        self.fly(0.2)
+        self.fly(0.2, contact=False, x=0.8)
+        assert self.stays.touchdowns[-1].slid_m == 0.0
+        self.fly(0.1, x=0.4)
+        assert self.stays.touchdowns[-1].slid_m == pytest.approx(0.4)
+        assert not self.stays.has_slid

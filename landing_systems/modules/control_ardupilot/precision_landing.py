@@ -103,7 +103,8 @@ class PrecisionLanding:
 
     def _in_range(self, height_m: float) -> bool:
         low, high = self._p.plnd_alt_min, self._p.plnd_alt_max
-        return not (0 < height_m < low or (high > 0 and height_m > high))
+        # On its feet a vehicle may be some millimetres below the place from which it took off.
+        return not ((low > 0 and height_m < low) or (high > 0 and height_m > high))
 
     def _recently_seen(self, time_s: float, position: Vector) -> bool:
         if self._seen_s is None or time_s - self._measured_s > FORGET_AFTER_S:

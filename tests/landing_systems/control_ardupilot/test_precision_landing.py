@@ -146,7 +146,7 @@ def test_a_target_in_sight_is_landed_on() -> None:
     assert flight.place == pytest.approx(PLACE, abs=0.01)
 
 
-@pytest.mark.parametrize("height", [8.5, 0.7])
+@pytest.mark.parametrize("height", [8.5, 0.7, 0.0, -0.001])
 def test_outside_its_heights_a_lost_target_does_not_matter(height: float) -> None:
     flight = Descent(height)
     assert flight.run(0.5) == ["descend"]
