@@ -19,6 +19,7 @@ from pytest_garl import (
     Mission,
     Observation,
     PositionSetpoint,
+    VelocitySetpoint,
     testing,
 )
 from pytest_garl.errors import LandingSystemError
@@ -108,6 +109,22 @@ class LandsAtHome(Climbs):
         return Land(diagnostics=Diagnostics()) if there else super().step(observation)
 
 
+class StandsOnItsFeet(Climbs):
+    """Comes down to its feet, and hovers there."""
+
+    def step(self, observation: Observation) -> Command:
+        if observation.time_s < 4:
+            return super().step(observation)
+        return PositionSetpoint(position_m=(0.0, -16.5, 0.2))
+
+
+class Skids(StandsOnItsFeet):
+    def step(self, observation: Observation) -> Command:
+        if observation.time_s < 4:
+            return super().step(observation)
+        return VelocitySetpoint(velocity_mps=(2.0, 0.0, -0.2))
+
+
 class Sleeps(Climbs):
     def step(self, observation: Observation) -> Command:
         with contextlib.suppress(Exception):
@@ -189,6 +206,8 @@ def test_check_finds_a_flight_that_depends_on_the_one_before() -> None:
         (GivesUp, ["gave up in a calm scenario", "gave up in both", "no diagnostics"]),
         (LandsAtHome, ["landed 16.5 m off", "never name a detection"]),
         (Climbs, ["did not land within 120 s"]),
+        (StandsOnItsFeet, ["touched the ground, but its motors did not stop"]),
+        (Skids, ["slid over the ground after its touchdown"]),
     ],
 )
 def test_check_warns_of_problems_of_a_search(system: type, words: list[str]) -> None:
