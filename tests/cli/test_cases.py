@@ -11,7 +11,7 @@ import pytest
 from click.testing import CliRunner, Result
 
 from pytest_garl.cli import main
-from pytest_garl.regressions.case import Case, Evidence, Violation
+from pytest_garl.regressions.case import Case, Evidence, Prevention, Violation
 from pytest_garl.regressions.case_file import load_case
 from pytest_garl.regressions.corpus import Corpus, replace_file
 from pytest_garl.scenarios.chromosome import decode
@@ -68,7 +68,8 @@ def case_of_broken_lander() -> Case:
             removed="nothing",
             versions=(("pytest-garl", version("pytest-garl")),),
         ),
-        limits=Limits(),
+        # The repaired lander gives up at once.
+        limits=Limits(abort="ok"),
     )
 
 
@@ -117,6 +118,34 @@ def test_show_omits_neighbours_if_none_was_flown(file: Path) -> None:
     file = replace_file(file, dataclasses.replace(case, evidence=evidence))
     assert "neighbours" not in garl("show", file).output
     assert "0/0" not in garl("list").output
+
+
+def test_show_says_until_when_a_collision_was_preventable(file: Path) -> None:
+    found = Prevention(answer="sensor-limited", inevitable_s=0.5, observed_s=0.3)
+    judged = dataclasses.replace(load_case(file), prevention=found, reason="sensor-limited")
+    file = replace_file(file, judged)
+    output = garl("show", file).output
+    assert (
+        "sensor-limited: collision inevitable from 0.5 s before the contact, the camera" in output
+    )
+    assert "It gates nothing: an escape exists, but the camera did not show the body" in output
+    assert "open (sensor-limited)" in garl("list").output
+
+
+def test_promoted_case_gates_again(file: Path) -> None:
+    judged = dataclasses.replace(load_case(file), reason="unpreventable")
+    file = replace_file(file, judged)
+    repair_lander()
+    assert garl("promote", file).exit_code == 0
+    fixed = load_case(file)
+    assert (fixed.status, fixed.gates) == ("fixed", True)
+
+
+def test_promote_refuses_a_lander_that_gives_up_needlessly(file: Path) -> None:
+    file = replace_file(file, dataclasses.replace(load_case(file), limits=Limits()))
+    repair_lander()
+    assert "still fails with its recorded moves (II:" in garl("promote", file).output
+    assert load_case(file).status == "open"
 
 
 def test_promote_requires_a_replay_that_is_fixed(file: Path) -> None:

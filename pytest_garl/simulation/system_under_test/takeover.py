@@ -74,6 +74,12 @@ class _Maker:
         self._system, self._takeover = system, takeover
         self.airframe: Airframe = airframe_of(system)
 
+    def __getattr__(self, name: str) -> Any:
+        """Return an attribute of the landing system's class."""
+        if name == "_system":
+            raise AttributeError(name)
+        return getattr(self._system, name)
+
     def __call__(self) -> TakenOver:
         return TakenOver(self._system(), self._takeover, self.airframe)
 
@@ -96,6 +102,8 @@ class TakenOver:
 
     def __getattr__(self, name: str) -> Any:
         """Return an attribute of the landing system, such as ``needs_camera``."""
+        if name == "_inner":
+            raise AttributeError(name)
         return getattr(self._inner, name)
 
     def reset(self, mission: Mission) -> None:

@@ -129,4 +129,5 @@ def test_attributes_of_the_landing_system_are_seen_through() -> None:
     system = with_takeover(ReferencePilot, takeover("hold"))()
     assert system.needs_camera is False
     assert callable(system.observe_truth)
+    assert with_takeover(ReferencePilot, takeover("hold")).needs_camera is False  # type: ignore[attr-defined]
     assert getattr(with_takeover(BlindLander, takeover("hold"))(), "observe_truth", None) is None
