@@ -88,13 +88,22 @@ def test_the_lowest_slot_fails_whatever_the_order(pytester: pytest.Pytester) -> 
     ],
 )
 def test_a_broken_system_is_a_finding_and_the_run_goes_on(
-    pytester: pytest.Pytester, system: str, words: str, share: str, parallel: tuple[str, ...]
+    pytester: pytest.Pytester,
+    system: str,
+    words: str,
+    share: str,
+    parallel: tuple[str, ...],
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     project(pytester, system)
+    # No line breaks in a share.
+    monkeypatch.setenv("COLUMNS", "120")
     result = run(pytester, "--garl-budget=2", "--garl-workers=1", "--garl-timeout=0.3", *parallel)
     result.assert_outcomes(failed=1, skipped=4, xfailed=1)
     result.stdout.fnmatch_lines([words])
-    result.stdout.fnmatch_lines(["*2 flown, violations 100.0 %*", f"*{share} 100.0 %*"])
+    result.stdout.fnmatch_lines(
+        ["*2 flown, landed 0.0 %, violations 100.0 %*", f"*{share} 100.0 %*"]
+    )
 
 
 def test_x_stops_at_the_first_failure(pytester: pytest.Pytester) -> None:

@@ -177,7 +177,11 @@ def test_ground_contact_off_the_marker_before_an_abort_fails(
     )
     write_simulator(pytester, touch, "True")
     result = run(pytester, "--garl-budget=4", "--garl-workers=0")
-    assert outcomes_of(result, "FAILED") == {"test_it.py::test_distance[lawn-g00-s00]"}
+    # Two flights touch the ground 3 m off the marker; the others give up above it, needlessly.
+    assert outcomes_of(result, "FAILED") == {
+        "test_it.py::test_distance[lawn-g00-s00]",
+        "test_it.py::test_time[lawn-g00-s01]",
+    }
 
 
 def test_resumed_run_reports_all_failures_again(pytester: pytest.Pytester) -> None:
