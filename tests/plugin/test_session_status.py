@@ -108,7 +108,7 @@ def test_summary_notes_a_violation_that_no_test_asserts(pytester: pytest.Pyteste
     write_tests(pytester, "Good", COLLISIONS)
     result = run(pytester, "--garl-budget=1", "--garl-workers=0")
     result.assert_outcomes(passed=1)
-    result.stdout.fnmatch_lines(["garl: no selected test fails for *: I[?]:unknown (1 flight)"])
+    result.stdout.fnmatch_lines(["garl: no selected test fails for *: I:nothing:unseen (1 flight)"])
 
 
 def test_session_without_landing_tests_reports_nothing(pytester: pytest.Pytester) -> None:
