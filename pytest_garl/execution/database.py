@@ -16,7 +16,7 @@ REMEDY = (
     "Is it a ledger, is there space, may it be written? Fix that and go on with --garl-resume, or "
     "choose another folder with the ini key garl_dir"
 )
-VERSION = 5
+VERSION = 6
 """Version of the tables below; a ledger of another version cannot be resumed."""
 SCHEMA = """
 CREATE TABLE run (key TEXT PRIMARY KEY, value TEXT NOT NULL);

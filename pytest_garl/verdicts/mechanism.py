@@ -181,7 +181,9 @@ def _no_landing_cause(flight: Flight, limits: Limits, end: str) -> tuple[Violati
     report = f"{_report_text(flight, at_s)}{_opportunity_text(flight)}"
     when = f" at {at_s:.1f} s" if flight.outcome == "gave_up" else ""
     if not readable:
-        return "II", "II:never-seen", f"{end}{when}; the marker was never in view.{report}"
+        # A detector may read a frame that a good one reads with less than one half.
+        view = "in view" if last_report_s(flight, at_s) is None else "in good view"
+        return "II", "II:never-seen", f"{end}{when}; the marker was never {view}.{report}"
     last = readable[-1]
     lost = at_s - last > LOST_AFTER_S
     if flight.outcome == "not_landed" and not lost:
