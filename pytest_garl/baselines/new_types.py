@@ -50,12 +50,17 @@ class NewType:
 def new_types(
     pairs: Sequence[Pair], expected: Collection[str], neighbours: NeighbourFlights
 ) -> list[NewType]:
-    """Return the types that only the head has; their p-values are not yet corrected."""
+    """Return the types that only the head has; their p-values are not yet corrected.
+
+    A pair that is fixed shows no new way to fail: a collision that became a needless abort
+    is milder, though its type may be new.
+    """
     old_types = {pair.base.type for pair in pairs} | {violation_type_of(each) for each in expected}
     changed = sum(not pair.identical for pair in pairs)
     found = []
-    for new_type in sorted({pair.head.type for pair in pairs} - old_types - {""}):
-        having = tuple(pair for pair in pairs if pair.head.type == new_type)
+    failed = [pair for pair in pairs if pair.result != "fixed"]
+    for new_type in sorted({pair.head.type for pair in failed} - old_types - {""}):
+        having = tuple(pair for pair in failed if pair.head.type == new_type)
         failing = tuple(
             (sum(each.type == new_type for each in flown), len(flown))
             for pair in having

@@ -60,6 +60,8 @@ def test_collisions_that_became_needless_aborts_are_fixed() -> None:
     found = gate((20, DOG, NEEDLESS), (6, NEEDLESS, NEEDLESS), (20, LANDED, LANDED))
     assert found.passed
     assert len(found.with_result("fixed")) == 20
+    # Its type is not new either, if no other flight has it.
+    assert gate((20, DOG, NEEDLESS), (20, LANDED, LANDED)).passed
     assert (found.violations.broke, found.violations.fixed) == (0, 0)
     assert any(
         line.startswith("violations other than no landing 20 -> 0 (0 graver than giving up, 20 m")
