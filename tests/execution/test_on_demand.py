@@ -45,7 +45,7 @@ def foggier(job: FlightJob) -> Callable[[FlyFunction], tuple[float, str]]:
 
 def test_procedure_decides_on_each_flight_by_the_one_before(job: FlightJob, ledger: Ledger) -> None:
     found = on_demand(ledger).run({"one": foggier(job), "two": foggier(job)})
-    assert found == {"one": (0.12, "I?:unknown"), "two": (0.12, "I?:unknown")}
+    assert found == {"one": (0.12, "I:nothing:unseen"), "two": (0.12, "I:nothing:unseen")}
     assert ledger.queries.meters()["on_demand"] == 8
     # These flights are not part of a search's figures.
     assert ledger.queries.flights() == []
@@ -73,7 +73,7 @@ def test_job_chooses_the_system(job: FlightJob, ledger: Ledger) -> None:
     def procedure(fly: FlyFunction) -> tuple[str, str]:
         return fly(job, scenario(0.14)).signature, fly(pilot, scenario(0.14)).signature
 
-    assert on_demand(ledger).run({"x": procedure}) == {"x": ("I?:unknown", "")}
+    assert on_demand(ledger).run({"x": procedure}) == {"x": ("I:nothing:unseen", "")}
 
 
 def test_error_in_one_procedure_ends_the_others(job: FlightJob, ledger: Ledger) -> None:

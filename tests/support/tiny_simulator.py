@@ -70,7 +70,7 @@ def fly(
         pilot = system()
         pilot.reset(_mission())
         command = pilot.step(_observation())
-        if isinstance(command, PositionSetpoint | Abort):
+        if isinstance(command, PositionSetpoint | Abort) and not knows:
             return _fly_positions(pilot, command, marker)
     except Exception as error:  # noqa: BLE001 (as the real simulator does)
         outcome, crash = "crashed", crash_of(error, "step")
