@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
+from functools import partial
 from typing import Any
 
 from pytest_garl.landing_system import Abort, Command, Land, VehicleState
@@ -29,6 +30,7 @@ from pytest_garl.simulation.physics.vehicle import (
     Quaternion,
     Thrusts,
     Vector,
+    VehicleModel,
     drag,
     lag,
     vehicle_model,
@@ -67,15 +69,9 @@ class Loop:
         self._marker = marker_position_m(scenario, map)
         self._model = vehicle_model(self._system.airframe)
         self.npcs = [Npc(scenario, map, name, policy()) for name, _ in map.present_objects]
-        self._world = World(
-            self._model,
-            map.uav_start_m,
-            map.bodies,
-            [npc.body for npc in self.npcs],
-            FEET_FRICTION[map.ground.texture],
-        )
+        self._world = _world(self._model, map, self.npcs)
         self.recorder = Recorder(map, self.npcs, self._marker)
-        stays = GroundStays(self.recorder, self._model, self._marker, self._under)
+        stays = GroundStays(self.recorder, self._model, self._marker, partial(_under, self))
         self._contacts = Contacts(self._world, self.recorder, self.npcs, self._model.size_m, stays)
         self._control = FlightControl(self._model)
         self._wind = wind_mps(scenario)
@@ -129,10 +125,9 @@ class Loop:
 
         A UAV that has touched down in time may come to rest.
         """
-        limit_s = self._time_limit_s
-        if self._ticks < round(limit_s * PHYSICS_RATE_HZ):
-            return False
-        return not self._contacts.settling(self._ticks / PHYSICS_RATE_HZ, limit_s)
+        now, limit_s = self._ticks / PHYSICS_RATE_HZ, self._time_limit_s
+        in_time = self._ticks < round(limit_s * PHYSICS_RATE_HZ)
+        return not (in_time or self._contacts.settling(now, limit_s))
 
     def tick(self) -> Outcome | None:
         """Advance by 1/240 s; return the outcome once there is one."""
@@ -213,10 +208,6 @@ class Loop:
             scenario=self.scenario,
         )
 
-    def _under(self, place: tuple[float, float]) -> str:
-        bodies = (*self.map.bodies, *(npc.body for npc in self.npcs))
-        return what_lies_under(place, self._marker, self.map.ground.layers, bodies, self.scenario)
-
     def eye(self) -> tuple[Vector, Quaternion]:
         """Return the camera's place and the UAV's attitude."""
         position, attitude, _, _ = self._world.uav_state()
@@ -257,6 +248,18 @@ class Loop:
             self.recorder.event(name, f"the system said {type(command).__name__}()")
         self._command = command
         self._control.remember_yaw(command)
+
+
+def _world(model: VehicleModel, map: Map, npcs: Sequence[Npc]) -> World:
+    moving = [npc.body for npc in npcs]
+    return World(model, map.uav_start_m, map.bodies, moving, FEET_FRICTION[map.ground.texture])
+
+
+def _under(loop: Loop, place: tuple[float, float]) -> str:
+    """Return what lies under the UAV if it touches down at a place at this moment."""
+    map, bodies = loop.map, (*loop.map.bodies, *(npc.body for npc in loop.npcs))
+    marker_m = marker_position_m(loop.scenario, map)
+    return what_lies_under(place, marker_m, map.ground.layers, bodies, loop.scenario)
 
 
 def _vehicle_state(tick: int, motion: Motion, thrusts: Thrusts) -> VehicleState:
