@@ -41,18 +41,24 @@ _EDGE_PX = 1.0
 class TphYoloDetector:
     """Finds markers in frames by the learned network and places them in the world.
 
-    Raises WeightsError for weights that are missing, damaged or not what their manifest says.
+    Below ``whole_below_m`` a marker that the frame cuts does not count.  Raises WeightsError for
+    weights that are missing, damaged or not what their manifest says.
     """
 
     def __init__(
-        self, mission: Mission, weights: Path = SHIPPED, *, min_confidence: float = MIN_CONFIDENCE
+        self,
+        mission: Mission,
+        weights: Path = SHIPPED,
+        *,
+        min_confidence: float = MIN_CONFIDENCE,
+        whole_below_m: float = WHOLE_BELOW_M,
     ) -> None:
         files = read_weights(weights)
         self._boxes, self._ids = load_network(files.boxes), load_network(files.ids)
         self._slope, self._offset = files.calibration
         self._camera: Camera = mission.camera
         self._side_m = mission.marker_side_m
-        self._min_confidence = min_confidence
+        self._min_confidence, self._whole_below_m = min_confidence, whole_below_m
         self._min_logit = (_logit(min_confidence) - self._offset) / self._slope
 
     def detect(self, observation: Observation) -> tuple[Detection, ...]:
@@ -68,7 +74,7 @@ class TphYoloDetector:
         for centre, size, logit in zip(boxes.centres_px, boxes.sizes_px, boxes.logits, strict=True):
             middle = (centre - shift) / scale
             place = self._place(middle, size / scale, side_px, observation)
-            if place is None or (height < WHOLE_BELOW_M and self._cut(middle, size / scale)):
+            if place is None or (height < self._whole_below_m and self._cut(middle, size / scale)):
                 continue
             (x, y), expected_px = place
             number, answer = self._identify(picture, centre, expected_px * scale)
