@@ -197,16 +197,7 @@ class Loop:
     def situation(self, npc: Npc) -> Situation:
         """Return what the policy of an NPC may see at this moment."""
         position, _, velocity, _ = self._world.uav_state()
-        return Situation(
-            time_s=self.recorder.time_s,
-            self=npc.state,
-            others=tuple(other.state for other in self.npcs if other is not npc),
-            uav_position_m=position,
-            uav_velocity_mps=velocity,
-            marker_position_m=self._marker,
-            map=self.map,
-            scenario=self.scenario,
-        )
+        return _situation(self, npc, position, velocity)
 
     def eye(self) -> tuple[Vector, Quaternion]:
         """Return the camera's place and the UAV's attitude."""
@@ -253,6 +244,19 @@ class Loop:
 def _world(model: VehicleModel, map: Map, npcs: Sequence[Npc]) -> World:
     moving = [npc.body for npc in npcs]
     return World(model, map.uav_start_m, map.bodies, moving, FEET_FRICTION[map.ground.texture])
+
+
+def _situation(loop: Loop, npc: Npc, position: Vector, velocity: Vector) -> Situation:
+    return Situation(
+        time_s=loop.recorder.time_s,
+        self=npc.state,
+        others=tuple(other.state for other in loop.npcs if other is not npc),
+        uav_position_m=position,
+        uav_velocity_mps=velocity,
+        marker_position_m=marker_position_m(loop.scenario, loop.map),
+        map=loop.map,
+        scenario=loop.scenario,
+    )
 
 
 def _under(loop: Loop, place: tuple[float, float]) -> str:
