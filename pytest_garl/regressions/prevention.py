@@ -143,7 +143,10 @@ def collision_of(
         return None
     flight = load(completed.record)
     contact = flight.contacts[-1] if flight.contacts else None
-    if contact is None or contact.body not in {item.name for item in flight.objects}:
+    recorded = {item.name: item.type for item in flight.objects}
+    # A user's own simulator may record no objects, or others.
+    present = map.without(scenario.removed_objects)
+    if contact is None or contact.body not in recorded or recorded != dict(present.present_objects):
         return None
     try:
         airframe = airframe_of(job.system.load())
@@ -155,7 +158,7 @@ def collision_of(
         behaviour=behaviour,
         flight=flight,
         contact=contact,
-        map=map.without(scenario.removed_objects),
+        map=present,
         airframe=airframe,
     )
 
