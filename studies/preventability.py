@@ -2,10 +2,11 @@
 
 ``python -m studies.preventability`` searches with the NPC policy dqn for violations of the three
 landing systems on both maps, and asks for each collision with a moving body whether it could have
-been prevented.  Two placebos take over where an escape would begin, 0.3 s after the body was
-observable: one holds the landing system's last command, one goes on to the marker and down, blind.
-The reference pilot, which knows where everything is, flies the whole scenario among objects that
-repeat their moves.  The rows go to ``docs/preventability.csv``; ``--report`` prints the table.
+been prevented.  Two placebos take over in its place: one holds the landing system's last command,
+one goes on to the marker and down, blind.  They do so from the state in which the planned escape
+was confirmed, and from the state 0.3 s after the body was observable.  The reference pilot, which
+knows where everything is, flies the whole scenario among objects that repeat their moves.  The rows
+go to ``docs/preventability.csv``; ``--report`` prints the table.
 """
 
 from __future__ import annotations
@@ -13,6 +14,7 @@ from __future__ import annotations
 import argparse
 import dataclasses
 import functools
+import math
 import os
 from collections.abc import Sequence
 from pathlib import Path
@@ -72,6 +74,8 @@ TABLE = ResultTable(
         "blind",
         "blind_touches_nothing",
         "reference_pilot",
+        "hold_late",
+        "blind_late",
     ),
     key=("system", "map", "slot"),
 )
@@ -94,8 +98,13 @@ def question(
 
     found = prevention_of(collision, fly_job, ESCAPE_FLIGHTS)
     pilot = dataclasses.replace(job, system=reference_to(ReferencePilot), npcs=behaviour.policy)
-    hold, hold_lenient = placebo(collision, "hold", fly)
-    blind, blind_lenient = placebo(collision, "blind", fly)
+    seen_s = collision.observation_s()
+    before_s = 0.0 if seen_s is None else collision.contact.time_s - seen_s - REACTION_S
+    early_s = collision.takeover_s(before_s)
+    hold, hold_lenient = placebo(collision, "hold", early_s, fly)
+    blind, blind_lenient = placebo(collision, "blind", early_s, fly)
+    reference_pilot = int(not fly(pilot, scenario).signature)
+    late_s = next((job.takeover.from_s for job in flown[-1:] if job.takeover), math.inf)
     return {
         "system": system,
         "map": job.map,
@@ -109,21 +118,20 @@ def question(
         "hold_touches_nothing": hold_lenient,
         "blind": blind,
         "blind_touches_nothing": blind_lenient,
-        "reference_pilot": int(not fly(pilot, scenario).signature),
+        "reference_pilot": reference_pilot,
+        "hold_late": placebo(collision, "hold", late_s, fly)[0],
+        "blind_late": placebo(collision, "blind", late_s, fly)[0],
     }
 
 
 def placebo(
-    collision: Collision, pilot: Literal["hold", "blind"], fly: FlyFunction
+    collision: Collision, pilot: Literal["hold", "blind"], from_s: float, fly: FlyFunction
 ) -> tuple[int | str, int | str]:
     """Return whether a placebo escapes by the same definition, and whether it touches no body.
 
-    Both are empty if the body was not observable in time.
+    Both are empty if it would take over after the contact.
     """
-    seen_s = collision.observation_s()
-    before_s = 0.0 if seen_s is None else collision.contact.time_s - seen_s - REACTION_S
-    from_s = collision.takeover_s(before_s)
-    if before_s <= 0 or from_s >= collision.contact.time_s:
+    if from_s >= collision.contact.time_s:
         return "", ""
     completed = fly(collision.job_of(pilot, from_s), collision.scenario)
     with collision.world() as world:
@@ -160,9 +168,11 @@ def report(rows: list[Row]) -> str:
         f"| {share(prevented, len(in_time))} |"
     )
     for name, column in (
-        ("placebo: last command held", "hold"),
+        ("placebo: last command held, from the state of the escape", "hold_late"),
+        ("placebo: blind descent, from the state of the escape", "blind_late"),
+        ("placebo: last command held, 0.3 s after first observation", "hold"),
         ("the same, touches no body", "hold_touches_nothing"),
-        ("placebo: blind descent", "blind"),
+        ("placebo: blind descent, 0.3 s after first observation", "blind"),
         ("the same, touches no body", "blind_touches_nothing"),
         ("reference pilot, whole flight, no violation", "reference_pilot"),
     ):

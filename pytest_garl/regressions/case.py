@@ -22,6 +22,8 @@ nothing was observable in time for it.  Unpreventable: no escape exists.  Not as
 is another one, or no flights were left for the question."""
 NoGateReason = Literal["", "edge", "sensor-limited", "unpreventable"]
 """Why a case gates nothing; empty for one that gates."""
+ESCAPE_STEP_S = 0.5
+"""Escapes are looked for so long before a collision, and at whole multiples of it."""
 MoveList = tuple[tuple[float, float], ...]
 Moves = tuple[tuple[str, MoveList], ...]
 ChangeList = tuple[tuple[int, str, float], ...]
@@ -79,9 +81,16 @@ class Prevention:
         """The answer in words, with the seconds; empty if it was not asked."""
         if self.answer == "not asked":
             return ""
-        escape = f"collision inevitable from {self.inevitable_s:.1f} s before the contact"
+        inevitable_s = self.inevitable_s or 0.0
         if self.answer == "unpreventable":
-            escape = f"no escape within the last {self.inevitable_s:.1f} s"
+            escape = f"no escape exists within the last {inevitable_s:.1f} s"
+        elif inevitable_s:
+            escape = (
+                f"an escape exists {inevitable_s + ESCAPE_STEP_S:.1f} s before the contact, none "
+                f"{inevitable_s:.1f} s before it"
+            )
+        else:
+            escape = f"an escape exists {ESCAPE_STEP_S:.1f} s before the contact"
         seen = (
             "the camera did not show the body before it"
             if self.observed_s is None

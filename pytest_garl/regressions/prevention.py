@@ -22,7 +22,7 @@ from pytest_garl.execution.flight import time_limit_s
 from pytest_garl.execution.flight_id import CompletedFlight
 from pytest_garl.execution.job import FlightJob
 from pytest_garl.landing_system import Airframe, airframe_of
-from pytest_garl.regressions.case import NOT_ASKED, Prevention, RecordedBehaviour
+from pytest_garl.regressions.case import ESCAPE_STEP_S, NOT_ASKED, Prevention, RecordedBehaviour
 from pytest_garl.regressions.clearance import escaped, world_of
 from pytest_garl.regressions.escape_model import Chase, EscapeModel
 from pytest_garl.regressions.escape_plan import HOVERS_S, find_escape
@@ -35,9 +35,8 @@ from pytest_garl.simulation.npc_policy import PolicySpec
 from pytest_garl.simulation.physics.world import PHYSICS_RATE_HZ, World
 from pytest_garl.simulation.system_under_test.takeover import Leg, Takeover
 
-STEP_S = 0.5
 LONGEST_ESCAPE_S = 5.0
-"""Escapes begin 0.5, 1.0, ... 5.0 s before the contact."""
+"""Escapes begin at most so long before the contact."""
 REACTION_S = 0.3
 """From the first observation to the first command of an escape takes so long: three frames at the
 default rate, in which a system notices, decides and its latency passes; engineering estimate."""
@@ -187,7 +186,7 @@ class _Question:
         contact_s = self._collision.contact.time_s
         seen_s = self._collision.observation_s()
         observed_s = None if seen_s is None else round(contact_s - seen_s, 3)
-        tried = [STEP_S * (1 + n) for n in range(round(LONGEST_ESCAPE_S / STEP_S))]
+        tried = [ESCAPE_STEP_S * (1 + n) for n in range(round(LONGEST_ESCAPE_S / ESCAPE_STEP_S))]
         tried = [before_s for before_s in tried if before_s < contact_s]
         latest_s = next((before_s for before_s in tried if self._escapes(before_s)), None)
         if latest_s is None:
@@ -199,7 +198,7 @@ class _Question:
         in_time = ready_s >= latest_s or (ready_s > 0 and self._escapes(ready_s))
         return Prevention(
             answer="preventable" if in_time else "sensor-limited",
-            inevitable_s=latest_s - STEP_S,
+            inevitable_s=latest_s - ESCAPE_STEP_S,
             observed_s=observed_s,
         )
 

@@ -2,6 +2,9 @@ from __future__ import annotations
 
 import dataclasses
 
+import pytest
+
+from pytest_garl.regressions.case import Prevention
 from pytest_garl.regressions.case_file import dump_case, parse_case
 from pytest_garl.scenarios.maps.map import load_map
 from tests.regressions.samples import case, case_with_changes
@@ -29,3 +32,28 @@ def test_case_of_an_own_assertion_belongs_to_its_test_in_any_file() -> None:
     assert parse_case(dump_case(with_function_name), load_map) == with_function_name
     assert (with_node_id.asserting_test, with_node_id.id) == ("test_own", with_function_name.id)
     assert with_node_id.id != case().id
+
+
+@pytest.mark.parametrize(
+    ("prevention", "text"),
+    [
+        (Prevention(), ""),
+        (
+            Prevention(answer="preventable", inevitable_s=0.0, observed_s=2.4),
+            "preventable: an escape exists 0.5 s before the contact, the camera showed the body "
+            "2.4 s before it",
+        ),
+        (
+            Prevention(answer="sensor-limited", inevitable_s=1.5),
+            "sensor-limited: an escape exists 2.0 s before the contact, none 1.5 s before it, the "
+            "camera did not show the body before it",
+        ),
+        (
+            Prevention(answer="unpreventable", inevitable_s=5.0, observed_s=4.0),
+            "unpreventable: no escape exists within the last 5.0 s, the camera showed the body "
+            "4.0 s before it",
+        ),
+    ],
+)
+def test_prevention_is_told_with_its_seconds(prevention: Prevention, text: str) -> None:
+    assert prevention.text == text

@@ -68,6 +68,8 @@ def collision(
         "blind": blind,
         "blind_touches_nothing": "1" if blind else "",
         "reference_pilot": "1",
+        "hold_late": "0",
+        "blind_late": "0",
     }
 
 
@@ -81,11 +83,12 @@ def test_the_table_of_escapes_shows_the_placebos_of_those_that_were_observable()
     lines = [[cell.strip() for cell in line.strip("|").split("|")] for line in _table(rows)]
     assert lines[0][:6] == ["MM-MLS", "4", "2", "1", "1", "0"]
     assert lines[0][6] == "1.2 (0.9 to 2.4)"
-    escapes = {name: (asked, found.partition(" ")[0]) for name, asked, found in lines[-7:]}
+    escapes = {name: (asked, found.partition(" ")[0]) for name, asked, found in lines[-9:]}
     assert escapes["planned escape, confirmed"] == ("4", "75.0")
     assert escapes["planned escape, 0.3 s after first observation"] == ("3", "66.7")
-    assert escapes["placebo: last command held"] == ("3", "0.0")
-    assert escapes["placebo: blind descent"] == ("3", "33.3")
+    assert escapes["placebo: last command held, from the state of the escape"] == ("4", "0.0")
+    assert escapes["placebo: last command held, 0.3 s after first observation"] == ("3", "0.0")
+    assert escapes["placebo: blind descent, 0.3 s after first observation"] == ("3", "33.3")
 
 
 def _table(rows: Sequence[Row]) -> list[str]:
