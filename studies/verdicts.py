@@ -49,7 +49,6 @@ COLUMNS = (
     "findings",
     "off_m",
     "landed_s",
-    "story",
 )
 Task = tuple[str, str, int, str]
 
@@ -94,7 +93,6 @@ def row_of(task: Task) -> dict[str, object]:
         "findings": " ".join(each.signature for each in verdict.findings),
         "off_m": f"{flight.final_distance_m:.3f}",
         "landed_s": f"{landed_s(flight):.2f}" if landed else "",
-        "story": verdict.story,
     }
 
 

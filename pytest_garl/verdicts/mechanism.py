@@ -31,6 +31,8 @@ from pytest_garl.verdicts.verdict import (
 
 LOST_AFTER_S = 3.0
 """A marker counts as lost if it was not readable for this long before the end."""
+RECENT_S = 0.5
+"""A marker that was in view so long ago is in view."""
 RESERVE_SHARE = 0.15
 """A landing that is given up in this last share of the time limit is given up for want of time."""
 MESSAGE_CHARS = 300
@@ -196,8 +198,9 @@ def _no_landing_cause(flight: Flight, limits: Limits, end: str) -> tuple[Violati
     if lost:
         return "II", f"II:lost:{phase}", f"{end}{when}; {view}.{report}"
     seen_s = len(readable) * _frame_s(flight)
+    ago = f", last {at_s - last:.1f} s before" if at_s - last > RECENT_S else ""
     text = (
-        f"Gave up{when} with the marker in view, which had been readable for {seen_s:.1f} s."
+        f"Gave up{when} with the marker in view{ago}; it had been readable for {seen_s:.1f} s."
         f"{report}"
     )
     return "II", f"II:gave-up-in-sight:{phase}", text
