@@ -156,5 +156,5 @@ def test_save_records_real_flights(checkouts: Path) -> None:
     assert "0 (0 %)     1           0" in result.output
     (saved,) = load_baseline(Path("base.toml")).sets
     assert saved.npcs_sha256
-    assert {flight.summary.signature.partition(":")[0] for flight in saved.flights} == {"abort"}
+    assert {flight.summary.signature.partition(":")[0] for flight in saved.flights} == {"II"}
     assert all(flight.summary.sha256 for flight in saved.flights)

@@ -7,6 +7,7 @@ import subprocess
 import sys
 from pathlib import Path
 
+import cv2  # noqa: F401  (a run of pytester forgets what it imports first; OpenCV imports only once)
 import pytest
 
 from tests.support.case_project import (

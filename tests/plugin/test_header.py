@@ -13,8 +13,8 @@ def test_header_forecasts_the_search_and_each_new_kind(pytester: pytest.Pytester
     result = pytester.runpytest_subprocess("-p", "no:cacheprovider", *args)
     result.stdout.fnmatch_lines(
         [
-            "garl: * 1 worker; about 18 s per system and map, then about 20 s per new kind of *",
-            "garl: 2 searches, about 35 s, then about 20 s per new kind of violation",
+            "garl: * 1 worker; about 18 s per system and map, then about 25 s per new kind of *",
+            "garl: 2 searches, about 35 s, then about 25 s per new kind of violation",
             "garl: confirming and shrinking 4 new kinds of violation, at most * flights, about * s",
         ]
     )
