@@ -10,10 +10,10 @@ from typing import Self
 from pytest_garl.execution.job import parse_job
 from pytest_garl.execution.ledger import Ledger
 from pytest_garl.execution.ledger_queries import LedgerFlight
-from pytest_garl.verdicts.verdict import Limits, Verdict
+from pytest_garl.verdicts.verdict import Limits, NoLanding, Verdict
 from pytest_garl.verdicts.wording import headline
 
-WHY_NO_LANDING = ("needless", "excused", "blocked")
+WHY_NO_LANDING: tuple[NoLanding, ...] = ("needless", "excused", "blocked")
 """Columns of the flights without landing: somebody could have landed; nobody could have read the
 marker for long enough; something never left it free for long enough."""
 
@@ -104,7 +104,7 @@ class SearchSummary:
             for each in self.flights
             if each.result.outcome == outcome
         ]
-        return {reason: reasons.count(reason) for reason in WHY_NO_LANDING}  # type: ignore[arg-type]
+        return {reason: reasons.count(reason) for reason in WHY_NO_LANDING}
 
     @property
     def completed(self) -> int:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Literal, get_args
 
@@ -42,6 +42,14 @@ MarginName = Literal[
 Excuse = Literal["", "undetectable", "blocked"]
 """Why nobody could have landed: the marker could not be read for long enough, or people, dogs or
 birds never left it free for long enough.  Empty if somebody could."""
+NoLanding = Literal["", "blocked", "excused", "needless"]
+"""Why a flight that was given up or ran out of time is excused, or that it is needless; empty for
+any other flight."""
+_NO_LANDING: Mapping[Excuse, NoLanding] = {
+    "blocked": "blocked",
+    "undetectable": "excused",
+    "": "needless",
+}
 AbortRule = Literal["needless", "ok", "violation"]
 
 
@@ -158,11 +166,11 @@ class Verdict:
         return kind_of(self.signature)
 
     @property
-    def no_landing(self) -> Literal["", "blocked", "excused", "needless"]:
+    def no_landing(self) -> NoLanding:
         """Why a flight that was given up or ran out of time is excused, or that it is not."""
         if self.outcome not in ("gave_up", "not_landed"):
             return ""
-        return {"blocked": "blocked", "undetectable": "excused", "": "needless"}[self.excuse]  # type: ignore[return-value]
+        return _NO_LANDING[self.excuse]
 
     def margin(self, name: MarginName) -> Margin | None:
         """Return the margin of a property, None if the flight has none."""

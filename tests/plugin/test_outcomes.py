@@ -21,6 +21,7 @@ from pytest_garl.plugin.outcomes import (
     decide,
     resolve,
 )
+from pytest_garl.regressions.case import NoGateReason, Status
 
 DOG, PERSON, OWN = "IV:dog:last-metre:unseen", "IV:person:descent:seen", "own:test_own:12345678"
 REPEATS = Reflights(failed=2, flown=2, same=True)
@@ -34,15 +35,17 @@ def found(**facts: Any) -> FailedItem:
     return FailedItem(**{"signature": DOG} | facts)
 
 
-def failed(status: str = "open", *, reason: str = "", accepted: bool = True, **facts: Any) -> Any:
+def failed(
+    status: Status = "open", *, reason: NoGateReason = "", accepted: bool = True, **facts: Any
+) -> Any:
     """Return facts about a test that failed on a saved case."""
-    case = CaseState(signature=DOG, status=status, reason=reason, accepted=accepted)  # type: ignore[arg-type]
+    case = CaseState(signature=DOG, status=status, reason=reason, accepted=accepted)
     return found(case=case, **facts)
 
 
-def passed(status: str = "open", *, reason: str = "", **facts: Any) -> PassedCase:
+def passed(status: Status = "open", *, reason: NoGateReason = "", **facts: Any) -> PassedCase:
     """Return facts about a test that passed on a saved case."""
-    case = CaseState(signature=DOG, status=status, reason=reason)  # type: ignore[arg-type]
+    case = CaseState(signature=DOG, status=status, reason=reason)
     rest: dict[str, Any] = {"violates": False} | facts
     return PassedCase(case=case, **rest)
 

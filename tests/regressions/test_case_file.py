@@ -2,6 +2,7 @@ from __future__ import annotations
 
 import dataclasses
 from pathlib import Path
+from typing import cast
 
 import numpy as np
 import pytest
@@ -80,7 +81,7 @@ def test_allowed_abort_of_the_first_schema_is_read_as_the_default_of_today() -> 
 @pytest.mark.parametrize("answer", ["preventable", "sensor-limited", "unpreventable"])
 @pytest.mark.parametrize("observed_s", [None, 2.4])
 def test_file_keeps_what_was_preventable(answer: Preventable, observed_s: float | None) -> None:
-    reason: NoGateReason = "" if answer == "preventable" else answer  # type: ignore[assignment]
+    reason = cast(NoGateReason, "" if answer == "preventable" else answer)
     found = Prevention(answer=answer, inevitable_s=0.5, observed_s=observed_s)
     judged = dataclasses.replace(case(), prevention=found, reason=reason)
     text = dump_case(judged)

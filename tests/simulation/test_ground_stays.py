@@ -14,6 +14,7 @@ from pytest_garl import (
     AttitudeSetpoint,
     Command,
     Land,
+    Mission,
     MotorThrusts,
     Observation,
     VehicleState,
@@ -36,8 +37,8 @@ class DescendsThen(Scripted):
     drift_mps = 0.0
     speed_mps = 0.5
 
-    def reset(self, mission: object) -> None:
-        super().reset(mission)  # type: ignore[arg-type]
+    def reset(self, mission: Mission) -> None:
+        super().reset(mission)
         self.touched_s: float | None = None
 
     def step(self, observation: Observation) -> Command:

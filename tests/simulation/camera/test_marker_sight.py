@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from typing import Any
 
 import numpy as np
 import pytest
@@ -19,16 +20,16 @@ def frame(
     height: float = 5.0,
     genes: Mapping[str, float] = NONE,
     place: tuple[float, float] = (0.0, 0.0),
-    objects: object = None,
+    objects: Any = None,
     attitude: tuple[float, float, float, float] = LEVEL,
 ) -> Frame:
     made, _ = renderer("lawn", genes=genes)
     x, y = made.marker_m
-    return made.render((x + place[0], y + place[1], height), attitude, 1.0, objects or FAR)  # type: ignore[arg-type]
+    return made.render((x + place[0], y + place[1], height), attitude, 1.0, objects or FAR)
 
 
-def view(*arguments: object, **options: object) -> MarkerView:
-    seen = frame(*arguments, **options).marker  # type: ignore[arg-type]
+def view(*arguments: Any, **options: Any) -> MarkerView:
+    seen = frame(*arguments, **options).marker
     assert seen is not None
     return seen
 
@@ -94,7 +95,7 @@ def test_the_contrast_is_that_of_the_picture(genes: Mapping[str, float]) -> None
         for column in range(-1, 8)
         if {row, column} & {-1, 0}
     ]
-    found = {True: [], False: []}  # type: ignore[var-annotated]
+    found: dict[bool, list[int]] = {True: [], False: []}
     for u, v, black in middles:
         if min(u, v) > 0:
             found[black].append(grey[round(v), round(u)])

@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import dataclasses
+from typing import Any
 
 import numpy as np
 import pytest
@@ -43,10 +44,10 @@ def taken_over(takeover: Takeover, policy: str = "stationary") -> Flight:
     return fly(scenario_with("dog-1"), system, policy_spec(policy), map=LAWN)
 
 
-def takeover(pilot: str, *legs: Leg, until_s: float = 13.0) -> Takeover:
+def takeover(pilot: Any, *legs: Leg, until_s: float = 13.0) -> Takeover:
     marker = blind_flight("dog-1", "stationary").marker_position_m
     return Takeover(
-        pilot=pilot,  # type: ignore[arg-type]
+        pilot=pilot,
         from_s=FROM_S,
         until_s=until_s,
         legs=legs,
