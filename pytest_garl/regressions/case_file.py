@@ -178,7 +178,7 @@ def _violation_lines(violation: Violation) -> list[str]:
         f"signature = {quoted(violation.signature)}",
         f'type = "{violation.type}"',
         f'property = "{violation.property}"',
-        f"margin = {violation.margin!r}  # {violation.unit}; what is not above 0 is violated",
+        f"margin = {violation.margin!r}  # what is not above 0 is violated",
         f"unit = {quoted(violation.unit)}",
         f"story = {quoted(violation.description)}",
     ]

@@ -37,7 +37,8 @@ def _packed(members: dict[str, bytes], rng: random.Random) -> bytes:
     compression = rng.choice((zipfile.ZIP_DEFLATED,) * 6 + (zipfile.ZIP_STORED, zipfile.ZIP_LZMA))
     with zipfile.ZipFile(buffer, "w", compression) as archive:
         for name, content in members.items():
-            archive.writestr(name, content)
+            # Written by its name alone, a member would carry the time of day.
+            archive.writestr(zipfile.ZipInfo(name), content, compression)
     data = bytearray(buffer.getvalue())
     if rng.random() < 0.1:
         # A directory that says another size, kind or place than the member has.
