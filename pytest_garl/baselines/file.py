@@ -14,8 +14,7 @@ from pytest_garl.files.reading import MEGABYTE, read_text
 from pytest_garl.files.toml import LARGEST_INTEGER, Table, finite, parse, quoted
 from pytest_garl.messages import listed, printable, shown
 from pytest_garl.regressions.case_file import read_limits
-from pytest_garl.scenarios.extra_genes import genome_like
-from pytest_garl.scenarios.genes import Property
+from pytest_garl.scenarios.genes import Property, genome_like
 from pytest_garl.scenarios.maps.map import Map
 from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.verdicts.verdict import Limits

@@ -13,6 +13,7 @@ from typing import cast, get_args
 from pytest_garl.errors import ScenarioError
 from pytest_garl.files.reading import read_text
 from pytest_garl.files.toml import Table, parse, quoted
+from pytest_garl.messages import printable
 from pytest_garl.regressions.behaviour_toml import (
     change_lines,
     move_lines,
@@ -173,12 +174,14 @@ def _read_prevention(top: Table) -> Prevention:
 
 
 def _violation_lines(violation: Violation) -> list[str]:
+    # A comment ends at a line's end, so that no text may bring one.
+    unit = printable(violation.unit, keep="")
     return [
         "[violation]",
         f"signature = {quoted(violation.signature)}",
         f'type = "{violation.type}"',
         f'property = "{violation.property}"',
-        f"margin = {violation.margin!r}  # what is not above 0 is violated",
+        f"margin = {violation.margin!r}  # {unit}; what is not above 0 is violated",
         f"unit = {quoted(violation.unit)}",
         f"story = {quoted(violation.description)}",
     ]

@@ -15,7 +15,6 @@ import numpy as np
 from pytest_garl.landing_system import Airframe, VelocitySetpoint
 from pytest_garl.regressions.clearance import Clearance, ObjectPose
 from pytest_garl.scenarios.bodies import rotate
-from pytest_garl.scenarios.extra_genes import wind_mps
 from pytest_garl.scenarios.maps.map import Map
 from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.simulation.environment import environment_at
@@ -39,6 +38,7 @@ from pytest_garl.simulation.physics.vehicle import (
     vehicle_model,
     wrench,
 )
+from pytest_garl.simulation.physics.wind import mean_wind_mps
 from pytest_garl.simulation.physics.world import PHYSICS_RATE_HZ, World
 from pytest_garl.simulation.randomness import generator
 from pytest_garl.simulation.system_under_test.takeover import Leg, velocity_of
@@ -75,7 +75,7 @@ class EscapeModel:
         track = chase.flight.uav
         self._index = max(0, int(np.searchsorted(track.time_s, from_s + 1e-6, side="right")) - 1)
         self._model = vehicle_model(chase.airframe)
-        self._wind = wind_mps(chase.scenario)
+        self._wind = mean_wind_mps(chase.scenario)
         self._npcs = self._warm_npcs()
 
     def position_m(self, name: str = "") -> Vector:

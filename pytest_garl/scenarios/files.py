@@ -11,7 +11,8 @@ from pytest_garl.files.json_values import dataclass_from, parse_json
 from pytest_garl.files.reading import read_text
 from pytest_garl.files.toml import Table, parse, quoted
 from pytest_garl.messages import shown
-from pytest_garl.scenarios.extra_genes import genome_like
+from pytest_garl.scenarios.genes import genome_like
+from pytest_garl.scenarios.groups.catalogue import GROUPS, PARAMETERS
 from pytest_garl.scenarios.maps.map import Map
 from pytest_garl.scenarios.scenario import Scenario
 
@@ -22,7 +23,7 @@ def dumps(scenario: Scenario) -> str:
     """Return the scenario as TOML: the same bytes for equal scenarios."""
     lines = [
         "# A scenario of pytest-garl. Genes are without unit: weather 0 to 1, places -1 to 1,",
-        "# velocity as a share of the type's top speed.",
+        "# velocity as a share of the type's top speed; others have their unit in their name.",
         f"schema = {SCHEMA}",
         f"map = {quoted(scenario.map)}",
         f"seed = {scenario.seed}",
@@ -34,9 +35,14 @@ def dumps(scenario: Scenario) -> str:
 
 
 def gene_lines(scenario: Scenario) -> list[str]:
-    """Return the lines of a file that hold the genes, one table per subject."""
+    """Return the lines of a file that hold the genes, one table per subject.
+
+    A condition with its nominal value has no line.
+    """
     lines, section = [], ""
     for key, value in scenario.genes:
+        if key in PARAMETERS and value == PARAMETERS[key].nominal:
+            continue
         head, _, name = key.partition(".")
         if head != section:
             lines += ["", f"[genes.{head}]"]
@@ -83,6 +89,8 @@ def read_genes(top: Table, map: Map) -> Scenario:
     genes = []
     for item in genome.properties:
         head, _, name = item.key.partition(".")
+        if head in GROUPS and name not in tables[head].values:
+            continue
         genes.append((item.key, tables[head].number(name, low=item.low, high=item.high)))
     seed = top.integer("seed")
     return Scenario(

@@ -11,6 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pytest_garl.errors import ScenarioError
+from pytest_garl.scenarios.groups.catalogue import GROUPS
+from pytest_garl.scenarios.groups.parameter import Group, Parameter
 
 if TYPE_CHECKING:
     from pytest_garl.scenarios.maps.map import Map
@@ -186,6 +188,38 @@ def genome_for(
         name="objects", genes=tuple(_object_gene(name) for name, _ in map.present_objects)
     )
     return Genome(composites=(environment, marker, objects, *extras))
+
+
+def group_gene(group: Group) -> CompositeGene:
+    """Return the gene of a group of conditions, in physical units over all that can be flown."""
+    pairs = zip(group.keys, group.parameters, strict=True)
+    properties = tuple(_group_property(key, each) for key, each in pairs)
+    return CompositeGene(
+        name=group.name, genes=(NuclearGene(name=group.name, properties=properties),)
+    )
+
+
+def _group_property(key: str, parameter: Parameter) -> Property:
+    return Property(
+        key=key,
+        low=parameter.low,
+        high=parameter.high,
+        nominal=parameter.nominal,
+        meaning=parameter.meaning,
+    )
+
+
+def genome_like(keys: Iterable[str], map: Map) -> Genome:
+    """Return the genome, weather in its full range, of scenarios that have these genes.
+
+    Whatever is not there by default is part of it if one of the keys is.
+    """
+    keys = tuple(keys)
+    heads = {key.partition(".")[0] for key in keys}
+    extras = [group_gene(group) for name, group in GROUPS.items() if name in heads]
+    genome = genome_for(map, weather="full", extras=extras)
+    bound = any(".destination_" in key for key in keys)
+    return with_destinations(genome) if bound else genome
 
 
 def with_destinations(genome: Genome) -> Genome:

@@ -53,6 +53,12 @@ def marker_position_m(scenario: Scenario, map: Map) -> tuple[float, float]:
     return gps_x + MARKER_RADIUS_M * u, gps_y + MARKER_RADIUS_M * v
 
 
+def told_position_m(scenario: Scenario, map: Map) -> tuple[float, float]:
+    """Return the coordinate (x, y) that the mission gives for the marker."""
+    gps_x, gps_y = map.gps_position_m
+    return gps_x + scenario["told.x_m"], gps_y + scenario["told.y_m"]
+
+
 def marker_genes(position_m: tuple[float, float], map: Map) -> dict[str, float]:
     """Return the marker genes that put its centre nearest to ``position_m``."""
     u = (position_m[0] - map.gps_position_m[0]) / MARKER_RADIUS_M

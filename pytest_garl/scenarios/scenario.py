@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from pytest_garl.errors import ScenarioError
+from pytest_garl.scenarios.groups.catalogue import PARAMETERS
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -28,10 +29,15 @@ class Scenario:
     removed_objects: tuple[str, ...] = ()
 
     def __getitem__(self, key: str) -> float:
-        """Return the value of a property; raise ScenarioError for one that is not there."""
+        """Return the value of a property, or the nominal one of a condition that is not named.
+
+        Raises ScenarioError for any other key that is not there.
+        """
         for name, value in self.genes:
             if name == key:
                 return value
+        if key in PARAMETERS:
+            return PARAMETERS[key].nominal
         raise ScenarioError(
             f"the scenario on map {self.map!r} has no gene {key!r}; "
             f"it has {', '.join(name for name, _ in self.genes)}"
@@ -46,6 +52,9 @@ class Scenario:
         for key in values:
             self[key]
         genes = tuple((name, float(values.get(name, value))) for name, value in self.genes)
+        named = {name for name, _ in genes}
+        added = [key for key in PARAMETERS if key in values and key not in named]
+        genes += tuple((key, float(values[key])) for key in added)
         return dataclasses.replace(self, genes=genes)
 
     def without(self, *names: str) -> Scenario:

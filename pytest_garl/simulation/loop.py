@@ -9,7 +9,6 @@ from typing import Any
 
 from pytest_garl.landing_system import Abort, Command, Land, VehicleState
 from pytest_garl.scenarios.bodies import rotate
-from pytest_garl.scenarios.extra_genes import wind_mps
 from pytest_garl.scenarios.maps.map import Map
 from pytest_garl.scenarios.placement import marker_position_m
 from pytest_garl.scenarios.scenario import Scenario
@@ -36,6 +35,7 @@ from pytest_garl.simulation.physics.vehicle import (
     vehicle_model,
     wrench,
 )
+from pytest_garl.simulation.physics.wind import mean_wind_mps
 from pytest_garl.simulation.physics.world import PHYSICS_RATE_HZ, World
 from pytest_garl.simulation.randomness import generator
 from pytest_garl.simulation.recorder import Recorder, Sight
@@ -74,7 +74,7 @@ class Loop:
         stays = GroundStays(self.recorder, self._model, self._marker, partial(_under, self))
         self._contacts = Contacts(self._world, self.recorder, self.npcs, self._model.size_m, stays)
         self._control = FlightControl(self._model)
-        self._wind = wind_mps(scenario)
+        self._wind = mean_wind_mps(scenario)
         self._pose_rng = generator(scenario.seed, "pose")
         self._thrusts = self._wanted_thrusts = NO_THRUST
         self._pending: list[tuple[int, Command]] = []

@@ -15,9 +15,8 @@ from dataclasses import dataclass
 from typing import Literal
 
 from pytest_garl.landing_system import Camera
-from pytest_garl.scenarios.extra_genes import gps_error_m
 from pytest_garl.scenarios.maps.map import Map
-from pytest_garl.scenarios.placement import marker_position_m
+from pytest_garl.scenarios.placement import marker_position_m, told_position_m
 from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.simulation.camera.projection import eye_under
 from pytest_garl.simulation.camera.renderer import Renderer
@@ -128,8 +127,7 @@ def _looks(scenario: Scenario, map: Map) -> Iterator[_Look]:
 
 def _stays(scenario: Scenario, map: Map) -> Iterator[_Look]:
     """Yield where a nominal landing stays, from when on, and for how long."""
-    (gps_x, gps_y), (error_x, error_y) = map.gps_position_m, gps_error_m(scenario)
-    told, marker = (gps_x + error_x, gps_y + error_y), marker_position_m(scenario, map)
+    told, marker = told_position_m(scenario, map), marker_position_m(scenario, map)
     turns = [2 * math.pi * index / RING_PLACES for index in range(RING_PLACES)]
     ring = [(told[0] + RING_M * math.cos(a), told[1] + RING_M * math.sin(a)) for a in turns]
     now = STARTS_AND_STOPS_S + _across_s(map.uav_start_m[:2], told)

@@ -32,7 +32,7 @@ class Wild:
             "nan": Move(x=math.nan, y=0.0),
             "words": Move(x=words, y=0.0),
             "number": 7,
-            "wind": Move(x=0.0, y=0.0, changes=(("wind.x", 0.1),)),
+            "wind": Move(x=0.0, y=0.0, changes=(("wind.mean_mps", 0.1),)),
             "fog": Move(x=0.0, y=0.0, changes=(("environment.fog", math.nan),)),
             "bare": Move(x=0.0, y=0.0, changes=bare),
         }
@@ -48,7 +48,10 @@ class Wild:
         ("number", "found 7; expected Move"),
         ("words", "found Move"),
         ("missing", "raised KeyError"),
-        ("wind", r"found the change \('wind.x', 0.1\); expected \(gene, number\) with one of env"),
+        (
+            "wind",
+            r"found the change \('wind.mean_mps', 0.1\); expected \(gene, number\) with",
+        ),
         ("fog", r"found the change \('environment.fog', nan\)"),
         ("bare", "found the change 'environment.fog'"),
     ],

@@ -18,8 +18,8 @@ from pytest_garl.baselines.pairs import FlightSummary
 from pytest_garl.baselines.record import BaselineSpec
 from pytest_garl.errors import BaselineError, ScenarioError
 from pytest_garl.messages import printable
-from pytest_garl.scenarios.extra_genes import WIND
-from pytest_garl.scenarios.genes import genome_for, with_destinations
+from pytest_garl.scenarios.genes import genome_for, group_gene, with_destinations
+from pytest_garl.scenarios.groups.catalogue import GROUPS
 from pytest_garl.scenarios.maps.map import load_map
 from pytest_garl.search.methods.random import random_scenarios
 from tests.baselines.samples import COURT, DOG, LANDED, LAWN, baseline, baseline_set
@@ -90,8 +90,9 @@ def test_a_file_of_schema_1_is_read_without_distances() -> None:
         parse_baseline(old.replace("schema = 1", "schema = 2"), load_map)
 
 
-def test_the_file_keeps_extra_genes() -> None:
-    scenarios = random_scenarios(LAWN, genome_for(LAWN, extras=(WIND,)), 0, 0, 2)
+def test_the_file_keeps_conditions() -> None:
+    genome = genome_for(LAWN, extras=(group_gene(GROUPS["wind"]),))
+    scenarios = random_scenarios(LAWN, genome, 0, 0, 2)
     samples = tuple(BaselineFlight(scenario=each, summary=LANDED) for each in scenarios)
     windy = baseline(dataclasses.replace(baseline_set(), flights=samples))
     assert parse_baseline(dump_baseline(windy), load_map) == windy

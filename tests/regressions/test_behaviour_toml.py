@@ -39,7 +39,7 @@ def test_changes_of_an_unknown_object_are_refused() -> None:
     [
         ("[0, ", "[-1, "),
         ("[0, ", "[0.5, "),
-        ('"environment.fog"', '"wind.x"'),
+        ('"environment.fog"', '"wind.mean_mps"'),
         ("0.01]", "nan]"),
         ("0.01]", '"a little"]'),
         ("0.01]", "0.01, 3]"),

@@ -9,7 +9,6 @@ import pytest
 
 from pytest_garl.errors import ScenarioError
 from pytest_garl.scenarios.chromosome import decode
-from pytest_garl.scenarios.extra_genes import EXTRAS
 from pytest_garl.scenarios.files import dump_scenario, dumps, load, loads, parse_scenario
 from pytest_garl.scenarios.genes import genome_for, with_destinations
 from pytest_garl.scenarios.maps.map import load_map
@@ -19,10 +18,23 @@ from pytest_garl.scenarios.validity import problems, repair
 COURT = load_map("court")
 
 
-def test_extra_genes_survive_the_file() -> None:
-    genome = genome_for(COURT, extras=EXTRAS.values())
-    scenario = decode(genome.nominal, genome, map="court", seed=3).replace({"wind.x": 0.5})
+def test_conditions_survive_the_file_which_names_only_those_that_are_not_nominal() -> None:
+    genome = genome_for(COURT)
+    plain = decode(genome.nominal, genome, map="court", seed=3)
+    scenario = plain.replace({"wind.mean_mps": 4.5})
+    assert "[genes.wind]\nmean_mps = 4.5\n" in dumps(scenario)
     assert loads(dumps(scenario), COURT) == scenario
+    assert dumps(plain.replace({"wind.mean_mps": 0.0})) == dumps(plain)
+
+
+def test_a_condition_that_cannot_be_flown_is_refused() -> None:
+    genome = genome_for(COURT)
+    plain = decode(genome.nominal, genome, map="court", seed=3)
+    text = dumps(plain.replace({"wind.mean_mps": 4.5}))
+    with pytest.raises(ScenarioError, match=r"genes.wind.mean_mps'?: found 99.*15"):
+        loads(text.replace("4.5", "99"), COURT)
+    with pytest.raises(ScenarioError, match=r"genes.wind.mean_knots'?: unknown key"):
+        loads(text.replace("mean_mps", "mean_knots"), COURT)
 
 
 def test_destinations_survive_the_file_and_are_asked_of_every_object() -> None:

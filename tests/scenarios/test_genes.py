@@ -2,8 +2,13 @@
 
 from __future__ import annotations
 
-from pytest_garl.scenarios.extra_genes import EXTRAS, genome_like
-from pytest_garl.scenarios.genes import genome_for, with_destinations
+from pytest_garl.scenarios.genes import (
+    genome_for,
+    genome_like,
+    group_gene,
+    with_destinations,
+)
+from pytest_garl.scenarios.groups.catalogue import GROUPS
 from pytest_garl.scenarios.maps.map import load_map
 
 COURT = load_map("court")
@@ -17,7 +22,7 @@ def test_weather_is_confined_unless_the_full_range_is_asked_for() -> None:
 
 
 def test_borders_fall_between_nuclear_genes() -> None:
-    genome = genome_for(COURT, extras=[EXTRAS["wind"]])
+    genome = genome_for(COURT, extras=[group_gene(GROUPS["wind"])])
     starts = {genome.keys.index(gene.properties[0].key) for gene in genome.genes}
     assert set(genome.borders) == starts - {0}
 
@@ -25,5 +30,6 @@ def test_borders_fall_between_nuclear_genes() -> None:
 def test_the_genome_of_scenarios_is_known_by_their_keys() -> None:
     plain = genome_for(COURT, weather="full")
     assert genome_like(plain.keys, COURT) == plain
-    whole = with_destinations(genome_for(COURT, weather="full", extras=EXTRAS.values()))
+    extras = [group_gene(each) for each in GROUPS.values()]
+    whole = with_destinations(genome_for(COURT, weather="full", extras=extras))
     assert genome_like(whole.keys, COURT) == whole

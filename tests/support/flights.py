@@ -15,7 +15,6 @@ from pytest_garl import (
 from pytest_garl.adversary.catalogue import policy_spec
 from pytest_garl.landing_system import Airframe
 from pytest_garl.scenarios.chromosome import decode
-from pytest_garl.scenarios.extra_genes import EXTRAS
 from pytest_garl.scenarios.genes import genome_for
 from pytest_garl.scenarios.maps.map import load_map
 from pytest_garl.scenarios.validity import repair
@@ -30,7 +29,7 @@ STAND = policy_spec("stationary")
 
 
 def nominal(**genes: float) -> Any:
-    genome = genome_for(EMPTY, extras=EXTRAS.values())
+    genome = genome_for(EMPTY)
     scenario = decode(genome.nominal, genome, map="lawn", seed=5)
     values = {key.replace("__", "."): value for key, value in genes.items()}
     return repair(scenario.replace(values), EMPTY)

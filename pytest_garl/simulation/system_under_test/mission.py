@@ -3,9 +3,13 @@
 from __future__ import annotations
 
 from pytest_garl.landing_system import Airframe, Mission
-from pytest_garl.scenarios.extra_genes import gps_error_m
 from pytest_garl.scenarios.maps.map import Map
-from pytest_garl.scenarios.placement import MARKER_DICTIONARY, MARKER_SIDE_M, TARGET_MARKER_ID
+from pytest_garl.scenarios.placement import (
+    MARKER_DICTIONARY,
+    MARKER_SIDE_M,
+    TARGET_MARKER_ID,
+    told_position_m,
+)
 from pytest_garl.scenarios.scenario import Scenario
 
 SEARCH_ALTITUDE_M = 10.0
@@ -14,10 +18,8 @@ SEARCH_ALTITUDE_M = 10.0
 
 def mission_for(scenario: Scenario, map: Map, airframe: Airframe, time_limit_s: float) -> Mission:
     """Return the mission that the landing system gets before take-off."""
-    error_x, error_y = gps_error_m(scenario)
-    gps_x, gps_y = map.gps_position_m
     return Mission(
-        gps_position_m=(gps_x + error_x, gps_y + error_y),
+        gps_position_m=told_position_m(scenario, map),
         home_m=map.uav_start_m,
         search_altitude_m=SEARCH_ALTITUDE_M,
         marker_id=TARGET_MARKER_ID,

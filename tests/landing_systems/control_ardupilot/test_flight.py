@@ -21,7 +21,6 @@ from pytest_garl import (
 )
 from pytest_garl.adversary.catalogue import policy_spec
 from pytest_garl.scenarios.chromosome import decode
-from pytest_garl.scenarios.extra_genes import WIND
 from pytest_garl.scenarios.genes import genome_for
 from pytest_garl.scenarios.maps.map import load_map
 from pytest_garl.scenarios.scenario import Scenario
@@ -88,7 +87,7 @@ class LandsBlind(Lands):
 
 
 def scenario(**genes: float) -> Scenario:
-    genome = genome_for(EMPTY, extras=[WIND])
+    genome = genome_for(EMPTY)
     nominal = decode(genome.nominal, genome, map="lawn", seed=5)
     return repair(nominal.replace({k.replace("__", "."): v for k, v in genes.items()}), EMPTY)
 
@@ -108,7 +107,7 @@ def test_it_holds_and_lands_below_itself_where_it_sees_none() -> None:
 
 
 def test_it_lands_precisely_in_wind() -> None:
-    where = scenario(marker__x=0.2, wind__x=0.5)
+    where = scenario(marker__x=0.2, wind__mean_mps=5.0)
     flight = fly(where, Lands, policy_spec("stationary"), map=EMPTY, time_limit_s=80)
     assert flight.outcome == "landed"
     assert flight.final_distance_m < 0.1

@@ -23,7 +23,7 @@ from tests.support.flights import EMPTY, STAND, Hovers, Scripted, nominal
 
 
 def test_the_vehicle_holds_its_place_in_wind() -> None:
-    flight = fly(nominal(wind__x=0.5), Hovers, STAND, map=EMPTY, time_limit_s=20)
+    flight = fly(nominal(wind__mean_mps=5.0), Hovers, STAND, map=EMPTY, time_limit_s=20)
     late = flight.uav.position_m[flight.uav.time_s > 12]
     error = np.linalg.norm(late - np.array([0.0, -16.5, 3.0]), axis=1)
     assert error.max() < 0.2

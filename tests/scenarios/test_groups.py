@@ -1,17 +1,19 @@
-"""Each extra gene acts on a flight; none acts at its nominal value."""
+"""Each group of conditions acts on a flight; none acts at its nominal values."""
 
 from __future__ import annotations
 
 import pytest
 
 from pytest_garl import Command, Mission, Observation, PositionSetpoint
-from pytest_garl.scenarios.extra_genes import EXTRAS
+from pytest_garl.scenarios.groups.catalogue import GROUPS, PARAMETERS
 from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.simulation.fly import fly
 from tests.support.flights import EMPTY, STAND, Scripted, nominal
 
 
 class GoesToTheCoordinate(Scripted):
+    needs_camera = True
+
     def reset(self, mission: Mission) -> None:
         self.place = (*mission.gps_position_m, 3.0)
 
@@ -24,14 +26,9 @@ def hash_of_flight(scenario: Scenario) -> str:
 
 
 @pytest.mark.sim
-@pytest.mark.parametrize("name", EXTRAS)
-def test_every_extra_gene_changes_a_flight(name: str) -> None:
-    keys = [item.key for gene in EXTRAS[name].genes for item in gene.properties]
-    whole = nominal()
-    without = Scenario(
-        map=whole.map,
-        seed=whole.seed,
-        genes=tuple((key, value) for key, value in whole.genes if key not in keys),
-    )
-    strong = whole.replace(dict.fromkeys(keys, 1.0))
-    assert hash_of_flight(without) == hash_of_flight(whole) != hash_of_flight(strong)
+@pytest.mark.parametrize("name", GROUPS)
+def test_every_group_changes_a_flight(name: str) -> None:
+    group, without = GROUPS[name], nominal()
+    ends = {key: PARAMETERS[key].high for key in group.keys}
+    assert hash_of_flight(without) == hash_of_flight(without.replace(group.nominal))
+    assert hash_of_flight(without) != hash_of_flight(without.replace(ends))

@@ -1,0 +1,13 @@
+"""All groups of conditions, in the order in which files list them."""
+
+from __future__ import annotations
+
+from pytest_garl.scenarios.groups import told, wind
+from pytest_garl.scenarios.groups.parameter import Group, Parameter
+
+GROUPS: dict[str, Group] = {each.name: each for each in (wind.GROUP, told.GROUP)}
+PARAMETERS: dict[str, Parameter] = {
+    key: each
+    for group in GROUPS.values()
+    for key, each in zip(group.keys, group.parameters, strict=True)
+}

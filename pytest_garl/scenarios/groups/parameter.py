@@ -1,0 +1,65 @@
+"""One condition in physical units, and the group of those that act together."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Literal
+
+from pytest_garl.errors import ScenarioError
+
+Spacing = Literal["linear", "inverse"]
+"""How a search spreads its draws over a range: evenly over the value, or evenly over 1 / value (a
+visibility acts through its inverse, the extinction)."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Parameter:
+    """One condition: its name ends with its unit, as in ``mean_mps``.
+
+    A scenario that does not name it has its ``nominal`` value, which has no effect.  ``low`` and
+    ``high`` are the limits of what the simulator can fly, not what a domain claims.  ``source``
+    says where the range of the domain `field` comes from.
+    """
+
+    name: str
+    nominal: float
+    low: float
+    high: float
+    meaning: str
+    source: str
+    spacing: Spacing = "linear"
+    whole: bool = False
+
+    def __post_init__(self) -> None:
+        if not self.low <= self.nominal <= self.high or self.low == self.high:
+            raise ScenarioError(
+                f"parameter {self.name!r}: expected low <= nominal <= high and low < high, "
+                f"found {self.low}, {self.nominal}, {self.high}"
+            )
+        if self.spacing == "inverse" and self.low <= 0:
+            raise ScenarioError(f"parameter {self.name!r}: inverse spacing needs a low above 0")
+
+    def fits(self, value: float) -> bool:
+        """Return whether the simulator can fly a value."""
+        inside = math.isfinite(value) and self.low <= value <= self.high
+        return inside and not (self.whole and value != int(value))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Group:
+    """Parameters that one cause switches on together: wind has a speed, a direction, gusts."""
+
+    name: str
+    meaning: str
+    parameters: tuple[Parameter, ...]
+
+    @property
+    def keys(self) -> tuple[str, ...]:
+        """Keys in scenarios and files, such as ``wind.mean_mps``, in order."""
+        return tuple(f"{self.name}.{each.name}" for each in self.parameters)
+
+    @property
+    def nominal(self) -> dict[str, float]:
+        """The nominal value of each key."""
+        return {key: each.nominal for key, each in zip(self.keys, self.parameters, strict=True)}
