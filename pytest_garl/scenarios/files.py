@@ -15,6 +15,7 @@ from pytest_garl.scenarios.genes import genome_like
 from pytest_garl.scenarios.groups.catalogue import GROUPS, PARAMETERS
 from pytest_garl.scenarios.maps.map import Map
 from pytest_garl.scenarios.scenario import Scenario
+from pytest_garl.scenarios.task import Task
 
 SCHEMA = 1
 
@@ -121,6 +122,8 @@ def dump_scenario(scenario: Scenario) -> str:
     }
     if scenario.removed_objects:
         values["absent"] = scenario.removed_objects
+    if scenario.task != Task():
+        values["task"] = dataclasses.asdict(scenario.task)
     return json.dumps(values)
 
 
@@ -130,6 +133,7 @@ def parse_scenario(text: str) -> Scenario:
         values = parse_json(text)
         if isinstance(values, dict):
             values["removed_objects"] = values.pop("absent", [])
+            values.setdefault("task", dataclasses.asdict(Task()))
         scenario = dataclass_from(Scenario, values)
     except ValueError as error:
         raise ScenarioError(f"a stored scenario is damaged: {error}") from error

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from pytest_garl.errors import ScenarioError
 from pytest_garl.scenarios.groups.catalogue import PARAMETERS
+from pytest_garl.scenarios.task import Task
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -20,13 +21,15 @@ class Scenario:
     genome's properties and the simulator.  ``seed`` feeds the sensor noise, the falling
     particles and the undirected object moves; it does not depend on the scenario's slot.
     ``removed_objects`` names the objects of the map that this scenario flies without; they have no
-    genes.  A search removes none; shrinking removes those that a violation does not need.
+    genes.  A search removes none; shrinking removes those that a violation does not need.  ``task``
+    is what the user states of the marker and the start, the same in all scenarios of a test.
     """
 
     map: str
     seed: int
     genes: tuple[tuple[str, float], ...]
     removed_objects: tuple[str, ...] = ()
+    task: Task = field(default_factory=Task)
 
     def __getitem__(self, key: str) -> float:
         """Return the value of a property, or the nominal one of a condition that is not named.
