@@ -44,6 +44,10 @@ MAX_DESCENT_MPS = 4.0
 """Climb and descent are the Matrice 100's ratings.  It may tilt 35 degrees; a landing controller
 stays below that."""
 MAX_INTEGRAL_MPS2 = 4.0
+BRAKING_SHARE = 0.7
+"""Share of a setpoint's acceleration limit with which the approach is planned.  The rest is for the
+loop of the velocity, which follows the falling wanted speed 1 / VELOCITY_P seconds late;
+``test_flight_control.py`` measures that the UAV does not overshoot."""
 ABORT_CLIMB_MPS = 3.0
 STANDING_AFTER_S = 0.35
 """PX4's documented time until ground contact counts, if a vehicle is told to descend and does not
@@ -61,15 +65,16 @@ class FlightControl:
         self._integral = [0.0, 0.0, 0.0]
         self._hold: Vector | None = None
         self._command: Command | None = None
-        self._yaw_rad = 0.0
+        self._yaw_rad: float | None = None
 
     def remember_yaw(self, command: Command) -> None:
-        """Keep the yaw of a command, because ``Land`` and ``Abort`` hold the last commanded yaw.
+        """Keep the yaw of a command: ``Land``, ``Abort`` and a yaw of None hold the last one.
 
         Called for every command, also while a landing system controls the motors itself.
         """
         if isinstance(command, PositionSetpoint | VelocitySetpoint):
-            self._yaw_rad = command.yaw_rad
+            if command.yaw_rad is not None:
+                self._yaw_rad = command.yaw_rad
         elif isinstance(command, AttitudeSetpoint):
             self._yaw_rad = _yaw(command.attitude)
 
@@ -91,57 +96,79 @@ class FlightControl:
         if type(command) is not type(self._command):
             self._hold = motion.position_m
         self._command = command
-        wanted, yaw = self._wanted_velocity(motion, command)
+        if self._yaw_rad is None:
+            self._yaw_rad = _yaw(motion.attitude)
+        wanted, yaw = self._wanted_velocity(motion, command, self._yaw_rad)
         if on_ground_s >= STANDING_AFTER_S and wanted[2] <= -DESCENDS_MPS:
             return NO_THRUST
-        ax, ay, az = self._acceleration(motion, wanted, dt_s)
+        limit, steepest = None, _MAX_SLOPE
+        if isinstance(command, PositionSetpoint):
+            limit = command.acceleration_mps2
+            if command.tilt_rad is not None:
+                steepest = math.tan(command.tilt_rad)
+        ax, ay, az = self._acceleration(motion, wanted, dt_s, limit)
         vertical = az + GRAVITY_MPS2
         if vertical < 2.0:
             vertical = 2.0
         tilt = math.hypot(ax, ay) / vertical
-        scale = _MAX_SLOPE / tilt if tilt > _MAX_SLOPE else 1.0
+        scale = steepest / tilt if tilt > steepest else 1.0
         direction = _unit((ax * scale, ay * scale, vertical))
         x, y, _, _ = motion.attitude
         upright = 1 - 2 * (x * x + y * y)
         thrust = self._model.mass_kg * vertical / (0.5 if upright < 0.5 else upright)
         return self._thrusts_towards(motion, direction, yaw, thrust)
 
-    def _wanted_velocity(self, motion: Motion, command: Command) -> tuple[Vector, float]:
+    def _wanted_velocity(
+        self, motion: Motion, command: Command, held_rad: float
+    ) -> tuple[Vector, float]:
         position = motion.position_m
         hold = self._hold or position
+        if isinstance(command, PositionSetpoint | VelocitySetpoint):
+            yaw = held_rad if command.yaw_rad is None else command.yaw_rad
         if isinstance(command, VelocitySetpoint):
-            return command.velocity_mps, command.yaw_rad
+            return command.velocity_mps, yaw
         if isinstance(command, PositionSetpoint):
             (ax, ay, az), (x, y, z) = command.position_m, position
             vx, vy, vz = POSITION_P * (ax - x), POSITION_P * (ay - y), POSITION_P * (az - z)
             length = math.sqrt(vx * vx + vy * vy + vz * vz)
-            factor = command.speed_mps / length if length > command.speed_mps else 1.0
-            return (vx * factor, vy * factor, vz * factor), command.yaw_rad
+            most = command.speed_mps
+            if command.acceleration_mps2 is not None:
+                most = min(most, _approach_mps(length / POSITION_P, command.acceleration_mps2))
+            factor = most / length if length > most else 1.0
+            return (vx * factor, vy * factor, vz * factor), yaw
         climb = ABORT_CLIMB_MPS if isinstance(command, Abort) else 0.0
         if isinstance(command, Land):
             climb = -command.speed_mps
         vx, vy = POSITION_P * (hold[0] - position[0]), POSITION_P * (hold[1] - position[1])
-        return (vx, vy, climb), self._yaw_rad
+        return (vx, vy, climb), held_rad
 
-    def _acceleration(self, motion: Motion, wanted: Vector, dt_s: float) -> Vector:
+    def _acceleration(
+        self, motion: Motion, wanted: Vector, dt_s: float, limit: float | None
+    ) -> Vector:
         (wx, wy, wz), (vx, vy, vz) = wanted, motion.velocity_mps
         climb = _bounded(wz, -MAX_DESCENT_MPS, MAX_CLIMB_MPS)
+        ex, ey, ez = wx - vx, wy - vy, climb - vz
+        mx = my = mz = MAX_ACCELERATION_MPS2
+        if limit is not None:
+            # The limit is that of the vector, so each axis has its share of it.
+            length = math.sqrt(ex * ex + ey * ey + ez * ez) or 1.0
+            mx, my, mz = (limit * abs(each) / length for each in (ex, ey, ez))
         return (
-            self._axis_acceleration(0, wx - vx, dt_s),
-            self._axis_acceleration(1, wy - vy, dt_s),
-            self._axis_acceleration(2, climb - vz, dt_s),
+            self._axis_acceleration(0, ex, dt_s, mx),
+            self._axis_acceleration(1, ey, dt_s, my),
+            self._axis_acceleration(2, ez, dt_s, mz),
         )
 
-    def _axis_acceleration(self, axis: int, error: float, dt_s: float) -> float:
+    def _axis_acceleration(self, axis: int, error: float, dt_s: float, most: float) -> float:
         proportional = VELOCITY_P * error
         integral = self._integral[axis]
         # Integrating while the output is saturated would wind up and overshoot.
-        if -MAX_ACCELERATION_MPS2 < proportional < MAX_ACCELERATION_MPS2:
+        if -most < proportional < most:
             total = integral + VELOCITY_I * error * dt_s
             integral = _bounded(total, -MAX_INTEGRAL_MPS2, MAX_INTEGRAL_MPS2)
             self._integral[axis] = integral
             return proportional + integral
-        return _bounded(proportional, -MAX_ACCELERATION_MPS2, MAX_ACCELERATION_MPS2) + integral
+        return _bounded(proportional, -most, most) + integral
 
     def _thrusts_towards(
         self, motion: Motion, direction: Vector, yaw_rad: float, thrust_n: float
@@ -159,6 +186,19 @@ class FlightControl:
             iz * YAW_RATE_P * (yaw - r),
         )
         return mix(thrust_n, torque, self._model)
+
+
+def _approach_mps(distance_m: float, acceleration_mps2: float) -> float:
+    """Return the speed from which a UAV stops within a distance, if it brakes so hard.
+
+    Far away v² = 2 a (d - d0 / 2), near by v = P d; both have the same value and slope at
+    d0 = a / P².
+    """
+    braking = BRAKING_SHARE * acceleration_mps2
+    near_m = braking / POSITION_P**2
+    if distance_m <= near_m:
+        return POSITION_P * distance_m
+    return math.sqrt(2 * braking * (distance_m - near_m / 2))
 
 
 def _bounded(value: float, low: float, high: float) -> float:

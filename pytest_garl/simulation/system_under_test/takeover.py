@@ -97,7 +97,7 @@ class TakenOver:
         self._control_dt_s = 1.0 / airframe.control_rate_hz if airframe.control_rate_hz else 0.0
         self._control = FlightControl(vehicle_model(airframe))
         self._last: Command = VelocitySetpoint(velocity_mps=(0.0, 0.0, 0.0))
-        self._yaw_rad = 0.0
+        self._yaw_rad: float | None = None
         self._height_m: float | None = None
 
     def __getattr__(self, name: str) -> Any:
@@ -163,7 +163,8 @@ class TakenOver:
     def _remember(self, command: Command) -> None:
         self._last = command
         if isinstance(command, PositionSetpoint | VelocitySetpoint):
-            self._yaw_rad = command.yaw_rad
+            if command.yaw_rad is not None:
+                self._yaw_rad = command.yaw_rad
         elif isinstance(command, AttitudeSetpoint):
             self._control.remember_yaw(command)
 

@@ -5,17 +5,21 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from pytest_garl.landing_system import (
+from pytest_garl.commands import (
+    MAX_ACCELERATION_MPS2,
     MAX_SPEED_MPS,
+    MAX_TILT_RAD,
+    MIN_ACCELERATION_MPS2,
+    MIN_TILT_RAD,
     WORLD_M,
     Abort,
     AttitudeSetpoint,
     Command,
     Land,
-    MotorThrusts,
     PositionSetpoint,
     VelocitySetpoint,
 )
+from pytest_garl.landing_system import MotorThrusts
 from pytest_garl.simulation.system_under_test.diagnostics import DiagnosticsQuota, read_diagnostics
 from pytest_garl.simulation.system_under_test.reading import NonsenseError, number, numbers, vector
 from pytest_garl.simulation.system_under_test.texts import shown
@@ -57,13 +61,21 @@ def read_command(answer: Any, quota: DiagnosticsQuota) -> Command:
     if kind is VelocitySetpoint:
         return VelocitySetpoint(
             velocity_mps=vector(answer.velocity_mps, f"{at}velocity_mps", MAX_SPEED_MPS, "m/s"),
-            yaw_rad=number(answer.yaw_rad, f"{at}yaw_rad"),
+            yaw_rad=_optional(answer.yaw_rad, f"{at}yaw_rad"),
             diagnostics=diagnostics,
         )
     return PositionSetpoint(
         position_m=vector(answer.position_m, f"{at}position_m", WORLD_M, "m"),
         speed_mps=_speed(answer, at),
-        yaw_rad=number(answer.yaw_rad, f"{at}yaw_rad"),
+        yaw_rad=_optional(answer.yaw_rad, f"{at}yaw_rad"),
+        acceleration_mps2=_optional(
+            answer.acceleration_mps2,
+            f"{at}acceleration_mps2",
+            MIN_ACCELERATION_MPS2,
+            MAX_ACCELERATION_MPS2,
+            "m/s²",
+        ),
+        tilt_rad=_optional(answer.tilt_rad, f"{at}tilt_rad", MIN_TILT_RAD, MAX_TILT_RAD, "rad"),
         diagnostics=diagnostics,
     )
 
@@ -82,6 +94,12 @@ def read_thrusts(answer: Any, max_thrust_n: float) -> _Thrusts:
         return values
     a, b, c, d = numbers(values, "control returned MotorThrusts with newtons", 4, most, "N")
     return a, b, c, d
+
+
+def _optional(
+    value: object, field: str, low: float = -math.inf, high: float = math.inf, unit: str = ""
+) -> float | None:
+    return None if value is None else number(value, field, low, high, unit)
 
 
 def _speed(answer: Any, at: str) -> float:

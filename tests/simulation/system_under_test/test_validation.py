@@ -72,6 +72,11 @@ def to(*position: Any, **more: Any) -> PositionSetpoint:
 
 
 WRONG: list[tuple[Callable[[], Any], str, str]] = [
+    # Limits of a setpoint.
+    (lambda: to(0.0, 0.0, 1.0, acceleration_mps2=0.0), "BadCommand", "acceleration_mps2 = 0"),
+    (lambda: to(0.0, 0.0, 1.0, acceleration_mps2=NAN), "BadCommand", "acceleration_mps2 = nan"),
+    (lambda: to(0.0, 0.0, 1.0, tilt_rad=35.0), "BadCommand", "expected 0.02 to 0.61 rad"),
+    (lambda: to(0.0, 0.0, 1.0, yaw_rad="north"), "BadCommand", "yaw_rad = 'north'"),
     # Diagnostics.
     (
         lambda: Land(diagnostics=diagnostics_with_detection(confidence=NAN)),
