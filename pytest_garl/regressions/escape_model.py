@@ -38,7 +38,7 @@ from pytest_garl.simulation.physics.vehicle import (
     vehicle_model,
     wrench,
 )
-from pytest_garl.simulation.physics.wind import mean_wind_mps
+from pytest_garl.simulation.physics.wind import MeanWind, mean_wind
 from pytest_garl.simulation.physics.world import PHYSICS_RATE_HZ, World
 from pytest_garl.simulation.randomness import generator
 from pytest_garl.simulation.system_under_test.takeover import Leg, velocity_of
@@ -75,7 +75,7 @@ class EscapeModel:
         track = chase.flight.uav
         self._index = max(0, int(np.searchsorted(track.time_s, from_s + 1e-6, side="right")) - 1)
         self._model = vehicle_model(chase.airframe)
-        self._wind = mean_wind_mps(chase.scenario)
+        self._wind = mean_wind(chase.scenario, chase.map.ground.texture)
         self._npcs = self._warm_npcs()
 
     def position_m(self, name: str = "") -> Vector:
@@ -181,7 +181,7 @@ class EscapeModel:
 class _Uav:
     """The UAV's rigid body: motors with lag, drag, gravity; it follows commanded velocities."""
 
-    def __init__(self, model: VehicleModel, wind: tuple[float, float], motion: Motion) -> None:
+    def __init__(self, model: VehicleModel, wind: MeanWind, motion: Motion) -> None:
         self._model, self._wind, self.motion = model, wind, motion
         self._control = FlightControl(model)
         x, y, z, w = motion.attitude
@@ -198,7 +198,9 @@ class _Uav:
         total, torque = wrench(self._thrusts, model)
         fx, fy, fz = rotate(motion.attitude, (0.0, 0.0, total))
         vx, vy, vz = motion.velocity_mps
-        dx, dy, dz = drag((vx - self._wind[0], vy - self._wind[1], vz), model)
+        # Without gusts: those of the flight depend on the way that it takes.
+        ax, ay, _ = self._wind.at(motion.position_m[2])
+        dx, dy, dz = drag((vx - ax, vy - ay, vz), model)
         mass = model.mass_kg
         vx, vy = vx + (fx + dx) / mass * TICK_S, vy + (fy + dy) / mass * TICK_S
         vz += ((fz + dz) / mass - GRAVITY_MPS2) * TICK_S

@@ -35,7 +35,7 @@ from pytest_garl.simulation.physics.vehicle import (
     vehicle_model,
     wrench,
 )
-from pytest_garl.simulation.physics.wind import mean_wind_mps
+from pytest_garl.simulation.physics.wind import Wind
 from pytest_garl.simulation.physics.world import PHYSICS_RATE_HZ, World
 from pytest_garl.simulation.randomness import generator
 from pytest_garl.simulation.recorder import Recorder, Sight
@@ -74,7 +74,7 @@ class Loop:
         stays = GroundStays(self.recorder, self._model, self._marker, partial(_under, self))
         self._contacts = Contacts(self._world, self.recorder, self.npcs, self._model.size_m, stays)
         self._control = FlightControl(self._model)
-        self._wind = mean_wind_mps(scenario)
+        self._wind = Wind(scenario, map.ground.texture)
         self._pose_rng = generator(scenario.seed, "pose")
         self._thrusts = self._wanted_thrusts = NO_THRUST
         self._pending: list[tuple[int, Command]] = []
@@ -163,8 +163,9 @@ class Loop:
         self._thrusts = lag(self._thrusts, self._thrusts_wanted(tick, motion), model, TICK_S)
         total, torque = wrench(self._thrusts, model)
         fx, fy, fz = rotate(attitude, (0.0, 0.0, total))
-        (vx, vy, vz), (wind_x, wind_y) = motion.velocity_mps, self._wind
-        dx, dy, dz = drag((vx - wind_x, vy - wind_y, vz), model)
+        vx, vy, vz = motion.velocity_mps
+        ax, ay, az = self._wind.velocity_mps(tick, motion.position_m, motion.velocity_mps)
+        dx, dy, dz = drag((vx - ax, vy - ay, vz - az), model)
         self._world.step(motion.position_m, (fx + dx, fy + dy, fz + dz), rotate(attitude, torque))
 
     def _thrusts_wanted(self, tick: int, motion: Motion) -> Thrusts:
