@@ -170,7 +170,8 @@ class Mission:
     """The task of one flight, which a landing system gets before take-off.
 
     ``gps_position_m`` (x, y) is the approximate place of the marker, which lies up to
-    7.5 m away from it.  ``home_m`` (x, y, z) is where the UAV stands at the start, motors off.
+    7.5 m away from it.  ``home_m`` (x, y, z) is where the UAV stands at the start,
+    motors off, or hovers if the test says so.
     """
 
     gps_position_m: tuple[float, float]
@@ -237,7 +238,9 @@ class LandingSystem(Protocol):
 
     A class may also declare ``airframe: Airframe``.  One that flies the motors itself
     declares ``Airframe(control_rate_hz=...)`` and offers
-    ``control(state: VehicleState) -> MotorThrusts``.
+    ``control(state: VehicleState) -> MotorThrusts``; it is not called before the first ``step``.
+    One that holds files, threads or processes offers ``close()``, which is called once after the
+    flight, however it ended.  If it raises, a flight that landed counts as a crash.
     """
 
     def reset(self, mission: Mission) -> None:

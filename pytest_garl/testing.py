@@ -174,6 +174,7 @@ class _Checker:
         ):
             again = self._fly(reused, scenario, seconds)
             self._check_equal(fresh.flight, again.flight, problem)
+        reused.close_instance()
         return other
 
     def _check_equal(self, fresh: Flight, again: Flight, problem: str) -> None:
@@ -324,6 +325,15 @@ def _reusing_one_instance(system: type) -> Any:
 
         def step(self, observation: Observation) -> Any:
             return self._instance.step(observation)
+
+        def close(self) -> None:
+            """Leave the instance open for its next flight."""
+
+        @staticmethod
+        def close_instance() -> None:
+            """Close the instance after its last flight."""
+            for instance in instances:
+                getattr(instance, "close", lambda: None)()
 
     Reused.__name__ = system.__name__
     return Reused

@@ -157,6 +157,8 @@ def _start_problems(
     index: int,
     at: tuple[float, float],
 ) -> Iterable[str]:
+    from pytest_garl.scenarios.start import start_m
+
     name, kind_name = map.present_objects[index]
     kind = OBJECT_TYPES[kind_name]
     reach = kind.radius_m + OBJECT_CLEARANCE_M
@@ -172,7 +174,9 @@ def _start_problems(
         if overlaps and math.hypot(at[0] - disc.x_m, at[1] - disc.y_m) < disc.radius_m + reach:
             yield f"{name} starts in or at {disc.name}"
             break
-    if math.dist(at, map.uav_start_m[:2]) < UAV_CLEARANCE_M:
+    # A hovering UAV is away from what walks below it.
+    x, y, height = start_m(scenario, map)
+    if math.dist(at, (x, y)) < UAV_CLEARANCE_M and kind.top_m + UAV_CLEARANCE_M > height:
         yield f"{name} starts at the UAV"
     if math.dist(at, marker) < MARKER_HALF_DIAGONAL_M + kind.radius_m:
         yield f"{name} starts on or over the marker"

@@ -36,7 +36,7 @@ class Contacts:
     ) -> None:
         self._world, self._recorder, self._npcs = world, recorder, npcs
         self._hull_m, self._stays = hull_m, stays
-        self._airborne = False
+        self._airborne = world.uav_state()[0][2] > AIRBORNE_M
         self._gaps: dict[str, float] = {}
         self._touched: set[str] = set()
         self._nothing_near = False

@@ -157,13 +157,14 @@ class Touchdown:
 class Step:
     """One camera frame: what there was to see and what the landing system made of it.
 
+    ``time_s`` is when the landing system got it; a frame that is lost has no step.
     ``marker_visible`` is the share (0..1) of the marker's area that this frame shows
     unhidden, where 0 means outside the frame or wholly covered; ``marker_px`` the
     side in pixels that an unhidden marker would have; ``marker`` what decides whether it can be
     read, None without a camera or outside the frame.  ``objects_visible`` names the dynamic objects
     of which at least one pixel is in the frame, and ``objects_px`` counts their pixels, in the same
     order.  ``estimation_error_m`` is the difference between the position in the observation and the
-    true one.
+    true one at the time of the picture.
     """
 
     time_s: float

@@ -12,12 +12,10 @@ from pytest_garl.scenarios.bodies import rotate
 from pytest_garl.scenarios.maps.map import Map
 from pytest_garl.scenarios.placement import marker_position_m
 from pytest_garl.scenarios.scenario import Scenario
-from pytest_garl.simulation.camera.frame import blank_frame
 from pytest_garl.simulation.camera.projection import eye_under
-from pytest_garl.simulation.camera.renderer import Renderer
 from pytest_garl.simulation.contacts import Contacts
 from pytest_garl.simulation.environment import changed
-from pytest_garl.simulation.flight import Flight, Outcome
+from pytest_garl.simulation.flight import Crash, Flight, Outcome
 from pytest_garl.simulation.ground_stays import GroundStays
 from pytest_garl.simulation.landing_place import what_lies_under
 from pytest_garl.simulation.npc_policy import DECISION_STEP_S, GeneChange, NpcPolicy, Situation
@@ -38,11 +36,13 @@ from pytest_garl.simulation.physics.vehicle import (
 from pytest_garl.simulation.physics.wind import Wind
 from pytest_garl.simulation.physics.world import PHYSICS_RATE_HZ, World
 from pytest_garl.simulation.randomness import generator
-from pytest_garl.simulation.recorder import Recorder, Sight
+from pytest_garl.simulation.recorder import Recorder
+from pytest_garl.simulation.sensors import Delivery, Sensors
+from pytest_garl.simulation.start import begin_at_start
 from pytest_garl.simulation.system_under_test.calls import StepGuard, SystemFailedError
 from pytest_garl.simulation.system_under_test.ground_truth import Truth, TruthObject
 from pytest_garl.simulation.system_under_test.mission import mission_for
-from pytest_garl.simulation.system_under_test.observation import estimation_error_m, observe
+from pytest_garl.simulation.system_under_test.observation import estimation_error_m
 from pytest_garl.simulation.system_under_test.system import SystemUnderTest
 
 TICK_S = 1 / PHYSICS_RATE_HZ
@@ -70,18 +70,16 @@ class Loop:
         self._model = vehicle_model(self._system.airframe)
         self.npcs = [Npc(scenario, map, name, policy()) for name, _ in map.present_objects]
         self._world = _world(self._model, map, self.npcs)
+        self._thrusts, self._command = begin_at_start(self._world, self._model, scenario, map)
         self.recorder = Recorder(map, self.npcs, self._marker)
         stays = GroundStays(self.recorder, self._model, self._marker, partial(_under, self))
         self._contacts = Contacts(self._world, self.recorder, self.npcs, self._model.size_m, stays)
         self._control = FlightControl(self._model)
         self._wind = Wind(scenario, map.ground.texture)
-        self._pose_rng = generator(scenario.seed, "pose")
-        self._thrusts = self._wanted_thrusts = NO_THRUST
+        self._wanted_thrusts = NO_THRUST
         self._pending: list[tuple[int, Command]] = []
-        self._command: Command | None = None
-        self._renderer: Renderer | None = None
+        self._sensors = Sensors(scenario, self.camera, self.recorder, self.npcs)
         self._ticks = 0
-        self._ticks_per_frame = _ticks_per_call(self.camera.rate_hz)
         self._ticks_per_control = _ticks_per_call(self._system.airframe.control_rate_hz)
 
     def run(self) -> Flight:
@@ -99,6 +97,7 @@ class Loop:
             outcome, crash = "crashed", error.crash
         finally:
             self.close()
+        outcome, crash = _after_closing(self._system, self.recorder, outcome, crash)
         return self.recorder.flight(outcome, crash, self._contacts.touchdowns)
 
     def begin(self) -> None:
@@ -112,8 +111,7 @@ class Loop:
         airframe = self._system.airframe
         self._system.start(mission_for(self.scenario, self.map, airframe, self._time_limit_s))
         if self._system.needs_camera:
-            rng = generator(self.scenario.seed, "sensor")
-            self._renderer = Renderer(self.scenario, self.map, airframe.camera, rng)
+            self._sensors.switch_on(self.scenario, self.map)
 
     def close(self) -> None:
         """Free the physics."""
@@ -148,12 +146,12 @@ class Loop:
             if isinstance(self._command, Abort) and self._contacts.gave_up(position):
                 self.recorder.event("gave_up", "gave up and climbed clear of everything")
                 return "gave_up"
-        if tick % self._ticks_per_frame == 0:
-            self._observe(tick, position, attitude, velocity)
+        x, y, z, w = attitude
+        motion = Motion(position, velocity, attitude, rotate((-x, -y, -z, w), spin))
+        self._observe(tick, motion)
         while self._pending and self._pending[0][0] <= tick:
             self._take(self._pending.pop(0)[1])
-        x, y, z, w = attitude
-        self._actuate(tick, Motion(position, velocity, attitude, rotate((-x, -y, -z, w), spin)))
+        self._actuate(tick, motion)
         thrust_n = sum(self._thrusts)
         return self._contacts.outcome(now, position, attitude, velocity, thrust_n)
 
@@ -172,7 +170,8 @@ class Loop:
         """Return the wanted thrusts of the system's own flight control, or of the simulated one."""
         if self._contacts.motors_stopped:
             return NO_THRUST
-        if not self._system.airframe.control_rate_hz or isinstance(self._command, Abort):
+        flies_motors = self._system.airframe.control_rate_hz and self._system.has_stepped
+        if not flies_motors or isinstance(self._command, Abort):
             on_ground_s = self._contacts.on_ground_s(tick / PHYSICS_RATE_HZ)
             return self._control.thrusts(motion, self._command, TICK_S, on_ground_s)
         if tick % self._ticks_per_control == 0:
@@ -192,8 +191,7 @@ class Loop:
         scenario = changed(self.scenario, changes)
         if scenario != self.scenario:
             self.scenario = scenario
-            if self._renderer:
-                self._renderer.change(scenario)
+            self._sensors.change(scenario)
 
     def situation(self, npc: Npc) -> Situation:
         """Return what the policy of an NPC may see at this moment."""
@@ -205,34 +203,25 @@ class Loop:
         position, attitude, _, _ = self._world.uav_state()
         return eye_under(position, attitude), attitude
 
-    def _observe(self, tick: int, position: Vector, attitude: Quaternion, velocity: Vector) -> None:
-        """Show the landing system a frame, and queue its command for after its latency."""
-        now = tick / PHYSICS_RATE_HZ
-        if self._system.observes_truth and not self._system.gave_up:
-            self._system.observe_truth(_truth(self._marker, self.npcs, self.map))
-        airframe = self._system.airframe
-        if self._renderer:
-            eye = eye_under(position, attitude)
-            poses = [(npc.position_m, npc.yaw_rad) for npc in self.npcs]
-            frame = self._renderer.render(eye, attitude, now, poses)
-            visible = self.recorder.sight(frame, self._renderer, eye, attitude)
-        else:
-            frame, visible = blank_frame(self.camera.height_px, self.camera.width_px), Sight()
+    def _observe(self, tick: int, motion: Motion) -> None:
+        """Show the landing system what has arrived, and queue its commands for their latency."""
         if self._system.gave_up:
-            # The recorded view explains a collision during the climb.
-            self.recorder.step(Abort(), visible)
+            if self._sensors.takes_picture(tick):
+                # The recorded view explains a collision during the climb.
+                self.recorder.step(Abort(), self._sensors.look(tick, motion)[1])
             return
-        observation = observe(
-            frame,
-            time_s=now,
-            position_m=position,
-            velocity_mps=velocity,
-            attitude=attitude,
-            rng=self._pose_rng,
-        )
-        command = self._system.step(observation)
-        self.recorder.step(command, visible, estimation_error_m(observation, position))
-        self._pending.append((tick + round(airframe.latency_s * PHYSICS_RATE_HZ), command))
+        for delivery in self._sensors.deliveries(tick, motion, told=motion):
+            if not self._system.gave_up:
+                self._step(tick, delivery)
+
+    def _step(self, tick: int, delivery: Delivery) -> None:
+        if self._system.observes_truth:
+            self._system.observe_truth(_truth(self._marker, self.npcs, self.map))
+        command = self._system.step(delivery.observation)
+        error_m = estimation_error_m(delivery.observation, delivery.place_m)
+        self.recorder.step(command, delivery.sight, error_m)
+        latency_s = self._system.airframe.latency_s
+        self._pending.append((tick + round(latency_s * PHYSICS_RATE_HZ), command))
 
     def _take(self, command: Command) -> None:
         if type(command) is not type(self._command) and isinstance(command, Abort | Land):
@@ -240,6 +229,21 @@ class Loop:
             self.recorder.event(name, f"the system said {type(command).__name__}()")
         self._command = command
         self._control.remember_yaw(command)
+
+
+def _after_closing(
+    system: SystemUnderTest, recorder: Recorder, outcome: Outcome, crash: Crash | None
+) -> tuple[Outcome, Crash | None]:
+    """Close the landing system; an error of that fails a flight that had landed."""
+    try:
+        system.close()
+    except SystemFailedError as error:
+        if outcome == "landed":
+            recorder.event("crashed", error.crash.message)
+            return "crashed", error.crash
+        # What ended the flight came first; it stays the finding.
+        recorder.event("close_failed", error.crash.message)
+    return outcome, crash
 
 
 def _world(model: VehicleModel, map: Map, npcs: Sequence[Npc]) -> World:

@@ -18,10 +18,12 @@ from pytest_garl.landing_system import Camera
 from pytest_garl.scenarios.maps.map import Map
 from pytest_garl.scenarios.placement import marker_position_m, told_position_m
 from pytest_garl.scenarios.scenario import Scenario
+from pytest_garl.scenarios.start import start_m
 from pytest_garl.simulation.camera.projection import eye_under
 from pytest_garl.simulation.camera.renderer import Renderer
 from pytest_garl.simulation.camera.solids import BodyPose
 from pytest_garl.simulation.environment import environment_at
+from pytest_garl.simulation.events import Event
 from pytest_garl.simulation.flight import Flight, NominalView, ObjectRecord
 from pytest_garl.simulation.randomness import generator
 from pytest_garl.simulation.system_under_test.descent import LAND_BELOW_M, SLOW_BELOW_M
@@ -32,6 +34,8 @@ Place = tuple[float, float]
 STARTS_AND_STOPS_S = 5.1
 """What the reference pilot takes for its climb to 10 m, at 3 m/s, and for starting and stopping on
 its way across; ``test_nominal.py`` measures it."""
+CLIMB_MPS = 3.0
+"""The speed of a ``PositionSetpoint`` that names none."""
 SEARCH_MPS = 2.0
 """Speed of the search: engineering estimate, half of the reference pilot's speed on its way across,
 so that a marker stays in the frame for seconds at 10 m above the ground."""
@@ -60,7 +64,8 @@ class _Look:
 
 def nominal_arrival_s(scenario: Scenario, map: Map) -> float:
     """Return when a pilot that knows the marker's place is above it: the reference pilot."""
-    return STARTS_AND_STOPS_S + _across_s(map.uav_start_m[:2], marker_position_m(scenario, map))
+    start = start_m(scenario, map)
+    return _up_s(start[2]) + _across_s(start[:2], marker_position_m(scenario, map))
 
 
 def nominal_landing_s(scenario: Scenario, map: Map) -> float:
@@ -77,14 +82,17 @@ def nominal_views(
 
     The objects are where they were at that time of the flight, or at its end if it had ended; the
     environment is that to which NPC policies had changed it.  The UAV's own path plays no part.
+    A camera that fails shows nothing.
     """
     renderer = Renderer(scenario, map, camera, generator(scenario.seed, "sensor"), colour=False)
-    shown, views = scenario, []
+    shown, views, outage = scenario, [], Event(scenario, "outage")
     for look in _looks(scenario, map):
         present = environment_at(scenario, flight, look.time_s)
         if present != shown:
             renderer.change(present)
             shown = present
+        if outage.happens(look.time_s):
+            continue
         eye = eye_under((*look.place_m, look.height_m), LEVEL)
         poses = [_pose(item, look.time_s) for item in flight.objects]
         frame = renderer.render(eye, LEVEL, look.time_s, poses)
@@ -130,7 +138,8 @@ def _stays(scenario: Scenario, map: Map) -> Iterator[_Look]:
     told, marker = told_position_m(scenario, map), marker_position_m(scenario, map)
     turns = [2 * math.pi * index / RING_PLACES for index in range(RING_PLACES)]
     ring = [(told[0] + RING_M * math.cos(a), told[1] + RING_M * math.sin(a)) for a in turns]
-    now = STARTS_AND_STOPS_S + _across_s(map.uav_start_m[:2], told)
+    start = start_m(scenario, map)
+    now = _up_s(start[2]) + _across_s(start[:2], told)
     stay_s = 2 * RING_M * math.sin(math.pi / RING_PLACES) / SEARCH_MPS
     for place in (told, *ring):
         yield _Look(
@@ -149,6 +158,11 @@ def _stays(scenario: Scenario, map: Map) -> Iterator[_Look]:
         took_s = (top - end) / DESCENT_MPS
         yield _Look(time_s=now, duration_s=took_s, place="above", place_m=marker, height_m=height)
         now += took_s
+
+
+def _up_s(height_m: float) -> float:
+    """Return what the climb to the search height takes, with all starting and stopping."""
+    return STARTS_AND_STOPS_S - min(height_m, SEARCH_ALTITUDE_M) / CLIMB_MPS
 
 
 def _across_s(start: Place, goal: Place) -> float:

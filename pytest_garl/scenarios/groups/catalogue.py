@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
-from pytest_garl.scenarios.groups import told, wind
+from pytest_garl.scenarios.groups import events, timing, told, wind
 from pytest_garl.scenarios.groups.parameter import Group, Parameter
 
-GROUPS: dict[str, Group] = {each.name: each for each in (wind.GROUP, told.GROUP)}
+GROUPS: dict[str, Group] = {
+    each.name: each for each in (wind.GROUP, told.GROUP, timing.GROUP, *events.GROUPS)
+}
 PARAMETERS: dict[str, Parameter] = {
     key: each
     for group in GROUPS.values()

@@ -124,7 +124,7 @@ class World:
         self._spheres[body] = (position_m, self._spheres[body][1])
 
     def place_uav(self, position: Vector, attitude: Quaternion) -> None:
-        """Move the UAV to a pose, to measure distances there; no flight is flown after that."""
+        """Move the UAV to a pose, at rest: to begin a flight there, or to measure distances."""
         pybullet.resetBasePositionAndOrientation(
             self._uav, position, attitude, **self._client_argument
         )

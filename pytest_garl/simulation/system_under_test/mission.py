@@ -11,6 +11,7 @@ from pytest_garl.scenarios.placement import (
     told_position_m,
 )
 from pytest_garl.scenarios.scenario import Scenario
+from pytest_garl.scenarios.start import start_m
 
 SEARCH_ALTITUDE_M = 10.0
 """Search height of the paper's published landing systems."""
@@ -20,7 +21,7 @@ def mission_for(scenario: Scenario, map: Map, airframe: Airframe, time_limit_s: 
     """Return the mission that the landing system gets before take-off."""
     return Mission(
         gps_position_m=told_position_m(scenario, map),
-        home_m=map.uav_start_m,
+        home_m=start_m(scenario, map),
         search_altitude_m=SEARCH_ALTITUDE_M,
         marker_id=TARGET_MARKER_ID,
         marker_side_m=MARKER_SIDE_M,

@@ -29,8 +29,8 @@ class SystemUnderTest:
     """The landing system of one flight.
 
     Every call may raise SystemFailedError, which ends the flight.
-    ``needs_camera`` and ``observes_truth`` are known after ``start``.  ``gave_up`` is whether the
-    last command was ``Abort()``.
+    ``needs_camera`` and ``observes_truth`` are known after ``start``.  ``has_stepped`` is whether
+    ``step`` has returned a command, ``gave_up`` whether the last one was ``Abort()``.
     """
 
     def __init__(self, make_system: Callable[[], Any], guard: StepGuard | None) -> None:
@@ -39,7 +39,8 @@ class SystemUnderTest:
         self._quota = DiagnosticsQuota()
         self.airframe, self._airframe_error = self._read_airframe()
         self.needs_camera, self.observes_truth = True, False
-        self.gave_up = False
+        self.has_stepped = self.gave_up = False
+        self._system: Any = None
 
     def _read_airframe(self) -> tuple[Airframe, SystemFailedError | None]:
         """Return the airframe; on failure the default and the error, which ``start`` raises."""
@@ -70,6 +71,7 @@ class SystemUnderTest:
         command: Command = self._calls.run(
             "step", lambda: read_command(self._system.step(observation), self._quota)
         )
+        self.has_stepped = True
         self.gave_up = isinstance(command, Abort)
         return command
 
@@ -79,6 +81,11 @@ class SystemUnderTest:
             "control", lambda: read_thrusts(self._system.control(state), max_thrust_n)
         )
         return thrusts
+
+    def close(self) -> None:
+        """Close a system that was created and has ``close``."""
+        if self._system is not None:
+            self._calls.run("close", lambda: getattr(self._system, "close", lambda: None)())
 
     def not_finite_error(self, time_s: float) -> SystemFailedError:
         """Return the error for a flight whose state has become NaN or infinite."""

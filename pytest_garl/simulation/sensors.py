@@ -1,0 +1,131 @@
+"""The sensors of one flight: what the camera shows, and when the landing system gets it."""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+from pytest_garl.landing_system import Camera, Observation
+from pytest_garl.scenarios.maps.map import Map
+from pytest_garl.scenarios.scenario import Scenario
+from pytest_garl.simulation.camera.frame import Frame, blank_frame
+from pytest_garl.simulation.camera.projection import eye_under
+from pytest_garl.simulation.camera.renderer import Renderer
+from pytest_garl.simulation.events import Event
+from pytest_garl.simulation.physics.npc import Npc
+from pytest_garl.simulation.physics.vehicle import Motion, Vector
+from pytest_garl.simulation.physics.world import PHYSICS_RATE_HZ
+from pytest_garl.simulation.randomness import generator
+from pytest_garl.simulation.recorder import Recorder, Sight
+from pytest_garl.simulation.system_under_test.observation import observe
+from pytest_garl.simulation.timing import Timing
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Delivery:
+    """An observation as it reaches the landing system.
+
+    ``sight`` is what its picture shows, ``place_m`` where the UAV was when it was taken.
+    """
+
+    observation: Observation
+    sight: Sight
+    place_m: Vector
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Picture:
+    frame: Frame
+    sight: Sight
+    place_m: Vector
+    tick: int
+    jitter_ms: float
+
+
+class Sensors:
+    """Takes pictures, puts a pose to each, and delivers them in order when they arrive."""
+
+    def __init__(
+        self, scenario: Scenario, camera: Camera, recorder: Recorder, npcs: Sequence[Npc]
+    ) -> None:
+        self._camera, self._recorder, self._npcs = camera, recorder, npcs
+        self._timing = Timing(scenario)
+        self._outage, self._freezes = Event(scenario, "outage"), scenario["outage.frozen"] > 0
+        self._rng = generator(scenario.seed, "pose")
+        self._renderer: Renderer | None = None
+        self._ticks_per_frame = max(1, round(PHYSICS_RATE_HZ / camera.rate_hz))
+        self._last_look: tuple[Frame, Sight] | None = None
+        self._pictures: deque[_Picture] = deque()
+        self._poses: deque[Motion] = deque(maxlen=1 + max(0, -self._timing.stamp_ticks))
+        self._under_way: deque[tuple[int, Delivery]] = deque()
+
+    def switch_on(self, scenario: Scenario, map: Map) -> None:
+        """Switch the camera on; without it frames are black and show nothing."""
+        rng = generator(scenario.seed, "sensor")
+        self._renderer = Renderer(scenario, map, self._camera, rng)
+
+    def change(self, scenario: Scenario) -> None:
+        """Show another environment from the next picture on."""
+        if self._renderer:
+            self._renderer.change(scenario)
+
+    def takes_picture(self, tick: int) -> bool:
+        """Whether the camera takes a picture at a step of the physics."""
+        return tick % self._ticks_per_frame == 0
+
+    def look(self, tick: int, motion: Motion) -> tuple[Frame, Sight]:
+        """Return the camera's picture at this moment, and what it shows."""
+        now = tick / PHYSICS_RATE_HZ
+        black = blank_frame(self._camera.height_px, self._camera.width_px), Sight()
+        if self._renderer is None:
+            return black
+        if self._outage.happens(now):
+            return self._last_look or black
+        eye = eye_under(motion.position_m, motion.attitude)
+        poses = [(npc.position_m, npc.yaw_rad) for npc in self._npcs]
+        frame = self._renderer.render(eye, motion.attitude, now, poses)
+        sight = self._recorder.sight(frame, self._renderer, eye, motion.attitude)
+        if self._freezes:
+            self._last_look = frame, sight
+        return frame, sight
+
+    def deliveries(self, tick: int, motion: Motion, told: Motion) -> Iterator[Delivery]:
+        """Yield what reaches the landing system at this step of the physics, in order.
+
+        ``motion`` is the true one, ``told`` what the UAV's navigation says of it.
+        """
+        late = self._timing.stamp_ticks
+        if late < 0:
+            self._poses.append(told)
+        if self.takes_picture(tick) and tick + late >= 0:
+            self._take(tick, motion)
+        if self._pictures and self._pictures[0].tick + max(0, late) <= tick:
+            picture = self._pictures.popleft()
+            self._send(tick, picture, self._poses[0] if late < 0 else told)
+        while self._under_way and self._under_way[0][0] <= tick:
+            yield self._under_way.popleft()[1]
+
+    def _take(self, tick: int, motion: Motion) -> None:
+        """Take a picture that waits for its pose, unless the frame is lost."""
+        jitter_ms = self._timing.jitter_ms()
+        if jitter_ms is None:
+            return
+        frame, sight = self.look(tick, motion)
+        picture = _Picture(
+            frame=frame, sight=sight, place_m=motion.position_m, tick=tick, jitter_ms=jitter_ms
+        )
+        self._pictures.append(picture)
+
+    def _send(self, tick: int, picture: _Picture, pose: Motion) -> None:
+        """Put a pose to a picture, and send both on their way."""
+        observation = observe(
+            picture.frame,
+            time_s=(tick + min(0, self._timing.stamp_ticks)) / PHYSICS_RATE_HZ,
+            position_m=pose.position_m,
+            velocity_mps=pose.velocity_mps,
+            attitude=pose.attitude,
+            rng=self._rng,
+        )
+        delivery = Delivery(observation=observation, sight=picture.sight, place_m=picture.place_m)
+        self._under_way.append((self._timing.arrival(tick, picture.jitter_ms), delivery))
