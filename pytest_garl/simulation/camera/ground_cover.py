@@ -1,4 +1,4 @@
-"""Leaves and snow that lie on the ground, as a pattern that repeats every 8 m."""
+"""Leaves and snow that lie on the ground, as patterns that repeat every 8 m and every 16 m."""
 
 from __future__ import annotations
 
@@ -13,12 +13,26 @@ from pytest_garl.simulation.camera.canvas import Bounds, Image
 from pytest_garl.simulation.camera.weather import Conditions
 
 TILE_M = 8.0
+_SNOW_TILE_M = 16.0
+"""Snow depth varies most over 7 to 45 m (Trujillo et al. 2007)."""
 _CELL_M = 0.01
+_SNOW_COLOUR = np.array([236, 240, 246], np.float32)
+_SNOW_SPECTRUM = 4.0
+"""Below 7 m, the mean two-dimensional power spectrum of snow depth falls with an exponent of 4.0 to
+4.5 (Trujillo et al. 2007, lidar of five areas of 1 km2); the lower one gives the roughest edges."""
+_HALF_OPAQUE_M = 0.01
+"""Depth at which half of the light is reflected by the snow: d / (d + h) with h of 7 mm for fresh
+snow (grains of 0.1 mm, 100 kg/m3) and 12 mm for melting snow (0.5 mm, 300 kg/m3), from two streams
+without absorption and the asymmetry 0.89 of Wiscombe and Warren (1980)."""
+_EDGE_SLOPE = 0.3
+"""Slope of the snow's surface, root mean square: bare ground warms the air, which melts a patch
+from its edges (Liston 1995), so that these are steeper than fallen snow; engineering estimate."""
+_LEVELS = 4096
 
 
 @functools.cache
-def _tiles() -> tuple[NDArray[np.float32], Image, NDArray[np.float32]]:
-    """Ranks in [0, 1] and colours of fallen leaves, and ranks of snow, on a tile of 8 m.
+def _leaves() -> tuple[NDArray[np.float32], Image]:
+    """Ranks in [0, 1] and colours of fallen leaves on a tile.
 
     A place is covered when its rank is below the cover gene, so that a gene of 0.1 covers
     a tenth of the ground and a larger gene covers the same places and more.
@@ -37,18 +51,52 @@ def _tiles() -> tuple[NDArray[np.float32], Image, NDArray[np.float32]]:
         cv2.fillPoly(order, [points], index)
         cv2.fillPoly(colours, [points], tint)
     order[order == 0] = count + 1
-    noise = np.zeros((size, size), np.float32)
-    for amplitude, step in ((1.0, 80), (0.7, 25), (0.5, 8), (0.25, 3)):
-        cells = size // step
-        small = rng.standard_normal((cells, cells)).astype(np.float32)
-        wrapped = np.pad(small, 2, mode="wrap")
-        big = cv2.resize(wrapped, ((cells + 4) * step,) * 2, interpolation=cv2.INTER_CUBIC).astype(
-            np.float32
-        )
-        noise += amplitude * cv2.resize(
-            big[2 * step : -2 * step, 2 * step : -2 * step], (size, size)
-        )
-    return _ranks(order.astype(np.float32)), colours, _ranks(noise)
+    return _ranks(order.astype(np.float32)), colours
+
+
+@functools.cache
+def _snow() -> tuple[NDArray[np.uint16], NDArray[np.float64]]:
+    """Snow's depth on a tile: levels below ``_LEVELS``, and the depth in metres of each level.
+
+    Depths are those above the mean: melting takes the same from all places, so that what is left
+    are the deepest ones, and a patch has its edges where the depth has a contour.
+    """
+    size = round(_SNOW_TILE_M / _CELL_M) // 2
+    rng = np.random.default_rng(8)
+    wave = np.fft.fftfreq(size)[:, None] ** 2 + np.fft.rfftfreq(size) ** 2
+    wave[0, 0] = np.inf
+    # Power falls as the wave number to the exponent; the root of power is amplitude.
+    spectrum = np.fft.rfft2(rng.standard_normal((size, size))) * wave ** (-_SNOW_SPECTRUM / 4)
+    depth = np.fft.irfft2(spectrum, (size, size))
+    along = (np.roll(depth, -1, axis) - depth for axis in (0, 1))
+    slope = math.sqrt(sum(float((each**2).mean()) for each in along)) / (2 * _CELL_M)
+    depth *= _EDGE_SLOPE / slope
+    padded = np.pad(depth.astype(np.float32), 2, mode="wrap")
+    fine = cv2.resize(padded, None, fx=2, fy=2, interpolation=cv2.INTER_CUBIC)[4:-4, 4:-4]
+    depths = np.linspace(float(fine.min()), float(fine.max()), _LEVELS)
+    step = depths[1] - depths[0]
+    return np.round((fine - depths[0]) / step).astype(np.uint16), depths
+
+
+@functools.cache
+def _snow_shares() -> NDArray[np.float64]:
+    """Share of the tile that is deeper than each level."""
+    levels, _ = _snow()
+    counts = np.bincount(levels.ravel(), minlength=_LEVELS)
+    shares: NDArray[np.float64] = 1 - np.cumsum(counts) / levels.size
+    return shares
+
+
+def _snow_opacity(share: float) -> NDArray[np.uint8]:
+    """Return the opacity (0..255) of each level if a share of the ground is half opaque or more."""
+    _, depths = _snow()
+    if share >= 1:
+        return np.full(_LEVELS, 255, np.uint8)
+    # Shares fall with the level.
+    edge = _LEVELS - int(np.searchsorted(_snow_shares()[::-1], share, side="right"))
+    depth = np.maximum(depths - depths[min(edge, _LEVELS - 1)] + _HALF_OPAQUE_M, 0)
+    opacity: NDArray[np.uint8] = np.round(255 * depth / (depth + _HALF_OPAQUE_M)).astype(np.uint8)
+    return opacity
 
 
 def _leaf_outline(rng: np.random.Generator) -> NDArray[np.float64]:
@@ -80,36 +128,43 @@ def cover(
     conditions: Conditions,
 ) -> None:
     """Lay leaves and snow over the image of a piece of ground, in place."""
-    if conditions.leaf_cover <= 0 and conditions.snow_cover <= 0:
-        return
-    leaves, colours, snow = _tiles()
-    size = leaves.shape[0]
     rows, columns = image.shape[:2]
-    x = ((bounds_m[0] - shift_m[0] + (np.arange(columns) + 0.5) * resolution) / _CELL_M).astype(
-        int
-    ) % size
-    y = ((shift_m[1] - bounds_m[3] + (np.arange(rows) + 0.5) * resolution) / _CELL_M).astype(
-        int
-    ) % size
-    grid = np.ix_(y, x)
+    x = bounds_m[0] + (np.arange(columns) + 0.5) * resolution
+    y = bounds_m[3] - (np.arange(rows) + 0.5) * resolution
     if conditions.leaf_cover > 0:
-        here = leaves[grid] <= conditions.leaf_cover
+        ranks, colours = _leaves()
+        grid = np.ix_(*_cells(x, y, shift_m, TILE_M))
+        here = ranks[grid] <= conditions.leaf_cover
         image[here] = colours[grid][here]
     if conditions.snow_cover > 0:
-        image[snow[grid] <= conditions.snow_cover] = (236, 240, 246)
+        levels, _ = _snow()
+        opacity = _snow_opacity(conditions.snow_cover)[levels]
+        alpha = opacity[np.ix_(*_cells(x, y, shift_m, _SNOW_TILE_M))]
+        white = alpha > 0
+        share = alpha[white, None] / np.float32(255)
+        image[white] = np.round(image[white] * (1 - share) + _SNOW_COLOUR * share)
 
 
 def covered(
     places_m: NDArray[np.float64], shift_m: NDArray[np.float64], conditions: Conditions
 ) -> NDArray[np.bool_]:
     """Whether places (n, 2) lie under leaves or snow; ``shift_m`` is the ground's, shape (n,)."""
-    leaves, _, snow = _tiles()
-    size = leaves.shape[0]
-    column = ((places_m[:, 0] - shift_m[0]) / _CELL_M).astype(int) % size
-    row = ((shift_m[1] - places_m[:, 1]) / _CELL_M).astype(int) % size
+    x, y = places_m[:, 0], places_m[:, 1]
     under = np.zeros(len(places_m), np.bool_)
     if conditions.leaf_cover > 0:
-        under |= leaves[row, column] <= conditions.leaf_cover
+        under |= _leaves()[0][_cells(x, y, shift_m, TILE_M)] <= conditions.leaf_cover
     if conditions.snow_cover > 0:
-        under |= snow[row, column] <= conditions.snow_cover
+        opacity = _snow_opacity(conditions.snow_cover)[_snow()[0]]
+        under |= opacity[_cells(x, y, shift_m, _SNOW_TILE_M)] > 127
     return under
+
+
+def _cells(
+    x: NDArray[np.floating], y: NDArray[np.floating], shift_m: NDArray[np.float64], tile_m: float
+) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    """Return rows and columns of places on a tile; the shift is one of a tile of ``TILE_M``."""
+    size = round(tile_m / _CELL_M)
+    east, north = shift_m * (tile_m / TILE_M)
+    column = ((x - east) / _CELL_M).astype(np.intp) % size
+    row = ((north - y) / _CELL_M).astype(np.intp) % size
+    return row, column
