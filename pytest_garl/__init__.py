@@ -12,6 +12,7 @@ import importlib
 __version__ = "0.2.0.dev0"
 
 _HOMES = {
+    "pytest_garl.fiducial": ("MarkerSpec", "NestedMarker"),
     "pytest_garl.landing_system": (
         "Abort",
         "Airframe",
@@ -30,6 +31,7 @@ _HOMES = {
         "VelocitySetpoint",
     ),
     "pytest_garl.plugin.landing": ("Landing",),
+    "pytest_garl.scenarios.task": ("Start",),
     "pytest_garl.simulation.flight": ("Flight",),
     "pytest_garl.simulation.npc_policy": ("Move", "PolicySpec", "Situation"),
     "pytest_garl.verdicts.verdict": ("Limits", "limits"),

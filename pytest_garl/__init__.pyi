@@ -1,3 +1,4 @@
+from pytest_garl.fiducial import MarkerSpec, NestedMarker
 from pytest_garl.landing_system import (
     Abort,
     Airframe,
@@ -16,6 +17,7 @@ from pytest_garl.landing_system import (
     VelocitySetpoint,
 )
 from pytest_garl.plugin.landing import Landing
+from pytest_garl.scenarios.task import Start
 from pytest_garl.simulation.flight import Flight
 from pytest_garl.simulation.npc_policy import Move, PolicySpec, Situation
 from pytest_garl.verdicts.verdict import Limits
@@ -36,13 +38,16 @@ __all__ = [
     "Landing",
     "LandingSystem",
     "Limits",
+    "MarkerSpec",
     "Mission",
     "MotorThrusts",
     "Move",
+    "NestedMarker",
     "Observation",
     "PolicySpec",
     "PositionSetpoint",
     "Situation",
+    "Start",
     "VehicleState",
     "VelocitySetpoint",
     "limits",

@@ -32,6 +32,7 @@ from pytest_garl.commands import (
     VelocitySetpoint,
 )
 from pytest_garl.errors import LandingSystemError
+from pytest_garl.fiducial import NestedMarker
 
 if TYPE_CHECKING:
     import numpy as np
@@ -172,6 +173,8 @@ class Mission:
     ``gps_position_m`` (x, y) is the approximate place of the marker, which lies up to
     7.5 m away from it.  ``home_m`` (x, y, z) is where the UAV stands at the start,
     motors off, or hovers if the test says so.
+    ``marker_dictionary`` is OpenCV's name of the marker's dictionary, ``marker_side_m`` the length
+    of its black border's outer side; ``nested_markers`` are smaller markers on its board.
     """
 
     gps_position_m: tuple[float, float]
@@ -182,6 +185,7 @@ class Mission:
     marker_dictionary: str
     camera: Camera
     time_limit_s: float
+    nested_markers: tuple[NestedMarker, ...] = ()
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

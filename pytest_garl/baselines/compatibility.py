@@ -6,13 +6,16 @@ from importlib.metadata import PackageNotFoundError, version
 
 from pytest_garl.baselines.file import Baseline, BaselineSet
 from pytest_garl.execution.job import FlightJob
+from pytest_garl.fiducial import MarkerSpec
+from pytest_garl.scenarios.task import Task
 from pytest_garl.verdicts.verdict import Limits
 
 
-def incompatibilities(base: BaselineSet, job: FlightJob) -> tuple[str, ...]:
+def incompatibilities(base: BaselineSet, job: FlightJob, task: Task) -> tuple[str, ...]:
     """Return the conditions that differ from the set's; rates are comparable if there are none."""
     conditions = (
         ("limits", limits_text(base.limits), limits_text(job.limits)),
+        *_task_conditions(base.task, task),
         (f"map {base.map}", base.map_sha256[:12], job.map_sha256[:12]),
         ("simulator", base.simulator, job.simulator.name),
         (f"weights of {base.npcs}", base.npcs_sha256[:12], job.npcs.sha256[:12]),
@@ -22,6 +25,18 @@ def incompatibilities(base: BaselineSet, job: FlightJob) -> tuple[str, ...]:
         for what, saved, found in conditions
         if saved != found
     )
+
+
+def _task_conditions(saved: Task, found: Task) -> tuple[tuple[str, str, str], ...]:
+    return (
+        ("marker", _marker_text(saved.marker), _marker_text(found.marker)),
+        ("start", repr(saved.start), repr(found.start)),
+    )
+
+
+def _marker_text(marker: MarkerSpec) -> str:
+    nested = f", nested {marker.nested}" if marker.nested else ""
+    return f"{marker.dictionary} id {marker.id} of {marker.side_m:g} m{nested}"
 
 
 def limits_text(limits: Limits) -> str:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -17,6 +18,7 @@ from pytest_garl.regressions.case_file import read_limits
 from pytest_garl.scenarios.genes import Property, genome_like
 from pytest_garl.scenarios.maps.map import Map
 from pytest_garl.scenarios.scenario import Scenario
+from pytest_garl.scenarios.task import Task, read_task, task_lines
 from pytest_garl.verdicts.verdict import Limits
 
 SCHEMA = 2
@@ -35,6 +37,7 @@ _KEYS = {
     "method",
     "limits",
     "genes",
+    "task",
     "flights",
 }
 _OUTCOMES = ("landed", "collision", "slid", "not_landed", "gave_up", "crashed", "inconclusive")
@@ -83,6 +86,11 @@ class BaselineSet:
             "failed; some failed by chance, so this baseline is kinder to a change than random "
             "scenarios are"
         )
+
+    @property
+    def task(self) -> Task:
+        """The task that all its flights have."""
+        return self.flights[0].scenario.task
 
     def scenario_name(self, index: int) -> str:
         """Return a scenario's name, such as ``court-17``."""
@@ -140,6 +148,7 @@ def _set_lines(each: BaselineSet) -> list[str]:
         "flights = [",
         *(f"  {_row(flight)}," for flight in each.flights),
         "]",
+        *task_lines(each.task, "set."),
     ]
 
 
@@ -212,6 +221,11 @@ def _check(baseline: Baseline, error: Callable[[str], GarlError]) -> None:
             (tuple(key for key, _ in flight.scenario.genes), flight.scenario.removed_objects)
             for flight in each.flights
         }
+        if any(flight.scenario.task != each.task for flight in each.flights):
+            raise error(
+                f"{each.system} on {each.map}: found flights to different markers, or from "
+                "different starts, expected the same task for all flights of a set"
+            )
         if len(shapes) > 1 or any(removed for _, removed in shapes):
             raise error(
                 f"{each.system} on {each.map}: found scenarios of different genes or without some "
@@ -229,6 +243,7 @@ def _read_set(table: Table, load_map: Callable[[str], Map], schema: int) -> Base
     except ScenarioError as error:
         raise table.error("map", str(error)) from error
     properties = _read_genes(table, map)
+    like = Scenario(map=map.name, seed=0, genes=(), task=read_task(table))
     rows = table.get("flights")
     if not isinstance(rows, list):
         raise table.error("flights", f"found {shown(rows)}, expected a list of flights")
@@ -242,7 +257,7 @@ def _read_set(table: Table, load_map: Callable[[str], Map], schema: int) -> Base
         method=table.string("method", ""),
         limits=read_limits(table.table("limits")),
         flights=tuple(
-            _read_row(table, f"flights[{index}]", _upgraded(row, schema), map.name, properties)
+            _read_row(table, f"flights[{index}]", _upgraded(row, schema), like, properties)
             for index, row in enumerate(rows)
         ),
     )
@@ -273,7 +288,7 @@ def _upgraded(row: Any, schema: int) -> Any:
 
 
 def _read_row(
-    table: Table, key: str, row: Any, map: str, properties: tuple[Property, ...]
+    table: Table, key: str, row: Any, like: Scenario, properties: tuple[Property, ...]
 ) -> BaselineFlight:
     kinds = (int, str, str, bool, str, list, str, list)
     if (
@@ -307,7 +322,7 @@ def _read_row(
             )
     genes = tuple((item.key, float(value)) for item, value in zip(properties, values, strict=True))
     return BaselineFlight(
-        scenario=Scenario(map=map, seed=seed, genes=genes),
+        scenario=dataclasses.replace(like, seed=seed, genes=genes),
         summary=FlightSummary(
             outcome=outcome,
             signature=printable(signature),

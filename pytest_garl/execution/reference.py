@@ -25,6 +25,7 @@ HASHED = (
     "commands.py",
     "cpu_dispatch.py",
     "execution",
+    "fiducial.py",
     "files",
     "landing_system.py",
     "scenarios",

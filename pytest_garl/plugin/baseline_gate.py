@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 import os
 from collections.abc import Generator, Iterable, Iterator, Sequence
 from pathlib import Path
@@ -57,7 +56,8 @@ class BaselineGateItem(pytest.Item):
         base = self.garl_gate
         try:
             npcs = policy_spec(base.npcs)
-            differing = incompatibilities(base, run.searches.job(self._target, npcs))
+            job = run.searches.job(self._target, npcs)
+            differing = incompatibilities(base, job, self._target.task)
             if differing:
                 self._refuse(differing)
             comparison = compare_flights(
@@ -141,7 +141,7 @@ class BaselineGatePlugin:
                 yield BaselineGateItem.from_parent(
                     collector,
                     name=f"baseline[{base.title}]",
-                    target=dataclasses.replace(marked.target, map=map),
+                    target=marked.on(map),
                     base=base,
                 )
 

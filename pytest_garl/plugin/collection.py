@@ -44,8 +44,8 @@ def targets_for(marker: pytest.Mark, options: Options, test: str) -> list[Target
             each for map in arguments.maps for each in _repeated_targets(arguments, map, options)
         ]
     searched = [
-        replace(arguments.target, map=map, slot=slot)
-        for map in arguments.maps
+        replace(target, slot=slot)
+        for target in [arguments.on(map) for map in arguments.maps]
         for slot in slots(options.budget, options.population)
     ]
     return [*_saved_targets(arguments, options, test), *searched]
@@ -64,7 +64,7 @@ def _saved_targets(arguments: MarkerArguments, options: Options, test: str) -> I
             continue
         if header.map not in arguments.maps or header.asserting_test not in ("", test):
             continue
-        target = replace(arguments.target, map=header.map, entry=entry)
+        target = replace(arguments.on(header.map), entry=entry)
         yield target
         if header.status == "fixed" and header.live:
             yield replace(target, live=True)
@@ -83,8 +83,8 @@ def _repeated_targets(arguments: MarkerArguments, map: str, options: Options) ->
             )
         if map_name_in(text, source=options.repeat) != map:
             return []
-        return [replace(arguments.target, map=map, file=options.repeat)]
+        return [replace(arguments.on(map), file=options.repeat)]
     slot = options.repeated_slot
     if slot is None or slot.map != map or arguments.target.system_name not in slot.scenarios:
         return []
-    return [replace(arguments.target, map=map, slot=slot.slot)]
+    return [replace(arguments.on(map), slot=slot.slot)]

@@ -2,17 +2,25 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import pytest
 
 from pytest_garl.errors import GarlError
 from pytest_garl.execution.reference import check_system
 from pytest_garl.execution.sources import data_files
+from pytest_garl.fiducial import MarkerSpec
 from pytest_garl.plugin.options import Options
 from pytest_garl.plugin.target import Target
+from pytest_garl.scenarios.placement import MAP_DICTIONARY
+from pytest_garl.scenarios.task import Start, Task
+
+if TYPE_CHECKING:
+    from pytest_garl.scenarios.maps.map import Map
+
+T = TypeVar("T", MarkerSpec, Start)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -22,7 +30,24 @@ class MarkerArguments:
     maps: tuple[str, ...]
     """Those of the marker's maps that ``--garl-map`` selects."""
     target: Target
-    """A target without map, which each item completes."""
+    """A target without map, for items that have none."""
+    marker: MarkerSpec | None = None
+    """The marker on the ground; None for that of each map."""
+    start: Start = field(default_factory=Start)
+    has_distance: bool = False
+    """Whether the user limits the distance, which else follows from the marker's size."""
+    map_folders: tuple[Path, ...] = ()
+
+    def on(self, map: str) -> Target:
+        """Return the target on a map."""
+        from pytest_garl.scenarios.maps.map import load_map
+        from pytest_garl.verdicts.verdict import default_distance_m
+
+        spec, limits = self.marker or load_map(map, self.map_folders).marker, self.target.limits
+        if not self.has_distance:
+            limits = replace(limits, distance_m=default_distance_m(spec.side_m))
+        task = Task(marker=spec, start=self.start)
+        return replace(self.target, map=map, limits=limits, task=task)
 
 
 def read_marker(marker: pytest.Mark, options: Options) -> MarkerArguments:
@@ -30,12 +55,12 @@ def read_marker(marker: pytest.Mark, options: Options) -> MarkerArguments:
     from pytest_garl.scenarios.maps.map import load_map, map_names
     from pytest_garl.verdicts.verdict import Limits, limits
 
-    known = {"system", "maps", "limits", "deterministic", "files"}
+    known = {"system", "maps", "marker", "start", "limits", "deterministic", "files"}
     unknown = sorted(set(marker.kwargs) - known)
     if unknown or marker.args:
         raise GarlError(
             f"mark.garl: found {', '.join(unknown) or 'positional arguments'}, expected keywords "
-            "system=, maps=, limits=, deterministic= and files="
+            "system=, maps=, marker=, start=, limits=, deterministic= and files="
         )
     if "system" not in marker.kwargs:
         raise GarlError("mark.garl: system= is missing; give the landing system's class")
@@ -46,9 +71,11 @@ def read_marker(marker: pytest.Mark, options: Options) -> MarkerArguments:
     if not maps:
         there = ", ".join(map_names(options.map_folders))
         raise GarlError(f"mark.garl: maps=[]: nothing to fly on; expected one or more of {there}")
+    spec = _of_type(marker, "marker", MarkerSpec)
     for map in maps:
-        load_map(map, options.map_folders)
+        _check_ids(spec, load_map(map, options.map_folders))
     given = marker.kwargs.get("limits", Limits())
+    has_distance = not isinstance(given, dict) or "distance_m" in given
     if isinstance(given, dict):
         given = limits(**{str(name): value for name, value in given.items()})
     if not isinstance(given, Limits):
@@ -67,7 +94,43 @@ def read_marker(marker: pytest.Mark, options: Options) -> MarkerArguments:
             deterministic=deterministic,
             files=_files(marker.kwargs.get("files", ()), options),
         ),
+        marker=spec,
+        start=_of_type(marker, "start", Start) or Start(),
+        has_distance=has_distance and "limits" in marker.kwargs,
+        map_folders=options.map_folders,
     )
+
+
+def _of_type(marker: pytest.Mark, name: str, kind: type[T]) -> T | None:
+    """Return an argument, made from a dict if it is one; None if it is not given."""
+    given = marker.kwargs.get(name)
+    if isinstance(given, dict):
+        known = [each.name for each in fields(kind)]
+        unknown = [str(each) for each in given if each not in known]
+        if unknown:
+            raise GarlError(
+                f"mark.garl: {name}= has {', '.join(unknown)}; expected {', '.join(known)}"
+            )
+        given = kind(**given)
+    if given is not None and not isinstance(given, kind):
+        raise GarlError(
+            f"mark.garl: {name}={given!r}: expected pytest_garl.{kind.__name__}(...) or a dict of "
+            "its fields"
+        )
+    return given
+
+
+def _check_ids(spec: MarkerSpec | None, map: Map) -> None:
+    """Refuse a marker that another one on the map's ground equals."""
+    own = spec or map.marker
+    same_family = own.dictionary.rpartition("_")[0] == MAP_DICTIONARY.rpartition("_")[0]
+    painted = {each.marker_id for each in map.ground.layers if each.kind == "marker"}
+    twice = sorted(painted & {each.id for each in own.markers}) if same_family else []
+    if twice:
+        raise GarlError(
+            f"mark.garl: marker={own!r}: the map {map.name!r} has another marker of the id "
+            f"{twice[0]} on its ground, so nobody could tell them apart; choose another id or map"
+        )
 
 
 def _files(given: Any, options: Options) -> tuple[str, ...]:

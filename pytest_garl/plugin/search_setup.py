@@ -131,7 +131,7 @@ class Searches:
         map = load_map(target.map, self.options.map_folders)
         plan = SearchPlan(
             map=map,
-            genome=genome_for(map, weather=self.options.weather),
+            genome=genome_for(map, weather=self.options.weather, task=target.task),
             seed=self.options.seed,
             population=self.options.population,
         )

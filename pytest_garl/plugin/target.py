@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from pytest_garl.execution.flight_id import FIRST_SLOT, FlightId, Slot, search_key
 from pytest_garl.execution.reference import reference_to
+from pytest_garl.scenarios.task import DEFAULT_TASK, Task
 
 if TYPE_CHECKING:
     from pytest_garl.regressions.case import Case
@@ -26,6 +27,8 @@ class Target:
     limits: Limits
     map: str = ""
     """Empty for a saved case whose file cannot be read."""
+    task: Task = DEFAULT_TASK
+    """The marker on the ground and the start of a search; cases and files have their own."""
     slot: Slot = FIRST_SLOT
     deterministic: bool = True
     """Whether the marker says that the system repeats its flights exactly."""
@@ -70,6 +73,8 @@ class Target:
             self.map,
             dataclasses.asdict(self.limits),
         ]
+        if self.task != DEFAULT_TASK:
+            facts.append(dataclasses.asdict(self.task))
         if self.entry is not None:
             facts += [str(self.entry.path), self.live]
         return search_key(json.dumps(facts))

@@ -38,6 +38,7 @@ from pytest_garl.regressions.case_header import (
 )
 from pytest_garl.scenarios.files import gene_lines, read_genes
 from pytest_garl.scenarios.maps.map import Map, load_map
+from pytest_garl.scenarios.task import task_lines
 from pytest_garl.verdicts.verdict import (
     DEFAULT_LIMITS,
     FARTHEST_M,
@@ -53,6 +54,7 @@ _SECTIONS = {
     "preventable",
     "limits",
     "genes",
+    "task",
     "policy",
     "moves",
     "changes",
@@ -81,6 +83,7 @@ def dump_case(case: Case) -> str:
         [
             "# Weather from 0 to 1, places from -1 to 1, velocity as a share of the top speed.",
             *gene_lines(case.scenario)[1:],
+            *task_lines(case.scenario.task),
         ],
         _policy_lines(case),
         *_behaviour_lines(case),

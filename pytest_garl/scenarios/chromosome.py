@@ -28,7 +28,7 @@ def decode(vector: NDArray[np.float64], genome: Genome, *, map: str, seed: int) 
     """Return the scenario that a chromosome stands for; the inverse of :func:`encode`."""
     values = _checked(np.asarray(vector, dtype=np.float64), genome)
     genes = tuple((key, float(value)) for key, value in zip(genome.keys, values, strict=True))
-    return Scenario(map=map, seed=seed, genes=genes)
+    return Scenario(map=map, seed=seed, genes=genes, task=genome.task)
 
 
 def _checked(vector: NDArray[np.float64], genome: Genome) -> NDArray[np.float64]:

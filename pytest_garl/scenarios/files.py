@@ -15,7 +15,7 @@ from pytest_garl.scenarios.genes import genome_like
 from pytest_garl.scenarios.groups.catalogue import GROUPS, PARAMETERS
 from pytest_garl.scenarios.maps.map import Map
 from pytest_garl.scenarios.scenario import Scenario
-from pytest_garl.scenarios.task import Task
+from pytest_garl.scenarios.task import Task, read_task, task_lines
 
 SCHEMA = 1
 
@@ -32,7 +32,7 @@ def dumps(scenario: Scenario) -> str:
     if scenario.removed_objects:
         names = ", ".join(quoted(name) for name in scenario.removed_objects)
         lines.append(f"absent = [{names}]")
-    return "\n".join([*lines, *gene_lines(scenario)]) + "\n"
+    return "\n".join([*lines, *task_lines(scenario.task), *gene_lines(scenario)]) + "\n"
 
 
 def gene_lines(scenario: Scenario) -> list[str]:
@@ -58,7 +58,7 @@ def loads(text: str, map: Map, *, source: str = "scenario") -> Scenario:
     Weather may use the full range.  Raises ScenarioError that names source and key.
     """
     top = Table(parse(text, source), source)
-    top.refuse_unknown({"schema", "map", "seed", "absent", "genes"})
+    top.refuse_unknown({"schema", "map", "seed", "absent", "genes", "task"})
     if top.integer("schema") != SCHEMA:
         raise top.error("schema", f"found {shown(top.get('schema'))}, expected {SCHEMA}")
     if top.string("map") != map.name:
@@ -67,7 +67,7 @@ def loads(text: str, map: Map, *, source: str = "scenario") -> Scenario:
 
 
 def read_genes(top: Table, map: Map) -> Scenario:
-    """Return the scenario in a document's ``seed``, ``absent`` and ``genes``."""
+    """Return the scenario in a document's ``seed``, ``absent``, ``genes`` and ``task``."""
     removed = top.strings("absent")
     try:
         map = map.without(removed)
@@ -95,7 +95,11 @@ def read_genes(top: Table, map: Map) -> Scenario:
         genes.append((item.key, tables[head].number(name, low=item.low, high=item.high)))
     seed = top.integer("seed")
     return Scenario(
-        map=map.name, seed=seed, genes=tuple(genes), removed_objects=map.removed_objects
+        map=map.name,
+        seed=seed,
+        genes=tuple(genes),
+        removed_objects=map.removed_objects,
+        task=read_task(top),
     )
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Literal
 
 import numpy as np
@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from pytest_garl.errors import ScenarioError
 from pytest_garl.scenarios.groups.catalogue import GROUPS
 from pytest_garl.scenarios.groups.parameter import Group, Parameter
+from pytest_garl.scenarios.task import Task
 
 if TYPE_CHECKING:
     from pytest_garl.scenarios.maps.map import Map
@@ -58,9 +59,13 @@ class CompositeGene:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Genome:
-    """All properties that may vary in a scenario on one map, in a fixed order."""
+    """All properties that may vary in a scenario on one map, in a fixed order.
+
+    ``task`` is what its scenarios have in common.
+    """
 
     composites: tuple[CompositeGene, ...]
+    task: Task = field(default_factory=Task)
 
     def __post_init__(self) -> None:
         twice = sorted({key for key in self.keys if self.keys.count(key) > 1})
@@ -163,9 +168,16 @@ ENVIRONMENT = (*(f"environment.{name}" for name, _ in WEATHER), SUN)
 
 
 def genome_for(
-    map: Map, *, weather: WeatherRange = "confined", extras: Iterable[CompositeGene] = ()
+    map: Map,
+    *,
+    weather: WeatherRange = "confined",
+    extras: Iterable[CompositeGene] = (),
+    task: Task | None = None,
 ) -> Genome:
-    """Return the genome of scenarios on ``map``: environment, marker, its NPCs, extras."""
+    """Return the genome of scenarios on ``map``: environment, marker, its NPCs, extras.
+
+    Without a task its scenarios have the map's marker.
+    """
     top = CONFINED_WEATHER if weather == "confined" else 1.0
     environment = CompositeGene(
         name="environment",
@@ -187,7 +199,10 @@ def genome_for(
     objects = CompositeGene(
         name="objects", genes=tuple(_object_gene(name) for name, _ in map.present_objects)
     )
-    return Genome(composites=(environment, marker, objects, *extras))
+    return Genome(
+        composites=(environment, marker, objects, *extras),
+        task=Task(marker=map.marker) if task is None else task,
+    )
 
 
 def group_gene(group: Group) -> CompositeGene:
@@ -234,7 +249,7 @@ def with_destinations(genome: Genome) -> Genome:
         else each
         for each in genome.composites
     )
-    return Genome(composites=tuple(composites))
+    return dataclasses.replace(genome, composites=tuple(composites))
 
 
 def _end_of_way(name: str, end: str) -> tuple[Property, ...]:

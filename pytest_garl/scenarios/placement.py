@@ -3,16 +3,75 @@
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 
+from pytest_garl.fiducial import MarkerSpec
 from pytest_garl.scenarios.maps.map import Map
 from pytest_garl.scenarios.object_types import OBJECT_TYPES
 from pytest_garl.scenarios.scenario import Scenario
 
-MARKER_SIDE_M = 1.5
+PAPER_MARKER = MarkerSpec()
+MARKER_SIDE_M = PAPER_MARKER.side_m
 MARKER_RADIUS_M = 7.5
-TARGET_MARKER_ID = 0
+TARGET_MARKER_ID = PAPER_MARKER.id
 """Paper, section 4.2: marker of 1.5 m, id 0, up to 7.5 m off the given GPS position."""
-MARKER_DICTIONARY = "DICT_5X5_50"
+MARKER_DICTIONARY = MAP_DICTIONARY = PAPER_MARKER.dictionary
+"""Also the dictionary of the other markers that are painted on the ground of maps."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PlacedMarker:
+    """One marker of a board in the world."""
+
+    dictionary: str
+    id: int
+    side_m: float
+    place_m: tuple[float, float]
+    yaw_rad: float
+
+    @property
+    def outline_m(self) -> tuple[tuple[float, float], ...]:
+        """Corners of the black border: the marker's top left, top right and so on, clockwise."""
+        half = self.side_m / 2
+        corners = ((-half, half), (half, half), (half, -half), (-half, -half))
+        return tuple(turned_about(self.place_m, corner, self.yaw_rad) for corner in corners)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Pad:
+    """The board with the marker as it lies on the ground; at zero yaw its top is north."""
+
+    spec: MarkerSpec
+    place_m: tuple[float, float]
+    yaw_rad: float = 0.0
+
+    @property
+    def markers(self) -> tuple[PlacedMarker, ...]:
+        """All markers of the board in the world, the main one first."""
+        return tuple(
+            PlacedMarker(
+                dictionary=self.spec.dictionary,
+                id=each.id,
+                side_m=each.side_m,
+                place_m=turned_about(self.place_m, each.offset_m, self.yaw_rad),
+                yaw_rad=self.yaw_rad,
+            )
+            for each in self.spec.markers
+        )
+
+    @property
+    def main(self) -> PlacedMarker:
+        """The marker that missions name."""
+        return self.markers[0]
+
+
+def turned_about(
+    centre: tuple[float, float], offset: tuple[float, float], yaw_rad: float
+) -> tuple[float, float]:
+    """Return a centre plus an offset that is turned by a yaw."""
+    cos, sin = math.cos(yaw_rad), math.sin(yaw_rad)
+    x, y = offset
+    return centre[0] + (cos * x - sin * y), centre[1] + (sin * x + cos * y)
 
 
 def square_to_disc(x: float, y: float) -> tuple[float, float]:
@@ -51,6 +110,11 @@ def marker_position_m(scenario: Scenario, map: Map) -> tuple[float, float]:
     u, v = square_to_disc(scenario["marker.x"], scenario["marker.y"])
     gps_x, gps_y = map.gps_position_m
     return gps_x + MARKER_RADIUS_M * u, gps_y + MARKER_RADIUS_M * v
+
+
+def pad_of(scenario: Scenario, map: Map) -> Pad:
+    """Return the board with the scenario's marker."""
+    return Pad(spec=scenario.task.marker, place_m=marker_position_m(scenario, map))
 
 
 def told_position_m(scenario: Scenario, map: Map) -> tuple[float, float]:

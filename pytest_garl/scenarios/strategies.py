@@ -33,7 +33,7 @@ def scenarios(
 
     def build(drawn: tuple[tuple[float, ...], int]) -> Scenario:
         genes = tuple(zip(genome.keys, drawn[0], strict=True))
-        return repair(Scenario(map=map, seed=drawn[1], genes=genes), place)
+        return repair(Scenario(map=map, seed=drawn[1], genes=genes, task=genome.task), place)
 
     return st.tuples(values, st.integers(0, 2**32 - 1)).map(build)
 

@@ -7,12 +7,12 @@ import math
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 
+from pytest_garl.fiducial import MarkerSpec
 from pytest_garl.scenarios.bodies import Body, Part, rotate
 from pytest_garl.scenarios.maps.map import Map
 from pytest_garl.scenarios.object_types import OBJECT_TYPES
 from pytest_garl.scenarios.placement import (
     MARKER_RADIUS_M,
-    MARKER_SIDE_M,
     marker_genes,
     marker_position_m,
     object_start_m,
@@ -20,10 +20,10 @@ from pytest_garl.scenarios.placement import (
 )
 from pytest_garl.scenarios.scenario import Scenario
 
-MARKER_HALF_DIAGONAL_M = MARKER_SIDE_M / math.sqrt(2)
-MARKER_CLEARANCE_M = MARKER_HALF_DIAGONAL_M + 0.25
-"""No static part stands or hangs nearer to the marker's centre than this, so that a UAV
-of 1 m can reach it with a quarter of a metre to spare beyond the marker's corners."""
+UAV_REACH_M = 0.75
+MARGIN_M = 0.25
+"""No static part stands or hangs nearer to the marker's corners than the margin, nor to its centre
+than reach and margin of a UAV of 1 m, so that such a UAV can reach it."""
 UAV_CLEARANCE_M = 2.0
 OBJECT_CLEARANCE_M = 0.3
 _RING_STEP_M = 0.1
@@ -76,7 +76,8 @@ def problems(scenario: Scenario, map: Map) -> tuple[str, ...]:
     map = map.without(scenario.removed_objects)
     discs = tuple(disc for body in map.bodies for disc in discs_of(body))
     marker = marker_position_m(scenario, map)
-    found = list(_marker_problems(marker, map, discs))
+    spec = scenario.task.marker
+    found = list(_marker_problems(marker, spec, map, discs))
     for index, (name, _) in enumerate(map.present_objects):
         found += _start_problems(
             scenario, map, discs, marker, index, object_start_m(scenario, map, name)
@@ -93,8 +94,9 @@ def repair(scenario: Scenario, map: Map) -> Scenario:
     map = map.without(scenario.removed_objects)
     discs = tuple(disc for body in map.bodies for disc in discs_of(body))
     marker = marker_position_m(scenario, map)
-    if any(_marker_problems(marker, map, discs)):
-        place = _nearest(marker, lambda at: not any(_marker_problems(at, map, discs)))
+    spec = scenario.task.marker
+    if any(_marker_problems(marker, spec, map, discs)):
+        place = _nearest(marker, lambda at: not any(_marker_problems(at, spec, map, discs)))
         scenario = scenario.replace(marker_genes(place, map))
     for index, (name, _) in enumerate(map.present_objects):
         marker = marker_position_m(scenario, map)
@@ -132,17 +134,24 @@ def _nearest(
             raise ScenarioError("no valid place within 200 m; the map leaves no room")
 
 
-def _marker_problems(marker: tuple[float, float], map: Map, discs: Iterable[Disc]) -> Iterable[str]:
-    x, y = marker
+def clearance_m(marker: MarkerSpec) -> float:
+    """Return how far a marker's centre is from every static part, at least."""
+    return max(marker.half_diagonal_m, UAV_REACH_M) + MARGIN_M
+
+
+def _marker_problems(
+    marker: tuple[float, float], spec: MarkerSpec, map: Map, discs: Iterable[Disc]
+) -> Iterable[str]:
+    (x, y), clearance = marker, clearance_m(spec)
     if math.dist(marker, map.gps_position_m) > MARKER_RADIUS_M + 1e-9:
         yield "the marker lies outside its disc of 7.5 m"
     for disc in discs:
-        if math.hypot(x - disc.x_m, y - disc.y_m) < disc.radius_m + MARKER_CLEARANCE_M:
+        if math.hypot(x - disc.x_m, y - disc.y_m) < disc.radius_m + clearance:
             yield f"the marker is under or too near {disc.name}"
             break
     for layer in map.ground.layers:
         if layer.kind == "marker":
-            reach = MARKER_HALF_DIAGONAL_M + layer.size_m / math.sqrt(2)
+            reach = spec.half_diagonal_m + layer.size_m / math.sqrt(2)
             if math.dist(marker, layer.points_m[0]) < reach:
                 yield f"the marker overlaps {layer.name}"
     if math.dist(marker, map.uav_start_m[:2]) < UAV_CLEARANCE_M:
@@ -178,7 +187,7 @@ def _start_problems(
     x, y, height = start_m(scenario, map)
     if math.dist(at, (x, y)) < UAV_CLEARANCE_M and kind.top_m + UAV_CLEARANCE_M > height:
         yield f"{name} starts at the UAV"
-    if math.dist(at, marker) < MARKER_HALF_DIAGONAL_M + kind.radius_m:
+    if math.dist(at, marker) < scenario.task.marker.half_diagonal_m + kind.radius_m:
         yield f"{name} starts on or over the marker"
     for other, other_kind in map.present_objects[:index]:
         near = kind.radius_m + OBJECT_TYPES[other_kind].radius_m

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import itertools
 import math
 import reprlib
@@ -25,6 +26,7 @@ class UserMethod:
 
     def __init__(self, name: str, make: Callable[[SearchPlan], Method], plan: SearchPlan) -> None:
         self._name, self._population = name, plan.population
+        self._task = plan.genome.task
         self._method = self._call("the factory", lambda: make(plan))
         missing = [each for each in ("learns", "ask", "tell") if not hasattr(self._method, each)]
         if missing:
@@ -41,7 +43,8 @@ class UserMethod:
         right = isinstance(found, Sequence) and all(isinstance(each, Scenario) for each in found)
         if not right or len(found) < self._population:
             self._refuse("ask()", found, f"a list of {self._population} pytest_garl scenarios")
-        return found
+        # Which marker lies there, and where a flight starts, is the user's test's to say.
+        return [dataclasses.replace(each, task=self._task) for each in found]
 
     def tell(self, flown: Sequence[FlownScenario]) -> Sequence[tuple[float, ...]]:
         """Let the method learn; return its objectives."""

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from pytest_garl.scenarios.bodies import Body
 from pytest_garl.scenarios.maps.map import Layer
-from pytest_garl.scenarios.placement import MARKER_SIDE_M
+from pytest_garl.scenarios.placement import PlacedMarker
 from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.simulation.camera.ground import shadow_of
 from pytest_garl.simulation.camera.meshes import mesh_of, placed_hulls
@@ -27,7 +27,7 @@ Place = tuple[float, float]
 
 def what_lies_under(
     place: Place,
-    marker_m: Place,
+    marker: PlacedMarker,
     layers: Iterable[Layer],
     bodies: Iterable[Body],
     scenario: Scenario,
@@ -39,7 +39,7 @@ def what_lies_under(
     be taken for a marker.
     """
     layers = tuple(layers)
-    targets = [(_square_distance_m(place, marker_m, MARKER_SIDE_M, 0.0), "marker")]
+    targets = [(_square_distance_m(place, marker.place_m, marker.side_m, marker.yaw_rad), "marker")]
     targets += [
         (_square_distance_m(place, layer.points_m[0], layer.size_m, layer.yaw_rad), layer.name)
         for layer in layers

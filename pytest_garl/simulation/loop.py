@@ -10,7 +10,7 @@ from typing import Any
 from pytest_garl.landing_system import Abort, Command, Land, VehicleState
 from pytest_garl.scenarios.bodies import rotate
 from pytest_garl.scenarios.maps.map import Map
-from pytest_garl.scenarios.placement import marker_position_m
+from pytest_garl.scenarios.placement import marker_position_m, pad_of
 from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.simulation.camera.projection import eye_under
 from pytest_garl.simulation.contacts import Contacts
@@ -267,8 +267,8 @@ def _situation(loop: Loop, npc: Npc, position: Vector, velocity: Vector) -> Situ
 def _under(loop: Loop, place: tuple[float, float]) -> str:
     """Return what lies under the UAV if it touches down at a place at this moment."""
     map, bodies = loop.map, (*loop.map.bodies, *(npc.body for npc in loop.npcs))
-    marker_m = marker_position_m(loop.scenario, map)
-    return what_lies_under(place, marker_m, map.ground.layers, bodies, loop.scenario)
+    marker = pad_of(loop.scenario, map).main
+    return what_lies_under(place, marker, map.ground.layers, bodies, loop.scenario)
 
 
 def _vehicle_state(tick: int, motion: Motion, thrusts: Thrusts) -> VehicleState:

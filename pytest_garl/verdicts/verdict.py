@@ -18,6 +18,13 @@ FARTHEST_M = 1000.0
 """The largest limit of distance, wider than any map."""
 LEAST_DISTANCE_M = 0.3
 """The smallest default limit of distance: what a landing by a camera reaches."""
+
+
+def default_distance_m(marker_side_m: float) -> float:
+    """Return the limit of distance for a marker: the UAV stands on it."""
+    return max(LEAST_DISTANCE_M, marker_side_m / 2)
+
+
 PropertyName = Literal["distance", "time", "collision", "crash", "abort", "own"]
 """The property that a violation is about.  A flight that gives up needlessly violates "time": it
 never lands.  Where the limits forbid to give up, the property is "abort", which no test asserts."""
@@ -63,7 +70,7 @@ class Limits:
     "violation" always, "ok" never.
     """
 
-    distance_m: float = max(LEAST_DISTANCE_M, MARKER_SIDE_M / 2)
+    distance_m: float = default_distance_m(MARKER_SIDE_M)
     time_s: float = 120.0
     abort: AbortRule = "needless"
 

@@ -7,7 +7,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pytest_garl.landing_system import Detection
-from pytest_garl.scenarios.placement import MARKER_SIDE_M
 from pytest_garl.simulation.camera.projection import View
 from pytest_garl.simulation.camera.renderer import Renderer
 from pytest_garl.simulation.flight import Step
@@ -47,9 +46,7 @@ class CameraPane:
         return pane
 
     def _marker(self, poses: Poses) -> NDArray[np.float64]:
-        half, (x, y) = MARKER_SIDE_M / 2, self._renderer.marker_m
-        square = np.array([[x - half, y + half], [x + half, y + half]])
-        square = np.vstack([square, [[x + half, y - half], [x - half, y - half]]])
+        square = np.array(self._renderer.pad.main.outline_m)
         view = View.of(self._renderer.camera, poses.eye_m, poses.attitude)
         return self._pixels(view.ground_polygon(square))
 

@@ -13,7 +13,7 @@ from pytest_garl.landing_system import Camera
 from pytest_garl.scenarios.bodies import rotate
 from pytest_garl.scenarios.maps.map import Map
 from pytest_garl.scenarios.object_types import OBJECT_TYPES
-from pytest_garl.scenarios.placement import MARKER_SIDE_M
+from pytest_garl.scenarios.placement import pad_of
 from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.simulation.camera.ground import paint_ground
 from pytest_garl.simulation.camera.ground_cover import cover_shift
@@ -44,6 +44,7 @@ class MapPane:
         self._scale = min(WIDTH / across, HEIGHT / up)
         self._left = WIDTH / 2 - (x_min + x_max) / 2 * self._scale
         self._bottom = HEIGHT / 2 + (y_min + y_max) / 2 * self._scale
+        self._marker = pad_of(scenario, map).main
         self._background = self._ground(scenario)
         self._draw_background()
 
@@ -122,11 +123,8 @@ class MapPane:
                 r, g, b = ((2 * value + 255) // 3 for value in part.colour)
                 drawing.area(image, outline, (r, g, b))
                 drawing.line(image, outline, part.colour, 1, closed=True)
-        x, y = self._flight.marker_position_m
-        half = MARKER_SIDE_M / 2
-        square = np.array([[x - half, y - half], [x + half, y - half], [x + half, y + half]])
-        square = np.vstack([square, [[x - half, y + half]]])
-        drawing.line(image, self.pixels(square), drawing.MARKER, 3, closed=True)
+        square = self.pixels(np.array(self._marker.outline_m))
+        drawing.line(image, square, drawing.MARKER, 3, closed=True)
         self._draw_scale_bar()
 
     def _draw_scale_bar(self) -> None:
@@ -162,7 +160,7 @@ class MapPane:
 
     def _write_names(self, pane: drawing.Image, poses: Poses) -> None:
         labels = Labels(pane)
-        half = MARKER_SIDE_M / 2
+        half = self._marker.side_m / 2
         labels.keep_clear(self._pixel(self._flight.marker_position_m), half * self._scale)
         labels.keep_clear(self._pixel(poses.position_m), _UAV_RADIUS_M * self._scale)
         names = [(name, (x, y), half, drawing.INK) for name, x, y in self._flight.decoys]

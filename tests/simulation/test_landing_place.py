@@ -12,6 +12,7 @@ import pytest
 from pytest_garl.scenarios.chromosome import decode
 from pytest_garl.scenarios.genes import genome_for
 from pytest_garl.scenarios.maps.map import Layer, Map, load_map
+from pytest_garl.scenarios.placement import PAPER_MARKER, Pad, PlacedMarker
 from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.simulation.camera import map_texture
 from pytest_garl.simulation.camera.canvas import Canvas
@@ -28,6 +29,10 @@ def scenario_at(map: Map, sun: float) -> Scenario:
     return scenario.replace({"environment.sun_position": sun})
 
 
+def marker_at(place_m: tuple[float, float], yaw_rad: float = 0.0) -> PlacedMarker:
+    return Pad(spec=PAPER_MARKER, place_m=place_m, yaw_rad=yaw_rad).main
+
+
 def under(
     place: tuple[float, float],
     map: Map = COURT,
@@ -35,7 +40,7 @@ def under(
     sun: float = NOON,
 ) -> str:
     scenario = scenario_at(map, sun)
-    return what_lies_under(place, marker_m, map.ground.layers, map.bodies, scenario)
+    return what_lies_under(place, marker_at(marker_m), map.ground.layers, map.bodies, scenario)
 
 
 @pytest.mark.parametrize("map", [COURT, LAWN], ids=lambda map: map.name)
@@ -131,7 +136,7 @@ def test_what_is_found_is_what_the_camera_paints(layer: Layer) -> None:
         if abs(distance_m - REACH_M) < 2 * m_per_px:
             continue
         decided += 1
-        found = what_lies_under((x, y), FAR_M, [layer], [], scenario)
+        found = what_lies_under((x, y), marker_at(FAR_M), [layer], [], scenario)
         assert (found == "line") == (distance_m < REACH_M), (x, y, distance_m)
     assert decided > 300
 
@@ -139,5 +144,5 @@ def test_what_is_found_is_what_the_camera_paints(layer: Layer) -> None:
 def test_moving_bodies_cast_shadows_too() -> None:
     tree = dataclasses.replace(LAWN.bodies[0], position_m=(0.0, 0.0, 0.0))
     scenario = scenario_at(LAWN, NOON)
-    assert what_lies_under((0.0, 2.0), FAR_M, (), [tree], scenario) == "shadow"
-    assert what_lies_under((0.0, 2.0), FAR_M, (), [], scenario) == "nothing"
+    assert what_lies_under((0.0, 2.0), marker_at(FAR_M), (), [tree], scenario) == "shadow"
+    assert what_lies_under((0.0, 2.0), marker_at(FAR_M), (), [], scenario) == "nothing"

@@ -5,7 +5,7 @@ import dataclasses
 import pytest
 
 from pytest_garl.errors import OptionError
-from pytest_garl.verdicts.verdict import Limits, Margin, Verdict, count_decided
+from pytest_garl.verdicts.verdict import Limits, Margin, Verdict, count_decided, default_distance_m
 from pytest_garl.verdicts.wording import decided_text
 
 
@@ -49,3 +49,9 @@ def test_invalid_limits_are_refused() -> None:
         OptionError, match="found abort='no', expected 'needless', 'ok' or 'violation'"
     ):
         Limits(abort="no")  # type: ignore[arg-type]
+
+
+def test_the_limit_of_distance_follows_the_marker() -> None:
+    assert default_distance_m(1.5) == Limits().distance_m
+    assert default_distance_m(0.2) == 0.3
+    assert default_distance_m(4.0) == 2.0

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -11,12 +12,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pytest_garl import Camera
+from pytest_garl.fiducial import MarkerSpec
 from pytest_garl.scenarios.chromosome import decode
 from pytest_garl.scenarios.genes import CONFINED_WEATHER, genome_for
 from pytest_garl.scenarios.maps.map import Map
 from pytest_garl.scenarios.object_types import OBJECT_TYPES
 from pytest_garl.scenarios.placement import MARKER_SIDE_M, TARGET_MARKER_ID
 from pytest_garl.scenarios.scenario import Scenario
+from pytest_garl.scenarios.task import Task
 from pytest_garl.scenarios.validity import repair
 from pytest_garl.simulation.camera.canvas import marker_bits
 from pytest_garl.simulation.camera.frame import Frame
@@ -102,7 +105,8 @@ def pictures(
 ) -> Iterator[Picture]:
     """Yield ``count`` pictures of one random scenario from random poses."""
     scenario = random_scenario(rng, map, weather)
-    renderer = Renderer(scenario, map, CAMERA, rng, marker_id=marker_id)
+    task = Task(marker=MarkerSpec(id=marker_id))
+    renderer = Renderer(dataclasses.replace(scenario, task=task), map, CAMERA, rng)
     prints = [Print(marker_id=marker_id, place_m=renderer.marker_m)]
     prints += [
         Print(

@@ -5,11 +5,12 @@ from __future__ import annotations
 import dataclasses
 import functools
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Literal
 
 from pytest_garl.errors import ScenarioError
+from pytest_garl.fiducial import MarkerSpec
 from pytest_garl.messages import listed, shown
 from pytest_garl.scenarios.bodies import Body
 
@@ -55,7 +56,8 @@ class Map:
     """One place: ground, static bodies, dynamic objects, bounds, GPS position and start.
 
     ``bounds_m`` is (x_min, x_max, y_min, y_max); ``objects`` are (type, count) pairs
-    of the dynamic objects; ``sha256`` is the hash of the file and part of a run's identity.
+    of the dynamic objects; ``marker`` is the one to land on unless the test states another;
+    ``sha256`` is the hash of the file and part of a run's identity.
     ``removed_objects`` are the names of objects that one scenario leaves out; a map file removes
     none.
     """
@@ -69,6 +71,7 @@ class Map:
     bodies: tuple[Body, ...]
     objects: tuple[tuple[str, int], ...]
     sha256: str
+    marker: MarkerSpec = field(default_factory=MarkerSpec)
     removed_objects: tuple[str, ...] = ()
 
     @property

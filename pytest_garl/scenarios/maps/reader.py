@@ -16,6 +16,7 @@ from pytest_garl.scenarios.bodies import Body
 from pytest_garl.scenarios.maps.map import Ground, Layer, LayerKind, Map, Texture
 from pytest_garl.scenarios.object_types import OBJECT_TYPES
 from pytest_garl.scenarios.static_bodies import STATIC_BODIES
+from pytest_garl.scenarios.task import read_marker_spec
 
 _GPS_DISC_M = 7.5
 LARGEST_AREA_M2 = 10_000.0
@@ -58,6 +59,7 @@ def read_map(file: Path) -> Map:
             "layers",
             "bodies",
             "objects",
+            "marker",
         }
     )
     x_min, x_max, y_min, y_max = _bounds(top)
@@ -79,6 +81,7 @@ def read_map(file: Path) -> Map:
         ground=_ground(top),
         bodies=bodies,
         objects=_objects(top),
+        marker=read_marker_spec(top),
         sha256=hashlib.sha256(content).hexdigest(),
     )
 

@@ -11,12 +11,13 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from pytest_garl.fiducial import DICTIONARIES
+from pytest_garl.scenarios.placement import MAP_DICTIONARY, Pad
+
 Image = NDArray[np.uint8]
 Bounds = tuple[float, float, float, float]
 """A rectangle of ground in metres: x_min, x_max, y_min, y_max."""
 
-MARKER_CELLS = 7
-"""A DICT_5X5 marker has five data cells and a black border of one on each side."""
 WHITE_LEVEL, BLACK_LEVEL = 238.0, 24.0
 """Grey levels of printed white and black in full light: albedos of 0.93 and 0.09, engineering
 estimate of a print on matt foil."""
@@ -50,12 +51,23 @@ class Canvas:
                 side = np.array([-along[1], along[0]]) / length * width_m / 2
                 self.polygon(np.array([start + side, end + side, end - side, start - side]), colour)
 
+    def board(self, pad: Pad) -> None:
+        """Draw all markers of a pad, later ones over earlier ones."""
+        for each in pad.markers:
+            self.marker(each.place_m, each.side_m, each.yaw_rad, each.id, each.dictionary)
+
     def marker(
-        self, centre: tuple[float, float], side_m: float, yaw_rad: float, marker_id: int
+        self,
+        centre: tuple[float, float],
+        side_m: float,
+        yaw_rad: float,
+        marker_id: int,
+        dictionary: str = MAP_DICTIONARY,
     ) -> None:
         """Draw a marker on a white board with a margin of one cell; its top is north at yaw 0."""
-        bits = marker_bits(marker_id)
-        cell = side_m / MARKER_CELLS
+        bits = marker_bits(marker_id, dictionary)
+        cells = len(bits)
+        cell = side_m / cells
         cos, sin = math.cos(yaw_rad), math.sin(yaw_rad)
         rotation = np.array([[cos, -sin], [sin, cos]])
 
@@ -67,17 +79,18 @@ class Canvas:
         board = side_m + 2 * cell
         self.polygon(square(-board / 2, board / 2, board), (WHITE_LEVEL,) * 3)
         self.polygon(square(-side_m / 2, side_m / 2, side_m), (BLACK_LEVEL,) * 3)
-        for row in range(MARKER_CELLS):
-            for column in range(MARKER_CELLS):
+        for row in range(cells):
+            for column in range(cells):
                 if bits[row, column]:
                     x, y = -side_m / 2 + column * cell, side_m / 2 - row * cell
                     self.polygon(square(x, y, cell), (WHITE_LEVEL,) * 3)
 
 
 @functools.cache
-def marker_bits(marker_id: int) -> NDArray[np.bool_]:
-    """Return the cells (7, 7) of a DICT_5X5_50 marker; True is white."""
-    dictionary = cv2.aruco.getPredefinedDictionary(cv2.aruco.DICT_5X5_50)
-    image = cv2.aruco.generateImageMarker(dictionary, marker_id, MARKER_CELLS, borderBits=1)
+def marker_bits(marker_id: int, dictionary: str = MAP_DICTIONARY) -> NDArray[np.bool_]:
+    """Return the cells (n, n) of a marker with its border, 7 for DICT_5X5_50; True is white."""
+    cells = DICTIONARIES[dictionary].bits + 2
+    family = cv2.aruco.getPredefinedDictionary(getattr(cv2.aruco, dictionary))
+    image = cv2.aruco.generateImageMarker(family, marker_id, cells, borderBits=1)
     bits: NDArray[np.bool_] = np.asarray(image) > 127
     return bits

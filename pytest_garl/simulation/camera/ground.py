@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+import math
 from dataclasses import dataclass
 
 import cv2
@@ -10,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pytest_garl.scenarios.maps.map import Map
-from pytest_garl.scenarios.placement import MARKER_SIDE_M, TARGET_MARKER_ID, marker_position_m
+from pytest_garl.scenarios.placement import Pad, pad_of
 from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.simulation.camera import map_texture
 from pytest_garl.simulation.camera.canvas import Bounds, Canvas, Image
@@ -21,6 +22,10 @@ from pytest_garl.simulation.camera.weather import WET_ALBEDO_LOSS, Conditions
 
 _INSET_M = 0.01
 _INSET_HALF_M = 2.0
+"""Resolution and half the side of the piece about the marker; both follow the user's board."""
+_INSET_MARGIN_M = 0.25
+_PX_PER_MODULE = 6
+_MOST_INSET_PX = 1600
 _LEVELS = 6
 
 
@@ -84,23 +89,21 @@ def paint_ground(
     map: Map,
     conditions: Conditions,
     shift: NDArray[np.float64],
-    marker_id: int = TARGET_MARKER_ID,
 ) -> PaintedGround:
     """Paint the ground of one flight in full light; exposure comes later.
 
     ``shift`` is where the pattern of fallen leaves and snow begins, as of ``cover_shift``.
     """
-    marker = marker_position_m(scenario, map)
-    return _lit(_painted(marker, map, conditions, shift, marker_id), map, conditions, shift)
+    pad = pad_of(scenario, map)
+    return _lit(_painted(pad, map, conditions, shift), map, conditions, shift)
 
 
 def repaint(
     ground: PaintedGround,
-    marker_m: tuple[float, float],
+    pad: Pad,
     map: Map,
     before: Conditions,
     conditions: Conditions,
-    marker_id: int,
 ) -> PaintedGround:
     """Return the ground under other conditions than ``before``, as if painted under them.
 
@@ -111,7 +114,7 @@ def repaint(
         return ground
     unlit, shift = ground.unlit, ground.cover_shift_m
     if _cover_of(conditions) != _cover_of(before):
-        unlit = _painted(marker_m, map, conditions, shift, marker_id)
+        unlit = _painted(pad, map, conditions, shift)
     return _lit(unlit, map, conditions, shift)
 
 
@@ -124,24 +127,33 @@ def _light_of(conditions: Conditions) -> tuple[float, ...]:
 
 
 def _painted(
-    marker: tuple[float, float],
+    pad: Pad,
     map: Map,
     conditions: Conditions,
     shift: NDArray[np.float64],
-    marker_id: int,
 ) -> tuple[Canvas, Canvas]:
     """Paint both pieces, with the marker and what lies about."""
-    half = _INSET_HALF_M
-    inset_box = (marker[0] - half, marker[0] + half, marker[1] - half, marker[1] + half)
+    half, resolution = _inset_of(pad)
+    x, y = pad.place_m
+    inset_box = (x - half, x + half, y - half, y + half)
     wide = Canvas(map_texture.picture(map).copy(), map_texture.bounds_of(map), RESOLUTION_M)
-    inset = Canvas(map_texture.detail(map, inset_box, _INSET_M), inset_box, _INSET_M)
+    inset = Canvas(map_texture.detail(map, inset_box, resolution), inset_box, resolution)
     for canvas in (wide, inset):
-        canvas.marker(marker, MARKER_SIDE_M, 0.0, marker_id)
+        canvas.board(pad)
         if conditions.wetness > 0:
             alpha = 1 - WET_ALBEDO_LOSS * conditions.wetness
             cv2.convertScaleAbs(canvas.image, canvas.image, alpha)
         cover(canvas.image, canvas.bounds_m, canvas.m_per_px, shift, conditions)
     return wide, inset
+
+
+def _inset_of(pad: Pad) -> tuple[float, float]:
+    """Return half the side, and the resolution, of the piece that holds the pad finely."""
+    half = max(_INSET_HALF_M, pad.spec.reach_m + _INSET_MARGIN_M)
+    module_m = min(each.side_m for each in pad.markers) / pad.spec.modules
+    resolution = max(min(_INSET_M, module_m / _PX_PER_MODULE), 2 * half / _MOST_INSET_PX)
+    # A whole number of pixels.
+    return half, 2 * half / math.ceil(2 * half / resolution - 1e-9)
 
 
 def _lit(

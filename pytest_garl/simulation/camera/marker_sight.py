@@ -12,13 +12,9 @@ from numpy.typing import NDArray
 from pytest_garl.landing_system import Camera
 from pytest_garl.simulation.camera.gloss import Gloss
 from pytest_garl.simulation.camera.marker_patch import (
-    BOARD_MODULES,
     GREY,
-    MODULE_M,
-    PROBES,
     PROBES_PER_MODULE,
     MarkerPatch,
-    modules,
 )
 from pytest_garl.simulation.camera.particles import Particles
 from pytest_garl.simulation.camera.projection import NEAR_M, View
@@ -33,6 +29,8 @@ _LEAST_SEEN = 4
 """So many places of white and of black must be seen for a contrast."""
 _EDGE = 0.1
 """The painted edges of modules are a pixel wide and turn so much of the places beside them."""
+_MOSTLY = 0.25
+"""A marker of which less is hidden can be read, if with errors."""
 _ROUND = 4
 """Decimals that are recorded."""
 
@@ -44,28 +42,21 @@ class MarkerSight:
         self,
         camera: Camera,
         patch: MarkerPatch,
-        marker_id: int,
         conditions: Conditions,
         sensor: Sensor,
         particles: Particles,
     ) -> None:
         self._camera, self._patch, self._conditions = camera, patch, conditions
         self._sensor, self._particles = sensor, particles
-        ones = np.ones((PROBES_PER_MODULE, PROBES_PER_MODULE), np.bool_)
-        self._white = np.kron(modules(marker_id), ones).ravel()
-        row, column = np.divmod(np.arange(PROBES**2), PROBES)
-        ring = np.minimum(
-            np.minimum(row, PROBES - 1 - row), np.minimum(column, PROBES - 1 - column)
-        )
+        self._white, last = patch.white, patch.probes - 1
+        row, column = np.divmod(np.arange(patch.probes**2), patch.probes)
+        ring = np.minimum(np.minimum(row, last - row), np.minimum(column, last - column))
         ring //= PROBES_PER_MODULE
         self._margin, self._border, self._bits = ring == 0, ring == 1, ring >= 2
         self._on_marker = ~self._margin
-        half = MODULE_M * (BOARD_MODULES / 2 - 1)
-        x, y = patch.places_m.mean(axis=0)
-        self._middle_m = np.array([x, y])
-        signs = np.array([[-half, half], [half, half], [half, -half], [-half, -half]])
+        self._middle_m = np.array(patch.marker.place_m)
         # The four corners of the marker, then the places: projected together.
-        self._points_m = np.concatenate([signs + self._middle_m, patch.places_m])
+        self._points_m = np.concatenate([np.array(patch.marker.outline_m), patch.places_m])
         self._airlight = float(np.array(conditions.airlight) @ GREY)
         self._errors = self._error(patch.albedo * patch.light, patch.light)
 
@@ -100,7 +91,7 @@ class MarkerSight:
         return MarkerView(
             share_in_frame=round(float(framed), _ROUND),
             edge_modules=round(self._edge_modules(corners), _ROUND),
-            px_per_module=round(_px_per_module(corners), _ROUND),
+            px_per_module=round(self._px_per_module(corners), _ROUND),
             border_hidden=_mean(errors, inside & self._border),
             bits_hidden=_mean(errors, inside & self._bits),
             margin_hidden=_mean(errors, inside & self._margin),
@@ -123,16 +114,20 @@ class MarkerSight:
         light, conditions = self._patch.light, self._conditions
         if not sun_shines(conditions):
             return light
-        half = MODULE_M * BOARD_MODULES / 2
+        patch, probes = self._patch, self._patch.probes
+        half = patch.module_m * patch.modules / 2
+        cos, sin = math.cos(patch.marker.yaw_rad), math.sin(patch.marker.yaw_rad)
+        # From the world to the marker's pixels, whose rows run down.
+        turn = np.array([[cos, sin], [sin, -cos]])
         mask: NDArray[np.uint8] | None = None
         for shadow in shadows:
             place = np.array(shadow.place_m(conditions.sun)) - self._middle_m
             if math.hypot(*place) > shadow.reach_m + math.sqrt(2) * half:
                 continue
             if mask is None:
-                mask = np.zeros((PROBES, PROBES), np.uint8)
-            corners = (shadow.outlines + place) * (1.0, -1.0) * (PROBES / 2 / half)
-            fixed = np.round((corners + (PROBES / 2 - 0.5)) * 2**_SHIFT).astype(np.int32)
+                mask = np.zeros((probes, probes), np.uint8)
+            corners = (shadow.outlines + place) @ turn.T * (probes / 2 / half)
+            fixed = np.round((corners + (probes / 2 - 0.5)) * 2**_SHIFT).astype(np.int32)
             start = 0
             for count in shadow.corner_counts:
                 cv2.fillConvexPoly(mask, fixed[start : start + count], (1.0,), cv2.LINE_8, _SHIFT)
@@ -170,17 +165,47 @@ class MarkerSight:
         low = float(corners.min()) + 0.5
         right = self._camera.width_px - 0.5 - float(corners[:, 0].max())
         bottom = self._camera.height_px - 0.5 - float(corners[:, 1].max())
-        return min(1.0, min(low, right, bottom) / max(_px_per_module(corners), 1e-3))
+        return min(1.0, min(low, right, bottom) / max(self._px_per_module(corners), 1e-3))
+
+    def _px_per_module(self, corners: Array) -> float:
+        """Return the smaller singular value of the map from the ground to pixels, for a module."""
+        patch = self._patch
+        nw, ne, se, sw = corners.astype(np.float64) / patch.marker.side_m * patch.module_m
+        (a, c), (b, d) = ((ne + se) - (nw + sw)) / 2, ((nw + ne) - (sw + se)) / 2
+        total, determinant = a * a + b * b + c * c + d * d, a * d - b * c
+        root = math.sqrt(max(0.0, total * total - 4 * determinant * determinant))
+        return math.sqrt(max(0.0, (total - root) / 2))
 
 
-def _px_per_module(corners: Array) -> float:
-    """Return the smaller singular value of the map from the ground to pixels, for a module."""
-    side = MODULE_M * (BOARD_MODULES - 2)
-    nw, ne, se, sw = corners.astype(np.float64) / side * MODULE_M
-    (a, c), (b, d) = ((ne + se) - (nw + sw)) / 2, ((nw + ne) - (sw + se)) / 2
-    total, determinant = a * a + b * b + c * c + d * d, a * d - b * c
-    root = math.sqrt(max(0.0, total * total - 4 * determinant * determinant))
-    return math.sqrt(max(0.0, (total - root) / 2))
+class BoardSight:
+    """Tells how frames show a board: by the marker that a camera reads best from there.
+
+    That is the marker with the largest modules among those that are wholly in the frame and mostly
+    not hidden, and the main marker if there is none.
+    """
+
+    def __init__(self, sights: Sequence[MarkerSight]) -> None:
+        self._main, *self._nested = sights
+
+    def view(
+        self,
+        view: View,
+        segmentation: NDArray[np.int32],
+        layers: Sequence[PaintedSolid],
+        shadows: Sequence[Shadow],
+        gloss: Gloss | None,
+    ) -> MarkerView | None:
+        """Return how a frame shows the board, or None where nothing of it is in the frame."""
+        main = self._main.view(view, segmentation, layers, shadows, gloss)
+        if not self._nested or (main and _is_whole(main)):
+            return main
+        others = (each.view(view, segmentation, layers, shadows, gloss) for each in self._nested)
+        whole = [each for each in others if each and _is_whole(each)]
+        return max(whole, key=lambda each: each.px_per_module) if whole else main
+
+
+def _is_whole(view: MarkerView) -> bool:
+    return view.edge_modules >= 0 and max(view.border_hidden, view.bits_hidden) < _MOSTLY
 
 
 def _behind(

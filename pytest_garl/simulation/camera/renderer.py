@@ -15,14 +15,14 @@ from numpy.typing import NDArray
 from pytest_garl.errors import GarlError
 from pytest_garl.landing_system import Camera
 from pytest_garl.scenarios.maps.map import Map
-from pytest_garl.scenarios.placement import MARKER_SIDE_M, TARGET_MARKER_ID, marker_position_m
+from pytest_garl.scenarios.placement import pad_of
 from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.simulation.camera.frame import Frame
 from pytest_garl.simulation.camera.gloss import add_gloss, gloss_of
 from pytest_garl.simulation.camera.ground import PaintedGround, Raster, paint_ground, repaint
 from pytest_garl.simulation.camera.ground_cover import cover_shift, covered
 from pytest_garl.simulation.camera.marker_patch import paint_patch
-from pytest_garl.simulation.camera.marker_sight import MarkerSight
+from pytest_garl.simulation.camera.marker_sight import BoardSight, MarkerSight
 from pytest_garl.simulation.camera.particles import Particles
 from pytest_garl.simulation.camera.projection import FAR_M, View
 from pytest_garl.simulation.camera.sensor import Sensor
@@ -52,7 +52,7 @@ class _Look:
     decay: Array
     air: NDArray[np.uint8]
     veil: NDArray[np.uint8]
-    sight: MarkerSight
+    sight: BoardSight
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -76,8 +76,6 @@ class Renderer:
 
     ``segment_ids`` numbers ground (0), marker (1), static bodies and dynamic objects.
     With ``colour=False`` no ground is painted: such a renderer gives frames without images.
-    Flights have the marker that missions look for; another ``marker_id`` is for training
-    detectors.
     """
 
     def __init__(
@@ -88,19 +86,18 @@ class Renderer:
         rng: np.random.Generator,
         *,
         colour: bool = True,
-        marker_id: int = TARGET_MARKER_ID,
     ) -> None:
         self.camera = camera
         conditions = conditions_of(scenario)
-        self.marker_m = marker_position_m(scenario, map)
-        self._map, self._marker_id = map, marker_id
+        self.pad, self._map = pad_of(scenario, map), map
+        self.marker_m = self.pad.place_m
         names = ["ground", "marker", *(body.name for body in map.bodies)]
         names += [name for name, _ in map.present_objects]
         self.segment_ids: Mapping[str, int] = {name: index for index, name in enumerate(names)}
         self._shift = cover_shift(rng)
         self._ground: PaintedGround | None = None
         if colour:
-            self._ground = paint_ground(scenario, map, conditions, self._shift, marker_id)
+            self._ground = paint_ground(scenario, map, conditions, self._shift)
         width, height = camera.width_px, camera.height_px
         (cx, cy), focal = camera.centre_px, camera.focal_px
         self._columns = np.arange(width, dtype=np.float32)
@@ -125,9 +122,7 @@ class Renderer:
         """
         before, conditions = self.conditions, conditions_of(scenario)
         if self._ground is not None:
-            self._ground = repaint(
-                self._ground, self.marker_m, self._map, before, conditions, self._marker_id
-            )
+            self._ground = repaint(self._ground, self.pad, self._map, before, conditions)
         self._prepare(conditions, copy.deepcopy(self._before_draws))
 
     def _prepare(self, conditions: Conditions, rng: np.random.Generator) -> None:
@@ -137,12 +132,18 @@ class Renderer:
         veil = (1 - np.arange(256) / 255)[:, None] * airlight
         sensor = Sensor(self.camera, conditions, rng)
         particles = Particles(self.camera, conditions, rng)
-        patch = paint_patch(self.marker_m, self._map, conditions, self._shift, self._marker_id)
+        pad = self.pad
+        patches = [
+            paint_patch(each, pad, self._map, conditions, self._shift) for each in pad.markers
+        ]
+        sights = [
+            MarkerSight(self.camera, patch, conditions, sensor, particles) for patch in patches
+        ]
         self._look = _Look(
             conditions=conditions,
             sensor=sensor,
             particles=particles,
-            sight=MarkerSight(self.camera, patch, self._marker_id, conditions, sensor, particles),
+            sight=BoardSight(sights),
             decay=(-conditions.extinction_per_m * self._stretch).astype(np.float32),
             air=airlight.astype(np.uint8),
             veil=np.round(veil).astype(np.uint8).reshape(1, 256, 3),
@@ -233,7 +234,7 @@ class Renderer:
 
     def marker_side_px(self, height_m: float) -> float:
         """Side in pixels of the marker seen from straight above."""
-        return self.camera.focal_px * MARKER_SIDE_M / height_m
+        return self.camera.focal_px * self.pad.spec.side_m / height_m
 
     def _ground_image(self, scene: _Scene) -> NDArray[np.uint8]:
         view, ground, footprint = scene.view, _painted(scene.ground), scene.footprint_m
@@ -253,10 +254,7 @@ class Renderer:
         return np.asarray(cv2.cvtColor(image, cv2.COLOR_RGBA2RGB), dtype=np.uint8)
 
     def _marker_polygon(self, view: View) -> Array:
-        half = MARKER_SIDE_M / 2
-        x, y = self.marker_m
-        corners = [(x - half, y + half), (x + half, y + half), (x + half, y - half)]
-        return view.ground_polygon(np.array([*corners, (x - half, y - half)]))
+        return view.ground_polygon(np.array(self.pad.main.outline_m))
 
     def _marker_segment(self, segmentation: NDArray[np.int32], view: View) -> tuple[slice, slice]:
         """Draw the marker's segment; return the rows and columns that hold it."""

@@ -4,12 +4,7 @@ from __future__ import annotations
 
 from pytest_garl.landing_system import Airframe, Mission
 from pytest_garl.scenarios.maps.map import Map
-from pytest_garl.scenarios.placement import (
-    MARKER_DICTIONARY,
-    MARKER_SIDE_M,
-    TARGET_MARKER_ID,
-    told_position_m,
-)
+from pytest_garl.scenarios.placement import told_position_m
 from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.scenarios.start import start_m
 
@@ -19,13 +14,15 @@ SEARCH_ALTITUDE_M = 10.0
 
 def mission_for(scenario: Scenario, map: Map, airframe: Airframe, time_limit_s: float) -> Mission:
     """Return the mission that the landing system gets before take-off."""
+    marker = scenario.task.marker
     return Mission(
         gps_position_m=told_position_m(scenario, map),
         home_m=start_m(scenario, map),
         search_altitude_m=SEARCH_ALTITUDE_M,
-        marker_id=TARGET_MARKER_ID,
-        marker_side_m=MARKER_SIDE_M,
-        marker_dictionary=MARKER_DICTIONARY,
+        marker_id=marker.id,
+        marker_side_m=marker.side_m,
+        marker_dictionary=marker.dictionary,
+        nested_markers=marker.nested,
         camera=airframe.camera,
         time_limit_s=time_limit_s,
     )

@@ -27,9 +27,11 @@ from landing_systems.training.tphyolo.scenes import (
 )
 from landing_systems.training.tphyolo.scoring import mission, observation_of, score
 from pytest_garl import Observation
+from pytest_garl.fiducial import MarkerSpec
 from pytest_garl.scenarios.chromosome import decode
 from pytest_garl.scenarios.genes import genome_for
 from pytest_garl.scenarios.maps.map import load_map
+from pytest_garl.scenarios.task import Task
 from pytest_garl.simulation.camera.projection import View
 from pytest_garl.simulation.camera.renderer import Renderer
 
@@ -43,7 +45,8 @@ def renderer(number: int = 0, genes: Mapping[str, float] = NONE) -> Renderer:
     genome = genome_for(map, weather="full")
     scenario = decode(genome.nominal, genome, map="lawn", seed=1)
     scenario = scenario.replace({f"environment.{name}": value for name, value in genes.items()})
-    return Renderer(scenario, map, CAMERA, np.random.default_rng(0), marker_id=number)
+    scenario = dataclasses.replace(scenario, task=Task(marker=MarkerSpec(id=number)))
+    return Renderer(scenario, map, CAMERA, np.random.default_rng(0))
 
 
 def observed(

@@ -1,13 +1,17 @@
 from __future__ import annotations
 
+import dataclasses
+
 import cv2
 import numpy as np
 import pytest
 
+from pytest_garl.fiducial import MarkerSpec
 from pytest_garl.scenarios.chromosome import decode
 from pytest_garl.scenarios.genes import WEATHER, genome_for
 from pytest_garl.scenarios.maps.map import map_names
 from pytest_garl.scenarios.placement import marker_position_m
+from pytest_garl.scenarios.task import Task
 from pytest_garl.scenarios.validity import repair
 from pytest_garl.simulation.camera.frame import Frame
 from pytest_garl.simulation.camera.renderer import Renderer
@@ -84,7 +88,8 @@ def test_another_marker_is_drawn_where_asked() -> None:
     _, map = renderer()
     genome = genome_for(map, weather="full")
     scenario = repair(decode(genome.nominal, genome, map="lawn", seed=0), map)
-    other = Renderer(scenario, map, CAMERA, np.random.default_rng(0), marker_id=7)
+    scenario = dataclasses.replace(scenario, task=Task(marker=MarkerSpec(id=7)))
+    other = Renderer(scenario, map, CAMERA, np.random.default_rng(0))
     x, y = other.marker_m
     image = other.render((x, y, 3.0), LEVEL, 0.0, [((50.0, 50.0, 0.0), 0.0)] * 3).image
     detector = cv2.aruco.ArucoDetector(cv2.aruco.getPredefinedDictionary(cv2.aruco.DICT_5X5_50))
