@@ -40,7 +40,7 @@ class Oracle:
         plans = [wait for wait in WAITS_S if self._hits(situation, wait)]
         if plans:
             return self._towards(situation, 1.0) if plans[0] == 0 else STAY
-        top = situation.self.type.top_m
+        top = situation.self.top_m
         # Be as far away as it takes to arrive when the UAV has come down.
         falls_s = max(0.0, height - UAV_BOTTOM_M - top) / max(0.5, -situation.uav_velocity_mps[2])
         wanted = max(LURK_M, 0.8 * situation.self.speed_mps * falls_s)
@@ -62,7 +62,7 @@ class Oracle:
     def _hits(self, situation: Situation, wait_s: float) -> bool:
         """Forecast a straight run at the UAV after a wait."""
         me = situation.self
-        top, bottom = me.type.top_m, me.type.bottom_m
+        top, bottom = me.top_m, me.bottom_m
         ux, uy, height = situation.uav_position_m
         climb = situation.uav_velocity_mps[2]
         gap = math.dist(me.position_m[:2], (ux, uy))

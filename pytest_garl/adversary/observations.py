@@ -197,7 +197,7 @@ def in_own_frame(situation: Situation, x: float, y: float) -> tuple[float, float
 
 def _step_and_heights(situation: Situation) -> tuple[float, float, float]:
     """Return the NPC's way in one decision, and the heights of its top and bottom."""
-    body = situation.self.type
+    body = situation.self
     return (
         situation.self.speed_mps * DECISION_STEP_S / STEP_SCALE_M,
         body.top_m / BODY_SCALE_M,

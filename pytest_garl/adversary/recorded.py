@@ -110,7 +110,10 @@ class _Exit:
     def decide(self, situation: Situation) -> Move:
         """Return the next move: at full speed until the NPC has left the landing zone."""
         x, y, _ = situation.self.position_m
-        if math.dist((x, y), situation.marker_position_m) >= LANDING_ZONE_M:
+        me = situation.self
+        # A bird that stays where it is circles there.
+        circle_m = 2 * me.type.turn_radius_m if me.speed_mps > 0 else 0.0
+        if math.dist((x, y), situation.marker_position_m) >= LANDING_ZONE_M + circle_m:
             return STAY
         least = _STUCK * situation.self.speed_mps * DECISION_STEP_S
         stuck = self._place is not None and math.dist((x, y), self._place) < least

@@ -10,8 +10,12 @@ ARRIVED_M = 0.5
 
 
 def arrived(goal: tuple[float, float], situation: Situation) -> bool:
-    """Whether a position is within half a metre, or within the stride of one decision."""
-    reach = max(ARRIVED_M, DECISION_STEP_S * situation.self.speed_mps)
+    """Whether a position is within half a metre, the stride of one decision, or the narrowest turn.
+
+    A bird would circle around a place within its narrowest turn.
+    """
+    me = situation.self
+    reach = max(ARRIVED_M, DECISION_STEP_S * me.speed_mps, me.type.turn_radius_m)
     return math.dist(situation.self.position_m[:2], goal) < reach
 
 

@@ -147,14 +147,19 @@ class EscapeModel:
                     npc.policy.reset(situation, rng)
                 npc.decide(situation)
         self._place(npcs, self._index)
+        for npc, item in zip(npcs, chase.flight.objects, strict=True):
+            speeds = np.hypot(*item.track.velocity_mps[: self._index, :2].T)
+            npc.has_run(speeds.tolist(), TICKS_PER_SAMPLE * TICK_S)
         return npcs
 
     def _place(self, npcs: Sequence[Npc], index: int) -> None:
         for npc, item in zip(npcs, self._chase.flight.objects, strict=True):
-            npc.x_m, npc.y_m = (float(value) for value in item.track.position_m[index, :2])
-            npc.vx_mps, npc.vy_mps = (float(value) for value in item.track.velocity_mps[index, :2])
+            (x, y), (vx, vy) = (
+                (float(value) for value in values[index, :2])
+                for values in (item.track.position_m, item.track.velocity_mps)
+            )
             _, _, sine, cosine = (float(value) for value in item.track.attitude[index])
-            npc.yaw_rad = 2 * math.atan2(sine, cosine)
+            npc.place((x, y), (vx, vy), 2 * math.atan2(sine, cosine))
 
     def _first_motion(self) -> Motion:
         """Return the UAV's motion at the takeover: the sample before it, moved on."""

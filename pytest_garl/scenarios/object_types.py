@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
@@ -13,27 +14,65 @@ from pytest_garl.scenarios.bodies import Part, quaternion_of
 class ObjectType:
     """One kind of moving being.
 
-    ``altitude_m`` is the height of the body's frame above the ground (0 for those that
-    walk, the body's middle for those that fly); ``radius_m`` and ``height_m`` bound the parts.
+    It moves in the direction that it faces.  ``acceleration_mps2`` and ``braking_mps2`` bound how
+    fast its speed changes.  It turns on the spot at up to ``turn_rate_radps``, and on the move no
+    faster than ``lateral_mps2`` allows.  ``least_speed_mps`` is the speed below which it falls from
+    the air, 0 for those that walk.  It runs faster than ``sustained_speed_mps`` only in bursts:
+    for ``burst_m`` metres more than it goes at that speed in the same time.
+
+    ``altitude_m`` is the height of the body's frame above the ground, unless the scenario gives
+    another (0 for those that walk, the body's middle for those that fly); ``radius_m`` and
+    ``height_m`` bound the parts.
     """
 
     name: str
     top_speed_mps: float
     acceleration_mps2: float
+    braking_mps2: float
+    lateral_mps2: float
+    turn_rate_radps: float
     radius_m: float
     height_m: float
     altitude_m: float
     parts: tuple[Part, ...]
+    least_speed_mps: float = 0.0
+    sustained_speed_mps: float = math.inf
+    burst_m: float = 0.0
+
+    @property
+    def flies(self) -> bool:
+        """Whether it flies; then it never stops in the air."""
+        return self.least_speed_mps > 0
+
+    @property
+    def low_m(self) -> float:
+        """Height of the lowest point above the body's frame."""
+        return -self.height_m / 2 if self.flies else 0.0
 
     @property
     def bottom_m(self) -> float:
-        """Height of the lowest point above the ground."""
-        return self.altitude_m - self.height_m / 2 if self.altitude_m > 0 else 0.0
+        """Height of the lowest point above the ground at the type's own altitude."""
+        return self.altitude_m + self.low_m
 
     @property
     def top_m(self) -> float:
-        """Height of the highest point above the ground."""
+        """Height of the highest point above the ground at the type's own altitude."""
         return self.bottom_m + self.height_m
+
+    @property
+    def sitting_m(self) -> float:
+        """Height of the body's frame above the ground while it sits or stands there."""
+        return -self.low_m
+
+    @property
+    def turn_radius_m(self) -> float:
+        """Radius of the narrowest turn that it can make without stopping."""
+        return self.least_speed_mps**2 / self.lateral_mps2
+
+    def speed_mps(self, share: float) -> float:
+        """Return the speed for a share from 0 (it stays where it starts) to 1 (its top speed)."""
+        low = self.least_speed_mps if share > 0 else 0.0
+        return low + share * (self.top_speed_mps - low)
 
 
 def _limb(
@@ -106,8 +145,16 @@ OBJECT_TYPES: Mapping[str, ObjectType] = MappingProxyType(
                 # A jog: above the preferred walk-to-run transition of about 2 m/s
                 # (Diedrich and Warren 1995); the paper's code moves persons at 3 m/s.
                 top_speed_mps=3.0,
-                # Engineering estimate: from standing to jogging within about a second.
-                acceleration_mps2=3.0,
+                # Free walkers reach 1.54 m/s with a relaxation time of 0.66 s (Liu et al. 2017):
+                # they start with 2.3 m/s².
+                acceleration_mps2=2.3,
+                # Walkers slow down from about 1.3 m/s within 0.58 s (Tavana et al. 2024).
+                braking_mps2=2.3,
+                # Changing the direction takes longer than starting (Liu et al. 2017), so it is no
+                # harder: a turn of 0.9 m radius at 1.4 m/s, and of 4 m radius at 3 m/s.
+                lateral_mps2=2.3,
+                # Engineering estimate: half a turn on the spot in a second.
+                turn_rate_radps=math.pi,
                 radius_m=0.40,
                 height_m=1.76,
                 altitude_m=0.0,
@@ -115,12 +162,24 @@ OBJECT_TYPES: Mapping[str, ObjectType] = MappingProxyType(
             ),
             ObjectType(
                 name="dog",
-                # A slow gallop of a medium dog; trot turns to gallop at some 3 to 4 m/s
-                # (it scales with mass^0.2: Heglund and Taylor 1988).
-                top_speed_mps=5.0,
+                # A gallop of a medium dog, half of a racing greyhound's 16 m/s
+                # (Usherwood and Wilson 2005).
+                top_speed_mps=8.0,
+                # A trot turns to a gallop at some 3 to 4 m/s (it scales with mass^0.2: Heglund and
+                # Taylor 1988).  Engineering estimate: a dog plays at full gallop for five seconds.
+                # Speed above what can be kept up draws on a reserve of distance that slower
+                # running fills again: the critical-speed model (Hughson et al. 1984).
+                sustained_speed_mps=4.0,
+                burst_m=20.0,
                 # Engineering estimate: well below a sprinting start, which pitching limits
                 # (Williams et al. 2009).
                 acceleration_mps2=5.0,
+                braking_mps2=6.0,
+                # Half of what greyhounds stand on a bend, where the force on their legs rises by
+                # 65 %, which is 1.3 g to the side (Usherwood and Wilson 2005).
+                lateral_mps2=6.4,
+                # Engineering estimate: once around on the spot in a second.
+                turn_rate_radps=2 * math.pi,
                 radius_m=0.58,
                 height_m=0.70,
                 altitude_m=0.0,
@@ -128,11 +187,18 @@ OBJECT_TYPES: Mapping[str, ObjectType] = MappingProxyType(
             ),
             ObjectType(
                 name="bird",
-                # Slow flight of a gull; its cruise is about 12 to 13 m/s
-                # (Alerstam et al. 2007), which no bird keeps up circling over a court.
-                top_speed_mps=8.0,
-                # Engineering estimate: a turn of 10 m radius at top speed.
-                acceleration_mps2=6.0,
+                # Cruise of a herring gull: 12.8 m/s (Alerstam et al. 2007).
+                top_speed_mps=13.0,
+                # The stall of a herring gull of 1 kg and 0.2 m² (Pennycuick 2008) with a largest
+                # lift coefficient of 1.6 (Tucker and Heine 1990): sqrt(2 m g / (rho S C)) = 7.1.
+                least_speed_mps=7.0,
+                # Engineering estimates: flapping harder, and spreading wings and tail to brake.
+                acceleration_mps2=3.0,
+                braking_mps2=5.0,
+                # g tan(40°): engineering estimate of the bank.  A turn at least speed has a radius
+                # of 6 m.
+                lateral_mps2=8.2,
+                turn_rate_radps=2 * math.pi,
                 radius_m=0.72,
                 height_m=0.20,
                 # Engineering estimate: above people, below roofs, where gulls beg.

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from pytest_garl.fiducial import MarkerSpec
 from pytest_garl.scenarios.maps.map import Map
-from pytest_garl.scenarios.object_types import OBJECT_TYPES
+from pytest_garl.scenarios.object_types import OBJECT_TYPES, ObjectType
 from pytest_garl.scenarios.scenario import Scenario
 
 PAPER_MARKER = MarkerSpec()
@@ -162,6 +162,18 @@ def start_genes(name: str, position_m: tuple[float, float], map: Map) -> dict[st
 
 
 def object_speed_mps(scenario: Scenario, map: Map, name: str) -> float:
-    """Return the largest speed of an object: its velocity gene times its type's top speed."""
-    kind = dict(map.present_objects)[name]
-    return scenario[f"{name}.velocity"] * OBJECT_TYPES[kind].top_speed_mps
+    """Return the largest speed of an object: what its velocity gene means for its type."""
+    return object_type(map, name).speed_mps(scenario[f"{name}.velocity"])
+
+
+def object_altitude_m(scenario: Scenario, map: Map, name: str) -> float:
+    """Return the height of an object's frame above the ground; what never moves sits there."""
+    kind = object_type(map, name)
+    if not kind.flies or object_speed_mps(scenario, map, name) == 0:
+        return kind.sitting_m
+    return scenario.get(f"{name}.height_m", kind.altitude_m)
+
+
+def object_type(map: Map, name: str) -> ObjectType:
+    """Return the type of an object of the map."""
+    return OBJECT_TYPES[dict(map.present_objects)[name]]

@@ -15,6 +15,7 @@ from pytest_garl.scenarios.placement import (
     MARKER_RADIUS_M,
     marker_genes,
     marker_position_m,
+    object_altitude_m,
     object_start_m,
     start_genes,
 )
@@ -171,6 +172,7 @@ def _start_problems(
     name, kind_name = map.present_objects[index]
     kind = OBJECT_TYPES[kind_name]
     reach = kind.radius_m + OBJECT_CLEARANCE_M
+    bottom_m = object_altitude_m(scenario, map, name) + kind.low_m
     x_min, x_max, y_min, y_max = map.bounds_m
     tolerance = 1e-9
     if not (
@@ -179,7 +181,7 @@ def _start_problems(
     ):
         yield f"{name} starts outside the map"
     for disc in discs:
-        overlaps = disc.low_m < kind.top_m and kind.bottom_m < disc.high_m
+        overlaps = disc.low_m < bottom_m + kind.height_m and bottom_m < disc.high_m
         if overlaps and math.hypot(at[0] - disc.x_m, at[1] - disc.y_m) < disc.radius_m + reach:
             yield f"{name} starts in or at {disc.name}"
             break

@@ -25,7 +25,7 @@ DECISION_STEP_S = 0.5
 class NpcState:
     """Ground truth about one NPC at a decision; positions (x, y, z) in metres.
 
-    ``speed_mps`` is the NPC's highest speed: its velocity gene times its type's top speed.
+    ``speed_mps`` is the NPC's highest speed: what its velocity gene means for its type.
     ``position_m`` is that of the body's frame.
     """
 
@@ -34,6 +34,16 @@ class NpcState:
     position_m: tuple[float, float, float]
     velocity_mps: tuple[float, float]
     speed_mps: float
+
+    @property
+    def bottom_m(self) -> float:
+        """Height of its lowest point above the ground."""
+        return self.position_m[2] + self.type.low_m
+
+    @property
+    def top_m(self) -> float:
+        """Height of its highest point above the ground."""
+        return self.bottom_m + self.type.height_m
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -75,7 +75,7 @@ def _in_cylinder(item: ObjectRecord, marker_m: tuple[float, float]) -> NDArray[n
     """Whether an object is in the safety cylinder at each time of its track."""
     kind = OBJECT_TYPES.get(item.type)
     radius_m = kind.radius_m if kind else 0.0
-    bottom_m = kind.bottom_m - kind.altitude_m if kind else 0.0
+    bottom_m = kind.low_m if kind else 0.0
     x, y, z = item.track.position_m.T
     near = np.hypot(x - marker_m[0], y - marker_m[1]) - radius_m < CYLINDER_M
     inside: NDArray[np.bool_] = near & (z + bottom_m < CYLINDER_TOP_M)

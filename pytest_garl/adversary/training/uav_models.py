@@ -146,7 +146,7 @@ class AvoidingPilot(StraightPilot):
 
     def _is_close_below(self, item: TruthObject, position: tuple[float, ...]) -> bool:
         """Whether an NPC is closely below, and inside the camera's view."""
-        below = position[2] - item.type.top_m
+        below = position[2] - item.top_m
         dx, dy = abs(item.position_m[0] - position[0]), abs(item.position_m[1] - position[1])
         reach = item.type.radius_m
         if not 0 < below < self._avoidance.below_m:

@@ -1,4 +1,4 @@
-"""Motion of the dynamic objects: bounded in speed and acceleration, and around solid bodies."""
+"""Motion of the dynamic objects: within the limits of their bodies, and around solid ones."""
 
 from __future__ import annotations
 
@@ -7,8 +7,12 @@ from collections.abc import Sequence
 
 from pytest_garl.scenarios.bodies import Body
 from pytest_garl.scenarios.maps.map import Map
-from pytest_garl.scenarios.object_types import OBJECT_TYPES
-from pytest_garl.scenarios.placement import object_speed_mps, object_start_m
+from pytest_garl.scenarios.placement import (
+    object_altitude_m,
+    object_speed_mps,
+    object_start_m,
+    object_type,
+)
 from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.scenarios.validity import Disc, discs_of
 from pytest_garl.simulation.npc_policy import (
@@ -19,39 +23,53 @@ from pytest_garl.simulation.npc_policy import (
     Situation,
     decision,
 )
+from pytest_garl.simulation.physics.locomotion import (
+    STANDING_MPS,
+    is_far_out,
+    limit_mps,
+    next_course,
+    reserve_after,
+    to_the_middle,
+)
+from pytest_garl.simulation.physics.solids_ahead import course_around, free_velocity, gap_m
 
 _LOOK_AHEAD_M = 0.5
 _CONTACT_RANGE_M = 2.0
 """No two objects farther apart can touch in the next 1/60 s: more than the sum of two radii and of
 both ways in that time."""
-TURN_RATE_RADPS = 2 * math.pi
-"""A person or an animal turns around on the spot in about a second: engineering estimate."""
 
 
 class Npc:
     """One dynamic object of one flight."""
 
     def __init__(self, scenario: Scenario, map: Map, name: str, policy: NpcPolicy) -> None:
-        kind = dict(map.present_objects)[name]
         self.name = name
-        self.type = OBJECT_TYPES[kind]
+        self.type = object_type(map, name)
         self.policy = policy
         self.speed_mps = object_speed_mps(scenario, map, name)
         self.x_m, self.y_m = object_start_m(scenario, map, name)
-        self.vx_mps = self.vy_mps = 0.0
-        self.yaw_rad = 0.0
+        self.z_m = object_altitude_m(scenario, map, name)
+        self.flies = self.type.flies and self.speed_mps > 0
+        self._bounds = map.bounds_m
+        self.vx_mps = self.vy_mps = self.yaw_rad = 0.0
+        if self.flies:
+            self.yaw_rad = to_the_middle((self.x_m, self.y_m), self._bounds)
+            least = self.type.least_speed_mps
+            self.vx_mps = least * math.cos(self.yaw_rad)
+            self.vy_mps = least * math.sin(self.yaw_rad)
+        self._reserve_m = self.type.burst_m
         self.moves: list[tuple[float, float]] = []
         self.changes: list[tuple[int, str, float]] = []
         self._wanted_velocity_mps = (0.0, 0.0)
-        self._bounds = map.bounds_m
-        self.low_m, self.high_m = self.type.bottom_m, self.type.top_m
+        self.low_m = self.z_m + self.type.low_m
+        self.high_m = self.low_m + self.type.height_m
         self._solids = _solids_at_height_of(self, map.bodies)
         self._solids_in_reach: list[Disc] = []
 
     @property
     def position_m(self) -> tuple[float, float, float]:
         """Position of the body's frame in the world."""
-        return self.x_m, self.y_m, self.type.altitude_m
+        return self.x_m, self.y_m, self.z_m
 
     @property
     def body(self) -> Body:
@@ -89,33 +107,81 @@ class Npc:
         self.moves.append((x, y))
         self._wanted_velocity_mps = (x * self.speed_mps, y * self.speed_mps)
         # The few solids, mostly none, that it can reach before the next decision.
-        reach = self.type.radius_m + self.speed_mps * DECISION_STEP_S + _LOOK_AHEAD_M
+        ahead_m = max(_LOOK_AHEAD_M, 2 * self.type.turn_radius_m)
+        reach = self.type.radius_m + self.speed_mps * DECISION_STEP_S + ahead_m
         self._solids_in_reach = [
-            solid for solid in self._solids if _gap(solid, self.x_m, self.y_m) < reach
+            solid for solid in self._solids if gap_m(solid, (self.x_m, self.y_m)) < reach
         ]
 
     def advance(self, dt_s: float, others: Sequence[Npc] = ()) -> None:
-        """Accelerate towards the wanted velocity; slide along solids and ``others``."""
-        dvx, dvy = (
-            self._wanted_velocity_mps[0] - self.vx_mps,
-            self._wanted_velocity_mps[1] - self.vy_mps,
+        """Turn and accelerate towards the wanted velocity; slide along solids and ``others``."""
+        course, speed = next_course(
+            self.type,
+            (self.vx_mps, self.vy_mps),
+            self.yaw_rad,
+            self._wanted_now_mps(),
+            dt_s,
+            self.flies,
         )
-        change = math.hypot(dvx, dvy)
-        allowed = self.type.acceleration_mps2 * dt_s
-        share = min(1.0, allowed / change) if change > 0 else 0.0
-        vx, vy = self.vx_mps + share * dvx, self.vy_mps + share * dvy
+        self._reserve_m = reserve_after(self.type, self._reserve_m, speed, dt_s)
+        vx, vy = speed * math.cos(course), speed * math.sin(course)
         solids = [*self._solids_in_reach, *self._objects_in_reach(others)]
         if solids:
-            vx, vy = self._slide(vx, vy, dt_s, solids)
-        x_min, x_max, y_min, y_max = self._bounds
+            least = self.type.least_speed_mps if self.flies else 0.0
+            place, radius = (self.x_m, self.y_m), self.type.radius_m
+            vx, vy = free_velocity(place, (vx, vy), radius, least, dt_s, solids)
+        if math.hypot(vx, vy) > STANDING_MPS:
+            course = math.atan2(vy, vx)
+        turn = math.remainder(course - self.yaw_rad, 2 * math.pi)
+        largest_turn = self.type.turn_rate_radps * dt_s
+        self.yaw_rad += min(largest_turn, max(-largest_turn, turn))
+        self._move(vx, vy, dt_s)
+
+    def _wanted_now_mps(self) -> tuple[float, float]:
+        """Return the wanted velocity, as far as reserve, edge and what stands ahead allow."""
+        x, y = self._wanted_velocity_mps
+        asked = math.hypot(x, y)
+        limit = limit_mps(self.type, self._reserve_m)
+        if asked > limit:
+            x, y = x * limit / asked, y * limit / asked
+        if not self.flies:
+            return x, y
+        asked = max(asked, self.type.least_speed_mps)
+        if is_far_out((self.x_m, self.y_m), self._bounds):
+            course = to_the_middle((self.x_m, self.y_m), self._bounds)
+            return asked * math.cos(course), asked * math.sin(course)
+        if not self._solids_in_reach:
+            return x, y
+        place, course = (self.x_m, self.y_m), math.atan2(self.vy_mps, self.vx_mps)
+        passing = course_around(place, course, self.type, self._solids_in_reach)
+        if passing == course and (x or y):
+            course = math.atan2(y, x)
+            passing = course_around(place, course, self.type, self._solids_in_reach)
+        return (x, y) if passing == course else (math.cos(passing), math.sin(passing))
+
+    def _move(self, vx: float, vy: float, dt_s: float) -> None:
+        """Move on; walkers stop at the edge of the map."""
         x, y = self.x_m + vx * dt_s, self.y_m + vy * dt_s
-        self.x_m, self.y_m = min(x_max, max(x_min, x)), min(y_max, max(y_min, y))
+        x_min, x_max, y_min, y_max = self._bounds
+        if self.flies:
+            self.x_m, self.y_m = x, y
+        else:
+            self.x_m, self.y_m = min(x_max, max(x_min, x)), min(y_max, max(y_min, y))
         self.vx_mps = vx if self.x_m == x else 0.0
         self.vy_mps = vy if self.y_m == y else 0.0
-        if math.hypot(vx, vy) > 0.05:
-            turn = math.remainder(math.atan2(vy, vx) - self.yaw_rad, 2 * math.pi)
-            largest_turn = TURN_RATE_RADPS * dt_s
-            self.yaw_rad += min(largest_turn, max(-largest_turn, turn))
+
+    def place(
+        self, position_m: tuple[float, float], velocity_mps: tuple[float, float], yaw_rad: float
+    ) -> None:
+        """Put it somewhere in motion, as a record says."""
+        self.x_m, self.y_m = position_m
+        self.vx_mps, self.vy_mps = velocity_mps
+        self.yaw_rad = yaw_rad
+
+    def has_run(self, speeds_mps: Sequence[float], dt_s: float) -> None:
+        """Take in the speeds at which it ran before it was placed."""
+        for speed in speeds_mps:
+            self._reserve_m = reserve_after(self.type, self._reserve_m, speed, dt_s)
 
     def _objects_in_reach(self, others: Sequence[Npc]) -> list[Disc]:
         """Return the other objects that it could touch: near enough, and of overlapping heights."""
@@ -135,28 +201,6 @@ class Npc:
             and other.low_m < self.high_m
             and self.low_m < other.high_m
         ]
-
-    def _slide(
-        self, vx: float, vy: float, dt_s: float, solids: Sequence[Disc]
-    ) -> tuple[float, float]:
-        for solid in solids:
-            x, y = self.x_m + vx * dt_s, self.y_m + vy * dt_s
-            reach = solid.radius_m + self.type.radius_m
-            nx, ny = x - solid.x_m, y - solid.y_m
-            distance = math.hypot(nx, ny)
-            if 0 < distance < reach:
-                inward = (vx * nx + vy * ny) / distance
-                if inward < 0:
-                    vx, vy = vx - inward * nx / distance, vy - inward * ny / distance
-        x, y = self.x_m + vx * dt_s, self.y_m + vy * dt_s
-        for solid in solids:
-            if _gap(solid, x, y) < min(_gap(solid, self.x_m, self.y_m), self.type.radius_m):
-                return 0.0, 0.0
-        return vx, vy
-
-
-def _gap(solid: Disc, x: float, y: float) -> float:
-    return math.hypot(x - solid.x_m, y - solid.y_m) - solid.radius_m - 1e-9
 
 
 def _solids_at_height_of(npc: Npc, bodies: Sequence[Body]) -> tuple[Disc, ...]:

@@ -16,6 +16,11 @@ class TruthObject:
     velocity_mps: tuple[float, float]
     type: ObjectType
 
+    @property
+    def top_m(self) -> float:
+        """Height of its highest point above the ground."""
+        return self.position_m[2] + self.type.low_m + self.type.height_m
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Truth:
