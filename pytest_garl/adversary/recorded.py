@@ -106,6 +106,7 @@ class _Exit:
         self._heading = math.atan2(last[1], last[0]) if any(last) else _away(situation)
         self._place: tuple[float, float] | None = None
         self._waited, self._turns = 0, 0
+        self._has_left = False
 
     def decide(self, situation: Situation) -> Move:
         """Return the next move: at full speed until the NPC has left the landing zone."""
@@ -113,7 +114,9 @@ class _Exit:
         me = situation.self
         # A bird that stays where it is circles there.
         circle_m = 2 * me.type.turn_radius_m if me.speed_mps > 0 else 0.0
-        if math.dist((x, y), situation.marker_position_m) >= LANDING_ZONE_M + circle_m:
+        away_m = math.dist((x, y), situation.marker_position_m)
+        self._has_left |= away_m >= LANDING_ZONE_M + circle_m
+        if self._has_left:
             return STAY
         least = _STUCK * situation.self.speed_mps * DECISION_STEP_S
         stuck = self._place is not None and math.dist((x, y), self._place) < least

@@ -68,8 +68,11 @@ def test_a_recorded_npc_continues_over_the_marker_and_leaves(name: str) -> None:
     places = walked(((0.0, 1.0),) * 2, (0.0, -3.0), name=name)
     assert min(map(away, places)) < 1.5
     assert away(places[-1]) >= LANDING_ZONE_M
-    assert places[-1][1] > 0
-    assert places[-1] == places[-4], "it stands once it is out of the way"
+    assert name == "bird-1" or places[-1][1] > 0
+    if name == "bird-1":
+        assert min(map(away, places[-20:])) >= LANDING_ZONE_M, "it circles out of the way"
+    else:
+        assert places[-1] == places[-4], "it stands once it is out of the way"
 
 
 def test_a_standing_npc_leaves_away_from_the_marker() -> None:

@@ -46,7 +46,8 @@ def test_a_seed_repeats_its_episode_and_others_differ() -> None:
 
 @pytest.mark.sim
 def test_the_online_rival_changes_the_environment_that_it_sees() -> None:
-    env = SurrogateEnv(ONLINE)
+    # A bird would fly on while its policy changes the environment.
+    env = SurrogateEnv(dataclasses.replace(ONLINE, types=("person",)))
     starts = np.array([env.reset(seed=seed)[0] for seed in range(6)])
     # Weather, light and the marker's place are drawn anew for each episode.
     assert (starts[:, 4:].std(axis=0) > 0.05).all()
