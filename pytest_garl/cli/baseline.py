@@ -167,12 +167,14 @@ def scenario(file: Path, name: str) -> None:
     """Print one scenario of a baseline, such as court-17, as a file for pytest --garl-repeat."""
     from pytest_garl.baselines.file import load_baseline
     from pytest_garl.scenarios.files import dumps
+    from pytest_garl.scenarios.maps.map import load_map
 
     for each in load_baseline(file, (_maps_folder(),)).sets:
         for index, flight in enumerate(each.flights):
             if each.scenario_name(index) == name:
                 click.echo(f"# {name} of {file}; the NPC policy was {each.npcs}")
-                click.echo(dumps(flight.scenario), nl=False)
+                map = load_map(each.map, (_maps_folder(),))
+                click.echo(dumps(flight.scenario, map), nl=False)
                 return
     raise OptionError(f"{file}: found no scenario {name!r}, expected a name such as court-0")
 

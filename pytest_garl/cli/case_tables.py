@@ -47,7 +47,7 @@ def case_table(found: Iterable[CorpusEntry]) -> Table:
 def scenario_table(case: Case, map_folders: tuple[Path, ...]) -> Table:
     """Return a table of a case's scenario in words and physical units."""
     table = Table(box=None, header_style="bold")
-    for name in ("what", "value", "meaning"):
+    for name in ("what", "meaning"):
         table.add_column(name)
     for row in describe_scenario(case.scenario, map_folders):
         table.add_row(*(Text(cell) for cell in row))

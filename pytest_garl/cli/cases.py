@@ -192,7 +192,7 @@ def accept(project: _Project, files: tuple[Path, ...]) -> None:
     """
     found = [(file, project.case(file)) for file in files]
     for file, case in found:
-        replace_file(file, dataclasses.replace(case, accepted=True))
+        replace_file(file, dataclasses.replace(case, accepted=True), project.maps)
         _say(f"{file}: accepted; it is expected to fail ({case.violation.signature})")
 
 
@@ -219,7 +219,7 @@ def promote(project: _Project, file: Path) -> None:
             remarks.append(f"judged by {replayed.judged_by}")
     # What passes is not unpreventable.
     reason: NoGateReason = "edge" if case.edge else ""
-    replace_file(file, dataclasses.replace(case, status="fixed", reason=reason))
+    replace_file(file, dataclasses.replace(case, status="fixed", reason=reason), project.maps)
     _say(f"{file}: fixed; from now on it must pass")
     for line in remarks:
         _say(line)
@@ -261,7 +261,7 @@ def shrink(project: _Project, file: Path, flights: int, workers: int) -> None:
     if result.case is None:
         _say(f"{file}: {result.reason} ({spent}); it stays as it is")
         return
-    path = replace_file(file, result.case)
+    path = replace_file(file, result.case, project.maps)
     evidence = result.case.evidence
     renewed = result.case.id == case.id
     done = "its evidence is renewed" if renewed else f"removed {evidence.removed} in all"

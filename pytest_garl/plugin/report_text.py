@@ -150,11 +150,11 @@ def _scenario(config: pytest.Config, run: Run, target: Target) -> list[str]:
     from pytest_garl.regressions.description import describe_scenario
 
     scenario = run.scenario(target)
-    genes = [
-        meaning if gene.startswith("environment.") else f"{gene} {meaning}"
-        for gene, _, meaning in describe_scenario(scenario, run.options.map_folders)
+    parts = [
+        f"{subject} {words}" if words.startswith(("at ", "a ")) else words
+        for subject, words in describe_scenario(scenario, run.options.map_folders)
     ]
-    return [f"Scenario (seed {scenario.seed}): {'; '.join(genes)}"]
+    return [f"Scenario (seed {scenario.seed}): {'; '.join(parts)}"]
 
 
 def _share(reflights: Reflights) -> str:

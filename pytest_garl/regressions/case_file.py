@@ -36,7 +36,7 @@ from pytest_garl.regressions.case_header import (
     keys_of,
     read_header,
 )
-from pytest_garl.scenarios.files import gene_lines, read_genes
+from pytest_garl.scenarios.files import SCENARIO_KEYS, read_scenario, scenario_lines
 from pytest_garl.scenarios.maps.map import Map, load_map
 from pytest_garl.scenarios.task import task_lines
 from pytest_garl.verdicts.verdict import (
@@ -53,7 +53,6 @@ _SECTIONS = {
     "violation",
     "preventable",
     "limits",
-    "genes",
     "task",
     "policy",
     "moves",
@@ -73,16 +72,17 @@ def load_header(path: Path) -> CaseHeader:
     return read_header(Table(parse(header, str(path)), str(path)))
 
 
-def dump_case(case: Case) -> str:
+def dump_case(case: Case, load_map: Callable[[str], Map] = load_map) -> str:
     """Return the case as TOML: the same bytes for equal cases."""
+    map = load_map(case.scenario.map)
     sections = [
-        header_lines(case),
+        header_lines(case, map),
         _violation_lines(case.violation),
         *_prevention_lines(case.prevention),
         _limits_lines(case.limits),
         [
-            "# Weather from 0 to 1, places from -1 to 1, velocity as a share of the top speed.",
-            *gene_lines(case.scenario)[1:],
+            "# What is not nominal; each name ends with its unit, x is east and y north.",
+            *scenario_lines(case.scenario, map)[1:],
             *task_lines(case.scenario.task),
         ],
         _policy_lines(case),
@@ -96,12 +96,12 @@ def parse_case(text: str, load_map: Callable[[str], Map], *, source: str = "case
     """Return the case in ``text``; raise ScenarioError that names source and key."""
     top = Table(parse(text, source), source)
     header = read_header(top)
-    top.refuse_unknown(keys_of(header) | _SECTIONS)
+    top.refuse_unknown(keys_of(header) | _SECTIONS | {*SCENARIO_KEYS})
     try:
         map = load_map(header.map)
     except ScenarioError as error:
         raise top.error("map", str(error)) from error
-    scenario = read_genes(top, map)
+    scenario = read_scenario(top, map)
     removed = scenario.removed_objects
     names = [name for name, _ in map.all_objects if name not in removed]
     policy = top.table("policy")
@@ -132,9 +132,10 @@ def record_lines(case: Case) -> list[str]:
     return [*move_lines(case.behaviour), *change_lines(case.behaviour)]
 
 
-def size_of(case: Case) -> int:
+def size_of(case: Case, map: Map) -> int:
     """Return how many characters the scenario and the recorded behaviour take in the file."""
-    return sum(len(line) for line in (*gene_lines(case.scenario), *record_lines(case)))
+    lines = (*scenario_lines(case.scenario, map), *record_lines(case))
+    return sum(len(line) for line in lines)
 
 
 def _reason(header: CaseHeader, evidence: Evidence) -> NoGateReason:

@@ -10,11 +10,13 @@ from pytest_garl.execution.reference import SYSTEM_NAME
 from pytest_garl.files.toml import Table, quoted
 from pytest_garl.messages import shown
 from pytest_garl.regressions.case import Case, NoGateReason, Status, asserting_test
+from pytest_garl.scenarios.files import absent_line
+from pytest_garl.scenarios.maps.map import Map
 
 SCHEMA = 2
 FIRST_SCHEMA = 1
 """Files of it are read; new ones are written in today's schema."""
-_KEYS = {"schema", "system", "status", "accepted", "map", "seed", "test", "assertion", "absent"}
+_KEYS = {"schema", "system", "status", "accepted", "map", "seed", "test", "assertion"}
 _KEYS_OF_SCHEMA = {1: {"avoidable"}, 2: {"gates", "reason", "live"}}
 _WIDTH = 98
 _STATUSES: dict[int, dict[str, Status]] = {
@@ -41,7 +43,7 @@ def keys_of(header: CaseHeader) -> set[str]:
     return _KEYS | _KEYS_OF_SCHEMA[header.schema]
 
 
-def header_lines(case: Case) -> list[str]:
+def header_lines(case: Case, map: Map) -> list[str]:
     """Return the lines above the first table."""
     text, scenario = case.violation.description, case.scenario
     description = "".join(char if char.isprintable() else " " for char in text)
@@ -60,10 +62,7 @@ def header_lines(case: Case) -> list[str]:
         lines.append(f"test = {quoted(case.test)}")
     if case.assertion:
         lines.append(f"assertion = {quoted(case.assertion)}")
-    if scenario.removed_objects:
-        names = ", ".join(quoted(name) for name in scenario.removed_objects)
-        lines.append(f"absent = [{names}]")
-    return lines
+    return [*lines, *absent_line(scenario, map)]
 
 
 def read_header(top: Table) -> CaseHeader:

@@ -16,6 +16,7 @@ from pytest_garl.messages import printable
 from pytest_garl.regressions.case import Case
 from pytest_garl.regressions.case_file import dump_case, load_case, load_header
 from pytest_garl.regressions.case_header import CaseHeader
+from pytest_garl.scenarios.maps.map import load_map
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -118,13 +119,16 @@ class Corpus:
             if self._find(case) is not None:
                 return None
             self._listed.pop(folder, None)
-            return write_text_atomically(folder / f"{case.id}.toml", dump_case(case))
+            return write_text_atomically(folder / f"{case.id}.toml", self._text(case))
+
+    def _text(self, case: Case) -> str:
+        return dump_case(case, lambda name: load_map(name, self.map_folders))
 
     def save_patch(self, case: Case, patches: Path, root: Path) -> Path:
         """Write a patch that adds the case; the tree itself is left alone."""
         path = self._folder_of(case.system) / f"{case.id}.toml"
         try:
-            text = patch_of(path, root, dump_case(case))
+            text = patch_of(path, root, self._text(case))
         except ValueError as error:
             raise CorpusError(
                 f"{self.folder}: lies outside of the project at {root}: no patch"
@@ -178,10 +182,13 @@ class Corpus:
         return known
 
 
-def replace_file(path: Path, case: Case) -> Path:
+def replace_file(path: Path, case: Case, map_folders: tuple[Path, ...] = ()) -> Path:
     """Write a case in place of the one in ``path``, under the name that it should have."""
     with locked(path.parent):
-        written = write_text_atomically(path.with_name(f"{case.id}.toml"), dump_case(case))
+        written = write_text_atomically(
+            path.with_name(f"{case.id}.toml"),
+            dump_case(case, lambda name: load_map(name, map_folders)),
+        )
         if written != path:
             path.unlink(missing_ok=True)
         return written

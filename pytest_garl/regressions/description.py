@@ -7,7 +7,6 @@ from pathlib import Path
 
 import numpy as np
 
-from pytest_garl.regressions.simplification import genome_of
 from pytest_garl.scenarios.maps.map import load_map
 from pytest_garl.scenarios.placement import (
     marker_position_m,
@@ -16,7 +15,7 @@ from pytest_garl.scenarios.placement import (
     object_start_m,
 )
 from pytest_garl.scenarios.scenario import Scenario
-from pytest_garl.simulation.camera.weather import in_units
+from pytest_garl.scenarios.units import conditions_in_words
 from pytest_garl.simulation.flight import Flight, ObjectRecord
 from pytest_garl.simulation.physics.vehicle import up_m
 from pytest_garl.verdicts.verdict import Verdict
@@ -67,23 +66,17 @@ def _article(word: str) -> str:
     return "An" if word[0] in "aeiou" else "A"
 
 
-def describe_scenario(
-    scenario: Scenario, map_folders: tuple[Path, ...]
-) -> list[tuple[str, str, str]]:
-    """Return what is off nominal as (gene, value, meaning in physical units)."""
+def describe_scenario(scenario: Scenario, map_folders: tuple[Path, ...]) -> list[tuple[str, str]]:
+    """Return what is off nominal as (subject, words), in physical units."""
     map = load_map(scenario.map, map_folders)
-    rows = [
-        (item.key, f"{scenario[item.key]:.3g}", in_units(item.key, scenario[item.key]))
-        for item in genome_of(scenario, map).properties
-        if item.key.startswith("environment.") and scenario[item.key] != item.nominal
-    ]
+    rows = conditions_in_words(scenario, map)
     x, y = marker_position_m(scenario, map)
-    rows.append(("marker", "", f"at ({x:.1f}, {y:.1f}) m, east and north"))
+    rows.append(("marker", f"at ({x:.1f}, {y:.1f}) m, east and north"))
     for name, kind in map.without(scenario.removed_objects).present_objects:
         x, y = object_start_m(scenario, map, name)
         speed = object_speed_mps(scenario, map, name)
         way = f"from ({x:.1f}, {y:.1f}) m"
         goal = object_destination_m(scenario, map, name)
         way += f" to ({goal[0]:.1f}, {goal[1]:.1f}) m and back" if goal else ""
-        rows.append((name, "", f"a {kind} of up to {speed:.2f} m/s, {way}"))
+        rows.append((name, f"a {kind} of up to {speed:.2f} m/s, {way}"))
     return rows

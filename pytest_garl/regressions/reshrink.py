@@ -286,5 +286,5 @@ def is_simpler(case: Case, saved: Case, map: Map, *, outdated: bool) -> bool:
     """
     one, other = simplicity(case, map), simplicity(saved, map, outdated=outdated)
     if one == other:
-        return size_of(case) < size_of(saved)
+        return size_of(case, map) < size_of(saved, map)
     return no_worse(one, other)

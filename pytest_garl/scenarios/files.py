@@ -12,38 +12,60 @@ from pytest_garl.files.reading import read_text
 from pytest_garl.files.toml import Table, parse, quoted
 from pytest_garl.messages import shown
 from pytest_garl.scenarios.genes import genome_like
-from pytest_garl.scenarios.groups.catalogue import GROUPS, PARAMETERS
+from pytest_garl.scenarios.groups.catalogue import GROUPS
 from pytest_garl.scenarios.maps.map import Map
 from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.scenarios.task import Task, read_task, task_lines
+from pytest_garl.scenarios.units import from_sections, ranges_of, sections_of, snapped
 
-SCHEMA = 1
+SCHEMA = 2
+FIRST_SCHEMA = 1
+"""Files of it state genes without unit, under ``genes``.  They are read."""
 
 
-def dumps(scenario: Scenario) -> str:
+def dumps(scenario: Scenario, map: Map) -> str:
     """Return the scenario as TOML: the same bytes for equal scenarios."""
     lines = [
-        "# A scenario of pytest-garl. Genes are without unit: weather 0 to 1, places -1 to 1,",
-        "# velocity as a share of the type's top speed; others have their unit in their name.",
+        "# A scenario of pytest-garl: the marker, the objects that are there, and what is not",
+        "# nominal.  Each name ends with its unit; x is east and y north of the map's centre.",
         f"schema = {SCHEMA}",
         f"map = {quoted(scenario.map)}",
         f"seed = {scenario.seed}",
+        *absent_line(scenario, map),
     ]
-    if scenario.removed_objects:
-        names = ", ".join(quoted(name) for name in scenario.removed_objects)
-        lines.append(f"absent = [{names}]")
-    return "\n".join([*lines, *task_lines(scenario.task), *gene_lines(scenario)]) + "\n"
+    return "\n".join([*lines, *scenario_lines(scenario, map), *task_lines(scenario.task)]) + "\n"
 
 
-def gene_lines(scenario: Scenario) -> list[str]:
-    """Return the lines of a file that hold the genes, one table per subject.
+def absent_line(scenario: Scenario, map: Map) -> list[str]:
+    """Return the line that names the removed objects; files in units need none."""
+    if not scenario.removed_objects or is_in_units(scenario, map):
+        return []
+    names = ", ".join(quoted(name) for name in scenario.removed_objects)
+    return [f"absent = [{names}]"]
 
-    A condition with its nominal value has no line.
+
+def is_in_units(scenario: Scenario, map: Map) -> bool:
+    """Return whether a file in physical units has exactly the scenario's values.
+
+    A scenario of the first schema has genes of any number of digits; it keeps them.
     """
+    return snapped(scenario, map) == scenario
+
+
+def scenario_lines(scenario: Scenario, map: Map) -> list[str]:
+    """Return the lines of a file that hold the scenario's values, one table per subject."""
+    if not is_in_units(scenario, map):
+        return _gene_lines(scenario)
+    lines = []
+    for head, values in sections_of(scenario, map).items():
+        lines += ["", f"[scenario.{head}]"]
+        lines += [f"{name} = {value!r}" for name, value in values.items()]
+    return lines
+
+
+def _gene_lines(scenario: Scenario) -> list[str]:
     lines, section = [], ""
     for key, value in scenario.genes:
-        if key in PARAMETERS and value == PARAMETERS[key].nominal:
-            continue
         head, _, name = key.partition(".")
         if head != section:
             lines += ["", f"[genes.{head}]"]
@@ -53,21 +75,65 @@ def gene_lines(scenario: Scenario) -> list[str]:
 
 
 def loads(text: str, map: Map, *, source: str = "scenario") -> Scenario:
-    """Return the scenario in ``text``, which must name exactly the genes of its map.
-
-    Weather may use the full range.  Raises ScenarioError that names source and key.
-    """
+    """Return the scenario in ``text``; raise ScenarioError that names source and key."""
     top = Table(parse(text, source), source)
-    top.refuse_unknown({"schema", "map", "seed", "absent", "genes", "task"})
-    if top.integer("schema") != SCHEMA:
-        raise top.error("schema", f"found {shown(top.get('schema'))}, expected {SCHEMA}")
+    top.refuse_unknown({"schema", "map", "seed", *SCENARIO_KEYS})
+    if top.integer("schema") not in (FIRST_SCHEMA, SCHEMA):
+        found = shown(top.get("schema"))
+        raise top.error("schema", f"found {found}, expected {FIRST_SCHEMA} or {SCHEMA}")
     if top.string("map") != map.name:
         raise top.error("map", f"found {shown(top.string('map'))}, expected {map.name!r}")
-    return read_genes(top, map)
+    return read_scenario(top, map)
 
 
-def read_genes(top: Table, map: Map) -> Scenario:
-    """Return the scenario in a document's ``seed``, ``absent``, ``genes`` and ``task``."""
+SCENARIO_KEYS = ("absent", "genes", "scenario", "task")
+"""Keys of a document that :func:`read_scenario` reads."""
+
+
+def read_scenario(top: Table, map: Map) -> Scenario:
+    """Return the scenario in a document's ``scenario``, or in its ``genes`` and ``absent``."""
+    if "genes" in top.values and "scenario" in top.values:
+        raise top.error("genes", "found tables 'genes' and 'scenario', expected one of them")
+    if "genes" in top.values:
+        return _read_genes(top, map)
+    sections = top.table("scenario")
+    objects = dict(map.all_objects)
+    sections.refuse_unknown({"weather", "light", "marker", *objects, *GROUPS})
+    present = [name for name in objects if name in sections.values]
+    like = Scenario(
+        map=map.name,
+        seed=top.integer("seed"),
+        genes=(),
+        removed_objects=tuple(sorted({*objects} - {*present})),
+        task=read_task(top),
+    )
+    values = {head: _read_section(sections.table(head), head, map) for head in sections.values}
+    if "marker" not in values:
+        raise sections.error("marker", "missing, expected the marker's place, x_m and y_m")
+    scenario = from_sections(values, like, map)
+    if not is_in_units(scenario, map):
+        # More digits than a file keeps, or a place beyond the ends of its range.
+        scenario = snapped(scenario, map)
+    return scenario
+
+
+def _read_section(table: Table, head: str, map: Map) -> dict[str, float]:
+    ranges = ranges_of(head, map)
+    optional = {name for name in ranges if name.startswith("destination_")}
+    table.refuse_unknown({*ranges})
+    required = {*ranges} - optional if head not in ("weather", *GROUPS) or head == "light" else ()
+    for name in required:
+        table.get(name)
+    if bool(optional & {*table.values}) and not optional <= {*table.values}:
+        table.get(next(iter(sorted(optional - {*table.values}))))
+    return {
+        name: table.number(name, low=low, high=high)
+        for name, (low, high) in ranges.items()
+        if name in table.values
+    }
+
+
+def _read_genes(top: Table, map: Map) -> Scenario:
     removed = top.strings("absent")
     try:
         map = map.without(removed)

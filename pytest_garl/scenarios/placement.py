@@ -152,12 +152,17 @@ def _over_bounds(scenario: Scenario, map: Map, place: str) -> tuple[float, float
 
 def start_genes(name: str, position_m: tuple[float, float], map: Map) -> dict[str, float]:
     """Return the start genes that put an object at ``position_m``, clipped to the bounds."""
+    return place_genes(f"{name}.start", position_m, map)
+
+
+def place_genes(place: str, position_m: tuple[float, float], map: Map) -> dict[str, float]:
+    """Return the genes of an NPC's start or destination, clipped to the map's bounds."""
     x_min, x_max, y_min, y_max = map.bounds_m
     x = 2 * (position_m[0] - x_min) / (x_max - x_min) - 1
     y = 2 * (position_m[1] - y_min) / (y_max - y_min) - 1
     return {
-        f"{name}.start_x": max(-1.0, min(1.0, x)),
-        f"{name}.start_y": max(-1.0, min(1.0, y)),
+        f"{place}_x": max(-1.0, min(1.0, x)),
+        f"{place}_y": max(-1.0, min(1.0, y)),
     }
 
 

@@ -54,10 +54,16 @@ class Scenario:
         """Return a copy in which the named properties have other values."""
         for key in values:
             self[key]
-        genes = tuple((name, float(values.get(name, value))) for name, value in self.genes)
-        named = {name for name, _ in genes}
-        added = [key for key in PARAMETERS if key in values and key not in named]
-        genes += tuple((key, float(values[key])) for key in added)
+        kept = {name: float(values.get(name, value)) for name, value in self.genes}
+        conditions = {
+            key: float(values.get(key, kept.get(key, each.nominal)))
+            for key, each in PARAMETERS.items()
+        }
+        genes = tuple(pair for pair in kept.items() if pair[0] not in PARAMETERS)
+        # In one order and without nominal ones, so that equal scenarios are equal values.
+        genes += tuple(
+            (key, value) for key, value in conditions.items() if value != PARAMETERS[key].nominal
+        )
         return dataclasses.replace(self, genes=genes)
 
     def without(self, *names: str) -> Scenario:

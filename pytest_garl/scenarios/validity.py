@@ -20,6 +20,7 @@ from pytest_garl.scenarios.placement import (
     start_genes,
 )
 from pytest_garl.scenarios.scenario import Scenario
+from pytest_garl.scenarios.units import PLACE_DIGITS, snapped
 
 UAV_REACH_M = 0.75
 MARGIN_M = 0.25
@@ -89,9 +90,11 @@ def problems(scenario: Scenario, map: Map) -> tuple[str, ...]:
 def repair(scenario: Scenario, map: Map) -> Scenario:
     """Return the scenario with each offending place moved to the nearest valid one.
 
-    A valid scenario comes back unchanged.  The marker is mended first, then the objects
-    in order, each against what is settled already.
+    Its values are those that a file can write.  A valid scenario of such values comes back
+    unchanged.  The marker is repaired first, then the objects in order, each against what is
+    settled already.
     """
+    scenario = snapped(scenario, map)
     map = map.without(scenario.removed_objects)
     discs = tuple(disc for body in map.bodies for disc in discs_of(body))
     marker = marker_position_m(scenario, map)
@@ -126,7 +129,8 @@ def _nearest(
         for step in range(_DIRECTIONS):
             angle = 2 * math.pi * step / _DIRECTIONS
             radius = ring * _RING_STEP_M
-            at = (origin[0] + radius * math.cos(angle), origin[1] + radius * math.sin(angle))
+            x, y = origin[0] + radius * math.cos(angle), origin[1] + radius * math.sin(angle)
+            at = round(x, PLACE_DIGITS), round(y, PLACE_DIGITS)
             if valid(at):
                 return at
         if ring * _RING_STEP_M > 200:

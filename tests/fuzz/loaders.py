@@ -114,12 +114,13 @@ def _load_plan(path: Path, rng: random.Random) -> None:
 def _scenarios() -> list[str]:
     genome = genome_for(_COURT)
     whole = decode(genome.nominal, genome, map="court", seed=1)
-    return [scenarios.dumps(whole), scenarios.dumps(whole.without("person-1"))]
+    return [scenarios.dumps(whole, _COURT), scenarios.dumps(whole.without("person-1"), _COURT)]
 
 
 def _load_scenario(path: Path, rng: random.Random) -> None:
     found = scenarios.load(path)
-    assert scenarios.loads(scenarios.dumps(found), maps.load_map(found.map)) == found
+    map = maps.load_map(found.map)
+    assert scenarios.loads(scenarios.dumps(found, map), map) == found
 
 
 def _weights(folder: Path, *, stamp: bool = True) -> Path:

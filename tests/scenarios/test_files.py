@@ -22,18 +22,18 @@ def test_conditions_survive_the_file_which_names_only_those_that_are_not_nominal
     genome = genome_for(COURT)
     plain = decode(genome.nominal, genome, map="court", seed=3)
     scenario = plain.replace({"wind.mean_mps": 4.5})
-    assert "[genes.wind]\nmean_mps = 4.5\n" in dumps(scenario)
-    assert loads(dumps(scenario), COURT) == scenario
-    assert dumps(plain.replace({"wind.mean_mps": 0.0})) == dumps(plain)
+    assert "[scenario.wind]\nmean_mps = 4.5\n" in dumps(scenario, COURT)
+    assert loads(dumps(scenario, COURT), COURT) == scenario
+    assert dumps(plain.replace({"wind.mean_mps": 0.0}), COURT) == dumps(plain, COURT)
 
 
 def test_a_condition_that_cannot_be_flown_is_refused() -> None:
     genome = genome_for(COURT)
     plain = decode(genome.nominal, genome, map="court", seed=3)
-    text = dumps(plain.replace({"wind.mean_mps": 4.5}))
-    with pytest.raises(ScenarioError, match=r"genes.wind.mean_mps'?: found 99.*15"):
+    text = dumps(plain.replace({"wind.mean_mps": 4.5}), COURT)
+    with pytest.raises(ScenarioError, match=r"scenario.wind.mean_mps'?: found 99.*15"):
         loads(text.replace("4.5", "99"), COURT)
-    with pytest.raises(ScenarioError, match=r"genes.wind.mean_knots'?: unknown key"):
+    with pytest.raises(ScenarioError, match=r"scenario.wind.mean_knots'?: unknown key"):
         loads(text.replace("mean_mps", "mean_knots"), COURT)
 
 
@@ -41,17 +41,17 @@ def test_destinations_survive_the_file_and_are_asked_of_every_object() -> None:
     genome = with_destinations(genome_for(COURT))
     row = genome.random(np.random.default_rng(3))
     scenario = repair(decode(row, genome, map="court", seed=3), COURT)
-    text = dumps(scenario)
+    text = dumps(scenario, COURT)
     assert text.count("[genes.dog-1]") == 1
     assert loads(text, COURT) == scenario
     alone = scenario.without("dog-1", "bird-1")
-    assert loads(dumps(alone), COURT) == alone
+    assert loads(dumps(alone, COURT), COURT) == alone
     x = scenario["dog-1.destination_x"]
     with pytest.raises(ScenarioError, match=r"genes.dog-1.destination_x'?: missing"):
         loads(text.replace(f"destination_x = {x!r}\n", ""), COURT)
 
 
-GOOD = dumps(decode(genome_for(COURT).nominal, genome_for(COURT), map="court", seed=1))
+GOOD = dumps(decode(genome_for(COURT).nominal, genome_for(COURT), map="court", seed=1), COURT)
 
 
 @pytest.mark.parametrize(
@@ -85,20 +85,20 @@ def test_absent_objects_survive_the_file_and_have_no_genes() -> None:
     name = COURT.present_objects[0][0]
     fewer = whole.without(name)
     assert not any(key.startswith(f"{name}.") for key, _ in fewer.genes)
-    assert loads(dumps(fewer), COURT) == fewer
+    assert loads(dumps(fewer, COURT), COURT) == fewer
     assert problems(fewer, COURT) == ()
     assert repair(fewer, COURT) == fewer
 
 
 def test_an_absent_object_must_be_one_of_the_map() -> None:
     genome = genome_for(COURT)
-    text = dumps(repair(decode(genome.nominal, genome, map="court", seed=4), COURT))
+    text = dumps(repair(decode(genome.nominal, genome, map="court", seed=4), COURT), COURT)
     text = text.replace("seed = 4", 'seed = 4\nabsent = ["cat-1"]')
     with pytest.raises(ScenarioError, match=r"'absent': map 'court' has no object cat-1"):
         loads(text, COURT)
 
 
-SCENARIO = dumps(decode(genome_for(COURT).nominal, genome_for(COURT), map="court", seed=1))
+SCENARIO = dumps(decode(genome_for(COURT).nominal, genome_for(COURT), map="court", seed=1), COURT)
 
 
 @pytest.mark.parametrize(

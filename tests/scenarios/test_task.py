@@ -47,13 +47,13 @@ def test_a_search_breeds_scenarios_with_its_task() -> None:
 
 
 def test_a_task_survives_the_file_and_the_ledger() -> None:
-    assert loads(dumps(scenario()), COURT) == scenario()
+    assert loads(dumps(scenario(), COURT), COURT) == scenario()
     assert parse_scenario(dump_scenario(scenario())) == scenario()
 
 
 def test_a_file_states_no_task_that_is_the_default() -> None:
-    assert "task" not in dumps(scenario(Task()))
-    assert loads(dumps(scenario(Task())), COURT).task == Task()
+    assert "task" not in dumps(scenario(Task()), COURT)
+    assert loads(dumps(scenario(Task()), COURT), COURT).task == Task()
 
 
 @pytest.mark.parametrize(
@@ -71,7 +71,7 @@ def test_a_file_states_no_task_that_is_the_default() -> None:
     ],
 )
 def test_a_broken_task_names_file_and_key(old: str, new: str, message: str) -> None:
-    text = dumps(scenario()).replace(old, new)
+    text = dumps(scenario(), COURT).replace(old, new)
     with pytest.raises(ScenarioError, match=rf"^broken.toml: {message}"):
         loads(text, COURT, source="broken.toml")
 

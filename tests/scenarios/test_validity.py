@@ -24,7 +24,7 @@ def test_every_drawn_scenario_is_valid_and_survives_its_file(map: str, data: st.
     place = load_map(map)
     assert problems(scenario, place) == ()
     assert repair(scenario, place) == scenario
-    assert loads(dumps(scenario), place) == scenario
+    assert loads(dumps(scenario, place), place) == scenario
 
 
 def test_repair_changes_only_the_offending_genes() -> None:

@@ -2,15 +2,9 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
-from typing import Literal
 
 from pytest_garl.errors import ScenarioError
-
-Spacing = Literal["linear", "inverse"]
-"""How a search spreads its draws over a range: evenly over the value, or evenly over 1 / value (a
-visibility acts through its inverse, the extinction)."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -19,7 +13,7 @@ class Parameter:
 
     A scenario that does not name it has its ``nominal`` value, which has no effect.  ``low`` and
     ``high`` are the limits of what the simulator can fly, not what a domain claims.  ``source``
-    says where the range of the domain `field` comes from.
+    says where the range of the domain `field` comes from.  A value of a ``whole`` one is rounded.
     """
 
     name: str
@@ -28,7 +22,6 @@ class Parameter:
     high: float
     meaning: str
     source: str
-    spacing: Spacing = "linear"
     whole: bool = False
 
     def __post_init__(self) -> None:
@@ -37,13 +30,6 @@ class Parameter:
                 f"parameter {self.name!r}: expected low <= nominal <= high and low < high, "
                 f"found {self.low}, {self.nominal}, {self.high}"
             )
-        if self.spacing == "inverse" and self.low <= 0:
-            raise ScenarioError(f"parameter {self.name!r}: inverse spacing needs a low above 0")
-
-    def fits(self, value: float) -> bool:
-        """Return whether the simulator can fly a value."""
-        inside = math.isfinite(value) and self.low <= value <= self.high
-        return inside and not (self.whole and value != int(value))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -7,28 +7,22 @@ import math
 from dataclasses import dataclass
 
 from pytest_garl.scenarios.genes import ENVIRONMENT
+from pytest_garl.scenarios.light import sun_elevation_deg
 from pytest_garl.scenarios.scenario import Scenario
+from pytest_garl.scenarios.units import (
+    DUST_VISIBILITY_M,
+    FOG_VISIBILITY_M,
+    LEAVES_PER_M3,
+    RAIN_MMPH,
+    SNOW_MMPH,
+    TURN,
+)
 
 KOSCHMIEDER = 3.912
 """Visibility = 3.912 / extinction: Koschmieder's law (1924) at a contrast threshold of 2 %."""
-FOG_VISIBILITY_M = 10.0
-"""Gene 1: below 10 m were reported in the Great Smog of London, 1952."""
-DUST_VISIBILITY_M = 20.0
-"""Gene 1: engineering estimate, far below the 500 m at which a dust storm counts as heavy
-(ICAO 2009)."""
-RAIN_MMPH = 100.0
-"""Gene 1: twice the 50 mm/h from which the WMO calls rain violent."""
-SNOW_MMPH = 10.0
-"""Gene 1: water equivalent; twice the 5 mm/h from which the WMO calls snow heavy."""
-LEAVES_PER_M3 = 2.0
-"""Gene 1: engineering estimate of a gust through an autumn maple."""
 WET_ALBEDO_LOSS = 0.45
 """Gene 1: engineering estimate; soaked rough ground is markedly darker (theory: Lekner and
 Dorf 1988)."""
-TWILIGHT_DEG = -6.0
-"""Elevation at gene 0 and 1: the end of civil twilight (AMS Glossary); darker than that is
-night."""
-NOON_DEG = 60.0
 _LUX = (
     (-6.0, 3.4),
     (0.0, 400.0),
@@ -74,7 +68,7 @@ def conditions_of(scenario: Scenario) -> Conditions:
     grey, brown = (205.0, 210.0, 214.0), (196.0, 164.0, 120.0)
     share = dust / extinction if extinction > 0 else 0.0
     elevation = sun_elevation_deg(gene["sun_position"])
-    azimuth = math.pi * gene["sun_position"]
+    azimuth = math.pi * gene["sun_position"] + math.radians(scenario[TURN])
     height = math.radians(elevation)
     return Conditions(
         extinction_per_m=extinction,
@@ -95,32 +89,6 @@ def conditions_of(scenario: Scenario) -> Conditions:
         # The clearer and higher the sun, the more light comes from one direction.
         direct_share=0.75 * _ramp(elevation, 0.0, 20.0) * math.exp(-extinction * 10.0),
     )
-
-
-def in_units(key: str, value: float) -> str:
-    """Return the meaning of a value of an environment gene, in physical units."""
-    name = key.partition(".")[2]
-    if name == "sun_position":
-        return f"sun at an elevation of {sun_elevation_deg(value):.0f} degrees"
-    if name in ("fog", "dust"):
-        nearest_m = FOG_VISIBILITY_M if name == "fog" else DUST_VISIBILITY_M
-        return f"{name}, visibility {nearest_m / value:.0f} m"
-    if name in ("rain", "snow"):
-        most = RAIN_MMPH if name == "rain" else SNOW_MMPH
-        return f"falling {name}, {most * value:.1f} mm/h"
-    if name == "maple_leaf":
-        return f"falling leaves, {LEAVES_PER_M3 * value:.2f} per cubic metre"
-    what = {
-        "road_wetness": "as wet as it gets",
-        "road_leaf": "of the ground under leaves",
-        "road_snow": "of the ground under snow",
-    }
-    return f"{100 * value:.0f} % {what[name]}"
-
-
-def sun_elevation_deg(position: float) -> float:
-    """Return the sun's elevation: dawn at 0, noon at 0.5, dusk at 1."""
-    return TWILIGHT_DEG + (NOON_DEG - TWILIGHT_DEG) * math.sin(math.pi * position)
 
 
 def rain_extinction_per_m(rate_mmph: float) -> float:

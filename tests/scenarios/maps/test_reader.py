@@ -131,7 +131,7 @@ def test_a_map_with_a_strange_name_is_written_so_that_it_can_be_read(
     (tmp_path / f"{name}.toml").write_text(LAWN)
     map = load_map(name, [tmp_path])
     scenario = decode(genome_for(map).nominal, genome_for(map), map=name, seed=1)
-    (tmp_path / "one").write_text(dumps(scenario))
+    (tmp_path / "one").write_text(dumps(scenario, map))
     assert load(tmp_path / "one", (tmp_path,)) == scenario
 
 

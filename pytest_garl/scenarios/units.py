@@ -1,0 +1,254 @@
+"""Genes in the units of files and reports, and back: visibility in m, cover in %, places in m.
+
+In a chromosome weather, the marker's place and NPCs are without unit, so that every step acts alike
+along the range: extinction is proportional to 1 / visibility, and the marker's disc is a square.
+A value is written with few digits.  :func:`snapped` gives a scenario those values that its file can
+write, so that the file flies to the byte as the search flew it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from pytest_garl.scenarios.genes import ENVIRONMENT, SUN
+from pytest_garl.scenarios.groups.catalogue import GROUPS, PARAMETERS
+from pytest_garl.scenarios.light import (
+    NOON_DEG,
+    TWILIGHT_DEG,
+    position_of,
+    sun_azimuth_deg,
+    sun_elevation_deg,
+)
+from pytest_garl.scenarios.maps.map import Map
+from pytest_garl.scenarios.object_types import OBJECT_TYPES
+from pytest_garl.scenarios.placement import (
+    MARKER_RADIUS_M,
+    marker_genes,
+    marker_position_m,
+    object_destination_m,
+    object_speed_mps,
+    object_start_m,
+    place_genes,
+)
+from pytest_garl.scenarios.scenario import Scenario
+
+FOG_VISIBILITY_M = 10.0
+"""Gene 1: below 10 m were reported in the Great Smog of London, 1952."""
+DUST_VISIBILITY_M = 20.0
+"""Gene 1: engineering estimate, far below the 500 m at which a dust storm counts as heavy
+(ICAO 2009)."""
+RAIN_MMPH = 100.0
+"""Gene 1: twice the 50 mm/h from which the WMO calls rain violent."""
+SNOW_MMPH = 10.0
+"""Gene 1: water equivalent; twice the 5 mm/h from which the WMO calls snow heavy."""
+LEAVES_PER_M3 = 2.0
+"""Gene 1: engineering estimate of a gust through an autumn maple."""
+MOST_VISIBILITY_M = 1e6
+SIGNIFICANT_DIGITS = 5
+PLACE_DIGITS = 3
+"""Millimetres, and millimetres per second."""
+ANGLE_DIGITS = 2
+LIGHT = ("sun_elevation_deg", "sun_azimuth_deg")
+TURN = "light.turn_deg"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Weather:
+    """One weather gene: its name in files, and how its unit follows from the gene.
+
+    ``top`` is the value at gene 1; a visibility is inverse to its gene and infinite at 0.
+    """
+
+    name: str
+    top: float
+    is_visibility: bool = False
+
+    @property
+    def limits(self) -> tuple[float, float]:
+        """What can be flown, in the unit."""
+        return (self.top, MOST_VISIBILITY_M) if self.is_visibility else (0.0, self.top)
+
+    def physical(self, gene: float) -> float:
+        """Return the value in the unit, rounded; ``inf`` for the visibility at gene 0."""
+        if self.is_visibility:
+            return significant(self.top / gene) if gene > 0 else float("inf")
+        return significant(gene * self.top)
+
+    def gene(self, value: float) -> float:
+        """Return the gene of a value in the unit."""
+        return self.top / value if self.is_visibility else value / self.top
+
+
+WEATHER_UNITS: Mapping[str, Weather] = {
+    "environment.dust": Weather(
+        name="dust_visibility_m", top=DUST_VISIBILITY_M, is_visibility=True
+    ),
+    "environment.fog": Weather(name="fog_visibility_m", top=FOG_VISIBILITY_M, is_visibility=True),
+    "environment.rain": Weather(name="rain_mmph", top=RAIN_MMPH),
+    "environment.snow": Weather(name="snow_mmph", top=SNOW_MMPH),
+    "environment.road_wetness": Weather(name="wetness_percent", top=100.0),
+    "environment.maple_leaf": Weather(name="falling_leaves_per_m3", top=LEAVES_PER_M3),
+    "environment.road_leaf": Weather(name="leaf_cover_percent", top=100.0),
+    "environment.road_snow": Weather(name="snow_cover_percent", top=100.0),
+}
+"""How files write each of the paper's weather genes; 0 is clear."""
+WEATHER_GENES: Mapping[str, str] = {each.name: key for key, each in WEATHER_UNITS.items()}
+
+
+def significant(value: float, digits: int = SIGNIFICANT_DIGITS) -> float:
+    """Return a value rounded to a number of significant digits."""
+    return float(f"{value:.{digits}g}")
+
+
+def snapped(scenario: Scenario, map: Map) -> Scenario:
+    """Return the scenario with values that a file can write: millimetres, five digits, 0.01 deg.
+
+    Snapping twice changes nothing more.
+    """
+    return from_sections(sections_of(scenario, map), scenario, map)
+
+
+def sections_of(scenario: Scenario, map: Map) -> dict[str, dict[str, float]]:
+    """Return the scenario's values as files write them: section, name, value in the name's unit.
+
+    What is nominal is left out, but for the marker's place and the NPCs that are there.
+    """
+    sections: dict[str, dict[str, float]] = {"weather": {}, "light": {}}
+    for key, weather in WEATHER_UNITS.items():
+        if scenario[key] != 0:
+            sections["weather"][weather.name] = weather.physical(scenario[key])
+    position, turn = scenario[SUN], scenario[TURN]
+    if position != 0.5 or turn != 0:
+        azimuth = round((sun_azimuth_deg(position) + turn) % 360.0, ANGLE_DIGITS)
+        elevation = round(sun_elevation_deg(position), ANGLE_DIGITS)
+        sections["light"] = dict(zip(LIGHT, (elevation, azimuth), strict=True))
+    sections["marker"] = _named("", marker_position_m(scenario, map))
+    for name, _ in map.without(scenario.removed_objects).present_objects:
+        values = _named("start_", object_start_m(scenario, map, name))
+        goal = object_destination_m(scenario, map, name)
+        if goal:
+            values |= _named("destination_", goal)
+        speed = object_speed_mps(scenario, map, name)
+        sections[name] = values | {"speed_mps": round(speed, PLACE_DIGITS)}
+    for key, value in scenario.genes:
+        if key in PARAMETERS and key != TURN:
+            head, _, name = key.partition(".")
+            digits = significant(float(round(value)) if PARAMETERS[key].whole else value)
+            sections.setdefault(head, {})[name] = digits
+    return {name: values for name, values in sections.items() if values}
+
+
+def from_sections(
+    sections: Mapping[str, Mapping[str, float]], like: Scenario, map: Map
+) -> Scenario:
+    """Return a scenario with the values of a file; map, seed, objects and task as in ``like``."""
+    values = dict.fromkeys(ENVIRONMENT, 0.0) | {SUN: 0.5}
+    for name, value in sections.get("weather", {}).items():
+        key = WEATHER_GENES[name]
+        values[key] = WEATHER_UNITS[key].gene(value)
+    light = sections.get("light", {})
+    conditions: dict[str, float] = {}
+    if light:
+        values[SUN], turn = position_of(*(light[name] for name in LIGHT))
+        conditions[TURN] = round(turn, ANGLE_DIGITS)
+    marker = sections["marker"]
+    values |= marker_genes((marker["x_m"], marker["y_m"]), map)
+    kinds = dict(map.all_objects)
+    for name, kind in kinds.items():
+        if name in like.removed_objects:
+            continue
+        section = sections[name]
+        ends = ("start", "destination") if "destination_x_m" in section else ("start",)
+        for end in ends:
+            place = (section[f"{end}_x_m"], section[f"{end}_y_m"])
+            values |= place_genes(f"{name}.{end}", place, map)
+        values[f"{name}.velocity"] = section["speed_mps"] / OBJECT_TYPES[kind].top_speed_mps
+    for head, section in sections.items():
+        named = {f"{head}.{name}": value for name, value in section.items()}
+        conditions |= {key: value for key, value in named.items() if key in PARAMETERS}
+    bare = Scenario(
+        map=like.map,
+        seed=like.seed,
+        genes=tuple(values.items()),
+        removed_objects=like.removed_objects,
+        task=like.task,
+    )
+    return bare.replace(conditions)
+
+
+def _named(prefix: str, place_m: tuple[float, float]) -> dict[str, float]:
+    x, y = (round(each, PLACE_DIGITS) + 0.0 for each in place_m)
+    return {f"{prefix}x_m": x, f"{prefix}y_m": y}
+
+
+def ranges_of(head: str, map: Map) -> dict[str, tuple[float, float]]:
+    """Return what can be flown of each value in a section of a file: (lowest, highest)."""
+    if head == "weather":
+        return {each.name: each.limits for each in WEATHER_UNITS.values()}
+    if head == "light":
+        return {LIGHT[0]: (TWILIGHT_DEG, NOON_DEG), LIGHT[1]: (0.0, 360.0)}
+    if head == "marker":
+        (x, y), reach = map.gps_position_m, MARKER_RADIUS_M
+        return {"x_m": (x - reach, x + reach), "y_m": (y - reach, y + reach)}
+    kinds = dict(map.all_objects)
+    if head in kinds:
+        x_min, x_max, y_min, y_max = map.bounds_m
+        places: dict[str, tuple[float, float]] = {}
+        for end in ("start", "destination"):
+            places |= {f"{end}_x_m": (x_min, x_max), f"{end}_y_m": (y_min, y_max)}
+        return places | {"speed_mps": (0.0, OBJECT_TYPES[kinds[head]].top_speed_mps)}
+    return {each.name: (each.low, each.high) for each in GROUPS[head].parameters}
+
+
+_WORDS = {
+    "dust_visibility_m": "dust, visibility {:g} m",
+    "fog_visibility_m": "fog, visibility {:g} m",
+    "rain_mmph": "falling rain, {:g} mm/h",
+    "snow_mmph": "falling snow, {:g} mm/h",
+    "wetness_percent": "{:g} % as wet as it gets",
+    "falling_leaves_per_m3": "falling leaves, {:g} per cubic metre",
+    "leaf_cover_percent": "{:g} % of the ground under leaves",
+    "snow_cover_percent": "{:g} % of the ground under snow",
+}
+
+
+def conditions_in_words(scenario: Scenario, map: Map) -> list[tuple[str, str]]:
+    """Return (name, words) of each condition that is not nominal: weather, light, groups."""
+    sections = sections_of(scenario, map)
+    found = [
+        (name, _WORDS[name].format(significant(value, 3)))
+        for name, value in sections.get("weather", {}).items()
+    ]
+    light = sections.get("light")
+    if light:
+        elevation, azimuth = (light[name] for name in LIGHT)
+        words = f"sun at an elevation of {elevation:.0f} degrees, azimuth {azimuth:.0f} degrees"
+        found.append(("light", words))
+    for head, group in GROUPS.items():
+        for parameter in group.parameters:
+            key = f"{head}.{parameter.name}"
+            if key != TURN and scenario[key] != parameter.nominal:
+                words = f"{parameter.meaning}: {scenario[key]:g} {unit_of(parameter.name)}"
+                found.append((key, words.rstrip()))
+    return found
+
+
+def unit_of(name: str) -> str:
+    """Return the unit that a name ends with, for a reader; empty without one."""
+    return next((unit for ending, unit in _UNITS.items() if name.endswith(ending)), "")
+
+
+_UNITS = {
+    "_per_m3": "per cubic metre",
+    "_mps": "m/s",
+    "_mmph": "mm/h",
+    "_degps": "degrees/s",
+    "_deg": "degrees",
+    "_percent": "%",
+    "_ms": "ms",
+    "_hz": "Hz",
+    "_mm": "mm",
+    "_m": "m",
+    "_s": "s",
+}
