@@ -119,8 +119,10 @@ def pad_of(scenario: Scenario, map: Map) -> Pad:
 
 def told_position_m(scenario: Scenario, map: Map) -> tuple[float, float]:
     """Return the coordinate (x, y) that the mission gives for the marker."""
-    gps_x, gps_y = map.gps_position_m
-    return gps_x + scenario["told.x_m"], gps_y + scenario["told.y_m"]
+    surveyed = scenario["told.surveyed"] >= 0.5
+    x, y = marker_position_m(scenario, map) if surveyed else map.gps_position_m
+    error_m, towards = scenario["told.error_m"], math.radians(scenario["told.towards_deg"])
+    return x + error_m * math.cos(towards), y + error_m * math.sin(towards)
 
 
 def marker_genes(position_m: tuple[float, float], map: Map) -> dict[str, float]:

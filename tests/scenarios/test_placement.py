@@ -7,7 +7,15 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from pytest_garl.scenarios.placement import disc_to_square, square_to_disc
+from pytest_garl.scenarios.chromosome import decode
+from pytest_garl.scenarios.genes import genome_for
+from pytest_garl.scenarios.maps.map import load_map
+from pytest_garl.scenarios.placement import (
+    disc_to_square,
+    marker_position_m,
+    square_to_disc,
+    told_position_m,
+)
 
 
 def test_uniform_genes_give_a_uniform_disc() -> None:
@@ -22,3 +30,16 @@ def test_uniform_genes_give_a_uniform_disc() -> None:
 def test_disc_to_square_inverts_square_to_disc(x: float, y: float) -> None:
     back = disc_to_square(*square_to_disc(x, y))
     assert square_to_disc(*back) == pytest.approx(square_to_disc(x, y), abs=1e-9)
+
+
+def test_the_told_coordinate_is_the_maps_or_the_markers_and_has_an_error() -> None:
+    court = load_map("court")
+    genome = genome_for(court)
+    plain = decode(genome.nominal, genome, map="court", seed=1)
+    plain = plain.replace({"marker.x": 0.5, "marker.y": -0.4})
+    marker = marker_position_m(plain, court)
+    assert told_position_m(plain, court) == court.gps_position_m != marker
+    surveyed = plain.replace({"told.surveyed": 1.0})
+    assert told_position_m(surveyed, court) == marker
+    north = surveyed.replace({"told.error_m": 4.0, "told.towards_deg": 90.0})
+    assert told_position_m(north, court) == pytest.approx((marker[0], marker[1] + 4.0))

@@ -4,20 +4,35 @@ from __future__ import annotations
 
 from pytest_garl.scenarios.groups.parameter import Group, Parameter
 
-
-def _axis(name: str, axis: str) -> Parameter:
-    return Parameter(
-        name=name,
-        nominal=0.0,
-        low=-20.0,
-        high=20.0,
-        meaning=f"error of the told coordinate, {axis}",
-        source="u-blox M8 data sheet: 2.5 m CEP; twice that for a pad surveyed with a phone",
-    )
-
-
 GROUP = Group(
     name="told",
-    meaning="error of the coordinate that the mission gives",
-    parameters=(_axis("x_m", "east"), _axis("y_m", "north")),
+    meaning="the coordinate that the mission gives",
+    parameters=(
+        Parameter(
+            name="surveyed",
+            nominal=0.0,
+            low=0.0,
+            high=1.0,
+            whole=True,
+            meaning="1: the pad was surveyed, the coordinate is the marker's and has an error; "
+            "0: it is the map's, wherever the marker lies",
+            source="0 is the paper's world: the marker lies up to 7.5 m from the coordinate",
+        ),
+        Parameter(
+            name="error_m",
+            nominal=0.0,
+            low=0.0,
+            high=20.0,
+            meaning="error of the coordinate",
+            source="u-blox M8 data sheet: 2.5 m CEP; twice that for a pad surveyed with a phone",
+        ),
+        Parameter(
+            name="towards_deg",
+            nominal=0.0,
+            low=0.0,
+            high=360.0,
+            meaning="direction of the error, counter-clockwise from east",
+            source="any direction",
+        ),
+    ),
 )
