@@ -43,10 +43,10 @@ LOOK_EVERY = 2
 LOOK_EVERY_WAITING = 5
 """Frames per look of the detector, but for a free descent, in which it looks at each: its network
 takes two thirds of a step's time, and flying level five looks a second do, waiting two."""
-PATIENCE_S = 45.0
-"""Waited so long in all, for a place that is not free, it goes home while there is battery."""
-REFUGE_M = 4.5
-"""How high to wait while something is: above people, and above birds that fly at 3 m."""
+PATIENCE = 1 / 3
+"""Having waited for this share of its time limit for a place that is not free, it goes home."""
+BELOW_SEARCH_M = 0.3
+"""Lower than the height of the search by this, it makes way; that height is where it waits."""
 
 Vector = tuple[float, float, float]
 
@@ -90,7 +90,7 @@ class MultiModuleLandingSystem:
         if looks:
             self._tell_target(now, decision, seen)
         since, self._stepped_s = now - self._stepped_s, now
-        if self._waited_s > PATIENCE_S:
+        if self._waited_s > PATIENCE * self._mission.time_limit_s:
             return Abort(diagnostics=decision.diagnostics(seen, note="the place was never free"))
         if decision.phase == "abort":
             return Abort(diagnostics=decision.diagnostics(seen))
@@ -103,7 +103,8 @@ class MultiModuleLandingSystem:
         if self._watch.in_the_way(observation):
             self._blocked_s = now
         descends = decision.phase in ("descend", "commit")
-        if now - self._blocked_s < CLEAR_S and (descends or z < REFUGE_M - 0.3):
+        low = z < self._mission.search_altitude_m - BELOW_SEARCH_M
+        if now - self._blocked_s < CLEAR_S and (descends or low):
             self._look_every = LOOK_EVERY_WAITING
             self._waited_s += since
             return self._give_way(now, decision, seen, (x, y, z))
@@ -157,7 +158,7 @@ class MultiModuleLandingSystem:
     ) -> Command:
         """Climb straight up, where the UAV came from, without asking the planner."""
         self._decision.interrupt()
-        refuge = (at[0], at[1], max(at[2], min(REFUGE_M, self._mission.search_altitude_m)))
+        refuge = (at[0], at[1], max(at[2], self._mission.search_altitude_m))
         self._later(now, functools.partial(self._control.guide, position=refuge, yaw=0.0))
         note = "something is in the way below"
         return PositionSetpoint(

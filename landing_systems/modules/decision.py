@@ -33,10 +33,12 @@ class DecisionParameters:
     cone: float = 0.25
     cone_floor_m: float = 0.20
     """Descend only within 0.2 m plus a quarter of the height of the marker's axis."""
-    commit_height_m: float = 2.0
-    """Below this the 1.5 m marker with its white margin (1.93 m) no longer surely fits into
-    the 1.5 z m that the frame's short side covers: land on the estimate, and go on improving
-    it while the marker is in sight."""
+    commit_share: float = 9 / 14
+    """Where the marker with its white margin would cover more of the frame's short side than this,
+    it no longer surely fits: land on the estimate, and go on improving it while the marker is in
+    sight.  A marker of 1.5 m fits down to 2 m with a camera that covers 1.5 m from 1 m."""
+    least_commit_height_m: float = 0.5
+    """However small the marker is: lower, the downwash from the ground shakes the UAV."""
     commit_offset_m: float = 0.3
     confirm_patience_s: float = 3.0
     """How long to fly towards a fleeting sighting before going on with the search."""
@@ -49,10 +51,11 @@ class DecisionParameters:
     """PLND_RET_MAX's default."""
     abort_reserve_s: float = 12.0
     """Time kept to climb away before the mission's limit."""
-    search_rings_m: tuple[float, ...] = (4.0, 7.0)
-    """From 10 m the frame covers 20 m by 15 m, so the disc of 7.5 m in which the marker lies is
-    just in view from its centre; the rings show each place again, nearer to the middle."""
-    search_spacing_m: float = 4.5
+    search_radius_m: float = 7.5
+    """How far the marker may lie from the told coordinate: see ``Mission``."""
+    search_step: float = 0.3
+    """From one point of the search to the next, as a share of what the frame's short side covers:
+    each place is shown three times, and once near the middle."""
     arrive_m: float = 0.6
     pass_m: float = 1.5
     """Points of the search are passed by, not stopped at."""
@@ -99,6 +102,12 @@ class DecisionModule:
         self._searched: list[GroundPoint] = []
         self._candidate: GroundPoint | None = None
         self._candidate_at = 0.0
+        camera = mission.camera
+        self._short_side = min(camera.width_px, camera.height_px) / camera.focal_px
+        """What the frame's short side covers from a height of 1 m, in m."""
+        margin_m = mission.marker_side_m * 9 / 7
+        fits_m = margin_m / (self._short_side * self._p.commit_share)
+        self._commit_height_m = max(self._p.least_commit_height_m, fits_m)
 
     def decide(
         self,
@@ -194,9 +203,12 @@ class DecisionModule:
     def _pattern(self) -> list[GroundPoint]:
         """Rings about the given GPS position, out to the largest distance of the marker."""
         gps_x, gps_y = self._mission.gps_position_m
+        step_m = self._p.search_step * self._short_side * self._mission.search_altitude_m
+        rings = math.ceil(self._p.search_radius_m / step_m)
         places = []
-        for radius in self._p.search_rings_m:
-            count = math.ceil(2 * math.pi * radius / self._p.search_spacing_m)
+        for ring in range(1, rings + 1):
+            radius = self._p.search_radius_m * ring / rings
+            count = math.ceil(2 * math.pi * radius / step_m)
             for index in range(count + 1):
                 angle = 2 * math.pi * index / count
                 places.append((gps_x + radius * math.cos(angle), gps_y + radius * math.sin(angle)))
@@ -228,10 +240,10 @@ class DecisionModule:
             return self._go("regain", (*target, self._regain_height), "marker lost")
         inside = offset <= p.cone_floor_m + p.cone * z
         fresh = unseen_s < p.fresh_s
-        if z <= p.commit_height_m and offset <= p.commit_offset_m and fresh:
+        if z <= self._commit_height_m and offset <= p.commit_offset_m and fresh:
             return self._go("commit", (*target, 0.0), "below the height at which the marker fits")
-        if inside and fresh and z > p.commit_height_m:
-            return self._go("descend", (*target, p.commit_height_m - 0.2))
+        if inside and fresh and z > self._commit_height_m:
+            return self._go("descend", (*target, self._commit_height_m - 0.2))
         if inside and fresh:
             return self._go("descend", (*target, z))
         return self._go("approach", (*target, z), "" if fresh else "marker out of sight, holding")

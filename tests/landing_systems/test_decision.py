@@ -1,5 +1,7 @@
 from __future__ import annotations
 
+import dataclasses
+import math
 from collections.abc import Iterable
 
 from landing_systems.modules.decision import Decision, DecisionModule, DecisionParameters
@@ -28,8 +30,8 @@ def seen(x: float, y: float, *, number: int = 0, confidence: float = 0.9) -> Det
 class Pilot:
     """Feeds a decision module frame after frame."""
 
-    def __init__(self) -> None:
-        self.module = DecisionModule(MISSION)
+    def __init__(self, mission: Mission = MISSION) -> None:
+        self.module = DecisionModule(mission)
         self.time_s = 0.0
 
     def frame(
@@ -122,3 +124,24 @@ def test_a_marker_elsewhere_takes_the_targets_place_once_confirmed() -> None:
     decision = pilot.frames(2, ABOVE, (seen(*other),))
     assert decision.target_m is not None
     assert abs(decision.target_m[0] - other[0]) < 1e-9
+
+
+def test_a_smaller_marker_is_followed_farther_down() -> None:
+    pilot = Pilot(dataclasses.replace(MISSION, marker_side_m=0.6)).confirmed()
+    assert pilot.frame((*MARKER, 1.9), (seen(*MARKER),)).phase == "descend"
+    assert pilot.frame((*MARKER, 0.7), (seen(*MARKER),)).phase == "commit"
+
+
+def test_a_narrow_camera_searches_in_smaller_steps_over_the_same_disc() -> None:
+    steps = {}
+    for degrees in (45.0, 90.0):
+        camera = Camera(field_of_view_rad=math.radians(degrees))
+        pilot = Pilot(dataclasses.replace(MISSION, camera=camera))
+        pilot.frame((0, 0, 9.5))
+        places = [(10.0, 0.0)]
+        while (decision := pilot.frame((*places[-1], 10.0))).phase == "search":
+            places.append(decision.goal_m[:2])
+        reach = max(math.dist(place, (10.0, 0.0)) for place in places)
+        assert abs(reach - P.search_radius_m) < 1e-9
+        steps[degrees] = len(places)
+    assert steps[45.0] > 2 * steps[90.0]
