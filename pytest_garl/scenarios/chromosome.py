@@ -1,4 +1,8 @@
-"""Scenario to chromosome and back: exact inverses, since both hold gene units."""
+"""Scenario to chromosome and back.
+
+Both hold gene units.  A chromosome has a value for every property of its genome, a scenario only
+those of what is there and is not nominal.
+"""
 
 from __future__ import annotations
 
@@ -8,27 +12,75 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pytest_garl.errors import ScenarioError
-from pytest_garl.scenarios.genes import Genome
+from pytest_garl.scenarios.genes import CLEAR, Genome, NuclearGene
+from pytest_garl.scenarios.groups.catalogue import PARAMETERS
 from pytest_garl.scenarios.scenario import Scenario
+from pytest_garl.scenarios.sparse import OFF, ON
 
 
 def encode(scenario: Scenario, genome: Genome) -> NDArray[np.float64]:
-    """Return the scenario's values in the genome's order, shape (size,)."""
-    found = {key for key, _ in scenario.genes}
-    wanted = set(genome.keys)
-    if found != wanted:
+    """Return the scenario's values in the genome's order, shape (size,).
+
+    :func:`decode` gives the scenario back.  Raises ScenarioError for a scenario that the genome
+    cannot express.
+    """
+    known = dict(scenario.genes)
+    allowed = CLEAR | dict(genome.fixed)
+    unknown = sorted(
+        key for key in known.keys() - {*genome.keys} if known[key] != allowed.get(key, math.nan)
+    )
+    objects = [gene for gene in genome.genes if _is_object(gene)]
+    gone = {gene.name for gene in objects if gene.name in scenario.removed_objects}
+    missing = sorted(
+        item.key
+        for gene in genome.genes
+        for item in gene.values
+        if item.key not in known and item.key not in PARAMETERS and gene.name not in gone
+    )
+    if missing or unknown:
         raise ScenarioError(
-            f"scenario on map {scenario.map!r}: missing genes {sorted(wanted - found)}, "
-            f"unknown genes {sorted(found - wanted)}; expected exactly those of the genome"
+            f"scenario on map {scenario.map!r}: missing genes {missing}, "
+            f"unknown genes {unknown}; expected exactly those of the genome"
         )
-    return _checked(np.array([scenario[key] for key in genome.keys]), genome)
+    row: list[float] = []
+    for gene in genome.genes:
+        values = [
+            item.nominal if gene.name in gone else known.get(item.key, item.nominal)
+            for item in gene.values
+        ]
+        if gene.is_optional:
+            nominal = [item.nominal for item in gene.values]
+            acts = gene.name not in gone if _is_object(gene) else values != nominal
+            row.append(ON if acts else OFF)
+        row += values
+    return _checked(np.array(row), genome)
 
 
 def decode(vector: NDArray[np.float64], genome: Genome, *, map: str, seed: int) -> Scenario:
-    """Return the scenario that a chromosome stands for; the inverse of :func:`encode`."""
-    values = _checked(np.asarray(vector, dtype=np.float64), genome)
-    genes = tuple((key, float(value)) for key, value in zip(genome.keys, values, strict=True))
-    return Scenario(map=map, seed=seed, genes=genes, task=genome.task)
+    """Return the scenario that a chromosome stands for."""
+    row = dict(
+        zip(genome.keys, _checked(np.asarray(vector, dtype=np.float64), genome), strict=True)
+    )
+    values, removed = dict(CLEAR), [*genome.removed]
+    for gene in genome.genes:
+        acts = not gene.is_optional or row[gene.properties[0].key] > 0.5
+        if acts:
+            values |= {item.key: float(row[item.key]) for item in gene.values}
+        elif _is_object(gene):
+            removed.append(gene.name)
+    conditions = {key: value for key, value in values.items() if key in PARAMETERS}
+    scenario = Scenario(
+        map=map,
+        seed=seed,
+        genes=tuple((key, value) for key, value in values.items() if key not in PARAMETERS),
+        removed_objects=tuple(sorted(removed)),
+        task=genome.task,
+    )
+    return scenario.replace(conditions | dict(genome.fixed))
+
+
+def _is_object(gene: NuclearGene) -> bool:
+    return any(item.key == f"{gene.name}.velocity" for item in gene.properties)
 
 
 def _checked(vector: NDArray[np.float64], genome: Genome) -> NDArray[np.float64]:

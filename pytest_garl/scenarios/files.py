@@ -16,7 +16,7 @@ from pytest_garl.scenarios.groups.catalogue import GROUPS
 from pytest_garl.scenarios.maps.map import Map
 from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.scenarios.task import Task, read_task, task_lines
-from pytest_garl.scenarios.units import from_sections, ranges_of, sections_of, snapped
+from pytest_garl.scenarios.units import HEIGHT, from_sections, ranges_of, sections_of, snapped
 
 SCHEMA = 2
 FIRST_SCHEMA = 1
@@ -121,7 +121,11 @@ def _read_section(table: Table, head: str, map: Map) -> dict[str, float]:
     ranges = ranges_of(head, map)
     optional = {name for name in ranges if name.startswith("destination_")}
     table.refuse_unknown({*ranges})
-    required = {*ranges} - optional if head not in ("weather", *GROUPS) or head == "light" else ()
+    required = (
+        {*ranges} - optional - {HEIGHT}
+        if head not in ("weather", *GROUPS) or head == "light"
+        else ()
+    )
     for name in required:
         table.get(name)
     if bool(optional & {*table.values}) and not optional <= {*table.values}:

@@ -13,25 +13,33 @@ from numpy.typing import NDArray
 from pytest_garl.errors import ScenarioError
 from pytest_garl.scenarios.groups.catalogue import GROUPS
 from pytest_garl.scenarios.groups.parameter import Group, Parameter
+from pytest_garl.scenarios.sparse import draw
 from pytest_garl.scenarios.task import Task
 
 if TYPE_CHECKING:
     from pytest_garl.scenarios.maps.map import Map
 
 WeatherRange = Literal["confined", "full"]
+ACTIVE = "active."
+"""Begins the key of a bit of activity."""
 CONFINED_WEATHER = 0.15
 """Upper end of a weather gene unless the full range is asked for (paper, section 4.2.3)."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Property:
-    """One scalar of a gene: its key in scenarios and files, range, nominal value, meaning."""
+    """One scalar of a gene: its key in scenarios and files, range, nominal value, meaning.
+
+    ``outward`` says that values far from the nominal one are harsher, so that half of the draws of
+    a sparse genome lie in the outer third of the range; places and directions are drawn evenly.
+    """
 
     key: str
     low: float
     high: float
     nominal: float
     meaning: str
+    outward: bool = False
 
     def __post_init__(self) -> None:
         if not self.low <= self.nominal <= self.high or self.low == self.high:
@@ -43,10 +51,24 @@ class Property:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class NuclearGene:
-    """Properties that crossover never separates: a fog density, or a place (x, y)."""
+    """Properties that crossover never separates: a fog density, or a place (x, y).
+
+    If the first one is a bit of activity (:data:`ACTIVE`), the others count only while it is above
+    0.5: else a condition has its nominal value, and an object is not there.
+    """
 
     name: str
     properties: tuple[Property, ...]
+
+    @property
+    def is_optional(self) -> bool:
+        """Whether it has a bit of activity."""
+        return self.properties[0].key.startswith(ACTIVE)
+
+    @property
+    def values(self) -> tuple[Property, ...]:
+        """The properties without the bit of activity."""
+        return self.properties[1:] if self.is_optional else self.properties
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -61,11 +83,14 @@ class CompositeGene:
 class Genome:
     """All properties that may vary in a scenario on one map, in a fixed order.
 
-    ``task`` is what its scenarios have in common.
+    ``task``, the values ``fixed``, by key, and the objects of the map that are ``removed`` are
+    what its scenarios have in common.
     """
 
     composites: tuple[CompositeGene, ...]
     task: Task = field(default_factory=Task)
+    fixed: tuple[tuple[str, float], ...] = ()
+    removed: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         twice = sorted({key for key in self.keys if self.keys.count(key) > 1})
@@ -116,7 +141,13 @@ class Genome:
         return tuple(int(start) for start in starts[:-1])
 
     def random(self, rng: np.random.Generator) -> NDArray[np.float64]:
-        """Draw a chromosome uniformly from the whole range, shape (size,)."""
+        """Draw a chromosome, shape (size,).
+
+        Uniformly from the whole range; where genes are optional, few of them are active
+        (:mod:`~pytest_garl.scenarios.sparse`).
+        """
+        if any(gene.is_optional for gene in self.genes):
+            return draw(self, rng)
         return rng.uniform(self.lower, self.upper)
 
     def normalise(self, chromosome: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -165,6 +196,8 @@ WEATHER = (
 SUN = "environment.sun_position"
 ENVIRONMENT = (*(f"environment.{name}" for name, _ in WEATHER), SUN)
 """Keys of the environment's properties; none is below 0 or above 1."""
+CLEAR = dict.fromkeys(ENVIRONMENT, 0.0) | {SUN: 0.5}
+"""Their nominal values: clear weather at noon."""
 
 
 def genome_for(
@@ -197,7 +230,7 @@ def genome_for(
         genes=(place_gene("marker", "position", "place of the marker in its disc of 7.5 m"),),
     )
     objects = CompositeGene(
-        name="objects", genes=tuple(_object_gene(name) for name, _ in map.present_objects)
+        name="objects", genes=tuple(object_gene(name) for name, _ in map.present_objects)
     )
     return Genome(
         composites=(environment, marker, objects, *extras),
@@ -272,7 +305,8 @@ def _with_destination(gene: NuclearGene) -> NuclearGene:
     )
 
 
-def _object_gene(name: str) -> NuclearGene:
+def object_gene(name: str) -> NuclearGene:
+    """Return the gene of an NPC: where it starts, and how fast it is."""
     velocity = Property(
         key=f"{name}.velocity",
         low=0.0,

@@ -22,6 +22,12 @@ def sun_azimuth_deg(position: float) -> float:
     return 90.0 + 180.0 * position
 
 
+def position_of_elevation(elevation_deg: float) -> float:
+    """Return the position in the morning at which the sun has this elevation, 0 to 0.5."""
+    share = (elevation_deg - TWILIGHT_DEG) / (NOON_DEG - TWILIGHT_DEG)
+    return math.asin(min(1.0, max(0.0, share))) / math.pi
+
+
 def position_of(elevation_deg: float, azimuth_deg: float) -> tuple[float, float]:
     """Return the position on the day's way, and the turn in degrees that leads off it.
 
@@ -30,7 +36,6 @@ def position_of(elevation_deg: float, azimuth_deg: float) -> tuple[float, float]
     position = (azimuth_deg - 90.0) / 180.0
     if 0 <= position <= 1 and abs(sun_elevation_deg(position) - elevation_deg) < _ON_THE_WAY_DEG:
         return position, 0.0
-    share = (elevation_deg - TWILIGHT_DEG) / (NOON_DEG - TWILIGHT_DEG)
-    morning = math.asin(min(1.0, max(0.0, share))) / math.pi
+    morning = position_of_elevation(elevation_deg)
     position = morning if azimuth_deg % 360.0 <= 180.0 else 1.0 - morning
     return position, math.remainder(azimuth_deg - sun_azimuth_deg(position), 360.0)

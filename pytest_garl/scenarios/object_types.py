@@ -74,6 +74,23 @@ class ObjectType:
         low = self.least_speed_mps if share > 0 else 0.0
         return low + share * (self.top_speed_mps - low)
 
+    def share_of(self, speed_mps: float) -> float:
+        """Return the share that gives a speed; slower than it can move is its least speed."""
+        if speed_mps <= 0:
+            return 0.0
+        low = self.least_speed_mps
+        share = (speed_mps - low) / (self.top_speed_mps - low)
+        return min(1.0, max(_LEAST_SHARE if self.flies else 0.0, share))
+
+
+HEIGHTS_M = (1.0, 15.0)
+"""Heights at which a scenario may let birds fly: their wings clear the ground, and an approach at
+the paper's 10 m is met from below and from above."""
+
+
+_LEAST_SHARE = 1e-6
+"""The share of a bird at its least speed: at 0 it sits."""
+
 
 def _limb(
     length_m: float,

@@ -11,7 +11,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from pytest_garl.scenarios.genes import ENVIRONMENT, SUN
+from pytest_garl.scenarios.genes import CLEAR, SUN
 from pytest_garl.scenarios.groups.catalogue import GROUPS, PARAMETERS
 from pytest_garl.scenarios.light import (
     NOON_DEG,
@@ -21,7 +21,7 @@ from pytest_garl.scenarios.light import (
     sun_elevation_deg,
 )
 from pytest_garl.scenarios.maps.map import Map
-from pytest_garl.scenarios.object_types import OBJECT_TYPES
+from pytest_garl.scenarios.object_types import HEIGHTS_M, OBJECT_TYPES
 from pytest_garl.scenarios.placement import (
     MARKER_RADIUS_M,
     marker_genes,
@@ -51,6 +51,8 @@ PLACE_DIGITS = 3
 ANGLE_DIGITS = 2
 LIGHT = ("sun_elevation_deg", "sun_azimuth_deg")
 TURN = "light.turn_deg"
+HEIGHT = "height_m"
+"""Name of the height at which an object flies."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -62,6 +64,8 @@ class Weather:
 
     name: str
     top: float
+    meaning: str
+    source: str
     is_visibility: bool = False
 
     @property
@@ -80,17 +84,55 @@ class Weather:
         return self.top / value if self.is_visibility else value / self.top
 
 
+_COVER_SOURCE = "the paper's gene, a share"
 WEATHER_UNITS: Mapping[str, Weather] = {
     "environment.dust": Weather(
-        name="dust_visibility_m", top=DUST_VISIBILITY_M, is_visibility=True
+        name="dust_visibility_m",
+        top=DUST_VISIBILITY_M,
+        is_visibility=True,
+        meaning="how far one sees through dust",
+        source="ICAO 2009: a dust storm is heavy below 500 m",
     ),
-    "environment.fog": Weather(name="fog_visibility_m", top=FOG_VISIBILITY_M, is_visibility=True),
-    "environment.rain": Weather(name="rain_mmph", top=RAIN_MMPH),
-    "environment.snow": Weather(name="snow_mmph", top=SNOW_MMPH),
-    "environment.road_wetness": Weather(name="wetness_percent", top=100.0),
-    "environment.maple_leaf": Weather(name="falling_leaves_per_m3", top=LEAVES_PER_M3),
-    "environment.road_leaf": Weather(name="leaf_cover_percent", top=100.0),
-    "environment.road_snow": Weather(name="snow_cover_percent", top=100.0),
+    "environment.fog": Weather(
+        name="fog_visibility_m",
+        top=FOG_VISIBILITY_M,
+        is_visibility=True,
+        meaning="how far one sees through fog",
+        source="below 10 m in the Great Smog of London, 1952",
+    ),
+    "environment.rain": Weather(
+        name="rain_mmph",
+        top=RAIN_MMPH,
+        meaning="falling rain",
+        source="WMO: violent from 50 mm/h",
+    ),
+    "environment.snow": Weather(
+        name="snow_mmph",
+        top=SNOW_MMPH,
+        meaning="falling snow, as water",
+        source="WMO: heavy from 5 mm/h",
+    ),
+    "environment.road_wetness": Weather(
+        name="wetness_percent", top=100.0, meaning="wetness of the ground", source=_COVER_SOURCE
+    ),
+    "environment.maple_leaf": Weather(
+        name="falling_leaves_per_m3",
+        top=LEAVES_PER_M3,
+        meaning="falling maple leaves",
+        source="engineering estimate of a gust through an autumn maple",
+    ),
+    "environment.road_leaf": Weather(
+        name="leaf_cover_percent",
+        top=100.0,
+        meaning="share of the ground under leaves",
+        source=_COVER_SOURCE,
+    ),
+    "environment.road_snow": Weather(
+        name="snow_cover_percent",
+        top=100.0,
+        meaning="share of the ground under snow",
+        source=_COVER_SOURCE,
+    ),
 }
 """How files write each of the paper's weather genes; 0 is clear."""
 WEATHER_GENES: Mapping[str, str] = {each.name: key for key, each in WEATHER_UNITS.items()}
@@ -129,8 +171,10 @@ def sections_of(scenario: Scenario, map: Map) -> dict[str, dict[str, float]]:
         goal = object_destination_m(scenario, map, name)
         if goal:
             values |= _named("destination_", goal)
-        speed = object_speed_mps(scenario, map, name)
-        sections[name] = values | {"speed_mps": round(speed, PLACE_DIGITS)}
+        values["speed_mps"] = round(object_speed_mps(scenario, map, name), PLACE_DIGITS)
+        if any(key == f"{name}.{HEIGHT}" for key, _ in scenario.genes):
+            values[HEIGHT] = round(scenario[f"{name}.{HEIGHT}"], PLACE_DIGITS)
+        sections[name] = values
     for key, value in scenario.genes:
         if key in PARAMETERS and key != TURN:
             head, _, name = key.partition(".")
@@ -143,7 +187,7 @@ def from_sections(
     sections: Mapping[str, Mapping[str, float]], like: Scenario, map: Map
 ) -> Scenario:
     """Return a scenario with the values of a file; map, seed, objects and task as in ``like``."""
-    values = dict.fromkeys(ENVIRONMENT, 0.0) | {SUN: 0.5}
+    values = dict(CLEAR)
     for name, value in sections.get("weather", {}).items():
         key = WEATHER_GENES[name]
         values[key] = WEATHER_UNITS[key].gene(value)
@@ -159,11 +203,12 @@ def from_sections(
         if name in like.removed_objects:
             continue
         section = sections[name]
-        ends = ("start", "destination") if "destination_x_m" in section else ("start",)
-        for end in ends:
-            place = (section[f"{end}_x_m"], section[f"{end}_y_m"])
-            values |= place_genes(f"{name}.{end}", place, map)
-        values[f"{name}.velocity"] = section["speed_mps"] / OBJECT_TYPES[kind].top_speed_mps
+        values |= _place(f"{name}.start", section, map)
+        values[f"{name}.velocity"] = OBJECT_TYPES[kind].share_of(section["speed_mps"])
+        if HEIGHT in section:
+            values[f"{name}.{HEIGHT}"] = section[HEIGHT]
+        if "destination_x_m" in section:
+            values |= _place(f"{name}.destination", section, map)
     for head, section in sections.items():
         named = {f"{head}.{name}": value for name, value in section.items()}
         conditions |= {key: value for key, value in named.items() if key in PARAMETERS}
@@ -175,6 +220,11 @@ def from_sections(
         task=like.task,
     )
     return bare.replace(conditions)
+
+
+def _place(gene: str, section: Mapping[str, float], map: Map) -> dict[str, float]:
+    end = gene.partition(".")[2]
+    return place_genes(gene, (section[f"{end}_x_m"], section[f"{end}_y_m"]), map)
 
 
 def _named(prefix: str, place_m: tuple[float, float]) -> dict[str, float]:
@@ -197,7 +247,9 @@ def ranges_of(head: str, map: Map) -> dict[str, tuple[float, float]]:
         places: dict[str, tuple[float, float]] = {}
         for end in ("start", "destination"):
             places |= {f"{end}_x_m": (x_min, x_max), f"{end}_y_m": (y_min, y_max)}
-        return places | {"speed_mps": (0.0, OBJECT_TYPES[kinds[head]].top_speed_mps)}
+        kind = OBJECT_TYPES[kinds[head]]
+        heights = {HEIGHT: HEIGHTS_M} if kind.flies else {}
+        return places | {"speed_mps": (0.0, kind.top_speed_mps)} | heights
     return {each.name: (each.low, each.high) for each in GROUPS[head].parameters}
 
 

@@ -6,6 +6,7 @@ from pytest_garl.scenarios.groups.parameter import Group, Parameter
 
 _BEGIN = Parameter(
     name="from_s",
+    even=True,
     nominal=0.0,
     low=0.0,
     high=300.0,
@@ -31,6 +32,7 @@ OUTAGE = Group(
         ),
         Parameter(
             name="frozen",
+            even=True,
             nominal=0.0,
             low=0.0,
             high=1.0,
@@ -62,6 +64,7 @@ HEADING = Group(
     parameters=(
         Parameter(
             name="start_deg",
+            even=True,
             nominal=0.0,
             low=-180.0,
             high=180.0,

@@ -14,6 +14,7 @@ GROUP = Group(
     parameters=(
         Parameter(
             name="turn_deg",
+            even=True,
             nominal=0.0,
             low=-180.0,
             high=180.0,

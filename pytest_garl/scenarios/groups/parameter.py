@@ -14,6 +14,7 @@ class Parameter:
     A scenario that does not name it has its ``nominal`` value, which has no effect.  ``low`` and
     ``high`` are the limits of what the simulator can fly, not what a domain claims.  ``source``
     says where the range of the domain `field` comes from.  A value of a ``whole`` one is rounded.
+    An ``even`` one has no harsher end, as a direction or a time.
     """
 
     name: str
@@ -23,6 +24,7 @@ class Parameter:
     meaning: str
     source: str
     whole: bool = False
+    even: bool = False
 
     def __post_init__(self) -> None:
         if not self.low <= self.nominal <= self.high or self.low == self.high:

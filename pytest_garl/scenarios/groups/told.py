@@ -10,6 +10,7 @@ GROUP = Group(
     parameters=(
         Parameter(
             name="surveyed",
+            even=True,
             nominal=0.0,
             low=0.0,
             high=1.0,
@@ -28,6 +29,7 @@ GROUP = Group(
         ),
         Parameter(
             name="towards_deg",
+            even=True,
             nominal=0.0,
             low=0.0,
             high=360.0,

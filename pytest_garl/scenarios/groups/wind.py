@@ -18,6 +18,7 @@ GROUP = Group(
         ),
         Parameter(
             name="towards_deg",
+            even=True,
             nominal=0.0,
             low=0.0,
             high=360.0,

@@ -1,0 +1,157 @@
+"""The operational domain: the range of each condition in which a landing system is to land.
+
+Industry's term is *operational design domain* (ISO 34503).  A violation inside it is a bug.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from pytest_garl.scenarios.genes import WeatherRange, genome_for
+from pytest_garl.scenarios.groups.catalogue import GROUPS, PARAMETERS
+from pytest_garl.scenarios.light import NOON_DEG, TWILIGHT_DEG
+from pytest_garl.scenarios.maps.map import Map
+from pytest_garl.scenarios.object_types import HEIGHTS_M
+from pytest_garl.scenarios.scenario import Scenario
+from pytest_garl.scenarios.units import WEATHER_UNITS, sections_of
+
+ABSENT = "absent"
+"""The behaviour of NPCs in a domain without them."""
+ELEVATION = "light.sun_elevation_deg"
+BIRD_HEIGHT = "npcs.bird_height_m"
+_TOLERANCE = 1e-4
+"""Files keep five digits."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Condition:
+    """What a domain can give a range: name, unit in the name, limits, meaning, source."""
+
+    key: str
+    low: float
+    high: float
+    nominal: float
+    meaning: str
+    source: str
+
+
+def _conditions() -> dict[str, Condition]:
+    found = [
+        Condition(
+            key=f"weather.{each.name}",
+            low=each.limits[0] if each.is_visibility else 0.0,
+            high=float("inf") if each.is_visibility else each.top,
+            nominal=float("inf") if each.is_visibility else 0.0,
+            meaning=each.meaning,
+            source=each.source,
+        )
+        for each in WEATHER_UNITS.values()
+    ]
+    found.append(
+        Condition(
+            key=ELEVATION,
+            low=TWILIGHT_DEG,
+            high=NOON_DEG,
+            nominal=NOON_DEG,
+            meaning="elevation of the sun, which may stand in any direction",
+            source="-6 degrees: the end of civil twilight (AMS Glossary of Meteorology)",
+        )
+    )
+    for key, each in PARAMETERS.items():
+        if not key.startswith("light."):
+            found.append(
+                Condition(
+                    key=key,
+                    low=each.low,
+                    high=each.high,
+                    nominal=each.nominal,
+                    meaning=each.meaning,
+                    source=each.source,
+                )
+            )
+    low, high = HEIGHTS_M
+    found.append(
+        Condition(
+            key=BIRD_HEIGHT,
+            low=low,
+            high=high,
+            nominal=3.0,
+            meaning="height at which birds fly",
+            source="engineering estimate: from above people's heads to above the search height",
+        )
+    )
+    return {each.key: each for each in found}
+
+
+CONDITIONS: Mapping[str, Condition] = _conditions()
+"""All that a domain may state, by ``group.name``."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Domain:
+    """Ranges of conditions, and who moves the NPCs.
+
+    A condition without a range has its nominal value.  ``paper`` is set for the world of the paper,
+    which states no ranges: eight weather genes, the sun's way over the day, and dense scenarios.
+    """
+
+    name: str
+    npc_behaviour: str
+    ranges: tuple[tuple[str, float, float], ...] = ()
+    paper: WeatherRange | None = None
+
+    def range_of(self, key: str) -> tuple[float, float] | None:
+        """Return (low, high) of a condition, or None if it has its nominal value."""
+        return next(((low, high) for name, low, high in self.ranges if name == key), None)
+
+    @property
+    def groups(self) -> tuple[str, ...]:
+        """Names of the groups that have a range, in the order of the file format."""
+        named = {key.partition(".")[0] for key, _, _ in self.ranges}
+        return tuple(name for name in ("weather", "light", *GROUPS, "npcs") if name in named)
+
+    def outside(self, scenario: Scenario, map: Map) -> tuple[str, ...]:
+        """Return what of a scenario lies outside the domain, one phrase each."""
+        if self.paper:
+            return _outside_paper(scenario, map, self.paper)
+        found = []
+        objects = dict(map.all_objects)
+        sections = sections_of(scenario, map)
+        for head, values in sections.items():
+            if head in objects and self.npc_behaviour == ABSENT:
+                found.append(f"{head} is there, the domain has no NPCs")
+            if head == "marker" or head in objects:
+                continue
+            for name, value in values.items():
+                key = f"{head}.{name}"
+                if key not in CONDITIONS:
+                    continue
+                problem = _beyond(value, self.range_of(key), CONDITIONS[key].nominal)
+                if problem:
+                    found.append(f"{key} = {value:g}, {problem}")
+        return tuple(found)
+
+
+def _beyond(value: float, limits: tuple[float, float] | None, nominal: float) -> str:
+    low, high = limits or (nominal, nominal)
+    low, high = min(low, nominal), max(high, nominal)
+    slack = _TOLERANCE * max(1.0, abs(value))
+    if low - slack <= value <= high + slack:
+        return ""
+    return f"the domain has {low:g} to {high:g}" if limits else f"the domain has only {nominal:g}"
+
+
+def _outside_paper(scenario: Scenario, map: Map, weather: WeatherRange) -> tuple[str, ...]:
+    tops = {each.key: each.high for each in genome_for(map, weather=weather).properties}
+    found = []
+    for key, value in scenario.genes:
+        if key in PARAMETERS and value != PARAMETERS[key].nominal:
+            found.append(f"{key} = {value:g}, the paper's world has only nominal values of it")
+        elif value > tops.get(key, value) + _TOLERANCE:
+            unit = WEATHER_UNITS[key]
+            found.append(
+                f"{unit.name} = {unit.physical(value):g}, the domain ends at "
+                f"{unit.physical(tops[key]):g}"
+            )
+    return tuple(found)

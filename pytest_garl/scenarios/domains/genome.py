@@ -1,0 +1,162 @@
+"""The genome of a domain: what may vary in its scenarios on one map."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+
+from pytest_garl.scenarios.domains.domain import ABSENT, BIRD_HEIGHT, ELEVATION, Domain
+from pytest_garl.scenarios.genes import (
+    ACTIVE,
+    SUN,
+    CompositeGene,
+    Genome,
+    NuclearGene,
+    Property,
+    genome_for,
+    object_gene,
+    place_gene,
+)
+from pytest_garl.scenarios.groups.catalogue import GROUPS, PARAMETERS
+from pytest_garl.scenarios.light import position_of_elevation
+from pytest_garl.scenarios.maps.map import Map
+from pytest_garl.scenarios.object_types import OBJECT_TYPES
+from pytest_garl.scenarios.task import Task
+from pytest_garl.scenarios.units import WEATHER_UNITS
+
+WEATHER_CAUSES = {
+    "dust": ("dust",),
+    "fog": ("fog",),
+    "rain": ("rain", "road_wetness"),
+    "snow": ("snow", "road_snow"),
+    "leaves": ("maple_leaf", "road_leaf"),
+}
+"""Weather genes that one cause switches on together: rain wets the ground, snow covers it."""
+
+
+def genome_of(domain: Domain, map: Map, task: Task | None = None) -> Genome:
+    """Return the genome of the domain's scenarios on ``map``.
+
+    Every group, every cause of weather and every NPC has a bit of activity, unless the domain
+    excludes its nominal values.  The world of the paper has none.
+    """
+    if domain.paper:
+        return genome_for(map, weather=domain.paper, task=task)
+    fixed: dict[str, float] = {}
+    composites = [
+        CompositeGene(name="environment", genes=tuple(_weather(domain))),
+        CompositeGene(name="light", genes=tuple(_light(domain))),
+        CompositeGene(
+            name="marker",
+            genes=(place_gene("marker", "position", "place of the marker in its disc of 7.5 m"),),
+        ),
+        CompositeGene(name="objects", genes=tuple(_objects(domain, map))),
+    ]
+    for name in GROUPS:
+        values = []
+        for key in GROUPS[name].keys:
+            limits = domain.range_of(key)
+            if limits and limits[0] == limits[1]:
+                fixed[key] = limits[0]
+            elif limits:
+                values.append(_condition(key, limits))
+        if values:
+            composites.append(CompositeGene(name=name, genes=(_optional(name, values),)))
+    return Genome(
+        composites=tuple(each for each in composites if each.genes),
+        task=Task(marker=map.marker) if task is None else task,
+        fixed=tuple(fixed.items()),
+        removed=tuple(name for name, _ in map.present_objects)
+        if domain.npc_behaviour == ABSENT
+        else (),
+    )
+
+
+def _optional(name: str, values: Iterable[Property], *, may_rest: bool = True) -> NuclearGene:
+    """Return a gene with a bit of activity, unless one of its nominal values is not allowed."""
+    values = tuple(values)
+    if not may_rest or any(_excludes_nominal(each) for each in values):
+        return NuclearGene(name=name, properties=values)
+    bit = Property(
+        key=f"{ACTIVE}{name}", low=0.0, high=1.0, nominal=0.25, meaning=f"{name} acts above 0.5"
+    )
+    return NuclearGene(name=name, properties=(bit, *values))
+
+
+def _excludes_nominal(item: Property) -> bool:
+    return item.key in PARAMETERS and item.nominal != PARAMETERS[item.key].nominal
+
+
+def _condition(key: str, limits: tuple[float, float]) -> Property:
+    parameter, (low, high) = PARAMETERS[key], limits
+    return Property(
+        key=key,
+        low=low,
+        high=high,
+        nominal=min(high, max(low, parameter.nominal)),
+        meaning=parameter.meaning,
+        outward=not parameter.even,
+    )
+
+
+def _weather(domain: Domain) -> Iterable[NuclearGene]:
+    for cause, names in WEATHER_CAUSES.items():
+        values, may_rest = [], True
+        for name in names:
+            unit = WEATHER_UNITS[f"environment.{name}"]
+            limits = domain.range_of(f"weather.{unit.name}")
+            if limits is None:
+                continue
+            low, high = sorted(0.0 if math.isinf(each) else unit.gene(each) for each in limits)
+            if low == high == 0:
+                continue
+            may_rest &= low == 0
+            values.append(
+                Property(
+                    key=f"environment.{name}",
+                    low=low,
+                    high=max(high, math.nextafter(low, 1.0)),
+                    nominal=low,
+                    meaning=unit.meaning,
+                    outward=True,
+                )
+            )
+        if values:
+            yield _optional(cause, values, may_rest=may_rest)
+
+
+def _light(domain: Domain) -> Iterable[NuclearGene]:
+    limits = domain.range_of(ELEVATION)
+    if limits is None or limits[0] == limits[1]:
+        return
+    lowest = position_of_elevation(limits[0])
+    position = Property(
+        key=SUN,
+        low=lowest,
+        high=1 - lowest,
+        nominal=0.5,
+        meaning="position of the sun (0: dawn in the east, 0.5: noon, 1: dusk in the west)",
+        outward=True,
+    )
+    turn = _condition("light.turn_deg", (-180.0, 180.0))
+    yield _optional("light", (position, turn))
+
+
+def _objects(domain: Domain, map: Map) -> Iterable[NuclearGene]:
+    if domain.npc_behaviour == ABSENT:
+        return
+    heights = domain.range_of(BIRD_HEIGHT)
+    for name, kind in map.present_objects:
+        values = list(object_gene(name).properties)
+        if OBJECT_TYPES[kind].flies and heights:
+            low, high = heights
+            values.append(
+                Property(
+                    key=f"{name}.height_m",
+                    low=low,
+                    high=high,
+                    nominal=min(high, max(low, OBJECT_TYPES[kind].altitude_m)),
+                    meaning="height at which it flies",
+                )
+            )
+        yield _optional(name, values)
