@@ -18,6 +18,7 @@ from pytest_garl.simulation.environment import changed
 from pytest_garl.simulation.flight import Crash, Flight, Outcome
 from pytest_garl.simulation.ground_stays import GroundStays
 from pytest_garl.simulation.landing_place import what_lies_under
+from pytest_garl.simulation.navigation import Navigation
 from pytest_garl.simulation.npc_policy import DECISION_STEP_S, GeneChange, NpcPolicy, Situation
 from pytest_garl.simulation.physics.flight_control import NO_THRUST, FlightControl
 from pytest_garl.simulation.physics.npc import Npc
@@ -66,16 +67,17 @@ class Loop:
         self._time_limit_s = time_limit_s
         self._system = SystemUnderTest(system, guard)
         self.camera = self._system.airframe.camera
-        self._marker = marker_position_m(scenario, map)
+        self.marker_m = marker_position_m(scenario, map)
         self._model = vehicle_model(self._system.airframe)
         self.npcs = [Npc(scenario, map, name, policy()) for name, _ in map.present_objects]
         self._world = _world(self._model, map, self.npcs)
         self._thrusts, self._command = begin_at_start(self._world, self._model, scenario, map)
-        self.recorder = Recorder(map, self.npcs, self._marker)
-        stays = GroundStays(self.recorder, self._model, self._marker, partial(_under, self))
+        self.recorder = Recorder(map, self.npcs, self.marker_m)
+        stays = GroundStays(self.recorder, self._model, self.marker_m, partial(_under, self))
         self._contacts = Contacts(self._world, self.recorder, self.npcs, self._model.size_m, stays)
         self._control = FlightControl(self._model)
         self._wind = Wind(scenario, map.ground.texture)
+        self._navigation = Navigation(scenario)
         self._wanted_thrusts = NO_THRUST
         self._pending: list[tuple[int, Command]] = []
         self._sensors = Sensors(scenario, self.camera, self.recorder, self.npcs)
@@ -108,8 +110,15 @@ class Loop:
             rng = generator(self.scenario.seed, "objects", numbers[npc.name])
             npc.policy.reset(self.situation(npc), rng)
         self.recorder.begin(*self._world.uav_state()[:3])
-        airframe = self._system.airframe
-        self._system.start(mission_for(self.scenario, self.map, airframe, self._time_limit_s))
+        self._system.start(
+            mission_for(
+                self.scenario,
+                self.map,
+                self._system.airframe,
+                self._time_limit_s,
+                error_m=self._navigation.error_m,
+            )
+        )
         if self._system.needs_camera:
             self._sensors.switch_on(self.scenario, self.map)
 
@@ -148,17 +157,18 @@ class Loop:
                 return "gave_up"
         x, y, z, w = attitude
         motion = Motion(position, velocity, attitude, rotate((-x, -y, -z, w), spin))
-        self._observe(tick, motion)
+        told = self._navigation.estimate(tick, motion)
+        self._observe(tick, motion, told)
         while self._pending and self._pending[0][0] <= tick:
             self._take(self._pending.pop(0)[1])
-        self._actuate(tick, motion)
+        self._actuate(tick, motion, told)
         thrust_n = sum(self._thrusts)
         return self._contacts.outcome(now, position, attitude, velocity, thrust_n)
 
-    def _actuate(self, tick: int, motion: Motion) -> None:
+    def _actuate(self, tick: int, motion: Motion, told: Motion) -> None:
         """Apply the thrusts and the drag of this tick, and step the physics."""
         model, attitude = self._model, motion.attitude
-        self._thrusts = lag(self._thrusts, self._thrusts_wanted(tick, motion), model, TICK_S)
+        self._thrusts = lag(self._thrusts, self._thrusts_wanted(tick, told), model, TICK_S)
         total, torque = wrench(self._thrusts, model)
         fx, fy, fz = rotate(attitude, (0.0, 0.0, total))
         vx, vy, vz = motion.velocity_mps
@@ -166,16 +176,16 @@ class Loop:
         dx, dy, dz = drag((vx - ax, vy - ay, vz - az), model)
         self._world.step(motion.position_m, (fx + dx, fy + dy, fz + dz), rotate(attitude, torque))
 
-    def _thrusts_wanted(self, tick: int, motion: Motion) -> Thrusts:
+    def _thrusts_wanted(self, tick: int, told: Motion) -> Thrusts:
         """Return the wanted thrusts of the system's own flight control, or of the simulated one."""
         if self._contacts.motors_stopped:
             return NO_THRUST
         flies_motors = self._system.airframe.control_rate_hz and self._system.has_stepped
         if not flies_motors or isinstance(self._command, Abort):
             on_ground_s = self._contacts.on_ground_s(tick / PHYSICS_RATE_HZ)
-            return self._control.thrusts(motion, self._command, TICK_S, on_ground_s)
+            return self._control.thrusts(told, self._command, TICK_S, on_ground_s)
         if tick % self._ticks_per_control == 0:
-            state = _vehicle_state(tick, motion, self._thrusts)
+            state = _vehicle_state(tick, told, self._thrusts)
             self._wanted_thrusts = self._system.control(state, self._model.max_thrust_n)
         return self._wanted_thrusts
 
@@ -203,20 +213,20 @@ class Loop:
         position, attitude, _, _ = self._world.uav_state()
         return eye_under(position, attitude), attitude
 
-    def _observe(self, tick: int, motion: Motion) -> None:
+    def _observe(self, tick: int, motion: Motion, told: Motion) -> None:
         """Show the landing system what has arrived, and queue its commands for their latency."""
         if self._system.gave_up:
             if self._sensors.takes_picture(tick):
                 # The recorded view explains a collision during the climb.
                 self.recorder.step(Abort(), self._sensors.look(tick, motion)[1])
             return
-        for delivery in self._sensors.deliveries(tick, motion, told=motion):
+        for delivery in self._sensors.deliveries(tick, motion, told):
             if not self._system.gave_up:
                 self._step(tick, delivery)
 
     def _step(self, tick: int, delivery: Delivery) -> None:
         if self._system.observes_truth:
-            self._system.observe_truth(_truth(self._marker, self.npcs, self.map))
+            self._system.observe_truth(_truth(self, self._navigation.error_m))
         command = self._system.step(delivery.observation)
         error_m = estimation_error_m(delivery.observation, delivery.place_m)
         self.recorder.step(command, delivery.sight, error_m)
@@ -291,9 +301,14 @@ def _ticks_per_call(rate_hz: float | None) -> int:
     return max(1, round(PHYSICS_RATE_HZ / rate_hz)) if rate_hz else 1
 
 
-def _truth(marker_m: tuple[float, float], npcs: Sequence[Npc], map: Map) -> Truth:
-    objects = (
-        TruthObject(position_m=npc.position_m, velocity_mps=(npc.vx_mps, npc.vy_mps), type=npc.type)
-        for npc in npcs
-    )
-    return Truth(marker_m=marker_m, objects=tuple(objects), map=map)
+def _truth(loop: Loop, error_m: Vector) -> Truth:
+    """Return the truth in the frame of the estimated position, in which the pilot flies."""
+    dx, dy, dz = error_m
+    objects = []
+    for npc in loop.npcs:
+        x, y, z = npc.position_m
+        velocity = npc.vx_mps, npc.vy_mps
+        place = x + dx, y + dy, z + dz
+        objects.append(TruthObject(position_m=place, velocity_mps=velocity, type=npc.type))
+    x, y = loop.marker_m
+    return Truth(marker_m=(x + dx, y + dy), objects=tuple(objects), map=loop.map)

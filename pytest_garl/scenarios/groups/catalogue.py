@@ -2,11 +2,19 @@
 
 from __future__ import annotations
 
-from pytest_garl.scenarios.groups import events, light, timing, told, wind
+from pytest_garl.scenarios.groups import events, light, navigation, timing, told, wind
 from pytest_garl.scenarios.groups.parameter import Group, Parameter
 
 GROUPS: dict[str, Group] = {
-    each.name: each for each in (light.GROUP, wind.GROUP, told.GROUP, timing.GROUP, *events.GROUPS)
+    each.name: each
+    for each in (
+        light.GROUP,
+        wind.GROUP,
+        *navigation.GROUPS,
+        told.GROUP,
+        timing.GROUP,
+        *events.GROUPS,
+    )
 }
 PARAMETERS: dict[str, Parameter] = {
     key: each

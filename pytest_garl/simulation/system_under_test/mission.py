@@ -12,12 +12,24 @@ SEARCH_ALTITUDE_M = 10.0
 """Search height of the paper's published landing systems."""
 
 
-def mission_for(scenario: Scenario, map: Map, airframe: Airframe, time_limit_s: float) -> Mission:
-    """Return the mission that the landing system gets before take-off."""
+def mission_for(
+    scenario: Scenario,
+    map: Map,
+    airframe: Airframe,
+    time_limit_s: float,
+    *,
+    error_m: tuple[float, float, float] = (0.0, 0.0, 0.0),
+) -> Mission:
+    """Return the mission that the landing system gets before take-off.
+
+    Its home is where its own navigation, which errs by ``error_m``, says that it is.
+    """
     marker = scenario.task.marker
+    x, y, z = start_m(scenario, map)
+    dx, dy, dz = error_m
     return Mission(
         gps_position_m=told_position_m(scenario, map),
-        home_m=start_m(scenario, map),
+        home_m=(x + dx, y + dy, z + dz),
         search_altitude_m=SEARCH_ALTITUDE_M,
         marker_id=marker.id,
         marker_side_m=marker.side_m,

@@ -1,0 +1,144 @@
+"""What the UAV's navigation says of its state, which the landing system and the control act on.
+
+The errors are first-order Gauss-Markov processes.  Such a process has no derivative, so the error
+follows it with a lag and a largest rate, and the error of the velocity is exactly that rate: the
+estimated velocity is the derivative of the estimated position.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+
+from pytest_garl.scenarios.scenario import Scenario
+from pytest_garl.simulation.physics.vehicle import Motion, Quaternion, Vector
+from pytest_garl.simulation.physics.world import PHYSICS_RATE_HZ
+from pytest_garl.simulation.randomness import generator
+
+LAG_S = 10.0
+"""Engineering estimate: filters such as PX4's EKF2 weight GPS so that they follow it in some 10
+s."""
+MOST_RATE_MPS = 0.1
+TICKS_PER_DRAW = 24
+"""Ten draws a second: often, compared with the lag."""
+_DRAW_S = TICKS_PER_DRAW / PHYSICS_RATE_HZ
+_TICK_S = 1 / PHYSICS_RATE_HZ
+
+
+@dataclass(slots=True, kw_only=True)
+class _Wandering:
+    """Errors that follow a Gauss-Markov process; lists have one entry per component."""
+
+    error: list[float]
+    sigma: float
+    most_rate: float = math.inf
+    rate: list[float] = field(default_factory=list)
+    target: list[float] = field(default_factory=list)
+
+    def __post_init__(self) -> None:
+        self.target, self.rate = [*self.error], [0.0] * len(self.error)
+
+    def draw(self, keep: float, numbers: list[float]) -> None:
+        """Draw the next target; ``keep`` is the correlation with the last one."""
+        spread = self.sigma * math.sqrt(1 - keep * keep)
+        self.target = [
+            keep * old + spread * number for old, number in zip(self.target, numbers, strict=True)
+        ]
+
+    def advance(self) -> None:
+        """Follow the target for a step of the physics."""
+        rate = [(wanted - now) / LAG_S for wanted, now in zip(self.target, self.error, strict=True)]
+        fast = math.hypot(*rate) / self.most_rate
+        self.rate = [each / fast for each in rate] if fast > 1 else rate
+        self.error = [now + each * _TICK_S for now, each in zip(self.error, self.rate, strict=True)]
+
+
+class Navigation:
+    """The estimate of the UAV's motion; call ``estimate`` for each step of the physics."""
+
+    def __init__(self, scenario: Scenario) -> None:
+        def value(name: str) -> float:
+            return scenario[f"navigation.{name}"]
+
+        away = math.radians(value("towards_deg"))
+        position_m = value("position_m")
+        self._place = _Wandering(
+            error=[position_m * math.cos(away), position_m * math.sin(away)],
+            sigma=position_m / math.sqrt(2),
+            most_rate=MOST_RATE_MPS,
+        )
+        height_m = value("height_m")
+        self._height = _Wandering(error=[0.0], sigma=height_m, most_rate=MOST_RATE_MPS)
+        yaw = math.radians(value("yaw_deg"))
+        self._yaw = _Wandering(error=[yaw], sigma=abs(yaw))
+        tilt, side = math.radians(value("tilt_deg")), math.radians(value("tilt_towards_deg"))
+        # About the body's x (right side down) and y (nose down).
+        self._tilt = _Wandering(
+            error=[tilt * math.sin(side), tilt * math.cos(side)], sigma=tilt / math.sqrt(2)
+        )
+        self._keep = math.exp(-_DRAW_S / value("correlation_s"))
+        self._errs = bool(position_m or height_m or yaw or tilt)
+        jump, over = scenario["jump.distance_m"], math.radians(scenario["jump.towards_deg"])
+        self._jump_m = jump * math.cos(over), jump * math.sin(over)
+        self._jump_tick = round(scenario["jump.from_s"] * PHYSICS_RATE_HZ)
+        self._jumped = False
+        self._rng = generator(scenario.seed, "navigation")
+
+    @property
+    def error_m(self) -> Vector:
+        """The error of the estimated position at this moment."""
+        (x, y), (z,) = self._place.error, self._height.error
+        jump_x, jump_y = self._jump_m if self._jumped else (0.0, 0.0)
+        return x + jump_x, y + jump_y, z
+
+    def estimate(self, tick: int, motion: Motion) -> Motion:
+        """Return the estimate of a motion, itself if nothing errs."""
+        if tick >= self._jump_tick and any(self._jump_m):
+            self._jumped = True
+        if not self._errs and not self._jumped:
+            return motion
+        if self._errs and tick:
+            self._advance(tick)
+        position = _sum(motion.position_m, self.error_m)
+        velocity = _sum(motion.velocity_mps, (*self._place.rate, *self._height.rate))
+        attitude = motion.attitude
+        if any(self._yaw.error) or any(self._tilt.error):
+            yaw, (about_x, about_y) = self._yaw.error[0], self._tilt.error
+            attitude = _product(_turn(0.0, 0.0, yaw), attitude)
+            attitude = _product(attitude, _turn(about_x, about_y, 0.0))
+        return Motion(position, velocity, attitude, motion.spin_radps)
+
+    def _advance(self, tick: int) -> None:
+        if tick % TICKS_PER_DRAW == 0:
+            # As many draws for each part whatever errs, so that one error does not change another.
+            numbers = [float(each) for each in self._rng.standard_normal(6)]
+            self._place.draw(self._keep, numbers[0:2])
+            self._height.draw(self._keep, numbers[2:3])
+            self._yaw.draw(self._keep, numbers[3:4])
+            self._tilt.draw(self._keep, numbers[4:6])
+        for each in (self._place, self._height, self._yaw, self._tilt):
+            each.advance()
+
+
+def _sum(one: Vector, other: tuple[float, ...]) -> Vector:
+    (x, y, z), (dx, dy, dz) = one, other
+    return x + dx, y + dy, z + dz
+
+
+def _turn(x: float, y: float, z: float) -> Quaternion:
+    """Return the quaternion of a turn about an axis by the vector's length, in rad."""
+    angle = math.hypot(x, y, z)
+    share = math.sin(angle / 2) / angle if angle else 0.5
+    return x * share, y * share, z * share, math.cos(angle / 2)
+
+
+def _product(first: Quaternion, second: Quaternion) -> Quaternion:
+    """Return the turn ``second`` followed by ``first``, both seen in the frame of ``first``."""
+    ax, ay, az, aw = first
+    bx, by, bz, bw = second
+    return (
+        aw * bx + ax * bw + ay * bz - az * by,
+        aw * by - ax * bz + ay * bw + az * bx,
+        aw * bz + ax * by - ay * bx + az * bw,
+        aw * bw - ax * bx - ay * by - az * bz,
+    )
