@@ -59,6 +59,7 @@ def draw(folder: Path) -> None:
     home = np.array([*EMPTY.uav_start_m[:2], HEIGHT_M])
     away = flight.uav.position_m - home
     errors = np.array([step.estimation_error_m for step in flight.steps])
+    errors -= errors[0]
     late = flight.uav.time_s > 12.0
     right.plot(away[late, 0], away[late, 1], linewidth=0.8, label="where it is")
     steps_late = np.array([step.time_s for step in flight.steps]) > 12.0
@@ -67,7 +68,7 @@ def draw(folder: Path) -> None:
         -errors[steps_late, 1],
         ".",
         markersize=1,
-        label="home less the error",
+        label="less what the error grew by",
     )
     right.set(title="a UAV that holds its place", xlabel="east (m)", ylabel="north (m)")
     right.axis("equal")
