@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import numpy as np
@@ -20,7 +21,7 @@ COURT = load_map("court")
 
 def test_conditions_survive_the_file_which_names_only_those_that_are_not_nominal() -> None:
     genome = genome_for(COURT)
-    plain = decode(genome.nominal, genome, map="court", seed=3)
+    plain = repair(decode(genome.nominal, genome, map="court", seed=3), COURT)
     scenario = plain.replace({"wind.mean_mps": 4.5})
     assert "[scenario.wind]\nmean_mps = 4.5\n" in dumps(scenario, COURT)
     assert loads(dumps(scenario, COURT), COURT) == scenario
@@ -29,7 +30,7 @@ def test_conditions_survive_the_file_which_names_only_those_that_are_not_nominal
 
 def test_a_condition_that_cannot_be_flown_is_refused() -> None:
     genome = genome_for(COURT)
-    plain = decode(genome.nominal, genome, map="court", seed=3)
+    plain = repair(decode(genome.nominal, genome, map="court", seed=3), COURT)
     text = dumps(plain.replace({"wind.mean_mps": 4.5}), COURT)
     with pytest.raises(ScenarioError, match=r"scenario.wind.mean_mps'?: found 99.*15"):
         loads(text.replace("4.5", "99"), COURT)
@@ -42,15 +43,45 @@ def test_destinations_survive_the_file_and_are_asked_of_every_object() -> None:
     row = genome.random(np.random.default_rng(3))
     scenario = repair(decode(row, genome, map="court", seed=3), COURT)
     text = dumps(scenario, COURT)
-    assert text.count("[genes.dog-1]") == 1
+    assert text.count("[scenario.dog-1]") == 1
     assert loads(text, COURT) == scenario
     alone = scenario.without("dog-1", "bird-1")
     assert loads(dumps(alone, COURT), COURT) == alone
-    x = scenario["dog-1.destination_x"]
-    with pytest.raises(ScenarioError, match=r"genes.dog-1.destination_x'?: missing"):
-        loads(text.replace(f"destination_x = {x!r}\n", ""), COURT)
+    head, _, tail = text.partition("[scenario.dog-1]")
+    x_m = re.search(r"destination_x_m = .*\n", tail)
+    assert x_m is not None
+    with pytest.raises(ScenarioError, match=r"scenario.dog-1.destination_x_m'?: missing"):
+        loads(f"{head}[scenario.dog-1]{tail.replace(x_m.group(), '', 1)}", COURT)
 
 
+IN_UNITS = dumps(
+    repair(
+        decode(genome_for(COURT).nominal, genome_for(COURT), map="court", seed=1), COURT
+    ).replace({"environment.fog": 0.1}),
+    COURT,
+)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "expected"),
+    [
+        ("fog_visibility_m = 100.0", "fog_visibility_m = 3.0", "'scenario.weather.fog_visibility"),
+        ("fog_visibility_m = 100.0", "mist_m = 3.0", "'scenario.weather.mist_m': unknown key"),
+        ("[scenario.marker]", "[scenario.market]", "'scenario.market': unknown key"),
+        ("schema = 2", "schema = 9", "'schema': found 9, expected 1 or 2"),
+        ("x_m = 0.0", "", "'scenario.marker.x_m': missing"),
+        ("x_m = 0.0", "x_m = 99.0", "'scenario.marker.x_m': found 99"),
+    ],
+)
+def test_a_broken_file_in_units_names_file_and_key(old: str, new: str, expected: str) -> None:
+    assert old in IN_UNITS
+    with pytest.raises(ScenarioError) as caught:
+        loads(IN_UNITS.replace(old, new, 1), COURT, source="case.toml")
+    assert "case.toml" in str(caught.value)
+    assert expected in str(caught.value)
+
+
+# The values of this one have more digits than a file in units, so its file lists genes.
 GOOD = dumps(decode(genome_for(COURT).nominal, genome_for(COURT), map="court", seed=1), COURT)
 
 
@@ -62,7 +93,7 @@ GOOD = dumps(decode(genome_for(COURT).nominal, genome_for(COURT), map="court", s
         ("fog = 0.0", "fog = nan", "'genes.environment.fog'"),
         ("fog = 0.0", 'fog = "thick"', "expected a number"),
         ("fog = 0.0", "mist = 0.0", "'genes.environment.mist': unknown key"),
-        ("schema = 1", "schema = 9", "'schema': found 9, expected 1"),
+        ("schema = 2", "schema = 9", "'schema': found 9, expected 1 or 2"),
         ('map = "court"', 'map = "lawn"', "expected 'court'"),
         ("seed = 1", "seed = -1", "'seed'"),
     ],
@@ -92,7 +123,7 @@ def test_absent_objects_survive_the_file_and_have_no_genes() -> None:
 
 def test_an_absent_object_must_be_one_of_the_map() -> None:
     genome = genome_for(COURT)
-    text = dumps(repair(decode(genome.nominal, genome, map="court", seed=4), COURT), COURT)
+    text = dumps(decode(genome.nominal, genome, map="court", seed=4), COURT)
     text = text.replace("seed = 4", 'seed = 4\nabsent = ["cat-1"]')
     with pytest.raises(ScenarioError, match=r"'absent': map 'court' has no object cat-1"):
         loads(text, COURT)

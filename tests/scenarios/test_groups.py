@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import dataclasses
+
 import pytest
 
 from pytest_garl import Command, Mission, Observation, PositionSetpoint
 from pytest_garl.scenarios.groups.catalogue import GROUPS, PARAMETERS
 from pytest_garl.scenarios.scenario import Scenario
+from pytest_garl.scenarios.task import Start, Task
 from pytest_garl.simulation.fly import fly
 from tests.support.flights import EMPTY, STAND, Scripted, nominal
 
@@ -30,7 +33,9 @@ def hash_of_flight(scenario: Scenario) -> str:
 @pytest.mark.sim
 @pytest.mark.parametrize("name", GROUPS)
 def test_every_group_changes_a_flight(name: str) -> None:
-    group, without = GROUPS[name], nominal()
+    # From 10 m above the middle of the map it sees trees and their shadows.
+    group, start = GROUPS[name], Start(mode="hover", height_m=10.0)
+    without = dataclasses.replace(nominal(), task=Task(start=start))
     # What begins at the end of its range begins after this short flight.
     ends = {
         key: PARAMETERS[key].low if key.endswith(".from_s") else PARAMETERS[key].high
