@@ -20,6 +20,7 @@ COMMANDS = {
     "cases": "cases",
     "check": "check",
     "diff": "baseline",
+    "domain": "domain",
     "experiment": "experiment",
     "report": "report",
     "train": "train",

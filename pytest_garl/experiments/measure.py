@@ -98,7 +98,7 @@ def result_row(
         result_hash=ledger.queries.result_hash(search.key)[:HASH_DIGITS],
         limits=limits_text(search.job.limits),
         **_violations(search),
-        **_diversity(search, str(ledger.fact("weather"))),
+        **_diversity(search, str(ledger.fact("domain"))),
         **_durations(search, ledger),
         **_versions(search.job, ledger),
     )
@@ -130,10 +130,10 @@ def limits_text(limits: Limits) -> str:
     return f"{limits.distance_m:g} m, {limits.time_s:g} s, abort {limits.abort}"
 
 
-def _diversity(search: FinishedSearch, weather: str) -> dict[str, Any]:
+def _diversity(search: FinishedSearch, domain: str) -> dict[str, Any]:
     """Return the columns of distances between scenarios and of coverage."""
     scenarios = [parse_scenario(flight.scenario) for flight in search.flights]
-    raw_weather, genes = chromosomes(scenarios, search.map, weather)
+    raw_weather, genes = chromosomes(scenarios, search.map, domain)
     violating = np.array([verdict.violation for verdict in search.verdicts])
     cells = covered_cells(search)
     return {
@@ -167,16 +167,18 @@ def _versions(job: FlightJob, ledger: Ledger) -> dict[str, Any]:
 
 
 def chromosomes(
-    scenarios: Sequence[Scenario], map: Map, weather: str
+    scenarios: Sequence[Scenario], map: Map, domain: str
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Return the scenarios' weather genes, (n, 8), and their normalised genes, (n, d).
 
     The genes are those that every method has, so that distances are comparable.  The destinations
-    of NPCs, which are genes of ``ga`` and ``offline-rl`` alone, are left out.
+    of NPCs, which are genes of ``ga`` and ``offline-rl`` alone, are left out.  Whoever is not there
+    counts as if it stood at its nominal place.
     """
-    genome = genome_for(map, weather="full" if weather == "full" else "confined")
+    genome = genome_for(map, weather="confined" if domain == "paper" else "full")
+    nominal = dict(zip(genome.keys, genome.nominal, strict=True))
     raw = [[each[f"environment.{name}"] for name, _ in WEATHER] for each in scenarios]
-    whole = [[each[key] for key in genome.keys] for each in scenarios]
+    whole = [[each.get(key, nominal[key]) for key in genome.keys] for each in scenarios]
     return np.array(raw), genome.normalise(np.array(whole))
 
 

@@ -64,11 +64,16 @@ OPTIONS = (
         "run. 'ray' needs pytest-garl[ray]. The results are the same (default: local).",
     ),
     Option(
+        name="domain",
+        metavar="NAME|FILE",
+        help="The conditions in which the systems are to land: field, calm, paper, or a TOML file. "
+        "It takes the place of the domain of the tests' markers. `garl domain show` explains one "
+        "(default: paper).",
+    ),
+    Option(
         name="weather",
         metavar="RANGE",
-        default="confined",
-        help="How bad the weather may become: 'confined' keeps its genes in [0, 0.15], 'full' in "
-        "[0, 1] (default: confined).",
+        help="Deprecated: 'confined' is --garl-domain=paper, 'full' the same in any weather.",
     ),
     Option(
         name="timeout",

@@ -36,6 +36,33 @@ def limits_lines(run: Run) -> list[str]:
     ]
 
 
+def domain_lines(run: Run) -> list[str]:
+    """Return the domains of markers, and the saved cases that lie outside their domain."""
+    from pytest_garl.scenarios.maps.map import load_map
+
+    targets = [target for slots in run.searches.targets.values() for target in slots.values()]
+    given = dict.fromkeys(
+        (target.system.__qualname__, target.domain)
+        for target in targets
+        if target.entry is None and target.domain is not None
+    )
+    lines = [
+        f"garl: domain of {name}: {domain.name}"
+        for name, domain in given
+        if domain is not None and domain != run.options.domain
+    ]
+    for target in targets:
+        if target.case is not None and target.domain is not None:
+            map = load_map(target.map, run.options.map_folders)
+            outside = target.domain.outside(target.case.scenario, map)
+            if outside:
+                lines.append(
+                    f"garl: {target.name} lies outside the domain {target.domain.name} and is "
+                    f"flown all the same: {'; '.join(outside)}"
+                )
+    return list(dict.fromkeys(lines))
+
+
 def acceptance_warning(run: Run) -> list[str]:
     """Return a warning if git cannot tell which cases are committed."""
     problem = run.options.corpus.acceptance.problem
@@ -70,7 +97,7 @@ def _search_line(run: Run) -> str:
     resuming = f"resuming after {done} flights; " if options.resume else ""
     return (
         f"garl: {resuming}budget {options.budget} per system and map, method {options.method}, "
-        f"seed {options.seed}, NPCs {options.npcs}, weather {options.weather}, "
+        f"seed {options.seed}, NPCs {options.npcs}, domain {options.domain.name}, "
         f"{_workers(run)}"
     )
 

@@ -200,9 +200,14 @@ def pytest_report_collectionfinish(config: pytest.Config) -> list[str]:
     run = config.stash.get(RUN, None)
     if run is None:
         return []
-    from pytest_garl.plugin.header import acceptance_warning, forecast, limits_lines
+    from pytest_garl.plugin.header import (
+        acceptance_warning,
+        domain_lines,
+        forecast,
+        limits_lines,
+    )
 
-    return [*forecast(run), *limits_lines(run), *acceptance_warning(run)]
+    return [*forecast(run), *limits_lines(run), *domain_lines(run), *acceptance_warning(run)]
 
 
 def pytest_terminal_summary(terminalreporter: Any, config: pytest.Config) -> None:

@@ -18,6 +18,7 @@ from pytest_garl.scenarios.placement import MAP_DICTIONARY
 from pytest_garl.scenarios.task import Start, Task
 
 if TYPE_CHECKING:
+    from pytest_garl.scenarios.domains.domain import Domain
     from pytest_garl.scenarios.maps.map import Map
 
 T = TypeVar("T", MarkerSpec, Start)
@@ -55,12 +56,13 @@ def read_marker(marker: pytest.Mark, options: Options) -> MarkerArguments:
     from pytest_garl.scenarios.maps.map import load_map, map_names
     from pytest_garl.verdicts.verdict import Limits, limits
 
-    known = {"system", "maps", "marker", "start", "limits", "deterministic", "files"}
+    known = {"system", "maps", "domain", "marker", "start", "limits"}
+    known |= {"deterministic", "files"}
     unknown = sorted(set(marker.kwargs) - known)
     if unknown or marker.args:
         raise GarlError(
             f"mark.garl: found {', '.join(unknown) or 'positional arguments'}, expected keywords "
-            "system=, maps=, marker=, start=, limits=, deterministic= and files="
+            "system=, maps=, domain=, marker=, start=, limits=, deterministic= and files="
         )
     if "system" not in marker.kwargs:
         raise GarlError("mark.garl: system= is missing; give the landing system's class")
@@ -92,6 +94,7 @@ def read_marker(marker: pytest.Mark, options: Options) -> MarkerArguments:
             system=system,
             limits=given,
             deterministic=deterministic,
+            domain=_domain(marker.kwargs.get("domain"), options),
             files=_files(marker.kwargs.get("files", ()), options),
         ),
         marker=spec,
@@ -99,6 +102,17 @@ def read_marker(marker: pytest.Mark, options: Options) -> MarkerArguments:
         has_distance=has_distance and "limits" in marker.kwargs,
         map_folders=options.map_folders,
     )
+
+
+def _domain(given: Any, options: Options) -> Domain:
+    if given is not None and not isinstance(given, str):
+        raise GarlError(
+            f"mark.garl: domain={given!r}: expected a name such as 'field', or a TOML file"
+        )
+    try:
+        return options.domain_of(given)
+    except GarlError as error:
+        raise GarlError(f"mark.garl: domain={given!r}: {error}") from error
 
 
 def _of_type(marker: pytest.Mark, name: str, kind: type[T]) -> T | None:

@@ -9,7 +9,16 @@ import pytest
 from pytest_garl.plugin.keys import is_landing_item
 from pytest_garl.plugin.options import Options
 
-SEARCH_OPTIONS = ("seed", "method", "population", "weather", "duplicates", "shrink", "resume")
+SEARCH_OPTIONS = (
+    "seed",
+    "method",
+    "population",
+    "domain",
+    "weather",
+    "duplicates",
+    "shrink",
+    "resume",
+)
 """Options that only a search uses."""
 
 

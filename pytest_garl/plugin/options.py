@@ -20,7 +20,7 @@ from pytest_garl.search.catalogue import default_policy, find_method, method_nam
 if TYPE_CHECKING:
     from pytest_garl.execution.stored_ledger import StoredSlot
     from pytest_garl.regressions.corpus import Corpus
-    from pytest_garl.scenarios.genes import WeatherRange
+    from pytest_garl.scenarios.domains.domain import Domain
 
 SLOT_ID = re.compile(r"(?P<map>.+)-g(?P<generation>\d{2,})-s(?P<slot>\d{2,})")
 LARGEST_POPULATION = 20
@@ -50,7 +50,8 @@ class Options:
     """None: as many as the Ray cluster has CPUs."""
     ray_address: str
     """Of a cluster that is there already, or empty: one on this machine."""
-    weather: WeatherRange
+    domain: Domain
+    """Of the command line, else of the ini key, else the default one."""
     timeout_s: float
     repeat: str
     """A slot or a scenario file to fly again, or empty."""
@@ -58,6 +59,8 @@ class Options:
     """The slot that ``repeat`` names, as the earlier search flew it."""
     duplicates: Literal["xfail", "fail"]
     npcs: str
+    """Who moves the NPCs: of the command line or the ini key, else of the domain."""
+    npcs_are_given: bool
     baseline: Path | None
     level: float
     shrink: int
@@ -79,6 +82,21 @@ class Options:
     def map_folders(self) -> tuple[Path, ...]:
         """Folders of a user's own maps."""
         return (self.root / "scenarios" / "maps",)
+
+    def domain_of(self, marker: str | None) -> Domain:
+        """Return the domain of a test whose marker names one, or None.
+
+        The command line's takes its place.  Raises GarlError for a domain that cannot be read.
+        """
+        if marker is None or {"domain", "weather"} & self.given:
+            return self.domain
+        from pytest_garl.scenarios.domains.reader import domain_named
+
+        return domain_named(marker, self.root)
+
+    def npcs_in(self, domain: Domain) -> str:
+        """Return who moves the NPCs in a domain: a policy's name, or a file of weights."""
+        return self.npcs if self.npcs_are_given else _npcs_of(domain, self.method)
 
     @functools.cached_property
     def corpus(self) -> Corpus:
@@ -116,6 +134,8 @@ def read_options(config: pytest.Config) -> Options:
     folder = config.rootpath / str(config.getini("garl_dir"))
     repeat = _repeat(text["repeat"])
     slot = _repeated_slot(repeat, folder / "ledger.sqlite")
+    domain = _domain(config, text["domain"], text["weather"])
+    npcs = text["npcs"] or (slot.npcs if slot else "")
     return Options(
         given=_given(config),
         budget=budget,
@@ -127,14 +147,15 @@ def read_options(config: pytest.Config) -> Options:
         pool=cast(Literal["local", "ray"], _among("pool", text["pool"], ("local", "ray"))),
         workers=_workers(text["workers"], text["pool"], address),
         ray_address=address,
-        weather=cast("WeatherRange", _among("weather", text["weather"], ("confined", "full"))),
+        domain=domain,
         timeout_s=_number("timeout", text["timeout"], 1e6, "a positive number of seconds"),
         repeat=repeat,
         repeated_slot=slot,
         duplicates=cast(
             Literal["xfail", "fail"], _among("duplicates", text["duplicates"], ("xfail", "fail"))
         ),
-        npcs=_npcs(text["npcs"] or (slot.npcs if slot else ""), text["method"]),
+        npcs=_npcs(npcs) if npcs else _npcs_of(domain, text["method"]),
+        npcs_are_given=bool(npcs),
         baseline=_baseline(config),
         level=_number("level", text["level"], 1, "a number between 0 and 1"),
         shrink=_shrink(text["shrink"]),
@@ -230,9 +251,50 @@ def _method(text: str) -> str:
     return text
 
 
-def _npcs(text: str, method: str) -> str:
-    if not text:
+def _domain(config: pytest.Config, text: str, weather: str) -> Domain:
+    """Return the domain of the options; the alias names one of the paper's."""
+    from pytest_garl.scenarios.domains.reader import DEFAULT_DOMAIN, domain_named
+
+    if weather:
+        _among("weather", weather, ("confined", "full"))
+        instead = "paper" if weather == "confined" else "paper-full"
+        if text:
+            raise pytest.UsageError(
+                f"--garl-weather={weather} has no effect beside --garl-domain={text}, which states "
+                "the weather; give only one of them"
+            )
+        config.issue_config_time_warning(
+            pytest.PytestDeprecationWarning(
+                f"--garl-weather={weather} will go with the next release; "
+                f"--garl-domain={instead} means the same"
+            ),
+            stacklevel=2,
+        )
+        text = instead
+    given = config.getoption("--garl-domain") is not None
+    try:
+        return domain_named(text or DEFAULT_DOMAIN, Path() if given else config.rootpath)
+    except GarlError as error:
+        raise pytest.UsageError(f"--garl-domain: {error}") from error
+
+
+def _npcs_of(domain: Domain, method: str) -> str:
+    """Return the policy that a domain names; in the paper's world the method chooses it."""
+    from pytest_garl.scenarios.domains.domain import ABSENT
+
+    if domain.paper:
         return default_policy(method)
+    if domain.npc_behaviour == ABSENT:
+        return "stationary"
+    if domain.npc_behaviour not in policy_names():
+        raise pytest.UsageError(
+            f"domain {domain.name}: key 'npc_behaviour': found {domain.npc_behaviour!r}, expected "
+            f"{ABSENT} or one of {', '.join(policy_names())}"
+        )
+    return domain.npc_behaviour
+
+
+def _npcs(text: str) -> str:
     if text in policy_names():
         return text
     if not text.endswith(".npz"):

@@ -20,8 +20,8 @@ from pytest_garl.execution.reference import BUILT_IN, Reference, reference_to
 from pytest_garl.execution.sources import combined_sha256, data_files, source_hashes
 from pytest_garl.plugin.options import Options
 from pytest_garl.plugin.target import Target
+from pytest_garl.scenarios.domains.genome import genome_of
 from pytest_garl.scenarios.files import load
-from pytest_garl.scenarios.genes import genome_for
 from pytest_garl.scenarios.maps.map import load_map
 from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.search.breeder import Breeder
@@ -102,7 +102,7 @@ class Searches:
 
     def _register(self, search: str, wanted: Mapping[Slot, Target], npcs: PolicySpec) -> None:
         target = next(iter(wanted.values()))
-        npcs = npc_policy_of(target, npcs)
+        npcs = npc_policy_of(target, self._of_domain(target, npcs))
         job = self.job(target, npcs)
         removed = target.case.scenario.removed_objects if target.case else ()
         check_policy(npcs, load_map(job.map, self.options.map_folders).without(removed))
@@ -123,6 +123,12 @@ class Searches:
             )
         self.breeders[search] = Breeder(self.ledger, search, method, slots)
 
+    def _of_domain(self, target: Target, npcs: PolicySpec) -> PolicySpec:
+        """Return the policy of a target's domain, unless the user chose another."""
+        options = self.options
+        chosen = options.npcs_are_given or npcs != policy_spec(options.npcs)
+        return npcs if chosen else policy_spec(options.npcs_in(target.domain or options.domain))
+
     def _method(self, target: Target, wanted: Mapping[Slot, Target]) -> Method:
         if target.entry or self.options.repeat:
             return FixedScenarios(
@@ -131,7 +137,7 @@ class Searches:
         map = load_map(target.map, self.options.map_folders)
         plan = SearchPlan(
             map=map,
-            genome=genome_for(map, weather=self.options.weather, task=target.task),
+            genome=genome_of(target.domain or self.options.domain, map, target.task),
             seed=self.options.seed,
             population=self.options.population,
         )

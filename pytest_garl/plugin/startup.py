@@ -102,7 +102,7 @@ def _facts(options: Options) -> dict[str, Any]:
         "method": options.method,
         "population": options.population,
         "map": ",".join(options.maps),
-        "weather": options.weather,
+        "domain": options.domain.label,
         "npcs": options.npcs,
     }
 

@@ -16,6 +16,7 @@ from pytest_garl.scenarios.task import DEFAULT_TASK, Task
 if TYPE_CHECKING:
     from pytest_garl.regressions.case import Case
     from pytest_garl.regressions.corpus import CorpusEntry
+    from pytest_garl.scenarios.domains.domain import Domain
     from pytest_garl.verdicts.verdict import Limits
 
 
@@ -29,6 +30,8 @@ class Target:
     """Empty for a saved case whose file cannot be read."""
     task: Task = DEFAULT_TASK
     """The marker on the ground and the start of a search; cases and files have their own."""
+    domain: Domain | None = None
+    """The operational domain of a search, and that which a case is compared with."""
     slot: Slot = FIRST_SLOT
     deterministic: bool = True
     """Whether the marker says that the system repeats its flights exactly."""
@@ -75,6 +78,8 @@ class Target:
         ]
         if self.task != DEFAULT_TASK:
             facts.append(dataclasses.asdict(self.task))
+        if self.domain is not None and self.entry is None:
+            facts.append(self.domain.label)
         if self.entry is not None:
             facts += [str(self.entry.path), self.live]
         return search_key(json.dumps(facts))

@@ -35,7 +35,7 @@ USER_FAILURES = "own failures"
 """The ledger's fact with the failed assertions about users' own properties."""
 BEGAN, ENDED = "began", "ended"
 """The ledger's facts: when the run began and ended, in UTC."""
-_RUN_FACTS = ("seed", "budget", "method", "population", "weather", "npcs", "python")
+_RUN_FACTS = ("seed", "budget", "method", "population", "domain", "npcs", "python")
 
 
 def utc_now() -> str:

@@ -11,11 +11,11 @@ from pytest_garl.search.methods.random import random_scenarios
 MAP = load_map("lawn")
 
 
-@pytest.mark.parametrize("weather", ["confined", "full"])
-def test_distances_leave_out_the_destinations_of_npcs(weather: str) -> None:
-    genome = genome_for(MAP, weather="full" if weather == "full" else "confined")
+@pytest.mark.parametrize("domain", ["paper", "paper-full"])
+def test_distances_leave_out_the_destinations_of_npcs(domain: str) -> None:
+    genome = genome_for(MAP, weather="confined" if domain == "paper" else "full")
     bound = random_scenarios(MAP, with_destinations(genome), 3, 0, 5)
-    raw, genes = chromosomes(bound, MAP, weather)
+    raw, genes = chromosomes(bound, MAP, domain)
     assert raw.shape == (5, 8)
     assert genes.shape == (5, genome.size)
     assert genes.min() >= 0

@@ -185,7 +185,7 @@ def test_second_run_in_the_same_folder_is_refused(pytester: pytest.Pytester) -> 
     [
         (("--garl-seed=1",), "*seed was 0, is 1*"),
         (("--garl-method=random",), "*method was garl, is random*"),
-        (("--garl-weather=full",), "*weather was confined, is full*"),
+        (("--garl-domain=paper-full",), "*domain was paper, is paper-full*"),
     ],
 )
 def test_resume_refuses_another_search(

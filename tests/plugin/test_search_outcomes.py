@@ -263,7 +263,7 @@ def test_ground_contact_before_an_abort_fails_the_search(
     conftest = pytester.path / "conftest.py"
     conftest.write_text(conftest.read_text().replace("tiny_simulator", "gives_up"))
     # In fog it comes down 3 m off the marker.
-    result = run(pytester, "--garl-budget=6", "--garl-workers=0", "--garl-weather=full")
+    result = run(pytester, "--garl-budget=6", "--garl-workers=0", "--garl-domain=paper-full")
     outcomes = result.parseoutcomes()
     assert outcomes["failed"] == 1
     assert result.ret == pytest.ExitCode.TESTS_FAILED

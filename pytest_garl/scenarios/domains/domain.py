@@ -5,6 +5,7 @@ Industry's term is *operational design domain* (ISO 34503).  A violation inside 
 
 from __future__ import annotations
 
+import hashlib
 from collections.abc import Mapping
 from dataclasses import dataclass
 
@@ -100,10 +101,19 @@ class Domain:
     npc_behaviour: str
     ranges: tuple[tuple[str, float, float], ...] = ()
     paper: WeatherRange | None = None
+    built_in: bool = False
 
     def range_of(self, key: str) -> tuple[float, float] | None:
         """Return (low, high) of a condition, or None if it has its nominal value."""
         return next(((low, high) for name, low, high in self.ranges if name == key), None)
+
+    @property
+    def label(self) -> str:
+        """The name; for a domain of a user's file with a digest of its ranges."""
+        if self.built_in:
+            return self.name
+        digest = hashlib.sha256(repr(self).encode()).hexdigest()[:8]
+        return f"{self.name} ({digest})"
 
     @property
     def groups(self) -> tuple[str, ...]:

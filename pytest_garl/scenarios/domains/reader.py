@@ -20,6 +20,8 @@ from pytest_garl.scenarios.light import NOON_DEG
 
 BUILT_IN = ("field", "calm", "paper")
 """Names of the domains that come with the package."""
+DEFAULT_DOMAIN = "paper"
+"""The domain of a run that names none."""
 HIDDEN = ("paper-full",)
 """What ``--garl-weather=full`` named; read, but not listed."""
 _SECTIONS = ("weather", "light", *GROUPS, "npcs")
@@ -75,7 +77,13 @@ def _read(file: Path, source: str, name: str, above: tuple[str, ...]) -> Domain:
             "[wind] mean_mps = [0, 6], or npc_behaviour"
         )
     ordered = tuple((key, *ranges[key]) for key in CONDITIONS if key in ranges)
-    return Domain(name=name, npc_behaviour=behaviour, ranges=ordered, paper=paper)
+    return Domain(
+        name=name,
+        npc_behaviour=behaviour,
+        ranges=ordered,
+        paper=paper,
+        built_in=file.parent == Path(__file__).parent,
+    )
 
 
 def _paper(top: Table, base: Domain | None) -> WeatherRange | None:
