@@ -27,6 +27,7 @@ _HOMES = {
         "MotorThrusts",
         "Observation",
         "PositionSetpoint",
+        "Rangefinder",
         "VehicleState",
         "VelocitySetpoint",
     ),

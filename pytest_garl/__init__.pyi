@@ -13,6 +13,7 @@ from pytest_garl.landing_system import (
     MotorThrusts,
     Observation,
     PositionSetpoint,
+    Rangefinder,
     VehicleState,
     VelocitySetpoint,
 )
@@ -46,6 +47,7 @@ __all__ = [
     "Observation",
     "PolicySpec",
     "PositionSetpoint",
+    "Rangefinder",
     "Situation",
     "Start",
     "VehicleState",

@@ -17,7 +17,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Protocol, runtime_checkable
+from typing import TYPE_CHECKING, Literal, Protocol, get_args, runtime_checkable
 
 from pytest_garl.commands import (
     MAX_SPEED_MPS,
@@ -33,6 +33,7 @@ from pytest_garl.commands import (
 )
 from pytest_garl.errors import LandingSystemError
 from pytest_garl.fiducial import NestedMarker
+from pytest_garl.messages import listed
 
 if TYPE_CHECKING:
     import numpy as np
@@ -53,8 +54,10 @@ __all__ = [
     "LandingSystem",
     "Mission",
     "MotorThrusts",
+    "NavigationKind",
     "Observation",
     "PositionSetpoint",
+    "Rangefinder",
     "VehicleState",
     "VelocitySetpoint",
     "airframe_of",
@@ -65,6 +68,8 @@ MAX_RATE_HZ = 240.0
 
 
 _MOST_PIXELS = 3840 * 2160
+NavigationKind = Literal["rtk", "gnss", "ideal"]
+"""What the vehicle's navigation rests on."""
 
 
 def _check(
@@ -135,6 +140,30 @@ class Camera:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class Rangefinder:
+    """A laser rangefinder beside the camera, which measures along the body's -z axis.
+
+    It reads once per camera frame, and has no reading of what is nearer than ``least_m`` or farther
+    than ``most_m``.  The default is LightWare's SF11/C, with the limits that PX4 has for it; a
+    TFmini reads 0.3 to 6 m outdoors (ArduPilot's documentation).  Raises LandingSystemError for a
+    limit outside 0 to 200 m, and if the lower one is not below the upper one.
+    """
+
+    least_m: float = 0.2
+    most_m: float = 120.0
+
+    def __post_init__(self) -> None:
+        __tracebackhide__ = True
+        for name in ("least_m", "most_m"):
+            _check("Rangefinder", name, getattr(self, name), 0.0, 200.0, "m")
+        if self.least_m >= self.most_m:
+            raise LandingSystemError(
+                f"Rangefinder from {self.least_m:g} to {self.most_m:g} m: expected least_m below "
+                "most_m"
+            )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Airframe:
     """The vehicle of a landing system, declared by its class.
 
@@ -145,6 +174,10 @@ class Airframe:
     ``simulation/physics/vehicle.py``). Raises LandingSystemError for a mass outside 0.1 to 100
     kg, a size outside 0.1 to 5 m, a latency outside 0 to 5 s, a control rate outside 1 to 240
     Hz.
+
+    ``navigation`` bounds the navigation errors that a search draws: "gnss" all those of the domain,
+    "rtk" those of a receiver with corrections, "ideal" none.  A scenario file flies as written.
+    ``rangefinder`` adds ``Observation.rangefinder_m``.
     """
 
     mass_kg: float = 2.355
@@ -152,6 +185,8 @@ class Airframe:
     camera: Camera = field(default_factory=Camera)
     latency_s: float = 0.1
     control_rate_hz: float | None = None
+    navigation: NavigationKind = "gnss"
+    rangefinder: Rangefinder | None = None
 
     def __post_init__(self) -> None:
         __tracebackhide__ = True
@@ -164,6 +199,17 @@ class Airframe:
         _check("Airframe", "latency_s", self.latency_s, 0.0, 5.0, "s")
         if self.control_rate_hz is not None:
             _check("Airframe", "control_rate_hz", self.control_rate_hz, 1.0, MAX_RATE_HZ, "Hz")
+        if self.navigation not in get_args(NavigationKind):
+            raise LandingSystemError(
+                f"Airframe.navigation = {self.navigation!r:.80}; expected "
+                f"{listed(get_args(NavigationKind))}"
+            )
+        rangefinder: object = self.rangefinder
+        if rangefinder is not None and not isinstance(rangefinder, Rangefinder):
+            found = type(rangefinder).__name__
+            raise LandingSystemError(
+                f"Airframe.rangefinder is of type {found}; expected Rangefinder(...) or None"
+            )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -194,7 +240,9 @@ class Observation:
 
     ``position_m`` and ``velocity_mps`` are shape (3,) in the world frame, ``attitude``
     is the quaternion (4,); ``image`` is RGB uint8 (H, W, 3) and ``depth_m`` is planar
-    depth float32 (H, W) in metres.  The arrays are read-only.
+    depth float32 (H, W) in metres.  The arrays are read-only.  ``rangefinder_m`` is the distance
+    from the camera's place to what lies below along the body's axis; None without a rangefinder,
+    and if nothing is in its range.
     """
 
     time_s: float
@@ -203,6 +251,7 @@ class Observation:
     attitude: NDArray[np.float64]
     image: NDArray[np.uint8]
     depth_m: NDArray[np.float32]
+    rangefinder_m: float | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -271,7 +320,7 @@ def airframe_of(system: object) -> Airframe:
         raise LandingSystemError(
             f"{name}.airframe is {what[:80]}; expected pytest_garl.Airframe(...) in the class"
         )
-    camera = airframe.camera
+    camera, rangefinder = airframe.camera, airframe.rangefinder
     # Rebuilt, so that a subclass cannot change the values after the check.
     return Airframe(
         mass_kg=float(airframe.mass_kg),
@@ -286,4 +335,8 @@ def airframe_of(system: object) -> Airframe:
         control_rate_hz=None
         if airframe.control_rate_hz is None
         else float(airframe.control_rate_hz),
+        navigation=airframe.navigation,
+        rangefinder=None
+        if rangefinder is None
+        else Rangefinder(least_m=float(rangefinder.least_m), most_m=float(rangefinder.most_m)),
     )

@@ -37,6 +37,7 @@ from pytest_garl.simulation.physics.vehicle import (
 from pytest_garl.simulation.physics.wind import Wind
 from pytest_garl.simulation.physics.world import PHYSICS_RATE_HZ, World
 from pytest_garl.simulation.randomness import generator
+from pytest_garl.simulation.rangefinder import Ranging
 from pytest_garl.simulation.recorder import Recorder
 from pytest_garl.simulation.sensors import Delivery, Sensors
 from pytest_garl.simulation.start import begin_at_start
@@ -80,7 +81,8 @@ class Loop:
         self._navigation = Navigation(scenario)
         self._wanted_thrusts = NO_THRUST
         self._pending: list[tuple[int, Command]] = []
-        self._sensors = Sensors(scenario, self.camera, self.recorder, self.npcs)
+        ranging = Ranging(scenario, self._system.airframe.rangefinder, self._world)
+        self._sensors = Sensors(scenario, self.camera, self.recorder, self.npcs, ranging)
         self._ticks = 0
         self._ticks_per_control = _ticks_per_call(self._system.airframe.control_rate_hz)
 

@@ -4,7 +4,17 @@ from __future__ import annotations
 
 import numpy as np
 
-PURPOSES = ("ground", "sensor", "pose", "particles", "objects", "wind", "navigation", "timing")
+PURPOSES = (
+    "ground",
+    "sensor",
+    "pose",
+    "particles",
+    "objects",
+    "wind",
+    "navigation",
+    "timing",
+    "rangefinder",
+)
 
 
 def generator(seed: int, purpose: str, index: int = 0) -> np.random.Generator:

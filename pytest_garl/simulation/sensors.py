@@ -17,6 +17,7 @@ from pytest_garl.simulation.physics.npc import Npc
 from pytest_garl.simulation.physics.vehicle import Motion, Vector
 from pytest_garl.simulation.physics.world import PHYSICS_RATE_HZ
 from pytest_garl.simulation.randomness import generator
+from pytest_garl.simulation.rangefinder import Ranging
 from pytest_garl.simulation.recorder import Recorder, Sight
 from pytest_garl.simulation.system_under_test.observation import observe
 from pytest_garl.simulation.timing import Timing
@@ -41,15 +42,22 @@ class _Picture:
     place_m: Vector
     tick: int
     jitter_ms: float
+    range_m: float | None
 
 
 class Sensors:
     """Takes pictures, puts a pose to each, and delivers them in order when they arrive."""
 
     def __init__(
-        self, scenario: Scenario, camera: Camera, recorder: Recorder, npcs: Sequence[Npc]
+        self,
+        scenario: Scenario,
+        camera: Camera,
+        recorder: Recorder,
+        npcs: Sequence[Npc],
+        ranging: Ranging,
     ) -> None:
         self._camera, self._recorder, self._npcs = camera, recorder, npcs
+        self._ranging = ranging
         self._timing = Timing(scenario)
         self._outage, self._freezes = Event(scenario, "outage"), scenario["outage.frozen"] > 0
         self._rng = generator(scenario.seed, "pose")
@@ -113,7 +121,12 @@ class Sensors:
             return
         frame, sight = self.look(tick, motion)
         picture = _Picture(
-            frame=frame, sight=sight, place_m=motion.position_m, tick=tick, jitter_ms=jitter_ms
+            frame=frame,
+            sight=sight,
+            place_m=motion.position_m,
+            tick=tick,
+            jitter_ms=jitter_ms,
+            range_m=self._ranging.reading_m(motion),
         )
         self._pictures.append(picture)
 
@@ -125,6 +138,7 @@ class Sensors:
             position_m=pose.position_m,
             velocity_mps=pose.velocity_mps,
             attitude=pose.attitude,
+            rangefinder_m=picture.range_m,
             rng=self._rng,
         )
         delivery = Delivery(observation=observation, sight=picture.sight, place_m=picture.place_m)

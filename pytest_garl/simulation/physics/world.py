@@ -49,6 +49,9 @@ uses their convex hull."""
 _EXACT_RANGE_M = 3.0
 """The engine computes distances up to this one; longer ones are those of bounding spheres."""
 
+_PAST_HULL_M = 0.005
+"""Step with which a ray leaves the UAV's own hull."""
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class HullContact:
@@ -135,6 +138,25 @@ class World:
             self._uav, self._ground, _EXACT_RANGE_M, **self._client_argument
         )
         return min((point[8] for point in points), default=_EXACT_RANGE_M)
+
+    def distance_m(self, start: Vector, direction: Vector, most_m: float) -> float | None:
+        """Return the distance from a place to the first body in a direction, the hull excepted.
+
+        ``direction`` has length 1.  None if nothing lies within ``most_m``.
+        """
+        (x, y, z), (dx, dy, dz) = start, direction
+        end = x + dx * most_m, y + dy * most_m, z + dz * most_m
+        passed_m = 0.0
+        while passed_m < most_m:
+            begin = x + dx * passed_m, y + dy * passed_m, z + dz * passed_m
+            body, _, share, _, _ = pybullet.rayTest(begin, end, **self._client_argument)[0]
+            if body < 0:
+                return None
+            hit_m: float = passed_m + share * (most_m - passed_m)
+            if body != self._uav:
+                return hit_m
+            passed_m = hit_m + _PAST_HULL_M
+        return None
 
     def hull_contacts(self) -> tuple[HullContact, ...]:
         """Return the UAV's present contacts, one per body."""

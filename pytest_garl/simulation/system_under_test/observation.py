@@ -45,6 +45,7 @@ def observe(
     position_m: Vector,
     velocity_mps: Vector,
     attitude: Quaternion,
+    rangefinder_m: float | None,
     rng: np.random.Generator,
 ) -> Observation:
     """Return what a frame shows, the pose with noise drawn from ``rng``; arrays are read-only."""
@@ -56,6 +57,7 @@ def observe(
         attitude=_frozen(np.array(attitude)),
         image=_NOT_PAINTED,
         depth_m=_frozen(frame.depth_m),
+        rangefinder_m=rangefinder_m,
     )
     object.__setattr__(observation, "_paint", lambda: _frozen(frame.image))
     return observation
