@@ -15,6 +15,7 @@ from pytest_garl import (
     Command,
     Land,
     Observation,
+    Rangefinder,
 )
 from pytest_garl.errors import LandingSystemError
 from pytest_garl.landing_system import airframe_of
@@ -68,6 +69,10 @@ def test_airframe_of_a_class_that_raises_is_a_finding() -> None:
         (lambda: Airframe(control_rate_hz=0), "control_rate_hz = 0"),
         (lambda: Airframe(control_rate_hz="fast"), "control_rate_hz = 'fast'"),  # type: ignore[arg-type]
         (lambda: Airframe(camera=None), "camera is of type NoneType"),  # type: ignore[arg-type]
+        (lambda: Airframe(navigation="gps"), "navigation = 'gps'; expected rtk, gnss, ideal"),  # type: ignore[arg-type]
+        (lambda: Airframe(rangefinder=True), "rangefinder is of type bool"),  # type: ignore[arg-type]
+        (lambda: Rangefinder(most_m=NAN), "most_m = nan; expected a number from 0 to 200 m"),
+        (lambda: Rangefinder(least_m=6, most_m=2), "from 6 to 2 m: expected least_m below"),
         (lambda: Camera(rate_hz=0), "rate_hz = 0; expected a number from 0.1 to 240 Hz"),
         (lambda: Camera(width_px=0, height_px=0), "width_px = 0; expected a whole number"),
         (lambda: Camera(width_px=320.5), "width_px = 320.5"),  # type: ignore[arg-type]
