@@ -39,18 +39,19 @@ class _Wandering:
         self.target, self.rate = [*self.error], [0.0] * len(self.error)
 
     def draw(self, keep: float, numbers: list[float]) -> None:
-        """Draw the next target; ``keep`` is the correlation with the last one."""
+        """Draw the next target, ``keep`` is the correlation with the last one; turn towards it."""
         spread = self.sigma * math.sqrt(1 - keep * keep)
         self.target = [
             keep * old + spread * number for old, number in zip(self.target, numbers, strict=True)
         ]
-
-    def advance(self) -> None:
-        """Follow the target for a step of the physics."""
         rate = [(wanted - now) / LAG_S for wanted, now in zip(self.target, self.error, strict=True)]
         fast = math.hypot(*rate) / self.most_rate
         self.rate = [each / fast for each in rate] if fast > 1 else rate
-        self.error = [now + each * _TICK_S for now, each in zip(self.error, self.rate, strict=True)]
+
+    def advance(self) -> None:
+        """Change the errors for a step of the physics."""
+        for index, rate in enumerate(self.rate):
+            self.error[index] += rate * _TICK_S
 
 
 class Navigation:
@@ -77,7 +78,10 @@ class Navigation:
             error=[tilt * math.sin(side), tilt * math.cos(side)], sigma=tilt / math.sqrt(2)
         )
         self._keep = math.exp(-_DRAW_S / value("correlation_s"))
-        self._errs = bool(position_m or height_m or yaw or tilt)
+        # With the slices of the drawn numbers that are theirs.
+        parts = (self._place, 0, 2), (self._height, 2, 3), (self._yaw, 3, 4), (self._tilt, 4, 6)
+        self._parts = [part for part in parts if part[0].sigma]
+        self._errs = bool(self._parts)
         jump, over = scenario["jump.distance_m"], math.radians(scenario["jump.towards_deg"])
         self._jump_m = jump * math.cos(over), jump * math.sin(over)
         self._jump_tick = round(scenario["jump.from_s"] * PHYSICS_RATE_HZ)
@@ -112,12 +116,10 @@ class Navigation:
         if tick % TICKS_PER_DRAW == 0:
             # As many draws for each part whatever errs, so that one error does not change another.
             numbers = [float(each) for each in self._rng.standard_normal(6)]
-            self._place.draw(self._keep, numbers[0:2])
-            self._height.draw(self._keep, numbers[2:3])
-            self._yaw.draw(self._keep, numbers[3:4])
-            self._tilt.draw(self._keep, numbers[4:6])
-        for each in (self._place, self._height, self._yaw, self._tilt):
-            each.advance()
+            for part, first, last in self._parts:
+                part.draw(self._keep, numbers[first:last])
+        for part, _, _ in self._parts:
+            part.advance()
 
 
 def _sum(one: Vector, other: tuple[float, ...]) -> Vector:
