@@ -38,19 +38,21 @@ def limits_lines(run: Run) -> list[str]:
 
 def domain_lines(run: Run) -> list[str]:
     """Return the domains of markers, and the saved cases that lie outside their domain."""
+    from pytest_garl.scenarios.domains.navigation import within
     from pytest_garl.scenarios.maps.map import load_map
 
     targets = [target for slots in run.searches.targets.values() for target in slots.values()]
     given = dict.fromkeys(
-        (target.system.__qualname__, target.domain)
+        (target.system.__qualname__, target.domain, target.navigation)
         for target in targets
         if target.entry is None and target.domain is not None
     )
-    lines = [
-        f"garl: domain of {name}: {domain.name}"
-        for name, domain in given
-        if domain is not None and domain != run.options.domain
-    ]
+    lines = []
+    for name, domain, navigation in given:
+        if domain is not None and domain != run.options.domain:
+            lines.append(f"garl: domain of {name}: {domain.name}")
+        if domain is not None and domain != within(domain, navigation):
+            lines.append(f"garl: navigation of {name}: {navigation}, which bounds the domain's")
     for target in targets:
         if target.case is not None and target.domain is not None:
             map = load_map(target.map, run.options.map_folders)

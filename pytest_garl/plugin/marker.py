@@ -53,6 +53,7 @@ class MarkerArguments:
 
 def read_marker(marker: pytest.Mark, options: Options) -> MarkerArguments:
     """Return the arguments of a marker; raise GarlError if one is invalid."""
+    from pytest_garl.scenarios.domains.navigation import within
     from pytest_garl.scenarios.maps.map import load_map, map_names
     from pytest_garl.verdicts.verdict import Limits, limits
 
@@ -88,15 +89,18 @@ def read_marker(marker: pytest.Mark, options: Options) -> MarkerArguments:
     deterministic = marker.kwargs.get("deterministic", True)
     if not isinstance(deterministic, bool):
         raise GarlError(f"mark.garl: deterministic={deterministic!r}: expected True or False")
+    target = Target(
+        system=system,
+        limits=given,
+        deterministic=deterministic,
+        domain=_domain(marker.kwargs.get("domain"), options),
+        files=_files(marker.kwargs.get("files", ()), options),
+    )
+    if target.domain is not None:
+        within(target.domain, target.navigation)  # Raises if they contradict each other.
     return MarkerArguments(
         maps=tuple(map for map in maps if not options.maps or map in options.maps),
-        target=Target(
-            system=system,
-            limits=given,
-            deterministic=deterministic,
-            domain=_domain(marker.kwargs.get("domain"), options),
-            files=_files(marker.kwargs.get("files", ()), options),
-        ),
+        target=target,
         marker=spec,
         start=_of_type(marker, "start", Start) or Start(),
         has_distance=has_distance and "limits" in marker.kwargs,

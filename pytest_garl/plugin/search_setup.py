@@ -21,6 +21,7 @@ from pytest_garl.execution.sources import combined_sha256, data_files, source_ha
 from pytest_garl.plugin.options import Options
 from pytest_garl.plugin.target import Target
 from pytest_garl.scenarios.domains.genome import genome_of
+from pytest_garl.scenarios.domains.navigation import within
 from pytest_garl.scenarios.files import load
 from pytest_garl.scenarios.maps.map import load_map
 from pytest_garl.scenarios.scenario import Scenario
@@ -135,9 +136,10 @@ class Searches:
                 {slot: _scenario_of(self.options, each) for slot, each in wanted.items()}
             )
         map = load_map(target.map, self.options.map_folders)
+        domain = within(target.domain or self.options.domain, target.navigation)
         plan = SearchPlan(
             map=map,
-            genome=genome_of(target.domain or self.options.domain, map, target.task),
+            genome=genome_of(domain, map, target.task),
             seed=self.options.seed,
             population=self.options.population,
         )

@@ -14,6 +14,7 @@ from pytest_garl.execution.reference import reference_to
 from pytest_garl.scenarios.task import DEFAULT_TASK, Task
 
 if TYPE_CHECKING:
+    from pytest_garl.landing_system import NavigationKind
     from pytest_garl.regressions.case import Case
     from pytest_garl.regressions.corpus import CorpusEntry
     from pytest_garl.scenarios.domains.domain import Domain
@@ -55,6 +56,16 @@ class Target:
     def system_name(self) -> str:
         """The landing system's name in ledgers and cases: "module:class"."""
         return f"{self.system.__module__}:{self.system.__qualname__}"
+
+    @property
+    def navigation(self) -> NavigationKind:
+        """What the airframe's navigation rests on; of one that cannot be read, the default."""
+        from pytest_garl.landing_system import Airframe, airframe_of
+
+        try:
+            return airframe_of(self.system).navigation
+        except Exception:  # noqa: BLE001 (code of a landing system; the flights report what it raises)
+            return Airframe().navigation
 
     @property
     def case(self) -> Case | None:

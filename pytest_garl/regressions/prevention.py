@@ -31,6 +31,7 @@ from pytest_garl.scenarios.maps.map import Map
 from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.simulation.flight import Contact, Flight
 from pytest_garl.simulation.flight_file import load
+from pytest_garl.simulation.navigation import error_m_at
 from pytest_garl.simulation.npc_policy import PolicySpec
 from pytest_garl.simulation.physics.world import PHYSICS_RATE_HZ, World
 from pytest_garl.simulation.system_under_test.takeover import Leg, Takeover
@@ -89,9 +90,17 @@ class Collision:
             from_s=from_s,
             until_s=self.until_s + EXTRA_S,
             legs=legs,
-            marker_m=self.flight.marker_position_m,
+            marker_m=self._believed_marker_m(from_s)
+            if pilot == "blind"
+            else self.flight.marker_position_m,
         )
         return dataclasses.replace(self.job, npcs=self.npcs(from_s), takeover=takeover)
+
+    def _believed_marker_m(self, time_s: float) -> tuple[float, float]:
+        """Return the marker's place in the frame of the UAV's own estimate at a time."""
+        x, y = self.flight.marker_position_m
+        dx, dy, _ = error_m_at(self.scenario, time_s)
+        return x + dx, y + dy
 
     def model(self, from_s: float, world: World) -> EscapeModel:
         """Return the model of an escape from a time on."""

@@ -54,6 +54,15 @@ class _Wandering:
             self.error[index] += rate * _TICK_S
 
 
+def error_m_at(scenario: Scenario, time_s: float) -> Vector:
+    """Return the error of the estimated position at a time of a scenario's flight."""
+    navigation = Navigation(scenario)
+    rest = Motion((0.0, 0.0, 0.0), (0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 1.0), (0.0, 0.0, 0.0))
+    for tick in range(round(time_s * PHYSICS_RATE_HZ) + 1):
+        navigation.estimate(tick, rest)
+    return navigation.error_m
+
+
 class Navigation:
     """The estimate of the UAV's motion; call ``estimate`` for each step of the physics."""
 
@@ -62,20 +71,22 @@ class Navigation:
             return scenario[f"navigation.{name}"]
 
         away = math.radians(value("towards_deg"))
+        # What follows with a lag has less variance than its target, so the target gets more.
+        more = math.sqrt(1 + LAG_S / value("correlation_s"))
         position_m = value("position_m")
         self._place = _Wandering(
             error=[position_m * math.cos(away), position_m * math.sin(away)],
-            sigma=position_m / math.sqrt(2),
+            sigma=more * position_m / math.sqrt(2),
             most_rate=MOST_RATE_MPS,
         )
         height_m = value("height_m")
-        self._height = _Wandering(error=[0.0], sigma=height_m, most_rate=MOST_RATE_MPS)
+        self._height = _Wandering(error=[0.0], sigma=more * height_m, most_rate=MOST_RATE_MPS)
         yaw = math.radians(value("yaw_deg"))
-        self._yaw = _Wandering(error=[yaw], sigma=abs(yaw))
+        self._yaw = _Wandering(error=[yaw], sigma=more * abs(yaw))
         tilt, side = math.radians(value("tilt_deg")), math.radians(value("tilt_towards_deg"))
         # About the body's x (right side down) and y (nose down).
         self._tilt = _Wandering(
-            error=[tilt * math.sin(side), tilt * math.cos(side)], sigma=tilt / math.sqrt(2)
+            error=[tilt * math.sin(side), tilt * math.cos(side)], sigma=more * tilt / math.sqrt(2)
         )
         self._keep = math.exp(-_DRAW_S / value("correlation_s"))
         # With the slices of the drawn numbers that are theirs.

@@ -72,6 +72,21 @@ def test_escape_from_a_chasing_dog_is_confirmed_by_one_flight(tmp_path: Path) ->
     assert job.npcs.name == "recorded, then dqn"
 
 
+def test_the_blind_pilot_knows_the_marker_in_the_frame_of_its_own_estimate(tmp_path: Path) -> None:
+    certain = collision(tmp_path)
+    x, y = certain.flight.marker_position_m
+    errs = {"navigation.position_m": 2.0, "navigation.towards_deg": 90.0}
+    erring = dataclasses.replace(certain, scenario=certain.scenario.replace(errs))
+    takeovers = [
+        certain.job_of("blind", 5.0).takeover,
+        erring.job_of("escape", 0.0).takeover,
+        erring.job_of("blind", 0.0).takeover,
+    ]
+    goals = [takeover.marker_m for takeover in takeovers if takeover is not None]
+    assert goals[:2] == [(x, y), (x, y)]
+    assert goals[2] == pytest.approx((x, y + 2.0))
+
+
 def test_dog_that_does_not_react_repeats_its_moves(tmp_path: Path) -> None:
     crossed = collision(tmp_path, "greedy")
     fly = Flights(crossed)

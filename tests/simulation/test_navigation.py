@@ -14,7 +14,7 @@ from pytest_garl import Abort, Airframe, Command, Mission, Observation, VehicleS
 from pytest_garl.landing_system import MotorThrusts
 from pytest_garl.scenarios.placement import marker_position_m
 from pytest_garl.simulation.fly import fly
-from pytest_garl.simulation.navigation import LAG_S, MOST_RATE_MPS, Navigation
+from pytest_garl.simulation.navigation import LAG_S, MOST_RATE_MPS, Navigation, error_m_at
 from pytest_garl.simulation.physics.vehicle import Motion
 from pytest_garl.simulation.physics.world import PHYSICS_RATE_HZ
 from pytest_garl.simulation.system_under_test.reference_pilot import ReferencePilot
@@ -46,26 +46,37 @@ def test_the_error_begins_as_named_and_the_height_without_one() -> None:
     assert errors_m([first])[0] == pytest.approx((0.0, 2.0, 0.0), abs=1e-9)
 
 
-def test_the_error_has_its_root_mean_square_at_all_times() -> None:
-    ends = [
-        errors_m(estimates(90.0, seed=seed, position_m=2.0, correlation_s=60.0))[-1]
-        for seed in range(60)
-    ]
-    rms = math.sqrt(np.mean(np.sum(np.square(np.array(ends)[:, :2]), axis=1)))
-    # The lag takes away some of what is faster than it; 60 draws are known to a tenth or so.
-    assert 1.4 < rms < 2.4
+def test_the_error_has_its_root_mean_square_and_its_correlation_time() -> None:
+    # Small enough that the largest rate does not matter.
+    genes = {"position_m": 0.5, "correlation_s": 30.0}
+    named = {f"navigation__{key}": each for key, each in genes.items()}
+    navigation, places = Navigation(nominal(**named)), []
+    for tick in range(4000 * PHYSICS_RATE_HZ):
+        motion = navigation.estimate(tick, REST)
+        if tick % PHYSICS_RATE_HZ == 0:
+            places.append(motion.position_m)
+    errors = (np.array(places) - REST.position_m)[:, :2]
+    # 4000 s hold some 50 independent errors of each axis: the figures are known to a tenth.
+    rms = math.sqrt(np.mean(np.sum(np.square(errors), axis=1)))
+    assert rms == pytest.approx(0.5, rel=0.08)
+    tau, variance = 30.0, float(np.mean(np.square(errors)))
+    for apart_s in (15, 30, 60):
+        like = float(np.mean(errors[apart_s:] * errors[:-apart_s])) / variance
+        # Of a process with this correlation time that passes a lag.
+        decays = tau * math.exp(-apart_s / tau) - LAG_S * math.exp(-apart_s / LAG_S)
+        assert like == pytest.approx(decays / (tau - LAG_S), abs=0.1)
 
 
-def test_the_error_forgets_its_start_within_its_correlation_time() -> None:
-    def kept(correlation_s: float) -> float:
-        ends = [
-            errors_m(estimates(60.0, seed=seed, position_m=2.0, correlation_s=correlation_s))[-1]
-            for seed in range(40)
-        ]
-        return float(np.mean(np.array(ends)[:, 0])) / 2.0
-
-    assert kept(600.0) == pytest.approx(math.exp(-(60.0 - LAG_S) / 600.0), abs=0.2)
-    assert kept(30.0) == pytest.approx(math.exp(-(60.0 - LAG_S) / 30.0), abs=0.35)
+def test_the_error_at_a_time_is_that_of_the_flight() -> None:
+    scenario = dataclasses.replace(
+        nominal(navigation__position_m=2.0, navigation__correlation_s=30.0, jump__distance_m=1.0),
+        seed=5,
+    )
+    flown = errors_m(
+        estimates(10.0, position_m=2.0, correlation_s=30.0, jump__distance_m=1.0, seed=5)
+    )
+    assert error_m_at(scenario, 9.0) == pytest.approx(tuple(flown[9 * PHYSICS_RATE_HZ]))
+    assert math.dist(error_m_at(scenario, 0.0), (3.0, 0.0, 0.0)) < 1e-6
 
 
 def test_the_estimated_velocity_is_the_derivative_of_the_estimated_position() -> None:
