@@ -8,7 +8,8 @@ from pathlib import Path
 import click
 
 from pytest_garl.scenarios.domains.domain import ABSENT, CONDITIONS, Domain
-from pytest_garl.scenarios.domains.reader import BUILT_IN, DEFAULT_DOMAIN, domain_named
+from pytest_garl.scenarios.domains.names import BUILT_IN, DEFAULT_DOMAIN
+from pytest_garl.scenarios.domains.reader import domain_named
 from pytest_garl.scenarios.groups.catalogue import GROUPS
 from pytest_garl.scenarios.units import unit_of
 

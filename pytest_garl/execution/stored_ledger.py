@@ -50,11 +50,11 @@ _STATES = ("waiting", "claimed", "flown")
 
 @dataclasses.dataclass(frozen=True, slots=True, kw_only=True)
 class StoredSlot:
-    """A slot of an earlier run: the NPC policy, and for each landing system the scenario."""
+    """A slot of an earlier run: for each landing system the scenario and the NPC policy's name."""
 
     map: str
     slot: Slot
-    npcs: str
+    npcs: Mapping[str, str]
     scenarios: Mapping[str, Scenario]
 
 
@@ -68,10 +68,11 @@ def read_slot(path: Path, map: str, slot: Slot) -> StoredSlot:
         found = ledger.queries.scenarios(slot.generation, slot.index, map)
         if not found:
             raise LedgerError(f"no such slot in {path}; it holds {_flown_slots(ledger)}")
+        jobs = [parse_job(job) for _, job in ledger.searches()]
         return StoredSlot(
             map=map,
             slot=slot,
-            npcs=str(ledger.fact("npcs") or ""),
+            npcs={job.system.name: job.npcs.name for job in jobs if job.map == map},
             scenarios={system: parse_scenario(text) for system, text in found.items()},
         )
 

@@ -11,6 +11,7 @@ from collections import namedtuple
 import pytest
 
 from pytest_garl.adversary.catalogue import DEFAULT_POLICY, policy_names
+from pytest_garl.scenarios.domains.names import DEFAULT_DOMAIN
 from pytest_garl.search.catalogue import DEFAULT_METHOD, method_names
 
 Option = namedtuple("Option", ["name", "metavar", "help", "default"], defaults=[""])
@@ -66,14 +67,16 @@ OPTIONS = (
     Option(
         name="domain",
         metavar="NAME|FILE",
-        help="The conditions in which the systems are to land: field, calm, paper, or a TOML file. "
-        "It takes the place of the domain of the tests' markers. `garl domain show` explains one "
-        "(default: paper).",
+        help="Operational domain: the conditions in which the landing system is to land. Built in "
+        "are field, calm and paper; or give your own TOML file. It wins over the domain of a "
+        f"test's marker, and that over the ini key; `garl domain show` explains it (default: "
+        f"{DEFAULT_DOMAIN}).",
     ),
     Option(
         name="weather",
         metavar="RANGE",
-        help="Deprecated: 'confined' is --garl-domain=paper, 'full' the same in any weather.",
+        help="Deprecated, use --garl-domain: 'confined' is the domain paper, 'full' the same with "
+        "any weather.",
     ),
     Option(
         name="timeout",
@@ -120,8 +123,9 @@ OPTIONS = (
         name="npcs",
         metavar="POLICY",
         help=f"NPC policy, which moves people, dogs and birds: {', '.join(policy_names())}, or "
-        f"weights (.npz) that `garl train` wrote (default: {DEFAULT_POLICY}; the methods of the "
-        "paper have their own, see docs/methods.md; with --garl-repeat the policy of the search).",
+        f"weights (.npz) that `garl train` wrote (default: as the domain says; in the domain paper "
+        f"{DEFAULT_POLICY}, and the methods of the paper have their own, see docs/methods.md; with "
+        "--garl-repeat the policy of the search).",
     ),
 )
 

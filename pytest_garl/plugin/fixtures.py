@@ -12,6 +12,7 @@ from pytest_garl.plugin.keys import (
     BODY_RUNS,
     LANDING,
     OUTCOME,
+    OUTSIDE,
     RUN,
     SIGNATURE,
     UNPROVEN,
@@ -36,16 +37,19 @@ def garl_slot(request: pytest.FixtureRequest) -> Target:
 
 
 @pytest.fixture(scope="session")
-def npcs(request: pytest.FixtureRequest) -> PolicySpec:
-    """Return the NPC policy; override this fixture in a conftest.py to choose another."""
-    from pytest_garl.adversary.catalogue import DEFAULT_POLICY, policy_spec
+def npcs(request: pytest.FixtureRequest) -> PolicySpec | None:
+    """Return the NPC policy of ``--garl-npcs``, or None for the one of the test's domain.
+
+    Override this fixture in a conftest.py to choose another.
+    """
+    from pytest_garl.adversary.catalogue import policy_spec
 
     run = request.config.stash.get(RUN, None)
-    return policy_spec(run.options.npcs if run else DEFAULT_POLICY)
+    return policy_spec(run.options.npcs) if run and run.options.npcs else None
 
 
 @pytest.fixture
-def landing(request: pytest.FixtureRequest, garl_slot: Target, npcs: PolicySpec) -> Landing:
+def landing(request: pytest.FixtureRequest, garl_slot: Target, npcs: PolicySpec | None) -> Landing:
     """Return the landing of the item's slot; wait until it is flown."""
     from pytest_garl.plugin.item_facts import another_test_fails
     from pytest_garl.plugin.item_report import end_unjudged
@@ -72,6 +76,8 @@ def landing(request: pytest.FixtureRequest, garl_slot: Target, npcs: PolicySpec)
         ("garl.elapsed_s", result.elapsed_s),
         ("garl.trajectory_sha256", flight.sha256),
     ]
+    if outside := run.outside_domain(garl_slot):
+        item.user_properties.append((OUTSIDE, outside))
     if reasons := run.unproven(garl_slot):
         request.node.user_properties.append((UNPROVEN, "; ".join(reasons)))
     item.stash[LANDING] = landing
@@ -90,12 +96,14 @@ def scenario(request: pytest.FixtureRequest, garl_slot: Target, landing: Landing
     return scenario
 
 
-def _checked_policy(given: object) -> PolicySpec:
+def _checked_policy(given: object) -> PolicySpec | None:
     """Return what the fixture ``npcs`` names; raise PolicyError for what names no policy."""
     from pytest_garl.adversary.catalogue import policy_spec
     from pytest_garl.errors import PolicyError
     from pytest_garl.simulation.npc_policy import PolicySpec
 
+    if given is None:
+        return None
     if isinstance(given, str):
         return policy_spec(given)
     if not isinstance(given, PolicySpec):

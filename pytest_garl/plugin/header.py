@@ -37,9 +37,8 @@ def limits_lines(run: Run) -> list[str]:
 
 
 def domain_lines(run: Run) -> list[str]:
-    """Return the domains of markers, and the saved cases that lie outside their domain."""
+    """Return the domains of markers that name another one, and airframes that bound a domain."""
     from pytest_garl.scenarios.domains.navigation import within
-    from pytest_garl.scenarios.maps.map import load_map
 
     targets = [target for slots in run.searches.targets.values() for target in slots.values()]
     given = dict.fromkeys(
@@ -50,18 +49,10 @@ def domain_lines(run: Run) -> list[str]:
     lines = []
     for name, domain, navigation in given:
         if domain is not None and domain != run.options.domain:
-            lines.append(f"garl: domain of {name}: {domain.name}")
+            npcs = run.options.policy_in(domain)
+            lines.append(f"garl: domain of {name}: {domain.name}, NPCs {npcs}")
         if domain is not None and domain != within(domain, navigation):
             lines.append(f"garl: navigation of {name}: {navigation}, which bounds the domain's")
-    for target in targets:
-        if target.case is not None and target.domain is not None:
-            map = load_map(target.map, run.options.map_folders)
-            outside = target.domain.outside(target.case.scenario, map)
-            if outside:
-                lines.append(
-                    f"garl: {target.name} lies outside the domain {target.domain.name} and is "
-                    f"flown all the same: {'; '.join(outside)}"
-                )
     return list(dict.fromkeys(lines))
 
 
@@ -99,8 +90,8 @@ def _search_line(run: Run) -> str:
     resuming = f"resuming after {done} flights; " if options.resume else ""
     return (
         f"garl: {resuming}budget {options.budget} per system and map, method {options.method}, "
-        f"seed {options.seed}, NPCs {options.npcs}, domain {options.domain.name}, "
-        f"{_workers(run)}"
+        f"seed {options.seed}, NPCs {options.policy_in(options.domain)}, "
+        f"domain {options.domain.name}, {_workers(run)}"
     )
 
 

@@ -53,8 +53,9 @@ def pytest_configure(config: pytest.Config) -> None:
     """Register the marker; read the options and begin the run if the session searches."""
     config.addinivalue_line(
         "markers",
-        "garl(system, maps, limits, deterministic, files): search for violations of a landing "
-        "system. system is its class; maps are names (default: court and lawn); limits is "
+        "garl(system, maps, domain, limits, deterministic, files): search for violations of a "
+        "landing system. system is its class; maps are names (default: court and lawn); domain "
+        "is the name or the TOML file of the conditions in which it is to land; limits is "
         "limits(distance_m=0.75, time_s=120, abort='needless'): how far from the marker and how "
         "late it may land, and when giving up is a violation: if somebody could have landed "
         "('needless'), never ('ok'), always ('violation'); deterministic is False if equal "
@@ -207,7 +208,7 @@ def pytest_report_collectionfinish(config: pytest.Config) -> list[str]:
         limits_lines,
     )
 
-    return [*forecast(run), *limits_lines(run), *domain_lines(run), *acceptance_warning(run)]
+    return [*forecast(run), *domain_lines(run), *limits_lines(run), *acceptance_warning(run)]
 
 
 def pytest_terminal_summary(terminalreporter: Any, config: pytest.Config) -> None:

@@ -57,6 +57,8 @@ WORKER_ASSERTION = "garl.own"
 """A worker's item failed in an assertion about a user's own property: its signature."""
 FINDING_TEST = "garl.found"
 """A worker's item failed for a violation that a search found: the search and the signature."""
+OUTSIDE = "garl.outside"
+"""A saved case whose values lie outside the test's domain, and which of them."""
 FATAL = "garl.fatal"
 """Why the run cannot go on."""
 

@@ -12,9 +12,11 @@ from typing import TYPE_CHECKING, Any, Literal, cast
 import pytest
 
 from pytest_garl.adversary.catalogue import policy_names
+from pytest_garl.adversary.domain_policy import domain_with_policy, policy_in
 from pytest_garl.errors import GarlError
 from pytest_garl.execution.flight_id import Slot
 from pytest_garl.plugin.arguments import OPTIONS, Option
+from pytest_garl.scenarios.domains.names import DEFAULT_DOMAIN
 from pytest_garl.search.catalogue import default_policy, find_method, method_names
 
 if TYPE_CHECKING:
@@ -51,7 +53,7 @@ class Options:
     ray_address: str
     """Of a cluster that is there already, or empty: one on this machine."""
     domain: Domain
-    """Of the command line, else of the ini key, else the default one."""
+    """Of the command line, else of the ini file, else the default one."""
     timeout_s: float
     repeat: str
     """A slot or a scenario file to fly again, or empty."""
@@ -59,8 +61,7 @@ class Options:
     """The slot that ``repeat`` names, as the earlier search flew it."""
     duplicates: Literal["xfail", "fail"]
     npcs: str
-    """Who moves the NPCs: of the command line or the ini key, else of the domain."""
-    npcs_are_given: bool
+    """The NPC policy that an option names; empty: the domain's, or that of the repeated slot."""
     baseline: Path | None
     level: float
     shrink: int
@@ -78,25 +79,23 @@ class Options:
         """Whether the session flies a search or a repeated scenario, and not saved cases only."""
         return self.budget > 0 or bool(self.repeat)
 
+    def domain_of(self, named: str | None) -> Domain:
+        """Return the domain of a test whose marker names one; the command line wins.
+
+        Raises ScenarioError for a domain that cannot be read.
+        """
+        if named is None or self.given & {"domain", "weather"}:
+            return self.domain
+        return domain_with_policy(named, self.root)
+
+    def policy_in(self, domain: Domain) -> str:
+        """Return the name of the policy that moves the NPCs of a search in a domain."""
+        return self.npcs or policy_in(domain, default_policy(self.method))
+
     @property
     def map_folders(self) -> tuple[Path, ...]:
         """Folders of a user's own maps."""
         return (self.root / "scenarios" / "maps",)
-
-    def domain_of(self, marker: str | None) -> Domain:
-        """Return the domain of a test whose marker names one, or None.
-
-        The command line's takes its place.  Raises GarlError for a domain that cannot be read.
-        """
-        if marker is None or {"domain", "weather"} & self.given:
-            return self.domain
-        from pytest_garl.scenarios.domains.reader import domain_named
-
-        return domain_named(marker, self.root)
-
-    def npcs_in(self, domain: Domain) -> str:
-        """Return who moves the NPCs in a domain: a policy's name, or a file of weights."""
-        return self.npcs if self.npcs_are_given else _npcs_of(domain, self.method)
 
     @functools.cached_property
     def corpus(self) -> Corpus:
@@ -134,8 +133,6 @@ def read_options(config: pytest.Config) -> Options:
     folder = config.rootpath / str(config.getini("garl_dir"))
     repeat = _repeat(text["repeat"])
     slot = _repeated_slot(repeat, folder / "ledger.sqlite")
-    domain = _domain(config, text["domain"], text["weather"])
-    npcs = text["npcs"] or (slot.npcs if slot else "")
     return Options(
         given=_given(config),
         budget=budget,
@@ -147,15 +144,14 @@ def read_options(config: pytest.Config) -> Options:
         pool=cast(Literal["local", "ray"], _among("pool", text["pool"], ("local", "ray"))),
         workers=_workers(text["workers"], text["pool"], address),
         ray_address=address,
-        domain=domain,
+        domain=_domain(config),
         timeout_s=_number("timeout", text["timeout"], 1e6, "a positive number of seconds"),
         repeat=repeat,
         repeated_slot=slot,
         duplicates=cast(
             Literal["xfail", "fail"], _among("duplicates", text["duplicates"], ("xfail", "fail"))
         ),
-        npcs=_npcs(npcs) if npcs else _npcs_of(domain, text["method"]),
-        npcs_are_given=bool(npcs),
+        npcs=_npcs(text["npcs"]),
         baseline=_baseline(config),
         level=_number("level", text["level"], 1, "a number between 0 and 1"),
         shrink=_shrink(text["shrink"]),
@@ -251,51 +247,50 @@ def _method(text: str) -> str:
     return text
 
 
-def _domain(config: pytest.Config, text: str, weather: str) -> Domain:
-    """Return the domain of the options; the alias names one of the paper's."""
-    from pytest_garl.scenarios.domains.reader import DEFAULT_DOMAIN, domain_named
+def _domain(config: pytest.Config) -> Domain:
+    """Return the session's domain.
 
-    if weather:
-        _among("weather", weather, ("confined", "full"))
-        instead = "paper" if weather == "confined" else "paper-full"
-        if text:
+    The command line names a file as seen from here, the ini key as seen from the root.
+    ``--garl-weather`` is the old name of two domains.
+    """
+    names = ("domain", "weather")
+    option = [str(config.getoption(f"--garl-{name}") or "") for name in names]
+    ini = [str(config.getini(f"garl_{name}")) for name in names]
+    for (domain, weather), folder in ((option, Path()), (ini, config.rootpath)):
+        if domain and weather:
             raise pytest.UsageError(
-                f"--garl-weather={weather} has no effect beside --garl-domain={text}, which states "
-                "the weather; give only one of them"
+                f"--garl-weather={weather}: found beside --garl-domain={domain}, which says how "
+                "bad the weather may become; give only --garl-domain"
             )
-        config.issue_config_time_warning(
-            pytest.PytestDeprecationWarning(
-                f"--garl-weather={weather} will go with the next release; "
-                f"--garl-domain={instead} means the same"
-            ),
-            stacklevel=2,
+        if weather:
+            domain = _OLD_WEATHER[_among("weather", weather, tuple(_OLD_WEATHER))]
+            _warn_of_weather(config, weather, domain)
+        if domain:
+            return _read_domain(domain, folder)
+    return _read_domain(DEFAULT_DOMAIN, Path())
+
+
+_OLD_WEATHER = {"confined": "paper", "full": "paper-full"}
+
+
+def _warn_of_weather(config: pytest.Config, weather: str, domain: str) -> None:
+    if not hasattr(config, "workerinput"):
+        text = (
+            f"--garl-weather={weather} will go with the next release; --garl-domain={domain} "
+            "means the same"
         )
-        text = instead
-    given = config.getoption("--garl-domain") is not None
+        config.issue_config_time_warning(pytest.PytestDeprecationWarning(text), stacklevel=2)
+
+
+def _read_domain(text: str, folder: Path) -> Domain:
     try:
-        return domain_named(text or DEFAULT_DOMAIN, Path() if given else config.rootpath)
+        return domain_with_policy(text, folder)
     except GarlError as error:
-        raise pytest.UsageError(f"--garl-domain: {error}") from error
-
-
-def _npcs_of(domain: Domain, method: str) -> str:
-    """Return the policy that a domain names; in the paper's world the method chooses it."""
-    from pytest_garl.scenarios.domains.domain import ABSENT
-
-    if domain.paper:
-        return default_policy(method)
-    if domain.npc_behaviour == ABSENT:
-        return "stationary"
-    if domain.npc_behaviour not in policy_names():
-        raise pytest.UsageError(
-            f"domain {domain.name}: key 'npc_behaviour': found {domain.npc_behaviour!r}, expected "
-            f"{ABSENT} or one of {', '.join(policy_names())}"
-        )
-    return domain.npc_behaviour
+        raise pytest.UsageError(f"--garl-domain={text}: {error}") from error
 
 
 def _npcs(text: str) -> str:
-    if text in policy_names():
+    if not text or text in policy_names():
         return text
     if not text.endswith(".npz"):
         expected = f"one of {', '.join(policy_names())}, or weights (.npz) that `garl train` wrote"

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, TextIO
 
 import pytest
 
+from pytest_garl.errors import LedgerError
 from pytest_garl.execution.batch import fly_all
 from pytest_garl.execution.flight_id import CompletedFlight, FlightId
 from pytest_garl.execution.ledger import Ledger
@@ -32,6 +33,7 @@ if TYPE_CHECKING:
     from pytest_garl.regressions.forecast import RemainingWork
 
 from pytest_garl.execution.ledger import SESSION_FACT
+from pytest_garl.reports.search_summary import DOMAINS
 
 SELECTED = "selected flights"
 """The ledger's fact: how many flights of searches the selected tests want."""
@@ -161,6 +163,7 @@ class Run:
         Raises LedgerError if a search to resume flew something else.
         """
         files: dict[str, set[str]] = {}
+        domains: dict[str, set[str]] = {}
         for item in items:
             target = target_of(item)
             if target is not None:
@@ -168,9 +171,13 @@ class Run:
                 self.items.setdefault(target.flight, []).append(selected(item))
                 search = f"{target.system_name} on {target.map}"
                 files.setdefault(search, set()).add(item.nodeid.partition("::")[0])
+                if target.is_searched and target.domain and not self.options.repeat:
+                    domains.setdefault(search, set()).add(target.domain.label)
         # xdist's controller, which writes the summary and the progress line, has no items.
         for search, names in files.items():
             self.ledger.note_fact(f"files of {search}", " ".join(sorted(names)))
+        for search, labels in domains.items():
+            self._note_domains(search, labels)
         wanted = self.searches.targets.values()
         searched = [slots for slots in wanted if not any(each.entry for each in slots.values())]
         self.search_sizes = [len(slots) for slots in searched]
@@ -178,6 +185,17 @@ class Run:
             self.ledger.note_fact(SELECTED, sum(self.search_sizes))
         if self.options.resume:
             self.searches.check_resumed()
+
+    def _note_domains(self, search: str, wanted: set[str]) -> None:
+        """Note in which domains a system is flown on a map; a resumed run has the same ones."""
+        key = f"{DOMAINS}{search}"
+        known = self.ledger.fact(key)
+        if self.options.resume and known is not None and not wanted <= {*known}:
+            raise LedgerError(
+                f"--garl-resume: the domain of {search} was {' and '.join(known)}, is "
+                f"{' and '.join(sorted(wanted))}; run without --garl-resume to begin anew"
+            )
+        self.ledger.note_fact(key, sorted({*(known or ()), *wanted}))
 
     def note_finding_test(self, search: str, signature: str, nodeid: str) -> None:
         """Note a test that failed for a violation; of several keep the first by name."""
@@ -199,7 +217,7 @@ class Run:
         """Which item of which process reports what."""
         return ReportClaims(ledger=self.ledger)
 
-    def fly(self, target: Target, npcs: PolicySpec) -> CompletedFlight:
+    def fly(self, target: Target, npcs: PolicySpec | None) -> CompletedFlight:
         """Return a slot's flight after it and all lower selected slots are flown."""
         self.searches.register(target.system, npcs)
         try:
@@ -226,6 +244,19 @@ class Run:
         excuse = flight.result.verdict.excuse
         excused = (f"nobody could have landed ({excuse})",) if excuse else ()
         return *excused, *stale_reasons(target.case, sources, flight.sha256)
+
+    def outside_domain(self, target: Target) -> str:
+        """Return the file of a case and its values outside the test's domain; empty if it has none.
+
+        The case is flown all the same: what was found once must not come back unnoticed.
+        """
+        if target.case is None or target.entry is None or target.domain is None:
+            return ""
+        scenario = target.case.scenario
+        map = load_map(target.map, self.options.map_folders)
+        values = "; ".join(target.domain.outside(scenario, map))
+        file = target.entry.path.name
+        return f"{file} is outside the domain {target.domain.name}: {values}" if values else ""
 
     def scenario(self, target: Target) -> Scenario:
         """Return the scenario of a slot."""

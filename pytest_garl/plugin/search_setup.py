@@ -53,8 +53,11 @@ class Searches:
         wanted = self.targets[target.search]
         return [wanted[slot] for slot in sorted(wanted) if slot < target.slot]
 
-    def register(self, system: type, npcs: PolicySpec) -> None:
-        """Put all searches of a landing system into the ledger."""
+    def register(self, system: type, npcs: PolicySpec | None) -> None:
+        """Put all searches of a landing system into the ledger.
+
+        Without a policy the NPCs of each search move as its domain says.
+        """
         for search, wanted in self.targets.items():
             sample = next(iter(wanted.values()))
             if search not in self.breeders and sample.system is system and not sample.broken:
@@ -97,13 +100,23 @@ class Searches:
             flights=self.options.flights,
         )
 
+    def policy_name(self, target: Target) -> str:
+        """Return the policy of a target's NPCs, unless a fixture names one."""
+        repeated, options = self.options.repeated_slot, self.options
+        stored = repeated.npcs.get(target.system_name, "") if repeated else ""
+        if not options.npcs and (stored in policy_names() or stored.endswith(".npz")):
+            return stored
+        return options.policy_in(target.domain or options.domain)
+
     def sources(self, target: Target) -> tuple[tuple[str, str], ...]:
         """Return name and hash of everything that a target's landing system consists of."""
         return source_hashes(target.system, data_files(target.files, self.options.root))
 
-    def _register(self, search: str, wanted: Mapping[Slot, Target], npcs: PolicySpec) -> None:
+    def _register(
+        self, search: str, wanted: Mapping[Slot, Target], given: PolicySpec | None
+    ) -> None:
         target = next(iter(wanted.values()))
-        npcs = npc_policy_of(target, self._of_domain(target, npcs))
+        npcs = npc_policy_of(target, given or policy_spec(self.policy_name(target)))
         job = self.job(target, npcs)
         removed = target.case.scenario.removed_objects if target.case else ()
         check_policy(npcs, load_map(job.map, self.options.map_folders).without(removed))
@@ -123,12 +136,6 @@ class Searches:
                 f"{', '.join(job.differences(parse_job(known)))}"
             )
         self.breeders[search] = Breeder(self.ledger, search, method, slots)
-
-    def _of_domain(self, target: Target, npcs: PolicySpec) -> PolicySpec:
-        """Return the policy of a target's domain, unless the user chose another."""
-        options = self.options
-        chosen = options.npcs_are_given or npcs != policy_spec(options.npcs)
-        return npcs if chosen else policy_spec(options.npcs_in(target.domain or options.domain))
 
     def _method(self, target: Target, wanted: Mapping[Slot, Target]) -> Method:
         if target.entry or self.options.repeat:

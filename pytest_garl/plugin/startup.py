@@ -36,7 +36,7 @@ def begin_run(config: pytest.Config, options: Options) -> None:
     """
     try:
         # Weights that cannot be trusted, or no Ray, end the session before there is a ledger.
-        policy_spec(options.npcs)
+        policy_spec(options.policy_in(options.domain))
         if options.pool == "ray":
             check_ray(options.ray_address)
         ledger, lock = _open_ledger(config, options)
@@ -103,7 +103,7 @@ def _facts(options: Options) -> dict[str, Any]:
         "population": options.population,
         "map": ",".join(options.maps),
         "domain": options.domain.label,
-        "npcs": options.npcs,
+        "npcs": options.policy_in(options.domain),
     }
 
 

@@ -10,7 +10,7 @@ import pytest
 
 from pytest_garl.plugin.github_summary import write_step_summary
 from pytest_garl.plugin.header import cpu_dispatch_warning
-from pytest_garl.plugin.keys import CASE, MAYBE_FIXED, STALE
+from pytest_garl.plugin.keys import CASE, MAYBE_FIXED, OUTSIDE, STALE
 from pytest_garl.plugin.run import Run
 from pytest_garl.plugin.save_cases import saved_lines
 from pytest_garl.plugin.session_status import notes
@@ -32,6 +32,7 @@ def write_run(reporter: Any, run: Run, tally: Tally) -> None:
         *saved_lines(run.investigated, reporter.config),
         *([f"nothing more was saved: {run.save_problem}"] if run.save_problem else []),
         *_passing_cases(reporter),
+        *_cases_outside(reporter),
         *(wrapped(line, width_of(reporter.config)) for line in cpu_dispatch_warning(run)),
     ]
     if lines:
@@ -64,6 +65,13 @@ def _passing_cases(reporter: Any) -> list[str]:
         ),
         *(f"stale: {text}" for text in sorted(stale)),
     ]
+
+
+def _cases_outside(reporter: Any) -> list[str]:
+    """Return a line for each case whose values lie outside the domain of its test."""
+    outside = _property_values(reporter, ("passed", "failed", "xfailed", "skipped"), OUTSIDE)
+    width = width_of(reporter.config)
+    return [wrapped(f"flown, although {text}", width, others="  ") for text in sorted(outside)]
 
 
 def _property_values(reporter: Any, outcomes: tuple[str, ...], key: str) -> set[str]:
@@ -104,7 +112,14 @@ def _lines_about(searches: list[SearchSummary], run: Run, reporter: Any) -> list
             f"not finished: {done} of {total} flown; the same command with --garl-resume goes on"
         )
     results_hash = run.ledger.queries.result_hash()[:16]
+    worlds = dict.fromkeys(_world(search) for search in searches if search.domains)
+    lines += [wrapped(world, width, others="  ") for world in worlds]
     return [*lines, f"ledger: {run.ledger.path}  results {results_hash}"]
+
+
+def _world(search: SearchSummary) -> str:
+    """Return the conditions of a search: its domain, and who moved the NPCs."""
+    return f"domain {' and '.join(search.domains)}, NPCs {' and '.join(search.npcs)}"
 
 
 def fold_skips(reporter: Any) -> None:

@@ -32,7 +32,7 @@ class Target:
     task: Task = DEFAULT_TASK
     """The marker on the ground and the start of a search; cases and files have their own."""
     domain: Domain | None = None
-    """The operational domain of a search, and that which a case is compared with."""
+    """What a search varies, and what a case is compared with."""
     slot: Slot = FIRST_SLOT
     deterministic: bool = True
     """Whether the marker says that the system repeats its flights exactly."""
@@ -77,6 +77,11 @@ class Target:
         """The problem of the case's file, empty if it can be read."""
         return self.entry.problem if self.entry is not None else ""
 
+    @property
+    def is_searched(self) -> bool:
+        """Whether a search breeds the scenario; else a saved case or a file holds it."""
+        return self.entry is None and not self.file
+
     @functools.cached_property
     def search(self) -> str:
         """Key of the search that the slot belongs to; each flight of a case has its own."""
@@ -89,7 +94,7 @@ class Target:
         ]
         if self.task != DEFAULT_TASK:
             facts.append(dataclasses.asdict(self.task))
-        if self.domain is not None and self.entry is None:
+        if self.domain is not None and self.is_searched:
             facts.append(self.domain.label)
         if self.entry is not None:
             facts += [str(self.entry.path), self.live]

@@ -7,7 +7,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Self
 
-from pytest_garl.execution.job import parse_job
+from pytest_garl.execution.job import FlightJob, parse_job
 from pytest_garl.execution.ledger import Ledger
 from pytest_garl.execution.ledger_queries import LedgerFlight
 from pytest_garl.verdicts.verdict import Limits, NoLanding, Verdict
@@ -16,6 +16,10 @@ from pytest_garl.verdicts.wording import headline
 WHY_NO_LANDING: tuple[NoLanding, ...] = ("needless", "excused", "blocked")
 """Columns of the flights without landing: somebody could have landed; nobody could have read the
 marker for long enough; something never left it free for long enough."""
+
+
+DOMAINS = "domains of "
+"""Begins the ledger's fact with the names of the domains of a system on a map."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -78,6 +82,10 @@ class SearchSummary:
     """How many flights violate a property, built in or a user's own."""
     findings: tuple[ViolationKind, ...] = ()
     limits: tuple[Limits, ...] = ()
+    domains: tuple[str, ...] = ()
+    """Names of the domains, of a file with a digest; several only if markers differ."""
+    npcs: tuple[str, ...] = ()
+    """Names of the policies that moved the NPCs."""
 
     @property
     def name(self) -> str:
@@ -182,6 +190,7 @@ def _summary(
         for finding in flight.result.verdict.findings:
             before = flight.id.slot_id, finding.story
             findings.setdefault(finding.signature, []).append(before)
+    jobs = _jobs(ledger, flights)
     files = str(ledger.fact(f"files of {system} on {map}") or "")
     return SearchSummary(
         system=system,
@@ -191,7 +200,9 @@ def _summary(
         kinds=_kinds(violations),
         violating=len({slot for items in violations.values() for slot, _ in items}),
         findings=_kinds(findings),
-        limits=_limits(ledger, flights),
+        limits=tuple(dict.fromkeys(job.limits for job in jobs)),
+        domains=tuple(ledger.fact(f"{DOMAINS}{system} on {map}") or ()),
+        npcs=tuple(dict.fromkeys(job.npcs.name for job in jobs)),
     )
 
 
@@ -210,9 +221,9 @@ def _kinds(stories: Mapping[str, Sequence[tuple[str, str]]]) -> tuple[ViolationK
     return tuple(sorted(kinds, key=lambda each: (-each.count, each.signature)))
 
 
-def _limits(ledger: Ledger, flights: Sequence[LedgerFlight]) -> tuple[Limits, ...]:
+def _jobs(ledger: Ledger, flights: Sequence[LedgerFlight]) -> list[FlightJob]:
     jobs = [ledger.job(search) for search in dict.fromkeys(each.id.search for each in flights)]
-    return tuple(dict.fromkeys(parse_job(job).limits for job in jobs if job is not None))
+    return [parse_job(job) for job in jobs if job is not None]
 
 
 LEGEND = {

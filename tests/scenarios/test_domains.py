@@ -12,7 +12,8 @@ from pytest_garl.errors import ScenarioError
 from pytest_garl.scenarios.chromosome import decode, encode
 from pytest_garl.scenarios.domains.domain import CONDITIONS, Domain
 from pytest_garl.scenarios.domains.genome import genome_of
-from pytest_garl.scenarios.domains.reader import BUILT_IN, domain_named
+from pytest_garl.scenarios.domains.names import BUILT_IN
+from pytest_garl.scenarios.domains.reader import domain_named
 from pytest_garl.scenarios.files import dumps, loads
 from pytest_garl.scenarios.genes import Genome, genome_for, with_destinations
 from pytest_garl.scenarios.groups.catalogue import PARAMETERS

@@ -14,16 +14,11 @@ from pytest_garl.files.reading import read_text
 from pytest_garl.files.toml import Table, parse
 from pytest_garl.messages import listed, shown
 from pytest_garl.scenarios.domains.domain import ABSENT, BIRD_HEIGHT, CONDITIONS, ELEVATION, Domain
+from pytest_garl.scenarios.domains.names import BUILT_IN, HIDDEN
 from pytest_garl.scenarios.genes import WeatherRange
 from pytest_garl.scenarios.groups.catalogue import GROUPS
 from pytest_garl.scenarios.light import NOON_DEG
 
-BUILT_IN = ("field", "calm", "paper")
-"""Names of the domains that come with the package."""
-DEFAULT_DOMAIN = "paper"
-"""The domain of a run that names none."""
-HIDDEN = ("paper-full",)
-"""What ``--garl-weather=full`` named; read, but not listed."""
 _SECTIONS = ("weather", "light", *GROUPS, "npcs")
 
 
