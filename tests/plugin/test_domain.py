@@ -1,0 +1,170 @@
+"""The operational domain of a search: who names it, and what follows from it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from pytest_garl.execution.job import parse_job
+from pytest_garl.execution.ledger import Ledger
+from pytest_garl.scenarios.domains.names import DEFAULT_DOMAIN
+from tests.support.landing_project import project, run
+
+ONE = ("--garl-budget=1", "--garl-workers=0")
+WINDY = 'extends = "calm"\n[wind]\nmean_mps = [0, 2]\n'
+
+
+def mark(pytester: pytest.Pytester, domain: str) -> None:
+    """Let the project's tests name a domain."""
+    file = pytester.path / "test_it.py"
+    text = file.read_text().replace("maps=['lawn']", f"maps=['lawn'], domain={domain}")
+    assert domain in text
+    file.write_text(text)
+
+
+def named(pytester: pytest.Pytester, domain: str) -> None:
+    project(pytester)
+    mark(pytester, domain)
+
+
+def npcs_in(file: Path) -> str:
+    ledger = Ledger(file)
+    [(_, job)] = ledger.searches()
+    ledger.close()
+    return parse_job(job).npcs.name
+
+
+def test_summary_names_the_domain_and_who_moves_the_npcs(pytester: pytest.Pytester) -> None:
+    project(pytester)
+    result = run(pytester, *ONE)
+    result.stdout.fnmatch_lines([f"garl: *domain {DEFAULT_DOMAIN}, *"])
+    result.stdout.fnmatch_lines([f"domain {DEFAULT_DOMAIN}, NPCs *"])
+
+
+@pytest.mark.parametrize(
+    ("marker", "args", "expected"),
+    [
+        ("", ("-o", "garl_domain=calm"), "domain calm, NPCs waypoint"),
+        ("'calm'", ("-o", "garl_domain=field"), "domain calm, NPCs waypoint"),
+        ("'calm'", ("--garl-domain=field",), "domain field, NPCs waypoint"),
+        ("'calm'", ("--garl-weather=full",), "domain paper-full, NPCs dqn"),
+        ("", ("--garl-weather=confined", "-o", "garl_domain=field"), "domain paper, NPCs dqn"),
+        ("", ("--garl-domain=calm", "-o", "garl_weather=full"), "domain calm, NPCs waypoint"),
+        ("'calm'", ("--garl-npcs=stand",), "domain calm, NPCs stand"),
+        ("'calm'", ("--garl-method=garl-paper",), "domain calm, NPCs waypoint"),
+        ("'mine.toml'", (), "domain mine (????????), NPCs waypoint"),
+    ],
+)
+def test_option_wins_over_marker_and_marker_over_ini_key(
+    pytester: pytest.Pytester, marker: str, args: tuple[str, ...], expected: str
+) -> None:
+    project(pytester)
+    if marker:
+        mark(pytester, marker)
+    (pytester.path / "mine.toml").write_text(WINDY)
+    result = run(pytester, *ONE, *args)
+    result.stdout.fnmatch_lines([expected])
+
+
+def test_domain_of_a_marker_is_announced_and_named_under_xdist(pytester: pytest.Pytester) -> None:
+    named(pytester, "'calm'")
+    run(pytester, *ONE).stdout.fnmatch_lines(["garl: domain of Good: calm, NPCs waypoint"])
+    spread = run(pytester, "--garl-budget=2", "--garl-workers=1", "-n2")
+    spread.stdout.fnmatch_lines(["domain calm, NPCs waypoint"])
+
+
+@pytest.mark.parametrize(
+    ("args", "words"),
+    [
+        (("--garl-domain=sea",), "*--garl-domain=sea: *found 'sea', expected field, calm*"),
+        (("--garl-domain=no.toml",), "*--garl-domain=no.toml: *no.toml*"),
+        (("--garl-domain=wild.toml",), "*wild.toml: key 'npc_behaviour': found 'wild', expected*"),
+        (("--garl-domain=calm", "--garl-weather=full"), "*--garl-weather=full: found beside*"),
+        (("--garl-weather=bad",), "*--garl-weather: found 'bad', expected one of confined, full"),
+    ],
+)
+def test_invalid_domain_is_one_usage_error(
+    pytester: pytest.Pytester, args: tuple[str, ...], words: str
+) -> None:
+    project(pytester)
+    (pytester.path / "wild.toml").write_text('extends = "calm"\nnpc_behaviour = "wild"\n')
+    result = run(pytester, *ONE, *args)
+    assert result.ret == pytest.ExitCode.USAGE_ERROR
+    result.stderr.fnmatch_lines([words])
+    assert "Traceback" not in result.stderr.str()
+
+
+@pytest.mark.parametrize(
+    ("domain", "words"),
+    [
+        ("'sea'", "*mark.garl: domain='sea': *expected field, calm*"),
+        ("7", "*mark.garl: domain=7: expected a name such as 'field', or a TOML file*"),
+        ("'wild.toml'", "*wild.toml: key 'wind.mean_mps': found *3, 1*lowest value first*"),
+    ],
+)
+def test_invalid_domain_of_a_marker_names_file_and_key(
+    pytester: pytest.Pytester, domain: str, words: str
+) -> None:
+    named(pytester, domain)
+    (pytester.path / "wild.toml").write_text("[wind]\nmean_mps = [3, 1]\n")
+    result = run(pytester, *ONE)
+    assert result.ret == pytest.ExitCode.INTERRUPTED
+    result.stdout.fnmatch_lines([words])
+
+
+def test_domain_without_a_search_is_an_option_without_effect(pytester: pytest.Pytester) -> None:
+    project(pytester)
+    result = run(pytester, "--garl-domain=calm")
+    assert result.ret == pytest.ExitCode.USAGE_ERROR
+    result.stderr.fnmatch_lines(["*--garl-domain has no effect without --garl-budget*"])
+
+
+def test_old_weather_option_warns(pytester: pytest.Pytester) -> None:
+    project(pytester)
+    result = run(pytester, *ONE, "--garl-weather=full")
+    result.stdout.fnmatch_lines(["*--garl-weather=full will go with the next release; *"])
+
+
+def test_fixture_npcs_wins_over_the_domain(pytester: pytest.Pytester) -> None:
+    """Also if it names the policy that the session's own domain has."""
+    named(pytester, "'calm'")
+    with (pytester.path / "conftest.py").open("a") as file:
+        file.write("import pytest\n@pytest.fixture(scope='session')\ndef npcs(): return 'dqn'\n")
+    run(pytester, *ONE, "-o", "garl_domain=paper").stdout.fnmatch_lines(["domain calm, NPCs dqn"])
+
+
+def test_repeated_slot_has_the_npcs_of_its_search(pytester: pytest.Pytester) -> None:
+    named(pytester, "'calm'")
+    run(pytester, *ONE)
+    run(pytester, "--garl-repeat=lawn-g00-s00", "--garl-workers=0", "-o", "garl_domain=paper")
+    assert npcs_in(pytester.path / ".garl" / "repeat.sqlite") == "waypoint"
+
+
+def test_absent_npcs_take_part_in_no_flight(pytester: pytest.Pytester) -> None:
+    named(pytester, "'mine.toml'")
+    (pytester.path / "mine.toml").write_text('extends = "calm"\nnpc_behaviour = "absent"\n')
+    result = run(pytester, "--garl-budget=4", "--garl-workers=0")
+    result.stdout.fnmatch_lines(["domain mine*, NPCs stationary"])
+    ledger = Ledger(pytester.path / ".garl" / "ledger.sqlite")
+    scenarios = [flight.scenario for flight in ledger.queries.flights()]
+    ledger.close()
+    assert len(scenarios) == 4
+    assert all("velocity" not in scenario for scenario in scenarios)
+
+
+@pytest.mark.parametrize("where", ["ini file", "marker", "file"])
+def test_resume_refuses_another_domain(pytester: pytest.Pytester, where: str) -> None:
+    named(pytester, "'mine.toml'" if where == "file" else "'calm'")
+    mine = pytester.path / "mine.toml"
+    mine.write_text(WINDY)
+    run(pytester, *ONE)
+    if where == "file":
+        mine.write_text(WINDY.replace("2", "3"))
+    elif where == "marker":
+        test = pytester.path / "test_it.py"
+        test.write_text(test.read_text().replace("'calm'", "'field'"))
+    args = ("-o", "garl_domain=field") if where == "ini file" else ()
+    result = run(pytester, *ONE, "--garl-resume", *args)
+    assert result.ret == pytest.ExitCode.USAGE_ERROR
+    result.stderr.fnmatch_lines(["*domain * was *, is *run without --garl-resume*"])
