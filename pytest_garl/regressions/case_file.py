@@ -36,7 +36,7 @@ from pytest_garl.regressions.case_header import (
     keys_of,
     read_header,
 )
-from pytest_garl.scenarios.files import SCENARIO_KEYS, read_scenario, scenario_lines
+from pytest_garl.scenarios.files import SCENARIO_KEYS, is_in_units, read_scenario, scenario_lines
 from pytest_garl.scenarios.maps.map import Map, load_map
 from pytest_garl.scenarios.task import task_lines
 from pytest_garl.verdicts.verdict import (
@@ -49,6 +49,8 @@ from pytest_garl.verdicts.verdict import (
     ViolationType,
 )
 
+_IN_UNITS = "# What is not nominal; each name ends with its unit, x is east and y north."
+_IN_GENES = "# Weather from 0 to 1, places from -1 to 1, velocity as a share of the top speed."
 _SECTIONS = {
     "violation",
     "preventable",
@@ -81,7 +83,7 @@ def dump_case(case: Case, load_map: Callable[[str], Map] = load_map) -> str:
         *_prevention_lines(case.prevention),
         _limits_lines(case.limits),
         [
-            "# What is not nominal; each name ends with its unit, x is east and y north.",
+            _IN_UNITS if is_in_units(case.scenario, map) else _IN_GENES,
             *scenario_lines(case.scenario, map)[1:],
             *task_lines(case.scenario.task),
         ],

@@ -8,6 +8,7 @@ write, so that the file flies to the byte as the search flew it.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 
@@ -45,7 +46,10 @@ SNOW_MMPH = 10.0
 LEAVES_PER_M3 = 2.0
 """Gene 1: engineering estimate of a gust through an autumn maple."""
 MOST_VISIBILITY_M = 1e6
+"""Haze that thin is not seen on any map; a gene that says so becomes 0."""
 SIGNIFICANT_DIGITS = 5
+_NEAR_ZERO = 1e-9
+"""In every unit of a file a value that small has no effect."""
 PLACE_DIGITS = 3
 """Millimetres, and millimetres per second."""
 ANGLE_DIGITS = 2
@@ -139,8 +143,8 @@ WEATHER_GENES: Mapping[str, str] = {each.name: key for key, each in WEATHER_UNIT
 
 
 def significant(value: float, digits: int = SIGNIFICANT_DIGITS) -> float:
-    """Return a value rounded to a number of significant digits."""
-    return float(f"{value:.{digits}g}")
+    """Return a value rounded to a number of significant digits; one near 0 becomes 0."""
+    return float(f"{value:.{digits}g}") if abs(value) > _NEAR_ZERO else 0.0
 
 
 def snapped(scenario: Scenario, map: Map) -> Scenario:
@@ -158,14 +162,15 @@ def sections_of(scenario: Scenario, map: Map) -> dict[str, dict[str, float]]:
     """
     sections: dict[str, dict[str, float]] = {"weather": {}, "light": {}}
     for key, weather in WEATHER_UNITS.items():
-        if scenario[key] != 0:
-            sections["weather"][weather.name] = weather.physical(scenario[key])
+        value = weather.physical(scenario[key])
+        if value != 0 and value <= weather.limits[1]:
+            sections["weather"][weather.name] = value
     position, turn = scenario[SUN], scenario[TURN]
     if position != 0.5 or turn != 0:
         azimuth = round((sun_azimuth_deg(position) + turn) % 360.0, ANGLE_DIGITS)
         elevation = round(sun_elevation_deg(position), ANGLE_DIGITS)
         sections["light"] = dict(zip(LIGHT, (elevation, azimuth), strict=True))
-    sections["marker"] = _named("", marker_position_m(scenario, map))
+    sections["marker"] = _inside_disc(_named("", marker_position_m(scenario, map)), map)
     for name, _ in map.without(scenario.removed_objects).present_objects:
         values = _named("start_", object_start_m(scenario, map, name))
         goal = object_destination_m(scenario, map, name)
@@ -230,6 +235,21 @@ def _place(gene: str, section: Mapping[str, float], map: Map) -> dict[str, float
 def _named(prefix: str, place_m: tuple[float, float]) -> dict[str, float]:
     x, y = (round(each, PLACE_DIGITS) + 0.0 for each in place_m)
     return {f"{prefix}x_m": x, f"{prefix}y_m": y}
+
+
+def _inside_disc(place: dict[str, float], map: Map) -> dict[str, float]:
+    """Return a marker's place, moved by a millimetre where rounding took it out of its disc."""
+    middle = dict(zip(("x_m", "y_m"), map.gps_position_m, strict=True))
+    if math.dist((*place.values(),), (*middle.values(),)) <= MARKER_RADIUS_M:
+        return place
+    step = 10.0**-PLACE_DIGITS
+    return {
+        name: round(
+            value - math.copysign(min(step, abs(value - middle[name])), value - middle[name]),
+            PLACE_DIGITS,
+        )
+        for name, value in place.items()
+    }
 
 
 def ranges_of(head: str, map: Map) -> dict[str, tuple[float, float]]:

@@ -19,6 +19,7 @@ from pytest_garl.scenarios.chromosome import decode
 from pytest_garl.scenarios.genes import genome_for
 from pytest_garl.scenarios.maps.map import load_map
 from pytest_garl.scenarios.scenario import Scenario
+from pytest_garl.scenarios.units import snapped
 from pytest_garl.scenarios.validity import repair
 from pytest_garl.verdicts.verdict import Limits
 from tests.support.results import flight_result
@@ -78,8 +79,9 @@ def violating_scenario(seed: int = 7) -> Scenario:
     return repair(decode(row, genome, map="lawn", seed=1), LAWN)
 
 
-VIOLATING_SCENARIO = violating_scenario().replace(
-    {f"{COLLIDING_OBJECT}.velocity": 0.9, "environment.fog": 0.12}
+VIOLATING_SCENARIO = snapped(
+    violating_scenario().replace({f"{COLLIDING_OBJECT}.velocity": 0.9, "environment.fog": 0.12}),
+    LAWN,
 )
 SIGNATURE = "IV:dog:last-metre:unseen"
 Fails = Callable[[Scenario, str], bool]

@@ -11,8 +11,39 @@ from tests.regressions.samples import case, case_with_changes
 
 
 def test_ids_of_cases_never_change() -> None:
-    assert case().id == "lawn-IV-dog-33ab15"
-    assert case_with_changes().id == "lawn-IV-dog-96cf0c"
+    assert case().id == "lawn-IV-dog-5506d7"
+    assert case_with_changes().id == "lawn-IV-dog-0eb186"
+
+
+FIRST_SCHEMA_GENES = (
+    ("environment.dust", 0.0767732437050385),
+    ("environment.fog", 0.1425695544488903),
+    ("environment.rain", 0.02162394190794506),
+    ("environment.snow", 0.14229741707058657),
+    ("environment.road_wetness", 0.046774717801572815),
+    ("environment.maple_leaf", 0.06349896734588635),
+    ("environment.road_leaf", 0.12415538907306625),
+    ("environment.road_snow", 0.061379870455374186),
+    ("environment.sun_position", 0.5495936876730595),
+    ("marker.x", -0.6483092983222674),
+    ("marker.y", 0.7220318591052368),
+    ("dog-1.start_x", 0.5007293452601052),
+    ("dog-1.start_y", -0.43918248402792015),
+    ("dog-1.velocity", 0.48519097443163506),
+)
+"""Of any digits, as searches saved them before files were in physical units."""
+
+
+def test_a_case_whose_genes_have_any_digits_keeps_its_id_through_its_file() -> None:
+    for each, name in (
+        (case(), "lawn-IV-dog-33ab15"),
+        (case_with_changes(), "lawn-IV-dog-96cf0c"),
+    ):
+        scenario = dataclasses.replace(each.scenario, genes=FIRST_SCHEMA_GENES)
+        old = dataclasses.replace(each, scenario=scenario)
+        assert old.id == name
+        assert "[genes.environment]\n" in dump_case(old)
+        assert parse_case(dump_case(old), load_map) == old
 
 
 def test_id_names_map_type_and_subject_and_differs_between_scenarios() -> None:

@@ -122,7 +122,7 @@ def test_file_keeps_names_with_quotes_and_backslashes() -> None:
     strange = dataclasses.replace(
         strange, scenario=dataclasses.replace(strange.scenario, map=odd.name)
     )
-    assert parse_case(dump_case(strange), lambda _: odd) == strange
+    assert parse_case(dump_case(strange, lambda _: odd), lambda _: odd) == strange
 
 
 def test_file_keeps_the_test_and_the_hashes_of_the_sources() -> None:
