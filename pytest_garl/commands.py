@@ -12,8 +12,8 @@ WORLD_M = 1_000.0
 of metres wide: what is beyond is a mistake in units or an estimate that diverged."""
 MAX_SPEED_MPS = 100.0
 """No commanded speed may be higher: no multirotor is so fast."""
-MIN_ACCELERATION_MPS2, MAX_ACCELERATION_MPS2 = 0.1, 10.0
-MIN_TILT_RAD, MAX_TILT_RAD = 0.02, 0.61
+LEAST_ASKED_ACCELERATION_MPS2, MOST_ASKED_ACCELERATION_MPS2 = 0.1, 10.0
+LEAST_ASKED_TILT_RAD, MOST_ASKED_TILT_RAD = 0.02, 0.61
 """Limits of a setpoint's own limits.  Below the low ones a UAV does not stop within the map; 35
 degrees is the largest tilt that the Matrice 100's data sheet allows."""
 

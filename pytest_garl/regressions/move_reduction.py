@@ -56,13 +56,12 @@ def _with_later_moves(
         if wait <= 0 or all(move == (0.0, 0.0) for move in own[:wait]):
             continue
         index = min(len(track.time_s) - 1, int(track.time_s.searchsorted(wait * DECISION_STEP_S)))
-        x, y = (float(value) for value in track.position_m[index, :2])
+        # Whole centimetres: few digits, and a place that the case's file can write.
+        x, y = (round(float(value), 2) for value in track.position_m[index, :2])
         there = scenario.replace(start_genes(name, (x, y), map))
         if problems(there, map):
             continue
         still: MoveList = ((0.0, 0.0),) * wait + own[wait:]
-        rounded = {key: round(value, 3) for key, value in start_genes(name, (x, y), map).items()}
-        there = there.replace(rounded)
         yield (
             there,
             tuple((each, _rounded(still if each == name else its)) for each, its in moves),

@@ -6,11 +6,11 @@ import math
 from typing import Any
 
 from pytest_garl.commands import (
-    MAX_ACCELERATION_MPS2,
+    LEAST_ASKED_ACCELERATION_MPS2,
+    LEAST_ASKED_TILT_RAD,
     MAX_SPEED_MPS,
-    MAX_TILT_RAD,
-    MIN_ACCELERATION_MPS2,
-    MIN_TILT_RAD,
+    MOST_ASKED_ACCELERATION_MPS2,
+    MOST_ASKED_TILT_RAD,
     WORLD_M,
     Abort,
     AttitudeSetpoint,
@@ -71,11 +71,13 @@ def read_command(answer: Any, quota: DiagnosticsQuota) -> Command:
         acceleration_mps2=_optional(
             answer.acceleration_mps2,
             f"{at}acceleration_mps2",
-            MIN_ACCELERATION_MPS2,
-            MAX_ACCELERATION_MPS2,
+            LEAST_ASKED_ACCELERATION_MPS2,
+            MOST_ASKED_ACCELERATION_MPS2,
             "m/s²",
         ),
-        tilt_rad=_optional(answer.tilt_rad, f"{at}tilt_rad", MIN_TILT_RAD, MAX_TILT_RAD, "rad"),
+        tilt_rad=_optional(
+            answer.tilt_rad, f"{at}tilt_rad", LEAST_ASKED_TILT_RAD, MOST_ASKED_TILT_RAD, "rad"
+        ),
         diagnostics=diagnostics,
     )
 

@@ -76,18 +76,24 @@ def _no_numpy_warnings() -> Iterator[None]:
 class GoesAcross(Scripted):
     """Takes off, then crosses 8 m under limits of its own."""
 
-    limits: ClassVar[dict[str, float]] = {}
+    acceleration_mps2: ClassVar[float | None] = None
+    tilt_rad: ClassVar[float | None] = None
 
     def step(self, observation: Observation) -> Command:
         if observation.time_s < 5:
             return self.hover(5.0)
         goal = (self.home[0], self.home[1] + 8.0, 5.0)
-        return PositionSetpoint(position_m=goal, speed_mps=4.0, **self.limits)  # type: ignore[arg-type]
+        return PositionSetpoint(
+            position_m=goal,
+            speed_mps=4.0,
+            acceleration_mps2=self.acceleration_mps2,
+            tilt_rad=self.tilt_rad,
+        )
 
 
 def crossing(**limits: float) -> tuple[float, float, float]:
     """Return the highest acceleration (over 0.5 s) and tilt of a crossing, and its overshoot."""
-    flight = flight_of(type("GoesAcross", (GoesAcross,), {"limits": limits}), 25)
+    flight = flight_of(type("GoesAcross", (GoesAcross,), limits), 25)
     track = flight.uav
     away = track.time_s > 5
     velocity, (x, y) = track.velocity_mps[away, :2], track.attitude[away, :2].T

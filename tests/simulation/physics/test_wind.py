@@ -9,6 +9,7 @@ import pytest
 from numpy.typing import NDArray
 
 from pytest_garl import Command, Observation, PositionSetpoint
+from pytest_garl.scenarios.maps.map import Texture
 from pytest_garl.simulation.fly import fly
 from pytest_garl.simulation.physics.wind import (
     CALM,
@@ -44,8 +45,8 @@ def test_mean_wind_is_given_at_six_metres() -> None:
 
 
 @pytest.mark.parametrize(("ground", "roughness_m"), [("grass", 0.03), ("concrete", 0.005)])
-def test_wind_grows_with_the_logarithm_of_height(ground: str, roughness_m: float) -> None:
-    wind = mean_wind(nominal(wind__mean_mps=4.0), ground)  # type: ignore[arg-type]
+def test_wind_grows_with_the_logarithm_of_height(ground: Texture, roughness_m: float) -> None:
+    wind = mean_wind(nominal(wind__mean_mps=4.0), ground)
     for height_m in (0.2, 1.0, 10.0):
         share = math.log(height_m / roughness_m) / math.log(6.0 / roughness_m)
         assert wind.at(height_m)[0] == pytest.approx(4 * share)
