@@ -20,8 +20,11 @@ from pytest_garl.execution.flight_id import CompletedFlight
 from pytest_garl.execution.job import FlightJob, parse_job
 from pytest_garl.execution.reference import BUILT_IN, Reference
 from pytest_garl.execution.stored_ledger import checked_ledger
+from pytest_garl.scenarios.domains.domain import Domain
+from pytest_garl.scenarios.domains.genome import genome_of
+from pytest_garl.scenarios.domains.names import DEFAULT_DOMAIN
+from pytest_garl.scenarios.domains.reader import domain_named
 from pytest_garl.scenarios.files import parse_scenario
-from pytest_garl.scenarios.genes import WeatherRange, genome_for
 from pytest_garl.scenarios.maps.map import Map, load_map
 from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.search.methods.random import random_scenarios
@@ -39,7 +42,7 @@ class BaselineSpec:
     maps: tuple[str, ...] = ("court", "lawn")
     count: int = 100
     seed: int = 0
-    weather: WeatherRange = "confined"
+    domain: Domain = field(default_factory=lambda: domain_named(DEFAULT_DOMAIN))
     npcs: str = "waypoint"
     limits: Limits = field(default_factory=Limits)
     simulator: Reference = BUILT_IN
@@ -47,8 +50,7 @@ class BaselineSpec:
 
     def scenarios(self, map: Map) -> Sequence[Scenario]:
         """Return the random scenarios on a map: the first generation of random search."""
-        genome = genome_for(map, weather=self.weather)
-        return random_scenarios(map, genome, self.seed, 0, self.count)
+        return random_scenarios(map, genome_of(self.domain, map), self.seed, 0, self.count)
 
 
 def fly_baseline(

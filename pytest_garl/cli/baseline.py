@@ -14,6 +14,7 @@ from rich.table import Table
 from rich.text import Text
 
 from pytest_garl.errors import OptionError
+from pytest_garl.scenarios.domains.names import DEFAULT_DOMAIN, OLD_WEATHER
 from pytest_garl.verdicts.verdict import DEFAULT_LIMITS
 
 if TYPE_CHECKING:
@@ -23,6 +24,8 @@ if TYPE_CHECKING:
     from pytest_garl.execution.flight_id import CompletedFlight
     from pytest_garl.execution.reference import Reference
 
+IN_PAPER = "waypoint"
+"""The NPC policy of a baseline in the world of the paper: nobody pursues the UAV."""
 FAILED = 1
 """Exit status of a comparison that fails; a usage error is 2."""
 COLOURS = {"broke": "red", "fixed": "green", "changed": "yellow"}
@@ -52,17 +55,22 @@ _SPEC_OPTIONS = (
     ),
     click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True),
     click.option(
+        "--domain",
+        metavar="NAME|FILE",
+        show_default=DEFAULT_DOMAIN,
+        help="Conditions that the scenarios are drawn from, as for --garl-domain.",
+    ),
+    click.option(
         "--weather",
         type=click.Choice(["confined", "full"]),
-        default="confined",
-        show_default=True,
-        help="How bad the weather may become, as for --garl-weather.",
+        help="Deprecated, use --domain: 'confined' is the domain paper, 'full' the same with any "
+        "weather.",
     ),
     click.option(
         "--npcs",
-        default="waypoint",
-        show_default=True,
-        help="NPC policy, which moves people, dogs and birds, as for --garl-npcs.",
+        default="",
+        help="NPC policy, which moves people, dogs and birds, as for --garl-npcs.  [default: as "
+        "the domain says; in the domain paper, waypoint]",
     ),
     click.option(
         "--distance-m",
@@ -237,16 +245,31 @@ def _spec(
     time_s: float,
     abort: Any,
     simulator: str,
+    domain: str | None,
+    weather: str | None,
+    npcs: str,
     **rest: Any,
 ) -> BaselineSpec:
+    from pytest_garl.adversary.domain_policy import domain_with_policy, policy_in
     from pytest_garl.baselines.record import BaselineSpec
     from pytest_garl.verdicts.verdict import Limits
 
     names = tuple(dict.fromkeys(part.strip() for part in maps.split(",") if part.strip()))
     if not names:
         raise OptionError(f"--maps: found {maps!r}, expected names such as court,lawn")
+    if weather and domain:
+        raise OptionError(
+            f"--weather={weather}: found beside --domain={domain}, which says how bad the weather "
+            "may become; give only --domain"
+        )
+    if weather:
+        domain = OLD_WEATHER[weather]
+        click.echo(f"--weather={weather} is deprecated; --domain={domain} means the same", err=True)
+    conditions = domain_with_policy(domain or DEFAULT_DOMAIN)
     return BaselineSpec(
         maps=names,
+        domain=conditions,
+        npcs=npcs or policy_in(conditions, IN_PAPER),
         limits=Limits(distance_m=distance_m, time_s=time_s, abort=abort),
         simulator=_simulator(simulator),
         map_folders=(_maps_folder(),),

@@ -7,11 +7,13 @@ from pathlib import Path
 
 import click
 
-from pytest_garl.scenarios.domains.domain import ABSENT, CONDITIONS, Domain
+from pytest_garl.adversary.domain_policy import domain_with_policy
+from pytest_garl.scenarios.domains.domain import ABSENT, CONDITIONS, ELEVATION, Domain
 from pytest_garl.scenarios.domains.names import BUILT_IN, DEFAULT_DOMAIN
-from pytest_garl.scenarios.domains.reader import domain_named
+from pytest_garl.scenarios.genes import CONFINED_WEATHER
 from pytest_garl.scenarios.groups.catalogue import GROUPS
-from pytest_garl.scenarios.units import unit_of
+from pytest_garl.scenarios.light import NOON_DEG, TWILIGHT_DEG
+from pytest_garl.scenarios.units import WEATHER_UNITS, unit_of
 
 MEANINGS = {
     "field": "what a landing system in the field meets",
@@ -46,34 +48,43 @@ def list_domains() -> None:
 @click.argument("name", default=DEFAULT_DOMAIN)
 def show(name: str) -> None:
     """Show each range of the domain NAME, or of a TOML file, with its meaning and source."""
-    click.echo(text_of(domain_named(name, Path.cwd())), nl=False)
+    click.echo(text_of(domain_with_policy(name, Path.cwd())), nl=False)
 
 
 def text_of(domain: Domain) -> str:
     """Return a domain for people: every range with unit, meaning and source."""
     npcs = "none" if domain.npc_behaviour == ABSENT else domain.npc_behaviour
-    lines = [f"domain {domain.name}: NPCs {npcs}"]
-    if domain.paper:
-        top = "0.15" if domain.paper == "confined" else "1"
-        lines += [
-            f"The world of the paper: eight weather genes in [0, {top}], the sun on its way over",
-            "the day, a marker within 7.5 m of the told coordinate, all objects there.",
-        ]
-        return "\n".join(lines) + "\n"
-    for group in domain.groups:
+    lines = [f"domain {domain.name}: NPCs {npcs}{' or as the method says' * bool(domain.paper)}"]
+    lines += ["The marker lies anywhere within 7.5 m of the middle of its place on the map."]
+    ranges = ranges_of(domain)
+    for group in dict.fromkeys(key.partition(".")[0] for key, _, _ in ranges):
         meaning = GROUPS[group].meaning if group in GROUPS else ""
         lines += ["", f"{group}: {_HEADS.get(group) or meaning}"]
-        for key, low, high in domain.ranges:
+        for key, low, high in ranges:
             if key.partition(".")[0] == group:
                 condition, title = CONDITIONS[key], key.partition(".")[2]
-                unit = unit_of(title)
-                lines.append(f"  {title}: {_range(low, high)} {unit}".rstrip())
+                lines.append(f"  {title}: {range_in_words(title, low, high)}")
                 lines.append(f"    {condition.meaning}; nominal {condition.nominal:g}")
                 lines.append(f"    source: {condition.source}")
     return "\n".join(lines) + "\n"
 
 
-def _range(low: float, high: float) -> str:
+def ranges_of(domain: Domain) -> tuple[tuple[str, float, float], ...]:
+    """Return (condition, lowest, highest) of all that varies; the paper's genes in units."""
+    if not domain.paper:
+        return domain.ranges
+    top = CONFINED_WEATHER if domain.paper == "confined" else 1.0
+    ends = [(f"weather.{each.name}", each.physical(top), each) for each in WEATHER_UNITS.values()]
+    weather = [
+        (key, end, math.inf) if each.is_visibility else (key, 0.0, end) for key, end, each in ends
+    ]
+    return (*weather, (ELEVATION, TWILIGHT_DEG, NOON_DEG))
+
+
+def range_in_words(name: str, low: float, high: float) -> str:
+    """Return a range with the unit that the condition's name ends with."""
     if low == high:
-        return f"always {low:g}"
-    return f"{low:g} and more" if math.isinf(high) else f"{low:g} to {high:g}"
+        text = f"always {low:g}"
+    else:
+        text = f"{low:g} and more" if math.isinf(high) else f"{low:g} to {high:g}"
+    return f"{text} {unit_of(name)}".rstrip()

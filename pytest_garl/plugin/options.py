@@ -16,7 +16,7 @@ from pytest_garl.adversary.domain_policy import domain_with_policy, policy_in
 from pytest_garl.errors import GarlError
 from pytest_garl.execution.flight_id import Slot
 from pytest_garl.plugin.arguments import OPTIONS, Option
-from pytest_garl.scenarios.domains.names import DEFAULT_DOMAIN
+from pytest_garl.scenarios.domains.names import DEFAULT_DOMAIN, OLD_WEATHER
 from pytest_garl.search.catalogue import default_policy, find_method, method_names
 
 if TYPE_CHECKING:
@@ -263,14 +263,11 @@ def _domain(config: pytest.Config) -> Domain:
                 "bad the weather may become; give only --garl-domain"
             )
         if weather:
-            domain = _OLD_WEATHER[_among("weather", weather, tuple(_OLD_WEATHER))]
+            domain = OLD_WEATHER[_among("weather", weather, tuple(OLD_WEATHER))]
             _warn_of_weather(config, weather, domain)
         if domain:
             return _read_domain(domain, folder)
     return _read_domain(DEFAULT_DOMAIN, Path())
-
-
-_OLD_WEATHER = {"confined": "paper", "full": "paper-full"}
 
 
 def _warn_of_weather(config: pytest.Config, weather: str, domain: str) -> None:

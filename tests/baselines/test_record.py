@@ -8,21 +8,26 @@ import pytest
 from pytest_garl.adversary.catalogue import policy_spec
 from pytest_garl.baselines.record import BaselineSpec, baseline_from_ledger
 from pytest_garl.errors import BaselineError
+from pytest_garl.scenarios.domains.reader import domain_named
+from pytest_garl.scenarios.scenario import Scenario
 from tests.baselines.samples import LAWN, baseline_set, job, write_ledger
 
 
 def test_equal_specs_draw_equal_scenarios_and_a_longer_one_begins_alike() -> None:
     assert BaselineSpec(count=5).scenarios(LAWN) == BaselineSpec(count=9).scenarios(LAWN)[:5]
     assert BaselineSpec(count=5).scenarios(LAWN) != BaselineSpec(count=5, seed=1).scenarios(LAWN)
-    worst = max(each["environment.fog"] for each in BaselineSpec(count=50).scenarios(LAWN))
-    assert (
-        worst
-        <= 0.15
-        < max(
-            each["environment.fog"]
-            for each in BaselineSpec(count=50, weather="full").scenarios(LAWN)
-        )
-    )
+
+
+def test_the_scenarios_of_a_baseline_come_from_its_domain() -> None:
+    def drawn(name: str) -> list[Scenario]:
+        return [*BaselineSpec(count=50, domain=domain_named(name)).scenarios(LAWN)]
+
+    confined, full = drawn("paper"), drawn("paper-full")
+    assert max(each["environment.fog"] for each in confined) <= 0.15
+    assert max(each["environment.fog"] for each in full) > 0.15
+    assert {each["wind.mean_mps"] for each in confined} == {0}
+    winds = [each["wind.mean_mps"] for each in drawn("calm")]
+    assert 2 < max(winds) <= 3
 
 
 @pytest.mark.parametrize("method", ["garl", "random", ""])
