@@ -83,8 +83,7 @@ def ranges_of(domain: Domain) -> tuple[tuple[str, float, float], ...]:
 
 def range_in_words(name: str, low: float, high: float) -> str:
     """Return a range with the unit that the condition's name ends with."""
-    if low == high:
-        text = f"always {low:g}"
-    else:
-        text = f"{low:g} and more" if math.isinf(high) else f"{low:g} to {high:g}"
-    return f"{text} {unit_of(name)}".rstrip()
+    unit = f" {unit_of(name)}".rstrip()
+    if math.isinf(high):
+        return f"{low:g}{unit} and more"
+    return f"always {low:g}{unit}" if low == high else f"{low:g} to {high:g}{unit}"

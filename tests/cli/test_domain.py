@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import textwrap
 from pathlib import Path
 
 import pytest
@@ -45,7 +46,7 @@ def test_show_gives_each_range_with_its_meaning_and_source(name: str) -> None:
 def test_show_gives_the_paper_in_units() -> None:
     text = text_of(domain_named("paper"))
     assert "  rain_mmph: 0 to 15 mm/h\n" in text
-    assert "  fog_visibility_m: 66.667 and more m\n" in text
+    assert "  fog_visibility_m: 66.667 m and more\n" in text
     assert "  sun_elevation_deg: -6 to 60 degrees\n" in text
 
 
@@ -81,6 +82,16 @@ def test_show_refuses_a_file_with_one_message(
     assert words in result.output
     assert "mine.toml" in result.output
     assert "Traceback" not in result.output
+
+
+def test_the_example_of_the_page_is_a_domain(tmp_path: Path) -> None:
+    example = PAGE.read_text().partition("    # my_domain.toml\n")[2].partition("\nThe names")[0]
+    file = tmp_path / "my_domain.toml"
+    file.write_text(textwrap.dedent(example))
+    domain = domain_named(str(file))
+    assert domain.range_of("wind.mean_mps") == (0, 4)
+    assert domain.range_of("timing.latency_ms") == (80, 120)
+    assert "outage" not in domain.groups
 
 
 def test_page_has_the_table_of_the_built_in_domains() -> None:

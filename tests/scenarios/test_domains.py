@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import tomllib
 from collections import Counter
 from pathlib import Path
 
@@ -10,13 +11,14 @@ import pytest
 
 from pytest_garl.errors import ScenarioError
 from pytest_garl.scenarios.chromosome import decode, encode
+from pytest_garl.scenarios.domains import reader
 from pytest_garl.scenarios.domains.domain import CONDITIONS, Domain
 from pytest_garl.scenarios.domains.genome import genome_of
 from pytest_garl.scenarios.domains.names import BUILT_IN
 from pytest_garl.scenarios.domains.reader import domain_named
 from pytest_garl.scenarios.files import dumps, loads
 from pytest_garl.scenarios.genes import Genome, genome_for, with_destinations
-from pytest_garl.scenarios.groups.catalogue import PARAMETERS
+from pytest_garl.scenarios.groups.catalogue import GROUPS, PARAMETERS
 from pytest_garl.scenarios.maps.map import load_map
 from pytest_garl.scenarios.placement import marker_position_m, told_position_m
 from pytest_garl.scenarios.scenario import Scenario
@@ -193,3 +195,11 @@ def test_drawn_scenarios_lie_inside_their_domain() -> None:
 def test_every_condition_has_a_meaning_and_a_source() -> None:
     assert all(each.meaning and each.source for each in CONDITIONS.values())
     assert {*PARAMETERS} - {"light.turn_deg"} <= {*CONDITIONS}
+
+
+@pytest.mark.parametrize("name", ["field", "calm"])
+def test_every_group_is_stated_in_the_built_in_domains(name: str) -> None:
+    """A new group gets ranges there, or ``group = false``, so that nobody forgets it."""
+    file = Path(reader.__file__).with_name(f"{name}.toml")
+    stated = tomllib.loads(file.read_text())
+    assert {*GROUPS} <= {*stated}, f"give ranges, or false, in {file.name}"
