@@ -9,6 +9,7 @@ import pytest
 from pytest_garl.execution.job import parse_job
 from pytest_garl.execution.ledger import Ledger
 from pytest_garl.scenarios.domains.names import DEFAULT_DOMAIN
+from tests.support.case_project import run as run_cases
 from tests.support.landing_project import project, run
 
 ONE = ("--garl-budget=1", "--garl-workers=0")
@@ -151,6 +152,22 @@ def test_absent_npcs_take_part_in_no_flight(pytester: pytest.Pytester) -> None:
     ledger.close()
     assert len(scenarios) == 4
     assert all("velocity" not in scenario for scenario in scenarios)
+
+
+@pytest.mark.parametrize("args", [(), ("-n2",)], ids=["alone", "xdist"])
+def test_case_outside_the_domain_is_flown_and_named(
+    searched: pytest.Pytester, args: tuple[str, ...]
+) -> None:
+    (searched.path / "mine.toml").write_text('extends = "calm"\nnpc_behaviour = "absent"\n')
+    inside = run_cases(searched, "--garl-workers=0")
+    inside.stdout.no_fnmatch_line("*outside the domain*")
+    outside = run_cases(searched, "--garl-workers=1", "-o", "garl_domain=mine.toml", *args)
+    assert outside.parseoutcomes() == inside.parseoutcomes()
+    dogs = [
+        line for line in outside.outlines if "outside the domain mine" in line and "dog" in line
+    ]
+    assert len(dogs) == 1
+    assert dogs[0].startswith("flown, although lawn-IV-dog-")
 
 
 @pytest.mark.parametrize("where", ["ini file", "marker", "file"])
