@@ -108,7 +108,7 @@ def test_the_search_shows_every_marker_of_the_disc(place: tuple[float, float]) -
 
 
 def test_the_search_shows_a_marker_far_from_a_wrong_coordinate() -> None:
-    genes = {"marker__y": 1.0, "told__y_m": -2.5}
+    genes = {"marker__y": 1.0, "told__error_m": 2.5, "told__towards_deg": 270.0}
     flight = given_up(EMPTY, {}, **genes)
     search = [view for view in flight.nominal_views if view.place == "search"]
     assert max(view.marker.share_in_frame for view in search) == 1.0

@@ -39,7 +39,7 @@ class Waits(Scripted):
 
 
 def test_a_hover_begins_at_its_offset_from_the_told_coordinate() -> None:
-    scenario = hovering(8.0, told__x_m=3.0)
+    scenario = hovering(8.0, told__error_m=3.0)
     flight = fly(scenario, Waits, STAND, map=EMPTY, time_limit_s=3.0)
     assert start_m(scenario, EMPTY) == pytest.approx((5.0, -1.0, 8.0))
     away = np.linalg.norm(flight.uav.position_m - np.array([5.0, -1.0, 8.0]), axis=1)
