@@ -192,7 +192,11 @@ def test_repeat_shows_the_failure_of_an_expected_case(searched: pytest.Pytester)
     [
         ('status = "open"', "status = open", "not valid TOML"),
         ("schema = 2", "schema = 9", "key 'schema': found 9, expected 1 or 2"),
-        ("fog = 0.0", "fog = 1.5", "'genes.environment.fog': found 1.5"),
+        (
+            "[scenario.marker]",
+            "[scenario.weather]\nfog_visibility_m = 1.5\n\n[scenario.marker]",
+            "'scenario.weather.fog_visibility_m': found 1.5",
+        ),
         ('map = "lawn"', 'map = "moon"', "key 'map': unknown map 'moon'"),
         ('"systems:Good"', '"systems:Other"', "key 'system': found 'systems:Other', expected"),
         ("dog-1 = []", "dog-1 = [[1, 2.0, 0.0]]", "'moves.dog-1': found [[]1, 2.0, 0.0]"),
