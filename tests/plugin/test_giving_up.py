@@ -158,8 +158,8 @@ def test_needless_giving_up_is_red_in_the_real_simulator(
     write_four_tests(pytester, system)
     (pytester.path / "conftest.py").unlink()
     # The weather of seed 0 is an excuse.
-    search = ("--garl-budget=1", "--garl-seed=2", "--garl-workers=0", "--garl-npcs=stationary")
-    search = (*search, "-rf")
+    flights = ("--garl-budget=1", "--garl-seed=2", "--garl-workers=0", "--garl-npcs=stationary")
+    search = (*flights, "-rf")
     for index, selection in enumerate(SELECTIONS.values()):
         # Flown once; the other selections judge the same flight.
         resume = ("--garl-resume",) if index else ()
