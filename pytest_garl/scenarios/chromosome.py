@@ -15,7 +15,7 @@ from pytest_garl.errors import ScenarioError
 from pytest_garl.scenarios.genes import CLEAR, Genome, NuclearGene
 from pytest_garl.scenarios.groups.catalogue import PARAMETERS
 from pytest_garl.scenarios.scenario import Scenario
-from pytest_garl.scenarios.sparse import OFF, ON
+from pytest_garl.scenarios.sparse import OFF, ON, active_genes
 
 
 def encode(scenario: Scenario, genome: Genome) -> NDArray[np.float64]:
@@ -62,9 +62,9 @@ def decode(vector: NDArray[np.float64], genome: Genome, *, map: str, seed: int) 
         zip(genome.keys, _checked(np.asarray(vector, dtype=np.float64), genome), strict=True)
     )
     values, removed = dict(CLEAR), [*genome.removed]
+    active = active_genes(genome, row, seed)
     for gene in genome.genes:
-        acts = not gene.is_optional or row[gene.properties[0].key] > 0.5
-        if acts:
+        if not gene.is_optional or gene.name in active:
             values |= {item.key: float(row[item.key]) for item in gene.values}
         elif _is_object(gene):
             removed.append(gene.name)

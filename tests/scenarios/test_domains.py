@@ -203,3 +203,21 @@ def test_every_group_is_stated_in_the_built_in_domains(name: str) -> None:
     file = Path(reader.__file__).with_name(f"{name}.toml")
     stated = tomllib.loads(file.read_text())
     assert {*GROUPS} <= {*stated}, f"give ranges, or false, in {file.name}"
+
+
+def test_bred_scenarios_stay_sparse_and_no_gene_is_preferred() -> None:
+    genome = genome_of(FIELD, COURT)
+    optional = [gene for gene in genome.genes if gene.is_optional]
+    counts: Counter[str] = Counter()
+    for seed in range(300):
+        # All bits on, as a cross of many parents has them.
+        scenario = decode(
+            np.where(genome.lower == 0, 0.75, genome.nominal), genome, map="court", seed=seed
+        )
+        row = encode(scenario, genome)
+        bits = dict(zip(genome.keys, row, strict=True))
+        acting = [gene.name for gene in optional if bits[gene.properties[0].key] > 0.5]
+        assert len(acting) <= 3
+        counts.update(acting)
+    assert len(counts) == len(optional)
+    assert max(counts.values()) < 3 * 300 * 3 / len(optional)
