@@ -12,7 +12,6 @@ from pytest_garl import Camera, Detection, Mission, Observation
 
 CAMERA_FROM_BODY = np.array([[0.0, -1.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 0.0, -1.0]])
 """Image right is the body's -y, image down its -x, the optical axis its -z."""
-CELLS = 7
 LOOKS: tuple[tuple[float, float, float], ...] = (
     (0.0, 0.0, 0.0),
     (0.0, 0.0, 3.0),
@@ -39,7 +38,8 @@ class OpenCvDetector:
         )
         parameters = cv2.aruco.DetectorParameters()
         # 24 px of side at 10 m in 320x240 is a perimeter rate of 0.3; half of that is noise.
-        parameters.minMarkerPerimeterRate = 0.12
+        # A smaller marker is smaller in the frame.
+        parameters.minMarkerPerimeterRate = 0.12 * min(1.0, mission.marker_side_m / 1.5)
         parameters.adaptiveThreshWinSizeMin = 5
         parameters.adaptiveThreshWinSizeMax = 25
         parameters.adaptiveThreshWinSizeStep = 20
@@ -55,6 +55,8 @@ class OpenCvDetector:
         self._camera: Camera = mission.camera
         self._wanted = mission.marker_id
         self._side_m = mission.marker_side_m
+        # The bits and a black border of one cell on each side.
+        self._cells = dictionary.markerSize + 2
         self._look = 0
         self._other = 0
         half = mission.marker_side_m / 2
@@ -70,7 +72,7 @@ class OpenCvDetector:
         """
         grey = np.asarray(cv2.cvtColor(observation.image, cv2.COLOR_RGB2GRAY))
         height = max(0.5, float(observation.position_m[2]))
-        cell_px = self._camera.focal_px * self._side_m / height / CELLS
+        cell_px = self._camera.focal_px * self._side_m / height / self._cells
         scale = min(1.0, LARGEST_CELL_PX / cell_px)
         if scale < 1:
             grey = np.asarray(cv2.resize(grey, None, None, scale, scale, cv2.INTER_AREA))
