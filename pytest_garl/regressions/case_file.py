@@ -272,9 +272,9 @@ def _evidence_lines(evidence: Evidence) -> list[list[str]]:
     return [
         [
             "[evidence]",
-            f'trajectory_sha256 = "{evidence.trajectory_sha256}"',
+            f"trajectory_sha256 = {quoted(evidence.trajectory_sha256)}",
             f"cpu = {quoted(evidence.cpu)}  # class of CPUs on which the hash holds",
-            f'map_sha256 = "{evidence.map_sha256}"',
+            f"map_sha256 = {quoted(evidence.map_sha256)}",
             f"neighbours = {evidence.neighbours}  # slightly different scenarios flown",
             f"neighbours_failed = {evidence.neighbours_failed}",
             f"removed = {quoted(evidence.removed)}",

@@ -23,6 +23,7 @@ from pytest_garl.scenarios.maps.map import load_map
 from pytest_garl.scenarios.placement import marker_position_m, told_position_m
 from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.scenarios.units import sections_of
+from pytest_garl.scenarios.sparse import active_genes
 from pytest_garl.scenarios.validity import repair
 from pytest_garl.search.methods.random import random_scenarios
 
@@ -208,15 +209,15 @@ def test_every_group_is_stated_in_the_built_in_domains(name: str) -> None:
 def test_bred_scenarios_stay_sparse_and_no_gene_is_preferred() -> None:
     genome = genome_of(FIELD, COURT)
     optional = [gene for gene in genome.genes if gene.is_optional]
-    is_bit = np.array([key.startswith("active.") for key in genome.keys])
-    counts: Counter[str] = Counter()
-    for seed in range(300):
-        # All bits on, as a cross of many parents has them.
-        scenario = decode(np.where(is_bit, 0.75, genome.nominal), genome, map="court", seed=seed)
-        row = encode(scenario, genome)
-        bits = dict(zip(genome.keys, row, strict=True))
-        acting = [gene.name for gene in optional if bits[gene.properties[0].key] > 0.5]
-        assert len(acting) <= 3
-        counts.update(acting)
-    assert len(counts) == len(optional)
-    assert max(counts.values()) < 3 * 300 * 3 / len(optional)
+    # All bits on, as a cross of many parents has them.
+    row = {key: 0.75 for key in genome.keys}
+    seeds = range(600)
+    acting = [active_genes(genome, row, seed) for seed in seeds]
+    counts = Counter(name for names in acting for name in names)
+    assert {len(names) for names in acting} == {3}
+    share = 3 * len(seeds) / len(optional)
+    assert all(0.6 * share < counts[gene.name] < 1.4 * share for gene in optional)
+    bits = [key.startswith("active.") for key in genome.keys]
+    bred = decode(np.where(bits, 0.75, genome.nominal), genome, map="court", seed=1)
+    encoded = dict(zip(genome.keys, encode(bred, genome), strict=True))
+    assert sum(encoded[gene.properties[0].key] > 0.5 for gene in optional) <= 3
