@@ -22,8 +22,8 @@ from pytest_garl.scenarios.groups.catalogue import GROUPS, PARAMETERS
 from pytest_garl.scenarios.maps.map import load_map
 from pytest_garl.scenarios.placement import marker_position_m, told_position_m
 from pytest_garl.scenarios.scenario import Scenario
-from pytest_garl.scenarios.units import sections_of
 from pytest_garl.scenarios.sparse import active_genes
+from pytest_garl.scenarios.units import sections_of
 from pytest_garl.scenarios.validity import repair
 from pytest_garl.search.methods.random import random_scenarios
 
@@ -210,7 +210,7 @@ def test_bred_scenarios_stay_sparse_and_no_gene_is_preferred() -> None:
     genome = genome_of(FIELD, COURT)
     optional = [gene for gene in genome.genes if gene.is_optional]
     # All bits on, as a cross of many parents has them.
-    row = {key: 0.75 for key in genome.keys}
+    row = dict.fromkeys(genome.keys, 0.75)
     seeds = range(600)
     acting = [active_genes(genome, row, seed) for seed in seeds]
     counts = Counter(name for names in acting for name in names)
