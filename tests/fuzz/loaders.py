@@ -158,6 +158,7 @@ def _prepare_record(folder: Path, rng: random.Random) -> Path:
         job, flight = job_of(Good, folder), FlightId(search="flight", map="lawn")
         fly_job(job, scenario(0.05), flight, None)
         vars(_prepare_record)["sample"] = job.record(flight).read_bytes()
+        job.record(flight).unlink()
     content: bytes = vars(_prepare_record)["sample"]
     if rng.random() < 0.5:
         path.write_bytes(binary_mutations.archive_changed(content, rng))

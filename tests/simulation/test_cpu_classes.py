@@ -91,7 +91,7 @@ def case_of_each(wanted: Callable[[Case], bool], best: Callable[..., Any]) -> li
 
 def length(case: Case) -> int:
     """Count the decisions of its objects, one for every half second."""
-    return max(len(moves) for _, moves in case.moves)
+    return max((len(moves) for _, moves in case.moves), default=0)
 
 
 SHORT = case_of_each(lambda case: length(case) >= 25, min)
