@@ -12,12 +12,11 @@ import importlib
 __version__ = "0.2.0.dev0"
 
 _HOMES = {
+    "pytest_garl.airframe": ("Airframe", "Camera", "Rangefinder"),
     "pytest_garl.fiducial": ("MarkerSpec", "NestedMarker"),
     "pytest_garl.landing_system": (
         "Abort",
-        "Airframe",
         "AttitudeSetpoint",
-        "Camera",
         "Command",
         "Detection",
         "Diagnostics",
@@ -27,7 +26,6 @@ _HOMES = {
         "MotorThrusts",
         "Observation",
         "PositionSetpoint",
-        "Rangefinder",
         "VehicleState",
         "VelocitySetpoint",
     ),

@@ -22,6 +22,7 @@ SYSTEM_NAME = re.compile(r"\w[\w-]*(\.\w[\w-]*)*:[^\W\d]\w*(\.[^\W\d]\w*)*")
 
 HASHED = (
     "adversary",
+    "airframe.py",
     "commands.py",
     "cpu_dispatch.py",
     "execution",

@@ -21,7 +21,11 @@ from pytest_garl.simulation.system_under_test.texts import (
 )
 
 _SIMULATION = Path(__file__).parents[1]
-_SIMULATION_FILES = {_SIMULATION.parent / "landing_system.py", *_SIMULATION.rglob("*.py")}
+_SIMULATION_FILES = {
+    _SIMULATION.parent / "airframe.py",
+    _SIMULATION.parent / "landing_system.py",
+    *_SIMULATION.rglob("*.py"),
+}
 """Files whose frames are left out of the traceback of a landing system."""
 
 
