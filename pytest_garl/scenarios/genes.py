@@ -84,13 +84,15 @@ class Genome:
     """All properties that may vary in a scenario on one map, in a fixed order.
 
     ``task``, the values ``fixed``, by key, and the objects of the map that are ``removed`` are
-    what its scenarios have in common.
+    what its scenarios have in common.  In scenarios of a dense genome all optional genes may act,
+    and act when drawn, instead of at most three.
     """
 
     composites: tuple[CompositeGene, ...]
     task: Task = field(default_factory=Task)
     fixed: tuple[tuple[str, float], ...] = ()
     removed: tuple[str, ...] = ()
+    is_dense: bool = False
 
     def __post_init__(self) -> None:
         twice = sorted({key for key in self.keys if self.keys.count(key) > 1})

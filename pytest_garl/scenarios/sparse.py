@@ -28,10 +28,12 @@ ON_ABOVE = 0.5
 
 
 def draw(genome: Genome, rng: np.random.Generator) -> NDArray[np.float64]:
-    """Draw a chromosome in which at most three of the optional genes are active."""
+    """Draw a chromosome in which at most three optional genes are active, or all if dense."""
     optional = [gene.name for gene in genome.genes if gene.is_optional]
-    count = min(int(rng.choice(len(COUNT_SHARES), p=COUNT_SHARES)), len(optional))
-    active = {optional[index] for index in rng.choice(len(optional), size=count, replace=False)}
+    active = {*optional}
+    if not genome.is_dense:
+        count = min(int(rng.choice(len(COUNT_SHARES), p=COUNT_SHARES)), len(optional))
+        active = {optional[index] for index in rng.choice(len(optional), size=count, replace=False)}
     row: list[float] = []
     for gene in genome.genes:
         is_active = not gene.is_optional or gene.name in active
@@ -45,13 +47,14 @@ def active_genes(genome: Genome, row: Mapping[str, float], seed: int) -> frozens
     """Return the names of the optional genes that act: of those that are on, the three highest.
 
     So a bit of activity is a priority, and any operator breeds sparse scenarios.  The scenario's
-    seed decides between equal ones, so that no gene is preferred for its place in the genome.
+    seed decides between equal ones, so that no gene is preferred for its place in the genome.  In a
+    dense genome all that are on act.
     """
     priorities = {
         gene.name: row[gene.properties[0].key] for gene in genome.genes if gene.is_optional
     }
     names = [name for name, priority in priorities.items() if priority > ON_ABOVE]
-    if len(names) > MOST_ACTIVE:
+    if len(names) > MOST_ACTIVE and not genome.is_dense:
         order = np.random.default_rng(seed).permutation(len(names))
         shuffled = [names[index] for index in order]
         names = sorted(shuffled, key=lambda name: -priorities[name])[:MOST_ACTIVE]

@@ -34,11 +34,14 @@ WEATHER_CAUSES = {
 """Weather genes that one cause switches on together: rain wets the ground, snow covers it."""
 
 
-def genome_of(domain: Domain, map: Map, task: Task | None = None) -> Genome:
+def genome_of(
+    domain: Domain, map: Map, task: Task | None = None, *, is_dense: bool = False
+) -> Genome:
     """Return the genome of the domain's scenarios on ``map``.
 
     Every group, every cause of weather and every NPC has a bit of activity, unless the domain
-    excludes its nominal values.  The world of the paper has none.
+    excludes its nominal values.  The world of the paper has none.  Few are
+    active in a drawn scenario, all in one of a dense genome.
     """
     if domain.paper:
         return genome_for(map, weather=domain.paper, task=task)
@@ -66,6 +69,7 @@ def genome_of(domain: Domain, map: Map, task: Task | None = None) -> Genome:
         composites=tuple(each for each in composites if each.genes),
         task=Task(marker=map.marker) if task is None else task,
         fixed=tuple(fixed.items()),
+        is_dense=is_dense,
         removed=tuple(name for name, _ in map.present_objects)
         if domain.npc_behaviour == ABSENT
         else (),

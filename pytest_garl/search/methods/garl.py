@@ -13,6 +13,9 @@ Places and speeds of NPCs are spread out as in the paper's mutation: away from a
 which means to the ends of their ranges.  The marker decides where the UAV flies, and is put far
 from its nearest earlier place.  Weather and light are not spread, because at the ends of their
 ranges a flight is aborted rather than failed.
+
+In a sparse genome only the values of what acts are spread, away from the earlier scenarios in which
+it acted.  Which groups act is drawn or inherited: bits that are spread would all be on.
 """
 
 from __future__ import annotations
@@ -26,7 +29,9 @@ from numpy.typing import NDArray
 
 from pytest_garl.execution.result import FlightResult
 from pytest_garl.scenarios.chromosome import decode, encode
+from pytest_garl.scenarios.genes import ACTIVE, Genome
 from pytest_garl.scenarios.scenario import Scenario
+from pytest_garl.scenarios.sparse import ON_ABOVE
 from pytest_garl.scenarios.validity import repair
 from pytest_garl.search.method import FlownScenario, MethodDeclaration, SearchPlan
 from pytest_garl.search.objectives import BODIES, near_miss, violation_proximity
@@ -127,8 +132,10 @@ class Garl:
         self._chromosomes: list[Matrix] = []
         self._seen: Counter[str] = Counter()
         keys = plan.genome.keys
-        self._weather = np.array([key.startswith("environment.") for key in keys])
+        self._weather = _weather(plan.genome)
         self._marker = np.array([key.startswith("marker.") for key in keys])
+        self._is_bit = np.array([key.startswith(ACTIVE) for key in keys])
+        self._bit_of = _bits(plan.genome)
 
     def ask(self) -> Sequence[Scenario]:
         """Return the next generation."""
@@ -204,9 +211,14 @@ class Garl:
         rng, genome, spread = self._rng, self._plan.genome, row.copy()
         earlier = np.array(self._chromosomes) if self._chromosomes else row[None]
         marker, share = self._marker, self._parameters.spread_share
+        which = which & ~self._is_bit
         for column in np.flatnonzero(which & ~marker & (rng.random(row.size) < share)):
+            bit = self._bit_of[column]
+            values = earlier[:, column] if bit < 0 else earlier[earlier[:, bit] > ON_ABOVE, column]
+            if not values.size:
+                continue  # The first scenario in which it acts.
             drawn = rng.uniform(genome.lower[column], genome.upper[column], CANDIDATES)
-            spread[column] = drawn[farthest_from_all(drawn, earlier[:, column])]
+            spread[column] = drawn[farthest_from_all(drawn, values)]
         if (which & marker).any() and rng.random() < share:
             shape = CANDIDATES, int(marker.sum())
             places = rng.uniform(genome.lower[marker], genome.upper[marker], shape)
@@ -236,6 +248,8 @@ class Garl:
             )[0]
             if rng.random() < self._parameters.other_weather_share:
                 row = np.where(self._weather, encode(self._in_other_weather(), genome), row)
+            bits = self._bit_of[aim]
+            row[bits[bits >= 0]] = 1.0  # Of all that would act, this one does.
             return self._scenario(np.where(aim, moved, row), seed)
         second = self._elite(str(rng.choice(self._fertile()))).scenario
         pair = np.array([[*row, seed], [*encode(second, genome), second.seed]])
@@ -260,6 +274,26 @@ class Garl:
     def _scenario(self, row: Matrix, seed: int) -> Scenario:
         plan = self._plan
         return repair(decode(row, plan.genome, map=plan.map.name, seed=seed), plan.map)
+
+
+def _weather(genome: Genome) -> NDArray[np.bool_]:
+    """Return which columns belong to genes of weather and light, their bits among them."""
+    return np.array(
+        [
+            any(item.key.startswith("environment.") for item in gene.properties)
+            for gene in genome.genes
+            for _ in gene.properties
+        ]
+    )
+
+
+def _bits(genome: Genome) -> NDArray[np.int_]:
+    """Return for each column that of its gene's bit of activity, -1 for a gene without one."""
+    columns: list[int] = []
+    for gene in genome.genes:
+        bit = len(columns) if gene.is_optional else -1
+        columns += [bit] * len(gene.properties)
+    return np.array(columns)
 
 
 def _is_about_a_body(result: FlightResult) -> bool:
