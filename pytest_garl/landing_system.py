@@ -97,7 +97,8 @@ class Observation:
 
     ``position_m`` and ``velocity_mps`` are shape (3,) in the world frame, ``attitude``
     is the quaternion (4,); ``image`` is RGB uint8 (H, W, 3) and ``depth_m`` is planar
-    depth float32 (H, W) in metres.  The arrays are read-only.  ``rangefinder_m`` is the distance
+    depth float32 (H, W) in metres: 0 where nothing is measured, 100 where an unlimited depth
+    camera sees nothing.  The arrays are read-only.  ``rangefinder_m`` is the distance
     from the camera's place to what lies below along the body's axis; None without a rangefinder,
     and if nothing is in its range.
     """

@@ -58,6 +58,8 @@ class MovementWatch:
         world = place + (self._rays * depth) @ _rotation(observation.attitude).T
         cells = ((world[..., :2] - self._origin) / CELL_M).astype(int)
         inside = ((cells >= 0) & (cells < self._size)).all(axis=-1)
+        # A depth of 0 is no measurement: neither bare ground nor a thing.
+        inside &= depth[..., 0] > 0
         height = world[..., 2]
         # A cell counts as bare only if all around it was bare as well: edges are unsure.
         bare_at = cv2.erode(self._bare_at, np.ones((3, 3), np.uint8))

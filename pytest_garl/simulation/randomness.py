@@ -14,6 +14,7 @@ PURPOSES = (
     "navigation",
     "timing",
     "rangefinder",
+    "depth",
 )
 
 

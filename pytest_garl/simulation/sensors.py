@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from pytest_garl.landing_system import Camera, Observation
 from pytest_garl.scenarios.maps.map import Map
 from pytest_garl.scenarios.scenario import Scenario
+from pytest_garl.simulation.camera.depth_sensor import DepthSensor
 from pytest_garl.simulation.camera.frame import Frame, blank_frame
 from pytest_garl.simulation.camera.projection import eye_under
 from pytest_garl.simulation.camera.renderer import Renderer
@@ -62,6 +63,7 @@ class Sensors:
         self._outage, self._freezes = Event(scenario, "outage"), scenario["outage.frozen"] > 0
         self._rng = generator(scenario.seed, "pose")
         self._renderer: Renderer | None = None
+        self._depth: DepthSensor | None = None
         self._ticks_per_frame = max(1, round(PHYSICS_RATE_HZ / camera.rate_hz))
         self._last_look: tuple[Frame, Sight] | None = None
         self._pictures: deque[_Picture] = deque()
@@ -72,11 +74,13 @@ class Sensors:
         """Switch the camera on; without it frames are black and show nothing."""
         rng = generator(scenario.seed, "sensor")
         self._renderer = Renderer(scenario, map, self._camera, rng)
+        self._depth = DepthSensor(scenario, self._camera)
 
     def change(self, scenario: Scenario) -> None:
         """Show another environment from the next picture on."""
-        if self._renderer:
+        if self._renderer and self._depth:
             self._renderer.change(scenario)
+            self._depth.change(scenario)
 
     def takes_picture(self, tick: int) -> bool:
         """Whether the camera takes a picture at a step of the physics."""
@@ -86,13 +90,14 @@ class Sensors:
         """Return the camera's picture at this moment, and what it shows."""
         now = tick / PHYSICS_RATE_HZ
         black = blank_frame(self._camera.height_px, self._camera.width_px), Sight()
-        if self._renderer is None:
+        if self._renderer is None or self._depth is None:
             return black
         if self._outage.happens(now):
             return self._last_look or black
         eye = eye_under(motion.position_m, motion.attitude)
         poses = [(npc.position_m, npc.yaw_rad) for npc in self._npcs]
         frame = self._renderer.render(eye, motion.attitude, now, poses)
+        frame.measured_m = self._depth.measured(frame.depth_m, now)
         sight = self._recorder.sight(frame, self._renderer, eye, motion.attitude)
         if self._freezes:
             self._last_look = frame, sight

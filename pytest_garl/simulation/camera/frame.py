@@ -17,10 +17,11 @@ class Frame:
     A ray that meets nothing has depth 100 and segment -1.  ``pixels`` is the
     number of pixels of each segment; it does not count the ground, segment 0.  ``image`` is
     painted on first access, and does not depend on the time of that access.  ``marker`` says how
-    the frame shows the marker, None where it does not; it needs no picture.
+    the frame shows the marker, None where it does not; it needs no picture.  ``measured_m`` is the
+    depth as the depth camera measures it, 0 where it measures nothing.
     """
 
-    __slots__ = ("_image", "_marker", "_paint", "depth_m", "pixels", "segmentation")
+    __slots__ = ("_image", "_marker", "_paint", "depth_m", "measured_m", "pixels", "segmentation")
 
     def __init__(
         self,
@@ -33,7 +34,7 @@ class Frame:
     ) -> None:
         self._paint, self._marker = paint, marker
         self._image: NDArray[np.uint8] | None = None
-        self.depth_m = depth_m
+        self.depth_m = self.measured_m = depth_m
         self.segmentation = segmentation
         self.pixels = pixels
 
