@@ -7,13 +7,12 @@ from pathlib import Path
 import numpy as np
 
 from pytest_garl.landing_system import Camera
-from pytest_garl.scenarios.maps.map import load_map
 from pytest_garl.simulation.camera.depth_sensor import DepthSensor, reach_m
 from pytest_garl.simulation.camera.projection import eye_under
 from pytest_garl.simulation.camera.renderer import Renderer
 from pytest_garl.simulation.camera.weather import KOSCHMIEDER
 from pytest_garl.simulation.randomness import generator
-from tests.support.flights import nominal
+from tests.support.flights import EMPTY, nominal
 
 PLACE_M, LEVEL = (6.0, 5.0, 8.0), (0.0, 0.0, 0.0, 1.0)
 CASES = {
@@ -35,7 +34,7 @@ def draw(folder: Path) -> None:
     for axis, (title, values) in zip(axes, CASES.items(), strict=False):
         scenario = nominal(**values)
         renderer = Renderer(
-            scenario, load_map("lawn"), camera, generator(scenario.seed, "sensor"), colour=False
+            scenario, EMPTY, camera, generator(scenario.seed, "sensor"), colour=False
         )
         frame = renderer.render(eye_under(PLACE_M, LEVEL), LEVEL, 0.0, [])
         depth = DepthSensor(scenario, camera).measured(frame.depth_m, 0.0)

@@ -30,7 +30,7 @@ def test_the_signal_at_the_reach_is_that_of_clear_air(extinction_per_m: float) -
 
 def test_a_nominal_depth_camera_returns_the_true_depth_in_any_weather() -> None:
     assert measured() is PLANE
-    assert measured(fog=0.15) is PLANE
+    assert measured(environment__fog=0.15) is PLANE
 
 
 def test_a_limit_cuts_rays_by_their_length() -> None:
@@ -44,12 +44,14 @@ def test_a_limit_cuts_rays_by_their_length() -> None:
 
 
 def test_fog_shortens_the_reach_when_the_environment_changes() -> None:
-    clear, foggy = nominal(depth__range_m=10.0), nominal(depth__range_m=10.0, fog=0.15)
+    clear, foggy = nominal(depth__range_m=10.0), nominal(depth__range_m=10.0, environment__fog=0.15)
     sensor = DepthSensor(clear, CAMERA)
     before = sensor.measured(PLANE, 0.0)
     sensor.change(foggy)
     assert np.count_nonzero(sensor.measured(PLANE, 0.0)) == 0 < np.count_nonzero(before)
-    assert np.array_equal(sensor.measured(PLANE, 0.0), measured(fog=0.15, depth__range_m=10.0))
+    assert np.array_equal(
+        sensor.measured(PLANE, 0.0), measured(environment__fog=0.15, depth__range_m=10.0)
+    )
 
 
 @pytest.mark.parametrize("percent", [5.0, 30.0, 80.0])
