@@ -86,8 +86,8 @@ class DepthSensor:
             smooth = cv2.GaussianBlur(noise, (2 * edge + 1, 2 * edge + 1), sigma)
             kernel = cv2.getGaussianKernel(2 * edge + 1, sigma)
             # White noise leaves the filter with the sum of the squared weights as its variance.
-            smooth /= float((kernel**2).sum())
-            pattern = np.ascontiguousarray(smooth[edge:-edge, edge:-edge], dtype=np.float32)
+            scale = np.float32((kernel**2).sum())
+            pattern = np.asarray(smooth[edge:-edge, edge:-edge] / scale, dtype=np.float32)
             self._patterns[epoch] = pattern
         return pattern
 
