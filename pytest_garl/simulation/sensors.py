@@ -13,6 +13,7 @@ from pytest_garl.simulation.camera.depth_sensor import DepthSensor
 from pytest_garl.simulation.camera.frame import Frame, blank_frame
 from pytest_garl.simulation.camera.projection import eye_under
 from pytest_garl.simulation.camera.renderer import Renderer
+from pytest_garl.simulation.camera.true_camera import Mounting, true_camera
 from pytest_garl.simulation.events import Event
 from pytest_garl.simulation.physics.npc import Npc
 from pytest_garl.simulation.physics.vehicle import Motion, Vector
@@ -59,7 +60,7 @@ class Sensors:
     ) -> None:
         self._camera, self._recorder, self._npcs = camera, recorder, npcs
         self._ranging = ranging
-        self._timing = Timing(scenario)
+        self._timing, self._mounting = Timing(scenario), Mounting(scenario)
         self._outage, self._freezes = Event(scenario, "outage"), scenario["outage.frozen"] > 0
         self._rng = generator(scenario.seed, "pose")
         self._renderer: Renderer | None = None
@@ -73,8 +74,9 @@ class Sensors:
     def switch_on(self, scenario: Scenario, map: Map) -> None:
         """Switch the camera on; without it frames are black and show nothing."""
         rng = generator(scenario.seed, "sensor")
-        self._renderer = Renderer(scenario, map, self._camera, rng)
-        self._depth = DepthSensor(scenario, self._camera)
+        camera = true_camera(self._camera, scenario)
+        self._renderer = Renderer(scenario, map, camera, rng)
+        self._depth = DepthSensor(scenario, camera)
 
     def change(self, scenario: Scenario) -> None:
         """Show another environment from the next picture on."""
@@ -96,9 +98,10 @@ class Sensors:
             return self._last_look or black
         eye = eye_under(motion.position_m, motion.attitude)
         poses = [(npc.position_m, npc.yaw_rad) for npc in self._npcs]
-        frame = self._renderer.render(eye, motion.attitude, now, poses)
+        attitude = self._mounting.attitude(motion.attitude)
+        frame = self._renderer.render(eye, attitude, now, poses)
         frame.measured_m = self._depth.measured(frame.depth_m, now)
-        sight = self._recorder.sight(frame, self._renderer, eye, motion.attitude)
+        sight = self._recorder.sight(frame, self._renderer, eye, attitude)
         if self._freezes:
             self._last_look = frame, sight
         return frame, sight

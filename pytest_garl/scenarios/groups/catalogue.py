@@ -2,7 +2,16 @@
 
 from __future__ import annotations
 
-from pytest_garl.scenarios.groups import depth, events, light, navigation, timing, told, wind
+from pytest_garl.scenarios.groups import (
+    camera,
+    depth,
+    events,
+    light,
+    navigation,
+    timing,
+    told,
+    wind,
+)
 from pytest_garl.scenarios.groups.parameter import Group, Parameter
 
 GROUPS: dict[str, Group] = {
@@ -13,6 +22,7 @@ GROUPS: dict[str, Group] = {
         *navigation.GROUPS,
         told.GROUP,
         timing.GROUP,
+        camera.GROUP,
         depth.GROUP,
         *events.GROUPS,
     )
