@@ -3,7 +3,8 @@
 ``python -m studies.sparsity`` flies OpenCV-MLS on the lawn with random search and ``garl``, once
 with each way of drawing.  It keeps every flight in ``.garl/sparsity.jsonl``, so that an
 interrupted search goes on after its last generation, and every finished search in
-``docs/sparsity.csv``; ``--report`` prints the table.
+``docs/sparsity.csv``; ``--report`` prints the table.  Delete the flights when the simulator or the
+system has changed.
 """
 
 from __future__ import annotations
