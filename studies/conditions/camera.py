@@ -40,5 +40,5 @@ def draw(folder: Path) -> None:
         axis.imshow(frame.image)
         axis.set_title(title, fontsize="small")
         axis.set(xticks=[], yticks=[])
-    figure.savefig(folder / "camera.png", dpi=70)
+    figure.savefig(folder / "camera.png", dpi=60)
     pyplot.close(figure)
