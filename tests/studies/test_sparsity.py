@@ -24,7 +24,8 @@ class Here:
 
 
 def windy(scenario: Scenario) -> FlightResult:
-    fails = scenario["wind.mean_mps"] > 3.0
+    """Fail where the marker is east of its coordinate or, so that both occur, in strong wind."""
+    fails = scenario["wind.mean_mps"] > 3.0 or scenario["marker.x"] > 0.3
     return flight_result("off", primary="distance") if fails else flight_result()
 
 
