@@ -39,11 +39,16 @@ class PlacedMarker:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Pad:
-    """The board with the marker as it lies on the ground; at zero yaw its top is north."""
+    """The board with the marker as it lies on the ground; at zero yaw its top is north.
+
+    ``worn_share`` of each marker is worn off in patches, which follow from ``seed``.
+    """
 
     spec: MarkerSpec
     place_m: tuple[float, float]
     yaw_rad: float = 0.0
+    worn_share: float = 0.0
+    seed: int = 0
 
     @property
     def markers(self) -> tuple[PlacedMarker, ...]:
@@ -114,7 +119,13 @@ def marker_position_m(scenario: Scenario, map: Map) -> tuple[float, float]:
 
 def pad_of(scenario: Scenario, map: Map) -> Pad:
     """Return the board with the scenario's marker."""
-    return Pad(spec=scenario.task.marker, place_m=marker_position_m(scenario, map))
+    return Pad(
+        spec=scenario.task.marker,
+        place_m=marker_position_m(scenario, map),
+        yaw_rad=math.radians(scenario["pad.yaw_deg"]),
+        worn_share=scenario["pad.worn_percent"] / 100,
+        seed=scenario.seed,
+    )
 
 
 def told_position_m(scenario: Scenario, map: Map) -> tuple[float, float]:

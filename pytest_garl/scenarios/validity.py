@@ -9,6 +9,7 @@ from dataclasses import dataclass
 
 from pytest_garl.fiducial import MarkerSpec
 from pytest_garl.scenarios.bodies import Body, Part, rotate
+from pytest_garl.scenarios.groups.pad import CLEARANCE
 from pytest_garl.scenarios.maps.map import Map
 from pytest_garl.scenarios.object_types import OBJECT_TYPES
 from pytest_garl.scenarios.placement import (
@@ -25,7 +26,8 @@ from pytest_garl.scenarios.units import PLACE_DIGITS, snapped
 UAV_REACH_M = 0.75
 MARGIN_M = 0.25
 """No static part stands or hangs nearer to the marker's corners than the margin, nor to its centre
-than reach and margin of a UAV of 1 m, so that such a UAV can reach it."""
+than reach and margin of a UAV of 1 m, so that such a UAV can reach it; `pad.clearance_m` asks for
+less."""
 UAV_CLEARANCE_M = 2.0
 OBJECT_CLEARANCE_M = 0.3
 _RING_STEP_M = 0.1
@@ -78,8 +80,7 @@ def problems(scenario: Scenario, map: Map) -> tuple[str, ...]:
     map = map.without(scenario.removed_objects)
     discs = tuple(disc for body in map.bodies for disc in discs_of(body))
     marker = marker_position_m(scenario, map)
-    spec = scenario.task.marker
-    found = list(_marker_problems(marker, spec, map, discs))
+    found = list(_marker_problems(marker, scenario, map, discs))
     for index, (name, _) in enumerate(map.present_objects):
         found += _start_problems(
             scenario, map, discs, marker, index, object_start_m(scenario, map, name)
@@ -98,9 +99,9 @@ def repair(scenario: Scenario, map: Map) -> Scenario:
     map = map.without(scenario.removed_objects)
     discs = tuple(disc for body in map.bodies for disc in discs_of(body))
     marker = marker_position_m(scenario, map)
-    spec = scenario.task.marker
-    if any(_marker_problems(marker, spec, map, discs)):
-        place = _nearest(marker, lambda at: not any(_marker_problems(at, spec, map, discs)))
+    wanted = scenario
+    if any(_marker_problems(marker, scenario, map, discs)):
+        place = _nearest(marker, lambda at: not any(_marker_problems(at, wanted, map, discs)))
         scenario = scenario.replace(marker_genes(place, map))
     for index, (name, _) in enumerate(map.present_objects):
         marker = marker_position_m(scenario, map)
@@ -139,15 +140,20 @@ def _nearest(
             raise ScenarioError("no valid place within 200 m; the map leaves no room")
 
 
-def clearance_m(marker: MarkerSpec) -> float:
-    """Return how far a marker's centre is from every static part, at least."""
-    return max(marker.half_diagonal_m, UAV_REACH_M) + MARGIN_M
+def clearance_m(marker: MarkerSpec, wanted_m: float = CLEARANCE.nominal) -> float:
+    """Return how far a marker's centre is from every static part, at least.
+
+    A scenario may want less than what reach and margin ask for.
+    """
+    usual = max(marker.half_diagonal_m, UAV_REACH_M) + MARGIN_M
+    return min(usual, wanted_m) if wanted_m < CLEARANCE.nominal else usual
 
 
 def _marker_problems(
-    marker: tuple[float, float], spec: MarkerSpec, map: Map, discs: Iterable[Disc]
+    marker: tuple[float, float], scenario: Scenario, map: Map, discs: Iterable[Disc]
 ) -> Iterable[str]:
-    (x, y), clearance = marker, clearance_m(spec)
+    (x, y), spec = marker, scenario.task.marker
+    clearance = clearance_m(spec, scenario["pad.clearance_m"])
     if math.dist(marker, map.gps_position_m) > MARKER_RADIUS_M + 1e-9:
         yield "the marker lies outside its disc of 7.5 m"
     for disc in discs:

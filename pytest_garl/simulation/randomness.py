@@ -15,6 +15,7 @@ PURPOSES = (
     "timing",
     "rangefinder",
     "depth",
+    "wear",
 )
 
 

@@ -8,6 +8,7 @@ from pytest_garl.scenarios.groups import (
     events,
     light,
     navigation,
+    pad,
     timing,
     told,
     wind,
@@ -24,6 +25,7 @@ GROUPS: dict[str, Group] = {
         timing.GROUP,
         camera.GROUP,
         depth.GROUP,
+        pad.GROUP,
         *events.GROUPS,
     )
 }

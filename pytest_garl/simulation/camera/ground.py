@@ -19,6 +19,7 @@ from pytest_garl.simulation.camera.ground_cover import cover
 from pytest_garl.simulation.camera.map_texture import RESOLUTION_M
 from pytest_garl.simulation.camera.meshes import mesh_of, placed_hulls
 from pytest_garl.simulation.camera.weather import WET_ALBEDO_LOSS, Conditions
+from pytest_garl.simulation.camera.wear import wear
 
 _INSET_M = 0.01
 _INSET_HALF_M = 2.0
@@ -140,6 +141,7 @@ def _painted(
     inset = Canvas(map_texture.detail(map, inset_box, resolution), inset_box, resolution)
     for canvas in (wide, inset):
         canvas.board(pad)
+        wear(canvas, pad, map)
         if conditions.wetness > 0:
             alpha = 1 - WET_ALBEDO_LOSS * conditions.wetness
             cv2.convertScaleAbs(canvas.image, canvas.image, alpha)

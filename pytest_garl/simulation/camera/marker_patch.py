@@ -20,6 +20,7 @@ from pytest_garl.simulation.camera.canvas import (
 )
 from pytest_garl.simulation.camera.ground import shadowed
 from pytest_garl.simulation.camera.ground_cover import cover
+from pytest_garl.simulation.camera.wear import wear
 from pytest_garl.simulation.camera.weather import WET_ALBEDO_LOSS, Conditions
 
 Array = NDArray[np.float32]
@@ -91,6 +92,7 @@ def paint_patch(
     bounds = (x - reach, x + reach, y - reach, y + reach)
     canvas = Canvas(np.zeros((wide, wide, 3), np.uint8), bounds, step)
     canvas.board(pad)
+    wear(canvas, pad, map)
     dry = 1 - WET_ALBEDO_LOSS * conditions.wetness
     cv2.convertScaleAbs(canvas.image, canvas.image, dry)
     cover(canvas.image, bounds, step, cover_shift_m, conditions)
