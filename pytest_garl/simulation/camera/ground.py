@@ -18,8 +18,8 @@ from pytest_garl.simulation.camera.canvas import Bounds, Canvas, Image
 from pytest_garl.simulation.camera.ground_cover import cover
 from pytest_garl.simulation.camera.map_texture import RESOLUTION_M
 from pytest_garl.simulation.camera.meshes import mesh_of, placed_hulls
-from pytest_garl.simulation.camera.weather import WET_ALBEDO_LOSS, Conditions
 from pytest_garl.simulation.camera.wear import wear
+from pytest_garl.simulation.camera.weather import WET_ALBEDO_LOSS, Conditions
 
 _INSET_M = 0.01
 _INSET_HALF_M = 2.0
