@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import dataclasses
+
 import cv2
 import numpy as np
 import pytest
@@ -17,7 +19,7 @@ from pytest_garl.simulation.flight import MarkerView
 from pytest_garl.simulation.randomness import generator
 from tests.support.flights import EMPTY, nominal
 
-CAMERA, HEIGHT_M = Camera(), 2.5
+CAMERA, HEIGHT_M = Camera(), 3.5
 LEVEL = (0.0, 0.0, 0.0, 1.0)
 
 
@@ -80,10 +82,15 @@ def test_the_oracle_agrees_with_the_picture_about_worn_modules() -> None:
     grey, reference = (each.image.astype(np.float64) @ GREY for each in (frame, clean))
     mask = clean.segmentation == 1
     rows, columns = np.nonzero(mask)
-    low, high = reference[mask].min(), reference[mask].max()
-    level = np.clip((grey[mask] - low) / (high - low), 0, 1)
-    before = reference[mask] > (low + high) / 2
-    wrong = np.where(before, 1 - level, level)
+    low, high = np.percentile(reference[mask], [5, 95])
+    colour = reference[mask] > (low + high) / 2
+
+    def wrong(picture: NDArray[np.float64]) -> NDArray[np.float64]:
+        level = np.clip((picture[mask] - low) / (high - low), 0, 1)
+        return np.where(colour, 1 - level, level)
+
+    # Without the edges of modules, which are grey in a clean picture too.
+    more = wrong(grey) - wrong(reference)
     size = columns.max() - columns.min() + 1
     module = np.minimum(
         (columns - columns.min()) * len(white) // size, (rows - rows.min()) * len(white) // size
@@ -92,13 +99,11 @@ def test_the_oracle_agrees_with_the_picture_about_worn_modules() -> None:
         (columns - columns.min()) * len(white) // size, (rows - rows.min()) * len(white) // size
     )
     border = (module == 0) | (farthest == len(white) - 1)
-    assert view.border_hidden == pytest.approx(float(wrong[border].mean()), abs=0.06)
-    assert view.bits_hidden == pytest.approx(float(wrong[~border].mean()), abs=0.06)
+    assert view.border_hidden == pytest.approx(float(more[border].mean()), abs=0.06)
+    assert view.bits_hidden == pytest.approx(float(more[~border].mean()), abs=0.06)
 
 
 def test_markers_wear_differently_with_another_seed_and_alike_with_the_same() -> None:
-    import dataclasses
-
     scenario = nominal(pad__worn_percent=15.0)
     other = dataclasses.replace(scenario, seed=scenario.seed + 1)
     assert look(scenario)[1] == look(scenario)[1]
