@@ -41,7 +41,8 @@ class PlacedMarker:
 class Pad:
     """The board with the marker as it lies on the ground; at zero yaw its top is north.
 
-    ``worn_share`` of each marker is worn off in patches, which follow from ``seed``.
+    ``worn_share`` of each marker is worn off in patches, which follow from ``seed``; a tarpaulin lies
+    over ``covered_share`` of the main one.
     """
 
     spec: MarkerSpec
@@ -49,6 +50,7 @@ class Pad:
     yaw_rad: float = 0.0
     worn_share: float = 0.0
     seed: int = 0
+    covered_share: float = 0.0
 
     @property
     def markers(self) -> tuple[PlacedMarker, ...]:
@@ -68,6 +70,15 @@ class Pad:
     def main(self) -> PlacedMarker:
         """The marker that missions name."""
         return self.markers[0]
+
+    @property
+    def cover_m(self) -> tuple[tuple[float, float], ...]:
+        """Corners of the tarpaulin: across the marker and its margins, from its left side on."""
+        half, margin = self.spec.side_m / 2, self.spec.side_m / self.spec.modules
+        right = -half + self.covered_share * self.spec.side_m
+        high, left = half + margin, -half - margin
+        corners = ((left, high), (right, high), (right, -high), (left, -high))
+        return tuple(turned_about(self.place_m, corner, self.yaw_rad) for corner in corners)
 
 
 def turned_about(

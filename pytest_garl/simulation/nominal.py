@@ -19,13 +19,12 @@ from pytest_garl.scenarios.maps.map import Map
 from pytest_garl.scenarios.placement import marker_position_m, told_position_m
 from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.scenarios.start import start_m
+from pytest_garl.simulation.camera.cover_event import renderer_of
 from pytest_garl.simulation.camera.projection import eye_under
-from pytest_garl.simulation.camera.renderer import Renderer
 from pytest_garl.simulation.camera.solids import BodyPose
 from pytest_garl.simulation.environment import environment_at
 from pytest_garl.simulation.events import Event
 from pytest_garl.simulation.flight import Flight, NominalView, ObjectRecord
-from pytest_garl.simulation.randomness import generator
 from pytest_garl.simulation.system_under_test.descent import LAND_BELOW_M, SLOW_BELOW_M
 from pytest_garl.simulation.system_under_test.mission import SEARCH_ALTITUDE_M
 from pytest_garl.simulation.system_under_test.reference_pilot import CRUISE_MPS, DESCENT_MPS
@@ -84,7 +83,7 @@ def nominal_views(
     environment is that to which NPC policies had changed it.  The UAV's own path plays no part.
     A camera that fails shows nothing.
     """
-    renderer = Renderer(scenario, map, camera, generator(scenario.seed, "sensor"), colour=False)
+    renderer = renderer_of(scenario, map, camera, colour=False)
     shown, views, outage = scenario, [], Event(scenario, "outage")
     for look in _looks(scenario, map):
         present = environment_at(scenario, flight, look.time_s)

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from pytest_garl.landing_system import Camera, Observation
 from pytest_garl.scenarios.maps.map import Map
 from pytest_garl.scenarios.scenario import Scenario
+from pytest_garl.simulation.camera.cover_event import renderer_of
 from pytest_garl.simulation.camera.depth_sensor import DepthSensor
 from pytest_garl.simulation.camera.frame import Frame, blank_frame
 from pytest_garl.simulation.camera.projection import eye_under
@@ -73,9 +74,8 @@ class Sensors:
 
     def switch_on(self, scenario: Scenario, map: Map) -> None:
         """Switch the camera on; without it frames are black and show nothing."""
-        rng = generator(scenario.seed, "sensor")
         camera = true_camera(self._camera, scenario)
-        self._renderer = Renderer(scenario, map, camera, rng)
+        self._renderer = renderer_of(scenario, map, camera)
         self._depth = DepthSensor(scenario, camera)
 
     def change(self, scenario: Scenario) -> None:

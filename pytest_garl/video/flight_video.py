@@ -13,10 +13,9 @@ from pytest_garl.landing_system import Camera
 from pytest_garl.scenarios.maps.map import Map
 from pytest_garl.scenarios.placement import marker_position_m
 from pytest_garl.scenarios.scenario import Scenario
-from pytest_garl.simulation.camera.renderer import Renderer
+from pytest_garl.simulation.camera.cover_event import renderer_of
 from pytest_garl.simulation.environment import environment_at
 from pytest_garl.simulation.flight import Flight
-from pytest_garl.simulation.randomness import generator
 from pytest_garl.video.camera_pane import CameraPane
 from pytest_garl.video.drawing import Image
 from pytest_garl.video.encoder import write
@@ -50,7 +49,7 @@ def frames(
     """
     place = map.without(scenario.removed_objects)
     _check(flight, scenario, place)
-    renderer = Renderer(scenario, place, camera, generator(scenario.seed, "sensor"))
+    renderer = renderer_of(scenario, place, camera)
     left, right = CameraPane(renderer), MapPane(flight, scenario, place, camera)
     below = Timeline(flight, signature)
     shown = scenario

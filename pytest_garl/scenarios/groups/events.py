@@ -58,6 +58,22 @@ BURST = Group(
         ),
     ),
 )
+COVER = Group(
+    name="cover",
+    meaning="a tarpaulin that lies over a part of the marker for some seconds",
+    parameters=(
+        _BEGIN,
+        _lasts("ArduPilot, AC_PrecLand, loses a landing target after 2 s; a gust moves things on"),
+        Parameter(
+            name="share_percent",
+            nominal=0.0,
+            low=0.0,
+            high=100.0,
+            meaning="share of the marker's width that it hides, from the marker's left side on",
+            source="any share: engineering estimate; ArUco reads no marker with a hidden corner",
+        ),
+    ),
+)
 HEADING = Group(
     name="heading",
     meaning="heading of the UAV at the start",
@@ -73,4 +89,4 @@ HEADING = Group(
         ),
     ),
 )
-GROUPS = (OUTAGE, BURST, HEADING)
+GROUPS = (OUTAGE, BURST, COVER, HEADING)

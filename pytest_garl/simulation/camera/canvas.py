@@ -21,6 +21,8 @@ Bounds = tuple[float, float, float, float]
 WHITE_LEVEL, BLACK_LEVEL = 238.0, 24.0
 """Grey levels of printed white and black in full light: albedos of 0.93 and 0.09, engineering
 estimate of a print on matt foil."""
+COVER_COLOUR = (92.0, 104.0, 78.0)
+"""A tarpaulin of olive green, with an albedo near 0.4; engineering estimate."""
 _SHIFT = 4
 """Fractional bits of the coordinates that OpenCV draws at."""
 
@@ -55,6 +57,11 @@ class Canvas:
         """Draw all markers of a pad, later ones over earlier ones."""
         for each in pad.markers:
             self.marker(each.place_m, each.side_m, each.yaw_rad, each.id, each.dictionary)
+
+    def tarpaulin(self, pad: Pad) -> None:
+        """Draw what lies over a part of a pad."""
+        if pad.covered_share > 0:
+            self.polygon(np.array(pad.cover_m), COVER_COLOUR)
 
     def marker(
         self,

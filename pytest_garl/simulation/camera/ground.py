@@ -11,8 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pytest_garl.scenarios.maps.map import Map
-from pytest_garl.scenarios.placement import Pad, pad_of
-from pytest_garl.scenarios.scenario import Scenario
+from pytest_garl.scenarios.placement import Pad
 from pytest_garl.simulation.camera import map_texture
 from pytest_garl.simulation.camera.canvas import Bounds, Canvas, Image
 from pytest_garl.simulation.camera.ground_cover import cover
@@ -86,16 +85,15 @@ class PaintedGround:
 
 
 def paint_ground(
-    scenario: Scenario,
     map: Map,
     conditions: Conditions,
     shift: NDArray[np.float64],
+    pad: Pad,
 ) -> PaintedGround:
     """Paint the ground of one flight in full light; exposure comes later.
 
     ``shift`` is where the pattern of fallen leaves and snow begins, as of ``cover_shift``.
     """
-    pad = pad_of(scenario, map)
     return _lit(_painted(pad, map, conditions, shift), map, conditions, shift)
 
 
@@ -142,6 +140,7 @@ def _painted(
     for canvas in (wide, inset):
         canvas.board(pad)
         wear(canvas, pad, map)
+        canvas.tarpaulin(pad)
         if conditions.wetness > 0:
             alpha = 1 - WET_ALBEDO_LOSS * conditions.wetness
             cv2.convertScaleAbs(canvas.image, canvas.image, alpha)

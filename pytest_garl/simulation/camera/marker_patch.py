@@ -93,6 +93,7 @@ def paint_patch(
     canvas = Canvas(np.zeros((wide, wide, 3), np.uint8), bounds, step)
     canvas.board(pad)
     wear(canvas, pad, map)
+    canvas.tarpaulin(pad)
     dry = 1 - WET_ALBEDO_LOSS * conditions.wetness
     cv2.convertScaleAbs(canvas.image, canvas.image, dry)
     cover(canvas.image, bounds, step, cover_shift_m, conditions)

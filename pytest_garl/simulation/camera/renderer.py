@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from pytest_garl.errors import GarlError
 from pytest_garl.landing_system import Camera
 from pytest_garl.scenarios.maps.map import Map
-from pytest_garl.scenarios.placement import pad_of
+from pytest_garl.scenarios.placement import Pad, pad_of
 from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.simulation.camera.frame import Frame
 from pytest_garl.simulation.camera.gloss import add_gloss, gloss_of
@@ -76,6 +76,7 @@ class Renderer:
 
     ``segment_ids`` numbers ground (0), marker (1), static bodies and dynamic objects.
     With ``colour=False`` no ground is painted: such a renderer gives frames without images.
+    ``pad`` is that of the scenario, unless another one is given.
     """
 
     def __init__(
@@ -86,10 +87,11 @@ class Renderer:
         rng: np.random.Generator,
         *,
         colour: bool = True,
+        pad: Pad | None = None,
     ) -> None:
         self.camera = camera
         conditions = conditions_of(scenario)
-        self.pad, self._map = pad_of(scenario, map), map
+        self.pad, self._map = pad_of(scenario, map) if pad is None else pad, map
         self.marker_m = self.pad.place_m
         names = ["ground", "marker", *(body.name for body in map.bodies)]
         names += [name for name, _ in map.present_objects]
@@ -97,7 +99,7 @@ class Renderer:
         self._shift = cover_shift(rng)
         self._ground: PaintedGround | None = None
         if colour:
-            self._ground = paint_ground(scenario, map, conditions, self._shift)
+            self._ground = paint_ground(map, conditions, self._shift, self.pad)
         width, height = camera.width_px, camera.height_px
         (cx, cy), focal = camera.centre_px, camera.focal_px
         self._columns = np.arange(width, dtype=np.float32)
@@ -263,6 +265,11 @@ class Renderer:
             return slice(0, 0), slice(0, 0)
         points = np.round(polygon * 2**_SHIFT).astype(np.int32)
         cv2.fillConvexPoly(segmentation, points, (1.0,), cv2.LINE_8, _SHIFT)
+        if self.pad.covered_share > 0:
+            cover = view.ground_polygon(np.array(self.pad.cover_m))
+            if len(cover) >= 3:
+                fixed = np.round(cover * 2**_SHIFT).astype(np.int32)
+                cv2.fillConvexPoly(segmentation, fixed, (0.0,), cv2.LINE_8, _SHIFT)
         return view.box(polygon)
 
 

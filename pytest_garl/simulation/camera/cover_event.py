@@ -1,0 +1,62 @@
+"""Something that lies over a part of the marker for some seconds."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Sequence
+
+import numpy as np
+
+from pytest_garl.landing_system import Camera
+from pytest_garl.scenarios.maps.map import Map
+from pytest_garl.scenarios.placement import pad_of
+from pytest_garl.scenarios.scenario import Scenario
+from pytest_garl.simulation.camera.frame import Frame
+from pytest_garl.simulation.camera.renderer import Quaternion, Renderer, Vector
+from pytest_garl.simulation.camera.solids import BodyPose
+from pytest_garl.simulation.events import Event
+from pytest_garl.simulation.randomness import generator
+
+
+def renderer_of(scenario: Scenario, map: Map, camera: Camera, *, colour: bool = True) -> Renderer:
+    """Return the renderer of a flight's frames, with what covers the marker for a while."""
+    made = Renderer if not _is_covered(scenario) else _Covering
+    return made(scenario, map, camera, generator(scenario.seed, "sensor"), colour=colour)
+
+
+def _is_covered(scenario: Scenario) -> bool:
+    return min(scenario["cover.lasts_s"], scenario["cover.share_percent"]) > 0
+
+
+class _Covering(Renderer):
+    """Draws with the cover while it lies there, and without it before and after."""
+
+    def __init__(
+        self,
+        scenario: Scenario,
+        map: Map,
+        camera: Camera,
+        rng: np.random.Generator,
+        *,
+        colour: bool = True,
+    ) -> None:
+        super().__init__(scenario, map, camera, rng, colour=colour)
+        self._event = Event(scenario, "cover")
+        share = scenario["cover.share_percent"] / 100
+        pad = dataclasses.replace(pad_of(scenario, map), covered_share=share)
+        # The same draws: nothing but the cover differs.
+        again = generator(scenario.seed, "sensor")
+        self._with_cover = Renderer(scenario, map, camera, again, colour=colour, pad=pad)
+
+    def change(self, scenario: Scenario) -> None:
+        """Show the environment of ``scenario`` from the next frame on."""
+        super().change(scenario)
+        self._with_cover.change(scenario)
+
+    def render(
+        self, position_m: Vector, attitude: Quaternion, time_s: float, objects: Sequence[BodyPose]
+    ) -> Frame:
+        """Return the frame from a camera at ``position_m`` with the UAV's ``attitude``."""
+        if self._event.happens(time_s):
+            return self._with_cover.render(position_m, attitude, time_s, objects)
+        return super().render(position_m, attitude, time_s, objects)
