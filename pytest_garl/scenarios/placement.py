@@ -41,8 +41,8 @@ class PlacedMarker:
 class Pad:
     """The board with the marker as it lies on the ground; at zero yaw its top is north.
 
-    ``worn_share`` of each marker is worn off in patches, which follow from ``seed``; a tarpaulin lies
-    over ``covered_share`` of the main one.
+    ``worn_share`` of each marker is worn off in patches, which follow from ``seed``; a tarpaulin
+    lies over ``covered_share`` of the main one.
     """
 
     spec: MarkerSpec

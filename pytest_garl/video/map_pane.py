@@ -86,7 +86,9 @@ class MapPane:
     def _ground(self, scenario: Scenario) -> drawing.Image:
         """Return the ground as it was painted for the flight, mixed with white."""
         shift = cover_shift(generator(scenario.seed, "sensor"))
-        wide = paint_ground(scenario, self._map, conditions_of(scenario), shift).wide
+        wide = paint_ground(
+            self._map, conditions_of(scenario), shift, pad_of(scenario, self._map)
+        ).wide
         coarseness = round(math.log2(max(1.0, 1 / self._scale / wide.m_per_px)))
         level = min(coarseness, len(wide.levels) - 1)
         world_of_pane = np.array(

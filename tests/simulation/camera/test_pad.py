@@ -35,7 +35,8 @@ def top_left(frame: Frame) -> NDArray[np.float64]:
     family = cv2.aruco.getPredefinedDictionary(cv2.aruco.DICT_5X5_50)
     grey = cv2.cvtColor(frame.image, cv2.COLOR_RGB2GRAY)
     corners, _, _ = cv2.aruco.ArucoDetector(family).detectMarkers(grey)
-    return np.asarray(corners[0], np.float64).reshape(4, 2)[0] - CAMERA.centre_px
+    first: NDArray[np.float64] = np.asarray(corners[0], np.float64).reshape(4, 2)[0]
+    return first - np.array(CAMERA.centre_px)
 
 
 @pytest.mark.parametrize("yaw", [-120.0, 30.0, 90.0])
@@ -87,7 +88,8 @@ def test_the_oracle_agrees_with_the_picture_about_worn_modules() -> None:
 
     def wrong(picture: NDArray[np.float64]) -> NDArray[np.float64]:
         level = np.clip((picture[mask] - low) / (high - low), 0, 1)
-        return np.where(colour, 1 - level, level)
+        error: NDArray[np.float64] = np.where(colour, 1 - level, level)
+        return error
 
     # Without the edges of modules, which are grey in a clean picture too.
     more = wrong(grey) - wrong(reference)
