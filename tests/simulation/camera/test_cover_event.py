@@ -16,15 +16,15 @@ from tests.support.flights import EMPTY, nominal
 LEVEL = (0.0, 0.0, 0.0, 1.0)
 
 
-def frame(share: float, time_s: float = 12.0, *, colour: bool = True, **genes: float) -> Frame:
+def frame(share: float, time_s: float = 12.0, *, colour: bool = True, yaw: float = 0.0) -> Frame:
     event = {"cover__from_s": 10.0, "cover__lasts_s": 5.0, "cover__share_percent": share}
-    renderer = renderer_of(nominal(**event, **genes), EMPTY, Camera(), colour=colour)
+    renderer = renderer_of(nominal(**event, pad__yaw_deg=yaw), EMPTY, Camera(), colour=colour)
     x, y = renderer.marker_m
     return renderer.render((x, y, 4.0), LEVEL, time_s, [])
 
 
-def view(share: float, **genes: float) -> MarkerView:
-    seen = frame(share, **genes).marker
+def view(share: float) -> MarkerView:
+    seen = frame(share).marker
     assert seen is not None
     return seen
 
@@ -44,8 +44,8 @@ def test_nothing_lies_there_before_and_after(time_s: float) -> None:
 @pytest.mark.parametrize("share", [10.0, 40.0, 80.0])
 @pytest.mark.parametrize("yaw", [0.0, 30.0])
 def test_the_cover_hides_its_share_of_the_markers_pixels(share: float, yaw: float) -> None:
-    free = frame(0.0, pad__yaw_deg=yaw).segmentation == 1
-    left = frame(share, pad__yaw_deg=yaw).segmentation == 1
+    free = frame(0.0, yaw=yaw).segmentation == 1
+    left = frame(share, yaw=yaw).segmentation == 1
     assert left.sum() / free.sum() == pytest.approx(1 - share / 100, abs=0.05)
 
 

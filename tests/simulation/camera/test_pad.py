@@ -36,7 +36,8 @@ def top_left(frame: Frame) -> NDArray[np.float64]:
     grey = cv2.cvtColor(frame.image, cv2.COLOR_RGB2GRAY)
     corners, _, _ = cv2.aruco.ArucoDetector(family).detectMarkers(grey)
     first: NDArray[np.float64] = np.asarray(corners[0], np.float64).reshape(4, 2)[0]
-    return first - np.array(CAMERA.centre_px)
+    offset: NDArray[np.float64] = first - np.array(CAMERA.centre_px)
+    return offset
 
 
 @pytest.mark.parametrize("yaw", [-120.0, 30.0, 90.0])
