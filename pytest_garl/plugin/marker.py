@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar, cast
 
 import pytest
 
@@ -15,7 +15,7 @@ from pytest_garl.fiducial import MarkerSpec
 from pytest_garl.plugin.options import Options
 from pytest_garl.plugin.target import Target
 from pytest_garl.scenarios.placement import MAP_DICTIONARY
-from pytest_garl.scenarios.task import Start, Task
+from pytest_garl.scenarios.task import Start, StartMode, Task
 
 if TYPE_CHECKING:
     from pytest_garl.scenarios.domains.domain import Domain
@@ -102,7 +102,7 @@ def read_marker(marker: pytest.Mark, options: Options) -> MarkerArguments:
         maps=tuple(map for map in maps if not options.maps or map in options.maps),
         target=target,
         marker=spec,
-        start=_of_type(marker, "start", Start) or Start(),
+        start=_start(marker),
         has_distance=has_distance and "limits" in marker.kwargs,
         map_folders=options.map_folders,
     )
@@ -117,6 +117,14 @@ def _domain(given: Any, options: Options) -> Domain:
         return options.domain_of(given)
     except GarlError as error:
         raise GarlError(f"mark.garl: domain={given!r}: {error}") from error
+
+
+def _start(marker: pytest.Mark) -> Start:
+    """Return the start; a text is its mode, as in ``start="hover"``."""
+    given = marker.kwargs.get("start")
+    if isinstance(given, str):
+        return Start(mode=cast("StartMode", given))  # Raises for another mode.
+    return _of_type(marker, "start", Start) or Start()
 
 
 def _of_type(marker: pytest.Mark, name: str, kind: type[T]) -> T | None:

@@ -44,6 +44,12 @@ def test_marker_and_start_reach_every_flight(pytester: pytest.Pytester, method: 
     }
 
 
+def test_a_start_is_named_by_its_mode(pytester: pytest.Pytester) -> None:
+    with_arguments(pytester, 'start="hover"')
+    run(pytester, "--garl-budget=2", "--garl-population=2")
+    assert {task.start for task in tasks_flown(pytester)} == {Start(mode="hover")}
+
+
 def test_a_saved_case_keeps_the_marker(pytester: pytest.Pytester) -> None:
     with_arguments(pytester, "marker={'id': 9, 'side_m': 2.0}", maps="['court']")
     tests = pytester.path / "test_it.py"
@@ -62,7 +68,8 @@ def test_a_saved_case_keeps_the_marker(pytester: pytest.Pytester) -> None:
         ("marker=3", "*mark.garl: marker=3: expected pytest_garl.MarkerSpec(...)*"),
         ("marker={'size_m': 1.0}", "*marker= has size_m; expected dictionary, id, side_m, nested*"),
         ("marker={'id': 77}", "*marker: found id = 77, expected a whole number from 0 to 49*"),
-        ("start='hover'", "*start='hover': expected pytest_garl.Start(...)*"),
+        ("start=7", "*start=7: expected pytest_garl.Start(...)*"),
+        ("start='air'", "*start: found mode = 'air', expected 'ground' or 'hover'*"),
         ("start={'mode': 'air'}", "*start: found mode = 'air', expected 'ground' or 'hover'*"),
     ],
 )
