@@ -22,6 +22,7 @@ from pytest_garl.scenarios.start import start_m
 from pytest_garl.simulation.camera.cover_event import renderer_of
 from pytest_garl.simulation.camera.projection import eye_under
 from pytest_garl.simulation.camera.solids import BodyPose
+from pytest_garl.simulation.camera.true_camera import Mounting, true_camera
 from pytest_garl.simulation.environment import environment_at
 from pytest_garl.simulation.events import Event
 from pytest_garl.simulation.flight import Flight, NominalView, ObjectRecord
@@ -81,9 +82,11 @@ def nominal_views(
 
     The objects are where they were at that time of the flight, or at its end if it had ended; the
     environment is that to which NPC policies had changed it.  The UAV's own path plays no part.
-    A camera that fails shows nothing.
+    A camera that fails shows nothing.  The camera is the true one, turned and dirty as the
+    scenario says; it hovers while it looks, so that a long exposure does not blur.
     """
-    renderer = renderer_of(scenario, map, camera, colour=False)
+    renderer = renderer_of(scenario, map, true_camera(camera, scenario), colour=False)
+    attitude = Mounting(scenario).attitude(LEVEL)
     shown, views, outage = scenario, [], Event(scenario, "outage")
     for look in _looks(scenario, map):
         present = environment_at(scenario, flight, look.time_s)
@@ -94,7 +97,7 @@ def nominal_views(
             continue
         eye = eye_under((*look.place_m, look.height_m), LEVEL)
         poses = [_pose(item, look.time_s) for item in flight.objects]
-        frame = renderer.render(eye, LEVEL, look.time_s, poses)
+        frame = renderer.render(eye, attitude, look.time_s, poses)
         if (marker := frame.marker) is None:
             continue
         views.append(

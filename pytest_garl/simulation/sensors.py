@@ -7,10 +7,12 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 from pytest_garl.landing_system import Camera, Observation
+from pytest_garl.scenarios.bodies import rotate
 from pytest_garl.scenarios.maps.map import Map
 from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.simulation.camera.cover_event import renderer_of
 from pytest_garl.simulation.camera.depth_sensor import DepthSensor
+from pytest_garl.simulation.camera.exposure import Movement
 from pytest_garl.simulation.camera.frame import Frame, blank_frame
 from pytest_garl.simulation.camera.projection import eye_under
 from pytest_garl.simulation.camera.renderer import Renderer
@@ -99,7 +101,11 @@ class Sensors:
         eye = eye_under(motion.position_m, motion.attitude)
         poses = [(npc.position_m, npc.yaw_rad) for npc in self._npcs]
         attitude = self._mounting.attitude(motion.attitude)
-        frame = self._renderer.render(eye, attitude, now, poses)
+        movement = Movement(
+            velocity_mps=motion.velocity_mps,
+            spin_radps=rotate(motion.attitude, motion.spin_radps),
+        )
+        frame = self._renderer.render(eye, attitude, now, poses, movement)
         frame.measured_m = self._depth.measured(frame.depth_m, now)
         sight = self._recorder.sight(frame, self._renderer, eye, attitude)
         if self._freezes:

@@ -11,6 +11,7 @@ from pytest_garl.landing_system import Camera
 from pytest_garl.scenarios.maps.map import Map
 from pytest_garl.scenarios.placement import pad_of
 from pytest_garl.scenarios.scenario import Scenario
+from pytest_garl.simulation.camera.exposure import STILL, Movement
 from pytest_garl.simulation.camera.frame import Frame
 from pytest_garl.simulation.camera.renderer import Quaternion, Renderer, Vector
 from pytest_garl.simulation.camera.solids import BodyPose
@@ -54,9 +55,14 @@ class _Covering(Renderer):
         self._with_cover.change(scenario)
 
     def render(
-        self, position_m: Vector, attitude: Quaternion, time_s: float, objects: Sequence[BodyPose]
+        self,
+        position_m: Vector,
+        attitude: Quaternion,
+        time_s: float,
+        objects: Sequence[BodyPose],
+        movement: Movement = STILL,
     ) -> Frame:
         """Return the frame from a camera at ``position_m`` with the UAV's ``attitude``."""
         if self._event.happens(time_s):
-            return self._with_cover.render(position_m, attitude, time_s, objects)
-        return super().render(position_m, attitude, time_s, objects)
+            return self._with_cover.render(position_m, attitude, time_s, objects, movement)
+        return super().render(position_m, attitude, time_s, objects, movement)

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pytest_garl.landing_system import Camera
+from pytest_garl.simulation.camera.exposure import Exposure
 from pytest_garl.simulation.camera.gloss import Gloss
 from pytest_garl.simulation.camera.marker_patch import (
     GREY,
@@ -67,6 +68,7 @@ class MarkerSight:
         layers: Sequence[PaintedSolid],
         shadows: Sequence[Shadow],
         gloss: Gloss | None,
+        exposure: Exposure,
     ) -> MarkerView | None:
         """Return how a frame shows the marker, or None where none of it is in the frame."""
         seen = self._points_m @ view.axes[:, :2].T - view.axes @ view.eye
@@ -88,6 +90,11 @@ class MarkerSight:
         if hidden.any():
             grey = _behind(grey, np.flatnonzero(hidden), row, column, layers)
             errors = self._error(grey, light)
+        contrast = self._contrast(grey, pixels, view, depth, inside & (errors < 0.5), gloss)
+        lit = light[inside]
+        if (clear := exposure.clear(row[inside], column[inside])) is not None:
+            # To a detector a dirty lens is what uneven light is.
+            contrast, lit = contrast * float(clear.mean()), lit * clear
         return MarkerView(
             share_in_frame=round(float(framed), _ROUND),
             edge_modules=round(self._edge_modules(corners), _ROUND),
@@ -95,11 +102,11 @@ class MarkerSight:
             border_hidden=_mean(errors, inside & self._border),
             bits_hidden=_mean(errors, inside & self._bits),
             margin_hidden=_mean(errors, inside & self._margin),
-            contrast=self._contrast(grey, pixels, view, depth, inside & (errors < 0.5), gloss),
-            uneven_light=round(float(light[inside].std()), _ROUND),
+            contrast=round(contrast, _ROUND),
+            uneven_light=round(float(lit.std()), _ROUND),
             clutter=round(self._particles.expected_cover(float(depth.mean())), _ROUND),
             noise=round(self._sensor.noise_levels, _ROUND),
-            blur_px=0.0,
+            blur_px=round(exposure.blur_px(corners.mean(axis=0)), _ROUND),
         )
 
     def _error(self, grey: Array, light: Array) -> Array:
@@ -194,12 +201,15 @@ class BoardSight:
         layers: Sequence[PaintedSolid],
         shadows: Sequence[Shadow],
         gloss: Gloss | None,
+        exposure: Exposure,
     ) -> MarkerView | None:
         """Return how a frame shows the board, or None where nothing of it is in the frame."""
-        main = self._main.view(view, segmentation, layers, shadows, gloss)
+        main = self._main.view(view, segmentation, layers, shadows, gloss, exposure)
         if not self._nested or (main and _is_whole(main)):
             return main
-        others = (each.view(view, segmentation, layers, shadows, gloss) for each in self._nested)
+        others = (
+            each.view(view, segmentation, layers, shadows, gloss, exposure) for each in self._nested
+        )
         whole = [each for each in others if each and _is_whole(each)]
         return max(whole, key=lambda each: each.px_per_module) if whole else main
 

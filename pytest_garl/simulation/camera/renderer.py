@@ -17,6 +17,7 @@ from pytest_garl.landing_system import Camera
 from pytest_garl.scenarios.maps.map import Map
 from pytest_garl.scenarios.placement import Pad, pad_of
 from pytest_garl.scenarios.scenario import Scenario
+from pytest_garl.simulation.camera.exposure import STILL, Exposure, Movement, Optics
 from pytest_garl.simulation.camera.frame import Frame
 from pytest_garl.simulation.camera.gloss import add_gloss, gloss_of
 from pytest_garl.simulation.camera.ground import PaintedGround, Raster, paint_ground, repaint
@@ -68,6 +69,7 @@ class _Scene:
     layers: Sequence[PaintedSolid]
     ground: PaintedGround | None
     look: _Look
+    exposure: Exposure
     segmentation: NDArray[np.int32]
 
 
@@ -92,6 +94,7 @@ class Renderer:
         self.camera = camera
         conditions = conditions_of(scenario)
         self.pad, self._map = pad_of(scenario, map) if pad is None else pad, map
+        self._optics = Optics(scenario, camera)
         self.marker_m = self.pad.place_m
         names = ["ground", "marker", *(body.name for body in map.bodies)]
         names += [name for name, _ in map.present_objects]
@@ -152,11 +155,17 @@ class Renderer:
         )
 
     def render(
-        self, position_m: Vector, attitude: Quaternion, time_s: float, objects: Sequence[BodyPose]
+        self,
+        position_m: Vector,
+        attitude: Quaternion,
+        time_s: float,
+        objects: Sequence[BodyPose],
+        movement: Movement = STILL,
     ) -> Frame:
         """Return the frame from a camera at ``position_m`` with the UAV's ``attitude``.
 
-        ``objects`` are the (position, yaw) of the dynamic objects in the map's order.
+        ``objects`` are the (position, yaw) of the dynamic objects in the map's order; the camera's
+        ``movement`` blurs the picture of a camera with an exposure time.
         """
         view = View.of(self.camera, position_m, attitude)
         depth, horizon = _ground_depth(view, self._columns, self._rows)
@@ -180,6 +189,7 @@ class Renderer:
             layers=layers,
             ground=self._ground,
             look=self._look,
+            exposure=self._optics.exposure(view, movement),
             segmentation=segmentation,
         )
         return Frame(
@@ -193,7 +203,7 @@ class Renderer:
     def _marker_view(self, scene: _Scene) -> MarkerView | None:
         gloss = gloss_of(scene.view, scene.look.conditions, self.camera.focal_px)
         return scene.look.sight.view(
-            scene.view, scene.segmentation, scene.layers, scene.shadows, gloss
+            scene.view, scene.segmentation, scene.layers, scene.shadows, gloss, scene.exposure
         )
 
     def _paint(self, scene: _Scene) -> NDArray[np.uint8]:
@@ -208,7 +218,7 @@ class Renderer:
             layer.paint_onto(image)
         look.particles.draw(image, scene.depth_m, view, scene.time_s)
         _fog(image, scene.depth_m, look)
-        return look.sensor.expose(image, scene.time_s)
+        return look.sensor.expose(scene.exposure.picture(image), scene.time_s)
 
     def marker_pixels(self, position_m: Vector, attitude: Quaternion) -> int:
         """Count the marker's pixels in a frame with nothing in front of it."""
