@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import cv2
 import numpy as np
@@ -74,7 +75,7 @@ class Exposure:
         """Return a sharp, clear picture as it reaches the sensor; it may be overwritten."""
         return self._soiled(self._moved(image))
 
-    def blur_px(self, place_px: Array) -> float:
+    def blur_px(self, place_px: NDArray[Any]) -> float:
         """Return how far a place of the ground moves over the picture during the exposure."""
         if not self._moves:
             return 0.0
@@ -85,8 +86,10 @@ class Exposure:
         return math.dist(first, last)
 
     def clear(self, row: NDArray[np.intp], column: NDArray[np.intp]) -> Array | None:
-        """Return the share of light that comes through the lens at pixels; None for a clean lens."""
-        return None if self.dirt is None else 1 - self.dirt[row, column] / np.float32(255)
+        """Return the share of light that passes the lens at pixels; None for a clean lens."""
+        if self.dirt is None:
+            return None
+        return np.asarray(1 - self.dirt[row, column] / np.float32(255), np.float32)
 
     @property
     def _moves(self) -> bool:
@@ -164,6 +167,6 @@ def _dirt(seed: int, camera: Camera, share: float) -> NDArray[np.uint8]:
     return np.asarray(np.round(taken), dtype=np.uint8)
 
 
-def _through(matrix: Matrix, place_px: Array) -> tuple[float, float]:
+def _through(matrix: NDArray[Any], place_px: NDArray[Any]) -> tuple[float, float]:
     x, y, scale = matrix @ (float(place_px[0]), float(place_px[1]), 1.0)
     return float(x / scale), float(y / scale)

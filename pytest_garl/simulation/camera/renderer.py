@@ -164,8 +164,7 @@ class Renderer:
     ) -> Frame:
         """Return the frame from a camera at ``position_m`` with the UAV's ``attitude``.
 
-        ``objects`` are the (position, yaw) of the dynamic objects in the map's order; the camera's
-        ``movement`` blurs the picture of a camera with an exposure time.
+        ``objects`` are the (position, yaw) of the dynamic objects in order; ``movement`` blurs.
         """
         view = View.of(self.camera, position_m, attitude)
         depth, horizon = _ground_depth(view, self._columns, self._rows)
