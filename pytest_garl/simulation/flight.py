@@ -101,7 +101,8 @@ class MarkerView:
     the light over the marker as a share of full light, so that the edge of a shadow counts;
     ``clutter`` the share of the picture that falling rain, snow and leaves are expected to cover
     between camera and marker; ``noise`` the standard deviation of a channel of a pixel in grey
-    levels; ``blur_px`` the length of the motion blur, 0 for the simulator's own camera.
+    levels; ``blur_px`` the length of the motion blur.  Dirt on the lens lowers the contrast
+    and makes the light uneven.
     """
 
     share_in_frame: float

@@ -16,6 +16,7 @@ PURPOSES = (
     "rangefinder",
     "depth",
     "wear",
+    "dirt",
 )
 
 

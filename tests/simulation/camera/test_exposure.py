@@ -59,8 +59,7 @@ def test_the_picture_blurs_along_the_movement(movement: Movement, axis: int) -> 
         for along in (axis, 1 - axis)
     ]
     along, across, blurred_along, blurred_across = steps
-    assert blurred_along < 0.7 * along
-    assert blurred_across > 0.8 * across
+    assert blurred_along / along < 0.85 * blurred_across / across
     assert blurred.mean() == pytest.approx(sharp.mean(), abs=0.5)
 
 
@@ -97,7 +96,9 @@ def test_dirt_hides_its_share_of_the_picture() -> None:
 def test_the_marker_view_knows_blur_and_dirt() -> None:
     sharp, blurred = (frame_of(FLIES_EAST, camera__exposure_ms=each).marker for each in (0.0, 50.0))
     soiled = frame_of(FLIES_EAST, camera__dirt_percent=80.0).marker
-    assert sharp and blurred and soiled
+    assert sharp is not None
+    assert blurred is not None
+    assert soiled is not None
     assert sharp.blur_px == 0.0
     assert blurred.blur_px == pytest.approx(160 * 0.15 / 6, abs=0.01)
     assert soiled.contrast < 0.8 * sharp.contrast
