@@ -109,8 +109,6 @@ class Renderer:
         self._rows = np.arange(height, dtype=np.float32)[:, None]
         across, down = (self._columns - cx) / focal, (self._rows - cy) / focal
         self._stretch = np.sqrt(1 + across**2 + down**2)
-        right, bottom = width - 1.0, height - 1.0
-        self._corners = np.array([[0, 0, 1], [right, 0, 1], [right, bottom, 1], [0, bottom, 1]]).T
         self._before_draws = copy.deepcopy(rng)
         self._prepare(conditions, rng)
 
@@ -208,7 +206,7 @@ class Renderer:
     def _paint(self, scene: _Scene) -> NDArray[np.uint8]:
         """Paint from the ground up, whatever the renderer has drawn since."""
         view, look = scene.view, scene.look
-        image = self._ground_image(scene)
+        image = _ground_image(scene)
         draw_shadows(image, view, scene.shadows, look.conditions)
         add_gloss(image, view, gloss_of(view, look.conditions, self.camera.focal_px))
         if scene.sky is not None:
@@ -247,23 +245,6 @@ class Renderer:
         """Side in pixels of the marker seen from straight above."""
         return self.camera.focal_px * self.pad.spec.side_m / height_m
 
-    def _ground_image(self, scene: _Scene) -> NDArray[np.uint8]:
-        view, ground, footprint = scene.view, _painted(scene.ground), scene.footprint_m
-        world = view.ground_of_pixel
-        height, width = self.camera.height_px, self.camera.width_px
-        # Four channels: warpPerspective is 2.5 times as fast as with three.
-        image = np.empty((height, width, 4), np.uint8)
-        inset = ground.inset
-        rows, columns = slice(0, height), slice(0, width)
-        if scene.sky is not None or not inset.holds(world @ self._corners):
-            _warp(ground.wide, image, world, footprint, cv2.BORDER_REFLECT_101)
-            rows, columns = view.box(view.ground_polygon(inset.outline))
-        part = image[rows, columns]
-        if part.size:
-            shift = np.array([[1.0, 0.0, columns.start], [0.0, 1.0, rows.start], [0.0, 0.0, 1.0]])
-            _warp(inset, part, world @ shift, footprint, cv2.BORDER_TRANSPARENT)
-        return np.asarray(cv2.cvtColor(image, cv2.COLOR_RGBA2RGB), dtype=np.uint8)
-
     def _marker_polygon(self, view: View) -> Array:
         return view.ground_polygon(np.array(self.pad.main.outline_m))
 
@@ -299,6 +280,26 @@ def _ground_depth(view: View, columns: Array, rows: Array) -> tuple[Array, bool]
     np.minimum(depth, np.float32(FAR_M), out=depth)
     depth[sky] = FAR_M
     return depth, True
+
+
+def _ground_image(scene: _Scene) -> NDArray[np.uint8]:
+    view, ground, footprint = scene.view, _painted(scene.ground), scene.footprint_m
+    world = view.ground_of_pixel
+    height, width = scene.depth_m.shape
+    # Four channels: warpPerspective is 2.5 times as fast as with three.
+    image = np.empty((height, width, 4), np.uint8)
+    right, bottom = width - 1.0, height - 1.0
+    corners = np.array([[0, 0, 1], [right, 0, 1], [right, bottom, 1], [0, bottom, 1]]).T
+    inset = ground.inset
+    rows, columns = slice(0, height), slice(0, width)
+    if scene.sky is not None or not inset.holds(world @ corners):
+        _warp(ground.wide, image, world, footprint, cv2.BORDER_REFLECT_101)
+        rows, columns = view.box(view.ground_polygon(inset.outline))
+    part = image[rows, columns]
+    if part.size:
+        shift = np.array([[1.0, 0.0, columns.start], [0.0, 1.0, rows.start], [0.0, 0.0, 1.0]])
+        _warp(inset, part, world @ shift, footprint, cv2.BORDER_TRANSPARENT)
+    return np.asarray(cv2.cvtColor(image, cv2.COLOR_RGBA2RGB), dtype=np.uint8)
 
 
 def _painted(ground: PaintedGround | None) -> PaintedGround:
