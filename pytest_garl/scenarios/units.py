@@ -301,8 +301,8 @@ def conditions_in_words(scenario: Scenario, map: Map) -> list[tuple[str, str]]:
         for parameter in group.parameters:
             key = f"{head}.{parameter.name}"
             if key != TURN and scenario[key] != parameter.nominal:
-                words = f"{parameter.meaning}: {scenario[key]:g} {unit_of(parameter.name)}"
-                found.append((key, words.rstrip()))
+                value = f"{scenario[key]:g} {unit_of(parameter.name)}".rstrip()
+                found.append((key, f"{value}: {parameter.meaning}"))
     return found
 
 

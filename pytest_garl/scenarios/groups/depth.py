@@ -17,7 +17,7 @@ GROUP = Group(
             meaning="reach of the depth camera in clear air, less in fog, rain and snow; beyond it "
             "the depth is 0; 100: no limit in any weather",
             source="Intel RealSense D400 series data sheet: about 10 m, which varies with light "
-            "and calibration; Steinvall 2009 for the air",
+            "and calibration; the lidar equation for the air",
         ),
         Parameter(
             name="holes_percent",

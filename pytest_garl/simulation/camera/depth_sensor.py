@@ -96,8 +96,8 @@ def reach_m(clear_m: float, extinction_per_m: float) -> float:
     """Return the reach in air with an extinction, of a sensor that reaches ``clear_m`` without it.
 
     What comes back falls with exp(-2 extinction R) / R^2 and is as weak at the reach as it is at
-    ``clear_m`` in clear air: R exp(extinction R) = clear_m, which Lambert's W solves (Steinvall,
-    Laser system range calculations and the Lambert W function, Applied Optics 48, 2009).
+    ``clear_m`` in clear air (the lidar equation of a surface that fills the beam):
+    R exp(extinction R) = clear_m, which Lambert's W solves.
     """
     if extinction_per_m <= 0:
         return clear_m
