@@ -5,8 +5,9 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from pytest_garl.fiducial import MarkerSpec
-from pytest_garl.scenarios.maps.map import Map
+from pytest_garl.fiducial import DICTIONARIES, MarkerSpec
+from pytest_garl.scenarios.groups import decoys as decoy_groups
+from pytest_garl.scenarios.maps.map import Layer, Map
 from pytest_garl.scenarios.object_types import OBJECT_TYPES, ObjectType
 from pytest_garl.scenarios.scenario import Scenario
 
@@ -38,11 +39,35 @@ class PlacedMarker:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class Decoy:
+    """A thing on the ground that could be taken for the marker; ``name`` is that of its group."""
+
+    name: str
+    kind: str
+    place_m: tuple[float, float]
+    yaw_rad: float
+    side_m: float
+    dictionary: str
+    id: int
+
+    @property
+    def layer(self) -> Layer:
+        """Return what it is to verdicts: a square on the ground."""
+        return Layer(
+            kind="marker",
+            name=f"{self.name}-{self.kind}",
+            points_m=(self.place_m,),
+            size_m=self.side_m,
+            yaw_rad=self.yaw_rad,
+        )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Pad:
     """The board with the marker as it lies on the ground; at zero yaw its top is north.
 
     ``worn_share`` of each marker is worn off in patches, which follow from ``seed``; a tarpaulin
-    lies over ``covered_share`` of the main one.
+    lies over ``covered_share`` of the main one.  ``decoys`` lie about it.
     """
 
     spec: MarkerSpec
@@ -51,6 +76,7 @@ class Pad:
     worn_share: float = 0.0
     seed: int = 0
     covered_share: float = 0.0
+    decoys: tuple[Decoy, ...] = ()
 
     @property
     def markers(self) -> tuple[PlacedMarker, ...]:
@@ -136,7 +162,34 @@ def pad_of(scenario: Scenario, map: Map) -> Pad:
         yaw_rad=math.radians(scenario["pad.yaw_deg"]),
         worn_share=scenario["pad.worn_percent"] / 100,
         seed=scenario.seed,
+        decoys=decoys_of(scenario, map),
     )
+
+
+def decoys_of(scenario: Scenario, map: Map) -> tuple[Decoy, ...]:
+    """Return the decoys of a scenario, each as large as the marker."""
+    spec, (east, north) = scenario.task.marker, map.gps_position_m
+    found = []
+    for group in decoy_groups.GROUPS:
+        kind = decoy_groups.KINDS[round(scenario[f"{group.name}.kind"])]
+        if kind == "none":
+            continue
+        other = (spec.id + 1) % DICTIONARIES[spec.dictionary].size
+        found.append(
+            Decoy(
+                name=group.name,
+                kind=kind,
+                place_m=(
+                    east + scenario[f"{group.name}.x_m"],
+                    north + scenario[f"{group.name}.y_m"],
+                ),
+                yaw_rad=math.radians(scenario[f"{group.name}.yaw_deg"]),
+                side_m=spec.side_m,
+                dictionary=spec.dictionary,
+                id=other if kind == "other-id" else spec.id,
+            )
+        )
+    return tuple(found)
 
 
 def told_position_m(scenario: Scenario, map: Map) -> tuple[float, float]:

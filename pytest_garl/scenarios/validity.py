@@ -9,11 +9,13 @@ from dataclasses import dataclass
 
 from pytest_garl.fiducial import MarkerSpec
 from pytest_garl.scenarios.bodies import Body, Part, rotate
+from pytest_garl.scenarios.groups.decoys import REACH_M
 from pytest_garl.scenarios.groups.pad import CLEARANCE
 from pytest_garl.scenarios.maps.map import Map
 from pytest_garl.scenarios.object_types import OBJECT_TYPES
 from pytest_garl.scenarios.placement import (
     MARKER_RADIUS_M,
+    decoys_of,
     marker_genes,
     marker_position_m,
     object_altitude_m,
@@ -28,6 +30,8 @@ MARGIN_M = 0.25
 """No static part stands or hangs nearer to the marker's corners than the margin, nor to its centre
 than reach and margin of a UAV of 1 m, so that such a UAV can reach it; `pad.clearance_m` asks for
 less."""
+MARGINED = 1 + 2 / 6
+"""Widest print of a marker as a share of its side: one of four bits with its white margin."""
 UAV_CLEARANCE_M = 2.0
 OBJECT_CLEARANCE_M = 0.3
 _RING_STEP_M = 0.1
@@ -81,6 +85,7 @@ def problems(scenario: Scenario, map: Map) -> tuple[str, ...]:
     discs = tuple(disc for body in map.bodies for disc in discs_of(body))
     marker = marker_position_m(scenario, map)
     found = list(_marker_problems(marker, scenario, map, discs))
+    found += _decoy_problems(scenario, map)
     for index, (name, _) in enumerate(map.present_objects):
         found += _start_problems(
             scenario, map, discs, marker, index, object_start_m(scenario, map, name)
@@ -103,6 +108,7 @@ def repair(scenario: Scenario, map: Map) -> Scenario:
     if any(_marker_problems(marker, scenario, map, discs)):
         place = _nearest(marker, lambda at: not any(_marker_problems(at, wanted, map, discs)))
         scenario = scenario.replace(marker_genes(place, map))
+    scenario = _with_free_decoys(scenario, map)
     for index, (name, _) in enumerate(map.present_objects):
         marker = marker_position_m(scenario, map)
         start = object_start_m(scenario, map, name)
@@ -167,6 +173,42 @@ def _marker_problems(
                 yield f"the marker overlaps {layer.name}"
     if math.dist(marker, map.uav_start_m[:2]) < UAV_CLEARANCE_M:
         yield "the marker lies under the UAV's start"
+
+
+def _decoy_problems(scenario: Scenario, map: Map, among: str = "") -> Iterable[str]:
+    """Yield what is wrong with the decoys, or with the one of a name; the first ones count first."""
+    taken = [("the marker", marker_position_m(scenario, map), scenario.task.marker.reach_m)]
+    taken += [
+        (each.name, each.points_m[0], each.size_m * MARGINED / math.sqrt(2))
+        for each in map.ground.layers
+        if each.kind == "marker"
+    ]
+    for decoy in decoys_of(scenario, map):
+        reach = decoy.side_m * MARGINED / math.sqrt(2)
+        if among in ("", decoy.name):
+            for name, place, other_reach in taken:
+                if math.dist(decoy.place_m, place) < reach + other_reach:
+                    yield f"{decoy.name} overlaps {name}"
+        taken.append((decoy.name, decoy.place_m, reach))
+
+
+def _with_free_decoys(scenario: Scenario, map: Map) -> Scenario:
+    for decoy in decoys_of(scenario, map):
+        x, y = f"{decoy.name}.x_m", f"{decoy.name}.y_m"
+
+        def moved(
+            at: tuple[float, float], scenario: Scenario = scenario, x: str = x, y: str = y
+        ) -> Scenario:
+            return scenario.replace({x: at[0], y: at[1]})
+
+        def free(at: tuple[float, float], name: str = decoy.name) -> bool:
+            near = max(abs(at[0]), abs(at[1])) <= REACH_M
+            return near and not any(_decoy_problems(moved(at), map, name))
+
+        place = scenario[x], scenario[y]
+        if not free(place):
+            scenario = moved(_nearest(place, free))
+    return scenario
 
 
 def _start_problems(

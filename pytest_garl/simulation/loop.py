@@ -73,7 +73,7 @@ class Loop:
         self.npcs = [Npc(scenario, map, name, policy()) for name, _ in map.present_objects]
         self._world = _world(self._model, map, self.npcs)
         self._thrusts, self._command = begin_at_start(self._world, self._model, scenario, map)
-        self.recorder = Recorder(map, self.npcs, self.marker_m)
+        self.recorder = Recorder(map, self.npcs, pad_of(scenario, map))
         stays = GroundStays(self.recorder, self._model, self.marker_m, partial(_under, self))
         self._contacts = Contacts(self._world, self.recorder, self.npcs, self._model.size_m, stays)
         self._control = FlightControl(self._model)
@@ -279,8 +279,9 @@ def _situation(loop: Loop, npc: Npc, position: Vector, velocity: Vector) -> Situ
 def _under(loop: Loop, place: tuple[float, float]) -> str:
     """Return what lies under the UAV if it touches down at a place at this moment."""
     map, bodies = loop.map, (*loop.map.bodies, *(npc.body for npc in loop.npcs))
-    marker = pad_of(loop.scenario, map).main
-    return what_lies_under(place, marker, map.ground.layers, bodies, loop.scenario)
+    pad = pad_of(loop.scenario, map)
+    layers = (*map.ground.layers, *(each.layer for each in pad.decoys))
+    return what_lies_under(place, pad.main, layers, bodies, loop.scenario)
 
 
 def _vehicle_state(tick: int, motion: Motion, thrusts: Thrusts) -> VehicleState:

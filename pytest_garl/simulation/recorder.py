@@ -11,6 +11,7 @@ import numpy as np
 
 from pytest_garl.landing_system import Command
 from pytest_garl.scenarios.maps.map import Map
+from pytest_garl.scenarios.placement import Pad
 from pytest_garl.simulation.camera.frame import Frame
 from pytest_garl.simulation.camera.renderer import Renderer
 from pytest_garl.simulation.flight import (
@@ -47,9 +48,13 @@ class Sight:
 class Recorder:
     """Collects poses, contacts, events and steps; ``time_s`` is the flight's present time."""
 
-    def __init__(self, map: Map, objects: Sequence[Npc], marker: tuple[float, float]) -> None:
+    def __init__(self, map: Map, objects: Sequence[Npc], pad: Pad) -> None:
         self.time_s = 0.0
-        self._map, self._objects, self._marker = map, objects, marker
+        self._objects, self._marker = objects, pad.place_m
+        layers = (*map.ground.layers, *(each.layer for each in pad.decoys))
+        self._decoys = tuple(
+            (each.name, *each.points_m[0]) for each in layers if each.kind == "marker"
+        )
         self._kinds: dict[str, tuple[str, BodyClass]] = {"ground": ("ground", "ground")}
         self._kinds |= {body.name: (body.kind, "static") for body in map.bodies}
         self._kinds |= {item.name: (item.type.name, "dynamic") for item in objects}
@@ -187,11 +192,7 @@ class Recorder:
             ),
             events=tuple(self._events),
             steps=tuple(self._steps),
-            decoys=tuple(
-                (layer.name, *layer.points_m[0])
-                for layer in self._map.ground.layers
-                if layer.kind == "marker"
-            ),
+            decoys=self._decoys,
             crash=crash,
             touchdown=touchdowns[-1] if touchdowns else None,
             earlier_touchdowns=tuple(touchdowns[:-1]),

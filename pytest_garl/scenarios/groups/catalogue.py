@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from pytest_garl.scenarios.groups import (
     camera,
+    decoys,
     depth,
     events,
     light,
@@ -26,6 +27,7 @@ GROUPS: dict[str, Group] = {
         camera.GROUP,
         depth.GROUP,
         pad.GROUP,
+        *decoys.GROUPS,
         *events.GROUPS,
     )
 }

@@ -14,6 +14,7 @@ from pytest_garl.scenarios.maps.map import Map
 from pytest_garl.scenarios.placement import Pad
 from pytest_garl.simulation.camera import map_texture
 from pytest_garl.simulation.camera.canvas import Bounds, Canvas, Image
+from pytest_garl.simulation.camera.decoys import paint_decoy
 from pytest_garl.simulation.camera.ground_cover import cover
 from pytest_garl.simulation.camera.map_texture import RESOLUTION_M
 from pytest_garl.simulation.camera.meshes import mesh_of, placed_hulls
@@ -138,6 +139,8 @@ def _painted(
     wide = Canvas(map_texture.picture(map).copy(), map_texture.bounds_of(map), RESOLUTION_M)
     inset = Canvas(map_texture.detail(map, inset_box, resolution), inset_box, resolution)
     for canvas in (wide, inset):
+        for decoy in pad.decoys:
+            paint_decoy(canvas, decoy)
         canvas.board(pad)
         wear(canvas, pad, map)
         canvas.tarpaulin(pad)

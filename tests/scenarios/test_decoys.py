@@ -1,0 +1,82 @@
+"""Decoys lie clear of the marker, of the map's own decoy and of each other, and are looked at."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Mapping
+
+import cv2
+import numpy as np
+import pytest
+
+from pytest_garl import Camera
+from pytest_garl.scenarios.chromosome import decode
+from pytest_garl.scenarios.files import dumps, loads
+from pytest_garl.scenarios.genes import genome_for
+from pytest_garl.scenarios.groups.decoys import KINDS
+from pytest_garl.scenarios.maps.map import load_map
+from pytest_garl.scenarios.placement import decoys_of, marker_position_m
+from pytest_garl.scenarios.scenario import Scenario
+from pytest_garl.scenarios.validity import problems, repair
+from pytest_garl.simulation.camera.renderer import Renderer
+from pytest_garl.simulation.randomness import generator
+from tests.support.flights import EMPTY
+
+MAPS = {name: dataclasses.replace(load_map(name), objects=()) for name in ("court", "lawn")}
+
+
+def scenario_on(name: str, values: Mapping[str, float]) -> Scenario:
+    genome = genome_for(MAPS[name])
+    scenario = decode(genome.nominal, genome, map=name, seed=5)
+    return repair(scenario.replace(values), MAPS[name])
+
+
+@pytest.mark.parametrize("name", MAPS)
+def test_decoys_are_moved_off_the_marker_and_off_each_other(name: str) -> None:
+    # All at the coordinate, or all at the map's own decoy.
+    for x, y in ((0.0, 0.0), (-5.6, 4.4)):
+        values = {f"decoy-{number}.kind": number for number in (1, 2, 3)}
+        values |= {f"decoy-{number}.x_m": x for number in (1, 2, 3)}
+        values |= {f"decoy-{number}.y_m": y for number in (1, 2, 3)}
+        scenario = scenario_on(name, values)
+        assert problems(scenario, MAPS[name]) == ()
+        assert repair(scenario, MAPS[name]) == scenario
+        assert loads(dumps(scenario, MAPS[name]), MAPS[name]) == scenario
+        places = [each.place_m for each in decoys_of(scenario, MAPS[name])]
+        places.append(marker_position_m(scenario, MAPS[name]))
+        places += [each.points_m[0] for each in MAPS[name].ground.layers if each.kind == "marker"]
+        gaps = [
+            np.hypot(a[0] - b[0], a[1] - b[1])
+            for index, a in enumerate(places)
+            for b in places[index + 1 :]
+        ]
+        # Two diagonals of 1.5 m touch at 2.12 m.
+        assert min(gaps) > 2.12
+
+
+@pytest.mark.parametrize("kind", range(1, len(KINDS)))
+@pytest.mark.parametrize("name", MAPS)
+def test_every_kind_is_seen_on_both_maps(name: str, kind: int) -> None:
+    pictures = []
+    for values in ({}, {"decoy-1.kind": float(kind), "decoy-1.x_m": 4.0, "decoy-1.y_m": -4.0}):
+        scenario = scenario_on(name, values)
+        camera = Camera()
+        place = MAPS[name]
+        renderer = Renderer(scenario, place, camera, generator(scenario.seed, "sensor"))
+        frame = renderer.render((4.0, -4.0, 4.0), (0.0, 0.0, 0.0, 1.0), 0.0, [])
+        pictures.append(frame.image.astype(int))
+        grey = cv2.cvtColor(frame.image, cv2.COLOR_RGB2GRAY)
+    change = np.abs(pictures[0] - pictures[1]).max(axis=2) > 30
+    side = 1.5 * camera.focal_px / 4.0
+    assert 0.3 * side**2 < change.sum() < 2.0 * side**2
+    family = cv2.aruco.getPredefinedDictionary(cv2.aruco.DICT_5X5_50)
+    _, ids, _ = cv2.aruco.ArucoDetector(family).detectMarkers(grey)
+    found = set() if ids is None else set(np.ravel(ids).tolist())
+    if KINDS[kind] == "other-id":
+        assert found == {1}
+    elif KINDS[kind] != "same-id-without-margin":
+        assert 0 not in found
+
+
+def test_a_scenario_without_decoys_has_none() -> None:
+    assert decoys_of(scenario_on("lawn", {}), EMPTY) == ()
