@@ -42,6 +42,8 @@ SEED = 27
 MAPS = ("court", "lawn")
 NONE = "none"
 """The row in which everything is nominal."""
+EQUAL = ("decoy-2", "decoy-3")
+"""Groups that differ from ``decoy-1`` in their number only."""
 SYSTEMS = {
     "pilot": "pytest_garl.simulation.system_under_test.reference_pilot:ReferencePilot",
     "opencv": "landing_systems.opencv_mls:OpenCvLandingSystem",
@@ -64,8 +66,9 @@ def genome_on(map_name: str) -> Genome:
 
 
 def group_names() -> tuple[str, ...]:
-    """Return the names of what can act alone, after the row without any."""
-    return (NONE, *(gene.name for gene in genome_on(MAPS[0]).genes if gene.is_optional))
+    """Return the names of what can act alone, after the row without any; of equal decoys one."""
+    names = (gene.name for gene in genome_on(MAPS[0]).genes if gene.is_optional)
+    return (NONE, *(name for name in names if name not in EQUAL))
 
 
 def scenario_of(group: str, number: int) -> Scenario:

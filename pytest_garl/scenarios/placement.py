@@ -52,10 +52,10 @@ class Decoy:
 
     @property
     def layer(self) -> Layer:
-        """Return what it is to verdicts: a square on the ground."""
+        """Return what it is to verdicts: a square on the ground, named by its kind alone."""
         return Layer(
             kind="marker",
-            name=f"{self.name}-{self.kind}",
+            name=f"decoy-{self.kind}",
             points_m=(self.place_m,),
             size_m=self.side_m,
             yaw_rad=self.yaw_rad,
@@ -171,7 +171,7 @@ def decoys_of(scenario: Scenario, map: Map) -> tuple[Decoy, ...]:
     spec, (east, north) = scenario.task.marker, map.gps_position_m
     found = []
     for group in decoy_groups.GROUPS:
-        kind = decoy_groups.KINDS[round(scenario[f"{group.name}.kind"])]
+        kind = decoy_groups.KINDS[math.ceil(scenario[f"{group.name}.kind"])]
         if kind == "none":
             continue
         other = (spec.id + 1) % DICTIONARIES[spec.dictionary].size

@@ -14,6 +14,7 @@ from dataclasses import dataclass
 
 from pytest_garl.scenarios.genes import CLEAR, SUN
 from pytest_garl.scenarios.groups.catalogue import GROUPS, PARAMETERS
+from pytest_garl.scenarios.groups.parameter import Parameter
 from pytest_garl.scenarios.light import (
     NOON_DEG,
     TWILIGHT_DEG,
@@ -183,7 +184,7 @@ def sections_of(scenario: Scenario, map: Map) -> dict[str, dict[str, float]]:
     for key, value in scenario.genes:
         if key in PARAMETERS and key != TURN:
             head, _, name = key.partition(".")
-            digits = significant(float(round(value)) if PARAMETERS[key].whole else value)
+            digits = significant(_whole(value, PARAMETERS[key]))
             sections.setdefault(head, {})[name] = digits
     return {name: values for name, values in sections.items() if values}
 
@@ -285,6 +286,12 @@ _WORDS = {
 }
 
 
+def _whole(value: float, parameter: Parameter) -> float:
+    if parameter.choices:
+        return float(math.ceil(value))
+    return float(round(value)) if parameter.whole else value
+
+
 def conditions_in_words(scenario: Scenario, map: Map) -> list[tuple[str, str]]:
     """Return (name, words) of each condition that is not nominal: weather, light, groups."""
     sections = sections_of(scenario, map)
@@ -301,9 +308,14 @@ def conditions_in_words(scenario: Scenario, map: Map) -> list[tuple[str, str]]:
         for parameter in group.parameters:
             key = f"{head}.{parameter.name}"
             if key != TURN and scenario[key] != parameter.nominal:
-                value = f"{scenario[key]:g} {unit_of(parameter.name)}".rstrip()
-                found.append((key, f"{value}: {parameter.meaning}"))
+                found.append((key, _in_words(scenario[key], parameter)))
     return found
+
+
+def _in_words(value: float, parameter: Parameter) -> str:
+    if parameter.choices:
+        return parameter.choices[int(value)]
+    return f"{f'{value:g} {unit_of(parameter.name)}'.rstrip()}: {parameter.meaning}"
 
 
 def unit_of(name: str) -> str:

@@ -176,7 +176,7 @@ def _marker_problems(
 
 
 def _decoy_problems(scenario: Scenario, map: Map, among: str = "") -> Iterable[str]:
-    """Yield what is wrong with the decoys, or with the one of a name; the first ones count first."""
+    """Yield what is wrong with the decoys, or with the one of a name; a later one gives way."""
     taken = [("the marker", marker_position_m(scenario, map), scenario.task.marker.reach_m)]
     taken += [
         (each.name, each.points_m[0], each.size_m * MARGINED / math.sqrt(2))

@@ -35,7 +35,7 @@ def scenario_on(name: str, values: Mapping[str, float]) -> Scenario:
 def test_decoys_are_moved_off_the_marker_and_off_each_other(name: str) -> None:
     # All at the coordinate, or all at the map's own decoy.
     for x, y in ((0.0, 0.0), (-5.6, 4.4)):
-        values = {f"decoy-{number}.kind": number for number in (1, 2, 3)}
+        values = {f"decoy-{number}.kind": float(number) for number in (1, 2, 3)}
         values |= {f"decoy-{number}.x_m": x for number in (1, 2, 3)}
         values |= {f"decoy-{number}.y_m": y for number in (1, 2, 3)}
         scenario = scenario_on(name, values)
@@ -80,3 +80,10 @@ def test_every_kind_is_seen_on_both_maps(name: str, kind: int) -> None:
 
 def test_a_scenario_without_decoys_has_none() -> None:
     assert decoys_of(scenario_on("lawn", {}), EMPTY) == ()
+
+
+def test_an_active_decoy_has_a_kind_and_a_cause_names_it_by_that() -> None:
+    values = {"decoy-1.kind": 0.01, "decoy-2.kind": 0.9, "decoy-2.x_m": 5.0}
+    found = decoys_of(scenario_on("lawn", values), MAPS["lawn"])
+    assert [each.kind for each in found] == ["other-id", "other-id"]
+    assert {each.layer.name for each in found} == {"decoy-other-id"}

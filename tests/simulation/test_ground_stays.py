@@ -20,6 +20,8 @@ from pytest_garl import (
     VehicleState,
     VelocitySetpoint,
 )
+from pytest_garl.fiducial import MarkerSpec
+from pytest_garl.scenarios.placement import Pad
 from pytest_garl.simulation.flight import Flight, Outcome, Touchdown
 from pytest_garl.simulation.fly import fly
 from pytest_garl.simulation.ground_stays import GroundStays
@@ -260,7 +262,7 @@ class TestGroundStays:
     """The stays by themselves, step by step."""
 
     def setup_method(self) -> None:
-        self.recorder = Recorder(EMPTY, (), (0.0, 0.0))
+        self.recorder = Recorder(EMPTY, (), Pad(spec=MarkerSpec(), place_m=(0.0, 0.0), yaw_rad=0.0))
         self.stays = GroundStays(
             self.recorder, vehicle_model(Airframe()), (0.0, 0.0), lambda place: "nothing"
         )

@@ -39,7 +39,7 @@ def _group(number: int) -> Group:
             Parameter(
                 name="kind",
                 even=True,
-                whole=True,
+                choices=KINDS,
                 nominal=0.0,
                 low=0.0,
                 high=float(len(KINDS) - 1),

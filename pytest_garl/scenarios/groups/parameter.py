@@ -14,6 +14,7 @@ class Parameter:
     A scenario that does not name it has its ``nominal`` value, which has no effect.  ``low`` and
     ``high`` are the limits of what the simulator can fly, not what a domain claims.  ``source``
     says where the range of the domain `field` comes from.  A value of a ``whole`` one is rounded.
+    ``choices`` name the whole values from 0 on; such a value is rounded up: only 0 is the first.
     An ``even`` one has no harsher end, as a direction or a time.
     """
 
@@ -24,6 +25,7 @@ class Parameter:
     meaning: str
     source: str
     whole: bool = False
+    choices: tuple[str, ...] = ()
     even: bool = False
 
     def __post_init__(self) -> None:
