@@ -19,6 +19,7 @@ def search_s(workers: int, budget: int, map: str) -> float:
             f"--garl-workers={workers}",
             f"--garl-map={map}",
             "--garl-method=random",
+            "--garl-domain=paper",
         ]
         command += ["-o", f"garl_dir={folder}", "landing_systems/test_opencv_mls.py"]
         began = time.perf_counter()

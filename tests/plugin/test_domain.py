@@ -8,7 +8,12 @@ import pytest
 
 from pytest_garl.execution.job import parse_job
 from pytest_garl.execution.ledger import Ledger
+from pytest_garl.regressions.case_file import load_case
 from pytest_garl.scenarios.domains.names import DEFAULT_DOMAIN
+from pytest_garl.scenarios.domains.reader import domain_named
+from pytest_garl.scenarios.files import parse_scenario
+from pytest_garl.scenarios.maps.map import load_map
+from tests.support.case_project import add_cases_to_git, cases
 from tests.support.case_project import run as run_cases
 from tests.support.landing_project import project, run
 
@@ -36,11 +41,45 @@ def npcs_in(file: Path) -> str:
     return parse_job(job).npcs.name
 
 
-def test_summary_names_the_domain_and_who_moves_the_npcs(pytester: pytest.Pytester) -> None:
+def in_default_domain(pytester: pytest.Pytester) -> None:
+    """Write a project that names no domain."""
     project(pytester)
+    (pytester.path / "pytest.ini").unlink()
+
+
+def test_summary_names_the_domain_and_who_moves_the_npcs(pytester: pytest.Pytester) -> None:
+    in_default_domain(pytester)
     result = run(pytester, *ONE)
-    result.stdout.fnmatch_lines([f"garl: *domain {DEFAULT_DOMAIN}, *"])
-    result.stdout.fnmatch_lines([f"domain {DEFAULT_DOMAIN}, NPCs *"])
+    result.stdout.fnmatch_lines(["garl: *NPCs waypoint, domain field, *"])
+    result.stdout.fnmatch_lines(["domain field, NPCs waypoint"])
+
+
+def test_search_draws_from_the_default_domain(pytester: pytest.Pytester) -> None:
+    """Its scenarios are sparse, and have conditions that the world of the paper lacks."""
+    in_default_domain(pytester)
+    result = run(pytester, "--garl-budget=40", "--garl-workers=0")
+    result.stdout.fnmatch_lines(["Good on lawn: 40 flown, *", "domain field, NPCs waypoint"])
+    ledger = Ledger(pytester.path / ".garl" / "ledger.sqlite")
+    scenarios = [parse_scenario(flight.scenario) for flight in ledger.queries.flights()]
+    ledger.close()
+    domain, map = domain_named(DEFAULT_DOMAIN), load_map("lawn")
+    assert [domain.outside(each, map) for each in scenarios] == [()] * 40
+    conditions = {key.partition(".")[0] for each in scenarios for key, _ in each.genes}
+    assert {"wind", "camera", "timing", "navigation"} <= conditions
+    present = [len({key for key, _ in each.genes if "velocity" in key}) for each in scenarios]
+    assert 0 in present
+    assert max(present) <= 3
+
+
+def test_case_that_the_default_domain_found_is_saved_and_flown(pytester: pytest.Pytester) -> None:
+    in_default_domain(pytester)
+    run_cases(pytester, "--garl-budget=40", "--garl-workers=0", "--garl-shrink=60")
+    (case,) = cases(pytester)
+    add_cases_to_git(pytester.path)
+    result = run_cases(pytester, "--garl-workers=0")
+    result.assert_outcomes(xfailed=1, skipped=2)
+    result.stdout.no_fnmatch_line("*outside the domain*")
+    assert load_case(case).scenario["dog-1.velocity"] > 0.7
 
 
 @pytest.mark.parametrize(

@@ -54,11 +54,16 @@ def test_collisions(landing):
 """
 
 
+INI = "[pytest]\ngarl_domain = paper\n"
+"""What the tiny simulator knows of conditions, fog and a dog, no sparse scenario lacks."""
+
+
 def write_project(folder: Path, system: str = "Good", maps: str = "['lawn']") -> None:
     shutil.copy(Path(__file__).with_name("tiny_simulator.py"), folder)
     (folder / "systems.py").write_text(SYSTEMS)
     (folder / "test_it.py").write_text(TESTS.format(system=system, maps=maps))
     (folder / "conftest.py").write_text(CONFTEST)
+    (folder / "pytest.ini").write_text(INI)
 
 
 def project(pytester: pytest.Pytester, system: str = "Good", maps: str = "['lawn']") -> None:

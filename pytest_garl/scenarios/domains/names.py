@@ -7,5 +7,5 @@ HIDDEN = ("paper-full",)
 """What ``--garl-weather=full`` named; read, but not listed."""
 OLD_WEATHER = {"confined": "paper", "full": "paper-full"}
 """The domains that ``--garl-weather`` named."""
-DEFAULT_DOMAIN = "paper"
+DEFAULT_DOMAIN = "field"
 """The domain of a search for which nobody names one."""
