@@ -2,20 +2,19 @@
 
 from __future__ import annotations
 
-import dataclasses
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, get_args
+from typing import Any
 
-from pytest_garl.baselines.pairs import FlightSummary, NoLanding
+from pytest_garl.baselines.pairs import FlightSummary
+from pytest_garl.baselines.rows import RowReader, is_sparse, listed_genes, row_text
 from pytest_garl.errors import BaselineError, GarlError, ScenarioError
 from pytest_garl.files.atomic import write_text_atomically
 from pytest_garl.files.reading import MEGABYTE, read_text
-from pytest_garl.files.toml import LARGEST_INTEGER, Table, finite, parse, quoted
-from pytest_garl.messages import listed, printable, shown
+from pytest_garl.files.toml import Table, parse, quoted
+from pytest_garl.messages import shown
 from pytest_garl.regressions.case_file import read_limits
-from pytest_garl.scenarios.genes import Property, genome_like
 from pytest_garl.scenarios.maps.map import Map
 from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.scenarios.task import Task, read_task, task_lines
@@ -37,10 +36,10 @@ _KEYS = {
     "method",
     "limits",
     "genes",
+    "sparse",
     "task",
     "flights",
 }
-_OUTCOMES = ("landed", "collision", "slid", "not_landed", "gave_up", "crashed", "inconclusive")
 _RENAMED = {"aborted": "gave_up"}
 
 
@@ -129,7 +128,8 @@ def dump_baseline(baseline: Baseline) -> str:
 
 def _set_lines(each: BaselineSet) -> list[str]:
     limits = each.limits
-    keys = [key for key, _ in each.flights[0].scenario.genes]
+    sparse = is_sparse(flight.scenario for flight in each.flights)
+    keys = listed_genes(each.flights[0].scenario, sparse)
     return [
         "[[set]]",
         f"system = {quoted(each.system)}",
@@ -142,27 +142,23 @@ def _set_lines(each: BaselineSet) -> list[str]:
         f"limits = {{ distance_m = {limits.distance_m!r}, time_s = {limits.time_s!r}, "
         f'abort = "{limits.abort}" }}',
         f"genes = [{', '.join(quoted(key) for key in keys)}]",
+        *(
+            [
+                "sparse = true  # a flight ends with further genes; objects without genes are not there"
+            ]
+            * sparse
+        ),
         "# Each: seed, outcome, signature, violation as the paper defines it, why it did not land",
         "# (blocked, excused or needless), [distance in m, time in s] of the landing, SHA-256 of",
-        "# the trajectory, values of the genes.",
+        "# the trajectory, values of the genes" + (", further ones." if sparse else "."),
         "flights = [",
-        *(f"  {_row(flight)}," for flight in each.flights),
+        *(
+            f"  {row_text(flight.scenario, flight.summary, keys, sparse)},"
+            for flight in each.flights
+        ),
         "]",
         *task_lines(each.task, "set."),
     ]
-
-
-def _row(flight: BaselineFlight) -> str:
-    scenario, summary = flight.scenario, flight.summary
-    values = ", ".join(repr(value) for _, value in scenario.genes)
-    landing = ""
-    if summary.distance_m is not None and summary.time_s is not None:
-        landing = f"{summary.distance_m!r}, {summary.time_s!r}"
-    return (
-        f"[{scenario.seed}, {quoted(summary.outcome)}, {quoted(summary.signature)}, "
-        f"{str(summary.paper_violation).lower()}, {quoted(summary.no_landing)}, [{landing}], "
-        f"{quoted(summary.sha256)}, [{values}]]"
-    )
 
 
 def parse_baseline(
@@ -217,19 +213,10 @@ def _check(baseline: Baseline, error: Callable[[str], GarlError]) -> None:
     for each in baseline.sets:
         if not each.flights:
             raise error(f"{each.system} on {each.map}: found no flights, expected at least one")
-        shapes = {
-            (tuple(key for key, _ in flight.scenario.genes), flight.scenario.removed_objects)
-            for flight in each.flights
-        }
         if any(flight.scenario.task != each.task for flight in each.flights):
             raise error(
                 f"{each.system} on {each.map}: found flights to different markers, or from "
                 "different starts, expected the same task for all flights of a set"
-            )
-        if len(shapes) > 1 or any(removed for _, removed in shapes):
-            raise error(
-                f"{each.system} on {each.map}: found scenarios of different genes or without some "
-                "of the map's objects, expected those of a search, with all of them"
             )
 
 
@@ -242,8 +229,7 @@ def _read_set(table: Table, load_map: Callable[[str], Map], schema: int) -> Base
         map = load_map(table.string("map"))
     except ScenarioError as error:
         raise table.error("map", str(error)) from error
-    properties = _read_genes(table, map)
-    like = Scenario(map=map.name, seed=0, genes=(), task=read_task(table))
+    reader = RowReader(table=table, map=map, keys=table.strings("genes"), task=read_task(table))
     rows = table.get("flights")
     if not isinstance(rows, list):
         raise table.error("flights", f"found {shown(rows)}, expected a list of flights")
@@ -257,24 +243,15 @@ def _read_set(table: Table, load_map: Callable[[str], Map], schema: int) -> Base
         method=table.string("method", ""),
         limits=read_limits(table.table("limits")),
         flights=tuple(
-            _read_row(table, f"flights[{index}]", _upgraded(row, schema), like, properties)
+            _flight(reader, f"flights[{index}]", _upgraded(row, schema))
             for index, row in enumerate(rows)
         ),
     )
 
 
-def _read_genes(table: Table, map: Map) -> tuple[Property, ...]:
-    """Return the genes whose values the flights list, in the order of the key ``genes``."""
-    keys = table.strings("genes")
-    genome = genome_like(keys, map)
-    if keys != genome.keys:
-        wrong = sorted({*keys} ^ {*genome.keys})
-        raise table.error(
-            "genes",
-            f"found genes other than those of the map {map.name!r}, or in another order "
-            f"({listed(wrong) or 'order'}); if the map has changed, save a baseline anew",
-        )
-    return genome.properties
+def _flight(reader: RowReader, key: str, row: Any) -> BaselineFlight:
+    scenario, summary = reader.read(key, row)
+    return BaselineFlight(scenario=scenario, summary=summary)
 
 
 def _upgraded(row: Any, schema: int) -> Any:
@@ -285,64 +262,3 @@ def _upgraded(row: Any, schema: int) -> Any:
     if isinstance(outcome, str):
         outcome = _RENAMED.get(outcome, outcome)
     return [seed, outcome, signature, paper_violation, "", [], *rest]
-
-
-def _read_row(
-    table: Table, key: str, row: Any, like: Scenario, properties: tuple[Property, ...]
-) -> BaselineFlight:
-    kinds = (int, str, str, bool, str, list, str, list)
-    if (
-        not isinstance(row, list)
-        or len(row) != len(kinds)
-        or any(type(item) is not kind for item, kind in zip(row, kinds, strict=True))
-    ):
-        raise table.error(
-            key,
-            f"found {shown(row)}, expected [seed, outcome, signature, true or false, why it did "
-            "not land, [distance, time] or [], hash, [genes]]",
-        )
-    seed, outcome, signature, paper_violation, no_landing, landing, sha256, values = row
-    if not 0 <= seed <= LARGEST_INTEGER:
-        raise table.error(
-            key,
-            f"found the seed {shown(seed)}, expected a whole number from 0 to {LARGEST_INTEGER}",
-        )
-    for word, words in ((outcome, _OUTCOMES), (no_landing, get_args(NoLanding))):
-        if word not in words:
-            known = ", ".join(each or "nothing" for each in words)
-            raise table.error(key, f"found {shown(word)}, expected one of {known}")
-    distance_m, time_s = _read_landing(table, key, landing)
-    if len(values) != len(properties):
-        raise table.error(key, f"found {len(values)} values of genes, expected {len(properties)}")
-    for item, value in zip(properties, values, strict=True):
-        number = finite(value)
-        if number is None or not item.low <= number <= item.high:
-            raise table.error(
-                key, f"{item.key}: found {shown(value)}, expected {item.low:g} to {item.high:g}"
-            )
-    genes = tuple((item.key, float(value)) for item, value in zip(properties, values, strict=True))
-    return BaselineFlight(
-        scenario=dataclasses.replace(like, seed=seed, genes=genes),
-        summary=FlightSummary(
-            outcome=outcome,
-            signature=printable(signature),
-            paper_violation=paper_violation,
-            no_landing=no_landing,
-            distance_m=distance_m,
-            time_s=time_s,
-            sha256=printable(sha256),
-        ),
-    )
-
-
-def _read_landing(
-    table: Table, key: str, landing: list[Any]
-) -> tuple[float, float] | tuple[None, None]:
-    """Return distance and time of a landing, None for both without one."""
-    if not landing:
-        return None, None
-    numbers = [finite(each) for each in landing]
-    match numbers:
-        case [float(distance_m), float(time_s)] if distance_m >= 0 and time_s >= 0:
-            return distance_m, time_s
-    raise table.error(key, f"found {shown(landing)}, expected [distance in m, time in s] or []")

@@ -15,6 +15,7 @@ from pytest_garl.baselines.record import BaselineSpec
 from pytest_garl.execution.job import FlightJob
 from pytest_garl.execution.ledger import Ledger
 from pytest_garl.execution.reference import BUILT_IN, Reference
+from pytest_garl.scenarios.domains.reader import domain_named
 from pytest_garl.scenarios.files import dump_scenario
 from pytest_garl.scenarios.maps.map import load_map
 from pytest_garl.verdicts.verdict import Limits
@@ -27,8 +28,14 @@ LANDED = FlightSummary(
 DOG = FlightSummary(outcome="collision", signature="IV:dog:descent:seen", paper_violation=True)
 
 
-def baseline_set(count: int = 3, summary: FlightSummary = LANDED) -> BaselineSet:
-    scenarios = BaselineSpec(count=count).scenarios(LAWN)
+def spec(count: int, domain: str = "paper", seed: int = 0) -> BaselineSpec:
+    return BaselineSpec(count=count, seed=seed, domain=domain_named(domain))
+
+
+def baseline_set(
+    count: int = 3, summary: FlightSummary = LANDED, domain: str = "paper"
+) -> BaselineSet:
+    scenarios = spec(count, domain).scenarios(LAWN)
     return BaselineSet(
         system="stack.landing:Lander",
         map="lawn",
@@ -60,7 +67,7 @@ def job(simulator: Reference = BUILT_IN) -> FlightJob:
 def write_ledger(path: Path, of: FlightJob, method: str = "") -> None:
     ledger = Ledger.create(path, {"method": method} if method else {})
     ledger.add_search("a", "stack.landing:Lander", "lawn", 2, of.dumps())
-    texts = [dump_scenario(each) for each in BaselineSpec(count=2).scenarios(LAWN)]
+    texts = [dump_scenario(each) for each in spec(2).scenarios(LAWN)]
     ledger.add_slots("a", 0, dict(enumerate(texts)))
     claim = ledger.queue.claim()
     assert claim is not None

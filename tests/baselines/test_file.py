@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import dataclasses
+import re
 from pathlib import Path
 
 import pytest
@@ -15,19 +16,19 @@ from pytest_garl.baselines.file import (
     save_baseline,
 )
 from pytest_garl.baselines.pairs import FlightSummary
-from pytest_garl.baselines.record import BaselineSpec
 from pytest_garl.errors import BaselineError, ScenarioError
 from pytest_garl.messages import printable
 from pytest_garl.scenarios.genes import genome_for, group_gene, with_destinations
 from pytest_garl.scenarios.groups.catalogue import GROUPS
-from pytest_garl.scenarios.maps.map import load_map
+from pytest_garl.scenarios.maps.map import Map, load_map
+from pytest_garl.scenarios.task import Start, Task
 from pytest_garl.search.methods.random import random_scenarios
-from tests.baselines.samples import COURT, DOG, LANDED, LAWN, baseline, baseline_set
+from tests.baselines.samples import COURT, DOG, LANDED, LAWN, baseline, baseline_set, spec
 
 
 def test_saving_and_loading_keeps_a_baseline_and_its_bytes(tmp_path: Path) -> None:
     court = dataclasses.replace(baseline_set(), map="court", map_sha256=COURT.sha256, flights=())
-    scenarios = BaselineSpec(count=2, seed=5).scenarios(COURT)
+    scenarios = spec(2, seed=5).scenarios(COURT)
     court = dataclasses.replace(
         court, flights=tuple(BaselineFlight(scenario=each, summary=DOG) for each in scenarios)
     )
@@ -105,6 +106,57 @@ def test_the_file_keeps_destinations() -> None:
     assert parse_baseline(dump_baseline(bound), load_map) == bound
 
 
+@pytest.mark.parametrize("domain", ["field", "calm"])
+@pytest.mark.parametrize("map", [LAWN, COURT], ids=["lawn", "court"])
+def test_the_file_keeps_sparse_scenarios(tmp_path: Path, map: Map, domain: str) -> None:
+    scenarios = spec(60, domain).scenarios(map)
+    assert len({each.removed_objects for each in scenarios}) > 2
+    flights = tuple(BaselineFlight(scenario=each, summary=LANDED) for each in scenarios)
+    one = dataclasses.replace(baseline_set(), map=map.name, map_sha256=map.sha256, flights=flights)
+    for each in (one, *(dataclasses.replace(one, flights=(flight,)) for flight in flights)):
+        text = dump_baseline(baseline(each))
+        assert parse_baseline(text, load_map) == baseline(each)
+        assert dump_baseline(parse_baseline(text, load_map)) == text
+
+
+def test_a_sparse_flight_is_one_short_line() -> None:
+    text = dump_baseline(baseline(baseline_set(60, domain="field")))
+    assert text.count("environment.fog") == 1
+    assert len(text) < 60 * 550 + 2500
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "words"),
+    [
+        ("{}", '{"wind.heat" = 1.0}', "found the gene 'wind.heat', expected a condition, or a "),
+        ("{}", '{"wind.mean_mps" = 900.0}', "wind.mean_mps: found 900.0, expected 0 to "),
+        ("{}", '{"cat-1.velocity" = 1.0}', "found the gene 'cat-1.velocity'"),
+        ("{}", '{"dog-1.velocity" = 1.0}', "dog-1: dog-1.start_x, dog-1.start_y missing"),
+        ("{}", '{"wind.mean_mps" = nan}', "wind.mean_mps: found nan"),
+        ("{}", "3", r"hash, \[genes\], {further genes}\]"),
+        ("sparse = true", "sparse = 1", r"'set\[0\].sparse': found 1"),
+        ("sparse = true", "sparse = false", r"hash, \[genes\]\]"),
+        ('"environment.fog", ', "", r"'set\[0\].genes': found genes other .*\(environment.fog\)"),
+    ],
+)
+def test_the_error_of_a_broken_sparse_flight_says_what_was_expected(
+    old: str, new: str, words: str
+) -> None:
+    (only, *_) = (
+        each
+        for each in baseline_set(60, domain="calm").flights
+        if not {name.partition(".")[0] for name, _ in each.scenario.genes}
+        - {"environment", "marker", "told"}
+    )
+    text = dump_baseline(baseline(dataclasses.replace(baseline_set(), flights=(only,))))
+    end = text.index("flights = [")
+    text = text[:end] + re.sub(r"{.*}", "{}", text[end:])
+    at = text.rindex(old)
+    with pytest.raises(ScenarioError, match=words) as caught:
+        parse_baseline(text[:at] + text[at:].replace(old, new, 1), load_map, source="base.toml")
+    assert "base.toml" in str(caught.value)
+
+
 @pytest.mark.parametrize(
     ("old", "new", "words"),
     [
@@ -140,13 +192,13 @@ def test_the_error_of_a_missing_file_names_the_command_that_writes_one(tmp_path:
 
 def test_save_refuses_sets_that_no_file_can_hold(tmp_path: Path) -> None:
     each = baseline_set()
-    dog = next(name for name, kind in LAWN.present_objects if kind == "dog")
-    small = dataclasses.replace(each.flights[0], scenario=each.flights[0].scenario.without(dog))
-    mixed = dataclasses.replace(each, flights=(*each.flights[1:], small))
+    hover = dataclasses.replace(each.flights[0].scenario, task=Task(start=Start(mode="hover")))
+    other = dataclasses.replace(each.flights[0], scenario=hover)
+    mixed = dataclasses.replace(each, flights=(*each.flights[1:], other))
     for wrong, words in (
         ((each, each), "twice"),
         ((dataclasses.replace(each, flights=()),), "found no flights"),
-        ((mixed,), "different genes or without some"),
+        ((mixed,), "different markers, or from different starts"),
     ):
         with pytest.raises(BaselineError, match=words):
             save_baseline(tmp_path / "base.toml", baseline(*wrong))

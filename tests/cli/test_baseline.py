@@ -76,7 +76,7 @@ def test_diff_flies_each_checkout_with_its_own_modules_and_lists_broken_pairs(
     checkouts: Path,
 ) -> None:
     (checkouts / "head" / "stack" / "helper.py").write_text(WRONG)
-    result = diff("--count=24")
+    result = diff("--count=24", "--domain=paper")
     assert result.exit_code == 1, result.output
     assert re.search(r"lawn-\d+ +broke +landed +V:ValueError@helper.decide", result.output)
     assert re.search(r"lawn-\d+ +changed +IV:dog:last-metre:unseen +V:", result.output)
