@@ -142,12 +142,7 @@ def _set_lines(each: BaselineSet) -> list[str]:
         f"limits = {{ distance_m = {limits.distance_m!r}, time_s = {limits.time_s!r}, "
         f'abort = "{limits.abort}" }}',
         f"genes = [{', '.join(quoted(key) for key in keys)}]",
-        *(
-            [
-                "sparse = true  # a flight ends with further genes; objects without genes are not there"
-            ]
-            * sparse
-        ),
+        *(["sparse = true  # a flight ends with further genes; other objects are absent"] * sparse),
         "# Each: seed, outcome, signature, violation as the paper defines it, why it did not land",
         "# (blocked, excused or needless), [distance in m, time in s] of the landing, SHA-256 of",
         "# the trajectory, values of the genes" + (", further ones." if sparse else "."),
