@@ -21,6 +21,8 @@ LOOKS: tuple[tuple[float, float, float], ...] = (
 """Ways to look at a frame, as sizes in marker cells: of an opening, which removes flakes and
 other bright specks; of a closing, which removes leaves and other dark ones; and of the
 neighbourhood whose brightest grey counts as white, which removes the edges of shadows."""
+SMALLEST_SHARE = 0.4
+"""What is smaller than this share of the marker, seen from the height of the search, is noise."""
 LARGEST_CELL_PX = 9.0
 """Larger cells are shrunk to this: near the ground as much is found, in half the time."""
 MAX_REPROJECTION_PX = 2.0
@@ -37,9 +39,7 @@ class OpenCvDetector:
             getattr(cv2.aruco, mission.marker_dictionary)
         )
         parameters = cv2.aruco.DetectorParameters()
-        # 24 px of side at 10 m in 320x240 is a perimeter rate of 0.3; half of that is noise.
-        # A smaller marker is smaller in the frame.
-        parameters.minMarkerPerimeterRate = 0.12 * min(1.0, mission.marker_side_m / 1.5)
+        parameters.minMarkerPerimeterRate = SMALLEST_SHARE * _perimeter_rate(mission)
         parameters.adaptiveThreshWinSizeMin = 5
         parameters.adaptiveThreshWinSizeMax = 25
         parameters.adaptiveThreshWinSizeStep = 20
@@ -130,6 +130,13 @@ class OpenCvDetector:
         scale = height / -offset[2]
         x, y = observation.position_m[:2] + scale * offset[:2]
         return float(x), float(y), 0.0
+
+
+def _perimeter_rate(mission: Mission) -> float:
+    """Return the marker's perimeter in pixels over the frame's longer side, as searched for."""
+    camera = mission.camera
+    side_px = camera.focal_px * mission.marker_side_m / mission.search_altitude_m
+    return 4 * side_px / max(camera.width_px, camera.height_px)
 
 
 def _cleaned(grey: NDArray[Any], look: int, cell_px: float) -> NDArray[Any]:

@@ -174,7 +174,6 @@ def decoys_of(scenario: Scenario, map: Map) -> tuple[Decoy, ...]:
         kind = decoy_groups.KINDS[math.ceil(scenario[f"{group.name}.kind"])]
         if kind == "none":
             continue
-        other = (spec.id + 1) % DICTIONARIES[spec.dictionary].size
         found.append(
             Decoy(
                 name=group.name,
@@ -186,10 +185,17 @@ def decoys_of(scenario: Scenario, map: Map) -> tuple[Decoy, ...]:
                 yaw_rad=math.radians(scenario[f"{group.name}.yaw_deg"]),
                 side_m=spec.side_m,
                 dictionary=spec.dictionary,
-                id=other if kind == "other-id" else spec.id,
+                id=_other_id(spec) if kind == "other-id" else spec.id,
             )
         )
     return tuple(found)
+
+
+def _other_id(spec: MarkerSpec) -> int:
+    """Return the next id that is not on the board."""
+    size, taken = DICTIONARIES[spec.dictionary].size, {each.id for each in spec.markers}
+    ids = ((spec.id + step) % size for step in range(1, size))
+    return next(each for each in ids if each not in taken)
 
 
 def told_position_m(scenario: Scenario, map: Map) -> tuple[float, float]:

@@ -7,8 +7,10 @@ import math
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 
+from pytest_garl.errors import ScenarioError
 from pytest_garl.fiducial import MarkerSpec
 from pytest_garl.scenarios.bodies import Body, Part, rotate
+from pytest_garl.scenarios.groups.catalogue import GROUPS
 from pytest_garl.scenarios.groups.decoys import REACH_M
 from pytest_garl.scenarios.groups.pad import CLEARANCE
 from pytest_garl.scenarios.maps.map import Map
@@ -127,7 +129,9 @@ def repair(scenario: Scenario, map: Map) -> Scenario:
 
 
 def _nearest(
-    origin: tuple[float, float], valid: Callable[[tuple[float, float]], bool]
+    origin: tuple[float, float],
+    valid: Callable[[tuple[float, float]], bool],
+    within_m: float = 200.0,
 ) -> tuple[float, float]:
     """Search rings of growing radius; a hundredth of a ring beyond so that rounding is harmless."""
     ring = 0
@@ -140,10 +144,8 @@ def _nearest(
             at = round(x, PLACE_DIGITS), round(y, PLACE_DIGITS)
             if valid(at):
                 return at
-        if ring * _RING_STEP_M > 200:
-            from pytest_garl.errors import ScenarioError
-
-            raise ScenarioError("no valid place within 200 m; the map leaves no room")
+        if ring * _RING_STEP_M > within_m:
+            raise ScenarioError(f"no valid place within {within_m:g} m; the map leaves no room")
 
 
 def clearance_m(marker: MarkerSpec, wanted_m: float = CLEARANCE.nominal) -> float:
@@ -193,6 +195,7 @@ def _decoy_problems(scenario: Scenario, map: Map, among: str = "") -> Iterable[s
 
 
 def _with_free_decoys(scenario: Scenario, map: Map) -> Scenario:
+    """Return the scenario with each decoy moved to where it is free, or without it if none is."""
     for decoy in decoys_of(scenario, map):
         x, y = f"{decoy.name}.x_m", f"{decoy.name}.y_m"
 
@@ -207,7 +210,11 @@ def _with_free_decoys(scenario: Scenario, map: Map) -> Scenario:
 
         place = scenario[x], scenario[y]
         if not free(place):
-            scenario = moved(_nearest(place, free))
+            try:
+                scenario = moved(_nearest(place, free, 2 * math.hypot(REACH_M, REACH_M)))
+            except ScenarioError:
+                # A marker of several metres and its like can fill the square.
+                scenario = scenario.replace(GROUPS[decoy.name].nominal)
     return scenario
 
 

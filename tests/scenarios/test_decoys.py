@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from pytest_garl import Camera
+from pytest_garl.fiducial import MarkerSpec, NestedMarker
 from pytest_garl.scenarios.chromosome import decode
 from pytest_garl.scenarios.files import dumps, loads
 from pytest_garl.scenarios.genes import genome_for
@@ -17,6 +18,8 @@ from pytest_garl.scenarios.groups.decoys import KINDS
 from pytest_garl.scenarios.maps.map import load_map
 from pytest_garl.scenarios.placement import decoys_of, marker_position_m
 from pytest_garl.scenarios.scenario import Scenario
+from pytest_garl.scenarios.task import Task
+from pytest_garl.scenarios.units import conditions_in_words
 from pytest_garl.scenarios.validity import problems, repair
 from pytest_garl.simulation.camera.renderer import Renderer
 from pytest_garl.simulation.randomness import generator
@@ -87,3 +90,26 @@ def test_an_active_decoy_has_a_kind_and_a_cause_names_it_by_that() -> None:
     found = decoys_of(scenario_on("lawn", values), MAPS["lawn"])
     assert [each.kind for each in found] == ["other-id", "other-id"]
     assert {each.layer.name for each in found} == {"decoy-other-id"}
+
+
+def test_another_id_is_not_one_of_the_board() -> None:
+    nested = (NestedMarker(id=1, side_m=0.3), NestedMarker(id=2, side_m=0.2, offset_m=(0.5, 0.0)))
+    scenario = scenario_on("lawn", {"decoy-1.kind": 1.0})
+    scenario = dataclasses.replace(scenario, task=Task(marker=MarkerSpec(nested=nested)))
+    assert [each.id for each in decoys_of(scenario, MAPS["lawn"])] == [3]
+
+
+def test_a_decoy_without_room_is_left_out() -> None:
+    values = {f"decoy-{number}.kind": 4.0 for number in (1, 2, 3)}
+    wide = MarkerSpec(side_m=5.0, nested=(NestedMarker(id=9, side_m=1.0, offset_m=(5.0, 5.0)),))
+    genome = genome_for(MAPS["lawn"])
+    scenario = decode(genome.nominal, genome, map="lawn", seed=5).replace(values)
+    scenario = repair(dataclasses.replace(scenario, task=Task(marker=wide)), MAPS["lawn"])
+    assert problems(scenario, MAPS["lawn"]) == ()
+    assert decoys_of(scenario, MAPS["lawn"]) == ()
+    assert repair(scenario, MAPS["lawn"]) == scenario
+
+
+def test_a_reader_sees_the_name_of_the_kind() -> None:
+    scenario = scenario_on("lawn", {"decoy-1.kind": 0.9, "decoy-1.x_m": 4.0})
+    assert ("decoy-1.kind", "other-id") in conditions_in_words(scenario, MAPS["lawn"])

@@ -12,6 +12,8 @@ Array = NDArray[np.float32]
 CLASS_IDS = (0, 1, 2, 3)
 """Ids that the network distinguishes as in the paper's published detector (marker0 to marker3); a
 marker of another id belongs to no class and is not reported."""
+BITS = "DICT_5X5_"
+"""How the names of their dictionaries begin: OpenCV's 5x5 ones share their first ids."""
 STRIDES = (4, 8, 16, 32)
 CHANNELS = 5
 """Centre x and y, logarithms of width and height, objectness."""

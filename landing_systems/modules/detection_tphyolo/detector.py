@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from landing_systems.modules.detection_opencv import CAMERA_FROM_BODY, rotation_matrix
 from landing_systems.modules.detection_tphyolo.decoding import (
+    BITS,
     CLASS_IDS,
     NETWORK_SIZE,
     class_logit,
@@ -42,7 +43,8 @@ class TphYoloDetector:
     """Finds markers in frames by the learned network and places them in the world.
 
     Below ``whole_below_m`` a marker that the frame cuts does not count.  Raises WeightsError for
-    weights that are missing, damaged or not what their manifest says.
+    weights that are missing, damaged or not what their manifest says, ValueError for a marker that
+    the network does not know.
     """
 
     def __init__(
@@ -53,6 +55,13 @@ class TphYoloDetector:
         min_confidence: float = MIN_CONFIDENCE,
         whole_below_m: float = WHOLE_BELOW_M,
     ) -> None:
+        if not mission.marker_dictionary.startswith(BITS) or mission.marker_id not in CLASS_IDS:
+            raise ValueError(
+                f"TPH-YOLO: found marker {mission.marker_id} of {mission.marker_dictionary}, "
+                f"expected one of {', '.join(map(str, CLASS_IDS))} of DICT_5X5_50, which its "
+                "network was trained on; take such a marker, train the network "
+                "(landing_systems/training/tphyolo), or use OpenCV-MLS"
+            )
         files = read_weights(weights)
         self._boxes, self._ids = load_network(files.boxes), load_network(files.ids)
         self._slope, self._offset = files.calibration

@@ -47,8 +47,8 @@ def _group(number: int) -> Group:
                 source="other ids of the family: personalrobotics/apriltags issue 18; a missing "
                 "margin: opencv_contrib issue 1698; H: ICAO Annex 14; boards of squares: opencv "
                 "issue 24117; windows: zoloto issue 207; things on the ground: apriltag issue 361; "
-                "high-contrast patterns such as grates and QR codes: personalrobotics/apriltags "
-                "issue 18",
+                "high-contrast patterns, of which a grate and a QR code are two: "
+                "personalrobotics/apriltags issue 18",
             ),
             _place("x", "east"),
             _place("y", "north"),

@@ -213,3 +213,14 @@ def test_flying_needs_neither_torch_nor_the_simulator() -> None:
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout.strip() == "[]"
+
+
+@pytest.mark.parametrize(("dictionary", "number"), [("DICT_APRILTAG_36h11", 0), ("DICT_5X5_50", 7)])
+def test_a_marker_that_the_network_does_not_know_is_refused(dictionary: str, number: int) -> None:
+    unknown = dataclasses.replace(mission(), marker_dictionary=dictionary, marker_id=number)
+    with pytest.raises(ValueError, match=f"found marker {number} of {dictionary}, expected one of"):
+        TphYoloDetector(unknown)
+
+
+def test_a_larger_dictionary_of_the_same_bits_is_accepted() -> None:
+    TphYoloDetector(dataclasses.replace(mission(), marker_dictionary="DICT_5X5_1000", marker_id=3))
