@@ -26,7 +26,7 @@ RUN_BY = {
     "garl check my_landing:MyLandingSystem": ("tests/cli/test_check.py", "check"),
     "pytest --garl-budget=40 test_my_landing.py": ("tests/test_pages.py", "--garl-budget"),
     TRY: ("tests/test_tutorial.py", "copytree"),
-    "pytest --garl-budget=16 --garl-shrink=16 --garl-domain=paper test_my_landing.py": (
+    "pytest --garl-budget=16 --garl-shrink=16 test_my_landing.py": (
         "tests/test_tutorial.py",
         "transcript",
     ),
@@ -131,7 +131,7 @@ def test_readme_explains_every_type_of_violation() -> None:
 
 
 def test_readme_shows_output_of_the_tutorial() -> None:
-    (output,) = (block for block in indented(README) if block[0].startswith("IV:"))
+    (output,) = (block for block in indented(README) if block[0].startswith("II:"))
     assert len(output) <= MOST_LINES
     tutorial = [line.split() for line in (DOCS / "tutorial.md").read_text().splitlines()]
     assert [line for line in output if line.split() not in [*tutorial, ["..."]]] == []
@@ -146,7 +146,7 @@ def test_every_command_of_the_readme_is_run() -> None:
     shown = {
         line.partition("#")[0].strip()
         for block in indented(README)
-        if not block[0].startswith("IV:")
+        if not block[0].startswith("II:")
         for line in block
     }
     assert shown == set(RUN_BY)
