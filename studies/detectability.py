@@ -24,14 +24,15 @@ from numpy.typing import NDArray
 from pytest_garl import cpu_dispatch
 from pytest_garl.simulation.flight import MarkerView
 from pytest_garl.verdicts.detectability import COEFFICIENTS, Network, features
+from studies.detectability_conditions import CONDITIONS
 from studies.detectability_fit import fit
-from studies.detectability_frames import GENES, KINDS, MAPS, Detectors, Kind, ReadFrame, read_frames
+from studies.detectability_frames import KINDS, MAPS, Detectors, Kind, ReadFrame, read_frames
 from studies.detectability_page import page
 from studies.detectability_report import WHOLE, Sample, draw
 
 Array = NDArray[np.float64]
 FIELDS = tuple(field.name for field in dataclasses.fields(MarkerView))
-COLUMNS = ("scenario", "map", *GENES, "height_m", *FIELDS, "stock", "good", "learned")
+COLUMNS = ("scenario", "map", *CONDITIONS, "height_m", *FIELDS, "stock", "good", "learned")
 CHUNK = 20
 DIAGRAM = Path("pictures", "detectability.png")
 
@@ -42,7 +43,7 @@ def table_of(frames: Iterable[ReadFrame]) -> Array:
         (
             each.scenario,
             MAPS.index(each.map),
-            *each.genes,
+            *each.conditions,
             each.height_m,
             *dataclasses.astuple(each.view),
             *each.read,
@@ -100,7 +101,7 @@ def held_out(tables: Sequence[Array]) -> list[Sample]:
 def sample_of(table: Array, predicted: Array) -> Sample:
     """Return the rows with their predictions (4, n), in the order of ``Sample``'s fields."""
     column = {name: table[:, index] for index, name in enumerate(COLUMNS)}
-    first = COLUMNS.index(GENES[0])
+    first = COLUMNS.index(CONDITIONS[0])
     return Sample(
         predicted=predicted[0],
         by_size=predicted[1],
@@ -108,7 +109,7 @@ def sample_of(table: Array, predicted: Array) -> Sample:
         constant=predicted[3],
         read_by=reads_of(table),
         map=column["map"],
-        genes=table[:, first : first + len(GENES)],
+        conditions=table[:, first : first + len(CONDITIONS)],
         height_m=column["height_m"],
         share_in_frame=column["share_in_frame"],
         hidden=(column["border_hidden"] + column["bits_hidden"]) / 2,

@@ -22,10 +22,12 @@ from pytest_garl.scenarios.object_types import OBJECT_TYPES
 from pytest_garl.scenarios.placement import MARKER_DICTIONARY, MARKER_SIDE_M, TARGET_MARKER_ID
 from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.scenarios.validity import repair
+from pytest_garl.simulation.camera.cover_event import renderer_of
 from pytest_garl.simulation.camera.projection import View, eye_under
-from pytest_garl.simulation.camera.renderer import Renderer
 from pytest_garl.simulation.camera.solids import BodyPose
+from pytest_garl.simulation.camera.true_camera import true_camera
 from pytest_garl.simulation.flight import MarkerView
+from studies.detectability_conditions import CONDITIONS, random_conditions, random_movement
 
 SEED = 260_000
 MAPS = ("court", "lawn")
@@ -47,7 +49,6 @@ RIGHT_WITHIN_M = MARKER_SIDE_M / 2
 CONFIRMED = 0.8
 """Confidence from which the reference landing systems act on a detection."""
 DETECTORS = ("stock", "good", "learned")
-GENES = (*(name for name, _ in WEATHER), "sun_position")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -56,7 +57,7 @@ class ReadFrame:
 
     scenario: int
     map: str
-    genes: tuple[float, ...]
+    conditions: tuple[float, ...]
     height_m: float
     view: MarkerView
     read: tuple[bool, ...]
@@ -131,7 +132,7 @@ def _is_there(place_m: Sequence[float], frame: DrawnFrame) -> bool:
 
 
 def random_scenario(rng: np.random.Generator, map: Map) -> Scenario:
-    """Draw a valid scenario over the full range of all genes.
+    """Draw a valid scenario over the full range of all conditions that change a picture.
 
     Some genes have any value and the others are confined or zero, because nothing could be read
     nearly anywhere if all were high at once.
@@ -153,7 +154,8 @@ def random_scenario(rng: np.random.Generator, map: Map) -> Scenario:
         values[SUN] = float(rng.uniform(0.35, 0.65))
     chromosome = np.array([values[key] for key in genome.keys])
     seed = int(rng.integers(2**31))
-    return repair(decode(chromosome, genome, map=map.name, seed=seed), map)
+    scenario = decode(chromosome, genome, map=map.name, seed=seed)
+    return repair(scenario.replace(random_conditions(rng)), map)
 
 
 def random_pose(
@@ -215,12 +217,13 @@ def drawn_frames(number: int, kind: Kind) -> Iterator[tuple[DrawnFrame, Scenario
     rng = np.random.default_rng([SEED, KINDS.index(kind), number])
     map = load_map(MAPS[number % len(MAPS)])
     scenario = random_scenario(rng, map)
-    renderer = Renderer(scenario, map, CAMERA, rng)
+    renderer = renderer_of(scenario, map, true_camera(CAMERA, scenario))
     for _ in range(FRAMES):
         position, attitude = random_pose(rng, renderer.marker_m, kind)
         objects = random_objects(rng, map, renderer.marker_m)
         eye = eye_under(position, attitude)
-        frame = renderer.render(eye, attitude, float(rng.uniform(0, 120)), objects)
+        time_s, movement = float(rng.uniform(0, 120)), random_movement(rng)
+        frame = renderer.render(eye, attitude, time_s, objects, movement)
         view = frame.marker
         if view is None:
             continue
@@ -269,7 +272,7 @@ def read_frames(number: int, detectors: Detectors, kind: Kind = "usual") -> list
         ReadFrame(
             scenario=number,
             map=scenario.map,
-            genes=tuple(scenario[f"environment.{name}"] for name in GENES),
+            conditions=tuple(scenario[key] for key in CONDITIONS),
             height_m=float(frame.observation.position_m[2]),
             view=frame.view,
             read=detectors.read(frame),

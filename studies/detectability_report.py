@@ -11,8 +11,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from pytest_garl.scenarios.genes import SUN
+from studies.detectability_conditions import CONDITIONS, RANGES
 from studies.detectability_fit import Bin, auc, brier, deciles, tenths
-from studies.detectability_frames import DETECTORS, GENES, MAPS
+from studies.detectability_frames import DETECTORS, MAPS
 
 Array = NDArray[np.float64]
 WHOLE = 0.9
@@ -20,8 +22,10 @@ WHOLE = 0.9
 ENOUGH = 500
 """A group of frames counts in the worst error from this size on."""
 _BANDS: tuple[float, ...] = (0.0, 0.15, 0.4, 1.0)
+_SHARES: tuple[float, ...] = (0.0, 0.3, 0.6, 1.0)
 _SUN_BANDS: tuple[float, ...] = (0.0, 0.1, 0.3, 0.7, 0.9, 1.0)
-"""Bands of a gene: confined, transition, and strong; night, low and high sun."""
+"""Bands of a gene: confined, transition, and strong; night, low and high sun.  ``_SHARES`` are
+those of a further condition, as shares of its range."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -37,7 +41,7 @@ class Sample:
     constant: Array
     read_by: Array
     map: Array
-    genes: Array
+    conditions: Array
     height_m: Array
     share_in_frame: Array
     hidden: Array
@@ -56,7 +60,7 @@ class Sample:
 
 
 def groups(sample: Sample) -> Iterator[tuple[str, Sample]]:
-    """Yield the frames by map, height, size, hidden share and bands of each gene."""
+    """Yield the frames by map, height, size, hidden share and bands of each condition."""
     for index, name in enumerate(MAPS):
         yield f"map {name}", sample.where(sample.map == index)
     for what, values, edges in (
@@ -65,9 +69,18 @@ def groups(sample: Sample) -> Iterator[tuple[str, Sample]]:
         ("hidden share", sample.hidden, (0.0, 0.05, 0.15, 0.3, 1.0)),
     ):
         yield from _bands(sample, what, values, edges)
-    for index, name in enumerate(GENES):
-        bands = _SUN_BANDS if name == "sun_position" else _BANDS
-        yield from _bands(sample, name, sample.genes[:, index], bands)
+    for index, key in enumerate(CONDITIONS):
+        name, values = key.removeprefix("environment."), sample.conditions[:, index]
+        if key not in RANGES:
+            yield from _bands(sample, name, values, _SUN_BANDS if key == SUN else _BANDS)
+            continue
+        # The sign plays no part; 0 is a band of its own.
+        share = np.abs(values) / RANGES[key][1]
+        yield f"{name}, none", sample.where(share == 0)
+        for low, high in itertools.pairwise(_SHARES):
+            end = RANGES[key][1]
+            chosen = (share > low) & (share <= high)
+            yield f"{name}, {low * end:g} to {high * end:g}", sample.where(chosen)
 
 
 def _bands(

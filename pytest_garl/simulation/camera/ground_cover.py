@@ -24,6 +24,10 @@ _HALF_OPAQUE_M = 0.01
 """Depth at which half of the light is reflected by the snow: d / (d + h) with h of 7 mm for fresh
 snow (grains of 0.1 mm, 100 kg/m3) and 12 mm for melting snow (0.5 mm, 300 kg/m3), from two streams
 without absorption and the asymmetry 0.89 of Wiscombe and Warren (1980)."""
+_SPREAD_PER_M = math.pi / 0.2
+"""Light that scatters through snow also goes sideways: after a depth d a pattern of stripes 0.2 m
+wide, as the modules of a marker are, has q d / sinh(q d) of the contrast that is left to an even
+light, with q = pi / 0.2 m (diffusion without absorption through a layer, decomposed into waves)."""
 _EDGE_SLOPE = 0.3
 """Slope of the snow's surface, root mean square: bare ground warms the air, which melts a patch
 from its edges (Liston 1995), so that these are steeper than fallen snow; engineering estimate."""
@@ -95,7 +99,11 @@ def _snow_opacity(share: float) -> NDArray[np.uint8]:
     # Shares fall with the level.
     edge = _LEVELS - int(np.searchsorted(_snow_shares()[::-1], share, side="right"))
     depth = np.maximum(depths - depths[min(edge, _LEVELS - 1)] + _HALF_OPAQUE_M, 0)
-    opacity: NDArray[np.uint8] = np.round(255 * depth / (depth + _HALF_OPAQUE_M)).astype(np.uint8)
+    spread = np.maximum(_SPREAD_PER_M * depth, 1e-9)
+    through = _HALF_OPAQUE_M / (depth + _HALF_OPAQUE_M) * spread / np.sinh(spread)
+    # No snow lies where the depth is 0.
+    shown = np.where(depth > 0, 1 - through, 0.0)
+    opacity: NDArray[np.uint8] = np.round(255 * shown).astype(np.uint8)
     return opacity
 
 
