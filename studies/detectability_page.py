@@ -117,20 +117,22 @@ of one module; nine places of each module are looked at.
 | `share_in_frame`, `edge_modules` | share in the frame; modules from the marker to the edge |
 | `border_hidden`, `bits_hidden`, `margin_hidden` | shares that things turn into the other colour |
 | `contrast`, `noise` | grey levels between white and black in the picture; the sensor's noise |
-| `uneven_light` | standard deviation of the light on the marker, as at a shadow's edge |
+| `uneven_light` | standard deviation of the light on the marker, as at a shadow's edge or behind dirt |
 | `clutter` | share of the picture that falling things are expected to cover |
-| `blur_px` | length of the motion blur; 0, because the simulated camera has none |
+| `blur_px` | how far the marker moves over the picture while it is exposed |
 
-Black that snow turns white counts in full and white under snow does not count. A leaf counts in
-part on either.
+Black that snow turns white counts in full and white under snow does not count. A leaf, and ground
+where the paint is worn off, count in part on either.
 
 ## How it was calibrated
 
-{frames} frames were drawn from random scenarios of both maps: all nine genes of the environment
-over their full range, any place of the marker and of the sun, people, dogs and birds on and
-beside the marker, heights from 0.5 to 12 m, tilts up to 20°, all headings. Places and genes were
-drawn so that many frames are neither easy nor hopeless, so the shares below are not those of
-flights. A frame is read if one of three detectors finds id 0 within 0.75 m of the marker's
+{frames} frames were drawn from random scenarios of both maps: weather and light over their full
+range, any place and turn of the marker and of the sun, people, dogs and birds on and beside the
+marker, heights from 0.5 to 12 m, tilts up to 20°, all headings; in a quarter of the scenarios each,
+over all that a file may name: a worn marker, a tarpaulin over it, an exposure time while the UAV
+moves and turns, dirt on the lens, a wrong focal length, a decoy. An error of the camera's mounting is a
+tilt like others. Places and values were drawn so that many frames are neither easy nor hopeless, so
+the shares below are not those of flights. A frame is read if one of three detectors finds id 0 within 0.75 m of the marker's
 middle: OpenCV's ArUco with its stock parameters; ArUco with the parameters of OpenCV-MLS and all
 four of its ways to look at a frame; the [learned detector](detection.md) with a confidence of at
 least 0.8. The learned detector ignores markers that the frame cuts below 2 m. This is a decision
@@ -170,7 +172,7 @@ and {hopeless} % of the {without_hope} frames with at most 0.1 are read. Of {cut
 than 90 % of the marker in them, {cut_predicted} are predicted to be read and {cut_read} are.
 
 Further frames are part of the fit and not of the tables: frames that were blurred after they were
-painted, because the simulated camera has no motion blur; frames from 12 to 45 m, where modules
+painted, farther than an exposure between two frames blurs; frames from 12 to 45 m, where modules
 are smaller than a flight with the default camera shows them; frames from 0.25 to 10 m whose edge
 cuts most markers.
 
@@ -178,7 +180,7 @@ cuts most markers.
 | --- | ---: | ---: | ---: | ---: | ---: |
 {others}
 
-## By map, height, size and gene
+## By map, height, size and condition
 
 The largest error of a group of equal size is, per map: {by_map}. The groups of at least
 {enough} frames whose mean prediction errs most:
@@ -194,8 +196,7 @@ The largest error of a group of equal size is, per map: {by_map}. The groups of 
 
 ## Limits
 
-- It is about this camera model and this marker: a pinhole without distortion, no motion blur, no
-  rolling shutter, one dictionary. Sizes are in pixels per module, so that other cameras and
+- It is about this camera model and this marker: a pinhole, no rolling shutter, one dictionary. Sizes are in pixels per module, so that other cameras and
   heights are covered within the range above.
 - It tells whether a frame can be read by one of these three detectors. The learned one reads
   nearly all of what any reads, and far more than ArUco does: a lump of snow across the border

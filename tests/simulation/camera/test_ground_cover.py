@@ -62,3 +62,16 @@ def test_snow_is_thin_at_its_edge() -> None:
     )
     shares = (seen - ground).mean(axis=2) / np.maximum(240 - ground.mean(axis=2), 1)
     assert ((shares > 0.25) & (shares < 0.75)).mean() > 0.02
+
+
+def test_nothing_shines_through_deep_snow() -> None:
+    made, _ = renderer(genes={"road_snow": 0.9})
+    bare, _ = renderer()
+    x, y = made.marker_m
+    far_away = [((50.0, 50.0, 0.0), 0.0)] * 3
+    seen, ground = (
+        each.render((x, y, 8.0), LEVEL, 0.0, far_away).image.astype(float) for each in (made, bare)
+    )
+    shares = (seen - ground).mean(axis=2) / np.maximum(240 - ground.mean(axis=2), 1)
+    # An even light would leave 2 % of the ground's contrast in half of the picture.
+    assert np.median(shares) > 0.99
