@@ -6,6 +6,7 @@ The frames and units are those of ``landing_system.py``.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Literal, get_args
 
@@ -19,7 +20,9 @@ if TYPE_CHECKING:
 MAX_RATE_HZ = 240.0
 """The rate of the physics: nothing can be asked more often."""
 
-
+MOST_WIDENING = 3.0
+"""A lens may show at most so many times the width and the height that a pinhole with the same
+picture and focal length shows."""
 _MOST_PIXELS = 3840 * 2160
 NavigationKind = Literal["rtk", "gnss", "ideal"]
 """What the vehicle's navigation rests on."""
@@ -48,18 +51,20 @@ class Camera:
     """A pinhole camera under the UAV's belly, looking along the body's -z axis.
 
     Image right (+u) is the body's right (-y); image down (+v) is the body's back (-x).
-    At zero yaw (nose east) the image's top is east and its right is south.  There is no
-    lens distortion.  The default is 320x240 at 10 Hz with 90 degrees of horizontal field
+    At zero yaw (nose east) the image's top is east and its right is south.  ``distortion`` are
+    the coefficients of its lens in OpenCV's order, k1, k2, p1, p2[, k3[, k4, k5, k6]]; none: a
+    pinhole.  The default is 320x240 at 10 Hz with 90 degrees of horizontal field
     of view; the paper's code used 640x480.  Raises LandingSystemError for a camera that cannot be
     simulated: fewer than 16 pixels on a side, more than 3840x2160 in all, a field of view
     outside 0.05 to 3 rad (towards pi the image plane grows without limit), a rate outside
-    0.1 to 240 Hz.
+    0.1 to 240 Hz, a distortion that folds back within the picture.
     """
 
     width_px: int = 320
     height_px: int = 240
     field_of_view_rad: float = math.pi / 2
     rate_hz: float = 10.0
+    distortion: tuple[float, ...] = ()
 
     def __post_init__(self) -> None:
         __tracebackhide__ = True
@@ -72,6 +77,36 @@ class Camera:
             )
         _check("Camera", "field_of_view_rad", self.field_of_view_rad, 0.05, 3.0, "rad")
         _check("Camera", "rate_hz", self.rate_hz, 0.1, MAX_RATE_HZ, "Hz")
+        object.__setattr__(self, "distortion", _coefficients(self.distortion))
+        if self.distortion:
+            self._check_lens()
+
+    def _check_lens(self) -> None:
+        __tracebackhide__ = True
+        import numpy as np
+
+        from pytest_garl.distortion import undistorted
+
+        edge = np.linspace(-1.0, 1.0, 41)
+        half = np.array([self.width_px, self.height_px]) / 2 / self.focal_px
+        whole = np.ones_like(edge)
+        sides = ((edge, whole), (edge, -whole), (whole, edge), (-whole, edge))
+        rim = np.concatenate([np.stack(side, axis=1) for side in sides])
+        seen = undistorted(rim * half, self.distortion)
+        what = f"Camera.distortion = {self.distortion}"
+        if seen is None:
+            raise LandingSystemError(
+                f"{what}: found a model that folds back within the picture of {self.width_px} x "
+                f"{self.height_px} px; expected k1, k2, p1, p2[, k3[, k4, k5, k6]] of a "
+                "calibration of this very camera, whose picture grows up to the corners"
+            )
+        wide = float((np.abs(seen).max(axis=0) / half).max())
+        if wide > MOST_WIDENING:
+            raise LandingSystemError(
+                f"{what}: found a lens that shows {wide:.1f} times what a pinhole shows; expected "
+                f"at most {MOST_WIDENING:g} times. A larger field_of_view_rad with a weaker "
+                "distortion may describe the same camera"
+            )
 
     @property
     def focal_px(self) -> float:
@@ -90,6 +125,22 @@ class Camera:
 
         (cx, cy), f = self.centre_px, self.focal_px
         return np.array([[f, 0.0, cx], [0.0, f, cy], [0.0, 0.0, 1.0]])
+
+
+def _coefficients(found: object) -> tuple[float, ...]:
+    """Return the coefficients of a lens as plain floats; raise LandingSystemError for others."""
+    __tracebackhide__ = True
+    try:
+        values = tuple(float(each) for each in found) if isinstance(found, Sequence) else None
+    except (TypeError, ValueError, OverflowError):
+        values = None
+    if values is None or len(values) not in (0, 4, 5, 8) or not all(map(math.isfinite, values)):
+        raise LandingSystemError(
+            f"Camera.distortion = {found!r:.80}; expected a tuple of 4, 5 or 8 finite numbers, "
+            "k1, k2, p1, p2[, k3[, k4, k5, k6]], or () for none"
+        )
+    # A lens whose coefficients are all 0 is none.
+    return values if any(values) else ()
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -189,6 +240,7 @@ def airframe_of(system: object) -> Airframe:
             height_px=int(camera.height_px),
             field_of_view_rad=float(camera.field_of_view_rad),
             rate_hz=float(camera.rate_hz),
+            distortion=camera.distortion,
         ),
         latency_s=float(airframe.latency_s),
         control_rate_hz=None

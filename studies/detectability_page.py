@@ -117,7 +117,7 @@ of one module; nine places of each module are looked at.
 | `share_in_frame`, `edge_modules` | share in the frame; modules from the marker to the edge |
 | `border_hidden`, `bits_hidden`, `margin_hidden` | shares that things turn into the other colour |
 | `contrast`, `noise` | grey levels between white and black in the picture; the sensor's noise |
-| `uneven_light` | standard deviation of the light on the marker, as at a shadow's edge or behind dirt |
+| `uneven_light` | standard deviation of the light on the marker, as in a shadow or behind dirt |
 | `clutter` | share of the picture that falling things are expected to cover |
 | `blur_px` | how far the marker moves over the picture while it is exposed |
 
@@ -130,11 +130,11 @@ where the paint is worn off, count in part on either.
 range, any place and turn of the marker and of the sun, people, dogs and birds on and beside the
 marker, heights from 0.5 to 12 m, tilts up to 20°, all headings; in a quarter of the scenarios each,
 over all that a file may name: a worn marker, a tarpaulin over it, an exposure time while the UAV
-moves and turns, dirt on the lens, a wrong focal length, a decoy. An error of the camera's mounting is a
-tilt like others. Places and values were drawn so that many frames are neither easy nor hopeless, so
-the shares below are not those of flights. A frame is read if one of three detectors finds id 0 within 0.75 m of the marker's
-middle: OpenCV's ArUco with its stock parameters; ArUco with the parameters of OpenCV-MLS and all
-four of its ways to look at a frame; the [learned detector](detection.md) with a confidence of at
+moves and turns, dirt on the lens, a wrong focal length, a decoy. An error of the camera's mounting
+is a tilt like others. Places and values were drawn so that many frames are neither easy nor
+hopeless, so the shares below are not those of flights. A frame is read if one of three detectors
+finds id 0 within 0.75 m of the marker's middle: OpenCV's ArUco with its stock parameters; ArUco with
+the parameters of OpenCV-MLS and all four of its ways to look at a frame; the [learned detector](detection.md) with a confidence of at
 least 0.8. The learned detector ignores markers that the frame cuts below 2 m. This is a decision
 about landing and not about sight, so it was switched off.
 
@@ -196,8 +196,9 @@ The largest error of a group of equal size is, per map: {by_map}. The groups of 
 
 ## Limits
 
-- It is about this camera model and this marker: a pinhole, no rolling shutter, one dictionary. Sizes are in pixels per module, so that other cameras and
-  heights are covered within the range above.
+- It is about this camera model and this marker: a pinhole, no rolling shutter, one dictionary.
+  Sizes are in pixels per module, so that other cameras and heights are covered within the range
+  above.
 - It tells whether a frame can be read by one of these three detectors. The learned one reads
   nearly all of what any reads, and far more than ArUco does: a lump of snow across the border
   stops ArUco, so that a system with ArUco alone can give up in sight of a readable marker. A

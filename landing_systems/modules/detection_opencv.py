@@ -8,6 +8,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from landing_systems.modules.lens import undistorted
 from pytest_garl import Camera, Detection, Mission, Observation
 
 CAMERA_FROM_BODY = np.array([[0.0, -1.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 0.0, -1.0]])
@@ -97,7 +98,7 @@ class OpenCvDetector:
         for quad, marker_id in zip(corners, numbers, strict=True):
             # Pixel centres are at whole numbers, before and after shrinking.
             corners_px = ((np.asarray(quad).reshape(4, 2) + 0.5) / scale - 0.5).astype(np.float32)
-            position = self._place(corners_px, observation)
+            position = self._place(undistorted(corners_px, self._camera), observation)
             if position is not None:
                 found.append(
                     Detection(

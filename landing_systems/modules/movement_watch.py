@@ -11,6 +11,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from landing_systems.modules.lens import undistorted
 from pytest_garl import Mission, Observation
 
 CELL_M = 0.25
@@ -36,6 +37,9 @@ class MovementWatch:
         camera = mission.camera
         (cx, cy), focal = camera.centre_px, camera.focal_px
         rows, columns = np.mgrid[0 : camera.height_px : STRIDE_PX, 0 : camera.width_px : STRIDE_PX]
+        if camera.distortion:
+            seen = undistorted(np.stack([columns, rows], axis=-1).reshape(-1, 2), camera)
+            columns, rows = seen.T.reshape(2, *rows.shape)
         # Rays in the body frame per metre of planar depth: x forward, y left, z up.
         self._rays = np.stack(
             [(cy - rows) / focal, (cx - columns) / focal, -np.ones(rows.shape)], axis=-1

@@ -25,6 +25,7 @@ HASHED = (
     "airframe.py",
     "commands.py",
     "cpu_dispatch.py",
+    "distortion.py",
     "execution",
     "fiducial.py",
     "files",

@@ -7,7 +7,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pytest_garl.landing_system import Detection
-from pytest_garl.simulation.camera.projection import View
 from pytest_garl.simulation.camera.renderer import Renderer
 from pytest_garl.simulation.flight import Step
 from pytest_garl.video import drawing
@@ -46,9 +45,7 @@ class CameraPane:
         return pane
 
     def _marker(self, poses: Poses) -> NDArray[np.float64]:
-        square = np.array(self._renderer.pad.main.outline_m)
-        view = View.of(self._renderer.camera, poses.eye_m, poses.attitude)
-        return self._pixels(view.ground_polygon(square))
+        return self._pixels(self._renderer.marker_outline(poses.eye_m, poses.attitude))
 
     def _detection(self, view: drawing.Image, detection: Detection) -> None:
         words = f"id {detection.marker_id}  {detection.confidence:.2f}"

@@ -20,6 +20,7 @@ from landing_systems.modules.detection_tphyolo.decoding import (
 )
 from landing_systems.modules.detection_tphyolo.patches import PADDING, normalised, patch
 from landing_systems.modules.detection_tphyolo.weights import SHIPPED, read_weights
+from landing_systems.modules.lens import undistorted
 from pytest_garl import Camera, Detection, Mission, Observation
 
 LARGEST_SIDE_PX = 64.0
@@ -168,7 +169,15 @@ def ground_place(
     None where the ray does not go down.
     """
     (cx, cy), focal = camera.centre_px, camera.focal_px
-    across, down = (centre_px[0] - 0.5 - cx) / focal, (centre_px[1] - 0.5 - cy) / focal
+    u, v = (
+        undistorted(np.asarray(centre_px)[None] - 0.5, camera)[0]
+        if camera.distortion
+        else (
+            centre_px[0] - 0.5,
+            centre_px[1] - 0.5,
+        )
+    )
+    across, down = (u - cx) / focal, (v - cy) / focal
     in_body = CAMERA_FROM_BODY.T @ np.array([across, down, 1.0])
     ray = rotation_matrix(observation.attitude) @ in_body
     if ray[2] > -1e-3:

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from pytest_garl.landing_system import Camera
 from pytest_garl.scenarios.groups.depth import NO_LIMIT_M
 from pytest_garl.scenarios.scenario import Scenario
+from pytest_garl.simulation.camera.lens import lens_of
 from pytest_garl.simulation.camera.weather import conditions_of
 from pytest_garl.simulation.randomness import generator
 
@@ -37,6 +38,8 @@ class DepthSensor:
         across = (np.arange(width, dtype=np.float32) - cx) / focal
         down = (np.arange(height, dtype=np.float32)[:, None] - cy) / focal
         self._stretch = np.sqrt(1 + across**2 + down**2)
+        if lens := lens_of(camera):
+            self._stretch = lens.stretch.astype(np.float32)
         self._size = width, height
         self._cells = max(4, round(_CELLS * height / width)), _CELLS
         share = scenario["depth.holes_percent"] / 100

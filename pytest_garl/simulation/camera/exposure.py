@@ -71,10 +71,6 @@ class Exposure:
     time_s: float
     dirt: NDArray[np.uint8] | None
 
-    def picture(self, image: NDArray[np.uint8]) -> NDArray[np.uint8]:
-        """Return a sharp, clear picture as it reaches the sensor; it may be overwritten."""
-        return self._soiled(self._moved(image))
-
     def blur_px(self, place_px: NDArray[Any]) -> float:
         """Return how far a place of the ground moves over the picture during the exposure."""
         if not self._moves:
@@ -113,7 +109,8 @@ class Exposure:
         then = View(camera=self.view.camera, eye=eye, axes=self.view.axes @ turn.T)
         return self._pixel_of_ground @ then.ground_of_pixel
 
-    def _moved(self, image: NDArray[np.uint8]) -> NDArray[np.uint8]:
+    def moved(self, image: NDArray[np.uint8]) -> NDArray[np.uint8]:
+        """Return a sharp picture of the view as the movement blurs it."""
         if not self._moves:
             return image
         height, width = image.shape[:2]
@@ -136,7 +133,8 @@ class Exposure:
         mean = cv2.convertScaleAbs(total, alpha=1 / steps)
         return np.asarray(cv2.cvtColor(mean, cv2.COLOR_RGBA2RGB), np.uint8)
 
-    def _soiled(self, image: NDArray[np.uint8]) -> NDArray[np.uint8]:
+    def soiled(self, image: NDArray[np.uint8]) -> NDArray[np.uint8]:
+        """Return a picture as a dirty lens lets it through."""
         if self.dirt is None:
             return image
         hidden = cv2.cvtColor(self.dirt, cv2.COLOR_GRAY2RGB)

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from pytest_garl.landing_system import Camera
 from pytest_garl.simulation.camera.exposure import Exposure
 from pytest_garl.simulation.camera.gloss import Gloss
+from pytest_garl.simulation.camera.lens import Lens
 from pytest_garl.simulation.camera.marker_patch import (
     GREY,
     PROBES_PER_MODULE,
@@ -42,12 +43,14 @@ class MarkerSight:
     def __init__(
         self,
         camera: Camera,
+        lens: Lens | None,
         patch: MarkerPatch,
         conditions: Conditions,
         sensor: Sensor,
         particles: Particles,
     ) -> None:
-        self._camera, self._patch, self._conditions = camera, patch, conditions
+        self._camera, self._lens = camera, lens
+        self._patch, self._conditions = patch, conditions
         self._sensor, self._particles = sensor, particles
         self._white, last = patch.white, patch.probes - 1
         row, column = np.divmod(np.arange(patch.probes**2), patch.probes)
@@ -74,10 +77,16 @@ class MarkerSight:
         seen = self._points_m @ view.axes[:, :2].T - view.axes @ view.eye
         if seen[:4, 2].min() <= NEAR_M:
             return None
-        pixels = view.pixels(seen)
-        corners, pixels, depth = pixels[:4], pixels[4:], seen[4:, 2]
-        column, row = np.rint(pixels).astype(np.intp).T
+        drawn = view.pixels(seen)
+        pixels, depth = drawn[4:], seen[4:, 2]
+        drawn_column, drawn_row = np.rint(pixels).astype(np.intp).T
+        column, row, corners = drawn_column, drawn_row, drawn[:4]
         height, width = segmentation.shape
+        if self._lens:
+            # Where the lens shows what was drawn.
+            shown = self._lens.shown(drawn)
+            corners, (column, row) = shown[:4], np.rint(shown[4:]).astype(np.intp).T
+            height, width = self._lens.stretch.shape
         inside = (column >= 0) & (column < width) & (row >= 0) & (row < height)
         framed = np.count_nonzero(inside & self._on_marker) / np.count_nonzero(self._on_marker)
         if not framed:
@@ -86,9 +95,9 @@ class MarkerSight:
         grey = self._patch.albedo * light
         errors = self._errors if light is self._patch.light else self._error(grey, light)
         hidden = np.zeros(len(grey), np.bool_)
-        hidden[inside] = segmentation[row[inside], column[inside]] > 1
+        hidden[inside] = segmentation[drawn_row[inside], drawn_column[inside]] > 1
         if hidden.any():
-            grey = _behind(grey, np.flatnonzero(hidden), row, column, layers)
+            grey = _behind(grey, np.flatnonzero(hidden), drawn_row, drawn_column, layers)
             errors = self._error(grey, light)
         contrast = self._contrast(grey, pixels, view, depth, inside & (errors < 0.5), gloss)
         lit = light[inside]
@@ -97,7 +106,7 @@ class MarkerSight:
             contrast, lit = contrast * float(clear.mean()), lit * clear
         return MarkerView(
             share_in_frame=round(float(framed), _ROUND),
-            edge_modules=round(self._edge_modules(corners), _ROUND),
+            edge_modules=round(self._edge_modules(corners, width, height), _ROUND),
             px_per_module=round(self._px_per_module(corners), _ROUND),
             border_hidden=_mean(errors, inside & self._border),
             bits_hidden=_mean(errors, inside & self._bits),
@@ -106,7 +115,7 @@ class MarkerSight:
             uneven_light=round(float(lit.std()), _ROUND),
             clutter=round(self._particles.expected_cover(float(depth.mean())), _ROUND),
             noise=round(self._sensor.noise_levels, _ROUND),
-            blur_px=round(exposure.blur_px(corners.mean(axis=0)), _ROUND),
+            blur_px=round(exposure.blur_px(drawn[:4].mean(axis=0)), _ROUND),
         )
 
     def _error(self, grey: Array, light: Array) -> Array:
@@ -167,11 +176,11 @@ class MarkerSight:
         difference = float(grey[white].mean() - grey[black].mean())
         return round(max(0.0, difference * self._sensor.exposure), _ROUND)
 
-    def _edge_modules(self, corners: Array) -> float:
+    def _edge_modules(self, corners: Array, width: int, height: int) -> float:
         """Return the distance of the nearest corner from the picture's edge, at most a module."""
         low = float(corners.min()) + 0.5
-        right = self._camera.width_px - 0.5 - float(corners[:, 0].max())
-        bottom = self._camera.height_px - 0.5 - float(corners[:, 1].max())
+        right = width - 0.5 - float(corners[:, 0].max())
+        bottom = height - 0.5 - float(corners[:, 1].max())
         return min(1.0, min(low, right, bottom) / max(self._px_per_module(corners), 1e-3))
 
     def _px_per_module(self, corners: Array) -> float:

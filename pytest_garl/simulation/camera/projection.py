@@ -116,5 +116,24 @@ class View:
         return camera.width_px / 2 / camera.focal_px, camera.height_px / 2 / camera.focal_px
 
 
+def ground_depth(view: View, columns: Array, rows: Array) -> tuple[Array, bool]:
+    """Return the ground's planar depth, and whether some ray misses the ground."""
+    across, down, level = view.ground_of_pixel[2].astype(np.float32)
+    slope = np.add(across * columns, down * rows + level)
+    up = float(view.eye[2])
+    highest = float(max(slope[0, 0], slope[0, -1], slope[-1, 0], slope[-1, -1]))
+    horizon = highest > -up / FAR_M
+    if not horizon:
+        return np.divide(np.float32(-up), slope, out=slope), False
+    # Exactly the far plane: beyond it by a rounding the rasteriser writes no depth, and short
+    # of it the sky would be ground.
+    sky = slope >= np.float32(-up / FAR_M)
+    slope[sky] = -up / FAR_M
+    depth: Array = np.divide(np.float32(-up), slope, out=slope)
+    np.minimum(depth, np.float32(FAR_M), out=depth)
+    depth[sky] = FAR_M
+    return depth, True
+
+
 def _within(value: float, most: int) -> int:
     return min(most, max(0, math.ceil(value)))

@@ -22,10 +22,11 @@ from pytest_garl.simulation.camera.frame import Frame
 from pytest_garl.simulation.camera.gloss import add_gloss, gloss_of
 from pytest_garl.simulation.camera.ground import PaintedGround, Raster, paint_ground, repaint
 from pytest_garl.simulation.camera.ground_cover import cover_shift, covered
+from pytest_garl.simulation.camera.lens import lens_of
 from pytest_garl.simulation.camera.marker_patch import paint_patch
 from pytest_garl.simulation.camera.marker_sight import BoardSight, MarkerSight
 from pytest_garl.simulation.camera.particles import Particles
-from pytest_garl.simulation.camera.projection import FAR_M, View
+from pytest_garl.simulation.camera.projection import FAR_M, View, ground_depth
 from pytest_garl.simulation.camera.sensor import Sensor
 from pytest_garl.simulation.camera.solids import (
     BodyPose,
@@ -91,7 +92,9 @@ class Renderer:
         colour: bool = True,
         pad: Pad | None = None,
     ) -> None:
-        self.camera = camera
+        self.camera, self._lens = camera, lens_of(camera)
+        # What is drawn is what a pinhole sees; a lens bends it.
+        self._drawn = drawn = self._lens.pinhole if self._lens else camera
         conditions = conditions_of(scenario)
         self.pad, self._map = pad_of(scenario, map) if pad is None else pad, map
         self._optics = Optics(scenario, camera)
@@ -103,8 +106,8 @@ class Renderer:
         self._ground: PaintedGround | None = None
         if colour:
             self._ground = paint_ground(map, conditions, self._shift, self.pad)
-        width, height = camera.width_px, camera.height_px
-        (cx, cy), focal = camera.centre_px, camera.focal_px
+        width, height = drawn.width_px, drawn.height_px
+        (cx, cy), focal = drawn.centre_px, drawn.focal_px
         self._columns = np.arange(width, dtype=np.float32)
         self._rows = np.arange(height, dtype=np.float32)[:, None]
         across, down = (self._columns - cx) / focal, (self._rows - cy) / focal
@@ -134,13 +137,14 @@ class Renderer:
         airlight = np.array(conditions.airlight)
         veil = (1 - np.arange(256) / 255)[:, None] * airlight
         sensor = Sensor(self.camera, conditions, rng)
-        particles = Particles(self.camera, conditions, rng)
+        particles = Particles(self._drawn, conditions, rng)
         pad = self.pad
         patches = [
             paint_patch(each, pad, self._map, conditions, self._shift) for each in pad.markers
         ]
         sights = [
-            MarkerSight(self.camera, patch, conditions, sensor, particles) for patch in patches
+            MarkerSight(self._drawn, self._lens, patch, conditions, sensor, particles)
+            for patch in patches
         ]
         self._look = _Look(
             conditions=conditions,
@@ -164,12 +168,12 @@ class Renderer:
 
         ``objects`` are the (position, yaw) of the dynamic objects in order; ``movement`` blurs.
         """
-        view = View.of(self.camera, position_m, attitude)
-        depth, horizon = _ground_depth(view, self._columns, self._rows)
+        view = View.of(self._drawn, position_m, attitude)
+        depth, horizon = ground_depth(view, self._columns, self._rows)
         segmentation = np.zeros(depth.shape, np.int32)
         if horizon:
             segmentation[depth >= FAR_M] = -1
-        marker = self._marker_segment(segmentation, view)
+        marker = _draw_marker(segmentation, view, self.pad)
         sky = segmentation < 0 if horizon else None
         footprint = float(depth[depth.shape[0] // 2, depth.shape[1] // 2]) / self.camera.focal_px
         self._solids.place(objects)
@@ -189,6 +193,9 @@ class Renderer:
             exposure=self._optics.exposure(view, movement),
             segmentation=segmentation,
         )
+        if self._lens:
+            depth, segmentation = self._lens.nearest(depth), self._lens.nearest(segmentation)
+            pixels[1:] = np.bincount(segmentation[segmentation > 0], minlength=len(pixels))[1:]
         return Frame(
             paint=functools.partial(self._paint, scene),
             marker=functools.partial(self._marker_view, scene),
@@ -215,13 +222,18 @@ class Renderer:
             layer.paint_onto(image)
         look.particles.draw(image, scene.depth_m, view, scene.time_s)
         _fog(image, scene.depth_m, look)
-        return look.sensor.expose(scene.exposure.picture(image), scene.time_s)
+        image = scene.exposure.moved(image)
+        if self._lens:
+            image = self._lens.picture(image)
+        return look.sensor.expose(scene.exposure.soiled(image), scene.time_s)
 
     def marker_pixels(self, position_m: Vector, attitude: Quaternion) -> int:
         """Count the marker's pixels in a frame with nothing in front of it."""
-        shape = self.camera.height_px, self.camera.width_px
+        shape = self._drawn.height_px, self._drawn.width_px
         segmentation = np.zeros(shape, np.int32)
-        self._marker_segment(segmentation, View.of(self.camera, position_m, attitude))
+        _draw_marker(segmentation, View.of(self._drawn, position_m, attitude), self.pad)
+        if self._lens:
+            segmentation = self._lens.nearest(segmentation)
         return int(np.count_nonzero(segmentation))
 
     def covered(self, places_m: NDArray[np.float64]) -> NDArray[np.bool_]:
@@ -230,7 +242,9 @@ class Renderer:
 
     def marker_area_px(self, position_m: Vector, attitude: Quaternion) -> float:
         """Projected area of the marker, clipped to the frame, with nothing in front."""
-        polygon = self._marker_polygon(View.of(self.camera, position_m, attitude))
+        if self._lens:
+            return float(self.marker_pixels(position_m, attitude))
+        polygon = self.marker_outline(position_m, attitude)
         if len(polygon) < 3:
             return 0.0
         width, height = self.camera.width_px, self.camera.height_px
@@ -245,41 +259,33 @@ class Renderer:
         """Side in pixels of the marker seen from straight above."""
         return self.camera.focal_px * self.pad.spec.side_m / height_m
 
-    def _marker_polygon(self, view: View) -> Array:
-        return view.ground_polygon(np.array(self.pad.main.outline_m))
-
-    def _marker_segment(self, segmentation: NDArray[np.int32], view: View) -> tuple[slice, slice]:
-        """Draw the marker's segment; return the rows and columns that hold it."""
-        polygon = self._marker_polygon(view)
-        if len(polygon) < 3:
-            return slice(0, 0), slice(0, 0)
-        points = np.round(polygon * 2**_SHIFT).astype(np.int32)
-        cv2.fillConvexPoly(segmentation, points, (1.0,), cv2.LINE_8, _SHIFT)
-        if self.pad.covered_share > 0:
-            cover = view.ground_polygon(np.array(self.pad.cover_m))
-            if len(cover) >= 3:
-                fixed = np.round(cover * 2**_SHIFT).astype(np.int32)
-                cv2.fillConvexPoly(segmentation, fixed, (0.0,), cv2.LINE_8, _SHIFT)
-        return view.box(polygon)
+    def marker_outline(self, position_m: Vector, attitude: Quaternion) -> Array:
+        """Return the pixels (n, 2) about which the marker lies, also outside of the picture."""
+        view = View.of(self._drawn, position_m, attitude)
+        corners = view.ground_polygon(np.array(self.pad.main.outline_m))
+        return self._lens.shown(_rounded(corners)) if self._lens else corners
 
 
-def _ground_depth(view: View, columns: Array, rows: Array) -> tuple[Array, bool]:
-    """Return the ground's planar depth, and whether some ray misses the ground."""
-    across, down, level = view.ground_of_pixel[2].astype(np.float32)
-    slope = np.add(across * columns, down * rows + level)
-    up = float(view.eye[2])
-    highest = float(max(slope[0, 0], slope[0, -1], slope[-1, 0], slope[-1, -1]))
-    horizon = highest > -up / FAR_M
-    if not horizon:
-        return np.divide(np.float32(-up), slope, out=slope), False
-    # Exactly the far plane: beyond it by a rounding the rasteriser writes no depth, and short
-    # of it the sky would be ground.
-    sky = slope >= np.float32(-up / FAR_M)
-    slope[sky] = -up / FAR_M
-    depth: Array = np.divide(np.float32(-up), slope, out=slope)
-    np.minimum(depth, np.float32(FAR_M), out=depth)
-    depth[sky] = FAR_M
-    return depth, True
+def _rounded(corners: Array) -> Array:
+    """Return a polygon's corners (n, 2) with places on its sides, because a lens bends them."""
+    parts = np.arange(8)[:, None] / 8
+    sides = [a + (b - a) * parts for a, b in zip(corners, np.roll(corners, -1, 0), strict=True)]
+    return np.concatenate(sides).astype(np.float32) if sides else corners
+
+
+def _draw_marker(segmentation: NDArray[np.int32], view: View, pad: Pad) -> tuple[slice, slice]:
+    """Draw the marker's segment; return the rows and columns that hold it."""
+    polygon = view.ground_polygon(np.array(pad.main.outline_m))
+    if len(polygon) < 3:
+        return slice(0, 0), slice(0, 0)
+    points = np.round(polygon * 2**_SHIFT).astype(np.int32)
+    cv2.fillConvexPoly(segmentation, points, (1.0,), cv2.LINE_8, _SHIFT)
+    if pad.covered_share > 0:
+        cover = view.ground_polygon(np.array(pad.cover_m))
+        if len(cover) >= 3:
+            fixed = np.round(cover * 2**_SHIFT).astype(np.int32)
+            cv2.fillConvexPoly(segmentation, fixed, (0.0,), cv2.LINE_8, _SHIFT)
+    return view.box(polygon)
 
 
 def _ground_image(scene: _Scene) -> NDArray[np.uint8]:

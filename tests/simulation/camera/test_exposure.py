@@ -89,7 +89,7 @@ def test_dirt_hides_its_share_of_the_picture() -> None:
     assert np.mean(clear <= 0.55) == pytest.approx(0.2, abs=0.01)
     assert clear.min() < 0.3
     white = np.full((camera.height_px, camera.width_px, 3), 200, np.uint8)
-    seen = Optics(scenario, camera).exposure(view, Movement()).picture(white)
+    seen = Optics(scenario, camera).exposure(view, Movement()).soiled(white)
     # Half of what the dirt takes is scattered.
     assert seen[..., 0] == pytest.approx(200 * (clear + (1 - clear) / 2), abs=2)
 
