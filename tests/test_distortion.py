@@ -58,7 +58,7 @@ def test_a_camera_keeps_plain_floats_and_no_lens_without_distortion() -> None:
         ((1e300, 1e300, 0.0, 0.0), "expected"),
         (
             (1.0, 0.0, 0.0, 0.0, 0.0, 4.0, 0.0, 0.0),
-            "times what a pinhole shows; expected at most 3 times",
+            "times what a pinhole shows",
         ),
     ],
 )

@@ -32,5 +32,5 @@ def draw(folder: Path) -> None:
         axis.imshow(renderer.render(place, LEVEL, 0.0, far_away).image)
         axis.set_title(title, fontsize="small")
         axis.set(xticks=[], yticks=[])
-    figure.savefig(folder / "lens.png", dpi=60)
+    figure.savefig(folder / "lens.png", dpi=50)
     pyplot.close(figure)
