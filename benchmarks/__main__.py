@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from benchmarks import collect, ledger, overhead, speed, throughput
+from benchmarks import collect, field, ledger, overhead, speed, throughput
 
 speed.main()
 overhead.main()
 collect.main()
 ledger.main()
 throughput.main()
+field.main()

@@ -135,8 +135,9 @@ is a tilt like others. Places and values were drawn so that many frames are neit
 hopeless, so the shares below are not those of flights. A frame is read if one of three detectors
 finds id 0 within 0.75 m of the marker's middle: OpenCV's ArUco with its stock parameters; ArUco
 with the parameters of OpenCV-MLS and all four of its ways to look at a frame; the [learned
-detector](detection.md) with a confidence of at least 0.8. The learned detector ignores markers that the frame cuts below 2 m. This is a decision
-about landing and not about sight, so it was switched off.
+detector](detection.md) with a confidence of at least 0.8. The learned detector ignores markers that
+the frame cuts below 2 m. This is a decision about landing and not about sight, so it was switched
+off.
 
 The oracle is one layer of eight logistic units with weights that are not negative and a logistic
 unit over them, so that more pixels and more contrast never lower the probability, and more that
