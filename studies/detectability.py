@@ -1,6 +1,6 @@
 """Calibrates the detectability oracle on painted frames that independent detectors read.
 
-``python -m studies.detectability`` draws and reads the frames (40 minutes on two cores) unless
+``python -m studies.detectability`` draws and reads the frames (15 minutes on two cores) unless
 ``--frames`` names a file that has them, fits the oracle, and writes its coefficients,
 ``docs/detectability.md`` and ``docs/pictures/detectability.png``.
 """
@@ -150,9 +150,9 @@ def generate(scenarios: int, kind: Kind, workers: int) -> Array:
 def main() -> None:
     """Draw the frames where there are none, fit, and write coefficients, page and diagram."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--scenarios", type=int, default=2600, help="default 2600")
+    parser.add_argument("--scenarios", type=int, default=2000, help="default 2000")
     parser.add_argument(
-        "--others", type=int, default=300, help="blurred, far, and cut; default 300 each"
+        "--others", type=int, default=250, help="blurred, far, cut, and cluttered; default 250 each"
     )
     parser.add_argument("--workers", type=int, default=2)
     parser.add_argument("--frames", type=Path, default=Path(".garl/detectability.npz"))

@@ -22,9 +22,9 @@ RANGES = {
     "cover.share_percent": (0.0, 100.0),
     "camera.exposure_ms": (0.0, 100.0),
     "camera.dirt_percent": (0.0, 80.0),
-    "camera.calibration_error_percent": (-20.0, 20.0),
 }
-"""The full ranges that a file may name.  An error of mounting is a tilt, and tilts are drawn."""
+"""The full ranges that a file may name.  An error of mounting is a tilt, and an error of the focal
+length another height; both are drawn."""
 CONDITIONS = (*(f"environment.{name}" for name, _ in WEATHER), SUN, *RANGES)
 """What a frame's row holds of its scenario."""
 
@@ -39,8 +39,6 @@ def random_conditions(rng: np.random.Generator) -> dict[str, float]:
     found |= _drawn(rng, "cover.share_percent")
     if "cover.share_percent" in found:
         found["cover.lasts_s"] = LAST_S
-    if rng.random() < ACTS:
-        found["camera.calibration_error_percent"] = float(rng.uniform(-20, 20))
     if rng.random() < ACTS:
         found["decoy-1.kind"] = float(rng.integers(1, len(KINDS)))
         found["decoy-1.yaw_deg"] = float(rng.uniform(-180, 180))

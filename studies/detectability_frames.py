@@ -25,18 +25,17 @@ from pytest_garl.scenarios.validity import repair
 from pytest_garl.simulation.camera.cover_event import renderer_of
 from pytest_garl.simulation.camera.projection import View, eye_under
 from pytest_garl.simulation.camera.solids import BodyPose
-from pytest_garl.simulation.camera.true_camera import true_camera
 from pytest_garl.simulation.flight import MarkerView
 from studies.detectability_conditions import CONDITIONS, random_conditions, random_movement
 
 SEED = 260_000
 MAPS = ("court", "lawn")
 CAMERA = Camera()
-Kind = Literal["usual", "blurred", "far", "cut"]
-KINDS: tuple[Kind, ...] = ("usual", "blurred", "far", "cut")
+Kind = Literal["usual", "blurred", "far", "cut", "cluttered"]
+KINDS: tuple[Kind, ...] = ("usual", "blurred", "far", "cut", "cluttered")
 """The frames of the calibration; frames blurred as by motion; frames from so high up that modules
 become smaller than those of any flight with this camera, as other cameras see them; frames whose
-edge cuts most markers."""
+edge cuts most markers; frames with more in the air than falls in any flight."""
 HEIGHTS_M = (0.5, 12.0)
 """From just above the ground to a little above the height of searches."""
 FAR_M = (12.0, 45.0)
@@ -217,7 +216,7 @@ def drawn_frames(number: int, kind: Kind) -> Iterator[tuple[DrawnFrame, Scenario
     rng = np.random.default_rng([SEED, KINDS.index(kind), number])
     map = load_map(MAPS[number % len(MAPS)])
     scenario = random_scenario(rng, map)
-    renderer = renderer_of(scenario, map, true_camera(CAMERA, scenario))
+    renderer = renderer_of(scenario, map, CAMERA)
     for _ in range(FRAMES):
         position, attitude = random_pose(rng, renderer.marker_m, kind)
         objects = random_objects(rng, map, renderer.marker_m)
@@ -230,6 +229,8 @@ def drawn_frames(number: int, kind: Kind) -> Iterator[tuple[DrawnFrame, Scenario
         image = frame.image
         if kind == "blurred":
             image, view = blur(rng, image, view)
+        if kind == "cluttered":
+            image, view = clutter(rng, image, view)
         observation = Observation(
             time_s=0.0,
             position_m=np.array(position),
@@ -264,6 +265,22 @@ def blur(
     noisy = smooth + lost * rng.standard_normal(image.shape, dtype=np.float32)
     picture = np.clip(np.round(noisy), 0, 255).astype(np.uint8)
     return picture, dataclasses.replace(view, blur_px=round(length, 4))
+
+
+def clutter(
+    rng: np.random.Generator, image: NDArray[np.uint8], view: MarkerView
+) -> tuple[NDArray[np.uint8], MarkerView]:
+    """Return the picture with a share behind flakes, drops or leaves that hang in the air."""
+    share, image = float(rng.uniform(0, 1)), image.copy()
+    colour = ((236, 240, 246), (150, 155, 160), (176, 92, 28))[rng.integers(3)]
+    radius = float(rng.uniform(0.2, 1.0)) * max(2.0, view.px_per_module)
+    # Where discs fall anywhere, a place stays free with exp(-their area over the picture's).
+    height, width = image.shape[:2]
+    count = -math.log(max(1e-3, 1 - share)) * width * height / (math.pi * radius**2)
+    for u, v in rng.uniform((0, 0), (width, height), (round(count), 2)):
+        cv2.circle(image, (int(u), int(v)), round(radius), colour, -1, cv2.LINE_AA)
+    whole = 1 - (1 - view.clutter) * (1 - share)
+    return image, dataclasses.replace(view, clutter=round(whole, 4))
 
 
 def read_frames(number: int, detectors: Detectors, kind: Kind = "usual") -> list[ReadFrame]:

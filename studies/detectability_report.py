@@ -74,8 +74,7 @@ def groups(sample: Sample) -> Iterator[tuple[str, Sample]]:
         if key not in RANGES:
             yield from _bands(sample, name, values, _SUN_BANDS if key == SUN else _BANDS)
             continue
-        # The sign plays no part; 0 is a band of its own.
-        share = np.abs(values) / RANGES[key][1]
+        share = values / RANGES[key][1]
         yield f"{name}, none", sample.where(share == 0)
         for low, high in itertools.pairwise(_SHARES):
             end = RANGES[key][1]

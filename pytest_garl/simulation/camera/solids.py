@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+import itertools
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -32,6 +33,8 @@ _SHIFT = 4
 """Fractional bits of the coordinates that OpenCV draws at."""
 _TO_GL = np.diag([1.0, -1.0, -1.0, 1.0]).astype(np.float32)
 """From camera axes (right, down, forward) to those of the rasteriser."""
+_SLACK_M = 1e-3
+"""A box this far out of the view is out of it, however corners are rounded."""
 _COARSE_PX = 4.0
 """A part of this radius in pixels is off by half a pixel if drawn with 6 sides instead of 10."""
 _COARSE_M = (0.0, 0.12, 0.3, 1.0)
@@ -116,6 +119,7 @@ class Solids:
         ]
         for solid, body in zip(self._static, map.bodies, strict=True):
             solid.move_to((body.position_m, body.yaw_rad), conditions)
+        self._boxes_m = np.array([_box(solid) for solid in self._static]).reshape(-1, 8, 3)
         self._moving = [
             _Solid(segment=segment_ids[name], meshes=_levels(OBJECT_TYPES[kind].parts))
             for name, kind in map.present_objects
@@ -153,7 +157,8 @@ class Solids:
         axes = view.axes.astype(np.float32)
         pixels = np.zeros(self._segments, np.intp)
         layers = []
-        for solid in (*self._static, *self._moving):
+        near = (self._static[index] for index in self._in_view(view))
+        for solid in (*near, *self._moving):
             at = np.array(solid.position_m)
             x, y, z = (float(value) for value in view.axes @ (at - view.eye))
             radius = solid.meshes[0].radius_m
@@ -177,6 +182,17 @@ class Solids:
                     pixels[solid.segment] = np.count_nonzero(layer.covered)
                     layers.append(layer)
         return pixels, layers
+
+    def _in_view(self, view: View) -> NDArray[np.intp]:
+        """Return the numbers of the static bodies whose boxes reach into the view's pyramid."""
+        seen = self._boxes_m @ view.axes.T - view.axes @ view.eye
+        ahead = seen[..., 2]
+        edge = np.array(view.reach) * ahead[..., None] + _SLACK_M
+        # Out of the view is a box of which all corners are on the outer side of one plane.
+        aside, before = seen[..., :2] > edge, seen[..., :2] < -edge
+        behind = np.all(ahead < NEAR_M - _SLACK_M, axis=1)
+        hidden = np.any(np.all(aside, axis=1) | np.all(before, axis=1), axis=1) | behind
+        return np.flatnonzero(~hidden)
 
     def _rasterise(
         self, corners: Array, paint: Array, depth: Array, view: View
@@ -263,6 +279,16 @@ def draw_shadows(
 def sun_shines(conditions: Conditions) -> bool:
     """Whether things cast shadows."""
     return conditions.direct_share > 0.01 and conditions.sun[2] > 0.02
+
+
+def _box(solid: _Solid) -> NDArray[np.float64]:
+    """Return the corners (8, 3) in the world of a box about a solid."""
+    corners = np.concatenate([mesh.corners.reshape(-1, 3) for mesh in solid.meshes])
+    sides = np.stack([corners.min(axis=0), corners.max(axis=0)]).astype(np.float64)
+    picks = np.array(list(itertools.product((0, 1), repeat=3)))
+    own = sides[picks, np.arange(3)]
+    placed: NDArray[np.float64] = own @ solid.rotation.T.astype(np.float64) + solid.position_m
+    return placed
 
 
 def _levels(parts: tuple[Part, ...]) -> tuple[Mesh, ...]:

@@ -13,8 +13,9 @@ from pytest_garl.landing_system import Camera
 from pytest_garl.scenarios.object_types import OBJECT_TYPES
 from pytest_garl.scenarios.validity import discs_of
 from pytest_garl.simulation.camera.meshes import mesh_of, placed
-from pytest_garl.simulation.camera.projection import FAR_M
-from tests.support.pictures import LEVEL, poses, renderer
+from pytest_garl.simulation.camera.projection import FAR_M, View
+from pytest_garl.simulation.camera.solids import Solids
+from tests.support.pictures import CAMERA, LEVEL, poses, renderer
 
 FINE = Camera(width_px=1280, height_px=960)
 """Fine, so that outlines of one pixel, where the renderers' conventions differ, weigh little."""
@@ -147,3 +148,26 @@ def test_a_body_before_the_sky_has_its_own_depth_from_any_height() -> None:
         assert trunk.sum() > 200
         assert frame.depth_m[trunk].max() < 15
         assert frame.depth_m.max() == FAR_M
+
+
+@pytest.mark.parametrize("name", ["court", "lawn"])
+def test_what_is_left_out_of_a_frame_could_not_be_seen(
+    name: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    made, _ = renderer(name)
+    rng, left_out = np.random.default_rng(5), 0
+    everything = range(len(made._solids._static))
+    for _ in range(30):
+        x, y = (float(each) for each in rng.uniform(-9, 9, 2))
+        turn = np.array([*rng.normal(0, 0.2, 2), *rng.normal(0, 1, 2)])
+        qx, qy, qz, qw = (float(each) for each in turn / np.linalg.norm(turn))
+        place, attitude = (x, y, float(rng.uniform(0.3, 12))), (qx, qy, qz, qw)
+        frame = made.render(place, attitude, 0.0, poses(x, y))
+        with monkeypatch.context() as patch:
+            patch.setattr(Solids, "_in_view", lambda self, view: everything)
+            whole = made.render(place, attitude, 0.0, poses(x, y))
+        assert (frame.image == whole.image).all()
+        assert (frame.depth_m == whole.depth_m).all()
+        assert (frame.segmentation == whole.segmentation).all()
+        left_out += len(everything) - len(made._solids._in_view(View.of(CAMERA, place, attitude)))
+    assert left_out > 10
