@@ -8,7 +8,7 @@ from __future__ import annotations
 import math
 import re
 import tomllib
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Mapping, Sequence
 from typing import Any
 
 from pytest_garl.errors import ScenarioError
@@ -125,6 +125,18 @@ class Table:
     ) -> float:
         """Return a finite number within [low, high]."""
         return self._number(key, self.get(key, default), low, high)
+
+    def choice(self, key: str, names: Sequence[str]) -> float:
+        """Return the place of a name among ``names``, from 0; the file may state the number."""
+        value = self.get(key)
+        number = names.index(value) if value in names else finite(value)
+        if number is None or not 0 <= number < len(names):
+            raise self.error(
+                key,
+                f"found {shown(value)}, expected one of {listed(names)}, "
+                f"or a number from 0 to {len(names) - 1}",
+            )
+        return float(number)
 
     def numbers(
         self,

@@ -147,14 +147,11 @@ def _scenario(config: pytest.Config, run: Run, target: Target) -> list[str]:
     """Return the scenario in physical units if ``-v`` is given."""
     if config.get_verbosity() < 1:
         return []
-    from pytest_garl.regressions.description import describe_scenario
+    from pytest_garl.regressions.description import scenario_in_words
 
     scenario = run.scenario(target)
-    parts = [
-        f"{subject} {words}" if words.startswith(("at ", "a ")) else words
-        for subject, words in describe_scenario(scenario, run.options.map_folders)
-    ]
-    return [f"Scenario (seed {scenario.seed}): {'; '.join(parts)}"]
+    words = scenario_in_words(scenario, run.options.map_folders)
+    return [f"Scenario (seed {scenario.seed}): {words}"]
 
 
 def _share(reflights: Reflights) -> str:

@@ -80,3 +80,11 @@ def describe_scenario(scenario: Scenario, map_folders: tuple[Path, ...]) -> list
         way += f" to ({goal[0]:.1f}, {goal[1]:.1f}) m and back" if goal else ""
         rows.append((name, f"a {kind} of up to {speed:.2f} m/s, {way}"))
     return rows
+
+
+def scenario_in_words(scenario: Scenario, map_folders: tuple[Path, ...]) -> str:
+    """Return what is off nominal in one line; words of weather and light name their subject."""
+    return "; ".join(
+        f"{subject} {words}" if "." in subject or words.startswith(("at ", "a ")) else words
+        for subject, words in describe_scenario(scenario, map_folders)
+    )

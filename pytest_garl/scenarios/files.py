@@ -12,7 +12,7 @@ from pytest_garl.files.reading import read_text
 from pytest_garl.files.toml import Table, parse, quoted
 from pytest_garl.messages import shown
 from pytest_garl.scenarios.genes import genome_like
-from pytest_garl.scenarios.groups.catalogue import GROUPS
+from pytest_garl.scenarios.groups.catalogue import GROUPS, PARAMETERS
 from pytest_garl.scenarios.maps.map import Map
 from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.scenarios.task import Task, read_task, task_lines
@@ -59,8 +59,14 @@ def scenario_lines(scenario: Scenario, map: Map) -> list[str]:
     lines = []
     for head, values in sections_of(scenario, map).items():
         lines += ["", f"[scenario.{head}]"]
-        lines += [f"{name} = {value!r}" for name, value in values.items()]
+        lines += [f"{name} = {_written(f'{head}.{name}', value)}" for name, value in values.items()]
     return lines
+
+
+def _written(key: str, value: float) -> str:
+    """Return a value in TOML: the name of a choice, or the number."""
+    is_named = key in PARAMETERS and PARAMETERS[key].choices
+    return quoted(PARAMETERS[key].text_of(value)) if is_named else repr(value)
 
 
 def _gene_lines(scenario: Scenario) -> list[str]:
@@ -131,10 +137,17 @@ def _read_section(table: Table, head: str, map: Map) -> dict[str, float]:
     if bool(optional & {*table.values}) and not optional <= {*table.values}:
         table.get(next(iter(sorted(optional - {*table.values}))))
     return {
-        name: table.number(name, low=low, high=high)
+        name: _number(table, head, name, low, high)
         for name, (low, high) in ranges.items()
         if name in table.values
     }
+
+
+def _number(table: Table, head: str, name: str, low: float, high: float) -> float:
+    parameter = PARAMETERS.get(f"{head}.{name}")
+    if parameter and parameter.choices:
+        return table.choice(name, parameter.choices)
+    return table.number(name, low=low, high=high)
 
 
 def _read_genes(top: Table, map: Map) -> Scenario:
@@ -162,7 +175,7 @@ def _read_genes(top: Table, map: Map) -> Scenario:
         head, _, name = item.key.partition(".")
         if head in GROUPS and name not in tables[head].values:
             continue
-        genes.append((item.key, tables[head].number(name, low=item.low, high=item.high)))
+        genes.append((item.key, _number(tables[head], head, name, item.low, item.high)))
     seed = top.integer("seed")
     return Scenario(
         map=map.name,

@@ -314,7 +314,7 @@ def conditions_in_words(scenario: Scenario, map: Map) -> list[tuple[str, str]]:
 
 def _in_words(value: float, parameter: Parameter) -> str:
     if parameter.choices:
-        return parameter.choices[math.ceil(value)]
+        return parameter.text_of(value)
     return f"{f'{value:g} {unit_of(parameter.name)}'.rstrip()}: {parameter.meaning}"
 
 

@@ -23,6 +23,7 @@ from pytest_garl.regressions.case_header import SCHEMA
 from pytest_garl.scenarios.chromosome import decode
 from pytest_garl.scenarios.genes import genome_for, with_destinations
 from pytest_garl.scenarios.maps.map import load_map
+from pytest_garl.scenarios.units import snapped
 from pytest_garl.scenarios.validity import repair
 from pytest_garl.verdicts.verdict import Limits
 from tests.regressions.samples import LAWN, OBJECT_NAMES, case, case_with_changes
@@ -114,6 +115,21 @@ def test_file_keeps_changes_of_the_environment() -> None:
     assert dump_case(parse_case(text, load_map)) == text
     assert case_with_changes().id != case().id
     assert "[changes]" not in dump_case(case())
+
+
+def test_file_names_the_kind_of_a_decoy_and_its_number_is_read() -> None:
+    plain = case()
+    conditions = {"decoy-1.kind": 3.0, "decoy-1.x_m": 4.0}
+    scenario = snapped(plain.scenario.replace(conditions), LAWN)
+    with_decoy = dataclasses.replace(plain, scenario=scenario)
+    text = dump_case(with_decoy)
+    assert '[scenario.decoy-1]\nkind = "helipad-h"\n' in text
+    assert parse_case(text, load_map) == with_decoy
+    with_number = parse_case(text.replace('"helipad-h"', "3.0"), load_map)
+    assert with_number == with_decoy
+    assert with_number.id == with_decoy.id
+    with pytest.raises(ScenarioError, match=r"x.toml: key 'scenario.decoy-1.kind': found 'mat'"):
+        parse_case(text.replace("helipad-h", "mat"), load_map, source="x.toml")
 
 
 def test_file_keeps_names_with_quotes_and_backslashes() -> None:

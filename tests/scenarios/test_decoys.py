@@ -10,8 +10,10 @@ import numpy as np
 import pytest
 
 from pytest_garl import Camera
+from pytest_garl.errors import ScenarioError
 from pytest_garl.fiducial import MarkerSpec, NestedMarker
 from pytest_garl.scenarios.chromosome import decode
+from pytest_garl.scenarios.domains.reader import domain_named
 from pytest_garl.scenarios.files import dumps, loads
 from pytest_garl.scenarios.genes import genome_for
 from pytest_garl.scenarios.groups.decoys import KINDS
@@ -108,6 +110,42 @@ def test_a_decoy_without_room_is_left_out() -> None:
     assert problems(scenario, MAPS["lawn"]) == ()
     assert decoys_of(scenario, MAPS["lawn"]) == ()
     assert repair(scenario, MAPS["lawn"]) == scenario
+
+
+@pytest.mark.parametrize("number", range(1, len(KINDS)))
+def test_a_file_states_the_name_of_the_kind_and_may_state_its_number(number: int) -> None:
+    scenario = scenario_on("lawn", {"decoy-1.kind": float(number), "decoy-1.x_m": 4.0})
+    text = dumps(scenario, MAPS["lawn"])
+    named = f'kind = "{KINDS[number]}"\n'
+    assert named in text
+    assert loads(text, MAPS["lawn"]) == scenario
+    for written in (f"kind = {number}\n", f"kind = {number}.0\n"):
+        assert loads(text.replace(named, written), MAPS["lawn"]) == scenario
+
+
+def test_a_decoy_whose_kind_is_none_is_not_there() -> None:
+    scenario = scenario_on("lawn", {"decoy-1.kind": 5.0, "decoy-1.x_m": 4.0})
+    text = dumps(scenario, MAPS["lawn"]).replace('"window"', '"none"')
+    assert decoys_of(loads(text, MAPS["lawn"]), MAPS["lawn"]) == ()
+
+
+@pytest.mark.parametrize("found", ["'helipad'", "8", "-1", "true", "['window']", "nan"])
+def test_an_unknown_kind_is_one_message_with_the_names(found: str) -> None:
+    scenario = scenario_on("lawn", {"decoy-1.kind": 5.0, "decoy-1.x_m": 4.0})
+    text = dumps(scenario, MAPS["lawn"]).replace('"window"', found)
+    with pytest.raises(ScenarioError) as caught:
+        loads(text, MAPS["lawn"], source="mat.toml")
+    assert str(caught.value) == (
+        f"mat.toml: key 'scenario.decoy-1.kind': found {found.replace('true', 'True')}, expected "
+        "one of none, other-id, same-id-without-margin, helipad-h, chequered-mat, window, grate, "
+        "qr-code, or a number from 0 to 7"
+    )
+
+
+def test_a_decoy_outside_a_domain_is_named() -> None:
+    scenario = scenario_on("lawn", {"decoy-1.kind": 5.0, "decoy-1.x_m": 4.0})
+    found = domain_named("calm").outside(scenario, MAPS["lawn"])
+    assert "decoy-1.kind = window, the domain has only none" in found
 
 
 def test_a_reader_sees_the_name_of_the_kind() -> None:

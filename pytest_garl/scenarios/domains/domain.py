@@ -137,19 +137,25 @@ class Domain:
                 key = f"{head}.{name}"
                 if key not in CONDITIONS:
                     continue
-                problem = _beyond(value, self.range_of(key), CONDITIONS[key].nominal)
+                problem = _beyond(key, value, self.range_of(key))
                 if problem:
-                    found.append(f"{key} = {value:g}, {problem}")
+                    found.append(f"{key} = {_text_of(key, value)}, {problem}")
         return tuple(found)
 
 
-def _beyond(value: float, limits: tuple[float, float] | None, nominal: float) -> str:
+def _beyond(key: str, value: float, limits: tuple[float, float] | None) -> str:
+    nominal = CONDITIONS[key].nominal
     low, high = limits or (nominal, nominal)
     low, high = min(low, nominal), max(high, nominal)
     slack = _TOLERANCE * max(1.0, abs(value))
     if low - slack <= value <= high + slack:
         return ""
-    return f"the domain has {low:g} to {high:g}" if limits else f"the domain has only {nominal:g}"
+    ends = f"{_text_of(key, low)} to {_text_of(key, high)}"
+    return f"the domain has {ends}" if limits else f"the domain has only {_text_of(key, nominal)}"
+
+
+def _text_of(key: str, value: float) -> str:
+    return PARAMETERS[key].text_of(value) if key in PARAMETERS else f"{value:g}"
 
 
 def _outside_paper(scenario: Scenario, map: Map, weather: WeatherRange) -> tuple[str, ...]:
@@ -157,7 +163,8 @@ def _outside_paper(scenario: Scenario, map: Map, weather: WeatherRange) -> tuple
     found = []
     for key, value in scenario.genes:
         if key in PARAMETERS and value != PARAMETERS[key].nominal:
-            found.append(f"{key} = {value:g}, the paper's world has only nominal values of it")
+            text = _text_of(key, value)
+            found.append(f"{key} = {text}, the paper's world has only nominal values of it")
         elif value > tops.get(key, value) + _TOLERANCE:
             unit = WEATHER_UNITS[key]
             found.append(

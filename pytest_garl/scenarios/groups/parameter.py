@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 from pytest_garl.errors import ScenarioError
@@ -15,6 +16,7 @@ class Parameter:
     ``high`` are the limits of what the simulator can fly, not what a domain claims.  ``source``
     says where the range of the domain `field` comes from.  A value of a ``whole`` one is rounded.
     ``choices`` name the whole values from 0 on; such a value is rounded up: only 0 is the first.
+    Files and reports state the name.
     An ``even`` one has no harsher end, as a direction or a time.
     """
 
@@ -34,6 +36,10 @@ class Parameter:
                 f"parameter {self.name!r}: expected low <= nominal <= high and low < high, "
                 f"found {self.low}, {self.nominal}, {self.high}"
             )
+
+    def text_of(self, value: float) -> str:
+        """Return a value for a reader: the name of a choice, or the number."""
+        return self.choices[math.ceil(value)] if self.choices else f"{value:g}"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
