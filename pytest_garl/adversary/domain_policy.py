@@ -9,7 +9,10 @@ from pytest_garl.errors import ScenarioError
 from pytest_garl.messages import shown
 from pytest_garl.scenarios.domains.domain import ABSENT, Domain
 from pytest_garl.scenarios.domains.reader import domain_named
+from pytest_garl.scenarios.story import GRADES
 
+GRADED = "graded"
+"""The policy of scenarios in which each NPC has a grade of its own."""
 NOBODY = "stationary"
 """The policy of scenarios without NPCs, which has nobody to move."""
 
@@ -38,4 +41,6 @@ def policy_in(domain: Domain, in_paper: str) -> str:
     """
     if domain.paper:
         return in_paper
-    return NOBODY if domain.npc_behaviour == ABSENT else domain.npc_behaviour
+    if domain.npc_behaviour == ABSENT:
+        return NOBODY
+    return GRADED if domain.npc_behaviour in GRADES else domain.npc_behaviour

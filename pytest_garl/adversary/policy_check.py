@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import dataclasses
+
 import numpy as np
 
 from pytest_garl.errors import PolicyError
@@ -9,6 +11,8 @@ from pytest_garl.scenarios.chromosome import decode
 from pytest_garl.scenarios.genes import genome_for, with_destinations
 from pytest_garl.scenarios.maps.map import Map
 from pytest_garl.scenarios.object_types import OBJECT_TYPES
+from pytest_garl.scenarios.scenario import Scenario
+from pytest_garl.scenarios.story import with_all_values
 from pytest_garl.simulation.npc_policy import NpcState, PolicySpec, Situation, decision
 
 
@@ -38,7 +42,7 @@ def check_policy(spec: PolicySpec, map: Map) -> None:
             uav_velocity_mps=(0.0, 0.0, 0.0),
             marker_position_m=((x_min + x_max) / 2, (y_min + y_max) / 2),
             map=map,
-            scenario=decode(genome.nominal, genome, map=map.name, seed=0),
+            scenario=_with_stories(decode(genome.nominal, genome, map=map.name, seed=0), map),
         )
         policy = spec.make()
         try:
@@ -50,3 +54,10 @@ def check_policy(spec: PolicySpec, map: Map) -> None:
                 f"NPC policy {spec.name!r}: reset raised {type(error).__name__}: {error}"
             ) from error
         decision(policy, situation)
+
+
+def _with_stories(scenario: Scenario, map: Map) -> Scenario:
+    told: dict[str, float] = {}
+    for name, kind in map.present_objects:
+        told |= with_all_values({}, name, kind)
+    return dataclasses.replace(scenario, genes=(*scenario.genes, *told.items()))

@@ -9,6 +9,7 @@ import numpy as np
 
 from pytest_garl.scenarios.maps.map import load_map
 from pytest_garl.scenarios.placement import (
+    map_in,
     marker_position_m,
     object_destination_m,
     object_speed_mps,
@@ -72,7 +73,7 @@ def describe_scenario(scenario: Scenario, map_folders: tuple[Path, ...]) -> list
     rows = conditions_in_words(scenario, map)
     x, y = marker_position_m(scenario, map)
     rows.append(("marker", f"at ({x:.1f}, {y:.1f}) m, east and north"))
-    for name, kind in map.without(scenario.removed_objects).present_objects:
+    for name, kind in map_in(scenario, map).present_objects:
         x, y = object_start_m(scenario, map, name)
         speed = object_speed_mps(scenario, map, name)
         way = f"from ({x:.1f}, {y:.1f}) m"

@@ -19,6 +19,7 @@ from pytest_garl.scenarios.maps.map import Map
 from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.simulation.environment import environment_at
 from pytest_garl.simulation.flight import Flight, Track
+from pytest_garl.simulation.landing_phases import LandingPhases
 from pytest_garl.simulation.npc_policy import (
     DECISION_STEP_S,
     NpcState,
@@ -35,6 +36,7 @@ from pytest_garl.simulation.physics.vehicle import (
     VehicleModel,
     drag,
     lag,
+    up_m,
     vehicle_model,
     wrench,
 )
@@ -76,6 +78,7 @@ class EscapeModel:
         self._index = max(0, int(np.searchsorted(track.time_s, from_s + 1e-6, side="right")) - 1)
         self._model = vehicle_model(chase.airframe)
         self._wind = mean_wind(chase.scenario, chase.map.ground.texture)
+        self._phases, self._known_samples = LandingPhases(), 0
         self._npcs = self._warm_npcs()
 
     def position_m(self, name: str = "") -> Vector:
@@ -85,6 +88,7 @@ class EscapeModel:
     def escapes(self, legs: tuple[Leg, ...], until_s: float) -> bool:
         """Return whether the UAV keeps clear of everything until a time if it flies the legs."""
         npcs = [_copied(npc) for npc in self._npcs]
+        phases = copy.deepcopy(self._phases)
         uav = _Uav(self._model, self._wind, self._first_motion())
         clearance = Clearance(self._chase.world, MODEL_KEPT_M)
         first, last = round(self.from_s * PHYSICS_RATE_HZ), round(until_s * PHYSICS_RATE_HZ)
@@ -92,7 +96,7 @@ class EscapeModel:
         for tick in range(first, last + 1):
             now = tick / PHYSICS_RATE_HZ
             if tick % TICKS_PER_NPC_STEP == 0:
-                self._move(npcs, tick, uav.motion, scenario)
+                self._move(npcs, tick, uav.motion, scenario, phases)
             if tick % TICKS_PER_SAMPLE == 0 or tick == first:
                 motion = uav.motion
                 elapsed_s = now - self.from_s
@@ -101,16 +105,33 @@ class EscapeModel:
             uav.fly(velocity_of(legs, now - self.from_s))
         return True
 
-    def _move(self, npcs: Sequence[Npc], tick: int, motion: Motion, scenario: Scenario) -> None:
+    def _move(
+        self,
+        npcs: Sequence[Npc],
+        tick: int,
+        motion: Motion,
+        scenario: Scenario,
+        phases: LandingPhases,
+    ) -> None:
+        phases.update(tick / PHYSICS_RATE_HZ, up_m(motion.position_m[2]))
         if tick % round(DECISION_STEP_S * PHYSICS_RATE_HZ) == 0:
-            situations = [self._situation(npc.state, npcs, tick, motion, scenario) for npc in npcs]
+            situations = [
+                self._situation(npc.state, npcs, tick, motion, scenario, phases) for npc in npcs
+            ]
             for npc, situation in zip(npcs, situations, strict=True):
                 npc.decide(situation)
         for npc in npcs:
+            npc.tell_time(tick / PHYSICS_RATE_HZ, phases.began_s)
             npc.advance(TICKS_PER_NPC_STEP / PHYSICS_RATE_HZ, npcs)
 
     def _situation(
-        self, state: NpcState, npcs: Sequence[Npc], tick: int, motion: Motion, scenario: Scenario
+        self,
+        state: NpcState,
+        npcs: Sequence[Npc],
+        tick: int,
+        motion: Motion,
+        scenario: Scenario,
+        phases: LandingPhases,
     ) -> Situation:
         return Situation(
             time_s=tick / PHYSICS_RATE_HZ,
@@ -121,6 +142,7 @@ class EscapeModel:
             marker_position_m=self._chase.flight.marker_position_m,
             map=self._chase.map,
             scenario=scenario,
+            phases_s=phases.began_s,
         )
 
     def _warm_npcs(self) -> list[Npc]:
@@ -137,29 +159,42 @@ class EscapeModel:
             tick = number * step
             index = int(np.searchsorted(chase.flight.uav.time_s, tick * TICK_S - 1e-6))
             index = min(index, len(chase.flight.uav.time_s) - 1)
+            self._tell_time(npcs, index)
             self._place(npcs, index)
             motion = self._motion(index)
             scenario = environment_at(chase.scenario, chase.flight, tick * TICK_S - 1e-6)
-            situations = [self._situation(npc.state, npcs, tick, motion, scenario) for npc in npcs]
+            situations = [
+                self._situation(npc.state, npcs, tick, motion, scenario, self._phases)
+                for npc in npcs
+            ]
             for npc, situation in zip(npcs, situations, strict=True):
                 if number == 0:
                     rng = generator(chase.scenario.seed, "objects", numbers[npc.name])
                     npc.policy.reset(situation, rng)
                 npc.decide(situation)
+        self._tell_time(npcs, self._index)
         self._place(npcs, self._index)
         for npc, item in zip(npcs, chase.flight.objects, strict=True):
             speeds = np.hypot(*item.track.velocity_mps[: self._index, :2].T)
             npc.has_run(speeds.tolist(), TICKS_PER_SAMPLE * TICK_S)
         return npcs
 
+    def _tell_time(self, npcs: Sequence[Npc], index: int) -> None:
+        """Take in the flight up to a sample of its track."""
+        track = self._chase.flight.uav
+        known = self._known_samples
+        for each in range(known, index + 1):
+            self._phases.update(float(track.time_s[each]), up_m(float(track.position_m[each, 2])))
+        self._known_samples = max(known, index + 1)
+        for npc in npcs:
+            npc.tell_time(float(track.time_s[index]), self._phases.began_s)
+
     def _place(self, npcs: Sequence[Npc], index: int) -> None:
         for npc, item in zip(npcs, self._chase.flight.objects, strict=True):
-            (x, y), (vx, vy) = (
-                (float(value) for value in values[index, :2])
-                for values in (item.track.position_m, item.track.velocity_mps)
-            )
+            vx, vy, _ = _vector(item.track.velocity_mps[index])
             _, _, sine, cosine = (float(value) for value in item.track.attitude[index])
-            npc.place((x, y), (vx, vy), 2 * math.atan2(sine, cosine))
+            place = _vector(item.track.position_m[index])
+            npc.place(place, (vx, vy), 2 * math.atan2(sine, cosine))
 
     def _first_motion(self) -> Motion:
         """Return the UAV's motion at the takeover: the sample before it, moved on."""
@@ -246,6 +281,7 @@ def _copied(npc: Npc) -> Npc:
     """Return an NPC that moves on by itself; what it shares with the other never changes."""
     own = copy.copy(npc)
     own.policy, own.moves, own.changes = copy.deepcopy(npc.policy), [*npc.moves], [*npc.changes]
+    own.bird_path = copy.copy(npc.bird_path)
     return own
 
 

@@ -28,6 +28,7 @@ from pytest_garl.regressions.escape_model import Chase, EscapeModel
 from pytest_garl.regressions.escape_plan import HOVERS_S, find_escape
 from pytest_garl.regressions.observation import first_observation_s
 from pytest_garl.scenarios.maps.map import Map
+from pytest_garl.scenarios.placement import map_in
 from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.simulation.flight import Contact, Flight
 from pytest_garl.simulation.flight_file import load
@@ -153,7 +154,7 @@ def collision_of(
     contact = flight.contacts[-1] if flight.contacts else None
     recorded = {item.name: item.type for item in flight.objects}
     # A user's own simulator may record no objects, or others.
-    present = map.without(scenario.removed_objects)
+    present = map_in(scenario, map)
     if contact is None or contact.body not in recorded or recorded != dict(present.present_objects):
         return None
     try:

@@ -15,6 +15,7 @@ from pytest_garl.scenarios.genes import genome_like
 from pytest_garl.scenarios.groups.catalogue import GROUPS, PARAMETERS
 from pytest_garl.scenarios.maps.map import Map
 from pytest_garl.scenarios.scenario import Scenario
+from pytest_garl.scenarios.story import STORY
 from pytest_garl.scenarios.task import Task, read_task, task_lines
 from pytest_garl.scenarios.units import HEIGHT, from_sections, ranges_of, sections_of, snapped
 
@@ -65,8 +66,10 @@ def scenario_lines(scenario: Scenario, map: Map) -> list[str]:
 
 def _written(key: str, value: float) -> str:
     """Return a value in TOML: the name of a choice, or the number."""
-    is_named = key in PARAMETERS and PARAMETERS[key].choices
-    return quoted(PARAMETERS[key].text_of(value)) if is_named else repr(value)
+    if key in PARAMETERS and PARAMETERS[key].choices:
+        return quoted(PARAMETERS[key].text_of(value))
+    told = STORY.get(key.partition(".")[2])
+    return quoted(told.choices[int(value)]) if told and told.choices else repr(value)
 
 
 def _gene_lines(scenario: Scenario) -> list[str]:
@@ -128,7 +131,7 @@ def _read_section(table: Table, head: str, map: Map) -> dict[str, float]:
     optional = {name for name in ranges if name.startswith("destination_")}
     table.refuse_unknown({*ranges})
     required = (
-        {*ranges} - optional - {HEIGHT}
+        {*ranges} - optional - {HEIGHT, *STORY}
         if head not in ("weather", *GROUPS) or head == "light"
         else ()
     )
@@ -136,6 +139,8 @@ def _read_section(table: Table, head: str, map: Map) -> dict[str, float]:
         table.get(name)
     if bool(optional & {*table.values}) and not optional <= {*table.values}:
         table.get(next(iter(sorted(optional - {*table.values}))))
+    if head in dict(map.all_objects) and {*table.values} & {*STORY}:
+        table.get("grade")
     return {
         name: _number(table, head, name, low, high)
         for name, (low, high) in ranges.items()
@@ -147,6 +152,9 @@ def _number(table: Table, head: str, name: str, low: float, high: float) -> floa
     parameter = PARAMETERS.get(f"{head}.{name}")
     if parameter and parameter.choices:
         return table.choice(name, parameter.choices)
+    told = STORY.get(name) if parameter is None else None
+    if told and told.choices:
+        return table.choice(name, told.choices)
     return table.number(name, low=low, high=high)
 
 

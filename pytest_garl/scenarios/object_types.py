@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -18,7 +19,8 @@ class ObjectType:
     fast its speed changes.  It turns on the spot at up to ``turn_rate_radps``, and on the move no
     faster than ``lateral_mps2`` allows.  ``least_speed_mps`` is the speed below which it falls from
     the air, 0 for those that walk.  It runs faster than ``sustained_speed_mps`` only in bursts:
-    for ``burst_m`` metres more than it goes at that speed in the same time.
+    for ``burst_m`` metres more than it goes at that speed in the same time.  It climbs and dives at
+    ``climb_mps`` and ``dive_mps`` at most.
 
     ``altitude_m`` is the height of the body's frame above the ground, unless the scenario gives
     another (0 for those that walk, the body's middle for those that fly); ``radius_m`` and
@@ -35,6 +37,8 @@ class ObjectType:
     height_m: float
     altitude_m: float
     parts: tuple[Part, ...]
+    climb_mps: float = 0.0
+    dive_mps: float = 0.0
     least_speed_mps: float = 0.0
     sustained_speed_mps: float = math.inf
     burst_m: float = 0.0
@@ -128,6 +132,23 @@ _PERSON = (
     _blob((0.21, 0.19, 0.14), (-0.01, 0.0, 1.68), _HAIR),
 )
 
+_STATURE = 1.16 / 1.75
+"""A child of six years to the adult: WHO growth reference (2007), median of boys, 1.16 m."""
+
+
+def _smaller(part: Part, share: float) -> Part:
+    (length, width, height), (x, y, z) = part.size_m, part.position_m
+    return dataclasses.replace(
+        part,
+        size_m=(share * length, share * width, share * height),
+        position_m=(share * x, share * y, share * z),
+        colour=_CHILDS_JACKET if part.colour == _JACKET else part.colour,
+    )
+
+
+_CHILDS_JACKET = (64, 120, 62)
+_CHILD = tuple(_smaller(part, _STATURE) for part in _PERSON)
+
 _COAT, _MUZZLE = (134, 92, 54), (72, 50, 34)
 _DOG = (
     _blob((0.62, 0.24, 0.26), (0.0, 0.0, 0.45), _COAT),
@@ -178,6 +199,20 @@ OBJECT_TYPES: Mapping[str, ObjectType] = MappingProxyType(
                 parts=_PERSON,
             ),
             ObjectType(
+                name="child",
+                # Engineering estimate: a child of six runs as fast as an adult sprints slowly.
+                top_speed_mps=4.0,
+                # As an adult: it is lighter and has shorter legs.
+                acceleration_mps2=2.3,
+                braking_mps2=2.3,
+                lateral_mps2=2.3,
+                turn_rate_radps=math.pi,
+                radius_m=0.28,
+                height_m=1.17,
+                altitude_m=0.0,
+                parts=_CHILD,
+            ),
+            ObjectType(
                 name="dog",
                 # A gallop of a medium dog, half of a racing greyhound's 16 m/s
                 # (Usherwood and Wilson 2005).
@@ -209,6 +244,11 @@ OBJECT_TYPES: Mapping[str, ObjectType] = MappingProxyType(
                 # The stall of a herring gull of 1 kg and 0.2 m² (Pennycuick 2008) with a largest
                 # lift coefficient of 1.6 (Tucker and Heine 1990): sqrt(2 m g / (rho S C)) = 7.1.
                 least_speed_mps=7.0,
+                # Birds of the gull's mass climb with 1 to 2 m/s (Hedenström and Alerstam 1992).
+                climb_mps=1.5,
+                # Engineering estimate: a dive of 40 degrees at 13 m/s, far below the stoop of a
+                # falcon.
+                dive_mps=8.0,
                 # Engineering estimates: flapping harder, and spreading wings and tail to brake.
                 acceleration_mps2=3.0,
                 braking_mps2=5.0,
@@ -225,4 +265,5 @@ OBJECT_TYPES: Mapping[str, ObjectType] = MappingProxyType(
         )
     }
 )
-"""The paper's three types: a taller one on the ground, a low one, one in the air."""
+"""The paper's three types, a taller one on the ground, a low one, one in the air; and children."""
+PAPER_TYPES = ("person", "dog", "bird")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import math
 from dataclasses import dataclass
 
@@ -10,6 +11,7 @@ from pytest_garl.scenarios.groups import decoys as decoy_groups
 from pytest_garl.scenarios.maps.map import Layer, Map
 from pytest_garl.scenarios.object_types import OBJECT_TYPES, ObjectType
 from pytest_garl.scenarios.scenario import Scenario
+from pytest_garl.scenarios.story import children_in
 
 PAPER_MARKER = MarkerSpec()
 MARKER_SIDE_M = PAPER_MARKER.side_m
@@ -251,17 +253,24 @@ def place_genes(place: str, position_m: tuple[float, float], map: Map) -> dict[s
 
 def object_speed_mps(scenario: Scenario, map: Map, name: str) -> float:
     """Return the largest speed of an object: what its velocity gene means for its type."""
-    return object_type(map, name).speed_mps(scenario[f"{name}.velocity"])
+    return object_type(scenario, map, name).speed_mps(scenario[f"{name}.velocity"])
 
 
 def object_altitude_m(scenario: Scenario, map: Map, name: str) -> float:
     """Return the height of an object's frame above the ground; what never moves sits there."""
-    kind = object_type(map, name)
+    kind = object_type(scenario, map, name)
     if not kind.flies or object_speed_mps(scenario, map, name) == 0:
         return kind.sitting_m
     return scenario.get(f"{name}.height_m", kind.altitude_m)
 
 
-def object_type(map: Map, name: str) -> ObjectType:
-    """Return the type of an object of the map."""
-    return OBJECT_TYPES[dict(map.present_objects)[name]]
+def object_type(scenario: Scenario, map: Map, name: str) -> ObjectType:
+    """Return the type of an object of the map in a scenario."""
+    return OBJECT_TYPES[dict(map_in(scenario, map).present_objects)[name]]
+
+
+def map_in(scenario: Scenario, map: Map) -> Map:
+    """Return the map with the objects that are there in a scenario."""
+    names = (name for name, _ in map.all_objects)
+    place = map.without(scenario.removed_objects)
+    return dataclasses.replace(place, children=children_in(scenario, names))

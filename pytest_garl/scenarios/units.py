@@ -34,6 +34,7 @@ from pytest_garl.scenarios.placement import (
     place_genes,
 )
 from pytest_garl.scenarios.scenario import Scenario
+from pytest_garl.scenarios.story import STORY, story_values, with_all_values
 
 FOG_VISIBILITY_M = 10.0
 """Gene 1: below 10 m were reported in the Great Smog of London, 1952."""
@@ -172,6 +173,7 @@ def sections_of(scenario: Scenario, map: Map) -> dict[str, dict[str, float]]:
         elevation = round(sun_elevation_deg(position), ANGLE_DIGITS)
         sections["light"] = dict(zip(LIGHT, (elevation, azimuth), strict=True))
     sections["marker"] = _inside_disc(_named("", marker_position_m(scenario, map)), map)
+    kinds = dict(map.all_objects)
     for name, _ in map.without(scenario.removed_objects).present_objects:
         values = _named("start_", object_start_m(scenario, map, name))
         goal = object_destination_m(scenario, map, name)
@@ -180,6 +182,8 @@ def sections_of(scenario: Scenario, map: Map) -> dict[str, dict[str, float]]:
         values["speed_mps"] = round(object_speed_mps(scenario, map, name), PLACE_DIGITS)
         if any(key == f"{name}.{HEIGHT}" for key, _ in scenario.genes):
             values[HEIGHT] = round(scenario[f"{name}.{HEIGHT}"], PLACE_DIGITS)
+        told = story_values(scenario, name, kinds[name])
+        values |= {key: round(value, PLACE_DIGITS) + 0.0 for key, value in told.items()}
         sections[name] = values
     for key, value in scenario.genes:
         if key in PARAMETERS and key != TURN:
@@ -210,11 +214,14 @@ def from_sections(
             continue
         section = sections[name]
         values |= _place(f"{name}.start", section, map)
-        values[f"{name}.velocity"] = OBJECT_TYPES[kind].share_of(section["speed_mps"])
+        body = "child" if section.get("body") else kind
+        values[f"{name}.velocity"] = OBJECT_TYPES[body].share_of(section["speed_mps"])
         if HEIGHT in section:
             values[f"{name}.{HEIGHT}"] = section[HEIGHT]
         if "destination_x_m" in section:
             values |= _place(f"{name}.destination", section, map)
+        if "grade" in section:
+            values |= with_all_values(section, name, kind)
     for head, section in sections.items():
         named = {f"{head}.{name}": value for name, value in section.items()}
         conditions |= {key: value for key, value in named.items() if key in PARAMETERS}
@@ -270,7 +277,11 @@ def ranges_of(head: str, map: Map) -> dict[str, tuple[float, float]]:
             places |= {f"{end}_x_m": (x_min, x_max), f"{end}_y_m": (y_min, y_max)}
         kind = OBJECT_TYPES[kinds[head]]
         heights = {HEIGHT: HEIGHTS_M} if kind.flies else {}
-        return places | {"speed_mps": (0.0, kind.top_speed_mps)} | heights
+        told = {
+            each.name: (each.low, each.high) for each in STORY.values() if kind.name in each.types
+        }
+        top_mps = max(kind.top_speed_mps, OBJECT_TYPES["child"].top_speed_mps * ("body" in told))
+        return places | {"speed_mps": (0.0, top_mps)} | heights | told
     return {each.name: (each.low, each.high) for each in GROUPS[head].parameters}
 
 

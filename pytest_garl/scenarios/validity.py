@@ -18,6 +18,7 @@ from pytest_garl.scenarios.object_types import OBJECT_TYPES
 from pytest_garl.scenarios.placement import (
     MARKER_RADIUS_M,
     decoys_of,
+    map_in,
     marker_genes,
     marker_position_m,
     object_altitude_m,
@@ -83,7 +84,7 @@ def _discs(body: Body, part: Part) -> Iterable[Disc]:
 
 def problems(scenario: Scenario, map: Map) -> tuple[str, ...]:
     """Return what is wrong with the scenario, one sentence each; nothing if it is valid."""
-    map = map.without(scenario.removed_objects)
+    map = map_in(scenario, map)
     discs = tuple(disc for body in map.bodies for disc in discs_of(body))
     marker = marker_position_m(scenario, map)
     found = list(_marker_problems(marker, scenario, map, discs))
@@ -103,7 +104,7 @@ def repair(scenario: Scenario, map: Map) -> Scenario:
     settled already.
     """
     scenario = snapped(scenario, map)
-    map = map.without(scenario.removed_objects)
+    map = map_in(scenario, map)
     discs = tuple(disc for body in map.bodies for disc in discs_of(body))
     marker = marker_position_m(scenario, map)
     wanted = scenario

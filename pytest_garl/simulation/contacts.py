@@ -139,5 +139,4 @@ class Contacts:
     def _approach_mps(self, body: str, velocity: Vector) -> float:
         """Return the UAV's speed relative to a body: a moving one may hit a hovering UAV."""
         moving = next((npc for npc in self._npcs if npc.name == body), None)
-        vx, vy = (moving.vx_mps, moving.vy_mps) if moving else (0.0, 0.0)
-        return math.dist(velocity, (vx, vy, 0.0))
+        return math.dist(velocity, moving.velocity_mps if moving else (0.0, 0.0, 0.0))

@@ -10,6 +10,7 @@ from typing import Any
 
 from pytest_garl.cpu_dispatch import dispatched
 from pytest_garl.scenarios.maps.map import Map, load_map
+from pytest_garl.scenarios.placement import map_in
 from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.simulation.flight import PACKAGES, Flight
 from pytest_garl.simulation.flight_file import hash_of
@@ -35,7 +36,7 @@ def fly(
     exception, its SystemExit included; KeyboardInterrupt passes through.
     """
     began = time.perf_counter()
-    place = (map or load_map(scenario.map)).without(scenario.removed_objects)
+    place = map_in(scenario, map or load_map(scenario.map))
     loop = Loop(scenario, system, npcs.make, place, time_limit_s, guard)
     flight = dataclasses.replace(
         with_nominal_landing(loop.run(), scenario, place, loop.camera),

@@ -17,6 +17,7 @@ from pytest_garl.simulation.contacts import Contacts
 from pytest_garl.simulation.environment import changed
 from pytest_garl.simulation.flight import Crash, Flight, Outcome
 from pytest_garl.simulation.ground_stays import GroundStays
+from pytest_garl.simulation.landing_phases import LandingPhases
 from pytest_garl.simulation.landing_place import what_lies_under
 from pytest_garl.simulation.navigation import Navigation
 from pytest_garl.simulation.npc_policy import DECISION_STEP_S, GeneChange, NpcPolicy, Situation
@@ -31,6 +32,7 @@ from pytest_garl.simulation.physics.vehicle import (
     VehicleModel,
     drag,
     lag,
+    up_m,
     vehicle_model,
     wrench,
 )
@@ -83,6 +85,7 @@ class Loop:
         self._pending: list[tuple[int, Command]] = []
         ranging = Ranging(scenario, self._system.airframe.rangefinder, self._world)
         self._sensors = Sensors(scenario, self.camera, self.recorder, self.npcs, ranging)
+        self.phases = LandingPhases()
         self._ticks = 0
         self._ticks_per_control = _ticks_per_call(self._system.airframe.control_rate_hz)
 
@@ -151,6 +154,7 @@ class Loop:
         if not math.isfinite(sum(position) + sum(attitude) + sum(velocity) + sum(spin)):
             raise self._system.not_finite_error(now)
         if tick % TICKS_PER_NPC_STEP == 0:
+            self.phases.update(now, up_m(position[2]))
             self._move_npcs(tick)
         if tick % TICKS_PER_TRACK_SAMPLE == 0:
             self._contacts.record_pose(now)
@@ -196,8 +200,9 @@ class Loop:
             moves = [npc.decide(self.situation(npc)) for npc in self.npcs]
             self._change([change for move in moves for change in move.changes])
         for npc in self.npcs:
+            npc.tell_time(self.recorder.time_s, self.phases.began_s)
             npc.advance(TICKS_PER_NPC_STEP / PHYSICS_RATE_HZ, self.npcs)
-            self._world.move(npc.name, npc.position_m, npc.yaw_rad, (npc.vx_mps, npc.vy_mps, 0.0))
+            self._world.move(npc.name, npc.position_m, npc.yaw_rad, npc.velocity_mps)
 
     def _change(self, changes: Sequence[GeneChange]) -> None:
         scenario = changed(self.scenario, changes)
@@ -273,6 +278,7 @@ def _situation(loop: Loop, npc: Npc, position: Vector, velocity: Vector) -> Situ
         marker_position_m=marker_position_m(loop.scenario, loop.map),
         map=loop.map,
         scenario=loop.scenario,
+        phases_s=loop.phases.began_s,
     )
 
 

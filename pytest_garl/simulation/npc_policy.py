@@ -51,7 +51,8 @@ class Situation:
     """The input of a policy that decides for one NPC: the exact state of everything.
 
     ``self`` is that NPC, ``others`` are all other NPCs.  ``scenario`` holds all genes, with those
-    of the environment as they are at the moment.
+    of the environment as they are at the moment.  ``phases_s`` are the times at which the phases of
+    the landing began so far (:data:`~pytest_garl.scenarios.story.PHASES`), infinite for the others.
     """
 
     time_s: float
@@ -62,6 +63,7 @@ class Situation:
     marker_position_m: tuple[float, float]
     map: Map
     scenario: Scenario
+    phases_s: tuple[float, ...] = (0.0, math.inf, math.inf, math.inf)
 
 
 GeneChange = tuple[str, float]

@@ -89,7 +89,7 @@ class Recorder:
         self._uav.append((*position, *attitude, *velocity))
         for track, item in zip(self._tracks, self._objects, strict=True):
             turn = (0.0, 0.0, math.sin(item.yaw_rad / 2), math.cos(item.yaw_rad / 2))
-            track.append((*item.position_m, *turn, item.vx_mps, item.vy_mps, 0.0))
+            track.append((*item.position_m, *turn, *item.velocity_mps))
         for name, gap in gaps.items():
             if gap < self._nearest.get(name, (math.inf, 0.0))[0]:
                 self._nearest[name] = (gap, time_s)

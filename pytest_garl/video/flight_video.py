@@ -11,7 +11,7 @@ import numpy as np
 from pytest_garl.errors import GarlError
 from pytest_garl.landing_system import Camera
 from pytest_garl.scenarios.maps.map import Map
-from pytest_garl.scenarios.placement import marker_position_m
+from pytest_garl.scenarios.placement import map_in, marker_position_m
 from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.simulation.camera.cover_event import renderer_of
 from pytest_garl.simulation.environment import environment_at
@@ -47,7 +47,7 @@ def frames(
     last moment with the outcome, for ``CLOSING_S``.  Raises GarlError where the flight is not
     one of this scenario.
     """
-    place = map.without(scenario.removed_objects)
+    place = map_in(scenario, map)
     _check(flight, scenario, place)
     renderer = renderer_of(scenario, place, camera)
     left, right = CameraPane(renderer), MapPane(flight, scenario, place, camera)

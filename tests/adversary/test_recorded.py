@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 
 from pytest_garl.adversary.catalogue import policy_spec
-from pytest_garl.adversary.recorded import LANDING_ZONE_M, handed_over_spec, recorded_spec
+from pytest_garl.adversary.recorded import handed_over_spec, recorded_spec
+from pytest_garl.adversary.way_out import LANDING_ZONE_M
 from pytest_garl.errors import PolicyError
 from pytest_garl.scenarios.chromosome import decode
 from pytest_garl.scenarios.genes import genome_for

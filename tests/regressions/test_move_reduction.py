@@ -90,7 +90,7 @@ def test_shorter_record_ends_where_the_longer_one_ends() -> None:
     ends = [f.objects[1].track.position_m[-1, :2] for f in (flight, last)]
     # It starts from standing where the longer one walked by, so it falls behind: by v² / 2a while
     # it gains speed, and by v t while it turns from where it faced, half around at most.
-    speed_mps, kind = object_speed_mps(SCENARIO, LAWN, name), object_type(LAWN, name)
+    speed_mps, kind = object_speed_mps(SCENARIO, LAWN, name), object_type(SCENARIO, LAWN, name)
     gaining_m = speed_mps**2 / (2 * kind.acceleration_mps2)
     z, w = last.objects[1].track.attitude[0, 2:]
     along = ends[1] - last.objects[1].track.position_m[0, :2]

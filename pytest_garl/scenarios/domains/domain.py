@@ -15,6 +15,7 @@ from pytest_garl.scenarios.light import NOON_DEG, TWILIGHT_DEG
 from pytest_garl.scenarios.maps.map import Map
 from pytest_garl.scenarios.object_types import HEIGHTS_M
 from pytest_garl.scenarios.scenario import Scenario
+from pytest_garl.scenarios.story import GRADES, STORY, story_of
 from pytest_garl.scenarios.units import WEATHER_UNITS, sections_of
 
 ABSENT = "absent"
@@ -82,6 +83,18 @@ def _conditions() -> dict[str, Condition]:
             source="engineering estimate: from above people's heads to above the search height",
         )
     )
+    for told in STORY.values():
+        if not told.choices and not told.is_place:
+            found.append(
+                Condition(
+                    key=f"npcs.{told.name}",
+                    low=told.low,
+                    high=told.high,
+                    nominal=told.nominal,
+                    meaning=told.meaning,
+                    source=told.source,
+                )
+            )
     return {each.key: each for each in found}
 
 
@@ -131,6 +144,8 @@ class Domain:
         for head, values in sections.items():
             if head in objects and self.npc_behaviour == ABSENT:
                 found.append(f"{head} is there, the domain has no NPCs")
+            if head in objects:
+                found += self._behaviour_outside(scenario, head)
             if head == "marker" or head in objects:
                 continue
             for name, value in values.items():
@@ -141,6 +156,14 @@ class Domain:
                 if problem:
                     found.append(f"{key} = {_text_of(key, value)}, {problem}")
         return tuple(found)
+
+    def _behaviour_outside(self, scenario: Scenario, name: str) -> tuple[str, ...]:
+        story = story_of(scenario, name)
+        if story is None or self.npc_behaviour not in GRADES:
+            return ()
+        if GRADES.index(story.grade) <= GRADES.index(self.npc_behaviour):
+            return ()
+        return (f"{name} is {story.grade}, the domain ends at {self.npc_behaviour}",)
 
 
 def _beyond(key: str, value: float, limits: tuple[float, float] | None) -> str:

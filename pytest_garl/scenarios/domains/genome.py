@@ -16,11 +16,13 @@ from pytest_garl.scenarios.genes import (
     genome_for,
     object_gene,
     place_gene,
+    story_property,
 )
 from pytest_garl.scenarios.groups.catalogue import GROUPS, PARAMETERS
 from pytest_garl.scenarios.light import position_of_elevation
 from pytest_garl.scenarios.maps.map import Map
 from pytest_garl.scenarios.object_types import OBJECT_TYPES
+from pytest_garl.scenarios.story import GRADES, STORY
 from pytest_garl.scenarios.task import Task
 from pytest_garl.scenarios.units import WEATHER_UNITS
 
@@ -146,6 +148,22 @@ def _light(domain: Domain) -> Iterable[NuclearGene]:
     yield _optional("light", (position, turn))
 
 
+def _story(domain: Domain, name: str, kind: str) -> Iterable[Property]:
+    """Yield the values of an NPC's story, if the domain names a grade of behaviour."""
+    if domain.npc_behaviour not in GRADES:
+        return
+    strongest = GRADES.index(domain.npc_behaviour)
+    for each in STORY.values():
+        low, high = each.draws
+        if each.name == "grade":
+            high = strongest + high % 1
+        elif not each.choices and not each.is_place:
+            limits = domain.range_of(f"npcs.{each.name}") or (each.nominal, each.nominal)
+            low, high = (limits[0] if low >= 0 else -limits[1]), limits[1]
+        if kind in each.types and low < high:
+            yield story_property(name, each, (low, high))
+
+
 def _objects(domain: Domain, map: Map) -> Iterable[NuclearGene]:
     if domain.npc_behaviour == ABSENT:
         return
@@ -163,4 +181,5 @@ def _objects(domain: Domain, map: Map) -> Iterable[NuclearGene]:
                     meaning="height at which it flies",
                 )
             )
+        values += _story(domain, name, kind)
         yield _optional(name, values)

@@ -58,8 +58,8 @@ class Map:
     ``bounds_m`` is (x_min, x_max, y_min, y_max); ``objects`` are (type, count) pairs
     of the dynamic objects; ``marker`` is the one to land on unless the test states another;
     ``sha256`` is the hash of the file and part of a run's identity.
-    ``removed_objects`` are the names of objects that one scenario leaves out; a map file removes
-    none.
+    ``removed_objects`` are the names of objects that one scenario leaves out, ``children`` those of
+    persons who are children in it; a map file names none.
     """
 
     name: str
@@ -73,14 +73,15 @@ class Map:
     sha256: str
     marker: MarkerSpec = field(default_factory=MarkerSpec)
     removed_objects: tuple[str, ...] = ()
+    children: tuple[str, ...] = ()
 
     @property
     def all_objects(self) -> tuple[tuple[str, str], ...]:
         """(name, type) of each dynamic object in order, including the removed ones."""
         return tuple(
-            (f"{kind}-{index}", kind)
+            (name, "child" if name in self.children else kind)
             for kind, count in self.objects
-            for index in range(1, count + 1)
+            for name in (f"{kind}-{index}" for index in range(1, count + 1))
         )
 
     @property

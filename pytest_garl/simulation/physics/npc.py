@@ -23,6 +23,7 @@ from pytest_garl.simulation.npc_policy import (
     Situation,
     decision,
 )
+from pytest_garl.simulation.physics.bird_path import BirdPath
 from pytest_garl.simulation.physics.locomotion import (
     STANDING_MPS,
     is_far_out,
@@ -44,7 +45,7 @@ class Npc:
 
     def __init__(self, scenario: Scenario, map: Map, name: str, policy: NpcPolicy) -> None:
         self.name = name
-        self.type = object_type(map, name)
+        self.type = object_type(scenario, map, name)
         self.policy = policy
         self.speed_mps = object_speed_mps(scenario, map, name)
         self.x_m, self.y_m = object_start_m(scenario, map, name)
@@ -58,18 +59,37 @@ class Npc:
             self.vx_mps = least * math.cos(self.yaw_rad)
             self.vy_mps = least * math.sin(self.yaw_rad)
         self._reserve_m = self.type.burst_m
+        self.bird_path = BirdPath(scenario, map, name, self.z_m) if self.flies else None
+        if self.bird_path and self.bird_path.waits:
+            self.x_m, self.y_m = self.bird_path.far_away_m
+            self.vx_mps = self.vy_mps = 0.0
         self.moves: list[tuple[float, float]] = []
         self.changes: list[tuple[int, str, float]] = []
         self._wanted_velocity_mps = (0.0, 0.0)
-        self.low_m = self.z_m + self.type.low_m
-        self.high_m = self.low_m + self.type.height_m
-        self._solids = _solids_at_height_of(self, map.bodies)
+        self.vz_mps = 0.0
+        lowest_m = self.bird_path.lowest_m if self.bird_path else self.z_m
+        self._solids = _solids_at_height_of(self, lowest_m, map.bodies)
         self._solids_in_reach: list[Disc] = []
 
     @property
     def position_m(self) -> tuple[float, float, float]:
         """Position of the body's frame in the world."""
         return self.x_m, self.y_m, self.z_m
+
+    @property
+    def velocity_mps(self) -> tuple[float, float, float]:
+        """Velocity in the world."""
+        return self.vx_mps, self.vy_mps, self.vz_mps
+
+    @property
+    def low_m(self) -> float:
+        """Height of its lowest point above the ground."""
+        return self.z_m + self.type.low_m
+
+    @property
+    def high_m(self) -> float:
+        """Height of its highest point above the ground."""
+        return self.low_m + self.type.height_m
 
     @property
     def body(self) -> Body:
@@ -113,8 +133,22 @@ class Npc:
             solid for solid in self._solids if gap_m(solid, (self.x_m, self.y_m)) < reach
         ]
 
+    def tell_time(self, time_s: float, phases_s: tuple[float, ...]) -> None:
+        """Say what time it is, and when the phases of the landing began; a bird may come now."""
+        path = self.bird_path
+        if path is not None and path.comes(time_s, phases_s):
+            (self.x_m, self.y_m), self.yaw_rad = path.entry_m, path.course_rad
+            self.vx_mps = self.speed_mps * math.cos(self.yaw_rad)
+            self.vy_mps = self.speed_mps * math.sin(self.yaw_rad)
+            self._wanted_velocity_mps = (self.vx_mps, self.vy_mps)
+
     def advance(self, dt_s: float, others: Sequence[Npc] = ()) -> None:
         """Turn and accelerate towards the wanted velocity; slide along solids and ``others``."""
+        if self.bird_path is not None:
+            if self.bird_path.waits:
+                return
+            z = self.bird_path.height_m((self.x_m, self.y_m), self.z_m, dt_s)
+            self.vz_mps, self.z_m = (z - self.z_m) / dt_s, z
         course, speed = next_course(
             self.type,
             (self.vx_mps, self.vy_mps),
@@ -171,10 +205,13 @@ class Npc:
         self.vy_mps = vy if self.y_m == y else 0.0
 
     def place(
-        self, position_m: tuple[float, float], velocity_mps: tuple[float, float], yaw_rad: float
+        self,
+        position_m: tuple[float, float, float],
+        velocity_mps: tuple[float, float],
+        yaw_rad: float,
     ) -> None:
         """Put it somewhere in motion, as a record says."""
-        self.x_m, self.y_m = position_m
+        self.x_m, self.y_m, self.z_m = position_m
         self.vx_mps, self.vy_mps = velocity_mps
         self.yaw_rad = yaw_rad
 
@@ -203,10 +240,11 @@ class Npc:
         ]
 
 
-def _solids_at_height_of(npc: Npc, bodies: Sequence[Body]) -> tuple[Disc, ...]:
+def _solids_at_height_of(npc: Npc, lowest_m: float, bodies: Sequence[Body]) -> tuple[Disc, ...]:
+    low_m = lowest_m + npc.type.low_m
     return tuple(
         disc
         for body in bodies
         for disc in discs_of(body)
-        if disc.low_m < npc.high_m and npc.low_m < disc.high_m
+        if disc.low_m < npc.high_m and low_m < disc.high_m
     )

@@ -1,0 +1,16 @@
+"""chasing: an NPC that sees the UAV late and from near; `grades.py` has its limits."""
+
+from __future__ import annotations
+
+from pytest_garl.adversary.interference import Interfering
+from pytest_garl.adversary.minds import Intercepting
+
+
+class Chasing(Interfering):
+    """Interferes for a while, within the limits of its grade."""
+
+    def __init__(self) -> None:
+        super().__init__("chasing", Intercepting())
+
+
+POLICY = Chasing
