@@ -54,6 +54,7 @@ TABLE = ResultTable(
         "budget",
         "seed",
         "landed",
+        "excused",
         "violations",
         "signatures",
         "active",
@@ -143,6 +144,7 @@ def search(key: Key, pool: Executor, flown: Flown) -> dict[str, Any]:
     return {
         **dict(zip(TABLE.key, key, strict=True)),
         "landed": sum(each.verdict.completed for each in results),
+        "excused": sum(each.verdict.no_landing in ("excused", "blocked") for each in results),
         "violations": sum(fails),
         "signatures": len({each.signature for each in results if each.verdict.violation}),
         "active": f"{np.mean(failing):.2f}" if failing else "",
@@ -154,9 +156,9 @@ def search(key: Key, pool: Executor, flown: Flown) -> dict[str, Any]:
 def report(rows: list[Row]) -> str:
     """Return a Markdown table: means over searches, shares of all their flights."""
     lines = [
-        "| scenarios | method | searches of | landed | violations | kinds of violations "
-        "| active when failing | flights to the first |",
-        "| --- | --- | --- | --- | --- | --- | --- | --- |",
+        "| scenarios | method | searches of | landed | excused or blocked | violations "
+        "| kinds of violations | active when failing | flights to the first |",
+        "| --- | --- | --- | --- | --- | --- | --- | --- | --- |",
     ]
     budgets = sorted({row["budget"] for row in rows}, key=int)
     for budget, drawing, method in itertools.product(budgets, DRAWINGS, METHODS):
@@ -178,8 +180,8 @@ def report(rows: list[Row]) -> str:
             method,
             f"{len(own)} × {budget}",
             *(
-                share(sum(int(row[name]) for row in own), flights)
-                for name in ("landed", "violations")
+                _share(method, sum(int(row[name]) for row in own), flights)
+                for name in ("landed", "excused", "violations")
             ),
             f"{np.mean([int(row['signatures']) for row in own]):.1f}",
             f"{active:.1f}" if total else "–",
@@ -187,6 +189,11 @@ def report(rows: list[Row]) -> str:
         )
         lines.append(f"| {' | '.join(cells)} |")
     return "\n".join(lines)
+
+
+def _share(method: str, count: int, total: int) -> str:
+    """Return a percentage; with an interval only if no flight depends on another."""
+    return share(count, total) if method == "random" else f"{100 * count / total:.1f} %"
 
 
 def fly_searches(arguments: argparse.Namespace) -> None:

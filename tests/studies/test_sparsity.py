@@ -61,5 +61,20 @@ def test_more_groups_act_in_the_failing_scenarios_of_dense_drawing(
     assert len(text.splitlines()) == 4
 
 
+def test_only_random_searches_have_an_interval_because_bred_flights_depend_on_each_other() -> None:
+    row = {
+        **{"drawing": "sparse", "budget": "60", "seed": "0", "limits": "0.75 m"},
+        **{"landed": "30", "excused": "15", "violations": "15", "signatures": "2"},
+        **{"active": "2.50", "first": "7"},
+    }
+    bred, drawn = (
+        [cell.strip() for cell in line.strip("|").split("|")]
+        for method in ("garl", "random")
+        for line in sparsity.report([{**row, "method": method}]).splitlines()[2:]
+    )
+    assert bred == ["sparse", "garl", "1 × 60", "50.0 %", "25.0 %", "25.0 %", "2.0", "2.5", "7.0"]
+    assert drawn[3:6] == ["50.0 % [36.8, 63.2]", "25.0 % [14.7, 37.9]", "25.0 % [14.7, 37.9]"]
+
+
 def map_texts(row: dict[str, Any]) -> dict[str, str]:
     return {name: str(value) for name, value in row.items()}
