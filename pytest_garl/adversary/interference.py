@@ -75,7 +75,9 @@ class Interference:
         if math.isinf(self._ends_s) and sighting is not None:
             self._ends_s = now + self._lasts_s
         if now >= min(self._ends_s, begins_s + APPROACH_S + self._lasts_s):
-            self._way_out = WayOut(situation, (self._move.x, self._move.y), LEAVES_TO_M)
+            # One that keeps away from the UAV turns back; another one goes straight on.
+            last = (self._move.x, self._move.y) if self._limits.keeps_m == 0 else (0.0, 0.0)
+            self._way_out = WayOut(situation, last, LEAVES_TO_M)
             return None
         if now - self._asked_s < self._limits.decides_every_s - 1e-6:
             return None
@@ -91,10 +93,8 @@ class Interference:
 
     def move(self, situation: Situation) -> Move:
         """Return the move until the next situation."""
-        if self._way_out is not None:
-            return self._way_out.decide(situation)
-        sighting = self._perception.sighting
-        return kept_away(self._move, sighting, situation, self._limits.keeps_m)
+        move = self._move if self._way_out is None else self._way_out.decide(situation)
+        return kept_away(move, self._perception.sighting, situation, self._limits.keeps_m)
 
 
 class Interfering:

@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pytest_garl.adversary.catalogue import WEIGHTS
+from pytest_garl.adversary.interference import Belief
 from pytest_garl.adversary.observations import ENCODINGS, on_turn
 from pytest_garl.errors import PolicyError
 from pytest_garl.files.arrays import unpack
@@ -65,6 +66,25 @@ class LearnedPolicy:
             return STAY
         values = self._network.values(self._encoding.state(situation))
         return self._encoding.moves(situation)[int(np.argmax(values))]
+
+
+def shipped(grade: str) -> str:
+    """Return the path of the weights of a grade's mind."""
+    return str(WEIGHTS / "grades" / f"{grade}.npz")
+
+
+class LearnedMind:
+    """The mind of an NPC that perceives the UAV in part: the best action by weights in a file."""
+
+    def __init__(self, weights: str) -> None:
+        sha256 = str(read_manifest(Path(weights))["sha256"])
+        self._network = _load(weights, sha256)
+        self._encoding = ENCODINGS[self._network.state]
+
+    def decide(self, belief: Belief) -> Move:
+        """Return the best action."""
+        values = self._network.values(self._encoding.state(belief))
+        return self._encoding.moves(belief)[int(np.argmax(values))]
 
 
 def learned_spec(name: str) -> PolicySpec:

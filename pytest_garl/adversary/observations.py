@@ -12,6 +12,7 @@ from types import MappingProxyType
 import numpy as np
 from numpy.typing import NDArray
 
+from pytest_garl.adversary.interference import Belief
 from pytest_garl.scenarios.genes import CONFINED_WEATHER, SUN
 from pytest_garl.simulation.npc_policy import DECISION_STEP_S, STAY, Move, Situation
 
@@ -30,6 +31,7 @@ PLACE_SCALE_M = 10.0
 SPEED_SCALE_MPS = 3.0
 STEP_SCALE_M = 4.0
 BODY_SCALE_M = 3.0
+LEFT_SCALE_S = 5.0
 """Divisors of each kind of number, so that all numbers are of the order of one."""
 LIMIT = 10.0
 """Bound of every number, however large the map."""
@@ -97,6 +99,17 @@ def relative(situation: Situation) -> State:
             sideways / SPEED_SCALE_MPS,
         )
     )
+
+
+def belief(situation: Situation) -> State:
+    """Return twelve numbers: ``relative`` to where the UAV is believed to be, and two of the grade.
+
+    These are how long the NPC still interferes, and whether it keeps away from the UAV.
+    """
+    if not isinstance(situation, Belief):
+        raise TypeError(f"expected a Belief, found {type(situation).__name__}")
+    own = (situation.left_s / LEFT_SCALE_S, float(situation.keeps_m > 0))
+    return np.concatenate([relative(situation), _vector(own)])
 
 
 def online(situation: Situation) -> State:
@@ -169,6 +182,7 @@ ENCODINGS: Mapping[str, Encoding] = MappingProxyType(
         "paper": Encoding(size=4, state=paper, moves=compass_moves),
         "extended": Encoding(size=9, state=extended, moves=compass_moves),
         "relative": Encoding(size=10, state=relative, moves=relative_moves),
+        "belief": Encoding(size=12, state=belief, moves=relative_moves),
         "online": Encoding(
             size=4 + len(CONDITIONS) + 2,
             state=online,

@@ -8,7 +8,8 @@ import numpy as np
 
 from pytest_garl.errors import PolicyError
 from pytest_garl.scenarios.chromosome import decode
-from pytest_garl.scenarios.genes import genome_for, with_destinations
+from pytest_garl.scenarios.genes import genome_for
+from pytest_garl.scenarios.genome_like import with_destinations
 from pytest_garl.scenarios.maps.map import Map
 from pytest_garl.scenarios.object_types import OBJECT_TYPES
 from pytest_garl.scenarios.scenario import Scenario

@@ -14,10 +14,12 @@ from typing import Any, get_args
 from pytest_garl.baselines.pairs import FlightSummary, NoLanding
 from pytest_garl.files.toml import LARGEST_INTEGER, Table, finite, quoted
 from pytest_garl.messages import listed, printable, shown
-from pytest_garl.scenarios.genes import genome_like, object_gene
+from pytest_garl.scenarios.genes import object_gene
+from pytest_garl.scenarios.genome_like import genome_like
 from pytest_garl.scenarios.groups.catalogue import PARAMETERS
 from pytest_garl.scenarios.maps.map import Map
 from pytest_garl.scenarios.scenario import Scenario
+from pytest_garl.scenarios.story import STORY
 from pytest_garl.scenarios.task import Task
 from pytest_garl.scenarios.units import HEIGHT, ranges_of
 
@@ -171,7 +173,8 @@ class RowReader:
     @cached_property
     def _known(self) -> dict[str, tuple[float, float]]:
         names = [name for name, _ in self.map.all_objects]
-        genome = genome_like([f"{name}.destination_x" for name in names], self.map)
+        keys = [f"{name}.{each}" for name in names for each in ("destination_x", *STORY)]
+        genome = genome_like(keys, self.map)
         known = {item.key: (item.low, item.high) for item in genome.properties}
         known = {key: limits for key, limits in known.items() if key.partition(".")[0] in names}
         for name in names:

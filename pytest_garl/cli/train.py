@@ -14,11 +14,11 @@ import click
 
 from pytest_garl import cpu_dispatch
 from pytest_garl.adversary.catalogue import DEFAULT_POLICY
-from pytest_garl.adversary.observations import ENCODINGS
 from pytest_garl.adversary.training.presets import PRESETS, Reward, Uav
 from pytest_garl.errors import GarlError
 from pytest_garl.landing_system import Airframe, airframe_of
 from pytest_garl.scenarios.object_types import OBJECT_TYPES
+from pytest_garl.scenarios.story import GRADES
 
 if TYPE_CHECKING:
     from pytest_garl.adversary.training.selection import TrainingPlan
@@ -36,6 +36,12 @@ RECENT_EPISODES = 50
     help=" ".join(f"{name} learns {preset.help}." for name, preset in PRESETS.items()),
 )
 @click.option(
+    "--grade",
+    type=click.Choice(GRADES[1:]),
+    help="Train for a grade of behaviour: NPCs that perceive the UAV within its limits. The same "
+    "as --policy with the grade's name; hostile NPCs are moved by dqn.",
+)
+@click.option(
     "--map",
     "maps",
     default="court,lawn",
@@ -45,9 +51,7 @@ RECENT_EPISODES = 50
 @click.option(
     "--type",
     "types",
-    default=",".join(OBJECT_TYPES),
-    show_default=True,
-    help="Types of NPCs that the policy moves, separated by commas.",
+    help="Types of NPCs that the policy moves, separated by commas (default: those of --policy).",
 )
 @click.option(
     "--system",
@@ -56,7 +60,7 @@ RECENT_EPISODES = 50
 )
 @click.option(
     "--state",
-    type=click.Choice([name for name, each in ENCODINGS.items() if not each.one_npc_acts]),
+    type=click.Choice(["paper", "extended", "relative"]),
     help="Input of the network, instead of that of --policy: the paper's four numbers, nine with "
     "the paper's actions, or ten in the NPC's own frame.",
 )
@@ -135,7 +139,16 @@ def _plan(options: dict[str, Any]) -> TrainingPlan:
     from pytest_garl.adversary.training.selection import TrainingPlan
     from pytest_garl.scenarios.maps.map import load_map
 
-    types = _names(options["types"])
+    name = options["policy"]
+    if options["grade"]:
+        name = "dqn" if options["grade"] == "hostile" else options["grade"]
+    preset = PRESETS[name]
+    if preset.surrogate.grades and (options["state"] or options["reward"]):
+        raise GarlError(
+            "--state and --reward are those of dqn and dqn-paper; NPCs of a grade learn from what "
+            "they perceive, to collide"
+        )
+    types = _names(options["types"]) if options["types"] else preset.surrogate.types
     for type_name in types:
         if type_name not in OBJECT_TYPES:
             raise GarlError(
@@ -143,9 +156,8 @@ def _plan(options: dict[str, Any]) -> TrainingPlan:
             )
     overrides = {name: options[name] for name in ("state", "uav", "reward") if options[name]}
     folders = (Path.cwd() / "scenarios" / "maps",)
-    preset = PRESETS[options["policy"]]
     return TrainingPlan(
-        name=options["policy"],
+        name=name,
         surrogate=dataclasses.replace(
             preset.surrogate,
             maps=tuple(load_map(name, folders) for name in _names(options["maps"])),

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 
-from pytest_garl.scenarios.genes import Genome, genome_like
+from pytest_garl.scenarios.genes import Genome
+from pytest_garl.scenarios.genome_like import genome_like
 from pytest_garl.scenarios.maps.map import Map
 from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.scenarios.validity import repair

@@ -12,10 +12,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pytest_garl.errors import ScenarioError
-from pytest_garl.scenarios.genes import CLEAR, Genome, NuclearGene
+from pytest_garl.scenarios.genes import CLEAR, Genome, NuclearGene, Property
 from pytest_garl.scenarios.groups.catalogue import PARAMETERS
 from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.scenarios.sparse import OFF, ON, active_genes
+from pytest_garl.scenarios.story import STORY
 
 
 def encode(scenario: Scenario, genome: Genome) -> NDArray[np.float64]:
@@ -45,7 +46,9 @@ def encode(scenario: Scenario, genome: Genome) -> NDArray[np.float64]:
     row: list[float] = []
     for gene in genome.genes:
         values = [
-            item.nominal if gene.name in gone else known.get(item.key, item.nominal)
+            item.nominal
+            if gene.name in gone
+            else _value(gene, item, known.get(item.key, item.nominal))
             for item in gene.values
         ]
         if gene.is_optional:
@@ -77,6 +80,13 @@ def decode(vector: NDArray[np.float64], genome: Genome, *, map: str, seed: int) 
         task=genome.task,
     )
     return scenario.replace(conditions | dict(genome.fixed))
+
+
+def _value(gene: NuclearGene, item: Property, value: float) -> float:
+    """Return a value; in a story, one that does not count may lie outside of the range."""
+    if _is_object(gene) and item.key.partition(".")[2] in STORY:
+        return min(item.high, max(item.low, value))
+    return value
 
 
 def _is_object(gene: NuclearGene) -> bool:

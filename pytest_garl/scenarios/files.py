@@ -11,7 +11,7 @@ from pytest_garl.files.json_values import dataclass_from, parse_json
 from pytest_garl.files.reading import read_text
 from pytest_garl.files.toml import Table, parse, quoted
 from pytest_garl.messages import shown
-from pytest_garl.scenarios.genes import genome_like
+from pytest_garl.scenarios.genome_like import genome_like
 from pytest_garl.scenarios.groups.catalogue import GROUPS, PARAMETERS
 from pytest_garl.scenarios.maps.map import Map
 from pytest_garl.scenarios.scenario import Scenario

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 from collections.abc import Iterable
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Literal
@@ -11,10 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pytest_garl.errors import ScenarioError
-from pytest_garl.scenarios.groups.catalogue import GROUPS
 from pytest_garl.scenarios.groups.parameter import Group, Parameter
 from pytest_garl.scenarios.sparse import draw
-from pytest_garl.scenarios.story import STORY, StoryParameter
 from pytest_garl.scenarios.task import Task
 
 if TYPE_CHECKING:
@@ -260,71 +257,7 @@ def _group_property(key: str, parameter: Parameter) -> Property:
     )
 
 
-def genome_like(keys: Iterable[str], map: Map) -> Genome:
-    """Return the genome, weather in its full range, of scenarios that have these genes.
-
-    Whatever is not there by default is part of it if one of the keys is.
-    """
-    keys = tuple(keys)
-    heads = {key.partition(".")[0] for key in keys}
-    extras = [group_gene(group) for name, group in GROUPS.items() if name in heads]
-    genome = genome_for(map, weather="full", extras=extras)
-    if any(key.endswith(".grade") for key in keys):
-        genome = with_values_of(genome, keys)
-    bound = any(".destination_" in key for key in keys)
-    return with_destinations(genome) if bound else genome
-
-
-def with_values_of(genome: Genome, keys: tuple[str, ...]) -> Genome:
-    """Return the genome with those values of NPCs' stories that are named, as they can be flown."""
-    composites = (
-        dataclasses.replace(
-            each, genes=tuple(_with_story(gene, {*keys} - {*genome.keys}) for gene in each.genes)
-        )
-        if each.name == "objects"
-        else each
-        for each in genome.composites
-    )
-    return dataclasses.replace(genome, composites=tuple(composites))
-
-
-def _with_story(gene: NuclearGene, keys: set[str]) -> NuclearGene:
-    told = tuple(
-        story_property(gene.name, each, (each.low, each.high))
-        for each in STORY.values()
-        if f"{gene.name}.{each.name}" in keys
-    )
-    return dataclasses.replace(gene, properties=(*gene.properties, *told))
-
-
-def story_property(name: str, parameter: StoryParameter, limits: tuple[float, float]) -> Property:
-    """Return the property of one value of an NPC's story."""
-    low, high = limits
-    return Property(
-        key=f"{name}.{parameter.name}",
-        low=low,
-        high=high,
-        nominal=min(high, max(low, parameter.nominal)),
-        meaning=parameter.meaning,
-    )
-
-
-def with_destinations(genome: Genome) -> Genome:
-    """Return the genome with a destination (x, y) for each NPC.
-
-    The destination belongs to the NPC's nuclear gene, so start and destination are inherited
-    together.
-    """
-    composites = (
-        dataclasses.replace(each, genes=tuple(_with_destination(gene) for gene in each.genes))
-        if each.name == "objects"
-        else each
-        for each in genome.composites
-    )
-    return dataclasses.replace(genome, composites=tuple(composites))
-
-
-def _end_of_way(name: str, end: str) -> tuple[Property, ...]:
+def end_of_way(name: str, end: str) -> tuple[Property, ...]:
     """Return the place at one end of an NPC's way; both ends have the same nominal corner."""
     return tuple(
         Property(
@@ -338,12 +271,6 @@ def _end_of_way(name: str, end: str) -> tuple[Property, ...]:
     )
 
 
-def _with_destination(gene: NuclearGene) -> NuclearGene:
-    return dataclasses.replace(
-        gene, properties=(*gene.properties, *_end_of_way(gene.name, "destination"))
-    )
-
-
 def object_gene(name: str) -> NuclearGene:
     """Return the gene of an NPC: where it starts, and how fast it is."""
     velocity = Property(
@@ -353,4 +280,4 @@ def object_gene(name: str) -> NuclearGene:
         nominal=0.0,
         meaning="speed as a share of the type's top speed",
     )
-    return NuclearGene(name=name, properties=(*_end_of_way(name, "start"), velocity))
+    return NuclearGene(name=name, properties=(*end_of_way(name, "start"), velocity))

@@ -218,10 +218,10 @@ def from_sections(
         values[f"{name}.velocity"] = OBJECT_TYPES[body].share_of(section["speed_mps"])
         if HEIGHT in section:
             values[f"{name}.{HEIGHT}"] = section[HEIGHT]
-        if "destination_x_m" in section:
-            values |= _place(f"{name}.destination", section, map)
         if "grade" in section:
             values |= with_all_values(section, name, kind)
+        if "destination_x_m" in section:
+            values |= _place(f"{name}.destination", section, map)
     for head, section in sections.items():
         named = {f"{head}.{name}": value for name, value in section.items()}
         conditions |= {key: value for key, value in named.items() if key in PARAMETERS}

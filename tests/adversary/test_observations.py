@@ -7,6 +7,7 @@ from collections import Counter
 import numpy as np
 import pytest
 
+from pytest_garl.adversary.interference import Belief
 from pytest_garl.adversary.observations import ACTIONS, ENCODINGS, on_turn
 from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.simulation.npc_policy import Move
@@ -127,6 +128,9 @@ def test_one_npc_is_drawn_for_each_decision() -> None:
 @pytest.mark.parametrize("name", ENCODINGS)
 def test_states_are_bounded_and_have_their_declared_size(name: str) -> None:
     seen = situation(being((4000.0, -3000.0)), uav=(1e6, 0.0, 500.0))
+    if name == "belief":
+        facts = {each.name: getattr(seen, each.name) for each in dataclasses.fields(seen)}
+        seen = Belief(**facts, left_s=5e3, keeps_m=2.0)
     state = ENCODINGS[name].state(seen)
     assert state.shape == (ENCODINGS[name].size,)
     assert np.abs(state).max() <= 10.0

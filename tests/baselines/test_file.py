@@ -18,7 +18,8 @@ from pytest_garl.baselines.file import (
 from pytest_garl.baselines.pairs import FlightSummary
 from pytest_garl.errors import BaselineError, ScenarioError
 from pytest_garl.messages import printable
-from pytest_garl.scenarios.genes import genome_for, group_gene, with_destinations
+from pytest_garl.scenarios.genes import genome_for, group_gene
+from pytest_garl.scenarios.genome_like import with_destinations
 from pytest_garl.scenarios.groups.catalogue import GROUPS
 from pytest_garl.scenarios.maps.map import Map, load_map
 from pytest_garl.scenarios.task import Start, Task

@@ -38,7 +38,7 @@ def test_garl_train_writes_weights_that_can_be_flown(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
-        (["--type=cat"], "--type: found 'cat', expected some of person, dog, bird"),
+        (["--type=cat"], "--type: found 'cat', expected some of person, child, dog, bird"),
         (["--map=moon"], "unknown map 'moon'"),
         (["--type=,"], "found ',', expected names"),
         (["--out=policy.pt"], "expected a name that ends in .npz"),

@@ -21,7 +21,8 @@ from pytest_garl.regressions.case import (
 from pytest_garl.regressions.case_file import dump_case, load_case, parse_case
 from pytest_garl.regressions.case_header import SCHEMA
 from pytest_garl.scenarios.chromosome import decode
-from pytest_garl.scenarios.genes import genome_for, with_destinations
+from pytest_garl.scenarios.genes import genome_for
+from pytest_garl.scenarios.genome_like import with_destinations
 from pytest_garl.scenarios.maps.map import load_map
 from pytest_garl.scenarios.units import snapped
 from pytest_garl.scenarios.validity import repair

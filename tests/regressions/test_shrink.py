@@ -8,7 +8,8 @@ import pytest
 from pytest_garl.regressions.shrink import reset_and_bisect, shrink, shrink_by_hypothesis
 from pytest_garl.regressions.simplification import complexity, genome_of
 from pytest_garl.scenarios.chromosome import decode
-from pytest_garl.scenarios.genes import genome_for, with_destinations
+from pytest_garl.scenarios.genes import genome_for
+from pytest_garl.scenarios.genome_like import with_destinations
 from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.scenarios.validity import problems, repair
 from tests.regressions.samples import COLLIDING_OBJECT, LAWN, OBJECT_NAMES, VIOLATING_SCENARIO

@@ -11,7 +11,8 @@ import pytest
 from pytest_garl.errors import ScenarioError
 from pytest_garl.scenarios.chromosome import decode
 from pytest_garl.scenarios.files import dump_scenario, dumps, load, loads, parse_scenario
-from pytest_garl.scenarios.genes import genome_for, with_destinations
+from pytest_garl.scenarios.genes import genome_for
+from pytest_garl.scenarios.genome_like import with_destinations
 from pytest_garl.scenarios.maps.map import load_map
 from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.scenarios.validity import problems, repair

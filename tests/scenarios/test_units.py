@@ -10,7 +10,8 @@ from hypothesis import strategies as st
 
 from pytest_garl.fiducial import MarkerSpec
 from pytest_garl.scenarios.files import dumps, is_in_units, loads
-from pytest_garl.scenarios.genes import SUN, genome_for, group_gene, with_destinations
+from pytest_garl.scenarios.genes import SUN, genome_for, group_gene
+from pytest_garl.scenarios.genome_like import with_destinations
 from pytest_garl.scenarios.groups.catalogue import GROUPS, PARAMETERS
 from pytest_garl.scenarios.maps.map import Map, load_map, map_names
 from pytest_garl.scenarios.object_types import HEIGHTS_M

@@ -34,6 +34,8 @@ class Training:
     target_every: int = 500
     """Updates after which the target network becomes a copy of the network."""
     double: bool = True
+    updates: int = 1
+    """Updates after each decision."""
     steps: int = 3
     """n of the n-step returns: rewards that are summed before the network estimates the rest."""
     environments: int = 2
@@ -47,7 +49,8 @@ class Surrogate:
     ``uav`` is "straight" (as in the paper), "avoiding", or "both", each in half of the episodes.
     ``discount`` is part of the potential-based reward.  With ``environment`` "drawn" an episode
     begins in any weather and light of a search and with the marker anywhere; with "clear" it begins
-    in clear weather with the marker at a fixed place.
+    in clear weather with the marker at a fixed place.  With ``grades`` an NPC perceives the UAV
+    within the limits of one of them, drawn anew, and its episode begins in the air near the marker.
     """
 
     maps: tuple[Map, ...]
@@ -57,6 +60,7 @@ class Surrogate:
     reward: Reward = "collision-first"
     discount: float = 0.99
     environment: Literal["clear", "drawn"] = "clear"
+    grades: tuple[str, ...] = ()
     airframe: Airframe = field(default_factory=Airframe)
 
 
@@ -70,6 +74,22 @@ class Preset:
     help: str
     surrogate: Surrogate
     training: Training
+
+
+def _graded(*grades: str) -> Preset:
+    """Return the preset of a policy that interferes within the limits of grades."""
+    return Preset(
+        help=f"to collide with a UAV that avoids or not, within the limits of {grades[0]} NPCs",
+        surrogate=Surrogate(
+            maps=(),
+            types=("person", "child", "dog", "bird"),
+            uav="both",
+            state="belief",
+            grades=grades,
+        ),
+        # Episodes are short, so that each decision is learned from more often.
+        training=Training(updates=4),
+    )
 
 
 PRESETS: Mapping[str, Preset] = MappingProxyType(
@@ -93,5 +113,6 @@ PRESETS: Mapping[str, Preset] = MappingProxyType(
             ),
             training=Training(double=False, steps=1),
         ),
+        **{name: _graded(name) for name in ("curious", "chasing")},
     }
 )

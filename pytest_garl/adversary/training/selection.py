@@ -97,6 +97,7 @@ def _manifest(
             "maps": {map.name: map.sha256 for map in surrogate.maps},
             "types": list(surrogate.types),
             "uav": surrogate.uav,
+            "grades": list(surrogate.grades),
             "reward": surrogate.reward,
             "environment": surrogate.environment,
             "airframe": dataclasses.asdict(surrogate.airframe),

@@ -17,8 +17,8 @@ from pytest_garl.adversary.training.checkpoint import (
     save_checkpoint,
 )
 from pytest_garl.adversary.training.dqn import EpisodeRecord, Experience, Learner, one_thread
+from pytest_garl.adversary.training.graded import env_of
 from pytest_garl.adversary.training.presets import Surrogate, Training
-from pytest_garl.adversary.training.surrogate import SurrogateEnv
 
 
 def train(
@@ -35,7 +35,7 @@ def train(
     continues from it ends with the same weights as one without interruption.
     """
     envs: Any = gymnasium.vector.AsyncVectorEnv(
-        [functools.partial(SurrogateEnv, surrogate)] * training.environments,
+        [functools.partial(env_of, surrogate)] * training.environments,
         context="spawn",
         autoreset_mode=gymnasium.vector.AutoresetMode.DISABLED,
     )
@@ -74,7 +74,7 @@ def _fly_round(envs: Any, learner: Learner, first: int) -> Iterator[EpisodeRecor
         actions = learner.act(states, epsilon)
         envs.step_async(actions)
         # Learn once for each decision while the simulator flies in other processes.
-        for _ in range(int(flying.sum())):
+        for _ in range(int(flying.sum()) * training.updates):
             learner.update()
         afters, rewards, terminated, truncated, info = envs.step_wait()
         for index in range(count):

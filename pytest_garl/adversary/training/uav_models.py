@@ -25,11 +25,15 @@ from pytest_garl.simulation.system_under_test.ground_truth import Truth, TruthOb
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FlightStyle:
-    """How a UAV flies: cruise height, horizontal speed and descent speed."""
+    """How a UAV flies: cruise height, horizontal speed and descent speed.
+
+    One that ``begins_in_air`` is at its cruise height from the start.
+    """
 
     cruise_m: float = 10.0
     speed_mps: float = 3.0
     descent_mps: float = 1.0
+    begins_in_air: bool = False
 
     @classmethod
     def drawn(cls, rng: np.random.Generator) -> FlightStyle:
@@ -83,7 +87,7 @@ class StraightPilot:
         """Start on the ground."""
         self._home = mission.home_m
         self._truth: Truth | None = None
-        self._at_cruise_height = self._above_marker = False
+        self._at_cruise_height, self._above_marker = self._style.begins_in_air, False
 
     def observe_truth(self, truth: Truth) -> None:
         """Keep the positions of marker and objects."""

@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 
 from pytest_garl.adversary.learned import Network
+from pytest_garl.adversary.training.graded import env_of
 from pytest_garl.adversary.training.presets import Surrogate
-from pytest_garl.adversary.training.surrogate import SurrogateEnv
 
 CHOICE_SEEDS_FROM = 2_000_000_000
 """First seed of the episodes that choose between trainings; seeds in training are hashes."""
@@ -58,7 +58,7 @@ def validate(
 
 def _fly_all(job: tuple[Network, Surrogate, Sequence[int]]) -> list[tuple[str, bool]]:
     network, surrogate, seeds = job
-    env = SurrogateEnv(surrogate)
+    env = env_of(surrogate)
 
     def best(state: Any) -> int:
         return int(np.argmax(network.values(state)))
@@ -68,7 +68,7 @@ def _fly_all(job: tuple[Network, Surrogate, Sequence[int]]) -> list[tuple[str, b
     return ends
 
 
-def _fly(env: SurrogateEnv, act: Callable[[Any], int], seed: int) -> tuple[str, bool]:
+def _fly(env: Any, act: Callable[[Any], int], seed: int) -> tuple[str, bool]:
     state, info = env.reset(seed=seed)
     over = False
     while not over:

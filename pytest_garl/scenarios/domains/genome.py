@@ -16,8 +16,8 @@ from pytest_garl.scenarios.genes import (
     genome_for,
     object_gene,
     place_gene,
-    story_property,
 )
+from pytest_garl.scenarios.genome_like import story_property
 from pytest_garl.scenarios.groups.catalogue import GROUPS, PARAMETERS
 from pytest_garl.scenarios.light import position_of_elevation
 from pytest_garl.scenarios.maps.map import Map

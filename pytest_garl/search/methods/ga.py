@@ -26,7 +26,7 @@ import dataclasses
 
 import numpy as np
 
-from pytest_garl.scenarios.genes import with_destinations
+from pytest_garl.scenarios.genome_like import with_destinations
 from pytest_garl.search.method import Method, MethodDeclaration, SearchPlan
 from pytest_garl.search.methods.garl_paper import objectives
 from pytest_garl.search.operators import MUTATION_PROBABILITY, Matrix

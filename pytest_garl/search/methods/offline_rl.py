@@ -37,7 +37,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pytest_garl.scenarios.chromosome import decode, encode
-from pytest_garl.scenarios.genes import Genome, with_destinations
+from pytest_garl.scenarios.genes import Genome
+from pytest_garl.scenarios.genome_like import with_destinations
 from pytest_garl.scenarios.maps.map import Map
 from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.scenarios.validity import problems, repair

@@ -5,7 +5,8 @@ import pytest
 
 from pytest_garl.adversary.catalogue import policy_spec
 from pytest_garl.errors import PolicyError
-from pytest_garl.scenarios.genes import genome_for, with_destinations
+from pytest_garl.scenarios.genes import genome_for
+from pytest_garl.scenarios.genome_like import with_destinations
 from pytest_garl.scenarios.placement import object_destination_m
 from pytest_garl.search.methods.random import random_scenarios
 from pytest_garl.simulation.fly import fly

@@ -14,7 +14,8 @@ pytest.importorskip("torch")
 
 from pytest_garl.errors import GarlError
 from pytest_garl.scenarios.chromosome import encode
-from pytest_garl.scenarios.genes import genome_for, with_destinations
+from pytest_garl.scenarios.genes import genome_for
+from pytest_garl.scenarios.genome_like import with_destinations
 from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.search.catalogue import make_method
 from pytest_garl.search.method import FlownScenario
