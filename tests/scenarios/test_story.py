@@ -85,7 +85,7 @@ def test_a_wrong_value_of_a_story_is_named(line: str, words: str) -> None:
     text = text.replace(
         'grade = "careless"', line if "grade" in line else f'grade = "careless"\n{line}'
     )
-    with pytest.raises(ScenarioError, match="scenario.dog-1") as error:
+    with pytest.raises(ScenarioError, match=r"scenario\.dog-1") as error:
         loads(text, LAWN)
     assert words in str(error.value)
 

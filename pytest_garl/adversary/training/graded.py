@@ -11,6 +11,7 @@ import gymnasium
 import numpy as np
 from numpy.typing import NDArray
 
+from pytest_garl.adversary.grades import GRADE_LIMITS
 from pytest_garl.adversary.interference import Belief, Interference
 from pytest_garl.adversary.observations import ENCODINGS, LIMIT
 from pytest_garl.adversary.training import rewards
@@ -25,9 +26,11 @@ from pytest_garl.adversary.training.uav_models import (
 )
 from pytest_garl.scenarios.maps.map import Map
 from pytest_garl.scenarios.object_types import HEIGHTS_M, OBJECT_TYPES
+from pytest_garl.scenarios.placement import marker_position_m, object_start_m, start_genes
 from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.scenarios.story import GRADES, LIMITS_S, with_all_values
 from pytest_garl.scenarios.task import Start
+from pytest_garl.scenarios.validity import repair
 from pytest_garl.simulation.npc_policy import Move, Situation
 
 Observation = NDArray[np.float32]
@@ -39,6 +42,8 @@ SHORTEST_S = 0.3
 """Share of its longest time that an NPC interferes at least."""
 AFTERMATH_STEPS = 3
 """Half seconds for which an episode goes on after the NPC's time: a collision may follow."""
+BEYOND_SIGHT_M = 2.0
+"""An NPC starts at most so much farther from the marker than it sees."""
 _TRIES = 100
 
 
@@ -154,6 +159,15 @@ def env_of(surrogate: Surrogate) -> GradedEnv | SurrogateEnv:
     return GradedEnv(surrogate) if surrogate.grades else SurrogateEnv(surrogate)
 
 
+def _near(scenario: Scenario, map: Map, name: str, grade: str) -> tuple[float, float]:
+    """Return the start of an NPC, moved to where it soon perceives a UAV above the marker."""
+    x, y = object_start_m(scenario, map, name)
+    mx, my = marker_position_m(scenario, map)
+    away = math.dist((x, y), (mx, my))
+    share = min(1.0, (GRADE_LIMITS[grade].sees_within_m + BEYOND_SIGHT_M) / max(away, 1e-6))
+    return mx + share * (x - mx), my + share * (y - my)
+
+
 def _with_story(
     scenario: Scenario, map: Map, grade: str, height_m: float, rng: np.random.Generator
 ) -> Scenario:
@@ -165,6 +179,7 @@ def _with_story(
         "lasts_s": LIMITS_S[grade] * float(rng.uniform(SHORTEST_S, 1.0)),
     }
     genes = dict(scenario.genes) | with_all_values(values, name, kind)
+    genes |= start_genes(name, _near(scenario, map, name, grade), map)
     if OBJECT_TYPES[kind].flies:
         bird_m = float(rng.uniform(HEIGHTS_M[0], height_m))
         genes[f"{name}.height_m"] = bird_m
@@ -176,4 +191,4 @@ def _with_story(
         offset_m=(offset * math.cos(angle), offset * math.sin(angle)),
     )
     task = dataclasses.replace(scenario.task, start=start)
-    return dataclasses.replace(scenario, genes=tuple(genes.items()), task=task)
+    return repair(dataclasses.replace(scenario, genes=tuple(genes.items()), task=task), map)
