@@ -35,7 +35,7 @@ GRADE_LIMITS: Mapping[str, GradeLimits] = {
         # Perceiving and deciding takes drivers 1 to 1.5 s (Green 2000).
         delay_s=1.0,
         decides_every_s=2.0,
-        # Two spans of the UAV: engineering estimate.
+        # People felt uncomfortable nearer than 2 m to a UAV (Abioye et al. 2024).
         keeps_m=2.0,
         intention="comes near, stops, looks; never under the rotors on purpose",
     ),

@@ -13,6 +13,7 @@ from pytest_garl.scenarios.domains.names import BUILT_IN, DEFAULT_DOMAIN
 from pytest_garl.scenarios.genes import CONFINED_WEATHER
 from pytest_garl.scenarios.groups.catalogue import GROUPS
 from pytest_garl.scenarios.light import NOON_DEG, TWILIGHT_DEG
+from pytest_garl.scenarios.story import GRADES
 from pytest_garl.scenarios.units import WEATHER_UNITS, unit_of
 
 MEANINGS = {
@@ -53,7 +54,8 @@ def show(name: str) -> None:
 
 def text_of(domain: Domain) -> str:
     """Return a domain for people: every range with unit, meaning and source."""
-    npcs = "none" if domain.npc_behaviour == ABSENT else domain.npc_behaviour
+    npcs = {ABSENT: "none"}.get(domain.npc_behaviour, domain.npc_behaviour)
+    npcs = f"up to {npcs}" if npcs in GRADES[1:] else npcs
     lines = [f"domain {domain.name}: NPCs {npcs}{' or as the method says' * bool(domain.paper)}"]
     lines += ["The marker lies anywhere within 7.5 m of the middle of its place on the map."]
     ranges = ranges_of(domain)

@@ -50,15 +50,15 @@ def in_default_domain(pytester: pytest.Pytester) -> None:
 def test_summary_names_the_domain_and_who_moves_the_npcs(pytester: pytest.Pytester) -> None:
     in_default_domain(pytester)
     result = run(pytester, *ONE)
-    result.stdout.fnmatch_lines(["garl: *NPCs waypoint, domain field, *"])
-    result.stdout.fnmatch_lines(["domain field, NPCs waypoint"])
+    result.stdout.fnmatch_lines(["garl: *NPCs graded, domain field, *"])
+    result.stdout.fnmatch_lines(["domain field, NPCs graded"])
 
 
 def test_search_draws_from_the_default_domain(pytester: pytest.Pytester) -> None:
     """Its scenarios are sparse, and have conditions that the world of the paper lacks."""
     in_default_domain(pytester)
     result = run(pytester, "--garl-budget=40", "--garl-workers=0")
-    result.stdout.fnmatch_lines(["Good on lawn: 40 flown, *", "domain field, NPCs waypoint"])
+    result.stdout.fnmatch_lines(["Good on lawn: 40 flown, *", "domain field, NPCs graded"])
     ledger = Ledger(pytester.path / ".garl" / "ledger.sqlite")
     scenarios = [parse_scenario(flight.scenario) for flight in ledger.queries.flights()]
     ledger.close()
@@ -87,15 +87,15 @@ def test_case_that_the_default_domain_found_is_saved_and_flown(pytester: pytest.
 @pytest.mark.parametrize(
     ("marker", "args", "expected"),
     [
-        ("", ("-o", "garl_domain=calm"), "domain calm, NPCs waypoint"),
-        ("'calm'", ("-o", "garl_domain=field"), "domain calm, NPCs waypoint"),
-        ("'calm'", ("--garl-domain=field",), "domain field, NPCs waypoint"),
+        ("", ("-o", "garl_domain=calm"), "domain calm, NPCs graded"),
+        ("'calm'", ("-o", "garl_domain=field"), "domain calm, NPCs graded"),
+        ("'calm'", ("--garl-domain=field",), "domain field, NPCs graded"),
         ("'calm'", ("--garl-weather=full",), "domain paper-full, NPCs dqn"),
         ("", ("--garl-weather=confined", "-o", "garl_domain=field"), "domain paper, NPCs dqn"),
-        ("", ("--garl-domain=calm", "-o", "garl_weather=full"), "domain calm, NPCs waypoint"),
+        ("", ("--garl-domain=calm", "-o", "garl_weather=full"), "domain calm, NPCs graded"),
         ("'calm'", ("--garl-npcs=stand",), "domain calm, NPCs stand"),
-        ("'calm'", ("--garl-method=garl-paper",), "domain calm, NPCs waypoint"),
-        ("'mine.toml'", (), "domain mine (????????), NPCs waypoint"),
+        ("'calm'", ("--garl-method=garl-paper",), "domain calm, NPCs graded"),
+        ("'mine.toml'", (), "domain mine (????????), NPCs graded"),
     ],
 )
 def test_option_wins_over_marker_and_marker_over_ini_key(
@@ -111,9 +111,9 @@ def test_option_wins_over_marker_and_marker_over_ini_key(
 
 def test_domain_of_a_marker_is_announced_and_named_under_xdist(pytester: pytest.Pytester) -> None:
     named(pytester, "'calm'")
-    run(pytester, *ONE).stdout.fnmatch_lines(["garl: domain of Good: calm, NPCs waypoint"])
+    run(pytester, *ONE).stdout.fnmatch_lines(["garl: domain of Good: calm, NPCs graded"])
     spread = run(pytester, "--garl-budget=2", "--garl-workers=1", "-n2")
-    spread.stdout.fnmatch_lines(["domain calm, NPCs waypoint"])
+    spread.stdout.fnmatch_lines(["domain calm, NPCs graded"])
 
 
 @pytest.mark.parametrize(
@@ -180,7 +180,7 @@ def test_repeated_slot_has_the_npcs_of_its_search(pytester: pytest.Pytester) -> 
     named(pytester, "'calm'")
     run(pytester, *ONE)
     run(pytester, "--garl-repeat=lawn-g00-s00", "--garl-workers=0", "-o", "garl_domain=paper")
-    assert npcs_in(pytester.path / ".garl" / "repeat.sqlite") == "waypoint"
+    assert npcs_in(pytester.path / ".garl" / "repeat.sqlite") == "graded"
 
 
 def test_absent_npcs_take_part_in_no_flight(pytester: pytest.Pytester) -> None:
