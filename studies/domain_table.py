@@ -33,7 +33,7 @@ def table() -> str:
             ]
             lines.append(f"| `{key}` | {' | '.join(cells)} |")
     moved = [each.npc_behaviour for each in domains.values()]
-    return "\n".join([*lines, f"| NPCs are moved by | {' | '.join(moved)} |"]) + "\n"
+    return "\n".join([*lines, f"| NPCs at most | {' | '.join(moved)} |"]) + "\n"
 
 
 def with_table(page: str) -> str:
