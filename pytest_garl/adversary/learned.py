@@ -15,7 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pytest_garl.adversary.catalogue import WEIGHTS
-from pytest_garl.adversary.interference import Belief
+from pytest_garl.adversary.grades import GRADE_LIMITS
+from pytest_garl.adversary.interference import Belief, Interfering
 from pytest_garl.adversary.observations import ENCODINGS, on_turn
 from pytest_garl.errors import PolicyError
 from pytest_garl.files.arrays import unpack
@@ -74,17 +75,27 @@ def shipped(grade: str) -> str:
 
 
 class LearnedMind:
-    """The mind of an NPC that perceives the UAV in part: the best action by weights in a file."""
+    """The mind of an NPC that perceives the UAV in part: the best action by weights in a file.
 
-    def __init__(self, weights: str) -> None:
-        sha256 = str(read_manifest(Path(weights))["sha256"])
-        self._network = _load(weights, sha256)
+    Without a hash the one in the manifest holds.
+    """
+
+    def __init__(self, weights: str, sha256: str = "") -> None:
+        known = sha256 or str(read_manifest(Path(weights))["sha256"])
+        self._network = _load(weights, known)
         self._encoding = ENCODINGS[self._network.state]
 
     def decide(self, belief: Belief) -> Move:
         """Return the best action."""
         values = self._network.values(self._encoding.state(belief))
         return self._encoding.moves(belief)[int(np.argmax(values))]
+
+
+class LearnedInterfering(Interfering):
+    """An NPC of a grade, with a mind that ``garl train`` wrote."""
+
+    def __init__(self, weights: str, sha256: str, grade: str) -> None:
+        super().__init__(grade, LearnedMind(weights, sha256))
 
 
 def learned_spec(name: str) -> PolicySpec:
@@ -95,14 +106,30 @@ def learned_spec(name: str) -> PolicySpec:
     or damaged, or contradicts its manifest.
     """
     path = _path(name)
-    sha256 = str(read_manifest(path)["sha256"])
+    manifest = read_manifest(path)
+    sha256 = str(manifest["sha256"])
     weights = name if path.parent == WEIGHTS else str(path.resolve())
     _load(weights, sha256)
+    arguments = (("weights", weights), ("sha256", sha256))
+    if ENCODINGS[str(manifest["state"])].is_belief:
+        grade = _strongest_grade(path, manifest)
+        return PolicySpec(
+            name=name,
+            factory=f"{__name__}:{LearnedInterfering.__name__}",
+            arguments=(*arguments, ("grade", grade)),
+        )
     return PolicySpec(
-        name=name,
-        factory=f"{__name__}:{LearnedPolicy.__name__}",
-        arguments=(("weights", weights), ("sha256", sha256)),
+        name=name, factory=f"{__name__}:{LearnedPolicy.__name__}", arguments=arguments
     )
+
+
+def _strongest_grade(path: Path, manifest: Mapping[str, Any]) -> str:
+    surrogate = manifest.get("surrogate")
+    named = surrogate.get("grades", ()) if isinstance(surrogate, dict) else ()
+    grades = [grade for grade in GRADE_LIMITS if grade in named]
+    if not grades:
+        raise _wrong(path, f"names no grade in its manifest; known: {', '.join(GRADE_LIMITS)}")
+    return grades[-1]
 
 
 def save(path: Path, network: Network, about: Mapping[str, Any]) -> None:

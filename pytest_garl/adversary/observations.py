@@ -167,7 +167,7 @@ class Encoding:
     """Turns a situation into the input of a network, and its actions into moves.
 
     ``size`` is the length of the state.  ``one_npc_acts`` is whether at each decision one NPC acts,
-    drawn at random, and all others stay.
+    drawn at random, and all others stay.  ``is_belief`` is whether the state is what an NPC believes.
     """
 
     size: int
@@ -175,6 +175,7 @@ class Encoding:
     moves: Callable[[Situation], tuple[Move, ...]]
     actions: int = len(ACTIONS)
     one_npc_acts: bool = False
+    is_belief: bool = False
 
 
 ENCODINGS: Mapping[str, Encoding] = MappingProxyType(
@@ -182,7 +183,7 @@ ENCODINGS: Mapping[str, Encoding] = MappingProxyType(
         "paper": Encoding(size=4, state=paper, moves=compass_moves),
         "extended": Encoding(size=9, state=extended, moves=compass_moves),
         "relative": Encoding(size=10, state=relative, moves=relative_moves),
-        "belief": Encoding(size=12, state=belief, moves=relative_moves),
+        "belief": Encoding(size=12, state=belief, moves=relative_moves, is_belief=True),
         "online": Encoding(
             size=4 + len(CONDITIONS) + 2,
             state=online,

@@ -14,7 +14,7 @@ import click
 
 from pytest_garl import cpu_dispatch
 from pytest_garl.adversary.catalogue import DEFAULT_POLICY
-from pytest_garl.adversary.training.presets import PRESETS, Reward, Uav
+from pytest_garl.adversary.training.presets import PRESETS, Preset, Reward, Uav
 from pytest_garl.errors import GarlError
 from pytest_garl.landing_system import Airframe, airframe_of
 from pytest_garl.scenarios.object_types import OBJECT_TYPES
@@ -37,9 +37,12 @@ RECENT_EPISODES = 50
 )
 @click.option(
     "--grade",
+    "grades",
     type=click.Choice(GRADES[1:]),
+    multiple=True,
     help="Train for a grade of behaviour: NPCs that perceive the UAV within its limits. The same "
-    "as --policy with the grade's name; hostile NPCs are moved by dqn.",
+    "as --policy with the grade's name; hostile NPCs are moved by dqn. Given twice, one network "
+    "learns for both grades.",
 )
 @click.option(
     "--map",
@@ -139,10 +142,7 @@ def _plan(options: dict[str, Any]) -> TrainingPlan:
     from pytest_garl.adversary.training.selection import TrainingPlan
     from pytest_garl.scenarios.maps.map import load_map
 
-    name = options["policy"]
-    if options["grade"]:
-        name = "dqn" if options["grade"] == "hostile" else options["grade"]
-    preset = PRESETS[name]
+    name, preset = _preset(options["policy"], options["grades"])
     if preset.surrogate.grades and (options["state"] or options["reward"]):
         raise GarlError(
             "--state and --reward are those of dqn and dqn-paper; NPCs of a grade learn from what "
@@ -172,6 +172,23 @@ def _plan(options: dict[str, Any]) -> TrainingPlan:
         out=options["out"],
         processes=os.cpu_count() or 1,
     )
+
+
+def _preset(policy: str, grades: tuple[str, ...]) -> tuple[str, Preset]:
+    """Return the name and the preset of the policy to train."""
+    if not grades:
+        return policy, PRESETS[policy]
+    if len(grades) == 1:
+        name = "dqn" if grades[0] == "hostile" else grades[0]
+        return name, PRESETS[name]
+    if "hostile" in grades:
+        raise GarlError(
+            "--grade: found hostile beside another grade; its NPCs perceive everything, so they "
+            "have a network of their own"
+        )
+    preset = PRESETS[grades[0]]
+    surrogate = dataclasses.replace(preset.surrogate, grades=grades)
+    return "-".join(grades), dataclasses.replace(preset, surrogate=surrogate)
 
 
 def _names(text: str) -> tuple[str, ...]:
