@@ -167,7 +167,7 @@ class Encoding:
     """Turns a situation into the input of a network, and its actions into moves.
 
     ``size`` is the length of the state.  ``one_npc_acts`` is whether at each decision one NPC acts,
-    drawn at random, and all others stay.  ``is_belief`` is whether the state is what an NPC believes.
+    drawn at random, and all others stay.  ``is_belief`` is whether the state is that of a belief.
     """
 
     size: int
