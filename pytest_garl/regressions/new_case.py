@@ -124,5 +124,5 @@ def _removed(origin: Scenario, scenario: Scenario, map: Map) -> str:
     before, after = (complexity(each, genome_of(origin, map)) for each in (origin, scenario))
     if before == after:
         return "nothing"
-    objects, genes = before[0] - after[0], before[1] - after[1]
-    return f"{objects} of {before[0]} objects, {genes} of {before[1]} genes off nominal"
+    objects, genes = before.objects - after.objects, before.genes - after.genes
+    return f"{objects} of {before.objects} objects, {genes} of {before.genes} genes off nominal"

@@ -36,7 +36,7 @@ def test_reset_and_bisect_removes_unneeded_parts_with_few_flights() -> None:
         passes=(reset_and_bisect,),
     )
     assert set(found.simplest.removed_objects) == {*OBJECT_NAMES} - {COLLIDING_OBJECT}
-    assert complexity(found.simplest, genome_of(VIOLATING_SCENARIO, LAWN))[1] == 1
+    assert complexity(found.simplest, genome_of(VIOLATING_SCENARIO, LAWN)).genes == 1
     assert 0.3 <= found.simplest[f"{COLLIDING_OBJECT}.velocity"] <= 0.3 + 0.9 / 8
     assert found.flights <= 6
 
@@ -46,7 +46,7 @@ def test_shrinking_keeps_the_parts_that_a_failure_needs(fails: Callable[[Scenari
     found = shrink(VIOLATING_SCENARIO, fails, LAWN, 100, colliding_object=COLLIDING_OBJECT)
     assert fails(found.simplest)
     assert problems(found.simplest, LAWN) == ()
-    assert complexity(found.simplest, genome_of(VIOLATING_SCENARIO, LAWN))[1] == (
+    assert complexity(found.simplest, genome_of(VIOLATING_SCENARIO, LAWN)).genes == (
         2 if fails is in_fog else 1
     )
 
