@@ -134,6 +134,7 @@ class CaseReshrinker:
             flight=flight,
             neighbours_failed=evidence.neighbours_failed,
             neighbours_flown=evidence.neighbours,
+            window_s=case.severity.window_s,
         )
 
     def _is_outdated(self) -> bool:
