@@ -12,14 +12,13 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 from pytest_garl.regressions.simplification import MARKER_PLACE
-from pytest_garl.scenarios.bodies import Body
 from pytest_garl.scenarios.maps.map import Map
 from pytest_garl.scenarios.object_types import HEIGHTS_M, OBJECT_TYPES, ObjectType
 from pytest_garl.scenarios.placement import marker_position_m, object_altitude_m, start_genes
 from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.scenarios.story import GRADES, STORY, with_all_values
 from pytest_garl.scenarios.units import HEIGHT, PLACE_DIGITS
-from pytest_garl.scenarios.validity import discs_of, problems, repair
+from pytest_garl.scenarios.validity import Disc, discs_of, problems, repair
 from pytest_garl.simulation.flight import Flight, ObjectRecord
 from pytest_garl.simulation.npc_policy import DECISION_STEP_S
 from pytest_garl.simulation.physics.bird_path import ENTRY_M, LEAST_HEIGHT_M
@@ -38,6 +37,8 @@ SHIFTS_S = (-1.0, -2.0, 1.0, 2.0)
 """By so much the entry is shifted to measure the window; the outer ones after the inner ones."""
 _TURNS_RAD = tuple(math.radians(each) for each in (0, 45, -45, 90, -90, 135, -135, 180))
 """Directions that are tried if the way is not free, from that of the contact on."""
+BIRD_GAP_M = 1.0
+"""A bird keeps at least so far from what stands beside its way: engineering estimate."""
 _STEP_S = 1 / 60
 """The simulator moves objects so often."""
 
@@ -103,7 +104,7 @@ def straight_crossing(bare: Scenario, encounter: Encounter, map: Map) -> Scenari
         course = encounter.course_rad + turn_rad
         for start, delay_s in _starts(encounter, course, map):
             scenario = _with_story(bare, encounter, start, delay_s, map)
-            if not problems(scenario, map) and _is_free(scenario, encounter, start, map):
+            if not problems(scenario, map) and _is_free(encounter, start, map):
                 # What the repair would move would not come in time.
                 repaired = repair(scenario, map)
                 if not _has_moved(scenario, repaired):
@@ -179,31 +180,31 @@ def _with_story(
     return dataclasses.replace(bare, genes=(*kept, *values.items()))
 
 
-def _is_free(scenario: Scenario, encounter: Encounter, start: Plane, map: Map) -> bool:
+def _is_free(encounter: Encounter, start: Plane, map: Map) -> bool:
     """Return whether nothing solid stands in the way, up to the place of the contact."""
-    if encounter.type.flies:
-        return True
-    x, y, z = encounter.place_m
-    low, high = z + encounter.type.low_m, z + encounter.type.low_m + encounter.type.height_m
-    return not any(
-        _stands_in(body, start, (x, y), encounter.type, low, high) for body in map.bodies
+    kind, (x, y, z) = encounter.type, encounter.place_m
+    low_m, gap_m = z + kind.low_m, kind.radius_m
+    if kind.flies:
+        # It enters far behind its start, and turns away from what it would pass too near.
+        behind = ENTRY_M / max(1e-9, math.dist(start, (x, y)))
+        start = x + (start[0] - x) * behind, y + (start[1] - y) * behind
+        gap_m += BIRD_GAP_M
+    discs = (
+        disc
+        for body in map.bodies
+        for disc in discs_of(body)
+        if disc.low_m < low_m + kind.height_m and low_m < disc.high_m
     )
+    return all(_distance_m(start, (x, y), disc) >= disc.radius_m + gap_m for disc in discs)
 
 
-def _stands_in(
-    body: Body, start: Plane, end: Plane, kind: ObjectType, low_m: float, high_m: float
-) -> bool:
-    length = math.dist(start, end)
-    for disc in discs_of(body):
-        if disc.low_m >= high_m or disc.high_m <= low_m:
-            continue
-        ahead_x, ahead_y = end[0] - start[0], end[1] - start[1]
-        along = (disc.x_m - start[0]) * ahead_x + (disc.y_m - start[1]) * ahead_y
-        share = min(1.0, max(0.0, along / length**2)) if length > 0 else 0.0
-        nearest = start[0] + share * ahead_x, start[1] + share * ahead_y
-        if math.dist(nearest, (disc.x_m, disc.y_m)) < disc.radius_m + kind.radius_m:
-            return True
-    return False
+def _distance_m(start: Plane, end: Plane, disc: Disc) -> float:
+    """Return the distance of a disc's middle from the way between two places."""
+    ahead_x, ahead_y = end[0] - start[0], end[1] - start[1]
+    length = math.hypot(ahead_x, ahead_y)
+    along = (disc.x_m - start[0]) * ahead_x + (disc.y_m - start[1]) * ahead_y
+    share = min(1.0, max(0.0, along / length**2)) if length > 0 else 0.0
+    return math.dist((start[0] + share * ahead_x, start[1] + share * ahead_y), (disc.x_m, disc.y_m))
 
 
 def _has_moved(scenario: Scenario, repaired: Scenario) -> bool:
