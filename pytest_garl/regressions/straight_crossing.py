@@ -35,10 +35,10 @@ FARTHEST_M = 8.0
 """A walker starts at most so far from the place: enough to have its speed there."""
 SHIFTS_S = (-1.0, -2.0, 1.0, 2.0)
 """By so much the entry is shifted to measure the window; the outer ones after the inner ones."""
-_TURNS_RAD = tuple(math.radians(each) for each in (0, 45, -45, 90, -90, 135, -135, 180))
+_TURNS_RAD = tuple(sign * turn * math.pi / 8 for turn in range(9) for sign in (1, -1))
 """Directions that are tried if the way is not free, from that of the contact on."""
-BIRD_GAP_M = 1.0
-"""A bird keeps at least so far from what stands beside its way: engineering estimate."""
+BIRD_GAP_M = 0.5
+"""A bird keeps more than so far from what stands beside its way (`solids_ahead.py`)."""
 _STEP_S = 1 / 60
 """The simulator moves objects so often."""
 
@@ -183,11 +183,19 @@ def _with_story(
 def _is_free(encounter: Encounter, start: Plane, map: Map) -> bool:
     """Return whether nothing solid stands in the way, up to the place of the contact."""
     kind, (x, y, z) = encounter.type, encounter.place_m
-    low_m, gap_m = z + kind.low_m, kind.radius_m
+    low_m, gap_m, end = z + kind.low_m, kind.radius_m, (x, y)
     if kind.flies:
-        # It enters far behind its start, and turns away from what it would pass too near.
-        behind = ENTRY_M / max(1e-9, math.dist(start, (x, y)))
-        start = x + (start[0] - x) * behind, y + (start[1] - y) * behind
+        # It enters far behind its start, and turns away from what stands ahead of it.
+        away_m = max(1e-9, math.dist(start, end))
+        back_x, back_y = (start[0] - x) / away_m, (start[1] - y) / away_m
+        ahead_m = 2 * kind.turn_radius_m
+        start, end = (
+            (x + ENTRY_M * back_x, y + ENTRY_M * back_y),
+            (
+                x - ahead_m * back_x,
+                y - ahead_m * back_y,
+            ),
+        )
         gap_m += BIRD_GAP_M
     discs = (
         disc
@@ -195,7 +203,7 @@ def _is_free(encounter: Encounter, start: Plane, map: Map) -> bool:
         for disc in discs_of(body)
         if disc.low_m < low_m + kind.height_m and low_m < disc.high_m
     )
-    return all(_distance_m(start, (x, y), disc) >= disc.radius_m + gap_m for disc in discs)
+    return all(_distance_m(start, end, disc) >= disc.radius_m + gap_m for disc in discs)
 
 
 def _distance_m(start: Plane, end: Plane, disc: Disc) -> float:
