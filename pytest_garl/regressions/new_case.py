@@ -145,5 +145,6 @@ def _removed(origin: Scenario, scenario: Scenario, map: Map) -> str:
     before, after = (complexity(each, genome_of(origin, map)) for each in (origin, scenario))
     if before == after:
         return "nothing"
-    objects, genes = before.objects - after.objects, before.genes - after.genes
+    # A crossing object walks, even if the one that was found stood.
+    objects, genes = before.objects - after.objects, max(0, before.genes - after.genes)
     return f"{objects} of {before.objects} objects, {genes} of {before.genes} genes off nominal"

@@ -31,8 +31,8 @@ USUAL_MPS = {"person": 1.4, "child": 2.0, "dog": 4.0}
 walks beside it, a trot (`object_types.py`)."""
 LEAST_MPS = 0.5
 """Slower than this nobody crosses a place; engineering estimate."""
-FARTHEST_M = 8.0
-"""A walker starts at most so far from the place: enough to have its speed there."""
+NEAREST_M, FARTHEST_M = 2.0, 8.0
+"""A walker starts so far from the place: outside of the UAV's way, and with its speed there."""
 SHIFTS_S = (-1.0, -2.0, 1.0, 2.0)
 """By so much the entry is shifted to measure the window; the outer ones after the inner ones."""
 _TURNS_RAD = tuple(sign * turn * math.pi / 8 for turn in range(9) for sign in (1, -1))
@@ -136,7 +136,7 @@ def _starts(encounter: Encounter, course_rad: float, map: Map) -> Iterator[tuple
         if (encounter.time_s - delay_s) * speed > FARTHEST_M + speed:
             continue
         dx, dy = walked_m(encounter.type, speed, course_rad, encounter.time_s - delay_s)
-        if math.hypot(dx, dy) <= FARTHEST_M:
+        if NEAREST_M <= math.hypot(dx, dy) <= FARTHEST_M:
             early.append(((x - dx, y - dy), delay_s))
     # An entry that can be shifted both ways first.
     late = [each for each in early if each[1] >= max(SHIFTS_S)]

@@ -70,17 +70,27 @@ def _values(scenario: Scenario, group: Group) -> Iterator[tuple[float, str]]:
     for key, each in zip(group.keys, group.parameters, strict=True):
         value = scenario[key]
         if value != each.nominal:
-            words = each.text_of(value) if each.choices else _in_words(group.name, each.name, value)
-            yield _share(each, value), words
+            yield _share(each, value), _value_in_words(group.name, each, value)
 
 
 def _share(parameter: Parameter, value: float) -> float:
     """Return how far a value is from nominal; a kind, a direction or a time has no harsher end."""
-    if parameter.choices or parameter.even:
+    if parameter.choices or parameter.even or _is_switch(parameter):
         return 0.0
     nominal = parameter.nominal
     reach = max(parameter.high - nominal, nominal - parameter.low)
     return abs(value - nominal) / reach if math.isfinite(reach) else 0.0
+
+
+def _is_switch(parameter: Parameter) -> bool:
+    """Whether it is on or off: told.surveyed."""
+    return parameter.whole and (parameter.low, parameter.high) == (0, 1)
+
+
+def _value_in_words(group: str, parameter: Parameter, value: float) -> str:
+    if parameter.choices:
+        return parameter.text_of(value)
+    return parameter.name if _is_switch(parameter) else _in_words(group, parameter.name, value)
 
 
 def _in_words(cause: str, name: str, value: float) -> str:

@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Callable
 
 import numpy as np
@@ -10,6 +11,7 @@ from pytest_garl.regressions.simplification import complexity, genome_of
 from pytest_garl.scenarios.chromosome import decode
 from pytest_garl.scenarios.genes import genome_for, with_destinations
 from pytest_garl.scenarios.scenario import Scenario
+from pytest_garl.scenarios.story import with_all_values
 from pytest_garl.scenarios.validity import problems, repair
 from tests.regressions.samples import COLLIDING_OBJECT, LAWN, OBJECT_NAMES, VIOLATING_SCENARIO
 
@@ -114,3 +116,21 @@ def test_hypothesis_lowers_genes_that_can_only_be_lowered_together() -> None:
         first, unequal, LAWN, 300, colliding_object=COLLIDING_OBJECT, passes=(shrink_by_hypothesis,)
     )
     assert plain.simplest["environment.fog"] == plain.simplest["environment.dust"] == 0
+
+
+def test_shrinking_leaves_choices_places_and_times_of_a_story_alone() -> None:
+    told = {"grade": 2.0, "phase": 2.0, "delay_s": 7.5, "lasts_s": 4.0}
+    genes = with_all_values(told, COLLIDING_OBJECT, "person")
+    chasing = dataclasses.replace(
+        VIOLATING_SCENARIO, genes=(*VIOLATING_SCENARIO.genes, *genes.items())
+    )
+    flown: list[Scenario] = []
+
+    def fails(scenario: Scenario) -> bool:
+        flown.append(scenario)
+        return scenario[f"{COLLIDING_OBJECT}.lasts_s"] >= 2.0
+
+    found = shrink(chasing, fails, LAWN, 60, colliding_object=COLLIDING_OBJECT)
+    assert 2.0 <= found.simplest[f"{COLLIDING_OBJECT}.lasts_s"] <= 3.0
+    for name in ("grade", "phase", "delay_s"):
+        assert {each[f"{COLLIDING_OBJECT}.{name}"] for each in flown} == {told[name]}

@@ -107,7 +107,7 @@ def test_way_does_not_lead_through_something_solid() -> None:
     met = dataclasses.replace(MET, place_m=(*at, 0.0), course_rad=0.0)
     scenario = crossing(met)
     start = object_start_m(scenario, LAWN, "person-1")
-    assert 1.0 < start[0] - x < 4.0
+    assert 1.0 < start[0] - x < 2.0
     # So near that nobody can start in between.
     met = dataclasses.replace(met, place_m=(x + 1.0, y, 0.0))
     turned = object_start_m(crossing(met), LAWN, "person-1")

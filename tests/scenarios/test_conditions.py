@@ -23,6 +23,7 @@ def test_nominal_scenario_has_no_active_condition() -> None:
         ({"environment.rain": 0.3}, "rain", 0.3, "30 mm/h"),
         ({"environment.road_snow": 0.4}, "snow", 0.4, "cover 40 %"),
         ({"environment.sun_position": 0.1}, "light", 0.8, "sun 14 degrees high"),
+        ({"told.surveyed": 1.0}, "told", 0.0, "surveyed"),
         ({"decoy-1.kind": 7.0}, "decoy-1", 0.0, "qr-code"),
     ],
 )
