@@ -141,12 +141,12 @@ def _row(violation: Violation, passes: str, fails: Callable[[Scenario], bool]) -
         "slot": violation.slot,
         "signature": violation.signature,
         "flights": found.flights,
-        "objects_before": before[0],
-        "objects": after[0],
-        "genes_before": before[1],
-        "genes": after[1],
-        "distance_before": before[2],
-        "distance": after[2],
+        "objects_before": before.objects,
+        "objects": after.objects,
+        "genes_before": before.genes,
+        "genes": after.genes,
+        "distance_before": before.distance,
+        "distance": after.distance,
     }
 
 

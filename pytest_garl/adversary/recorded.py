@@ -29,6 +29,7 @@ class Recorded:
     """
 
     reads_uav = False
+    grade = ""
 
     def __init__(self, moves: str, changes: str = "{}") -> None:
         self._all: dict[str, list[list[float]]] = json.loads(moves)
@@ -67,6 +68,8 @@ class HandedOver:
     That policy is asked at every decision, so that it has seen the whole flight when its moves
     count.
     """
+
+    grade = ""
 
     def __init__(self, decisions: int, live: str, moves: str, changes: str = "{}") -> None:
         name, factory, arguments = json.loads(live)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import sys
 from typing import TYPE_CHECKING, Any
 
@@ -26,6 +27,7 @@ def fly_job(
     finite, that is a finding, and no record is left.
     """
     from pytest_garl.errors import NotFiniteError
+    from pytest_garl.execution.severity_of_flight import severity_of
     from pytest_garl.simulation.flight_file import save
     from pytest_garl.simulation.system_under_test.takeover import with_takeover
 
@@ -51,7 +53,9 @@ def fly_job(
     except NotFiniteError as error:
         crash = Crash(kind="nonsense", error="NotFinite", message=str(error))
         return broken_result(crash, map.diagonal_m), "", flown.wall_s
-    return judged(flown, job.limits), flown.sha256, flown.wall_s
+    result = judged(flown, job.limits)
+    severity = severity_of(flown, result.verdict, scenario, map, job.npcs)
+    return dataclasses.replace(result, severity=severity), flown.sha256, flown.wall_s
 
 
 def time_limit_s(limits: Limits) -> float:
@@ -60,7 +64,7 @@ def time_limit_s(limits: Limits) -> float:
 
 
 def judged(flight: Flight, limits: Limits) -> FlightResult:
-    """Return the result of a flight."""
+    """Return the result of a flight, without the severity of a violation."""
     from pytest_garl.verdicts.judge import closest_call, judge, off_marker_m, why_undecided
     from pytest_garl.verdicts.touchdowns import landed_s
 

@@ -24,6 +24,7 @@ FLYING = (
     "adversary.recorded",
     *(f"adversary.policies.{name}" for name in scripted_policies()),
     "execution.flight",
+    "execution.severity_of_flight",
     "scenarios.files",
     "scenarios.maps.reader",
     "simulation.flight_file",

@@ -10,6 +10,7 @@ from typing import Any, Self
 
 from pytest_garl.errors import LedgerError
 from pytest_garl.execution.database import REMEDY
+from pytest_garl.execution.severity import NO_SEVERITY, Severity
 from pytest_garl.files.json_values import dataclass_from, parse_json
 from pytest_garl.messages import printable
 from pytest_garl.simulation.flight import Crash
@@ -27,7 +28,8 @@ class FlightResult:
     ``off_marker_m`` is the distance of a touchdown too far from the marker before the UAV gave up.
     ``closest_call`` is the signature that a near miss would have had, ``closest_body`` the body
     of that near miss; both are empty without one.  ``landed_s`` is the time of the touchdown of a
-    flight that landed.
+    flight that landed.  ``severity`` is what a violation took; None without a violation, and in
+    ledgers of earlier versions.
     """
 
     outcome: str
@@ -41,6 +43,7 @@ class FlightResult:
     crash: Crash | None
     off_marker_m: float | None = None
     landed_s: float | None = None
+    severity: Severity | None = None
 
     @property
     def signature(self) -> str:
@@ -71,7 +74,7 @@ class FlightResult:
         return json.dumps(self.to_json(), sort_keys=True, allow_nan=False)
 
 
-_DEFAULTS: Mapping[str, Any] = {"off_marker_m": None, "landed_s": None}
+_DEFAULTS: Mapping[str, Any] = {"off_marker_m": None, "landed_s": None, "severity": None}
 _FIELDS = frozenset(field.name for field in dataclasses.fields(FlightResult))
 
 
@@ -117,4 +120,5 @@ def broken_result(crash: Crash, diagonal_m: float, *, inconclusive: bool = False
             story=f"The landing system {verb}: {crash.message}.",
         ),
         crash=crash,
+        severity=None if inconclusive else NO_SEVERITY,
     )

@@ -179,10 +179,9 @@ class _Writer:
             return self._expect(report_text.expected_failure(decision, facts, ""))
         self._note(REPORTED_FAILURE, key)
         self._note_finding_test(failure)
-        verdict = self.result.verdict
         return self._fail(
             report_text.violation_text(
-                self.item, self.run, target, failure, verdict, facts.reflights
+                self.item, self.run, target, failure, self.result, facts.reflights
             )
         )
 

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import pytest
 
+from pytest_garl.execution.result import FlightResult
 from pytest_garl.plugin.item_facts import ItemFailure, divergence_s
 from pytest_garl.plugin.outcomes import CaseState, Decision, FailedItem, Reason, Reflights
 from pytest_garl.plugin.run import Run
@@ -14,7 +15,6 @@ from pytest_garl.plugin.target import Target
 from pytest_garl.plugin.terminal_text import width_of, wrapped
 from pytest_garl.regressions.case import Case
 from pytest_garl.verdicts.statistics import share_interval
-from pytest_garl.verdicts.verdict import Verdict
 from pytest_garl.verdicts.wording import headline
 
 _CASE_FAILURES = {
@@ -86,10 +86,11 @@ def violation_text(
     run: Run,
     target: Target,
     failure: ItemFailure,
-    verdict: Verdict,
+    result: FlightResult,
     reflights: Reflights | None,
 ) -> FailureText:
     """Return the text of a violation that a search found."""
+    verdict = result.verdict
     story = verdict.story
     own = failure.failed_assertion if failure.user_property else None
     lines = [f"{failure.signature}: a property of your own" if own else failure.signature]
@@ -97,7 +98,9 @@ def violation_text(
         lines.append("It is not saved: its test takes other fixtures than landing and scenario.")
     elif own and verdict.primary is not None:
         lines.append("It is saved only if it also fails in a flight that violates nothing else.")
-    remarks = [*_scenario(item.config, run, target), *_doubts(run, target, reflights)]
+    severity = result.severity.text if result.severity else ""
+    took = [f"It took {severity}."] if severity and not own else []
+    remarks = [*took, *_scenario(item.config, run, target), *_doubts(run, target, reflights)]
     repeat = repeat_line(item, target)
     lines += [*_wrapped(remarks if own else [story, *remarks], item.config), repeat]
     return FailureText(

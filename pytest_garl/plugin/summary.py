@@ -184,6 +184,9 @@ def _kind_lines(
         fits = len(signature) + 2 + len(command) <= width
         lines += [f"{signature}  {command}"] if fits else [signature.rstrip(), f"{'':8}{command}"]
         lines.append(wrapped(kind.headline, width, first=" " * 8, others=" " * 8))
+        if kind.severity_text:
+            least = f"at the least: {kind.severity_text}"
+            lines.append(wrapped(least, width, first=" " * 8, others=" " * 10))
     return lines
 
 

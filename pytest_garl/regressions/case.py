@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 from pytest_garl.adversary.recorded import recorded_spec
+from pytest_garl.execution.severity import NO_SEVERITY, Severity
 from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.simulation.npc_policy import PolicySpec
 from pytest_garl.verdicts.verdict import Limits, PropertyName, ViolationType
@@ -47,9 +48,10 @@ class Evidence:
     """The measurements that support a case.
 
     ``neighbours_failed`` of ``neighbours`` slightly different scenarios failed with the same
-    signature; ``trajectory_sha256`` is that of the flight, on CPUs of the class ``cpu``;
-    ``removed`` says what shrinking removed.  ``system_sha256`` and ``simulator_sha256`` are hashes
-    of the sources that flew it; empty in files of earlier versions.
+    signature, or by the same kind of body if the entry of a crossing object was shifted;
+    ``trajectory_sha256`` is that of the flight, on CPUs of the class ``cpu``; ``removed`` says what
+    shrinking removed.  ``system_sha256`` and ``simulator_sha256`` are hashes of the sources that
+    flew it; empty in files of earlier versions.
     """
 
     trajectory_sha256: str
@@ -146,7 +148,7 @@ class Case:
     case gates nothing.  ``live`` is whether a repair must also hold against objects that a live
     policy moves: an escape from them exists.  ``limits`` are those of the tests when it was found;
     pytest flies it with those of today.  ``accepted`` marks a case as known in projects without
-    git.
+    git.  ``severity`` is what the violation takes; empty in files of earlier versions.
     """
 
     system: str
@@ -165,6 +167,7 @@ class Case:
     reason: NoGateReason = ""
     live: bool = False
     prevention: Prevention = NOT_ASKED
+    severity: Severity = NO_SEVERITY
 
     @property
     def behaviour(self) -> RecordedBehaviour:

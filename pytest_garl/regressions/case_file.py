@@ -36,6 +36,7 @@ from pytest_garl.regressions.case_header import (
     keys_of,
     read_header,
 )
+from pytest_garl.regressions.severity_toml import read_severity, severity_lines
 from pytest_garl.scenarios.files import SCENARIO_KEYS, is_in_units, read_scenario, scenario_lines
 from pytest_garl.scenarios.maps.map import Map, load_map
 from pytest_garl.scenarios.task import task_lines
@@ -53,6 +54,7 @@ _IN_UNITS = "# What is not nominal; each name ends with its unit, x is east and 
 _IN_GENES = "# Weather from 0 to 1, places from -1 to 1, velocity as a share of the top speed."
 _SECTIONS = {
     "violation",
+    "severity",
     "preventable",
     "limits",
     "task",
@@ -80,6 +82,7 @@ def dump_case(case: Case, load_map: Callable[[str], Map] = load_map) -> str:
     sections = [
         header_lines(case, map),
         _violation_lines(case.violation),
+        *severity_lines(case.severity),
         *_prevention_lines(case.prevention),
         _limits_lines(case.limits),
         [
@@ -126,6 +129,7 @@ def parse_case(text: str, load_map: Callable[[str], Map], *, source: str = "case
         reason=_reason(header, evidence),
         live=header.live,
         prevention=_read_prevention(top),
+        severity=read_severity(top),
     )
 
 

@@ -14,6 +14,7 @@ from pytest_garl.regressions.robustness import NEIGHBOURS, neighbours
 from pytest_garl.scenarios.maps.map import Map
 from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.simulation.flight_file import load
+from pytest_garl.simulation.npc_policy import PolicySpec
 
 ESCAPE_FLIGHTS = 3
 """Flights that are kept to confirm an escape from a collision with a moving body: two attempts from
@@ -57,9 +58,13 @@ class CaseFlights:
         flight = self._live[scenario] = self._go(self.request.job, scenario)
         return flight
 
+    def fly_moved_by(self, scenario: Scenario, npcs: PolicySpec) -> CompletedFlight:
+        """Fly a scenario with another policy than the search's."""
+        return self._go(dataclasses.replace(self.request.job, npcs=npcs), scenario)
+
     def fly_recorded(self, scenario: Scenario, behaviour: RecordedBehaviour) -> CompletedFlight:
         """Fly a scenario in which the objects repeat recorded moves."""
-        return self._go(dataclasses.replace(self.request.job, npcs=behaviour.policy), scenario)
+        return self.fly_moved_by(scenario, behaviour.policy)
 
     def fails_live(self, scenario: Scenario) -> bool:
         """Fly a scenario with the search's policy; return whether it fails in the same way."""
@@ -120,8 +125,9 @@ class CaseFlights:
         request = self.request
         if not request.asks_prevention:
             return NOT_ASKED
+        job = dataclasses.replace(request.job, npcs=failing.npcs or request.job.npcs)
         collision = collision_of(
-            request.job, failing.scenario, failing.behaviour, failing.flight, request.map
+            job, failing.scenario, failing.behaviour, failing.flight, request.map
         )
         if collision is None:
             return NOT_ASKED

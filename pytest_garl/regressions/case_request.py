@@ -2,15 +2,21 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 from pytest_garl.execution.flight_id import CompletedFlight
 from pytest_garl.execution.job import FlightJob
 from pytest_garl.regressions.case import Case, RecordedBehaviour
-from pytest_garl.regressions.simplification import complexity, genome_of
+from pytest_garl.regressions.simplification import Complexity, complexity, genome_of
 from pytest_garl.regressions.user_failure import UserAssertion
 from pytest_garl.scenarios.maps.map import Map
 from pytest_garl.scenarios.scenario import Scenario
+from pytest_garl.simulation.npc_policy import PolicySpec
+from pytest_garl.verdicts.verdict import kind_of
+
+LEAST_WINDOW_S = 1.0
+"""An entry whose window is shorter sits on an edge."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -61,11 +67,21 @@ class CaseRequest:
 
     @property
     def scenarios(self) -> list[Scenario]:
-        """The scenarios of the violations, the simplest first."""
+        """The scenarios of the violations, the simplest first.
+
+        Those of collisions with moving bodies are in the order of severity, weak adversaries first.
+        """
+        found = dict(self.violations)
         return sorted(
-            (scenario for scenario, _ in self.violations),
-            key=lambda each: complexity(each, genome_of(each, self.map)),
+            (scenario for scenario, _ in self.violations), key=lambda each: self._order(found, each)
         )
+
+    def _order(
+        self, found: Mapping[Scenario, CompletedFlight], scenario: Scenario
+    ) -> tuple[tuple[float, ...], Complexity]:
+        severity = found[scenario].result.severity if self.asks_prevention else None
+        key = () if severity is None else severity.key
+        return key, complexity(scenario, genome_of(scenario, self.map))
 
     def fails(self, scenario: Scenario, flight: CompletedFlight) -> bool:
         """Return whether a flight fails with this request's signature."""
@@ -73,6 +89,13 @@ class CaseRequest:
             return flight.signature == self.signature
         failure = self.user_assertion(flight, scenario)
         return failure is not None and failure.signature == self.signature
+
+    def fails_alike(self, flight: CompletedFlight) -> bool:
+        """Return whether a flight violates the same property by the same kind of body.
+
+        The phase of the landing and what the camera showed may be others.
+        """
+        return flight.result.verdict.kind == kind_of(self.signature)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -96,6 +119,9 @@ class FailingScenario:
 
     ``origin`` is the scenario of the search that it was made from.  Of
     ``neighbours_flown`` slightly different scenarios, ``neighbours_failed`` fail in the same way.
+    ``npcs`` is the policy that moved the objects, None for that of the search.  ``window_s`` is how
+    long the entry of a crossing object may be shifted so that it is still hit; None if that was not
+    measured.
     """
 
     origin: Scenario
@@ -104,3 +130,12 @@ class FailingScenario:
     flight: CompletedFlight
     neighbours_failed: int = 0
     neighbours_flown: int = 0
+    npcs: PolicySpec | None = None
+    window_s: float | None = None
+
+    @property
+    def is_robust(self) -> bool:
+        """Whether the case gates: the entry has a window, or all neighbours fail."""
+        if self.window_s is not None:
+            return self.window_s >= LEAST_WINDOW_S
+        return self.neighbours_failed == self.neighbours_flown

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
+from pytest_garl.execution.severity import NO_SEVERITY, Severity
 from pytest_garl.scenarios.maps.map import load_map
 from pytest_garl.scenarios.placement import (
     map_in,
@@ -27,17 +28,26 @@ NEAR_M = 3.0
 own stride."""
 
 
-def describe(flight: Flight, verdict: Verdict) -> str:
-    """Return the verdict's sentence; after a collision, how the moving object came near as well."""
+def describe(flight: Flight, verdict: Verdict, severity: Severity = NO_SEVERITY) -> str:
+    """Return the verdict's sentence behind what it took.
+
+    After a collision that is how the moving object came near, else the conditions.
+    """
+    if severity.about == "conditions" and severity.conditions:
+        return f"{_sentence(severity.text)}: {verdict.story}"
     contact = flight.contacts[-1] if flight.contacts else None
     if verdict.violation_type != "IV" or contact is None:
         return verdict.story
     hit = next((item for item in flight.objects if item.name == contact.body), None)
-    return f"{_approach(flight, hit)} {verdict.story}" if hit else verdict.story
+    return f"{_approach(flight, hit, severity)} {verdict.story}" if hit else verdict.story
 
 
-def _approach(flight: Flight, hit: ObjectRecord) -> str:
-    """Return how the object came near: ``A dog at 2.1 m/s enters from the south-east ...``."""
+def _sentence(text: str) -> str:
+    return text[:1].upper() + text[1:]
+
+
+def _approach(flight: Flight, hit: ObjectRecord, severity: Severity) -> str:
+    """Return how the object came near: ``A careless dog at 2.1 m/s enters from the south ...``."""
     uav, own = flight.uav.position_m, hit.track.position_m
     distance = np.hypot(own[:, 0] - uav[:, 0], own[:, 1] - uav[:, 1])
     outside = np.flatnonzero(distance > NEAR_M)
@@ -46,13 +56,17 @@ def _approach(flight: Flight, hit: ObjectRecord) -> str:
     up = up_m(float(uav[entered, 2]))
     speeds = np.hypot(hit.track.velocity_mps[:, 0], hit.track.velocity_mps[:, 1])
     speed = float(speeds[entered:].max())
-    kind = f"{_article(hit.type)} {hit.type}"
+    kind = " ".join(word for word in (severity.grade, hit.type) if word)
+    kind = f"{_article(kind)} {kind}"
     if speed < 0.1:
         return f"{kind} stands still in the UAV's way, {up:.1f} m below it."
     side = own[entered] - uav[entered]
     point = compass_point(float(side[0]), float(side[1]))
+    told = f"{kind} at {speed:.1f} m/s"
+    if severity.about == "body":
+        told = _sentence(severity.text) + ("," if severity.objects > 1 else "")
     return (
-        f"{kind} at {speed:.1f} m/s enters from the {point} while the UAV is {up:.1f} m above "
+        f"{told} enters from the {point} while the UAV is {up:.1f} m above "
         f"{_ground_below(flight, uav[entered])}."
     )
 

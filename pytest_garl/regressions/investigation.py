@@ -18,6 +18,7 @@ from pytest_garl.regressions.simplification import (
     empty_scenario,
     without_other_objects,
 )
+from pytest_garl.regressions.weaker_adversary import confirm_crossing, confirm_lower_grade
 from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.simulation.flight_file import load
 
@@ -52,13 +53,24 @@ class CaseBuilder:
             return flights.result(None, NOT_REPRODUCED)
         if request.is_exception:
             return self._exception(scenarios[0])
-        best = self._confirm_bare(scenarios[0])
+        crossing = confirm_crossing(flights, scenarios[0])
+        if crossing is not None and (crossing.is_robust or flights.left <= NEIGHBOURS):
+            return self._result(crossing)
+        best = confirm_lower_grade(flights, scenarios[0]) if crossing is None else None
+        best = best or self._confirm_bare(scenarios[0])
         if best is None or (best.neighbours_failed < NEIGHBOURS and flights.left > NEIGHBOURS):
             best = self._most_robust(scenarios[:CANDIDATES], best)
+        if crossing is not None and (best is None or best.neighbours_failed < NEIGHBOURS):
+            # Both sit on an edge, and the crossing is the simpler one.
+            return self._result(crossing)
         if best is None:
             return flights.result(None, NOT_REPRODUCED)
-        failing = self._shrink(best)[-1]
-        return flights.result(new_case(request, failing, flights.prevention(failing)))
+        return self._result(self._shrink(best)[-1])
+
+    def _result(self, failing: FailingScenario) -> CaseResult:
+        """Return the case of a failure, with the answer whether it could have been prevented."""
+        flights = self._flights
+        return flights.result(new_case(self._request, failing, flights.prevention(failing)))
 
     def _exception(self, first: Scenario) -> CaseResult:
         """Return the case of an exception or a hang: with an empty scenario if that fails too."""

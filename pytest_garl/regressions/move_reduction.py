@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 
-from pytest_garl.regressions.case import MoveList, Moves
+from pytest_garl.regressions.case import MoveList, Moves, RecordedBehaviour
 from pytest_garl.scenarios.maps.map import Map
 from pytest_garl.scenarios.placement import start_genes
 from pytest_garl.scenarios.scenario import Scenario
@@ -28,6 +28,12 @@ def shorter_records(
     """
     yield from _with_later_moves(scenario, moves, flight, name, map)
     yield scenario, tuple((each, _rounded(own)) for each, own in moves)
+
+
+def rounded(behaviour: RecordedBehaviour) -> RecordedBehaviour:
+    """Return the behaviour with moves in whole hundredths."""
+    moves = tuple((name, _rounded(own)) for name, own in behaviour.moves)
+    return RecordedBehaviour(moves=moves, changes=behaviour.changes)
 
 
 def _rounded(moves: MoveList) -> MoveList:

@@ -2,7 +2,11 @@
 
 from __future__ import annotations
 
+import dataclasses
+
 from pytest_garl.execution.reference import simulator_sha256
+from pytest_garl.execution.severity import NO_SEVERITY, Severity
+from pytest_garl.execution.severity_of_flight import severity_of
 from pytest_garl.regressions.case import (
     NOT_ASKED,
     Case,
@@ -20,6 +24,7 @@ from pytest_garl.scenarios.maps.map import Map
 from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.simulation.flight import Flight
 from pytest_garl.simulation.flight_file import load
+from pytest_garl.simulation.npc_policy import PolicySpec
 from pytest_garl.verdicts.verdict import Verdict
 
 
@@ -58,16 +63,18 @@ def new_case(
     flight = load(completed.record) if completed.record.exists() else None
     ask = request.user_assertion
     failure = ask(completed, failing.scenario) if ask else None
+    npcs = failing.npcs or job.npcs
+    severity = _severity(request, failing, flight, npcs)
     return Case(
         system=job.system.name,
         status="open",
         reason=_reason(failing, prevention),
-        live=prevention.answer == "preventable" and job.npcs.reads_uav,
+        live=prevention.answer == "preventable" and npcs.reads_uav,
         prevention=prevention,
         scenario=failing.scenario,
-        violation=_violation(completed.result.verdict, flight, failure),
-        policy=job.npcs.name,
-        policy_sha256=job.npcs.sha256,
+        violation=_violation(completed.result.verdict, flight, failure, severity),
+        policy=npcs.name,
+        policy_sha256=npcs.sha256,
         moves=failing.behaviour.moves,
         changes=failing.behaviour.changes,
         evidence=Evidence(
@@ -84,18 +91,32 @@ def new_case(
         limits=job.limits,
         test=request.test or (failure.test if failure else ""),
         assertion=failure.assertion if failure else "",
+        severity=severity,
     )
+
+
+def _severity(
+    request: CaseRequest, failing: FailingScenario, flight: Flight | None, npcs: PolicySpec
+) -> Severity:
+    """Return the severity, by the policy that moved the objects when their moves were recorded."""
+    result = failing.flight.result
+    found = result.severity
+    if flight is not None:
+        found = severity_of(flight, result.verdict, failing.scenario, request.map, npcs)
+    return dataclasses.replace(found or NO_SEVERITY, window_s=failing.window_s)
 
 
 def _reason(failing: FailingScenario, prevention: Prevention) -> NoGateReason:
     """Return why the case gates nothing; empty if it gates."""
-    if failing.neighbours_failed < failing.neighbours_flown:
+    if not failing.is_robust:
         return "edge"
     answer = prevention.answer
     return answer if answer in ("sensor-limited", "unpreventable") else ""
 
 
-def _violation(verdict: Verdict, flight: Flight | None, failure: UserFailure | None) -> Violation:
+def _violation(
+    verdict: Verdict, flight: Flight | None, failure: UserFailure | None, severity: Severity
+) -> Violation:
     """Return the violation: of the verdict, or of the test's own assertion."""
     if failure is not None:
         return Violation(
@@ -115,7 +136,7 @@ def _violation(verdict: Verdict, flight: Flight | None, failure: UserFailure | N
         property=verdict.primary,
         margin=margin.value if margin else 0.0,
         unit=margin.unit if margin else "1",
-        description=describe(flight, verdict) if flight else verdict.story,
+        description=describe(flight, verdict, severity) if flight else verdict.story,
     )
 
 
@@ -124,5 +145,6 @@ def _removed(origin: Scenario, scenario: Scenario, map: Map) -> str:
     before, after = (complexity(each, genome_of(origin, map)) for each in (origin, scenario))
     if before == after:
         return "nothing"
-    objects, genes = before[0] - after[0], before[1] - after[1]
-    return f"{objects} of {before[0]} objects, {genes} of {before[1]} genes off nominal"
+    # A crossing object walks, even if the one that was found stood.
+    objects, genes = before.objects - after.objects, max(0, before.genes - after.genes)
+    return f"{objects} of {before.objects} objects, {genes} of {before.genes} genes off nominal"

@@ -134,6 +134,7 @@ class CaseReshrinker:
             flight=flight,
             neighbours_failed=evidence.neighbours_failed,
             neighbours_flown=evidence.neighbours,
+            window_s=case.severity.window_s,
         )
 
     def _is_outdated(self) -> bool:
@@ -232,12 +233,13 @@ def _all_removed(before: str, after: str) -> str:
 class Simplicity:
     """The respects in which two cases of one failure are compared; less of each is better.
 
-    Objects; genes off nominal and their distance from it; decisions at which an object moves, and
-    runs of equal moves; characters of the record in the file; neighbours that do not fail or were
-    not flown; how much less the case asks of a repair; whether the evidence comes from other
-    sources than today's.
+    The strongest grade of an object; objects; genes off nominal and their distance from it;
+    decisions at which an object moves, and runs of equal moves; characters of the record in the
+    file; neighbours that do not fail or were not flown; how much less the case asks of a repair;
+    whether the evidence comes from other sources than today's.
     """
 
+    grade: int
     objects: int
     genes: int
     distance: float
@@ -251,12 +253,13 @@ class Simplicity:
 
 def simplicity(case: Case, map: Map, *, outdated: bool = False) -> Simplicity:
     """Return how simple a case is."""
-    objects, genes, distance, _ = complexity(case.scenario, genome_of(case.scenario, map))
+    found = complexity(case.scenario, genome_of(case.scenario, map))
     evidence = case.evidence
     return Simplicity(
-        objects=objects,
-        genes=genes,
-        distance=distance,
+        grade=found.grade,
+        objects=found.objects,
+        genes=found.genes,
+        distance=found.distance,
         moving=sum(move != (0.0, 0.0) for _, own in case.moves for move in own),
         runs=sum(len(list(itertools.groupby(own))) for _, own in case.moves),
         characters=sum(len(line) for line in record_lines(case)),

@@ -4,9 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from pytest_garl.regressions.simplification import genome_of
+from pytest_garl.regressions.simplification import CHOICES, genome_of
+from pytest_garl.scenarios.genes import Property
+from pytest_garl.scenarios.groups.catalogue import GROUPS
 from pytest_garl.scenarios.maps.map import Map
 from pytest_garl.scenarios.scenario import Scenario
+from pytest_garl.scenarios.story import STORY
 from pytest_garl.scenarios.validity import repair
 
 NEIGHBOURS = 3
@@ -18,7 +21,10 @@ a person would call another scenario."""
 
 
 def neighbours(scenario: Scenario, map: Map) -> tuple[Scenario, ...]:
-    """Return slightly different scenarios, always the same ones; nominal weather stays nominal."""
+    """Return slightly different scenarios, always the same ones.
+
+    Nominal weather stays nominal, and a choice, such as the grade of an object, stays as it is.
+    """
     rng = np.random.default_rng([scenario.seed, 0])
     present = dict(scenario.genes)
     items = [
@@ -26,15 +32,26 @@ def neighbours(scenario: Scenario, map: Map) -> tuple[Scenario, ...]:
         for item in genome_of(scenario, map).properties
         if item.key in present
         and (present[item.key] != item.nominal or not item.key.startswith("environment."))
+        and not item.key.endswith(CHOICES)
     ]
     found = []
     for _ in range(NEIGHBOURS):
         steps = rng.uniform(-JITTER, JITTER, len(items))
         moved = {
-            item.key: float(
-                np.clip(present[item.key] + step * (item.high - item.low), item.low, item.high)
-            )
+            item.key: float(np.clip(present[item.key] + step * _range(item), item.low, item.high))
             for item, step in zip(items, steps, strict=True)
         }
         found.append(repair(scenario.replace(moved), map))
     return tuple(found)
+
+
+def _range(item: Property) -> float:
+    """Return the width of a gene's range; of an object's story that which a search draws from.
+
+    What can be flown is six times as wide: a bird would come four metres too late.
+    """
+    head, _, name = item.key.partition(".")
+    if head in GROUPS or name not in STORY:
+        return item.high - item.low
+    low, high = STORY[name].draws
+    return high - low

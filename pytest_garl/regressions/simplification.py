@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from typing import NamedTuple
 
 from pytest_garl.scenarios.genes import Genome
 from pytest_garl.scenarios.genome_like import genome_like
 from pytest_garl.scenarios.maps.map import Map
 from pytest_garl.scenarios.scenario import Scenario
+from pytest_garl.scenarios.story import STORY
 from pytest_garl.scenarios.validity import repair
 
 MARKER_PLACE = ("marker.x", "marker.y")
@@ -89,9 +91,16 @@ def _reset(values: dict[str, float]) -> Simplification:
     return lambda scenario: scenario.replace(values)
 
 
-OBJECT_PLACES = ("start_x", "start_y", "destination_x", "destination_y")
-"""Genes whose distance from nominal is not counted: no place of an object is simpler than another;
-only their digits count."""
+CHOICES = tuple(f".{name}" for name, each in STORY.items() if each.choices)
+"""Ends of the keys of an object's choices, such as its grade: there is nothing between two."""
+OBJECT_PLACES = (
+    *("start_x", "start_y", "destination_x", "destination_y"),
+    *(f".{name}" for name, each in STORY.items() if each.is_place),
+    ".delay_s",
+    *CHOICES,
+)
+"""Ends of keys whose distance from nominal is not counted: no place and no time of an object is
+simpler than another, and no choice but the grade, which counts first; only their digits count."""
 
 
 def genome_of(scenario: Scenario, map: Map) -> Genome:
@@ -99,8 +108,28 @@ def genome_of(scenario: Scenario, map: Map) -> Genome:
     return genome_like((key for key, _ in scenario.genes), map)
 
 
-def complexity(scenario: Scenario, genome: Genome) -> tuple[int, int, float, int]:
-    """Return the number of objects, of genes off nominal, their distance from it, and digits."""
+def strongest_grade(scenario: Scenario) -> int:
+    """Return the number of the strongest grade of an object, from 1 on; 0 if none has a grade."""
+    grades = [1 + int(value) for key, value in scenario.genes if key.endswith(".grade")]
+    return max(grades, default=0)
+
+
+class Complexity(NamedTuple):
+    """How complex a scenario is, compared in this order; less is simpler.
+
+    The strongest grade of an object; the number of objects, and of genes off nominal; the distance
+    of these from nominal, each from 0 to 1; digits.
+    """
+
+    grade: int
+    objects: int
+    genes: int
+    distance: float
+    digits: int
+
+
+def complexity(scenario: Scenario, genome: Genome) -> Complexity:
+    """Return how complex a scenario is."""
     present = dict(scenario.genes)
     off, distance = 0, 0.0
     for gene in genome.genes:
@@ -113,7 +142,7 @@ def complexity(scenario: Scenario, genome: Genome) -> tuple[int, int, float, int
         distance += sum(shares)
     objects = sum(key.endswith(".velocity") for key in present)
     digits = sum(len(repr(value)) for value in present.values())
-    return objects, off, round(distance, 2), digits
+    return Complexity(strongest_grade(scenario), objects, off, round(distance, 2), digits)
 
 
 class BudgetSpentError(Exception):

@@ -123,6 +123,7 @@ def _search(
         "signatures": [
             {
                 **_kind(summary, kind, path),
+                "severity": kind.severity.to_json() if kind.severity else None,
                 "cases": [
                     case["file"]
                     for case in cases
@@ -186,6 +187,7 @@ def _cases(corpus: Corpus, systems: set[str]) -> list[dict[str, Any]]:
                 "reason": case.reason,
                 "known": corpus.is_accepted(entry),
                 "story": case.violation.description,
+                "severity": case.severity.to_json() if case.severity.about else None,
             }
         )
     return found

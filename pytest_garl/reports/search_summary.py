@@ -5,11 +5,13 @@ from __future__ import annotations
 import statistics
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from types import MappingProxyType
 from typing import Self
 
 from pytest_garl.execution.job import FlightJob, parse_job
 from pytest_garl.execution.ledger import Ledger
 from pytest_garl.execution.ledger_queries import LedgerFlight
+from pytest_garl.execution.severity import Severity
 from pytest_garl.verdicts.verdict import Limits, NoLanding, Verdict
 from pytest_garl.verdicts.wording import headline
 
@@ -18,6 +20,7 @@ WHY_NO_LANDING: tuple[NoLanding, ...] = ("needless", "excused", "blocked")
 marker for long enough; something never left it free for long enough."""
 
 
+NONE: Mapping[str, Severity] = MappingProxyType({})
 DOMAINS = "domains of "
 """Begins the ledger's fact with the names of the domains of a system on a map."""
 
@@ -41,7 +44,8 @@ class ViolationKind:
     """All violations with one signature, or all findings that came before another event.
 
     ``count`` is the number of flights, ``first`` the slot of the first one, ``story`` what happened
-    in it, and ``headline`` the story in short.
+    in it, and ``headline`` the story in short.  ``severity`` is the lowest of these flights, None
+    if none is known.
     """
 
     signature: str
@@ -49,6 +53,12 @@ class ViolationKind:
     first: str
     story: str
     headline: str
+    severity: Severity | None = None
+
+    @property
+    def severity_text(self) -> str:
+        """The lowest severity in words; empty if there is nothing to say."""
+        return self.severity.text if self.severity else ""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -197,7 +207,7 @@ def _summary(
         map=map,
         files=tuple(files.split()),
         flights=tuple(flights),
-        kinds=_kinds(violations),
+        kinds=_kinds(violations, _lowest_severities(flights)),
         violating=len({slot for items in violations.values() for slot, _ in items}),
         findings=_kinds(findings),
         limits=tuple(dict.fromkeys(job.limits for job in jobs)),
@@ -206,7 +216,21 @@ def _summary(
     )
 
 
-def _kinds(stories: Mapping[str, Sequence[tuple[str, str]]]) -> tuple[ViolationKind, ...]:
+def _lowest_severities(flights: Sequence[LedgerFlight]) -> dict[str, Severity]:
+    """Return the lowest severity of the violations, by signature."""
+    lowest: dict[str, Severity] = {}
+    for flight in flights:
+        result = flight.result
+        if result.verdict.violation and result.severity is not None:
+            lowest[result.signature] = min(
+                lowest.get(result.signature, result.severity), result.severity
+            )
+    return lowest
+
+
+def _kinds(
+    stories: Mapping[str, Sequence[tuple[str, str]]], severities: Mapping[str, Severity] = NONE
+) -> tuple[ViolationKind, ...]:
     """Return the kinds in (slot, story) by signature, the most frequent first."""
     kinds = [
         ViolationKind(
@@ -215,6 +239,7 @@ def _kinds(stories: Mapping[str, Sequence[tuple[str, str]]]) -> tuple[ViolationK
             first=items[0][0],
             story=items[0][1],
             headline=headline(items[0][1]),
+            severity=severities.get(signature),
         )
         for signature, items in stories.items()
     ]

@@ -331,10 +331,10 @@ def _in_words(value: float, parameter: Parameter) -> str:
 
 def unit_of(name: str) -> str:
     """Return the unit that a name ends with, for a reader; empty without one."""
-    return next((unit for ending, unit in _UNITS.items() if name.endswith(ending)), "")
+    return next((unit for ending, unit in UNITS.items() if name.endswith(ending)), "")
 
 
-_UNITS = {
+UNITS = {
     "_per_m3": "per cubic metre",
     "_mps": "m/s",
     "_mmph": "mm/h",

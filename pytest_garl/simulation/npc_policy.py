@@ -153,6 +153,18 @@ class PolicySpec:
         """Whether its NPCs may react to the UAV; a class says ``reads_uav = False`` if not."""
         return bool(getattr(self._load(), "reads_uav", True))
 
+    @property
+    def grade(self) -> str:
+        """How much its NPCs know of the UAV, one of ``GRADES``; empty if each has its own grade.
+
+        A class says ``grade = "curious"``.  Without that its NPCs are hostile if they may react to
+        the UAV, else careless.
+        """
+        told = getattr(self._load(), "grade", None)
+        if isinstance(told, str):
+            return told
+        return "hostile" if self.reads_uav else "careless"
+
     def _load(self) -> Any:
         module, _, attribute = self.factory.partition(":")
         try:

@@ -72,9 +72,11 @@ def test_a_report_holds_the_violations_of_the_search(searched: Path) -> None:
     dog = kinds["IV:dog:last-metre:unseen"]
     assert (dog["type"], dog["count"], dog["first"]["slot"]) == ("IV", 3, "lawn-g00-s01")
     assert dog["headline"] == "collided with dog-1 at 1.0 m/s, 0.0 m up, over the marker"
+    assert dog["severity"]["grade"] == "hostile"
+    assert dog["severity"]["text"].startswith("a hostile dog at ")
     assert dog["repeat"] == "pytest test_it.py --garl-repeat=lawn-g00-s01"
     (own,) = [kind for kind in one["signatures"] if kind["type"] == "own"]
-    assert own["story"] == "too slow"
+    assert (own["story"], own["severity"]) == ("too slow", None)
     assert one["violating"] == 8
     assert {case["signature"] for case in found["cases"]} <= set(kinds)
     files = [file for kind in kinds.values() for file in kind["cases"]]

@@ -76,6 +76,7 @@ def test_text_holds_the_keys_that_stored_ledgers_have() -> None:
         "landed_s",
         "off_marker_m",
         "outcome",
+        "severity",
         "undecided",
         "verdict",
     ]

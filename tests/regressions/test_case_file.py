@@ -10,6 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from pytest_garl.errors import ScenarioError
+from pytest_garl.execution.severity import NO_SEVERITY, Severity
 from pytest_garl.messages import printable
 from pytest_garl.regressions.case import (
     NOT_ASKED,
@@ -180,3 +181,46 @@ def test_error_of_a_broken_file_names_source_and_key(old: str, new: str, words: 
     with pytest.raises(ScenarioError, match=words) as caught:
         parse_case(text.replace(old, new), load_map, source="lawn-x.toml")
     assert "lawn-x.toml" in str(caught.value)
+
+
+BODY = Severity(
+    about="body",
+    grade="careless",
+    type="person",
+    objects=2,
+    interference_s=0.0,
+    speed_mps=1.4,
+    window_s=3.0,
+)
+CONDITIONS = Severity(
+    about="conditions", conditions=("fog", "wind"), largest="visibility 11 m", largest_share=0.9
+)
+
+
+@pytest.mark.parametrize(
+    "severity",
+    [BODY, dataclasses.replace(BODY, grade="", window_s=None), CONDITIONS, NO_SEVERITY],
+)
+def test_file_keeps_what_the_violation_takes(severity: Severity) -> None:
+    severe = dataclasses.replace(case(), severity=severity)
+    text = dump_case(severe)
+    assert parse_case(text, load_map) == severe
+    assert ("[severity]" in text) == bool(severity.about)
+    # The names of cases do not depend on it.
+    assert severe.id == case().id
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "words"),
+    [
+        ('grade = "careless"', 'grade = "angry"', "'severity.grade': found 'angry'"),
+        ("objects = 2", "objects = -1", "'severity.objects'"),
+        ("speed_mps = 1.4", "speed_mps = -1.0", "'severity.speed_mps'"),
+        ("window_s = 3.0", "window_s = 3000.0", "'severity.window_s'"),
+        ('grade = "careless"', "largest_share = 0.5", "'severity.largest_share': unknown key"),
+    ],
+)
+def test_wrong_severity_is_an_error_that_names_its_key(old: str, new: str, words: str) -> None:
+    text = dump_case(dataclasses.replace(case(), severity=BODY))
+    with pytest.raises(ScenarioError, match=words):
+        parse_case(text.replace(old, new), load_map)

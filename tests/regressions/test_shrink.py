@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Callable
 
 import numpy as np
@@ -11,6 +12,7 @@ from pytest_garl.scenarios.chromosome import decode
 from pytest_garl.scenarios.genes import genome_for
 from pytest_garl.scenarios.genome_like import with_destinations
 from pytest_garl.scenarios.scenario import Scenario
+from pytest_garl.scenarios.story import with_all_values
 from pytest_garl.scenarios.validity import problems, repair
 from tests.regressions.samples import COLLIDING_OBJECT, LAWN, OBJECT_NAMES, VIOLATING_SCENARIO
 
@@ -37,7 +39,7 @@ def test_reset_and_bisect_removes_unneeded_parts_with_few_flights() -> None:
         passes=(reset_and_bisect,),
     )
     assert set(found.simplest.removed_objects) == {*OBJECT_NAMES} - {COLLIDING_OBJECT}
-    assert complexity(found.simplest, genome_of(VIOLATING_SCENARIO, LAWN))[1] == 1
+    assert complexity(found.simplest, genome_of(VIOLATING_SCENARIO, LAWN)).genes == 1
     assert 0.3 <= found.simplest[f"{COLLIDING_OBJECT}.velocity"] <= 0.3 + 0.9 / 8
     assert found.flights <= 6
 
@@ -47,7 +49,7 @@ def test_shrinking_keeps_the_parts_that_a_failure_needs(fails: Callable[[Scenari
     found = shrink(VIOLATING_SCENARIO, fails, LAWN, 100, colliding_object=COLLIDING_OBJECT)
     assert fails(found.simplest)
     assert problems(found.simplest, LAWN) == ()
-    assert complexity(found.simplest, genome_of(VIOLATING_SCENARIO, LAWN))[1] == (
+    assert complexity(found.simplest, genome_of(VIOLATING_SCENARIO, LAWN)).genes == (
         2 if fails is in_fog else 1
     )
 
@@ -115,3 +117,21 @@ def test_hypothesis_lowers_genes_that_can_only_be_lowered_together() -> None:
         first, unequal, LAWN, 300, colliding_object=COLLIDING_OBJECT, passes=(shrink_by_hypothesis,)
     )
     assert plain.simplest["environment.fog"] == plain.simplest["environment.dust"] == 0
+
+
+def test_shrinking_leaves_choices_places_and_times_of_a_story_alone() -> None:
+    told = {"grade": 2.0, "phase": 2.0, "delay_s": 7.5, "lasts_s": 4.0}
+    genes = with_all_values(told, COLLIDING_OBJECT, "person")
+    chasing = dataclasses.replace(
+        VIOLATING_SCENARIO, genes=(*VIOLATING_SCENARIO.genes, *genes.items())
+    )
+    flown: list[Scenario] = []
+
+    def fails(scenario: Scenario) -> bool:
+        flown.append(scenario)
+        return scenario[f"{COLLIDING_OBJECT}.lasts_s"] >= 2.0
+
+    found = shrink(chasing, fails, LAWN, 60, colliding_object=COLLIDING_OBJECT)
+    assert 2.0 <= found.simplest[f"{COLLIDING_OBJECT}.lasts_s"] <= 3.0
+    for name in ("grade", "phase", "delay_s"):
+        assert {each[f"{COLLIDING_OBJECT}.{name}"] for each in flown} == {told[name]}

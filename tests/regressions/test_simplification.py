@@ -1,5 +1,7 @@
 from __future__ import annotations
 
+import dataclasses
+
 from pytest_garl.regressions.simplification import (
     Trials,
     bare_scenario,
@@ -12,6 +14,7 @@ from pytest_garl.regressions.simplification import (
     without_other_objects,
 )
 from pytest_garl.scenarios.scenario import Scenario
+from pytest_garl.scenarios.story import with_all_values
 from pytest_garl.scenarios.validity import problems
 from tests.regressions.samples import COLLIDING_OBJECT, LAWN, OBJECT_NAMES, VIOLATING_SCENARIO
 
@@ -62,19 +65,19 @@ GENOME = genome_of(VIOLATING_SCENARIO, LAWN)
 
 
 def test_complexity_counts_objects_genes_distance_and_digits() -> None:
-    objects, genes, distance, digits = complexity(VIOLATING_SCENARIO, GENOME)
-    assert objects == len(OBJECT_NAMES)
+    found = complexity(VIOLATING_SCENARIO, GENOME)
+    assert (found.grade, found.objects) == (0, len(OBJECT_NAMES))
     fewer = VIOLATING_SCENARIO.without(*OBJECT_NAMES[1:]).replace({"environment.fog": 0.0})
     less = complexity(fewer, GENOME)
-    assert less[0] == 1
-    assert less[1] < genes
-    assert less[2] < distance
-    assert less[3] < digits
+    assert less.objects == 1
+    assert less.genes < found.genes
+    assert less.distance < found.distance
+    assert less.digits < found.digits
 
 
 def test_place_of_an_object_counts_by_its_digits_alone() -> None:
     moved = VIOLATING_SCENARIO.replace({f"{COLLIDING_OBJECT}.start_x": 0.9})
-    assert complexity(moved, GENOME)[:3] == complexity(VIOLATING_SCENARIO, GENOME)[:3]
+    assert complexity(moved, GENOME)[:4] == complexity(VIOLATING_SCENARIO, GENOME)[:4]
     assert complexity(moved, GENOME) < complexity(VIOLATING_SCENARIO, GENOME)
 
 
@@ -92,3 +95,32 @@ def test_trials_fly_repaired_scenarios() -> None:
         )
     )
     assert problems(flown[0], LAWN) == ()
+
+
+def with_story(grade: float, **values: float) -> Scenario:
+    told = with_all_values({"grade": grade, **values}, COLLIDING_OBJECT, "person")
+    scenario = VIOLATING_SCENARIO
+    return dataclasses.replace(scenario, genes=(*scenario.genes, *told.items()))
+
+
+def test_lower_grade_is_simpler_than_anything_else() -> None:
+    chasing = with_story(2.0).without(*OBJECT_NAMES[1:]).replace({"environment.fog": 0.0})
+    careless = with_story(0.0)
+    genome = genome_of(careless, LAWN)
+    assert complexity(careless, genome) < complexity(chasing, genome)
+    assert (complexity(careless, genome).grade, complexity(chasing, genome).grade) == (1, 3)
+
+
+def test_choices_places_and_times_of_a_story_are_not_counted() -> None:
+    plain = with_story(1.0)
+    genome = genome_of(plain, LAWN)
+    name = COLLIDING_OBJECT
+    other = {
+        f"{name}.phase": 2.0,
+        f"{name}.body": 1.0,
+        f"{name}.delay_s": 7.0,
+        f"{name}.crosses_x_m": 1.0,
+    }
+    assert complexity(plain.replace(other), genome)[:4] == complexity(plain, genome)[:4]
+    longer = plain.replace({f"{name}.lasts_s": 9.0})
+    assert complexity(longer, genome).distance > complexity(plain, genome).distance

@@ -9,8 +9,10 @@ from pytest_garl.adversary.minds import Intercepting
 class Chasing(Interfering):
     """Interferes for a while, within the limits of its grade."""
 
+    grade = "chasing"
+
     def __init__(self) -> None:
-        super().__init__("chasing", Intercepting())
+        super().__init__(self.grade, Intercepting())
 
 
 POLICY = Chasing

@@ -9,8 +9,10 @@ from pytest_garl.adversary.minds import Intercepting
 class Curious(Interfering):
     """Interferes for a while, within the limits of its grade."""
 
+    grade = "curious"
+
     def __init__(self) -> None:
-        super().__init__("curious", Intercepting())
+        super().__init__(self.grade, Intercepting())
 
 
 POLICY = Curious

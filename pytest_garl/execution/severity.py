@@ -1,0 +1,112 @@
+"""How severe a violation is: how strong an adversary, or how harsh a world, it takes.
+
+The weaker the adversary, the more severe: a landing system that hits people who know nothing of it
+needs no enemy.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, Literal
+
+from pytest_garl.scenarios.story import GRADES
+
+MOST_LISTED = 4
+"""More conditions than these are counted and not named."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Severity:
+    """What it took to cause one violation.
+
+    ``about`` is "body" for a collision with a moving body, "conditions" for any other violation,
+    and empty where nothing is to be said: for a crash of the landing system.
+
+    Of a body: ``grade`` says how much it knew of the UAV, empty if nobody knows; ``type`` is
+    person, child, dog or bird; ``objects`` are in the scenario; it interfered for
+    ``interference_s`` up to the contact; ``speed_mps`` is its highest speed in the last 3 s.  Its
+    entry may be shifted within ``window_s`` and the UAV still hits such a body; None if that was
+    not measured.
+
+    Of conditions: ``conditions`` are active, objects that are there included; ``largest_share``
+    (0..1) is how far the strongest lies from nominal, as a share of all that can be flown;
+    ``largest`` says it in words.
+    """
+
+    about: Literal["", "body", "conditions"] = ""
+    grade: str = ""
+    type: str = ""
+    objects: int = 0
+    interference_s: float = 0.0
+    speed_mps: float = 0.0
+    window_s: float | None = None
+    conditions: tuple[str, ...] = ()
+    largest: str = ""
+    largest_share: float = 0.0
+
+    @property
+    def key(self) -> tuple[float, ...]:
+        """The order of severities: the lowest takes the weakest adversary or the mildest world.
+
+        Of bodies the lowest grade, then the fewest objects, the shortest interference, the lowest
+        speed; of conditions the fewest, then the smallest share.  A grade that nobody knows counts
+        as the strongest, and an empty severity comes last.
+        """
+        if self.about == "body":
+            rank = GRADES.index(self.grade) if self.grade in GRADES else len(GRADES)
+            return (0, rank, self.objects, self.interference_s, self.speed_mps)
+        if self.about == "conditions":
+            return (0, len(self.conditions), self.largest_share)
+        return (1,)
+
+    def __lt__(self, other: Severity) -> bool:
+        """Return whether it takes less."""
+        return self.key < other.key
+
+    @property
+    def text(self) -> str:
+        """It in words: ``a chasing dog at 6.1 m/s for 3.5 s, 2 others there``; may be empty."""
+        if self.about == "body":
+            return self._body_text()
+        return self._conditions_text() if self.about else ""
+
+    def _body_text(self) -> str:
+        words = " ".join(word for word in (self.grade, self.type) if word)
+        article = "an" if words.startswith(("a", "e", "i", "o", "u")) else "a"
+        text = f"{article} {words} at {self.speed_mps:.1f} m/s"
+        if self.interference_s > 0:
+            text += f" for {self.interference_s:.1f} s"
+        others = self.objects - 1
+        if others < 1:
+            return text
+        return f"{text}, {others} other{'s' if others > 1 else ''} there"
+
+    def _conditions_text(self) -> str:
+        names, count = self.conditions, len(self.conditions)
+        if not count:
+            return "nothing unusual"
+        if count == 1:
+            return f"{names[0]} alone{f', {self.largest}' if self.largest else ''}"
+        more = [f"{count - MOST_LISTED} more"] if count > MOST_LISTED else []
+        return f"{count} conditions: {', '.join([*names[:MOST_LISTED], *more])}"
+
+    def to_json(self) -> dict[str, Any]:
+        """Return plain values for a report: its text, and the facts of a body or of conditions."""
+        body = {
+            "grade": self.grade,
+            "type": self.type,
+            "objects": self.objects,
+            "interference_s": self.interference_s,
+            "speed_mps": self.speed_mps,
+            "window_s": self.window_s,
+        }
+        conditions = {
+            "conditions": list(self.conditions),
+            "largest": self.largest,
+            "largest_share": self.largest_share,
+        }
+        facts = {"": {}, "body": body, "conditions": conditions}[self.about]
+        return {"about": self.about, "text": self.text, **facts}
+
+
+NO_SEVERITY = Severity()

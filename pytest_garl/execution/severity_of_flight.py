@@ -1,0 +1,103 @@
+"""Measure how severe the violation of one flight is."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from pytest_garl.adversary.grades import GRADE_LIMITS
+from pytest_garl.execution.severity import NO_SEVERITY, Severity
+from pytest_garl.scenarios.conditions import active_conditions
+from pytest_garl.scenarios.maps.map import Map
+from pytest_garl.scenarios.scenario import Scenario
+from pytest_garl.scenarios.story import LIMITS_S, Story, story_of
+from pytest_garl.simulation.flight import Contact, Flight, ObjectRecord
+from pytest_garl.simulation.landing_phases import LandingPhases
+from pytest_garl.simulation.npc_policy import PolicySpec
+from pytest_garl.simulation.physics.vehicle import up_m
+from pytest_garl.verdicts.verdict import Verdict
+
+RECENT_S = 3.0
+"""The speed of a body is its highest within this time before the contact."""
+CENTIMETRES = 2
+"""Digits of lengths of time and of speeds."""
+
+
+def severity_of(
+    flight: Flight, verdict: Verdict, scenario: Scenario, map: Map, npcs: PolicySpec
+) -> Severity | None:
+    """Return what the violation of a flight took; None if it violates nothing.
+
+    ``npcs`` is the policy that moved the objects; a policy without a grade of its own moves each
+    object by the grade of its story.
+    """
+    if not verdict.violation:
+        return None
+    if verdict.violation_type == "V":
+        return NO_SEVERITY
+    present = tuple(name for name, _ in map.without(scenario.removed_objects).present_objects)
+    if verdict.violation_type == "IV" and flight.contacts:
+        return _of_body(flight, flight.contacts[-1], scenario, len(present), npcs)
+    conditions = active_conditions(scenario)
+    strongest = max(conditions, key=lambda each: each.share, default=None)
+    return Severity(
+        about="conditions",
+        conditions=(*(each.cause for each in conditions), *present),
+        largest=strongest.words if strongest else "",
+        largest_share=strongest.share if strongest else 0.0,
+    )
+
+
+def _of_body(
+    flight: Flight, contact: Contact, scenario: Scenario, objects: int, npcs: PolicySpec
+) -> Severity:
+    # A user's own simulator may not record its objects.
+    hit = next((item for item in flight.objects if item.name == contact.body), None)
+    story = story_of(scenario, contact.body)
+    grade = npcs.grade or (story.grade if story else "")
+    return Severity(
+        about="body",
+        grade=grade,
+        type=hit.type if hit else contact.kind,
+        objects=objects,
+        interference_s=_interference_s(flight, contact, hit, grade, story),
+        speed_mps=_speed_mps(hit, contact.time_s) if hit else 0.0,
+    )
+
+
+def _speed_mps(hit: ObjectRecord, until_s: float) -> float:
+    """Return the highest horizontal speed of a body shortly before the contact."""
+    track = hit.track
+    recent = (track.time_s >= until_s - RECENT_S) & (track.time_s <= until_s)
+    speeds = np.hypot(track.velocity_mps[recent, 0], track.velocity_mps[recent, 1])
+    return round(float(speeds.max()), CENTIMETRES) if len(speeds) else 0.0
+
+
+def _interference_s(
+    flight: Flight, contact: Contact, hit: ObjectRecord | None, grade: str, story: Story | None
+) -> float:
+    """Return how long a body interfered until the contact, as far as its track shows it.
+
+    A hostile one attacks during the whole flight.  One that sees the UAV in part interferes from
+    when it is near enough to see it, and its mind has noticed; solids between them do not count.
+    """
+    if grade == "hostile":
+        return round(contact.time_s, CENTIMETRES)
+    limits = GRADE_LIMITS.get(grade)
+    if limits is None or hit is None:
+        return 0.0
+    begins_s = story.begins_s(_phases_s(flight)) if story else 0.0
+    lasts_s = min(story.lasts_s, LIMITS_S[grade]) if story else LIMITS_S[grade]
+    time_s, apart_m = hit.track.time_s, hit.track.position_m - flight.uav.position_m
+    near = (time_s >= begins_s) & (np.linalg.norm(apart_m, axis=1) <= limits.sees_within_m)
+    if not near.any():
+        return 0.0
+    noticed_s = float(time_s[int(near.argmax())]) + limits.delay_s
+    return round(min(lasts_s, max(0.0, contact.time_s - noticed_s)), CENTIMETRES)
+
+
+def _phases_s(flight: Flight) -> tuple[float, ...]:
+    """Return when the phases of the landing began, from the UAV's track."""
+    phases = LandingPhases()
+    for time_s, height_m in zip(flight.uav.time_s, flight.uav.position_m[:, 2], strict=True):
+        phases.update(float(time_s), up_m(float(height_m)))
+    return phases.began_s

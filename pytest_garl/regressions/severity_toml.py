@@ -1,0 +1,71 @@
+"""The section of a case file that says what the violation takes."""
+
+from __future__ import annotations
+
+from pytest_garl.execution.severity import NO_SEVERITY, Severity
+from pytest_garl.files.toml import Table, quoted
+from pytest_garl.scenarios.story import GRADES
+from pytest_garl.verdicts.verdict import LONGEST_S
+
+MOST_OBJECTS = 1000
+FASTEST_MPS = 1000.0
+"""More is no object of a map, and no speed of a body."""
+_OF_BODY = {"grade", "type", "objects", "interference_s", "speed_mps", "window_s"}
+_OF_CONDITIONS = {"conditions", "largest", "largest_share"}
+
+
+def severity_lines(severity: Severity) -> list[list[str]]:
+    """Return the section, in a list of one; an empty list for an empty severity."""
+    if severity.about == "body":
+        window_s = severity.window_s
+        return [
+            [
+                "# The adversary that it takes; the weaker, the worse.",
+                "[severity]",
+                *([f"grade = {quoted(severity.grade)}"] if severity.grade else []),
+                f"type = {quoted(severity.type)}",
+                f"objects = {severity.objects}",
+                f"interference_s = {severity.interference_s!r}",
+                f"speed_mps = {severity.speed_mps!r}",
+                *([] if window_s is None else [f"window_s = {window_s!r}  # of its entry"]),
+            ]
+        ]
+    if severity.about == "conditions":
+        names = ", ".join(quoted(name) for name in severity.conditions)
+        return [
+            [
+                "# The conditions that it takes; the fewer, the worse.",
+                "[severity]",
+                f"conditions = [{names}]",
+                f"largest = {quoted(severity.largest)}",
+                f"largest_share = {severity.largest_share!r}",
+            ]
+        ]
+    return []
+
+
+def read_severity(top: Table) -> Severity:
+    """Return the severity in a document, empty without one; raise ScenarioError for a wrong key."""
+    if "severity" not in top.values:
+        return NO_SEVERITY
+    table = top.table("severity")
+    if "conditions" in table.values:
+        table.refuse_unknown(_OF_CONDITIONS)
+        return Severity(
+            about="conditions",
+            conditions=tuple(table.strings("conditions")),
+            largest=table.string("largest"),
+            largest_share=table.number("largest_share", low=0.0, high=1.0),
+        )
+    table.refuse_unknown(_OF_BODY)
+    return Severity(
+        about="body",
+        grade=table.string("grade", allowed=GRADES) if "grade" in table.values else "",
+        type=table.string("type"),
+        objects=table.integer("objects", high=MOST_OBJECTS),
+        interference_s=table.number("interference_s", low=0.0, high=LONGEST_S),
+        speed_mps=table.number("speed_mps", low=0.0, high=FASTEST_MPS),
+        window_s=table.number("window_s", low=0.0, high=LONGEST_S)
+        if "window_s" in table.values
+        else None,
+    )

@@ -1,0 +1,100 @@
+"""The conditions of a scenario that are not nominal: by cause, how strong, in a few words."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+from pytest_garl.scenarios.domains.genome import WEATHER_CAUSES
+from pytest_garl.scenarios.genes import SUN
+from pytest_garl.scenarios.groups.catalogue import GROUPS
+from pytest_garl.scenarios.groups.parameter import Group, Parameter
+from pytest_garl.scenarios.light import sun_elevation_deg
+from pytest_garl.scenarios.scenario import Scenario
+from pytest_garl.scenarios.units import TURN, UNITS, WEATHER_UNITS, significant, unit_of
+
+LIGHT_GROUP = "light"
+NOON = 0.5
+"""The nominal position of the sun."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ActiveCondition:
+    """One cause that is not nominal: fog, the light, the wind.
+
+    ``share`` (0..1) is how far its strongest value lies from nominal, as a share of all that can be
+    flown; 0 if its values are only kinds, directions and times.  ``words`` say that value.
+    """
+
+    cause: str
+    share: float
+    words: str
+
+
+def active_conditions(scenario: Scenario) -> tuple[ActiveCondition, ...]:
+    """Return the causes of weather, the light and the groups that are not nominal."""
+    found = []
+    for cause, names in WEATHER_CAUSES.items():
+        genes = {name: scenario.get(f"environment.{name}", 0.0) for name in names}
+        values = [(gene, _weather(cause, name, gene)) for name, gene in genes.items() if gene > 0]
+        found += _condition(cause, values)
+    found += _condition(LIGHT_GROUP, _light(scenario))
+    for name, group in GROUPS.items():
+        if name != LIGHT_GROUP:
+            found += _condition(name, list(_values(scenario, group)))
+    return tuple(found)
+
+
+def _condition(cause: str, values: list[tuple[float, str]]) -> list[ActiveCondition]:
+    if not values:
+        return []
+    share, words = max(values, key=lambda each: each[0])
+    return [ActiveCondition(cause=cause, share=round(min(1.0, share), 4), words=words)]
+
+
+def _weather(cause: str, name: str, gene: float) -> str:
+    unit = WEATHER_UNITS[f"environment.{name}"]
+    return _in_words(cause, unit.name, unit.physical(gene))
+
+
+def _light(scenario: Scenario) -> list[tuple[float, str]]:
+    position = scenario.get(SUN, NOON)
+    if position == NOON and scenario[TURN] == 0:
+        return []
+    words = f"sun {sun_elevation_deg(position):.0f} degrees high"
+    return [(abs(position - NOON) / NOON, words)]
+
+
+def _values(scenario: Scenario, group: Group) -> Iterator[tuple[float, str]]:
+    for key, each in zip(group.keys, group.parameters, strict=True):
+        value = scenario[key]
+        if value != each.nominal:
+            yield _share(each, value), _value_in_words(group.name, each, value)
+
+
+def _share(parameter: Parameter, value: float) -> float:
+    """Return how far a value is from nominal; a kind, a direction or a time has no harsher end."""
+    if parameter.choices or parameter.even or _is_switch(parameter):
+        return 0.0
+    nominal = parameter.nominal
+    reach = max(parameter.high - nominal, nominal - parameter.low)
+    return abs(value - nominal) / reach if math.isfinite(reach) else 0.0
+
+
+def _is_switch(parameter: Parameter) -> bool:
+    """Whether it is on or off: told.surveyed."""
+    return parameter.whole and (parameter.low, parameter.high) == (0, 1)
+
+
+def _value_in_words(group: str, parameter: Parameter, value: float) -> str:
+    if parameter.choices:
+        return parameter.text_of(value)
+    return parameter.name if _is_switch(parameter) else _in_words(group, parameter.name, value)
+
+
+def _in_words(cause: str, name: str, value: float) -> str:
+    """Return such as ``visibility 11 m`` for the name and the value of ``fog_visibility_m``."""
+    ending = next((ending for ending in UNITS if name.endswith(ending)), "")
+    words = [word for word in name.removesuffix(ending).split("_") if word != cause]
+    return " ".join([*words, f"{significant(value, 2):g}", unit_of(name)]).strip()

@@ -1,0 +1,82 @@
+from __future__ import annotations
+
+import dataclasses
+import json
+import random
+
+import pytest
+
+from pytest_garl.execution.result import FlightResult, parse_result
+from pytest_garl.execution.severity import NO_SEVERITY, Severity
+from tests.support.results import flight_result
+
+PERSON = Severity(about="body", grade="careless", type="person", objects=1, speed_mps=1.4)
+DOG = Severity(
+    about="body", grade="chasing", type="dog", objects=3, interference_s=3.5, speed_mps=6.1
+)
+FOG = Severity(
+    about="conditions", conditions=("fog",), largest="visibility 11 m", largest_share=0.9
+)
+
+
+@pytest.mark.parametrize(
+    ("severity", "text"),
+    [
+        (PERSON, "a careless person at 1.4 m/s"),
+        (DOG, "a chasing dog at 6.1 m/s for 3.5 s, 2 others there"),
+        (dataclasses.replace(PERSON, objects=2), "a careless person at 1.4 m/s, 1 other there"),
+        (dataclasses.replace(PERSON, grade=""), "a person at 1.4 m/s"),
+        (FOG, "fog alone, visibility 11 m"),
+        (dataclasses.replace(FOG, conditions=("fog", "wind")), "2 conditions: fog, wind"),
+        (
+            dataclasses.replace(FOG, conditions=tuple("abcdef")),
+            "6 conditions: a, b, c, d, 2 more",
+        ),
+        (Severity(about="conditions"), "nothing unusual"),
+        (NO_SEVERITY, ""),
+    ],
+)
+def test_severity_says_what_it_took(severity: Severity, text: str) -> None:
+    assert severity.text == text
+
+
+def test_order_is_grade_then_objects_then_interference_then_speed() -> None:
+    ordered = [
+        PERSON,
+        dataclasses.replace(PERSON, speed_mps=2.0),
+        dataclasses.replace(PERSON, objects=2, speed_mps=0.1),
+        dataclasses.replace(DOG, grade="curious", interference_s=9.0),
+        dataclasses.replace(DOG, objects=1, interference_s=5.0, speed_mps=8.0),
+        DOG,
+        dataclasses.replace(DOG, interference_s=4.0, speed_mps=1.0),
+        dataclasses.replace(PERSON, grade="hostile"),
+        dataclasses.replace(PERSON, grade=""),
+        NO_SEVERITY,
+    ]
+    shuffled = random.Random(0).sample(ordered, len(ordered))
+    assert sorted(shuffled) == ordered
+
+
+def test_fewer_conditions_come_before_milder_ones() -> None:
+    two = dataclasses.replace(FOG, conditions=("fog", "wind"), largest_share=0.1)
+    assert sorted([two, FOG]) == [FOG, two]
+    assert dataclasses.replace(FOG, largest_share=0.2) < FOG
+
+
+@pytest.mark.parametrize("severity", [None, NO_SEVERITY, PERSON, FOG])
+def test_ledger_keeps_severities(severity: Severity | None) -> None:
+    result = flight_result("IV:dog:descent:seen", severity=severity)
+    assert parse_result(result.dumps()) == result
+
+
+def test_result_of_an_earlier_version_has_no_severity() -> None:
+    values = json.loads(flight_result("IV:dog:descent:seen").dumps())
+    del values["severity"]
+    assert FlightResult.from_json(values).severity is None
+
+
+def test_report_holds_only_facts_that_count() -> None:
+    assert NO_SEVERITY.to_json() == {"about": "", "text": ""}
+    assert PERSON.to_json()["grade"] == "careless"
+    assert "conditions" not in PERSON.to_json()
+    assert FOG.to_json()["conditions"] == ["fog"]

@@ -1,0 +1,50 @@
+from __future__ import annotations
+
+import pytest
+
+from pytest_garl.scenarios.chromosome import decode
+from pytest_garl.scenarios.conditions import active_conditions
+from pytest_garl.scenarios.genes import genome_for
+from pytest_garl.scenarios.maps.map import load_map
+
+LAWN = load_map("lawn")
+GENOME = genome_for(LAWN)
+NOMINAL = decode(GENOME.nominal, GENOME, map="lawn", seed=0)
+
+
+def test_nominal_scenario_has_no_active_condition() -> None:
+    assert active_conditions(NOMINAL) == ()
+
+
+@pytest.mark.parametrize(
+    ("values", "cause", "share", "words"),
+    [
+        ({"environment.fog": 10 / 11}, "fog", 10 / 11, "visibility 11 m"),
+        ({"environment.rain": 0.3}, "rain", 0.3, "30 mm/h"),
+        ({"environment.road_snow": 0.4}, "snow", 0.4, "cover 40 %"),
+        ({"environment.sun_position": 0.1}, "light", 0.8, "sun 14 degrees high"),
+        ({"told.surveyed": 1.0}, "told", 0.0, "surveyed"),
+        ({"decoy-1.kind": 7.0}, "decoy-1", 0.0, "qr-code"),
+    ],
+)
+def test_condition_says_its_share_and_its_value(
+    values: dict[str, float], cause: str, share: float, words: str
+) -> None:
+    (found,) = active_conditions(NOMINAL.replace(values))
+    assert (found.cause, found.words) == (cause, words)
+    assert found.share == pytest.approx(share, abs=1e-4)
+
+
+def test_strongest_value_of_a_cause_counts() -> None:
+    (rain,) = active_conditions(
+        NOMINAL.replace({"environment.rain": 0.1, "environment.road_wetness": 0.8})
+    )
+    assert (rain.cause, rain.share, rain.words) == ("rain", 0.8, "wetness 80 %")
+
+
+def test_direction_has_no_harsher_end() -> None:
+    wind = {"wind.mean_mps": 3.0, "wind.towards_deg": 180.0}
+    (found,) = active_conditions(NOMINAL.replace(wind))
+    assert found.words == "mean 3 m/s"
+    (turned,) = active_conditions(NOMINAL.replace({"light.turn_deg": 90.0}))
+    assert (turned.cause, turned.share) == ("light", 0.0)
