@@ -67,6 +67,7 @@ def main() -> None:
     """Fly all minds and write the table."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--episodes", type=int, default=300)
+    parser.add_argument("--grades", nargs="+", default=["curious", "chasing"])
     parser.add_argument("--minds", nargs="+", default=["learned", *UNLEARNED])
     parser.add_argument("--workers", type=int, default=2)
     parser.add_argument("--out", type=Path, default=Path("docs/minds.csv"))
@@ -78,7 +79,7 @@ def main() -> None:
     )
     rows = []
     with ProcessPoolExecutor(arguments.workers) as pool:
-        for grade in ("curious", "chasing"):
+        for grade in arguments.grades:
             for mind in arguments.minds:
                 for uav in ("straight", "avoiding"):
                     hits = sum(pool.map(collisions, [(grade, mind, uav, each) for each in seeds]))

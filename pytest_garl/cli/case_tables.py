@@ -34,6 +34,8 @@ def case_table(found: Iterable[CorpusEntry]) -> Table:
         robust = (
             f"{evidence.neighbours_failed}/{evidence.neighbours}" if evidence.neighbours else ""
         )
+        if case.severity.window_s is not None:
+            robust = f"{case.severity.window_s:g} s"
         objects = str(len(case.moves))
         # In a plain string rich would draw ":dog:" as an emoji, and read "[red]" as a colour.
         signature = Text(printable(case.violation.signature, keep=""))

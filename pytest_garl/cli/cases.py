@@ -117,11 +117,8 @@ def show(project: _Project, file: Path) -> None:
         _say(f"\n{case.prevention.text}.")
     if not case.gates:
         _say(f"\nIt gates nothing: {_NO_GATE[case.reason]}.")
-    tried = f"{evidence.neighbours_failed} of {evidence.neighbours} neighbours fail too; "
-    _say(
-        f"\n{tried if evidence.neighbours else ''}shrinking removed {evidence.removed}; objects "
-        f"were moved by {case.policy}"
-    )
+    tried = f"{case.robustness}; " if case.robustness else ""
+    _say(f"\n{tried}shrinking removed {evidence.removed}; objects were moved by {case.policy}")
     _say(f"Fly it: garl cases replay {file}")
 
 

@@ -153,11 +153,8 @@ def _evidence(each: InvestigatedSignature, case: Case) -> list[str]:
     evidence = case.evidence
     if not each.result.flights:
         return ["as the search found it, not shrunk"]
-    robust = f"{evidence.neighbours_failed} of {evidence.neighbours} neighbours fail too"
-    if case.severity.window_s is not None:
-        robust = f"its entry has a window of {case.severity.window_s:g} s"
     return [
-        *([robust] if evidence.neighbours or case.severity.window_s else []),
+        *([case.robustness] if case.robustness else []),
         *([case.prevention.text] if case.prevention.text else []),
         *([] if case.gates else [f"{case.reason.upper()}, gates nothing"]),
         *([f"flown without NPCs because of {_seen(each)}"] if each.result.finding else []),

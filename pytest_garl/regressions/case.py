@@ -175,6 +175,16 @@ class Case:
         return RecordedBehaviour(moves=self.moves, changes=self.changes)
 
     @property
+    def robustness(self) -> str:
+        """How robust it is, in words; empty if that was not measured."""
+        evidence, window_s = self.evidence, self.severity.window_s
+        if window_s is not None:
+            return f"its entry has a window of {window_s:g} s"
+        if not evidence.neighbours:
+            return ""
+        return f"{evidence.neighbours_failed} of {evidence.neighbours} neighbours fail too"
+
+    @property
     def asserting_test(self) -> str:
         """The name of the test whose own assertion failed; empty for the built-in verdict."""
         return asserting_test(self.test, self.assertion)

@@ -23,8 +23,9 @@ from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.simulation.flight_file import load
 
 MINIMUM_CASE_FLIGHTS = 2 + NEIGHBOURS + ESCAPE_FLIGHTS
-"""The fewest flights that can confirm a violation: one of the scenario without all that the failure
-should not need, one of the scenario as found, its neighbours, those that confirm an escape."""
+"""The fewest flights that can confirm a violation: one of a straight crossing or of the scenario
+without all that the failure should not need, one of the scenario as found, its neighbours, those
+that confirm an escape."""
 EXCEPTION_FLIGHTS = 2
 """Flights for a Python exception or a hang, which hardly depends on the scenario: one of the
 scenario without objects and weather, one of the scenario as found."""

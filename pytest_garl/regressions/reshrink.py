@@ -110,8 +110,12 @@ class CaseReshrinker:
         saved = self._reproduce()
         if saved is None:
             return flights.result(None, NOT_REPRODUCED)
-        better = self._improved_case(saved, self._shrink_by_record(saved))
-        if better is None:
+        # A crossing is alone, careless and as slow as usual; its entry would lose its window.
+        is_crossing = case.severity.window_s is not None
+        better = None
+        if not is_crossing:
+            better = self._improved_case(saved, self._shrink_by_record(saved))
+        if better is None and not is_crossing:
             better = self._improved_case(saved, self._shrink_by_policy(saved))
         if better is None and self._is_outdated():
             better = self._replacement(saved, case.prevention)

@@ -171,3 +171,24 @@ def test_scripted_and_recorded_npcs_do_not_read_the_uav() -> None:
     assert not recorded_spec({}).reads_uav
     assert policy_spec("dqn").reads_uav
     assert handed_over_spec(recorded_spec({}), policy_spec("dqn"), 1.0).reads_uav
+
+
+@pytest.mark.parametrize(
+    ("name", "grade"),
+    [
+        ("careless", "careless"),
+        ("curious", "curious"),
+        ("chasing", "chasing"),
+        ("hostile", "hostile"),
+        ("dqn", "hostile"),
+        ("waypoint", "careless"),
+        ("graded", ""),
+    ],
+)
+def test_policy_says_the_grade_of_its_npcs(name: str, grade: str) -> None:
+    assert policy_spec(name).grade == grade
+
+
+def test_recorded_npcs_have_no_grade_of_their_own() -> None:
+    assert recorded_spec({}).grade == ""
+    assert handed_over_spec(recorded_spec({}), policy_spec("dqn"), 1.0).grade == ""

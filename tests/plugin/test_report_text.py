@@ -37,6 +37,15 @@ def test_headline_stands_where_people_look(
     assert f"{HIT}\n{AGAIN}" in messages
 
 
+def test_failure_and_summary_say_how_severe_the_violation_is(pytester: pytest.Pytester) -> None:
+    project(pytester)
+    output = run(pytester, *SEARCH, "--garl-shrink=0").stdout.str()
+    assert "\nIt took a hostile dog at 0.0 m/s for " in output
+    assert "\n        at the least: a hostile dog at 0.0 m/s for " in output
+    harmless = run(pytester, *SEARCH, "--garl-shrink=0", "--garl-npcs=waypoint").stdout.str()
+    assert "\nIt took a careless dog at 0.0 m/s" in harmless
+
+
 def test_printed_command_repeats_the_failure(pytester: pytest.Pytester) -> None:
     project(pytester)
     first = run(pytester, *SEARCH)

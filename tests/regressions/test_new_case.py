@@ -6,6 +6,7 @@ import pytest
 
 from pytest_garl.adversary.catalogue import policy_spec
 from pytest_garl.execution.flight_id import CompletedFlight
+from pytest_garl.execution.severity import Severity
 from pytest_garl.regressions.case import (
     NOT_ASKED,
     Preventable,
@@ -24,6 +25,7 @@ from tests.regressions.samples import (
     make_case_request,
 )
 
+DQN = policy_spec("dqn")
 REQUEST = make_case_request(10, VIOLATING_SCENARIO)
 SIMPLE = VIOLATING_SCENARIO.without(*OBJECT_NAMES[1:])
 FAILING = FailingScenario(
@@ -90,3 +92,24 @@ def test_case_without_flights_is_the_simplest_violation() -> None:
     assert result.case is not None
     assert result.case.scenario == SIMPLE
     assert (result.flights, result.case.evidence.neighbours) == (0, 0)
+
+
+def test_case_of_a_crossing_gates_if_its_entry_has_a_window() -> None:
+    careless = policy_spec("careless")
+    crossing = dataclasses.replace(FAILING, npcs=careless, window_s=1.0)
+    severity = Severity(about="body", grade="careless", type="person", objects=1)
+    result = dataclasses.replace(FAILING.flight.result, severity=severity)
+    flown = dataclasses.replace(FAILING.flight, result=result)
+    made = new_case(REQUEST, dataclasses.replace(crossing, flight=flown))
+    assert (made.reason, made.policy) == ("", "careless")
+    assert made.severity == dataclasses.replace(severity, window_s=1.0)
+    assert made.robustness == "its entry has a window of 1 s"
+    edge = new_case(REQUEST, dataclasses.replace(crossing, window_s=0.0))
+    assert edge.reason == "edge"
+
+
+def test_preventable_crossing_is_not_flown_with_a_live_policy() -> None:
+    chased = dataclasses.replace(REQUEST, job=dataclasses.replace(REQUEST.job, npcs=DQN))
+    crossing = dataclasses.replace(FAILING, npcs=policy_spec("careless"), window_s=2.0)
+    found = Prevention(answer="preventable", inevitable_s=1.0)
+    assert not new_case(chased, crossing, found).live

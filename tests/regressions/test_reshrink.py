@@ -8,6 +8,7 @@ import pytest
 
 from pytest_garl.cli import cases
 from pytest_garl.execution.reference import BUILT_IN, simulator_sha256
+from pytest_garl.execution.severity import Severity
 from pytest_garl.plugin import options
 from pytest_garl.regressions.case import Case
 from pytest_garl.regressions.case_file import size_of
@@ -161,3 +162,11 @@ def test_case_that_is_worse_in_one_respect_is_not_simpler() -> None:
 
 def test_case_with_new_evidence_is_simpler_than_an_outdated_one() -> None:
     assert is_simpler(SAVED, SAVED, LAWN, outdated=True)
+
+
+def test_crossing_with_a_window_is_not_shrunk_further() -> None:
+    crossing = dataclasses.replace(
+        saved(VIOLATING_SCENARIO),
+        severity=Severity(about="body", grade="careless", type="person", window_s=2.0),
+    )
+    assert shrunk(crossing, by_record) == (None, 1)

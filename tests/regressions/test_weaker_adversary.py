@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import random
 from pathlib import Path
 
 import pytest
@@ -108,6 +109,50 @@ def test_lower_grade_is_not_asked_of_a_policy_for_all_objects(tmp_path: Path) ->
 
     flights = chased(tmp_path, fly, policy="hostile")
     assert confirm_lower_grade(flights, flights.request.scenarios[0]) is None
+
+
+def on_an_edge(recorded_fails: bool) -> FlyFunction:
+    """Return flights in which a crossing fails in its moment only; others fail, or not at all."""
+    delays_s: list[float] = []
+
+    def fly(job: FlightJob, scenario: Scenario) -> CompletedFlight:
+        fails = recorded_fails
+        if any(key == "person-1.delay_s" for key, _ in scenario.genes):
+            delays_s.append(scenario["person-1.delay_s"])
+            fails = delays_s[-1] == delays_s[0]
+        return flown("IV:person:descent:seen" if fails else "")
+
+    return fly
+
+
+def test_robust_scenario_is_kept_in_place_of_a_crossing_on_an_edge(tmp_path: Path) -> None:
+    flights = flights_after(tmp_path, PERSON_ALONE, on_an_edge(recorded_fails=True))
+    made = build_case(flights.request, on_an_edge(recorded_fails=True)).case
+    assert made is not None
+    assert (made.severity.window_s, made.reason) == (None, "")
+
+
+def test_crossing_on_an_edge_is_kept_if_nothing_else_is_robust(tmp_path: Path) -> None:
+    flights = flights_after(tmp_path, PERSON_ALONE, on_an_edge(recorded_fails=False))
+    made = build_case(flights.request, on_an_edge(recorded_fails=False)).case
+    assert made is not None
+    assert (made.severity.window_s, made.reason) == (0.0, "edge")
+
+
+@pytest.mark.parametrize("budget", range(8, 20))
+@pytest.mark.parametrize("seed", range(5))
+def test_flights_stay_within_the_budget(tmp_path: Path, budget: int, seed: int) -> None:
+    chance, count = random.Random(seed), 0
+
+    def fly(job: FlightJob, scenario: Scenario) -> CompletedFlight:
+        nonlocal count
+        count += 1
+        return flown("IV:person:descent:seen" if chance.random() < 0.6 else "")
+
+    told = with_all_values({"grade": 2.0, "lasts_s": 5.0}, "person-1", "person")
+    chasing = dataclasses.replace(PERSON_ALONE, genes=(*PERSON_ALONE.genes, *told.items()))
+    request = flights_after(tmp_path, repair(chasing, LAWN), fly, budget=budget).request
+    assert build_case(request, fly).flights == count <= budget
 
 
 def flown(signature: str, record: Path = Path("/nowhere/x")) -> CompletedFlight:
