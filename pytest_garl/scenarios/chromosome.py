@@ -26,13 +26,11 @@ def encode(scenario: Scenario, genome: Genome) -> NDArray[np.float64]:
     cannot express.
     """
     known = dict(scenario.genes)
-    objects = [gene for gene in genome.genes if _is_object(gene)]
-    # The domain may allow only the nominal value of a part of a story.
-    told = {f"{gene.name}.{key}": each.nominal for gene in objects for key, each in STORY.items()}
-    allowed = CLEAR | told | dict(genome.fixed)
+    allowed = CLEAR | dict(genome.fixed)
     unknown = sorted(
         key for key in known.keys() - {*genome.keys} if known[key] != allowed.get(key, math.nan)
     )
+    objects = [gene for gene in genome.genes if _is_object(gene)]
     gone = {gene.name for gene in objects if gene.name in scenario.removed_objects}
     missing = sorted(
         item.key

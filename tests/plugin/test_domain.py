@@ -74,7 +74,7 @@ def test_search_draws_from_the_default_domain(pytester: pytest.Pytester) -> None
 
 def test_case_that_the_default_domain_found_is_saved_and_flown(pytester: pytest.Pytester) -> None:
     in_default_domain(pytester)
-    run_cases(pytester, "--garl-budget=40", "--garl-workers=0", "--garl-shrink=60")
+    run_cases(pytester, "--garl-budget=100", "--garl-workers=0", "--garl-shrink=60")
     saved = cases(pytester)
     assert saved
     add_cases_to_git(pytester.path)

@@ -26,6 +26,8 @@ from pytest_garl.scenarios.story import GRADES, STORY
 from pytest_garl.scenarios.task import Task
 from pytest_garl.scenarios.units import WEATHER_UNITS
 
+_NO_RANGE = 1e-9
+"""A range that files round to one value."""
 WEATHER_CAUSES = {
     "dust": ("dust",),
     "fog": ("fog",),
@@ -160,8 +162,9 @@ def _story(domain: Domain, name: str, kind: str) -> Iterable[Property]:
         elif not each.choices and not each.is_place:
             limits = domain.range_of(f"npcs.{each.name}") or (each.nominal, each.nominal)
             low, high = (limits[0] if low >= 0 else -limits[1]), limits[1]
-        if kind in each.types and low < high:
-            yield story_property(name, each, (low, high))
+        if kind in each.types:
+            # A value that the domain fixes is part of every story too.
+            yield story_property(name, each, (low, max(high, low + _NO_RANGE)))
 
 
 def _objects(domain: Domain, map: Map) -> Iterable[NuclearGene]:
