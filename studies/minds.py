@@ -1,25 +1,33 @@
 """Learned and unlearned minds of NPCs that perceive the UAV in part, in the surrogate.
 
 ``python -m studies.minds`` compares them on the same episodes, which no training and no validation
-used, and writes ``docs/minds.csv``.  ``interfering`` makes the policies of `studies.grades`.
+used, and adds the rows that ``docs/minds.csv`` lacks; ``--report`` prints the table.
+``interfering`` makes the policies of `studies.grades`.
 """
 
 from __future__ import annotations
 
 import argparse
-import csv
 import dataclasses
+import itertools
+import os
 from collections.abc import Callable, Mapping
-from concurrent.futures import ProcessPoolExecutor
+from concurrent.futures import Executor
 from pathlib import Path
+from typing import Any
 
 from pytest_garl.adversary.interference import Interfering, Mind
 from pytest_garl.adversary.learned import LearnedMind, shipped
 from pytest_garl.adversary.minds import Direct, Intercepting, ToMarker
-from studies.table import share
+from studies.table import Key, ResultTable, Row, run_study, share
 
 SEEDS_FROM = 3_500_000_000
 """Beyond the seeds of training, validation and report."""
+TABLE = ResultTable(
+    file=Path("docs/minds.csv"),
+    columns=("grade", "mind", "uav", "episodes", "collided"),
+    key=("grade", "mind", "uav", "episodes"),
+)
 UNLEARNED: Mapping[str, Callable[[], Mind]] = {
     "direct": Direct,
     "intercepting": Intercepting,
@@ -63,30 +71,46 @@ def collisions(job: tuple[str, str, str, range]) -> int:
     return hits
 
 
-def main() -> None:
-    """Fly all minds and write the table."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--episodes", type=int, default=300)
-    parser.add_argument("--grades", nargs="+", default=["curious", "chasing"])
-    parser.add_argument("--minds", nargs="+", default=["learned", *UNLEARNED])
-    parser.add_argument("--workers", type=int, default=2)
-    parser.add_argument("--out", type=Path, default=Path("docs/minds.csv"))
-    arguments = parser.parse_args()
-    half = arguments.episodes // 2
+def row_of(key: Key, pool: Executor) -> dict[str, Any]:
+    """Fly the episodes of one row."""
+    grade, mind, uav, episodes = key
+    count = int(episodes)
     seeds = (
-        range(SEEDS_FROM, SEEDS_FROM + half),
-        range(SEEDS_FROM + half, SEEDS_FROM + arguments.episodes),
+        range(SEEDS_FROM, SEEDS_FROM + count // 2),
+        range(SEEDS_FROM + count // 2, SEEDS_FROM + count),
     )
-    rows = []
-    with ProcessPoolExecutor(arguments.workers) as pool:
-        for grade in arguments.grades:
-            for mind in arguments.minds:
-                for uav in ("straight", "avoiding"):
-                    hits = sum(pool.map(collisions, [(grade, mind, uav, each) for each in seeds]))
-                    rows.append((grade, mind, uav, arguments.episodes, hits))
-                    print(*rows[-1], share(hits, arguments.episodes), flush=True)
-    with arguments.out.open("w", newline="") as file:
-        csv.writer(file).writerows([("grade", "mind", "uav", "episodes", "collided"), *rows])
+    hits = sum(pool.map(collisions, [(grade, mind, uav, each) for each in seeds]))
+    return {**dict(zip(TABLE.key, key, strict=True)), "collided": hits}
+
+
+def report(rows: list[Row]) -> str:
+    """Return a Markdown table."""
+    lines = ["| grade | mind | UAV | episodes | collided |", "| --- | --- | --- | ---: | --- |"]
+    for row in rows:
+        rate = share(int(row["collided"]), int(row["episodes"]))
+        lines.append(
+            f"| {row['grade']} | {row['mind']} | {row['uav']} | {row['episodes']} | {rate} |"
+        )
+    return "\n".join(lines)
+
+
+def main() -> None:
+    """Fly the missing rows, or print the table."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--episodes", type=int, default=200, help="per row; default 200")
+    parser.add_argument("--workers", type=int, default=os.cpu_count() or 1)
+    run_study(parser, TABLE, report, fly_rows)
+
+
+def fly_rows(arguments: argparse.Namespace) -> None:
+    """Fly the rows that the table lacks."""
+    keys = itertools.product(
+        ("curious", "chasing"),
+        ("learned", *UNLEARNED),
+        ("straight", "avoiding"),
+        (str(arguments.episodes),),
+    )
+    TABLE.fly_missing(keys, row_of, arguments.workers)
 
 
 if __name__ == "__main__":
