@@ -23,7 +23,8 @@ from typing import Any
 
 import numpy as np
 
-from pytest_garl.adversary.catalogue import policy_spec
+from pytest_garl.adversary.catalogue import DEFAULT_POLICY, policy_spec
+from pytest_garl.adversary.domain_policy import policy_in
 from pytest_garl.execution.flight import judged
 from pytest_garl.execution.result import FlightResult, parse_result
 from pytest_garl.experiments.measure import limits_text
@@ -109,7 +110,7 @@ def fly_one(scenario: Scenario) -> FlightResult:
     from landing_systems.opencv_mls import OpenCvLandingSystem
 
     cv2.setNumThreads(1)
-    npcs = policy_spec(DOMAIN.npc_behaviour)
+    npcs = policy_spec(policy_in(DOMAIN, DEFAULT_POLICY))
     return judged(fly(scenario, OpenCvLandingSystem, npcs, map=MAP), DEFAULT_LIMITS)
 
 
