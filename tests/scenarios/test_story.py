@@ -51,7 +51,7 @@ def test_no_drawn_story_interferes_for_longer_than_its_grade_may() -> None:
 
 
 def test_half_of_the_careless_persons_pause() -> None:
-    stories = [story_of(each, "person-1") for each in drawn(200)]
+    stories = [story_of(each, "person-1") for each in drawn(100)]
     pauses = [each.pause_s > 0 for each in stories if each and each.grade == "careless"]
     assert 0.3 < sum(pauses) / len(pauses) < 0.7
 
