@@ -19,6 +19,7 @@ from typing import Any
 from pytest_garl.adversary.interference import Interfering, Mind
 from pytest_garl.adversary.learned import LearnedMind, shipped
 from pytest_garl.adversary.minds import Direct, Intercepting, ToMarker
+from pytest_garl.adversary.training.presets import Uav
 from studies.table import Key, ResultTable, Row, run_study, share
 
 SEEDS_FROM = 3_500_000_000
@@ -47,7 +48,7 @@ def interfering(grade: str, mind: str) -> Interfering:
     return Interfering(grade, mind_of(grade, mind))
 
 
-def collisions(job: tuple[str, str, str, range]) -> int:
+def collisions(job: tuple[str, str, Uav, range]) -> int:
     """Return how many episodes end in a collision."""
     from pytest_garl.adversary.training.graded import GradedEnv
     from pytest_garl.adversary.training.presets import PRESETS
@@ -58,7 +59,7 @@ def collisions(job: tuple[str, str, str, range]) -> int:
     surrogate = dataclasses.replace(
         PRESETS[grade].surrogate,
         maps=maps,
-        uav=uav,  # type: ignore[arg-type]
+        uav=uav,
     )
     env, mind, hits = GradedEnv(surrogate), mind_of(grade, name), 0
     for seed in seeds:
@@ -73,7 +74,8 @@ def collisions(job: tuple[str, str, str, range]) -> int:
 
 def row_of(key: Key, pool: Executor) -> dict[str, Any]:
     """Fly the episodes of one row."""
-    grade, mind, uav, episodes = key
+    grade, mind, _, episodes = key
+    uav: Uav = "avoiding" if key[2] == "avoiding" else "straight"
     count = int(episodes)
     seeds = (
         range(SEEDS_FROM, SEEDS_FROM + count // 2),

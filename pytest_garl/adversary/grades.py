@@ -5,8 +5,6 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from pytest_garl.scenarios.story import LIMITS_S
-
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class GradeLimits:
@@ -22,10 +20,6 @@ class GradeLimits:
     decides_every_s: float
     keeps_m: float = 0.0
     intention: str
-
-    def lasts_s(self, grade: str) -> float:
-        """Return how long an NPC of the grade interferes at most."""
-        return LIMITS_S[grade]
 
 
 GRADE_LIMITS: Mapping[str, GradeLimits] = {

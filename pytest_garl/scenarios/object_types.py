@@ -266,4 +266,3 @@ OBJECT_TYPES: Mapping[str, ObjectType] = MappingProxyType(
     }
 )
 """The paper's three types, a taller one on the ground, a low one, one in the air; and children."""
-PAPER_TYPES = ("person", "dog", "bird")

@@ -17,11 +17,12 @@ PHASES = ("start", "8 m", "3 m", "touchdown")
 touchdown.  The delay counts from there."""
 CURIOUS_S = 20.0
 """Longest interference of a curious NPC: engineering estimate of how long somebody looks at a UAV
-that lands before he goes on."""
+that lands before walking on."""
 CHASE_S = 5.0
 """Longest chase, as the design of the grades says."""
 APPROACH_S = 10.0
 """An NPC that has come and perceives no UAV for so long leaves: engineering estimate."""
+WALKERS_AND_BIRDS = ("person", "dog", "bird")
 LONGEST_PAUSE_S = 60.0
 """So that a pad exists that is blocked for longer than a landing system can wait."""
 
@@ -44,7 +45,7 @@ class StoryParameter:
     nominal: float = 0.0
     choices: tuple[str, ...] = ()
     grades: tuple[str, ...] = GRADES[:3]
-    types: tuple[str, ...] = ("person", "dog", "bird")
+    types: tuple[str, ...] = WALKERS_AND_BIRDS
 
     @property
     def is_place(self) -> bool:
@@ -57,14 +58,25 @@ class StoryParameter:
         return float(int(value)) if self.choices else value
 
 
-def _chosen(name: str, choices: tuple[str, ...], **about: str | tuple[str, ...]) -> StoryParameter:
+def _chosen(
+    name: str,
+    choices: tuple[str, ...],
+    *,
+    meaning: str,
+    source: str,
+    grades: tuple[str, ...] = GRADES[:3],
+    types: tuple[str, ...] = WALKERS_AND_BIRDS,
+) -> StoryParameter:
     return StoryParameter(
         name=name,
         low=0.0,
         high=len(choices) - 1.0,
         draws=(0.0, len(choices) - 1e-6),
         choices=choices,
-        **about,  # type: ignore[arg-type]
+        meaning=meaning,
+        source=source,
+        grades=grades,
+        types=types,
     )
 
 
