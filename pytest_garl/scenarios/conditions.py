@@ -15,6 +15,7 @@ from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.scenarios.units import TURN, UNITS, WEATHER_UNITS, significant, unit_of
 
 LIGHT_GROUP = "light"
+TOLD_GROUP, TOLD_ERROR = "told", "told.error_m"
 NOON = 0.5
 """The nominal position of the sun."""
 
@@ -41,7 +42,9 @@ def active_conditions(scenario: Scenario) -> tuple[ActiveCondition, ...]:
         found += _condition(cause, values)
     found += _condition(LIGHT_GROUP, _light(scenario))
     for name, group in GROUPS.items():
-        if name != LIGHT_GROUP:
+        # A surveyed pad whose coordinate has no error is as good as it gets.
+        is_exact = name == TOLD_GROUP and scenario[TOLD_ERROR] == 0
+        if name != LIGHT_GROUP and not is_exact:
             found += _condition(name, list(_values(scenario, group)))
     return tuple(found)
 

@@ -14,6 +14,7 @@ NOMINAL = decode(GENOME.nominal, GENOME, map="lawn", seed=0)
 
 def test_nominal_scenario_has_no_active_condition() -> None:
     assert active_conditions(NOMINAL) == ()
+    assert active_conditions(NOMINAL.replace({"told.surveyed": 1.0})) == ()
 
 
 @pytest.mark.parametrize(
@@ -23,7 +24,7 @@ def test_nominal_scenario_has_no_active_condition() -> None:
         ({"environment.rain": 0.3}, "rain", 0.3, "30 mm/h"),
         ({"environment.road_snow": 0.4}, "snow", 0.4, "cover 40 %"),
         ({"environment.sun_position": 0.1}, "light", 0.8, "sun 14 degrees high"),
-        ({"told.surveyed": 1.0}, "told", 0.0, "surveyed"),
+        ({"told.surveyed": 1.0, "told.error_m": 5.0}, "told", 0.25, "error 5 m"),
         ({"decoy-1.kind": 7.0}, "decoy-1", 0.0, "qr-code"),
     ],
 )
