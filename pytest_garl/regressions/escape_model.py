@@ -121,7 +121,7 @@ class EscapeModel:
             for npc, situation in zip(npcs, situations, strict=True):
                 npc.decide(situation)
         for npc in npcs:
-            npc.tell_time(tick / PHYSICS_RATE_HZ, phases.began_s)
+            npc.take_in(tick / PHYSICS_RATE_HZ, phases.began_s, motion.position_m)
             npc.advance(TICKS_PER_NPC_STEP / PHYSICS_RATE_HZ, npcs)
 
     def _situation(
@@ -159,7 +159,7 @@ class EscapeModel:
             tick = number * step
             index = int(np.searchsorted(chase.flight.uav.time_s, tick * TICK_S - 1e-6))
             index = min(index, len(chase.flight.uav.time_s) - 1)
-            self._tell_time(npcs, index)
+            self._take_in(npcs, index)
             self._place(npcs, index)
             motion = self._motion(index)
             scenario = environment_at(chase.scenario, chase.flight, tick * TICK_S - 1e-6)
@@ -172,14 +172,14 @@ class EscapeModel:
                     rng = generator(chase.scenario.seed, "objects", numbers[npc.name])
                     npc.policy.reset(situation, rng)
                 npc.decide(situation)
-        self._tell_time(npcs, self._index)
+        self._take_in(npcs, self._index)
         self._place(npcs, self._index)
         for npc, item in zip(npcs, chase.flight.objects, strict=True):
             speeds = np.hypot(*item.track.velocity_mps[: self._index, :2].T)
             npc.has_run(speeds.tolist(), TICKS_PER_SAMPLE * TICK_S)
         return npcs
 
-    def _tell_time(self, npcs: Sequence[Npc], index: int) -> None:
+    def _take_in(self, npcs: Sequence[Npc], index: int) -> None:
         """Take in the flight up to a sample of its track."""
         track = self._chase.flight.uav
         known = self._known_samples
@@ -187,7 +187,8 @@ class EscapeModel:
             self._phases.update(float(track.time_s[each]), up_m(float(track.position_m[each, 2])))
         self._known_samples = max(known, index + 1)
         for npc in npcs:
-            npc.tell_time(float(track.time_s[index]), self._phases.began_s)
+            uav_m = _vector(track.position_m[index])
+            npc.take_in(float(track.time_s[index]), self._phases.began_s, uav_m)
 
     def _place(self, npcs: Sequence[Npc], index: int) -> None:
         for npc, item in zip(npcs, self._chase.flight.objects, strict=True):

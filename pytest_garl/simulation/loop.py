@@ -199,8 +199,9 @@ class Loop:
         if tick % round(DECISION_STEP_S * PHYSICS_RATE_HZ) == 0:
             moves = [npc.decide(self.situation(npc)) for npc in self.npcs]
             self._change([change for move in moves for change in move.changes])
+        uav_m, *_ = self._world.uav_state()
         for npc in self.npcs:
-            npc.tell_time(self.recorder.time_s, self.phases.began_s)
+            npc.take_in(self.recorder.time_s, self.phases.began_s, uav_m)
             npc.advance(TICKS_PER_NPC_STEP / PHYSICS_RATE_HZ, self.npcs)
             self._world.move(npc.name, npc.position_m, npc.yaw_rad, npc.velocity_mps)
 

@@ -24,6 +24,7 @@ from pytest_garl.simulation.npc_policy import (
     decision,
 )
 from pytest_garl.simulation.physics.bird_path import BirdPath
+from pytest_garl.simulation.physics.leap import Leap
 from pytest_garl.simulation.physics.locomotion import (
     STANDING_MPS,
     is_far_out,
@@ -59,6 +60,7 @@ class Npc:
             self.vx_mps = least * math.cos(self.yaw_rad)
             self.vy_mps = least * math.sin(self.yaw_rad)
         self._reserve_m = self.type.burst_m
+        self._leap = Leap(scenario, self.type, name)
         self.bird_path = BirdPath(scenario, map, name, self.z_m) if self.flies else None
         if self.bird_path and self.bird_path.waits:
             self.x_m, self.y_m = self.bird_path.far_away_m
@@ -133,8 +135,14 @@ class Npc:
             solid for solid in self._solids if gap_m(solid, (self.x_m, self.y_m)) < reach
         ]
 
-    def tell_time(self, time_s: float, phases_s: tuple[float, ...]) -> None:
-        """Say what time it is, and when the phases of the landing began; a bird may come now."""
+    def take_in(
+        self, time_s: float, phases_s: tuple[float, ...], uav_m: tuple[float, float, float]
+    ) -> None:
+        """Take in the time, when the phases of the landing began, and where the UAV is.
+
+        A bird may come now, and a dog leap.
+        """
+        self._leap.take_in(time_s, phases_s, (self.x_m, self.y_m), uav_m)
         path = self.bird_path
         if path is not None and path.comes(time_s, phases_s):
             (self.x_m, self.y_m), self.yaw_rad = path.entry_m, path.course_rad
@@ -148,6 +156,9 @@ class Npc:
             if self.bird_path.waits:
                 return
             z = self.bird_path.height_m((self.x_m, self.y_m), self.z_m, dt_s)
+            self.vz_mps, self.z_m = (z - self.z_m) / dt_s, z
+        elif self.type.leap_m > 0:
+            z = self._leap.height_m
             self.vz_mps, self.z_m = (z - self.z_m) / dt_s, z
         course, speed = next_course(
             self.type,
@@ -173,6 +184,8 @@ class Npc:
 
     def _wanted_now_mps(self) -> tuple[float, float]:
         """Return the wanted velocity, as far as reserve, edge and what stands ahead allow."""
+        if self._leap.is_airborne:
+            return self.vx_mps, self.vy_mps
         x, y = self._wanted_velocity_mps
         asked = math.hypot(x, y)
         limit = limit_mps(self.type, self._reserve_m)
