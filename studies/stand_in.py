@@ -159,7 +159,9 @@ def _moved(place: tuple[float, float], by_m: float, towards_deg: float) -> tuple
 
 
 def _clearness(scenario: Scenario) -> float:
-    depth = sum(most * (scenario.get(key, 0.0) / top) ** 2 for key, top, most in _losses(scenario))
+    depth: float = sum(
+        most * (scenario.get(key, 0.0) / top) ** 2 for key, top, most in _losses(scenario)
+    )
     dark = abs(2 * scenario.get("environment.sun_position", 0.5) - 1)
     return math.exp(-depth - 0.9 * dark**4)
 
@@ -202,7 +204,7 @@ def _sink_mps(scenario: Scenario) -> float:
 def _slide_m(scenario: Scenario) -> float:
     slippery = scenario.get("environment.road_wetness", 0.0) / 2
     slippery += scenario.get("environment.road_snow", 0.0)
-    return 0.02 + 0.15 * slippery * max(0.0, scenario["wind.mean_mps"] - 2.0) ** 1.5
+    return 0.02 + 0.15 * slippery * math.pow(max(0.0, scenario["wind.mean_mps"] - 2.0), 1.5)
 
 
 def _decoys(scenario: Scenario) -> list[tuple[str, tuple[float, float]]]:

@@ -18,6 +18,9 @@ from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.scenarios.sparse import OFF, ON, active_genes
 from pytest_garl.scenarios.story import STORY
 
+ROUNDING_SHARE = 1e-3
+"""Values of scenarios are rounded to what a file can write, by less than this share of a range."""
+
 
 def encode(scenario: Scenario, genome: Genome) -> NDArray[np.float64]:
     """Return the scenario's values in the genome's order, shape (size,).
@@ -56,7 +59,7 @@ def encode(scenario: Scenario, genome: Genome) -> NDArray[np.float64]:
             acts = gene.name not in gone if _is_object(gene) else values != nominal
             row.append(ON if acts else OFF)
         row += values
-    return _checked(np.array(row), genome)
+    return _checked(_without_rounding(np.array(row), genome), genome)
 
 
 def decode(vector: NDArray[np.float64], genome: Genome, *, map: str, seed: int) -> Scenario:
@@ -80,6 +83,13 @@ def decode(vector: NDArray[np.float64], genome: Genome, *, map: str, seed: int) 
         task=genome.task,
     )
     return scenario.replace(conditions | dict(genome.fixed))
+
+
+def _without_rounding(vector: NDArray[np.float64], genome: Genome) -> NDArray[np.float64]:
+    """Return the ends of ranges for values beyond them by what files round."""
+    inside = np.clip(vector, genome.lower, genome.upper)
+    is_rounding = np.abs(inside - vector) <= ROUNDING_SHARE * (genome.upper - genome.lower)
+    return np.where(is_rounding, inside, vector)
 
 
 def _value(gene: NuclearGene, item: Property, value: float) -> float:

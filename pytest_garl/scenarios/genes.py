@@ -150,6 +150,10 @@ class Genome:
             return draw(self, rng)
         return rng.uniform(self.lower, self.upper)
 
+    def random_active(self, rng: np.random.Generator, names: Iterable[str]) -> NDArray[np.float64]:
+        """Draw a chromosome, shape (size,), in which the named optional genes are active."""
+        return draw(self, rng, names)
+
     def normalise(self, chromosome: NDArray[np.float64]) -> NDArray[np.float64]:
         """Map gene units onto [0, 1], for distances between chromosomes."""
         scaled: NDArray[np.float64] = (chromosome - self.lower) / (self.upper - self.lower)

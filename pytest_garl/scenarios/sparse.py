@@ -6,7 +6,7 @@ scenario in which little is unusual says what a failure is due to.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -27,11 +27,16 @@ ON, OFF = 0.75, 0.25
 ON_ABOVE = 0.5
 
 
-def draw(genome: Genome, rng: np.random.Generator) -> NDArray[np.float64]:
-    """Draw a chromosome in which at most three optional genes are active, or all if dense."""
+def draw(
+    genome: Genome, rng: np.random.Generator, names: Iterable[str] | None = None
+) -> NDArray[np.float64]:
+    """Draw a chromosome in which at most three optional genes are active, or all if dense.
+
+    With ``names`` these are active.
+    """
     optional = [gene.name for gene in genome.genes if gene.is_optional]
-    active = {*optional}
-    if not genome.is_dense:
+    active = {*optional} if names is None else {*names}
+    if not genome.is_dense and names is None:
         count = min(int(rng.choice(len(COUNT_SHARES), p=COUNT_SHARES)), len(optional))
         active = {optional[index] for index in rng.choice(len(optional), size=count, replace=False)}
     row: list[float] = []

@@ -1,0 +1,114 @@
+"""The columns of a genome as a search sees them: which gene, which act, which are harsher."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pytest_garl.scenarios.genes import Genome, NuclearGene
+from pytest_garl.scenarios.sparse import MOST_ACTIVE, OFF, ON, ON_ABOVE
+from pytest_garl.scenarios.story import GRADES
+from pytest_garl.search.operators import Matrix
+
+Mask = NDArray[np.bool_]
+STRATA = ("nobody", "careless", "interfering")
+"""Scenarios without NPCs, with careless ones, and with one that knows of the UAV."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class OptionalGene:
+    """An optional gene: its columns, and what is special about it.
+
+    ``bit`` is the column of its bit of activity, ``values`` those behind it.  ``grade`` is the
+    column of an NPC's grade, -1 without one.
+    """
+
+    name: str
+    bit: int
+    values: slice
+    is_npc: bool
+    grade: int = -1
+
+
+class Columns:
+    """The columns of one genome.
+
+    ``outward`` are those whose values are harsher the farther they lie from nominal, ``owner`` is
+    the name of each column's gene, ``optional`` are the genes with a bit of activity.
+    """
+
+    def __init__(self, genome: Genome) -> None:
+        self.genome = genome
+        self.lower, self.upper, self.nominal = genome.lower, genome.upper, genome.nominal
+        self.outward: Mask = np.array([item.outward for item in genome.properties])
+        self.owner = tuple(gene.name for gene in genome.genes for _ in gene.properties)
+        firsts = [0, *genome.borders]
+        self.optional = tuple(
+            _optional_gene(gene, first)
+            for gene, first in zip(genome.genes, firsts, strict=True)
+            if gene.is_optional
+        )
+
+    @property
+    def limit(self) -> int:
+        """The most optional genes that act at once."""
+        return len(self.optional) if self.genome.is_dense else MOST_ACTIVE
+
+    @property
+    def strata(self) -> tuple[str, ...]:
+        """The strata that the genome has; none without optional genes."""
+        npcs = [gene for gene in self.optional if gene.is_npc]
+        found = ["nobody"] if len(npcs) < len(self.optional) else []
+        grades = [self.upper[gene.grade] for gene in npcs if gene.grade >= 0]
+        found += ["careless"] if npcs else []
+        found += ["interfering"] if any(each > 1 for each in grades) else []
+        return tuple(found)
+
+    def active(self, row: Matrix) -> tuple[OptionalGene, ...]:
+        """Return the optional genes whose bit is on."""
+        return tuple(gene for gene in self.optional if row[gene.bit] > ON_ABOVE)
+
+    def counting(self, row: Matrix) -> Mask:
+        """Return the columns whose values count: of genes that are not optional, or on."""
+        mask = np.ones(self.lower.size, dtype=bool)
+        for gene in self.optional:
+            mask[gene.bit] = False
+            if row[gene.bit] <= ON_ABOVE:
+                mask[gene.values] = False
+        return mask
+
+    def with_active(self, row: Matrix, names: tuple[str, ...]) -> Matrix:
+        """Return a copy in which exactly these optional genes are on."""
+        changed = row.copy()
+        for gene in self.optional:
+            changed[gene.bit] = ON if gene.name in names else OFF
+        return changed
+
+    def stratum(self, row: Matrix) -> str:
+        """Return the stratum of a row."""
+        npcs = [gene for gene in self.active(row) if gene.is_npc]
+        if not npcs:
+            return STRATA[0]
+        # An NPC without a grade is moved by a policy that knows of the UAV.
+        grades = [row[gene.grade] if gene.grade >= 0 else len(GRADES) for gene in npcs]
+        return STRATA[1] if max(grades) < 1 else STRATA[2]
+
+    def distance_from_nominal(self, row: Matrix) -> float:
+        """Return how far the counting outward values lie from nominal, in shares of ranges."""
+        mask = self.counting(row) & self.outward
+        shares = (row - self.nominal)[mask] / (self.upper - self.lower)[mask]
+        return float(np.linalg.norm(shares))
+
+
+def _optional_gene(gene: NuclearGene, first: int) -> OptionalGene:
+    keys = [item.key for item in gene.properties]
+    grade = f"{gene.name}.grade"
+    return OptionalGene(
+        name=gene.name,
+        bit=first,
+        values=slice(first + 1, first + len(keys)),
+        is_npc=f"{gene.name}.velocity" in keys,
+        grade=first + keys.index(grade) if grade in keys else -1,
+    )

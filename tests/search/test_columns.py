@@ -1,0 +1,58 @@
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from pytest_garl.scenarios.domains.genome import genome_of
+from pytest_garl.scenarios.domains.reader import domain_named
+from pytest_garl.scenarios.genes import genome_for
+from pytest_garl.scenarios.maps.map import load_map
+from pytest_garl.search.columns import Columns
+
+MAP = load_map("court")
+FIELD = Columns(genome_of(domain_named("field"), MAP))
+
+
+@pytest.mark.parametrize(
+    ("domain", "strata"),
+    [
+        ("field", ("nobody", "careless", "interfering")),
+        ("calm", ("nobody", "careless")),
+    ],
+)
+def test_a_domain_has_the_strata_that_its_npcs_allow(domain: str, strata: tuple[str, ...]) -> None:
+    assert Columns(genome_of(domain_named(domain), MAP)).strata == strata
+
+
+def test_the_world_of_the_paper_has_no_strata_and_all_values_count() -> None:
+    columns = Columns(genome_for(MAP))
+    assert columns.strata == ()
+    assert columns.counting(columns.nominal).all()
+
+
+def test_only_values_of_genes_that_are_on_count() -> None:
+    row = FIELD.with_active(FIELD.genome.random(np.random.default_rng(0)), ("wind",))
+    counting = {key for key, on in zip(FIELD.genome.keys, FIELD.counting(row), strict=True) if on}
+    wind = {"wind.mean_mps", "wind.towards_deg", "wind.turbulence"}
+    assert counting == wind | {"marker.x", "marker.y"}
+    assert [gene.name for gene in FIELD.active(row)] == ["wind"]
+
+
+def test_the_stratum_is_that_of_the_strongest_grade() -> None:
+    keys = FIELD.genome.keys
+    row = FIELD.with_active(FIELD.genome.nominal, ("fog",))
+    assert FIELD.stratum(row) == "nobody"
+    row = FIELD.with_active(row, ("dog-1", "person-1"))
+    assert FIELD.stratum(row) == "careless"
+    row[keys.index("dog-1.grade")] = 2.5
+    assert FIELD.stratum(row) == "interfering"
+
+
+def test_the_distance_from_nominal_grows_with_harsher_values_alone() -> None:
+    keys = FIELD.genome.keys
+    row = FIELD.with_active(FIELD.genome.nominal, ("wind",))
+    assert FIELD.distance_from_nominal(row) == 0.0
+    row[keys.index("wind.towards_deg")] = 270.0
+    assert FIELD.distance_from_nominal(row) == 0.0
+    row[keys.index("wind.mean_mps")] = 3.0
+    assert FIELD.distance_from_nominal(row) == pytest.approx(0.5)
