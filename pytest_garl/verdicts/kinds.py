@@ -74,8 +74,9 @@ def kinds_in_a_draw(counts: Sequence[int], flights: int, drawn: int) -> NDArray[
         for kinds in range(place + 1):
             without[:, kinds + 1] += np.convolve(chances[:, kinds], shown)[: drawn + 1]
         chances = without
-    found: NDArray[np.float64] = binom.pmf(drawn - taken, flights - sum(counts), share) @ chances
-    return found / found.sum()
+    weights = binom.pmf(drawn - taken, flights - sum(counts), share) @ chances
+    found: NDArray[np.float64] = weights / weights.sum()
+    return found
 
 
 def range_of_kinds(
