@@ -12,6 +12,7 @@ from pytest_garl.cli.cases import FOLDER
 from pytest_garl.files.atomic import write_text_atomically
 from pytest_garl.regressions.corpus import Corpus
 from pytest_garl.reports.run_report import run_report_as_json
+from pytest_garl.reports.shares_text import in_control_text
 
 
 @click.command()
@@ -56,9 +57,13 @@ def _text(found: dict[str, Any]) -> str:
             f"({search['violating_by_the_paper']} by the paper's definition, no landing counted), "
             f"gave up: {_counts(search['gave_up'])}"
         )
+        control = search["control"]
+        if control:
+            lines.append(f"  {control['text']}")
         for kind in search["signatures"]:
-            lines += [
-                f"  {kind['count']:4d}  {kind['signature']}: {kind['headline']}",
-                f"        {kind['repeat']}",
-            ]
+            lines.append(f"  {kind['count']:4d}  {kind['signature']}: {kind['headline']}")
+            seen = in_control_text(
+                kind["in_control"], control["random"]["flights"] if control else 0
+            )
+            lines += [f"        {text}" for text in (seen, kind["repeat"]) if text]
     return "\n".join([*lines, ""]) if lines else "no flights yet\n"

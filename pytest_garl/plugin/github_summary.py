@@ -10,8 +10,8 @@ from typing import Any
 import pytest
 
 from pytest_garl.plugin.keys import SIGNATURE, SLOT
-from pytest_garl.reports.search_summary import WHY_NO_LANDING, SearchSummary
-from pytest_garl.reports.shares_text import PAPER_DEFINITION, percent
+from pytest_garl.reports.search_summary import WHY_NO_LANDING, SearchSummary, ViolationKind
+from pytest_garl.reports.shares_text import PAPER_DEFINITION, kinds_lines, percent
 
 VARIABLE = "GITHUB_STEP_SUMMARY"
 """GitHub names in this variable the file whose text it shows on the page of the step."""
@@ -42,7 +42,7 @@ def write_step_summary(
     if not path:
         return
     rows: list[Row] = [
-        (f"{search.name} on {search.map}", kind.signature, str(kind.count), kind.headline, command)
+        (_where(search), kind.signature, _flights(search, kind), kind.headline, command)
         for search, of_search in zip(searches, commands, strict=True)
         for kind, command in zip(search.kinds, of_search, strict=True)
     ]
@@ -50,6 +50,9 @@ def write_step_summary(
     flown = sum(len(search.verdicts) for search in searches)
     tables = [_table(SHARES, [_shares(search) for search in searches])] if searches else []
     none = f"No violation{f' in {flown} flights' if flown else ''}."
+    tables += [
+        f"{_where(search)}: {_escaped(line)}" for search in searches for line in kinds_lines(search)
+    ]
     tables.append(_table(COLUMNS, rows) if rows else none)
     text = "\n\n".join(tables)
     try:
@@ -71,6 +74,17 @@ def _table(columns: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
     return "\n".join(lines)
 
 
+def _where(search: SearchSummary) -> str:
+    return f"{search.name} on {search.map}"
+
+
+def _flights(search: SearchSummary, kind: ViolationKind) -> str:
+    """Return the number of flights of a kind and, with a control arm, of the random ones."""
+    if kind.in_control is None:
+        return str(kind.count)
+    return f"{kind.count} ({kind.in_control} of {search.random_flights} random)"
+
+
 def _shares(search: SearchSummary) -> tuple[str, ...]:
     """Return the shares of a search, a cell for each of ``SHARES``."""
     total, gave_up = len(search.flights), search.without_landing("gave_up")
@@ -83,8 +97,7 @@ def _shares(search: SearchSummary) -> tuple[str, ...]:
         sum(search.crashes.values()),
         search.count("inconclusive"),
     ]
-    where = f"{search.name} on {search.map}"
-    return where, str(total), *(percent(count, total) for count in counts)
+    return _where(search), str(total), *(percent(count, total) for count in counts)
 
 
 def _failed_cases(reporter: Any) -> list[Row]:

@@ -99,7 +99,8 @@ def _facts(options: Options) -> dict[str, Any]:
         "python": sys.version.split()[0],
         "seed": options.seed,
         "budget": options.budget,
-        "method": options.method,
+        # A scenario that is flown again is nobody's search.
+        "method": None if options.repeat else options.method,
         "population": options.population,
         "map": ",".join(options.maps),
         "domain": options.domain.label,

@@ -19,7 +19,12 @@ from pytest_garl.plugin.tally import Tally
 from pytest_garl.plugin.terminal_text import width_of, wrapped
 from pytest_garl.reports.run_report import ENDED, USER_FAILURES, utc_now
 from pytest_garl.reports.search_summary import SearchSummary, ViolationKind, legend
-from pytest_garl.reports.shares_text import headline_shares, share_lines
+from pytest_garl.reports.shares_text import (
+    headline_shares,
+    in_control_text,
+    kinds_lines,
+    share_lines,
+)
 
 _UNDECIDED = "Skipped: not decided:"
 
@@ -164,7 +169,10 @@ def search_table(search: SearchSummary, config: pytest.Config, width: int) -> li
     """
     lines = [
         wrapped(f"{search.name} on {search.map}: {headline_shares(search)}", width, others="  "),
-        *(wrapped(line, width, first="  ", others="    ") for line in share_lines(search)),
+        *(
+            wrapped(line, width, first="  ", others="    ")
+            for line in (*share_lines(search), *kinds_lines(search))
+        ),
         *_kind_lines(search, search.kinds, config, width),
     ]
     if search.findings:
@@ -184,9 +192,11 @@ def _kind_lines(
         fits = len(signature) + 2 + len(command) <= width
         lines += [f"{signature}  {command}"] if fits else [signature.rstrip(), f"{'':8}{command}"]
         lines.append(wrapped(kind.headline, width, first=" " * 8, others=" " * 8))
-        if kind.severity_text:
-            least = f"at the least: {kind.severity_text}"
-            lines.append(wrapped(least, width, first=" " * 8, others=" " * 10))
+        least = f"at the least: {kind.severity_text}" if kind.severity_text else ""
+        seen = in_control_text(kind.in_control, search.random_flights)
+        facts = "; ".join(fact for fact in (least, seen) if fact)
+        if facts:
+            lines.append(wrapped(facts, width, first=" " * 8, others=" " * 10))
     return lines
 
 

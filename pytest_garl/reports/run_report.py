@@ -24,6 +24,7 @@ from pytest_garl.reports.search_summary import (
     ViolationKind,
     search_summaries,
 )
+from pytest_garl.reports.shares_text import control_text
 from pytest_garl.scenarios.files import parse_scenario
 from pytest_garl.verdicts.paper_metrics import top_k
 from pytest_garl.verdicts.statistics import share_interval
@@ -120,10 +121,13 @@ def _search(
             "distance": count_decided(verdicts, "distance"),
             "time": count_decided(verdicts, "time"),
         },
+        "effective_kinds": round(summary.effective_kinds, 4),
+        "control": _control(summary),
         "signatures": [
             {
                 **_kind(summary, kind, path),
                 "severity": kind.severity.to_json() if kind.severity else None,
+                "in_control": kind.in_control,
                 "cases": [
                     case["file"]
                     for case in cases
@@ -147,6 +151,24 @@ def _kind(summary: SearchSummary, kind: ViolationKind, path: Path) -> dict[str, 
         "headline": kind.headline,
         "repeat": _repeat_command(summary, kind.first, path),
     }
+
+
+def _control(summary: SearchSummary) -> dict[str, Any] | None:
+    """Return the random flights and the later ones, also at the smaller of the two numbers."""
+    control = summary.control
+    if control is None:
+        return None
+    found = control.at_equal_flights()
+    arms = {
+        name: {"flights": arm.flights, "kinds": arm.kinds}
+        for name, arm in (("random", control.random), ("later", control.later))
+    }
+    equal = found and {
+        "flights": found.flights,
+        "random": {"mean": round(found.random, 4), "range_95": list(found.random_range)},
+        "later": {"mean": round(found.later, 4), "range_95": list(found.later_range)},
+    }
+    return {**arms, "at_equal_flights": equal, "text": control_text(summary)}
 
 
 def _spread(spread: Spread | None) -> dict[str, float] | None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import statistics
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence, Set
 from dataclasses import dataclass
 from types import MappingProxyType
 from typing import Self
@@ -12,6 +12,8 @@ from pytest_garl.execution.job import FlightJob, parse_job
 from pytest_garl.execution.ledger import Ledger
 from pytest_garl.execution.ledger_queries import LedgerFlight
 from pytest_garl.execution.severity import Severity
+from pytest_garl.reports.control_arm import ControlArm, control_arm, is_control
+from pytest_garl.verdicts.kinds import hill_number
 from pytest_garl.verdicts.verdict import Limits, NoLanding, Verdict
 from pytest_garl.verdicts.wording import headline
 
@@ -45,7 +47,8 @@ class ViolationKind:
 
     ``count`` is the number of flights, ``first`` the slot of the first one, ``story`` what happened
     in it, and ``headline`` the story in short.  ``severity`` is the lowest of these flights, None
-    if none is known.
+    if none is known.  ``in_control`` is the number of random flights that show it, None without a
+    control arm to compare with.
     """
 
     signature: str
@@ -54,6 +57,7 @@ class ViolationKind:
     story: str
     headline: str
     severity: Severity | None = None
+    in_control: int | None = None
 
     @property
     def severity_text(self) -> str:
@@ -96,6 +100,18 @@ class SearchSummary:
     """Names of the domains, of a file with a digest; several only if markers differ."""
     npcs: tuple[str, ...] = ()
     """Names of the policies that moved the NPCs."""
+    control: ControlArm | None = None
+    """The random flights beside the later ones; None if the method has none."""
+
+    @property
+    def random_flights(self) -> int:
+        """The number of flights of the control arm, 0 without one."""
+        return self.control.random.flights if self.control else 0
+
+    @property
+    def effective_kinds(self) -> float:
+        """The Hill number of order 1 of the kinds of violation."""
+        return hill_number([kind.count for kind in self.kinds], 1)
 
     @property
     def name(self) -> str:
@@ -173,8 +189,9 @@ def search_summaries(
     failures: dict[tuple[str, str], list[SlotUserFailure]] = {}
     for each in user_failures:
         failures.setdefault((each.system, each.map), []).append(each)
+    method = ledger.fact("method")
     return [
-        _summary(ledger, system, map, flights, failures.get((system, map), []))
+        _summary(ledger, system, map, method, flights, failures.get((system, map), []))
         for (system, map), flights in flown.items()
     ]
 
@@ -183,6 +200,7 @@ def _summary(
     ledger: Ledger,
     system: str,
     map: str,
+    method: str | None,
     flights: list[LedgerFlight],
     user_failures: list[SlotUserFailure],
 ) -> SearchSummary:
@@ -202,17 +220,21 @@ def _summary(
             findings.setdefault(finding.signature, []).append(before)
     jobs = _jobs(ledger, flights)
     files = str(ledger.fact(f"files of {system} on {map}") or "")
+    control = control_arm(method, flights)
+    random = {f.id.slot_id for f in flights if is_control(method, f.id.slot.generation)}
+    compares = control is not None and control.later.flights > 0
     return SearchSummary(
         system=system,
         map=map,
         files=tuple(files.split()),
         flights=tuple(flights),
-        kinds=_kinds(violations, _lowest_severities(flights)),
+        kinds=_kinds(violations, _lowest_severities(flights), random if compares else None),
         violating=len({slot for items in violations.values() for slot, _ in items}),
         findings=_kinds(findings),
         limits=tuple(dict.fromkeys(job.limits for job in jobs)),
         domains=tuple(ledger.fact(f"{DOMAINS}{system} on {map}") or ()),
         npcs=tuple(dict.fromkeys(job.npcs.name for job in jobs)),
+        control=control,
     )
 
 
@@ -229,7 +251,9 @@ def _lowest_severities(flights: Sequence[LedgerFlight]) -> dict[str, Severity]:
 
 
 def _kinds(
-    stories: Mapping[str, Sequence[tuple[str, str]]], severities: Mapping[str, Severity] = NONE
+    stories: Mapping[str, Sequence[tuple[str, str]]],
+    severities: Mapping[str, Severity] = NONE,
+    random_slots: Set[str] | None = None,
 ) -> tuple[ViolationKind, ...]:
     """Return the kinds in (slot, story) by signature, the most frequent first."""
     kinds = [
@@ -240,6 +264,9 @@ def _kinds(
             story=items[0][1],
             headline=headline(items[0][1]),
             severity=severities.get(signature),
+            in_control=None
+            if random_slots is None
+            else len({slot for slot, _ in items} & random_slots),
         )
         for signature, items in stories.items()
     ]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from pytest_garl.reports.control_arm import LEAST_FLIGHTS, ControlArm
 from pytest_garl.reports.search_summary import WHY_NO_LANDING, SearchSummary
 from pytest_garl.verdicts.paper_metrics import top_k
 from pytest_garl.verdicts.statistics import share_interval
@@ -39,6 +40,27 @@ def share_lines(search: SearchSummary) -> list[str]:
     ]
 
 
+def kinds_lines(search: SearchSummary) -> list[str]:
+    """Return how diverse the violations are, and what random flights found beside the search."""
+    number, effective = len(search.kinds), search.effective_kinds
+    diverse = f"{number} kinds of violation, as diverse as {effective:.1f} equally frequent ones"
+    return [text for text in (diverse if number > 1 else "", control_text(search)) if text]
+
+
+def control_text(search: SearchSummary) -> str:
+    """Return what random flights found, and as many later ones; empty without a control arm."""
+    if search.control is None:
+        return ""
+    own = any(kind.signature.startswith("own:") for kind in search.kinds)
+    remark = " (assertions of your own left out)" if own else ""
+    return f"{_compared(search.control)}{remark}"
+
+
+def in_control_text(in_control: int | None, random_flights: int) -> str:
+    """Return in how many of the random flights a kind was seen; empty if there is no such count."""
+    return "" if in_control is None else f"seen in {in_control} of {random_flights} random flights"
+
+
 def limits_text(limits: Limits) -> str:
     """Return such as ``distance 0.75 m, time 120 s, abort="needless"``."""
     return f'distance {limits.distance_m:g} m, time {limits.time_s:g} s, abort="{limits.abort}"'
@@ -74,3 +96,33 @@ def _landings(search: SearchSummary) -> str:
         f"landings: distance median {distance_m.median:.2f} m, worst {distance_m.worst:.2f} m; "
         f"time median {time_s.median:.1f} s, worst {time_s.worst:.1f} s"
     )
+
+
+def _compared(control: ControlArm) -> str:
+    random, later = control.random, control.later
+    if not later.flights:
+        return f"all {random.flights} flights are random: nothing to compare them with"
+    found = control.at_equal_flights()
+    if found is None:
+        few, name = (random, "random") if random.flights < LEAST_FLIGHTS else (later, "later")
+        return (
+            f"against random flights: too few {name} flights to say "
+            f"({few.flights} of {LEAST_FLIGHTS})"
+        )
+    return (
+        f"at equal flights: {_of(random.flights, found.flights)} random ones (generation 0) "
+        f"{_found(found.random, found.random_range, random.flights == found.flights)}; "
+        f"{_of(later.flights, found.flights)} later ones "
+        f"{_found(found.later, found.later_range, later.flights == found.flights)}"
+    )
+
+
+def _of(flights: int, compared: int) -> str:
+    return f"the {flights}" if flights == compared else f"{compared} picked from the {flights}"
+
+
+def _found(mean: float, between: tuple[int, int], whole: bool) -> str:
+    if whole:
+        return f"found {between[0]} {'kind' if between[0] == 1 else 'kinds'}"
+    low, high = between
+    return f"find {mean:.1f} on average, {low} to {high} in 95 % of picks"

@@ -78,6 +78,12 @@ def test_a_report_holds_the_violations_of_the_search(searched: Path) -> None:
     (own,) = [kind for kind in one["signatures"] if kind["type"] == "own"]
     assert (own["story"], own["severity"]) == ("too slow", None)
     assert one["violating"] == 8
+    # The whole budget is one generation, and so random.
+    assert one["control"]["random"] == {"flights": 8, "kinds": 2}
+    assert one["control"]["later"] == {"flights": 0, "kinds": 0}
+    assert one["control"]["at_equal_flights"] is None
+    assert {kind["in_control"] for kind in kinds.values()} == {None}
+    assert 1 < one["effective_kinds"] < len(kinds)
     assert {case["signature"] for case in found["cases"]} <= set(kinds)
     files = [file for kind in kinds.values() for file in kind["cases"]]
     assert {*files} == {case["file"] for case in found["cases"]}
@@ -106,6 +112,24 @@ def test_a_report_of_a_killed_run_holds_its_finished_flights(
     assert found["flights"]["flown"] == 4
     assert found["searches"][0]["signatures"][0]["repeat"].endswith("-o garl_dir=elsewhere")
     assert found["cases"] == []
+
+
+def test_a_report_compares_random_flights_with_as_many_later_ones(tmp_path: Path) -> None:
+    write_project(tmp_path)
+    search(tmp_path, "--garl-budget=44", "--garl-population=20", "--garl-shrink=0")
+    (one,) = report(tmp_path)["searches"]
+    control = one["control"]
+    assert (control["random"]["flights"], control["later"]["flights"]) == (20, 24)
+    found = control["at_equal_flights"]
+    assert found["flights"] == 20
+    kinds = control["random"]["kinds"]
+    assert found["random"] == {"mean": kinds, "range_95": [kinds, kinds]}
+    low, high = found["later"]["range_95"]
+    assert low <= found["later"]["mean"] <= high <= control["later"]["kinds"]
+    assert all(kind["in_control"] <= kind["count"] for kind in one["signatures"])
+    words = garl(tmp_path, "report")
+    assert f"  {control['text']}\n" in words
+    assert "random flights\n        pytest test_it.py --garl-repeat=" in words
 
 
 def test_a_report_is_written_to_a_file_or_printed_as_text(searched: Path) -> None:

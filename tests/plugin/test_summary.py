@@ -106,6 +106,28 @@ def test_step_summary_holds_a_table_of_violations(
     assert folded == [f"SKIPPED [6] test_it.py: {reason}"]
 
 
+@PARALLEL
+def test_summary_shows_what_the_random_flights_found(
+    pytester: pytest.Pytester, parallel: tuple[str, ...], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    project(pytester)
+    page = pytester.path / "summary.md"
+    monkeypatch.setenv("GITHUB_STEP_SUMMARY", str(page))
+    monkeypatch.setenv("COLUMNS", "120")
+    search = ("--garl-budget=12", "--garl-population=4", "--garl-workers=1", "--garl-shrink=0")
+    result = run(pytester, *search, *parallel)
+    few = "against random flights: too few random flights to say (4 of 20)"
+    result.stdout.fnmatch_lines([f"  {few}", "*seen in * of 4 random flights"])
+    lines = page.read_text().splitlines()
+    assert f"Good on lawn: {few}" in [line.replace("\\", "") for line in lines]
+    assert re.search(r"\| \d+ \(\d of 4 random\) \|", page.read_text())
+    # All is in the ledger: a run that is over shows the same once more.
+    again = run(pytester, *search, "--garl-resume", *parallel)
+    again.stdout.fnmatch_lines([f"  {few}", "*seen in * of 4 random flights"])
+    for other in (("--garl-repeat=lawn-g00-s01",), (*search, "--garl-method=random")):
+        assert "random flights" not in run(pytester, *other, *parallel).stdout.str()
+
+
 def test_command_to_keep_patches_names_those_of_this_run(
     pytester: pytest.Pytester, monkeypatch: pytest.MonkeyPatch
 ) -> None:
