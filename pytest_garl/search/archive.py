@@ -63,13 +63,13 @@ class Archive:
 
     def __init__(self, columns: Columns, *, has_near: bool = True) -> None:
         self._columns, self._has_near = columns, has_near
-        self._cells: defaultdict[str, list[Entry]] = defaultdict(list)
+        self.cells: defaultdict[str, list[Entry]] = defaultdict(list)
         self._seen: Counter[str] = Counter()
         self._types: Counter[str] = Counter()
 
     def names(self) -> list[str]:
         """Return the cells to breed from: all but near misses of what was found."""
-        return sorted(name for name in self._cells if not self._is_answered(name))
+        return sorted(name for name in self.cells if not self._is_answered(name))
 
     def add(self, item: FlownScenario, row: Matrix) -> float:
         """Put a flight into its cells; return its success, 0 to 1."""
@@ -87,7 +87,7 @@ class Archive:
             self._insert(EXCUSED, item, row, (self._columns.distance_from_nominal(row),))
         for name, nearness in near_misses(result).items() if self._has_near else ():
             cell = f"{NEAR}{name}"
-            nearest = -self._cells[cell][0].rank[0] if self._cells[cell] else 0.0
+            nearest = -self.cells[cell][0].rank[0] if self.cells[cell] else 0.0
             if nearness > nearest + LEAST_PROGRESS and not self._is_answered(cell):
                 worths.append(PROGRESS_WORTH)
             self._insert(cell, item, row, (-nearness,))
@@ -95,7 +95,7 @@ class Archive:
 
     def parent(self, name: str, rng: np.random.Generator) -> Entry:
         """Return one of the best flights of a cell."""
-        best = self._cells[name][:BEST]
+        best = self.cells[name][:BEST]
         return best[int(rng.integers(len(best)))]
 
     def is_violation(self, name: str) -> bool:
@@ -112,7 +112,7 @@ class Archive:
         return self._seen[target] > 0
 
     def _insert(self, name: str, item: FlownScenario, row: Matrix, rank: tuple[float, ...]) -> None:
-        cell = self._cells[name]
+        cell = self.cells[name]
         cell.append(Entry(flown=item, row=row, rank=rank))
         cell.sort(key=lambda each: each.rank)
         del cell[BEST:]

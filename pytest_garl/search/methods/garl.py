@@ -13,7 +13,7 @@ does not count.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -58,6 +58,8 @@ class GarlParameters:
     """Whether scenarios without parents are drawn in strata; otherwise as the domain draws them."""
     breeds_near_misses: bool = True
     """Whether near misses have cells."""
+    archive: Callable[..., Archive] = Archive
+    """What keeps the flights, and says which cells are bred from."""
 
 
 class Garl:
@@ -69,7 +71,8 @@ class Garl:
         self._plan, self._parameters = plan, parameters or GarlParameters()
         self._rng = np.random.default_rng(seed_sequence("garl", plan.map.name, plan.seed))
         self._columns = Columns(plan.genome)
-        self._archive = Archive(self._columns, has_near=self._parameters.breeds_near_misses)
+        has_near = self._parameters.breeds_near_misses
+        self._archive = self._parameters.archive(self._columns, has_near=has_near)
         self._exploration = Exploration(self._columns, covers=self._parameters.covers_pairs)
         self._breeding = Breeding(self._columns, self._exploration)
         self._arms, self._ways = Bandit(), Bandit()

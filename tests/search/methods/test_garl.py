@@ -80,7 +80,7 @@ def test_children_of_excused_flights_are_milder() -> None:
     columns = method._columns
     parents = {
         entry.flown.scenario.seed: columns.distance_from_nominal(entry.row)
-        for entry in method._archive._cells["excused"]
+        for entry in method._archive.cells["excused"]
     }
     for _ in range(20):
         row, seed = method._child("excused", "soften")
