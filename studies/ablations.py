@@ -139,7 +139,7 @@ def search(key: Key, pool: Executor) -> dict[str, Any]:
         "limits": limits_text(DEFAULT_LIMITS),
         "landed": sum(verdict.completed for verdict in verdicts),
         "paper": sum(verdict.paper_violation for verdict in verdicts),
-        "kinds": len({each.kind for each in verdicts if each.violation}),
+        "kinds": len({each.cause for each in verdicts if each.violation}),
     }
 
 
@@ -147,7 +147,7 @@ def report(rows: list[Row]) -> str:
     """Return a Markdown table of means over searches; flights of one search are no sample."""
     lines = [
         "| variant | searches | landed, % | violations, % | paper's definition, % | definition "
-        "| Top-10 | kinds | signatures | distance |",
+        "| Top-10 | causes | kinds | distance |",
         "| --- | --- | --- | --- | --- | --- | --- | --- | --- | --- |",
     ]
     for name, limits in itertools.product(VARIANTS, sorted({row["limits"] for row in rows})):
