@@ -116,7 +116,7 @@ def row_of(key: Key) -> dict[str, Any]:
         "map": scenario.map,
         "outcome": flight.outcome,
         "no_landing": verdict.no_landing,
-        "kind": verdict.kind,
+        "kind": verdict.cause,
         "signature": verdict.signature,
     }
 

@@ -88,7 +88,7 @@ def row_of(task: Task) -> dict[str, object]:
         "outcome": flight.outcome,
         "no_landing": verdict.no_landing,
         "signature": verdict.signature,
-        "kind": verdict.kind,
+        "kind": verdict.cause,
         "paper": int(verdict.paper_violation),
         "findings": " ".join(each.signature for each in verdict.findings),
         "off_m": f"{flight.final_distance_m:.3f}",

@@ -64,6 +64,7 @@ def test_counts_in_remarks_agree_with_the_rows() -> None:
         kinds = dict(each.split("=") for each in line["kinds"].split("|") if each)
         assert (row.system, row.map, row.method) == (line["system"], line["map"], line["method"])
         assert tuple(kinds) == row.signatures
+        assert tuple(map(int, kinds.values())) == row.counts
         assert sum(map(int, kinds.values())) == row.violations
         assert int(line["aborted"]) == row.aborted
         assert row.violations + row.aborted + int(line["landed"]) == row.budget

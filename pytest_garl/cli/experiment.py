@@ -114,6 +114,6 @@ class _ProgressDisplay:
             self._print(
                 Text(
                     f"    {row.map}: {row.landings} of {row.budget} landed, {row.violations} "
-                    f"violate, {len(row.kinds)} kinds, Top-10 {top10}"
+                    f"violate, {len(row.signatures)} kinds, Top-10 {top10}"
                 )
             )

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 from typing import Literal
 
 from pytest_garl.experiments.metrics import (
+    CAUSES,
     COVERAGE,
     DISTANCE,
-    KINDS,
     PAPER,
     TOP10,
     VIOLATIONS,
@@ -60,7 +60,7 @@ GOALS = (
     Goal(metric=TOP10, less=True),
     Goal(metric=DISTANCE, factor=1.2),
     Goal(metric=COVERAGE, factor=2.0),
-    Goal(metric=KINDS),
+    Goal(metric=CAUSES),
 )
 
 

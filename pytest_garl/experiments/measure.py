@@ -108,6 +108,7 @@ def _violations(search: FinishedSearch) -> dict[str, Any]:
     """Return the columns that count outcomes and violations."""
     verdicts = search.verdicts
     types = Counter[str](each.violation_type or "" for each in verdicts if each.violation)
+    kinds = Counter(each.signature for each in verdicts if each.violation)
     without_landing = Counter[str](each.no_landing for each in verdicts)
     return {
         "violations": types.total(),
@@ -119,9 +120,8 @@ def _violations(search: FinishedSearch) -> dict[str, Any]:
         "aborted": sum(verdict.outcome == "gave_up" for verdict in verdicts),
         "inconclusive": sum(flight.result.inconclusive for flight in search.flights),
         "top10": top_k(verdicts, by_the_paper=False),
-        "signatures": tuple(
-            sorted({verdict.signature for verdict in verdicts if verdict.violation})
-        ),
+        "signatures": tuple(sorted(kinds)),
+        "kind_counts": tuple(kinds[name] for name in sorted(kinds)),
     }
 
 

@@ -35,9 +35,9 @@ PAPER = Metric(
 TOP10 = Metric(title="Top-10, flights", value_of=_top10, digits=0)
 DISTANCE = Metric(title="parameter distance", value_of=lambda row: row.parameter_distance, digits=2)
 COVERAGE = Metric(title="coverage, %", value_of=lambda row: 100 * row.covered / row.cells, digits=2)
-KINDS = Metric(title="kinds", value_of=lambda row: len(row.kinds), digits=1)
-SIGNATURES = Metric(title="signatures", value_of=lambda row: len(row.signatures), digits=1)
-METRICS = (VIOLATIONS, PAPER, TOP10, DISTANCE, COVERAGE, KINDS)
+CAUSES = Metric(title="causes", value_of=lambda row: len(row.causes), digits=1)
+KINDS = Metric(title="kinds", value_of=lambda row: len(row.signatures), digits=1)
+METRICS = (VIOLATIONS, PAPER, TOP10, DISTANCE, COVERAGE, CAUSES)
 OLD = "old"
 """The definition of a row of version 0.1, which does not name its limits."""
 
@@ -78,14 +78,19 @@ class MethodSearches:
         return tuple(sorted({row.limits or OLD for row in self.rows}))
 
     @property
-    def all_kinds(self) -> int:
-        """The number of distinct kinds of violation that all searches found together."""
-        return len({kind for row in self.rows for kind in row.kinds})
+    def all_causes(self) -> int:
+        """The number of distinct types and causes that all searches found together."""
+        return len({cause for row in self.rows for cause in row.causes})
 
     @property
-    def all_signatures(self) -> int:
-        """The number of distinct signatures that all searches found together."""
+    def all_kinds(self) -> int:
+        """The number of distinct kinds of violation that all searches found together."""
         return len({name for row in self.rows for name in row.signatures})
+
+    @property
+    def kind_counts(self) -> list[tuple[int, ...]]:
+        """The violations of each kind, of each search whose row tells them."""
+        return [row.counts for row in self.rows if row.counts is not None]
 
     def sum_of(self, count_of: Callable[[ResultRow], int | None]) -> int | None:
         """Return the sum of a count over all searches; None if a row does not hold it."""

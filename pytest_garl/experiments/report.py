@@ -21,8 +21,8 @@ HOW_TO_READ = f"""\
 - *Landed*: within the limit of distance from the marker's centre.
 - *Violations* are counted by the limits in the column *definition*. "Old" marks rows of version
   0.1: a violation is a collision, a landing more than 1.5 m from the marker, or no landing in
-  120 s, and a flight that gives up is none. Top-10, violating scenarios, coverage, kinds,
-  signatures and types are of the same violations. Rows of different definitions are not compared.
+  120 s, and a flight that gives up is none. Top-10, violating scenarios, coverage, causes,
+  kinds and types are of the same violations. Rows of different definitions are not compared.
 - *Paper's definition*: a collision, a crash, or no landing within 1.5 m of the marker; each flight
   that gives up counts, because the paper's type II is "no landing occurs". Old rows tell this too.
 - *Gave up*: flights that the landing system gave up, for whatever reason. *Blocked*, *excused* and
@@ -40,14 +40,22 @@ HOW_TO_READ = f"""\
   weather alone, without normalising it, so its figures stand beside that column.
 - *Coverage*: the share of cells of {CELL_M:g} m, up to {HEIGHT_M:g} m above the map, that
   violating flights pass through.
-- *Kinds*: distinct types and causes of violations, such as `IV:dog`, one count per seed.
-  *Signatures* distinguish the phase and the sight as well, as in `IV:dog:last-metre:unseen`.
+- *Causes*: distinct types and causes of violations, such as `IV:dog`, one count per seed.
+  *Kinds* are signatures. They distinguish the phase and the sight as well, as in
+  `IV:dog:last-metre:unseen`.
+- *Effective kinds*: so many equally frequent kinds would be as diverse as those that the search
+  found (Hill number of order 1), one figure per seed. All searches have the same number of flights.
+- *Kinds at equal violations*: how many kinds the given number of violations shows on average if it
+  is drawn from those of a search (rarefaction). The number is that of the search with the fewest
+  violations for this system and map, but at least {tables.LEAST_VIOLATIONS}; – for a search with
+  fewer. – also stands for a row that does not tell how often each kind occurred.
 - *Paper*: the paper's figure for its method of this name; its simulator, maps and landing systems
   are different. Its shares, Top-10, coverage and types of violations do not stand here, because its
   violations are of another definition.
 - *A12* (Vargha and Delaney): how often a search of the first method has the larger figure; 0.5
   means no difference. *p*: exact two-sided Mann-Whitney test over the seeds. Three seeds against
-  three cannot reach p below 0.10."""
+  three cannot reach p below 0.10. *p by Holm* counts all comparisons of effective kinds that the
+  table has for the system; the other p stand alone."""
 
 
 def write_report(
@@ -153,5 +161,6 @@ def _grid(experiment: Experiment, grid: Grid, rows: Sequence[ResultRow], path: P
         if drawn
         else "",
         compared,
+        tables.comparison_of_kinds(experiment, grid, rows),
         grid.remarks,
     ]

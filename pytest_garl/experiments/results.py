@@ -16,7 +16,7 @@ from pytest_garl.errors import ExperimentError
 from pytest_garl.files.atomic import locked, write_text_atomically
 from pytest_garl.files.reading import MEGABYTE, read_text
 from pytest_garl.messages import listed, printable, shown
-from pytest_garl.verdicts.verdict import kind_of
+from pytest_garl.verdicts.verdict import cause_of
 
 LARGEST_BYTES = 16 * MEGABYTE
 """About ten thousand searches, each a row of a kilobyte."""
@@ -32,8 +32,9 @@ class ResultRow:
     exist, such as a tenth violation after only nine.  ``limits`` says what counts as a violation in
     the row.  It is empty in a row of version 0.1, in which a violation was a collision, no landing
     within the time limit, or a landing more than 1.5 m from the marker, and a flight that gave up
-    was none.  ``unavoidable`` and ``piloted`` are void: the pilot that they tell of, flown without
-    eyes, "avoided" as much.
+    was none.  ``kind_counts`` has the violations of each of the ``signatures``, and is empty in a
+    row that does not tell them.  ``unavoidable`` and ``piloted`` are void: the pilot that they tell
+    of, flown without eyes, "avoided" as much.
     """
 
     system: str
@@ -80,6 +81,7 @@ class ResultRow:
     blocked: int | None = None
     excused: int | None = None
     needless: int | None = None
+    kind_counts: tuple[int, ...] = ()
 
     @property
     def key(self) -> tuple[str, str, str, int, int]:
@@ -110,9 +112,14 @@ class ResultRow:
         )
 
     @property
-    def kinds(self) -> tuple[str, ...]:
-        """The distinct kinds of violation: type and cause, without phase and sight."""
-        return tuple(sorted({kind_of(each) for each in self.signatures}))
+    def causes(self) -> tuple[str, ...]:
+        """The distinct types and causes of violations: signatures without phase and sight."""
+        return tuple(sorted({cause_of(each) for each in self.signatures}))
+
+    @property
+    def counts(self) -> tuple[int, ...] | None:
+        """The violations of each kind, in the order of ``signatures``; None if nobody knows."""
+        return self.kind_counts if len(self.kind_counts) == len(self.signatures) else None
 
 
 def _number(cell: str) -> float:
@@ -143,10 +150,17 @@ _READERS: Mapping[str, Callable[[str], Any]] = MappingProxyType(
         "float": _number,
         "int | None": _optional(_whole_number),
         "float | None": _optional(_number),
+        "tuple[int, ...]": lambda cell: tuple(
+            _whole_number(each) for each in (cell.split(SEPARATOR) if cell else ())
+        ),
         "tuple[str, ...]": lambda cell: tuple(printable(cell).split(SEPARATOR)) if cell else (),
     }
 )
-_EXPECTED = {"int": "a whole number from 0", "float": "a number"}
+_EXPECTED = {
+    "int": "a whole number from 0",
+    "float": "a number",
+    "tuple[int,": "whole numbers from 0",
+}
 _FIELDS = {field.name: str(field.type) for field in dataclasses.fields(ResultRow)}
 _FIRST_FIELDS = tuple(
     field.name for field in dataclasses.fields(ResultRow) if field.default is dataclasses.MISSING
@@ -174,7 +188,8 @@ def read_rows(path: Path) -> tuple[ResultRow, ...]:
 
 
 def _check_columns(path: Path, found: Sequence[str]) -> None:
-    if tuple(found) not in (tuple(_FIELDS), _FIRST_FIELDS):
+    # New columns stand at the end.
+    if len(found) < len(_FIRST_FIELDS) or tuple(found) != tuple(_FIELDS)[: len(found)]:
         wrong = {*found} ^ {*_FIELDS}
         raise ExperimentError(
             f"{path}: found other columns than expected"
@@ -201,7 +216,14 @@ def _row(
             raise ExperimentError(
                 f"{path}, line {line}: column {name!r}: found {shown(cell)}, expected {expected}"
             ) from error
-    return ResultRow(**values)
+    row = ResultRow(**values)
+    counts = row.kind_counts
+    if counts and (len(counts) != len(row.signatures) or sum(counts) != row.violations):
+        raise ExperimentError(
+            f"{path}, line {line}: column 'kind_counts': found {_cell(counts)}, expected "
+            f"{len(row.signatures)} numbers, one for each signature, {row.violations} in all"
+        )
+    return row
 
 
 def append_rows(path: Path, rows: Iterable[ResultRow]) -> None:
@@ -222,7 +244,7 @@ def _dumps(rows: Iterable[ResultRow]) -> str:
 
 def _cell(value: object) -> str:
     if isinstance(value, tuple):
-        return SEPARATOR.join(value)
+        return SEPARATOR.join(map(str, value))
     if isinstance(value, float):
         return f"{value:.4f}"
     return "" if value is None else str(value)

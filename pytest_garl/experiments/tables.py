@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+import statistics
+from collections.abc import Callable, Iterable, Iterator, Sequence
 
+from pytest_garl.baselines.gate_statistics import holm_adjusted
 from pytest_garl.experiments.metrics import (
+    CAUSES,
     COVERAGE,
     DISTANCE,
     KINDS,
     METRICS,
     PAPER,
-    SIGNATURES,
     VIOLATIONS,
     MethodSearches,
     Metric,
@@ -19,10 +21,13 @@ from pytest_garl.experiments.metrics import (
 )
 from pytest_garl.experiments.results import ResultRow
 from pytest_garl.experiments.spec import PAPER_TYPES, Experiment, Grid
+from pytest_garl.verdicts.kinds import hill_number, kinds_in_violations
 from pytest_garl.verdicts.statistics import mann_whitney, vargha_delaney
 
 NONE = "–"
 NOT_RUN = "not run"
+LEAST_VIOLATIONS = 5
+"""Among fewer violations hardly any two kinds are told apart, so no search is cut to fewer."""
 
 
 def markdown(header: Sequence[str], lines: Iterable[Sequence[str]]) -> str:
@@ -102,17 +107,25 @@ def diversity(experiment: Experiment, grid: Grid, rows: Sequence[ResultRow]) -> 
         "of weather alone",
         "paper",
         "coverage, %",
+        "causes",
         "kinds",
-        "signatures",
+        "effective kinds",
+        "kinds at equal violations",
     )
-    return _table(header, _diversity_cells, experiment, grid, rows)
+    equal = equal_violations(searches_in_grid(experiment, grid, rows))
+
+    def cells(experiment: Experiment, searches: MethodSearches) -> list[str]:
+        drawn = equal.get((searches.system, searches.map))
+        return [*_diversity_cells(experiment, searches), _rarefied(searches, drawn)]
+
+    return _table(header, cells, experiment, grid, rows)
 
 
 def _diversity_cells(experiment: Experiment, searches: MethodSearches) -> list[str]:
     paper = published_for(experiment, searches)
     distance = _number(paper.distance if paper else None, 2)
     if not searches.rows:
-        return [NOT_RUN, NONE, NONE, distance, NONE, NONE, NONE]
+        return [NOT_RUN, NONE, NONE, distance, *[NONE] * 4]
     violating = [
         row.violating_distance for row in searches.rows if row.violating_distance is not None
     ]
@@ -123,9 +136,51 @@ def _diversity_cells(experiment: Experiment, searches: MethodSearches) -> list[s
         f"{sum(weather) / len(weather):.3f}",
         distance,
         f"{searches.mean(COVERAGE):.2f}",
+        _distinct(searches, CAUSES, searches.all_causes),
         _distinct(searches, KINDS, searches.all_kinds),
-        _distinct(searches, SIGNATURES, searches.all_signatures),
+        _of_kinds(searches, lambda counts: hill_number(counts, 1)),
     ]
+
+
+def effective_kinds(searches: MethodSearches) -> list[float]:
+    """Return the Hill number of order 1 of each search whose row tells the counts.
+
+    All searches of an experiment have one budget, so that these are at equal flights.
+    """
+    return [hill_number(counts, 1) for counts in searches.kind_counts]
+
+
+def equal_violations(found: Iterable[MethodSearches]) -> dict[tuple[str, str], int]:
+    """Return at how many violations the searches of a system on a map are compared.
+
+    That is the smallest number of a search with at least :data:`LEAST_VIOLATIONS`.
+    """
+    smallest: dict[tuple[str, str], int] = {}
+    for searches in found:
+        key = searches.system, searches.map
+        for violations in map(sum, searches.kind_counts):
+            if violations >= LEAST_VIOLATIONS:
+                smallest[key] = min(violations, smallest.get(key, violations))
+    return smallest
+
+
+def _rarefied(searches: MethodSearches, drawn: int | None) -> str:
+    if drawn is None:
+        return NONE
+
+    def kinds(counts: Sequence[int]) -> float | None:
+        return kinds_in_violations(counts, drawn) if sum(counts) >= drawn else None
+
+    text = _of_kinds(searches, kinds)
+    return text if text == NONE else f"{text} in {drawn}"
+
+
+def _of_kinds(searches: MethodSearches, figure_of: Callable[[Sequence[int]], float | None]) -> str:
+    """Return a figure of the kinds of each search; one dash if no row tells them."""
+    if not searches.kind_counts:
+        return NONE
+    figures = [None if row.counts is None else figure_of(row.counts) for row in searches.rows]
+    return ", ".join(_number(figure, 1) for figure in figures)
 
 
 def _distinct(searches: MethodSearches, metric: Metric, in_all: int) -> str:
@@ -175,8 +230,59 @@ def comparison(experiment: Experiment, grid: Grid, rows: Sequence[ResultRow]) ->
 
     Searches whose rows count violations by different definitions are not compared.
     """
-    found = searches_in_grid(experiment, grid, rows)
     lines = []
+    for one, other in _pairs(experiment, grid, rows):
+        cells = [_compared(one.values(metric), other.values(metric)) for metric in METRICS]
+        lines.append([one.map, one.system, other.method, _seeds(one, other), *cells])
+    if not lines:
+        return ""
+    header = ("map", "system", f"{grid.methods[0]} against", "seeds")
+    return markdown((*header, *(metric.title for metric in METRICS)), lines)
+
+
+def comparison_of_kinds(experiment: Experiment, grid: Grid, rows: Sequence[ResultRow]) -> str:
+    """Return the same of the effective kinds, with p by Holm over all comparisons of a system.
+
+    A row that does not tell the counts is left out; two of each are needed.
+    """
+    pairs = [
+        (one, other, effective_kinds(one), effective_kinds(other))
+        for one, other in _pairs(experiment, grid, rows)
+        if min(len(one.kind_counts), len(other.kind_counts)) >= 2
+    ]
+    p_values = [mann_whitney(first, second)[1] for _, _, first, second in pairs]
+    adjusted = [0.0] * len(pairs)
+    for system in grid.systems:
+        own = [place for place, (one, *_) in enumerate(pairs) if one.system == system]
+        for place, p in zip(own, holm_adjusted([p_values[each] for each in own]), strict=True):
+            adjusted[place] = p
+    lines = [
+        [
+            one.map,
+            one.system,
+            other.method,
+            f"{len(first)}, {len(second)}",
+            f"{statistics.fmean(first):.1f}, {statistics.fmean(second):.1f}",
+            _compared(first, second),
+            f"{p:.2f}",
+        ]
+        for (one, other, first, second), p in zip(pairs, adjusted, strict=True)
+    ]
+    if not lines:
+        return ""
+    first_method = grid.methods[0]
+    header = (f"{first_method} against", "seeds", "effective kinds", "test", "p by Holm")
+    return markdown(("map", "system", *header), lines)
+
+
+def _pairs(
+    experiment: Experiment, grid: Grid, rows: Sequence[ResultRow]
+) -> Iterator[tuple[MethodSearches, MethodSearches]]:
+    """Yield the first method with each other of the same system and map, from two seeds of each on.
+
+    Rows of different definitions make no pair.
+    """
+    found = searches_in_grid(experiment, grid, rows)
     for one in found:
         if one.method != grid.methods[0] or len(one.rows) < 2:
             continue
@@ -184,17 +290,14 @@ def comparison(experiment: Experiment, grid: Grid, rows: Sequence[ResultRow]) ->
             if (other.system, other.map) != (one.system, one.map) or other is one:
                 continue
             if len(other.rows) >= 2 and len({*one.definitions, *other.definitions}) == 1:
-                seeds = f"{len(one.rows)}, {len(other.rows)}"
-                cells = [_compared(one, other, metric) for metric in METRICS]
-                lines.append([one.map, one.system, other.method, seeds, *cells])
-    if not lines:
-        return ""
-    header = ("map", "system", f"{grid.methods[0]} against", "seeds")
-    return markdown((*header, *(metric.title for metric in METRICS)), lines)
+                yield one, other
 
 
-def _compared(one: MethodSearches, other: MethodSearches, metric: Metric) -> str:
-    first, second = one.values(metric), other.values(metric)
+def _seeds(one: MethodSearches, other: MethodSearches) -> str:
+    return f"{len(one.rows)}, {len(other.rows)}"
+
+
+def _compared(first: Sequence[float], second: Sequence[float]) -> str:
     u, p = mann_whitney(first, second)
     return f"U {u:g}, p {p:.2f}, A12 {vargha_delaney(first, second):.2f}"
 

@@ -13,7 +13,7 @@ from pytest_garl.regressions.user_failure import UserAssertion
 from pytest_garl.scenarios.maps.map import Map
 from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.simulation.npc_policy import PolicySpec
-from pytest_garl.verdicts.verdict import kind_of
+from pytest_garl.verdicts.verdict import cause_of
 
 LEAST_WINDOW_S = 1.0
 """An entry whose window is shorter sits on an edge."""
@@ -95,7 +95,7 @@ class CaseRequest:
 
         The phase of the landing and what the camera showed may be others.
         """
-        return flight.result.verdict.kind == kind_of(self.signature)
+        return flight.result.verdict.cause == cause_of(self.signature)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

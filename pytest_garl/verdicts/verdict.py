@@ -168,9 +168,9 @@ class Verdict:
         return self.primary is not None
 
     @property
-    def kind(self) -> str:
+    def cause(self) -> str:
         """Type and cause without phase and sight, such as ``IV:dog``; empty without a violation."""
-        return kind_of(self.signature)
+        return cause_of(self.signature)
 
     @property
     def no_landing(self) -> NoLanding:
@@ -184,7 +184,7 @@ class Verdict:
         return next((margin for margin in self.margins if margin.property == name), None)
 
 
-def kind_of(signature: str) -> str:
+def cause_of(signature: str) -> str:
     """Return the type and the cause in a signature, without phase and sight."""
     return ":".join(signature.split(":")[:2])
 

@@ -51,6 +51,7 @@ PLAIN: dict[str, Any] = {
     "blocked": 1,
     "excused": 1,
     "needless": 2,
+    "kind_counts": (4, 6),
 }
 OF_VERSION_0_1: dict[str, Any] = {
     "limits": "",
@@ -60,6 +61,7 @@ OF_VERSION_0_1: dict[str, Any] = {
     "blocked": None,
     "excused": None,
     "needless": None,
+    "kind_counts": (),
 }
 """What a row of version 0.1 does not tell."""
 

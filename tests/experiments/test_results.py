@@ -9,7 +9,7 @@ from pytest_garl.errors import ExperimentError
 from pytest_garl.experiments.results import append_rows, read_rows
 from tests.experiments.samples import OF_VERSION_0_1, PLAIN, row
 
-BARE = row(seed=1, top10=None, signatures=(), violating_distance=None)
+BARE = row(seed=1, violations=0, top10=None, signatures=(), kind_counts=(), violating_distance=None)
 
 
 def add(path: Path, seeds: range) -> None:
@@ -48,9 +48,22 @@ def test_a_row_of_version_0_1_counts_flights_without_landing_by_the_papers_defin
     assert (row().paper_violations, row().landings) == (12, 26)
 
 
-def test_kinds_leave_out_phase_and_sight() -> None:
+def test_causes_leave_out_phase_and_sight() -> None:
     found = row(signatures=("IV:dog:descent:seen", "IV:dog:last-metre:unseen", "off:seen"))
-    assert found.kinds == ("IV:dog", "off:seen")
+    assert found.causes == ("IV:dog", "off:seen")
+
+
+def test_a_row_without_counts_of_its_kinds_does_not_tell_them() -> None:
+    assert row().counts == (4, 6)
+    assert row(kind_counts=()).counts is None
+    assert BARE.counts == ()
+
+
+def test_a_file_without_the_last_column_is_read(tmp_path: Path) -> None:
+    path = tmp_path / "rows.csv"
+    append_rows(path, [row()])
+    path.write_text(path.read_text().replace(",kind_counts", "").replace(",4|6\n", "\n"))
+    assert read_rows(path) == (row(kind_counts=()),)
 
 
 def test_a_search_has_one_row(tmp_path: Path) -> None:
@@ -86,8 +99,11 @@ def test_simultaneous_appends_lose_no_row(tmp_path: Path) -> None:
             "line 2: column 'violations': found 'ten', expected a whole number",
         ),
         (",1.5000,", ",nan,", "column 'parameter_distance': found 'nan', expected a number"),
-        (",eeeeeeeeeeee", "", "line 2: found too few cells, expected 44"),
-        (",eeeeeeeeeeee", ",e,e", "line 2: found too many cells, expected 44"),
+        (",4|6", "", "line 2: found too few cells, expected 45"),
+        (",eeeeeeeeeeee", ",e,e", "line 2: found too many cells, expected 45"),
+        (",4|6", ",4|-6", "column 'kind_counts': found '4|-6', expected whole numbers from 0"),
+        (",4|6", ",4|5", "'kind_counts': found 4|5, expected 2 numbers, one for each signature"),
+        (",4|6", ",10", "'kind_counts': found 10, expected 2 numbers, one for each signature, 10"),
         (",seed,", ",seeds,", "found other columns than expected: seed, seeds"),
         ("map,method", "method,map", "found other columns than expected, in another order"),
         (",40,10,", ',40,"10"0,', "line 2: not valid CSV"),

@@ -41,6 +41,8 @@ def test_a_toy_experiment_is_flown_measured_and_reported(tmp_path: Path) -> None
         # Whoever violates was somewhere.
         assert (row.covered > 0) == (row.violations > 0) == bool(row.signatures)
         assert row.limits
+        assert row.counts is not None
+        assert sum(row.counts) == row.violations
         assert row.landings + row.paper_violations <= row.budget
     garl("--report")
     text = (tmp_path / "smoke.md").read_text()
