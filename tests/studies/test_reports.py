@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Sequence
 
 from studies import ablations, adversary, preventability
@@ -42,16 +43,18 @@ def test_the_table_of_policies_shows_both_definitions() -> None:
     ]
 
 
-def test_ablations_of_different_definitions_have_different_lines() -> None:
-    common = {"variant": "garl", "budget": "400", "top10": "11", "distance": "2"}
-    old = {**common, "violations": "200", "signatures": "5", "limits": ""}
-    old |= {"landed": "", "paper": "", "kinds": ""}
-    new = {**common, "violations": "300", "signatures": "8", "limits": "0.75 m"}
-    new |= {"landed": "40", "paper": "340", "kinds": "4"}
-    assert ablations.report([old, new]).splitlines()[2:] == [
-        "| garl | 1 | – | 50 | – | old | 11 | – | 5 | 2 |",
-        "| garl | 1 | 10 | 75 | 85 | 0.75 m | 11 | 4 | 8 | 2 |",
-    ]
+def test_ablations_are_compared_seed_by_seed() -> None:
+    def row(variant: str, seed: int, kinds: int) -> dict[str, str]:
+        counts = {f"IV:{number}": 10 for number in range(kinds)}
+        facts = {"map": "court", "budget": "400", "early": "2", "excused": "0"}
+        return {"variant": variant, "seed": str(seed), **facts, "kinds": json.dumps(counts)}
+
+    seeds = (1, 2, 3)
+    rows = [row("garl", seed, 4 + seed) for seed in seeds]
+    rows += [row("random", seed, 2 + seed) for seed in seeds]
+    last = ablations.report(rows).splitlines()[-1]
+    cells = [cell.strip() for cell in last.strip("|").split("|")]
+    assert cells[:6] == ["random", "3", "4.0", "-2.0 ± 0.0", "4.0", "-2.0 ± 0.0"]
 
 
 def collision(
