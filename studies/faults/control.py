@@ -117,7 +117,7 @@ class ControlSystem:
 
     def decide(self, now: float, at: Vector, since_s: float) -> Command:
         """Return the command for a moment at a place, ``since_s`` after the last one."""
-        p, (x, y, z) = self.parameters, at
+        p, z = self.parameters, at[2]
         late = now > self.mission.time_limit_s - p.reserve_s and self.phase != "commit"
         if late or self.waited_s > p.patience_s or self.retries > p.most_retries:
             return self.give_up()
@@ -128,7 +128,7 @@ class ControlSystem:
         target = self.track.target
         if target is not None and self.must_wait(now, at, target):
             self.waited_s += since_s
-            return self.give_way(at)
+            return self.give_way(at, target)
         self.refuge = None
         if target is None:
             return self.search(now, at)
@@ -218,11 +218,12 @@ class ControlSystem:
             return self.search(now, at)
         return self.go(target, self.top_m, p.approach_mps)
 
-    def give_way(self, at: Vector) -> Command:
-        """Climb straight up, where it came from, and wait there."""
+    def give_way(self, at: Vector, target: Place) -> Command:
+        """Climb straight up, where it came from, and wait above the pad."""
         self.phase = "avoid"
         self.refuge = self.refuge or (at[0], at[1])
-        return self.go(self.refuge, self.top_m, 2.5)
+        is_up = at[2] > self.top_m - self.parameters.margin_m
+        return self.go(target if is_up else self.refuge, self.top_m, 2.5)
 
     def give_up(self) -> Command:
         """Say that the landing is given up."""
@@ -231,9 +232,7 @@ class ControlSystem:
 
     def go(self, place: Place, height_m: float, speed_mps: float) -> Command:
         """Fly to a place."""
-        return PositionSetpoint(
-            position_m=(*place, height_m), speed_mps=speed_mps, yaw_rad=None
-        )
+        return PositionSetpoint(position_m=(*place, height_m), speed_mps=speed_mps, yaw_rad=None)
 
     def sink(self, at: Vector, target: Place, rate_mps: float) -> Command:
         """Descend above the target; near the ground say so."""

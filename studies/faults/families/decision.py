@@ -87,13 +87,13 @@ class HoldsForEver(ControlSystem):
 
 
 class TightGate(ControlSystem):
-    """Descends only within 12 cm of the pad's axis.
+    """Descends only within 3 cm of the pad's axis.
 
     The report: a copter does not descend while its error exceeds a limit, and gusts exceed it
     always.
     """
 
-    parameters = dataclasses.replace(CONTROL, cone_m=0.12, cone=0.0)
+    parameters = dataclasses.replace(CONTROL, cone_m=0.03, cone=0.0)
 
 
 class OneTry(ControlSystem):

@@ -69,7 +69,7 @@ class FoldedYaw(ControlSystem):
 class DiagonalEyes(Eyes):
     """Eyes that expect a marker whose sides are along those of the picture."""
 
-    LEAST_FILL = 0.56
+    LEAST_FILL = 0.505
 
     def accepts(self, found: Detection, observation: Observation) -> bool:
         """Refuse a marker that fills too little of its upright box."""

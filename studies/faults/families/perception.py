@@ -21,7 +21,7 @@ class FixedThresholdEyes(Eyes):
         """Look at a picture of two greys."""
         grey = cv2.cvtColor(observation.image, cv2.COLOR_RGB2GRAY)
         _, binary = cv2.threshold(grey, self.THRESHOLD, 255, cv2.THRESH_BINARY)
-        image = np.asarray(cv2.cvtColor(binary, cv2.COLOR_GRAY2RGB))
+        image = np.asarray(cv2.cvtColor(binary, cv2.COLOR_GRAY2RGB), np.uint8)
         return super().detect(dataclasses.replace(observation, image=image))
 
 

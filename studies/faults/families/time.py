@@ -31,20 +31,20 @@ class Frozen(ControlSystem):
 class LateEyes(Eyes):
     """Eyes that combine the picture with the pose of a later frame."""
 
-    FRAMES = 6
+    FRAMES = 7
 
     def __init__(self, mission: Mission) -> None:
         super().__init__(mission)
         self._queue: deque[Observation] = deque(maxlen=self.FRAMES + 1)
 
     def detect(self, observation: Observation) -> tuple[Detection, ...]:
-        """Place what the picture of 0.6 s ago shows by the pose of this moment."""
+        """Place what the picture of 0.7 s ago shows by the pose of this moment."""
         self._queue.append(observation)
         return super().detect(dataclasses.replace(observation, image=self._queue[0].image))
 
 
 class Late(ControlSystem):
-    """Applies the newest attitude and position to a picture that took 0.6 s to process.
+    """Applies the newest attitude and position to a picture that took 0.7 s to process.
 
     The report: the stamp of the landing target is ignored, so that the correction belongs to
     another moment.
