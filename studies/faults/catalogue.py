@@ -86,7 +86,7 @@ GEOMETRY = (
     Fault(
         name="level",
         family="geometry",
-        links=(f"{ARDUPILOT}/issues/6297",),
+        links=(f"{PX4}/pull/9050", f"{ARDUPILOT}/issues/6297"),
         summary="ignores roll and pitch when it turns pixels into places",
         faulty=geometry.Level,
         fires="II",
@@ -177,7 +177,7 @@ DECISION = (
     Fault(
         name="impatient",
         family="decision",
-        links=(f"{PX4}/issues/9904",),
+        links=(f"{GITHUB}goodrobots/vision_landing/issues/34",),
         summary="gives up after two seconds without the pad",
         faulty=decision.Impatient,
         fires="II",

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from pytest_garl.scenarios.chromosome import decode, encode
@@ -35,14 +36,8 @@ def nominal(map_name: str) -> Scenario:
     map = load_map(map_name)
     genome = genome_of(DOMAIN, map)
     row = [item.nominal for gene in genome.genes for item in gene.properties]
-    scenario = decode(genome_row(row), genome, map=map_name, seed=1)
+    scenario = decode(np.array(row), genome, map=map_name, seed=1)
     return repair(scenario.replace({"marker.x": 0.0, "marker.y": 0.0}), map)
-
-
-def genome_row(values: list[float]) -> object:
-    import numpy as np
-
-    return np.array(values)
 
 
 def test_there_are_at_least_24_faults_with_names_links_and_scenarios_of_their_own() -> None:
@@ -157,8 +152,6 @@ def test_the_report_counts_misses_as_100_flights_and_names_them() -> None:
 
 
 def test_equal_methods_have_a_ratio_of_one() -> None:
-    import numpy as np
-
     flights = np.array([3.0, 100.0, 40.0])
     assert ratio_interval(flights, flights) == (1.0, 1.0, 1.0)
 

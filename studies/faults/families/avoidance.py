@@ -14,7 +14,7 @@ from studies.faults.watch import Watch
 class NoWatch(ControlSystem):
     """Looks at nothing but the marker.
 
-    The report: obstacle avoidance is not active while the vehicle lands.
+    The report: a planner for safe landings says that this is no landing, and does nothing.
     """
 
     def must_wait(self, now: float, at: Vector, target: tuple[float, float]) -> bool:
@@ -64,7 +64,7 @@ class NarrowWatch(Watch):
 class Narrow(ControlSystem):
     """Looks straight below, as a rangefinder does, while its rotors span a metre.
 
-    The report: one beam downwards sees no obstacle beside it.
+    The report: the distance below comes from an altimeter, which sees nothing beside it.
     """
 
     watch_of = NarrowWatch
@@ -73,7 +73,7 @@ class Narrow(ControlSystem):
 class StopsWatching(ControlSystem):
     """Ignores what comes into the way once it has committed.
 
-    The report: avoidance ends where the landing begins.
+    The report: obstacle avoidance ends without setpoints of a planner, and the flight goes on.
     """
 
     def must_wait(self, now: float, at: Vector, target: tuple[float, float]) -> bool:

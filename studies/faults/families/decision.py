@@ -65,7 +65,7 @@ class CommitsHigh(ControlSystem):
 class Impatient(ControlSystem):
     """Gives up after two seconds without the pad.
 
-    The report: a precision landing ends as soon as the target times out.
+    The report: the advice to take a target for lost after half a second.
     """
 
     parameters = dataclasses.replace(CONTROL, hold_s=2.0)
@@ -78,7 +78,7 @@ class Impatient(ControlSystem):
 class HoldsForEver(ControlSystem):
     """Holds above the place of a lost pad for ever.
 
-    The report: a precision landing stays in its horizontal approach without a timeout.
+    The report: a precision landing stays in its horizontal approach, without a timeout.
     """
 
     def regain(self, now: float, at: Vector, target: Place, unseen_s: float) -> Command:

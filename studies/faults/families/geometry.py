@@ -101,7 +101,8 @@ class LevelEyes(Eyes):
 class Level(ControlSystem):
     """Ignores roll and pitch when it turns pixels into places, as if the camera had a gimbal.
 
-    The report: bearings to the target are not corrected for the vehicle's attitude.
+    The report: a target in the frame of the camera needs the attitude of its moment; without it
+    the correction is off.
     """
 
     eyes_of = LevelEyes
