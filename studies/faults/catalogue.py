@@ -83,35 +83,8 @@ GEOMETRY = (
         fires="II",
         map="court",
     ),
-    Fault(
-        name="level",
-        family="geometry",
-        links=(f"{PX4}/pull/9050", f"{ARDUPILOT}/issues/6297"),
-        summary="ignores roll and pitch when it turns pixels into places",
-        faulty=geometry.Level,
-        fires="II",
-    ),
 )
 TIME = (
-    Fault(
-        name="frozen",
-        family="time",
-        links=(
-            f"{GITHUB}stereolabs/zed-ros-wrapper/issues/690",
-            f"{GITHUB}realsenseai/librealsense/issues/5885",
-        ),
-        summary="takes a repeated picture for a new one",
-        faulty=time.Frozen,
-        fires="off",
-    ),
-    Fault(
-        name="late",
-        family="time",
-        links=(f"{ARDUPILOT}/issues/5959", f"{ARDUPILOT}/pull/7046"),
-        summary="combines a picture of 0.7 s ago with the newest pose",
-        faulty=time.Late,
-        fires="II",
-    ),
     Fault(
         name="unfresh",
         family="time",

@@ -86,23 +86,3 @@ class Diagonal(ControlSystem):
     """
 
     eyes_of = DiagonalEyes
-
-
-class LevelEyes(Eyes):
-    """Eyes that take the camera for level."""
-
-    def detect(self, observation: Observation) -> tuple[Detection, ...]:
-        """Place markers with the heading alone."""
-        half = heading_of(observation.attitude) / 2
-        level = np.array([0.0, 0.0, math.sin(half), math.cos(half)])
-        return super().detect(dataclasses.replace(observation, attitude=level))
-
-
-class Level(ControlSystem):
-    """Ignores roll and pitch when it turns pixels into places, as if the camera had a gimbal.
-
-    The report: a target in the frame of the camera needs the attitude of its moment; without it
-    the correction is off.
-    """
-
-    eyes_of = LevelEyes
