@@ -10,7 +10,6 @@ from studies.faults.families import (
     geometry,
     identity,
     perception,
-    time,
 )
 from studies.faults.fault import Fault
 
@@ -84,16 +83,6 @@ GEOMETRY = (
         map="court",
     ),
 )
-TIME = (
-    Fault(
-        name="unfresh",
-        family="time",
-        links=(f"{GITHUB}goodrobots/vision_landing/issues/34",),
-        summary="descends on the last sighting, however old it is",
-        faulty=time.Unfresh,
-        fires="I",
-    ),
-)
 ESTIMATION = (
     Fault(
         name="gate",
@@ -119,6 +108,14 @@ ESTIMATION = (
         summary="locks the pad's place when it confirms it",
         faulty=estimation.Once,
         fires="off",
+    ),
+    Fault(
+        name="unfresh",
+        family="estimation",
+        links=(f"{GITHUB}goodrobots/vision_landing/issues/34",),
+        summary="descends on the last sighting, however old it is",
+        faulty=estimation.Unfresh,
+        fires="I",
     ),
 )
 DECISION = (
@@ -290,7 +287,6 @@ AVOIDANCE = (
 FAULTS: tuple[Fault, ...] = (
     *IDENTITY,
     *GEOMETRY,
-    *TIME,
     *ESTIMATION,
     *DECISION,
     *CONTROL,
