@@ -40,7 +40,6 @@ IDENTITY = (
         summary="raises if two markers are in one frame",
         faulty=identity.TwoMarkers,
         fires="V",
-        map="court",
     ),
     Fault(
         name="last-seen",
