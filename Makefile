@@ -7,7 +7,7 @@ FLIES := $(VENV)/.flies
 READY := $(VENV)/.installed
 SMOKE := .garl/experiment-smoke
 
-.PHONY: search test test-long test-ray lint types layers tests bench experiment-smoke clean
+.PHONY: search test test-long test-ray lint types layers tests bench faults experiment-smoke clean
 .DEFAULT_GOAL := help
 
 help:  ## show the commands
@@ -42,6 +42,10 @@ test-ray: $(READY)  ## the tests that start Ray clusters: minutes, so not part o
 
 bench: $(READY)  ## measure frames, flights and the plugin's overhead
 	$(BIN)/python -m benchmarks
+
+faults: $(READY)  ## search for planted faults and print mutation scores: a day on two cores
+	$(BIN)/python -m studies.faults
+	$(BIN)/python -m studies.faults --report
 
 experiment-smoke: $(READY)  ## fly, measure and report an experiment at toy size
 	rm -rf $(SMOKE)

@@ -1,0 +1,1 @@
+"""The faulty landing systems, one module for each family of public reports."""
