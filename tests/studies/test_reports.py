@@ -50,7 +50,7 @@ def test_ablations_are_compared_seed_by_seed() -> None:
         return {"variant": variant, "seed": str(seed), **facts, "kinds": json.dumps(counts)}
 
     seeds = (1, 2, 3)
-    rows = [row("garl", seed, 4 + seed) for seed in seeds]
+    rows: list[Row] = [row("garl", seed, 4 + seed) for seed in seeds]
     rows += [row("random", seed, 2 + seed) for seed in seeds]
     last = ablations.report(rows).splitlines()[-1]
     cells = [cell.strip() for cell in last.strip("|").split("|")]
