@@ -83,7 +83,6 @@ VARIANTS: dict[str, Callable[[SearchPlan], Method]] = {
     "without near misses": garl_with(breeds_near_misses=False),
     "near misses from NSGA-II's front": garl_with(archive=FrontArchive),
     "cells and strata alike": garl_with(learns_arms=False),
-    "ways to breed alike": garl_with(learns_ways=False),
     "a tenth exploring": garl_with(explore_share=0.1),
     "half exploring": garl_with(explore_share=0.5),
     "garl-paper": find_method("garl-paper"),

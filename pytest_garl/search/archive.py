@@ -98,10 +98,6 @@ class Archive:
         best = self.cells[name][:BEST]
         return best[int(rng.integers(len(best)))]
 
-    def is_violation(self, name: str) -> bool:
-        """Whether the cell is that of a violation."""
-        return name in self._seen
-
     def _is_answered(self, name: str) -> bool:
         """Whether a near miss's kind of failure was found."""
         if not name.startswith(NEAR):

@@ -14,6 +14,8 @@ WAYS = (STEP, HARDEN, SOFTEN, GRAFT, REDRAW)
 """Small steps; harsher values; milder values; a gene of another flight; one gene's values anew."""
 STEP_SHARE = 0.5
 """Share of the values that count which a step changes."""
+AIMED_SHARE = 0.8
+"""Share of the steps that change only the body which the parent came nearest to, or hit."""
 HARDEN_SHARE = 0.7
 """Share of the harsher values' way to the end of their range, at most, and of those that move."""
 SOFTEN_SHARE = 0.6
@@ -68,7 +70,7 @@ class Breeding:
             mask &= ~self._always
         about = np.array([name == body for name in columns.owner])
         # The last centimetres to a body depend on that body.
-        if about.any() and rng.random() < STEP_SHARE:
+        if about.any() and rng.random() < AIMED_SHARE:
             mask &= about
         if not mask.any():
             mask = columns.counting(row)

@@ -3,9 +3,8 @@
 The first generation is plain random scenarios of the domain: the control, to which the rest of the
 search is compared.  After it a bandit divides the flights between scenarios without parents, in
 strata without NPCs, with careless ones and with those that know of the UAV, and children of the
-archive's cells.  A second bandit chooses how a child is bred.  The first violation of a kind counts
-as a success and each further one less, so that what comes near to another kind is worth more than
-one more of the same.
+archive's cells.  The first violation of a kind counts as a success and each further one less, so
+that what comes near to another kind is worth more than one more of the same.
 
 A scenario that is flown like an earlier one is not flown again: its difference is a value that
 does not count.
@@ -50,8 +49,6 @@ class GarlParameters:
     """Least share of scenarios without parents, so that kinds are still found late in a search."""
     learns_arms: bool = True
     """Whether cells and strata are chosen by their success; otherwise all alike."""
-    learns_ways: bool = True
-    """Whether ways to breed are chosen by their success; otherwise all alike."""
     covers_pairs: bool = True
     """Whether scenarios without parents switch on genes whose pairs were flown least."""
     has_strata: bool = True
@@ -75,9 +72,9 @@ class Garl:
         self._archive = self._parameters.archive(self._columns, has_near=has_near)
         self._exploration = Exploration(self._columns, covers=self._parameters.covers_pairs)
         self._breeding = Breeding(self._columns, self._exploration)
-        self._arms, self._ways = Bandit(), Bandit()
-        self._choices: dict[str, tuple[str, str]] = {}
-        """The arm and the way of each scenario, by its text."""
+        self._arms = Bandit()
+        self._choices: dict[str, str] = {}
+        """The arm of each scenario, by its text."""
         self._generation = 0
 
     def ask(self) -> Sequence[Scenario]:
@@ -87,7 +84,7 @@ class Garl:
             return [self._new() for _ in range(plan.population)]
         control = random_scenarios(plan.map, plan.genome, plan.seed, 0, plan.population)
         for scenario in control:
-            self._note(scenario, "", "")
+            self._note(scenario, "")
         return control
 
     def tell(self, flown: Sequence[FlownScenario]) -> Sequence[tuple[float, ...]]:
@@ -95,10 +92,7 @@ class Garl:
         for item in flown:
             row = encode(item.scenario, self._plan.genome)
             success = self._archive.add(item, row)
-            arm, way = self._choices[dump_scenario(item.scenario)]
-            self._arms.learn(arm, success)
-            if way:
-                self._ways.learn(way, success)
+            self._arms.learn(self._choices[dump_scenario(item.scenario)], success)
         return proximities(flown)
 
     def _new(self) -> Scenario:
@@ -111,11 +105,11 @@ class Garl:
                 row, seed = self._child(arm, way)
             scenario = self._scenario(row, seed)
             if dump_scenario(scenario) not in self._choices:
-                self._note(scenario, arm, way)
+                self._note(scenario, arm)
                 return scenario
 
-    def _note(self, scenario: Scenario, arm: str, way: str) -> None:
-        self._choices[dump_scenario(scenario)] = arm, way
+    def _note(self, scenario: Scenario, arm: str) -> None:
+        self._choices[dump_scenario(scenario)] = arm
         self._exploration.note(encode(scenario, self._plan.genome))
 
     def _choose(self) -> tuple[str, str]:
@@ -124,16 +118,18 @@ class Garl:
         explore = [f"{EXPLORE}{each}" for each in strata or (ALL,)]
         cells = self._archive.names()
         if not cells or self._rng.random() < self._parameters.explore_share:
-            return self._pick(self._arms, explore, self._parameters.learns_arms), ""
-        arm = self._pick(self._arms, [*explore, *cells], self._parameters.learns_arms)
+            return self._pick(explore), ""
+        arm = self._pick([*explore, *cells])
         if arm in explore:
             return arm, ""
         if arm == EXCUSED:
             return arm, SOFTEN
-        return arm, self._pick(self._ways, WAYS, self._parameters.learns_ways)
+        return arm, str(self._rng.choice(WAYS))
 
-    def _pick(self, bandit: Bandit, names: Sequence[str], learns: bool) -> str:
-        return bandit.choose(names, self._rng) if learns else str(self._rng.choice(names))
+    def _pick(self, names: Sequence[str]) -> str:
+        if self._parameters.learns_arms:
+            return self._arms.choose(names, self._rng)
+        return str(self._rng.choice(names))
 
     def _explored(self, stratum: str) -> Matrix:
         if stratum == ALL:
