@@ -39,8 +39,9 @@ CREATE TABLE meter (name TEXT PRIMARY KEY, value REAL NOT NULL);
 SearchKind = Literal["search", "case", "on_demand"]
 """The purpose of flights: a search's budget, saved cases, or flights on demand, such as a second
 flight of a violation.  Figures and the result hash cover the searches alone."""
-BEHIND_SEARCHES = -1
-"""Priority of a flight that waits until no flight of a search waits; theirs is 0."""
+BEHIND_SEARCHES, BEFORE_SEARCHES = -1, 1
+"""Priorities of flights that are flown when no flight of a search waits, or before those of
+searches, whose priority is 0."""
 _LONGEST = 64_000_000
 """Most bytes of one value: a damaged file may declare a value that fills the memory."""
 

@@ -84,6 +84,10 @@ class LedgerQueries:
         row = self._database.execute("SELECT wanted FROM search WHERE id = ?", (search,)).fetchone()
         return int(row[0]) if row else 0
 
+    def left(self) -> int:
+        """Return how many flights of searches have no result, those not yet bred included."""
+        return sum(each.total - each.flown for each in self.progress())
+
     def unflown(self, search: str, generation: int) -> int:
         """Return how many of a generation's slots have no result."""
         row = self._database.execute(

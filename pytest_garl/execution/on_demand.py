@@ -89,7 +89,8 @@ class _Procedure:
 class OnDemandFlights:
     """Runs procedures, all at once or one after the other; ``on_wait`` is called at each turn.
 
-    Flights of a lower ``priority`` fly later.
+    ``priority`` returns the priority of a flight by the procedure's name and the number of its
+    earlier flights; those of a higher one fly earlier.
     """
 
     def __init__(
@@ -98,7 +99,7 @@ class OnDemandFlights:
         pool: Pool,
         on_wait: Callable[[], None] = lambda: None,
         *,
-        priority: int = 0,
+        priority: Callable[[str, int], int] = lambda name, requested: 0,
     ) -> None:
         self._ledger, self._pool, self._on_wait = ledger, pool, on_wait
         self._priority = priority
@@ -174,5 +175,6 @@ class OnDemandFlights:
         key = f"on demand {procedure.name} {procedure.requested} {job.flown_facts()} {text}"
         flight = FlightId(search=search_key(key), map=job.map)
         procedure.awaited = flight, Path(job.flights)
+        priority = self._priority(procedure.name, procedure.requested)
         procedure.requested += 1
-        self._ledger.add_flight(flight, job.system.name, job.dumps(), text, priority=self._priority)
+        self._ledger.add_flight(flight, job.system.name, job.dumps(), text, priority=priority)

@@ -69,8 +69,7 @@ def save_cases(run: Run, session: pytest.Session) -> None:
 
 def _announcement(run: Run, investigations: Investigations, requests: Sequence[CaseRequest]) -> str:
     """Return how much is left to confirm and shrink; ``run.remaining`` keeps it."""
-    workers = run.options.workers or 1
-    work = investigations.remaining(requests, _flight_s(run, requests), workers)
+    work = investigations.remaining(requests, _flight_s(run, requests))
     run.remaining = work
     kinds = f"{counted(len(requests), 'new kind')} of violation"
     beside = f", {done} done beside the search" if (done := investigations.ended) else ""

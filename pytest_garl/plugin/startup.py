@@ -130,7 +130,7 @@ def _investigations(
     from pytest_garl.regressions.investigations import Investigations
 
     shrinking = ShrinkBudget(each=options.shrink, capped=options.shrink_capped)
-    return Investigations(ledger, pool, options.corpus, shrinking)
+    return Investigations(ledger, pool, options.corpus, shrinking, options.workers or 1)
 
 
 def _shared_ledger(path: Path) -> Ledger:

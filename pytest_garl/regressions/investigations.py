@@ -8,7 +8,7 @@ from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Future
 from dataclasses import dataclass, field
 
-from pytest_garl.execution.database import BEHIND_SEARCHES
+from pytest_garl.execution.database import BEFORE_SEARCHES, BEHIND_SEARCHES
 from pytest_garl.execution.ledger import Ledger
 from pytest_garl.execution.on_demand import OnDemandFlights
 from pytest_garl.execution.pool import Pool
@@ -70,8 +70,10 @@ class Investigations:
 
     An investigation starts when the generation is flown in which its signature occurs first.  Its
     flights wait behind those of the searches, so they take the workers that have nothing else to
-    fly.  Nothing of them feeds a search.  What an investigation flies depends on its request and
-    on its number of flights, and both are the same for any number of workers and in a resumed run:
+    fly.  They follow each other; so they come first once they would take longer than the rest of
+    the searches on all workers, or one worker alone would fly them in the end.  Nothing of them
+    feeds a search.  What an investigation flies depends on its request and on its number of
+    flights, and both are the same for any number of workers and in a resumed run:
 
     - The signatures of a search get their flights in the order in which they are found, as long as
       the cap lasts.
@@ -81,11 +83,19 @@ class Investigations:
     If the pool flies in this process, everything is done after the search.
     """
 
-    def __init__(self, ledger: Ledger, pool: Pool, corpus: Corpus, shrinking: ShrinkBudget) -> None:
+    def __init__(
+        self,
+        ledger: Ledger,
+        pool: Pool,
+        corpus: Corpus,
+        shrinking: ShrinkBudget,
+        workers: int,
+    ) -> None:
         self._ledger, self._corpus, self._shrinking = ledger, corpus, shrinking
+        self._workers = workers
         self._beside = not pool.in_process
         self._new = NewSignatures(ledger, corpus, shrinking.each)
-        self._flights = OnDemandFlights(ledger, pool, priority=BEHIND_SEARCHES)
+        self._flights = OnDemandFlights(ledger, pool, priority=self._priority)
         self._requests: list[CaseRequest] = []
         self._searches: dict[str, _OfSearch] = {}
         self._started: dict[str, _Investigation] = {}
@@ -113,9 +123,7 @@ class Investigations:
             self._ledger, self._corpus, self._shrinking.each, self._requests, assertions
         )
 
-    def remaining(
-        self, requests: Requests, flight_s: Mapping[str, float], workers: int
-    ) -> RemainingWork:
+    def remaining(self, requests: Requests, flight_s: Mapping[str, float]) -> RemainingWork:
         """Return the work that all requests leave; ``flight_s`` is the time of a flight by name."""
         running = [
             (each.request, self._flights.requested(name))
@@ -127,7 +135,7 @@ class Investigations:
             search: self._of(search).left_for([each for each in waiting if each.search == search])
             for search in {each.search for each in requests}
         }
-        return remaining_work(running, waiting, left, flight_s, workers)
+        return remaining_work(running, waiting, left, flight_s, self._workers)
 
     def finish(self, requests: Requests, on_wait: Callable[[], None]) -> dict[str, CaseResult]:
         """Return the results of all requests by name, once the searches are over.
@@ -175,6 +183,12 @@ class Investigations:
         investigation = _Investigation(request=request, result=result)
         self._started[request.name] = investigation
         self._of(request.search).started.append(investigation)
+
+    def _priority(self, name: str, requested: int) -> int:
+        """Return the priority of an investigation's next flight."""
+        left = self._started[name].request.budget - requested
+        is_urgent = left * self._workers >= self._ledger.queries.left()
+        return BEFORE_SEARCHES if is_urgent else BEHIND_SEARCHES
 
     def _of(self, search: str) -> _OfSearch:
         if search not in self._searches:
