@@ -5,7 +5,12 @@ import dataclasses
 import pytest
 
 from pytest_garl.regressions.case_request import CaseRequest
-from pytest_garl.regressions.forecast import SPENT_SHARE, flights_after_search, remaining_work
+from pytest_garl.regressions.forecast import (
+    SPENT_SHARE,
+    flights_after_search,
+    flights_with_shrinking,
+    remaining_work,
+)
 from pytest_garl.regressions.investigation import MINIMUM_CASE_FLIGHTS
 from tests.regressions.samples import make_case_request, violating_scenario
 from tests.support.results import crash
@@ -65,3 +70,14 @@ def test_flights_after_search_stay_below_the_cap() -> None:
         <= flights_after_search(20, 12, 80)
         <= flights_after_search(20, 12, None)
     )
+
+
+@pytest.mark.parametrize("search", [12, 16, 40, 400])
+@pytest.mark.parametrize("kinds_per_flight", [0.0, 0.05, 0.1])
+def test_forecast_before_a_search_is_right_within_a_factor_of_one_and_a_half(
+    search: int, kinds_per_flight: float
+) -> None:
+    kinds = round(search * kinds_per_flight)
+    most = search + flights_after_search(kinds, 12, search)
+    assert 1 / 1.5 <= flights_with_shrinking(search, 12) / most <= 1.5
+    assert flights_with_shrinking(search, 0) == search
