@@ -16,7 +16,7 @@ REMEDY = (
     "Is it a ledger, is there space, may it be written? Fix that and go on with --garl-resume, or "
     "choose another folder with the ini key garl_dir"
 )
-VERSION = 6
+VERSION = 7
 """Version of the tables below; a ledger of another version cannot be resumed."""
 SCHEMA = """
 CREATE TABLE run (key TEXT PRIMARY KEY, value TEXT NOT NULL);
@@ -28,16 +28,20 @@ CREATE TABLE slot (
     search TEXT NOT NULL, generation INTEGER NOT NULL, slot INTEGER NOT NULL,
     scenario TEXT NOT NULL, state TEXT NOT NULL DEFAULT 'waiting', pid INTEGER, lease REAL,
     attempts INTEGER NOT NULL DEFAULT 0, after TEXT NOT NULL DEFAULT '',
+    priority INTEGER NOT NULL DEFAULT 0,
     result TEXT, objectives TEXT, sha256 TEXT, wall_s REAL,
     PRIMARY KEY (search, generation, slot)
 );
-CREATE INDEX slot_state ON slot (state, after DESC, generation, slot);
+CREATE INDEX slot_state ON slot (state, after DESC, priority DESC, generation, slot);
 CREATE TABLE worker (pid INTEGER PRIMARY KEY, owner INTEGER NOT NULL);
 CREATE TABLE meter (name TEXT PRIMARY KEY, value REAL NOT NULL);
 """
 SearchKind = Literal["search", "case", "on_demand"]
 """The purpose of flights: a search's budget, saved cases, or flights on demand, such as a second
 flight of a violation.  Figures and the result hash cover the searches alone."""
+BEHIND_SEARCHES, BEFORE_SEARCHES = -1, 1
+"""Priorities of flights that are flown when no flight of a search waits, or before those of
+searches, whose priority is 0."""
 _LONGEST = 64_000_000
 """Most bytes of one value: a damaged file may declare a value that fills the memory."""
 

@@ -140,18 +140,24 @@ class Ledger:
         return rows.fetchall()
 
     def add_slots(
-        self, search: str, generation: int, scenarios: Mapping[int, str], earlier_exits: str = ""
+        self,
+        search: str,
+        generation: int,
+        scenarios: Mapping[int, str],
+        earlier_exits: str = "",
+        priority: int = 0,
     ) -> None:
         """Add a generation's slots; raise LedgerError if they are there with other scenarios.
 
-        ``earlier_exits`` says how earlier flights of the slots ended, as in a Claim.
+        ``earlier_exits`` says how earlier flights of the slots ended, as in a Claim.  Slots of a
+        higher ``priority`` fly earlier.
         """
         with self.database.transaction():
             self.database.executemany(
-                "INSERT OR IGNORE INTO slot (search, generation, slot, scenario, after) "
-                "VALUES (?, ?, ?, ?, ?)",
+                "INSERT OR IGNORE INTO slot (search, generation, slot, scenario, after, priority) "
+                "VALUES (?, ?, ?, ?, ?, ?)",
                 [
-                    (search, generation, slot, text, earlier_exits)
+                    (search, generation, slot, text, earlier_exits, priority)
                     for slot, text in scenarios.items()
                 ],
             )
@@ -173,14 +179,6 @@ class Ledger:
         )
         return [(text, None if result is None else parse_result(result)) for text, result in rows]
 
-    def unflown(self, search: str, generation: int) -> int:
-        """Return how many of a generation's slots have no result."""
-        row = self.database.execute(
-            "SELECT count(*) FROM slot WHERE search = ? AND generation = ? AND result IS NULL",
-            (search, generation),
-        ).fetchone()
-        return int(row[0])
-
     def note_objectives(
         self, search: str, generation: int, objectives: Sequence[Sequence[float]]
     ) -> None:
@@ -195,13 +193,18 @@ class Ledger:
             )
 
     def add_flight(
-        self, flight: FlightId, system: str, job: str, scenario: str, earlier_exits: str = ""
+        self,
+        flight: FlightId,
+        system: str,
+        job: str,
+        scenario: str,
+        earlier_exits: str = "",
+        priority: int = 0,
     ) -> None:
         """Add one flight on demand, as a search of its own, unless it is there already."""
         self.add_search(flight.search, system, flight.map, 1, job, "on_demand")
-        self.add_slots(
-            flight.search, flight.slot.generation, {flight.slot.index: scenario}, earlier_exits
-        )
+        slot, texts = flight.slot, {flight.slot.index: scenario}
+        self.add_slots(flight.search, slot.generation, texts, earlier_exits, priority)
 
     def completed(self, flight: FlightId, folder: Path) -> CompletedFlight | None:
         """Return a flight whose record is in a folder, or None if it has no result."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import itertools
 import json
 import re
 from dataclasses import dataclass
@@ -78,11 +79,45 @@ class LedgerQueries:
         ).fetchone()
         return int(row[0])
 
-    def violating(self) -> list[LedgerFlight]:
-        """Return the flights of all searches that violated a property, in slot order."""
-        return self._flights("json_extract(result, '$.verdict.primary') IS NOT NULL")
+    def wanted(self, search: str) -> int:
+        """Return the number of flights of a search, those that have not been bred included."""
+        row = self._database.execute("SELECT wanted FROM search WHERE id = ?", (search,)).fetchone()
+        return int(row[0]) if row else 0
 
-    def _flights(self, condition: str, *values: str) -> list[LedgerFlight]:
+    def left(self) -> int:
+        """Return how many flights of searches have no result, those not yet bred included."""
+        return sum(each.total - each.flown for each in self.progress())
+
+    def unflown(self, search: str, generation: int) -> int:
+        """Return how many of a generation's slots have no result."""
+        row = self._database.execute(
+            "SELECT count(*) FROM slot WHERE search = ? AND generation = ? AND result IS NULL",
+            (search, generation),
+        ).fetchone()
+        return int(row[0])
+
+    def closed_generations(self, search: str, after: int) -> list[int]:
+        """Return the generations after ``after`` that are flown, up to the first that is not.
+
+        A search adds one generation after the other, so no earlier one can follow.
+        """
+        rows = self._database.execute(
+            "SELECT generation, sum(result IS NULL) FROM slot "
+            "WHERE search = ? AND generation > ? GROUP BY generation ORDER BY generation",
+            (search, after),
+        )
+        return [row[0] for row in itertools.takewhile(lambda row: not row[1], rows)]
+
+    def violating(self, search: str = "", generation: int | None = None) -> list[LedgerFlight]:
+        """Return the flights that violated a property, in slot order: all, or of a generation."""
+        return self._flights(
+            "json_extract(result, '$.verdict.primary') IS NOT NULL "
+            "AND ? IN ('', search.id) AND coalesce(?, generation) = generation",
+            search,
+            generation,
+        )
+
+    def _flights(self, condition: str, *values: str | int | None) -> list[LedgerFlight]:
         rows = self._database.execute(
             "SELECT search, map, generation, slot, system, scenario, result, sha256 FROM slot "
             "JOIN search ON search.id = slot.search WHERE kind = 'search' AND state = 'flown' "

@@ -16,7 +16,8 @@ from pytest_garl.execution.result import FlightResult
 _METERS = {"search": "flights", "case": "cases", "on_demand": "on_demand"}
 _NEXT, _NEXT_OF_SYSTEM = (
     "SELECT search, generation, slot, scenario, after, attempts FROM slot "
-    f"WHERE state = 'waiting' {condition} ORDER BY after DESC, generation, slot, search"
+    f"WHERE state = 'waiting' {condition} ORDER BY after DESC, priority DESC, generation, "
+    "slot, search"
     for condition in ("", "AND search IN (SELECT id FROM search WHERE system = ?)")
 )
 LEASE_S = 30.0

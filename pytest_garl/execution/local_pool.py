@@ -56,6 +56,8 @@ class FlightWorkers:
 class InProcessPool:
     """Flies one slot after the other in this process, for a debugger."""
 
+    in_process = True
+
     def __init__(self, queue: WorkQueue) -> None:
         self._queue = queue
 

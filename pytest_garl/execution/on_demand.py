@@ -11,9 +11,10 @@ requests and finds the results in the ledger.
 from __future__ import annotations
 
 import queue
-from collections.abc import Callable, Mapping, Sequence
-from concurrent.futures import Future, ThreadPoolExecutor
-from dataclasses import dataclass
+import threading
+from collections.abc import Callable, Mapping
+from concurrent.futures import Future
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Protocol, TypeVar
 
@@ -25,6 +26,9 @@ from pytest_garl.scenarios.files import dump_scenario
 from pytest_garl.scenarios.scenario import Scenario
 
 T = TypeVar("T")
+PATIENCE_S = 0.01
+"""How long the next request of a procedure is waited for.  Most take a millisecond; whoever plans
+an escape takes seconds, in which the others' flights go on."""
 
 
 class FlyFunction(Protocol):
@@ -43,10 +47,13 @@ class _Procedure:
     """A running procedure; None in a queue ends its requests, or its wait for a result."""
 
     name: str
-    requests: queue.SimpleQueue[tuple[FlightJob, Scenario] | None]
-    results: queue.SimpleQueue[CompletedFlight | None]
+    requests: queue.SimpleQueue[tuple[FlightJob, Scenario] | None] = field(
+        default_factory=queue.SimpleQueue
+    )
+    results: queue.SimpleQueue[CompletedFlight | None] = field(default_factory=queue.SimpleQueue)
     awaited: tuple[FlightId, Path] | None = None
-    flown: int = 0
+    requested: int = 0
+    thread: threading.Thread | None = None
 
     def fly(self, job: FlightJob, scenario: Scenario) -> CompletedFlight:
         """Request a flight and wait for it; the procedure calls this method as ``fly``."""
@@ -58,44 +65,94 @@ class _Procedure:
             raise _StoppedError
         return result
 
+    def start(self, function: Callable[[FlyFunction], T]) -> Future[T]:
+        """Run a function in a thread, and return what it will return."""
+        future: Future[T] = Future()
+
+        def work() -> None:
+            try:
+                future.set_result(function(self.fly))
+            except BaseException as error:  # noqa: BLE001 (whoever asks for the result raises it)
+                future.set_exception(error)
+            finally:
+                self.requests.put(None)
+
+        self.thread = threading.Thread(target=work, name=f"garl {self.name}", daemon=True)
+        self.thread.start()
+        return future
+
+    def stop(self) -> None:
+        """End the thread when it requests its next flight."""
+        self.results.put(None)
+
 
 class OnDemandFlights:
-    """Runs procedures; ``on_wait`` is called while their flights are waited for."""
+    """Runs procedures, all at once or one after the other; ``on_wait`` is called at each turn.
 
-    def __init__(self, ledger: Ledger, pool: Pool, on_wait: Callable[[], None]) -> None:
+    ``priority`` returns the priority of a flight by the procedure's name and the number of its
+    earlier flights; those of a higher one fly earlier.
+    """
+
+    def __init__(
+        self,
+        ledger: Ledger,
+        pool: Pool,
+        on_wait: Callable[[], None] = lambda: None,
+        *,
+        priority: Callable[[str, int], int] = lambda name, requested: 0,
+    ) -> None:
         self._ledger, self._pool, self._on_wait = ledger, pool, on_wait
+        self._priority = priority
+        self._procedures: dict[str, _Procedure] = {}
+        # In this process a flight and a procedure must not compute at the same time.
+        self._patience_s = None if pool.in_process else PATIENCE_S
+
+    def start(self, name: str, function: Callable[[FlyFunction], T]) -> Future[T]:
+        """Start a procedure; return what it will return.
+
+        The name is part of its flights' keys, so that a resumed run must give the same.
+        """
+        procedure = self._procedures[name] = _Procedure(name=name)
+        return procedure.start(function)
+
+    def advance(self) -> None:
+        """Give the procedures the flights that have ended, and request the next ones."""
+        for name, procedure in list(self._procedures.items()):
+            if self._has_ended(procedure):
+                del self._procedures[name]
+
+    def turn(self) -> None:
+        """Go on with the procedures, and let the pool fly for a moment if one still runs."""
+        self.advance()
+        if self._procedures:
+            self._pool.turn()
+
+    def requested(self, name: str) -> int:
+        """Return how many flights a procedure that runs has requested."""
+        procedure = self._procedures.get(name)
+        return procedure.requested if procedure else 0
+
+    def close(self) -> None:
+        """End the procedures that still run, and wait for their threads."""
+        for procedure in self._procedures.values():
+            procedure.stop()
+        for procedure in self._procedures.values():
+            if procedure.thread is not None:
+                procedure.thread.join()
+        self._procedures.clear()
 
     def run(self, functions: Mapping[str, Callable[[FlyFunction], T]]) -> dict[str, T]:
-        """Return what each procedure returns; raise the first error of one.
-
-        The names are part of the flights' keys, so that a resumed run must give the same.
-        """
-        procedures = [
-            _Procedure(name=name, requests=queue.SimpleQueue(), results=queue.SimpleQueue())
-            for name in functions
-        ]
-        with ThreadPoolExecutor(max(1, len(functions)), thread_name_prefix="garl") as threads:
-            try:
-                futures = {
-                    procedure.name: _begin(threads, procedure, functions[procedure.name])
-                    for procedure in procedures
-                }
-                self._wait(procedures)
-            finally:
-                for procedure in procedures:
-                    procedure.results.put(None)
+        """Return what each procedure returns; raise the first error of one."""
+        try:
+            futures = {name: self.start(name, function) for name, function in functions.items()}
+            while self._procedures:
+                self.turn()
+                self._on_wait()
+        finally:
+            self.close()
         return {name: future.result() for name, future in futures.items()}
 
-    def _wait(self, procedures: Sequence[_Procedure]) -> None:
-        """Let the pool fly until no procedure requests a flight."""
-        waiting = list(procedures)
-        while waiting:
-            waiting = [procedure for procedure in waiting if not self._advance(procedure)]
-            if waiting:
-                self._pool.turn()
-            self._on_wait()
-
-    def _advance(self, procedure: _Procedure) -> bool:
+    def _has_ended(self, procedure: _Procedure) -> bool:
         """Continue a procedure until it waits for a flight; return whether it has ended."""
         while True:
             if procedure.awaited is not None:
@@ -104,7 +161,10 @@ class OnDemandFlights:
                     return False
                 procedure.awaited = None
                 procedure.results.put(done)
-            request = procedure.requests.get()
+            try:
+                request = procedure.requests.get(timeout=self._patience_s)
+            except queue.Empty:
+                return False
             if request is None:
                 return True
             self._add_flight(procedure, *request)
@@ -112,16 +172,9 @@ class OnDemandFlights:
     def _add_flight(self, procedure: _Procedure, job: FlightJob, scenario: Scenario) -> None:
         text = dump_scenario(scenario)
         # The key contains the request: a run resumed with another budget requests other flights.
-        key = f"on demand {procedure.name} {procedure.flown} {job.flown_facts()} {text}"
+        key = f"on demand {procedure.name} {procedure.requested} {job.flown_facts()} {text}"
         flight = FlightId(search=search_key(key), map=job.map)
         procedure.awaited = flight, Path(job.flights)
-        procedure.flown += 1
-        self._ledger.add_flight(flight, job.system.name, job.dumps(), text)
-
-
-def _begin(
-    threads: ThreadPoolExecutor, procedure: _Procedure, function: Callable[[FlyFunction], T]
-) -> Future[T]:
-    future = threads.submit(function, procedure.fly)
-    future.add_done_callback(lambda _: procedure.requests.put(None))
-    return future
+        priority = self._priority(procedure.name, procedure.requested)
+        procedure.requested += 1
+        self._ledger.add_flight(flight, job.system.name, job.dumps(), text, priority=priority)

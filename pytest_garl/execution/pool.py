@@ -17,6 +17,10 @@ class Pool(Protocol):
     nothing.
     """
 
+    @property
+    def in_process(self) -> bool:
+        """Whether it flies in this process, where nothing else may compute during a flight."""
+
     def turn(self) -> None:
         """Continue the flights for a moment; raise GarlError if they cannot go on."""
 

@@ -99,6 +99,8 @@ class _Worker:
 class ProcessPool:
     """The workers that this process has started; several pools share a ledger and its limit."""
 
+    in_process = False
+
     def __init__(self, queue: WorkQueue, kind: WorkerKind) -> None:
         self._queue, self._kind = queue, kind
         self._workers: dict[int, _Worker] = {}

@@ -36,6 +36,7 @@ _TYPES = {
         "scenario": "text",
         "state": "text",
         "attempts": "integer",
+        "priority": "integer",
         "after": "text",
         "result": "text null",
         "objectives": "text null",

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 from pytest_garl import cpu_dispatch
 from pytest_garl.plugin.run import Run
 from pytest_garl.plugin.terminal_text import counted, duration
-from pytest_garl.regressions.forecast import seconds_per_new_signature
+from pytest_garl.regressions.forecast import flights_with_shrinking, seconds_per_new_signature
 from pytest_garl.reports.shares_text import limits_text
 from pytest_garl.verdicts.verdict import DEFAULT_LIMITS
 
@@ -21,7 +23,7 @@ def forecast(run: Run) -> list[str]:
     sizes = run.search_sizes
     if not options.budget or options.workers is None or len(sizes) < 2:
         return []
-    time = f"{_duration_of(run, sum(sizes))}{_duration_per_new_signature(run)}"
+    time = f"{_duration_of(run, sizes)}{_shrinking(run)}"
     return [f"garl: {len(sizes)} searches, {time}"]
 
 
@@ -103,18 +105,24 @@ def _workers(run: Run) -> str:
     if options.workers is None:
         return f"all workers{pool}"
     workers = counted(options.workers, "worker") if options.workers else "flown inside pytest"
-    time = (
-        f"{_duration_of(run, options.budget)} per system and map{_duration_per_new_signature(run)}"
-    )
+    time = f"{_duration_of(run, [options.budget])} per system and map{_shrinking(run)}"
     return f"{workers}{pool}; {time}"
 
 
-def _duration_of(run: Run, flights: int) -> str:
-    return f"about {duration(flights * run.flight_s / max(1, run.options.workers or 1))}"
+def _duration_of(run: Run, searches: Sequence[int]) -> str:
+    """Return how long searches of so many flights take, with all that the default cap allows."""
+    options = run.options
+    each = options.shrink if options.shrink_capped else 0
+    flights = sum(flights_with_shrinking(search, each) for search in searches)
+    return f"about {duration(flights * run.flight_s / max(1, options.workers or 1))}"
 
 
-def _duration_per_new_signature(run: Run) -> str:
-    if not run.options.shrink:
+def _shrinking(run: Run) -> str:
+    """Return what the duration says about shrinking."""
+    options = run.options
+    if not options.shrink:
         return ""
-    seconds = seconds_per_new_signature(run.options.shrink, run.flight_s, run.options.workers or 1)
-    return f", then about {duration(seconds)} per new kind of violation"
+    if options.shrink_capped:
+        return ", shrinking included"
+    seconds = seconds_per_new_signature(options.shrink, run.flight_s, options.workers or 1)
+    return f", and about {duration(seconds)} per new kind of violation"

@@ -184,6 +184,17 @@ def pytest_runtest_logreport(report: pytest.TestReport) -> None:
         if key == FINDING_TEST and worker is not None:
             search, _, signature = str(value).partition(" ")
             worker.config.stash[RUN].note_finding_test(search, signature, report.nodeid)
+    run = worker.config.stash.get(RUN, None) if worker is not None else None
+    if run is not None and run.investigations is not None:
+        _investigate(run)
+
+
+def _investigate(run: Any) -> None:
+    """Go on with investigations in xdist's controller, which waits for no flight."""
+    try:
+        run.investigations.advance()
+    except GarlError as error:
+        run.save_problem = str(error)
 
 
 def pytest_report_header(config: pytest.Config) -> str | None:
@@ -259,7 +270,7 @@ def _save_cases(run: Any, session: pytest.Session, *, nothing_compared: bool) ->
         # Without its ledger a session saves nothing; the summary says why.
         run.save_problem = run.save_problem or str(error)
     finally:
-        run.pool.close()
+        run.end_flights()
 
 
 def pytest_unconfigure(config: pytest.Config) -> None:

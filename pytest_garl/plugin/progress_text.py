@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from pytest_garl.execution.ledger import Ledger
 from pytest_garl.execution.ledger_queries import SearchProgress
 from pytest_garl.plugin.run import SELECTED, Run
-from pytest_garl.plugin.terminal_text import duration
+from pytest_garl.plugin.terminal_text import counted, duration
 from pytest_garl.regressions.forecast import RemainingWork, flights_after_search
 
 _MARGINS = ("collision", "distance", "time")
@@ -36,6 +36,8 @@ class RunProgress:
     """Flights expected beside the searches, those flown included."""
     left_s: float | None = None
     """A forecast of the time left, if there is a better one than the mean."""
+    investigated: int = 0
+    """Kinds of violation that are confirmed and shrunk beside the search at the moment."""
 
     @property
     def flown(self) -> float:
@@ -63,6 +65,8 @@ class RunProgress:
         if flying:
             where = f"{flying.system.split(':')[-1]} on {flying.map}"
             phrases.append(f"{where} g{flying.generation:02d} {flying.flown}/{flying.total}")
+            if self.investigated:
+                phrases.append(f"shrinking {counted(self.investigated, 'kind')} beside it")
         elif self.left_s is not None:
             phrases.append("confirming and shrinking")
         if self.flown and self.seconds > 0:
@@ -116,6 +120,7 @@ class ProgressReader:
         self._began = self._began or now
         flown_after = queries.meters().get("on_demand", 0)
         left_s = self._forecast(ledger, flown_after, now)
+        investigations = self._run.investigations
         return RunProgress(
             searches=searches,
             kinds=queries.violation_counts(),
@@ -125,6 +130,7 @@ class ProgressReader:
             flown_after=flown_after,
             expected_after=self._expected_after,
             left_s=left_s,
+            investigated=investigations.running if investigations else 0,
         )
 
     def _forecast(self, ledger: Ledger, flown_after: float, now: float) -> float | None:

@@ -31,6 +31,7 @@ if TYPE_CHECKING:
     from pytest_garl.plugin.user_assertions import ItemAssertion
     from pytest_garl.regressions.follow_up import InvestigatedSignature
     from pytest_garl.regressions.forecast import RemainingWork
+    from pytest_garl.regressions.investigations import Investigations
 
 from pytest_garl.execution.ledger import SESSION_FACT
 from pytest_garl.reports.search_summary import DOMAINS
@@ -127,6 +128,8 @@ class Run:
     simulator: Reference
     lock: TextIO | None = None
     """Keeps other runs out of the folder."""
+    investigations: Investigations | None = None
+    """Those of new signatures, in the process that saves their cases; None if none are saved."""
     searches: Searches = field(init=False)
     items: dict[FlightId, list[SelectedItem]] = field(default_factory=dict)
     """The selected items that judge a flight."""
@@ -205,12 +208,18 @@ class Run:
 
     def close(self) -> None:
         """End the workers, and let others have the ledger."""
-        self.pool.close()
+        self.end_flights()
         self.ledger.close()
         if self.lock is not None:
             self.lock.close()
         if not self.options.searches_or_repeats and self.options.controller == str(os.getpid()):
             self.ledger.remove()
+
+    def end_flights(self) -> None:
+        """End the investigations and the workers."""
+        if self.investigations is not None:
+            self.investigations.close()
+        self.pool.close()
 
     @functools.cached_property
     def claims(self) -> ReportClaims:
@@ -307,4 +316,6 @@ class Run:
 
     def _advance(self) -> None:
         self.searches.advance()
+        if self.investigations is not None:
+            self.investigations.advance()
         self.on_wait()

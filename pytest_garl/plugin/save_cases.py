@@ -21,25 +21,20 @@ from pytest_garl.plugin.terminal_text import begin_line, counted, duration, widt
 from pytest_garl.plugin.user_assertions import collect_assertion
 from pytest_garl.regressions.case import Case
 from pytest_garl.regressions.case_request import CaseRequest
-from pytest_garl.regressions.follow_up import (
-    InvestigatedSignature,
-    ShrinkBudget,
-    case_requests,
-    follow_up,
-)
-from pytest_garl.regressions.forecast import remaining_work
+from pytest_garl.regressions.follow_up import InvestigatedSignature, follow_up
+from pytest_garl.regressions.investigations import Investigations
 
 _PATCH = ".patch"
 
 
 def may_save(run: Run, session: pytest.Session) -> bool:
     """Return whether a search ended in this process, so that its violations may be saved."""
-    options, worker = run.options, is_xdist_worker(session.config)
+    worker = is_xdist_worker(session.config)
     ended = session.exitstatus in (pytest.ExitCode.OK, pytest.ExitCode.TESTS_FAILED)
     stopped = bool(session.shouldfail or session.shouldstop)
     if not (ended and run.loop_finished) or stopped or worker:
         return False
-    if options.repeat or not options.shrink:
+    if run.investigations is None:
         return False
     # After a second Ctrl-C pytest still has the status with which it began.
     return all(each.flown >= each.total for each in run.ledger.queries.progress())
@@ -47,21 +42,19 @@ def may_save(run: Run, session: pytest.Session) -> bool:
 
 def save_cases(run: Run, session: pytest.Session) -> None:
     """Confirm, shrink and save each new signature; ``run.investigated`` keeps the results."""
-    options, config = run.options, session.config
+    config, investigations = session.config, run.investigations
+    assert investigations is not None
     reporter: Any = config.pluginmanager.get_plugin("terminalreporter")
     try:
-        requests = _requests(run, session)
+        _collect_reported_failures(run, session)
+        requests = investigations.requests(run.user_assertions)
         if requests:
-            work = remaining_work(requests, _flight_s(run, requests), options.workers or 1)
-            run.remaining = work
             begin_line(reporter)
-            reporter.write_line(
-                "garl: confirming and shrinking "
-                f"{counted(len(requests), 'new kind')} of violation, "
-                f"at most {counted(work.at_most, 'flight')}, about {duration(work.seconds)}"
-            )
+            reporter.write_line(_announcement(run, investigations, requests))
         with show_progress(run, config):
-            run.investigated = follow_up(run.ledger, run.pool, requests, _saver(run), run.on_wait)
+            run.investigated = follow_up(
+                investigations, requests, run.finding_tests, _saver(run), run.on_wait
+            )
     except KeyboardInterrupt:
         begin_line(reporter)
         reporter.write_line(
@@ -74,16 +67,23 @@ def save_cases(run: Run, session: pytest.Session) -> None:
         run.save_problem = str(error)
 
 
-def _requests(run: Run, session: pytest.Session) -> tuple[CaseRequest, ...]:
-    """Return a request for each new signature, also for those that xdist's workers found."""
+def _announcement(run: Run, investigations: Investigations, requests: Sequence[CaseRequest]) -> str:
+    """Return how much is left to confirm and shrink; ``run.remaining`` keeps it."""
+    work = investigations.remaining(requests, _flight_s(run, requests))
+    run.remaining = work
+    kinds = f"{counted(len(requests), 'new kind')} of violation"
+    beside = f", {done} done beside the search" if (done := investigations.ended) else ""
+    return (
+        f"garl: confirming and shrinking {kinds}{beside}, "
+        f"at most {counted(work.at_most, 'flight')}, about {duration(work.seconds)}"
+    )
+
+
+def _collect_reported_failures(run: Run, session: pytest.Session) -> None:
+    """Collect the users' assertions that failed in xdist's workers."""
     for nodeid, signature in sorted(run.reported_failures.items()):
         target, user_assertion = collect_assertion(session, nodeid)
         run.user_assertions[target.search, signature] = user_assertion
-    options = run.options
-    shrinking = ShrinkBudget(each=options.shrink, capped=options.shrink_capped)
-    return case_requests(
-        run.ledger, options.corpus, shrinking, run.user_assertions, run.finding_tests
-    )
 
 
 def _saver(run: Run) -> Callable[[Case], Path | None]:

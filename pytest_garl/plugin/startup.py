@@ -7,7 +7,7 @@ import os
 import sys
 from importlib.metadata import version
 from pathlib import Path
-from typing import Any, TextIO
+from typing import TYPE_CHECKING, Any, TextIO
 
 import pytest
 
@@ -25,6 +25,9 @@ from pytest_garl.plugin.options import Options
 from pytest_garl.plugin.run import FLIGHT_S, Run
 from pytest_garl.reports.run_report import BEGAN, utc_now
 
+if TYPE_CHECKING:
+    from pytest_garl.regressions.investigations import Investigations
+
 EARLIER_FLIGHT_S = "seconds_per_flight"
 """The ledger's fact: wall time of a flight in the run before, for the forecast."""
 
@@ -41,10 +44,12 @@ def begin_run(config: pytest.Config, options: Options) -> None:
             check_ray(options.ray_address)
         ledger, lock = _open_ledger(config, options)
         own = config.hook.pytest_garl_fly(config=config)
+        pool = _pool(ledger, options)
         config.stash[RUN] = Run(
             options=options,
             ledger=ledger,
-            pool=_pool(ledger, options),
+            pool=pool,
+            investigations=_investigations(config, options, ledger, pool),
             simulator=reference_to(own) if own else BUILT_IN,
             lock=lock,
             flight_s=_flight_s(ledger),
@@ -113,6 +118,20 @@ def _pool(ledger: Ledger, options: Options) -> Pool:
         return ray_pool(ledger.queue, options.workers, options.root)
     assert options.workers is not None
     return local_pool(ledger.queue, options.workers)
+
+
+def _investigations(
+    config: pytest.Config, options: Options, ledger: Ledger, pool: Pool
+) -> Investigations | None:
+    """Return the investigations of a search, in the process that saves cases; else None."""
+    if is_xdist_worker(config) or not options.budget or options.repeat or not options.shrink:
+        return None
+    # Only a search needs Hypothesis, which shrinks.
+    from pytest_garl.regressions.allowance import ShrinkBudget
+    from pytest_garl.regressions.investigations import Investigations
+
+    shrinking = ShrinkBudget(each=options.shrink, capped=options.shrink_capped)
+    return Investigations(ledger, pool, options.corpus, shrinking, options.workers or 1)
 
 
 def _shared_ledger(path: Path) -> Ledger:

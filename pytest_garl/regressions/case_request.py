@@ -23,9 +23,8 @@ LEAST_WINDOW_S = 1.0
 class CaseRequest:
     """A request to make a case of one signature of one search.
 
-    ``violations`` are scenarios with the flights that violated.  ``name`` begins with the search.
-    ``budget`` limits the flights of this request, ``cap`` those of the landing system for all
-    signatures of the search together; None is no limit.  ``user_assertion`` is the test's assertion
+    ``violations`` are scenarios with the flights that violated, in slot order.  ``name`` begins
+    with the search.  ``budget`` limits the flights.  ``user_assertion`` is the test's assertion
     that failed, None for the built-in verdict; ``test`` is the node id of the test that found it.
     ``finding`` is the signature of what had gone wrong before the end of these flights, empty for a
     request about their violation; ``known`` are the signatures that get a case without it.
@@ -39,7 +38,6 @@ class CaseRequest:
     budget: int
     user_assertion: UserAssertion | None = None
     test: str = ""
-    cap: int | None = None
     finding: str = ""
     known: tuple[str, ...] = ()
 
@@ -67,14 +65,16 @@ class CaseRequest:
 
     @property
     def scenarios(self) -> list[Scenario]:
-        """The scenarios of the violations, the simplest first.
+        """The scenarios of the violations: the first, then the others, the simplest first.
 
         Those of collisions with moving bodies are in the order of severity, weak adversaries first.
         """
         found = dict(self.violations)
-        return sorted(
-            (scenario for scenario, _ in self.violations), key=lambda each: self._order(found, each)
-        )
+        first, others = self.violations[:1], self.violations[1:]
+        return [
+            *(scenario for scenario, _ in first),
+            *sorted((each for each, _ in others), key=lambda each: self._order(found, each)),
+        ]
 
     def _order(
         self, found: Mapping[Scenario, CompletedFlight], scenario: Scenario

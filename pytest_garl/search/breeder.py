@@ -44,7 +44,7 @@ class Breeder:
     def _parents_are_flown(self) -> bool:
         if self._next_generation == 0 or not self._method.learns:
             return True
-        return self._ledger.unflown(self._search, self._next_generation - 1) == 0
+        return self._ledger.queries.unflown(self._search, self._next_generation - 1) == 0
 
     def _learn(self, generation: int) -> None:
         if not self._method.learns:

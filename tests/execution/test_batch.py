@@ -32,6 +32,8 @@ SCENARIOS = BaselineSpec(count=3).scenarios(load_map("lawn"))
 class Instant:
     """Flies nothing; remembers the slots that waited at its first turn."""
 
+    in_process = False
+
     def __init__(self, ledger: Ledger) -> None:
         self.ledger = ledger
         self.handed_out: list[str] = []

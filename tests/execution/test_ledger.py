@@ -41,7 +41,7 @@ def test_new_run_keeps_the_previous_ledger(tmp_path: Path) -> None:
     first.close()
     Ledger.create(tmp_path / "ledger.sqlite", FACTS).close()
     kept = Ledger(tmp_path / "ledger-previous.sqlite")
-    assert kept.unflown("s", 0) == 3
+    assert kept.queries.unflown("s", 0) == 3
 
 
 @pytest.mark.parametrize(

@@ -72,3 +72,17 @@ def test_flights_are_those_with_a_result_in_slot_order(tmp_path: Path) -> None:
     done = flights[1].completed(tmp_path)
     assert (done.signature, done.sha256) == ("IV:dog", "ab")
     assert done.record == flights[1].id.record(tmp_path)
+
+
+def test_generations_are_closed_in_order(tmp_path: Path) -> None:
+    ledger = waiting_ledger(tmp_path / "ledger.sqlite")
+    ledger.add_slots("s", 1, {0: "d"})
+    claims = [ledger.queue.claim() for _ in range(4)]
+    for claim in reversed(claims):
+        assert claim is not None
+        assert ledger.queries.closed_generations("s", -1) == []
+        ledger.queue.record(claim, flight_result("IV:dog"), "", 1.0)
+    assert ledger.queries.closed_generations("s", -1) == [0, 1]
+    assert ledger.queries.closed_generations("s", 0) == [1]
+    assert [flight.id.slot.index for flight in ledger.queries.violating("s", 0)] == [0, 1, 2]
+    assert ledger.queries.wanted("s") == 3

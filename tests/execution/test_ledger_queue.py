@@ -6,6 +6,7 @@ from pathlib import Path
 
 import pytest
 
+from pytest_garl.execution.database import BEHIND_SEARCHES
 from pytest_garl.execution.flight_id import FlightId
 from pytest_garl.execution.ledger import Ledger
 from pytest_garl.execution.ledger_queue import WorkQueue
@@ -135,3 +136,15 @@ def test_used_worker_gets_slots_of_its_own_system_alone(tmp_path: Path) -> None:
     assert ledger.queue.others_wait("systems:Other")
     assert not ledger.queue.others_wait("systems:Good")
     assert ledger.queue.claim(flown="systems:Good") is not None
+
+
+def test_slots_of_a_low_priority_wait_behind_all_others(tmp_path: Path) -> None:
+    ledger = waiting_ledger(tmp_path / "ledger.sqlite")
+    behind = FlightId(search="behind", map="court")
+    ledger.add_flight(behind, "systems:Good", "{}", "x", priority=BEHIND_SEARCHES)
+    again = FlightId(search="again", map="court")
+    ledger.add_flight(again, "systems:Good", "{}", "y")
+    claims = [ledger.queue.claim() for _ in range(5)]
+    order = [claim.flight.search for claim in claims if claim is not None]
+    # A test waits for a flight that is repeated; it is flown with generation 0.
+    assert order == ["again", "s", "s", "s", "behind"]

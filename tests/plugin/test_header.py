@@ -7,14 +7,26 @@ import pytest
 from tests.support.landing_project import project
 
 
-def test_header_forecasts_the_search_and_each_new_kind(pytester: pytest.Pytester) -> None:
+def test_header_forecasts_search_and_shrinking(pytester: pytest.Pytester) -> None:
     project(pytester, maps="['lawn', 'court']")
     args = ("--garl-budget=8", "--garl-workers=1", "-k", "test_collisions")
     result = pytester.runpytest_subprocess("-p", "no:cacheprovider", *args)
     result.stdout.fnmatch_lines(
         [
-            "garl: * 1 worker; about 18 s per system and map, then about 25 s per new kind of *",
-            "garl: 2 searches, about 35 s, then about 25 s per new kind of violation",
-            "garl: confirming and shrinking 4 new kinds of violation, at most * flights, about * s",
+            "garl: * 1 worker; about 28 s per system and map, shrinking included",
+            "garl: 2 searches, about 57 s, shrinking included",
+            "garl: confirming and shrinking 4 new kinds of violation*, at most * flight*, about *s",
         ]
     )
+
+
+@pytest.mark.parametrize(
+    ("shrink", "words"), [("12", ", and about 25 s per new kind of violation"), ("0", "")]
+)
+def test_header_forecasts_each_kind_if_there_is_no_cap(
+    pytester: pytest.Pytester, shrink: str, words: str
+) -> None:
+    project(pytester)
+    args = ("--garl-budget=8", "--garl-workers=1", "-k", "test_time", f"--garl-shrink={shrink}")
+    result = pytester.runpytest_subprocess("-p", "no:cacheprovider", *args)
+    result.stdout.fnmatch_lines([f"garl: * 1 worker; about 18 s per system and map{words}"])

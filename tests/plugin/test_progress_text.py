@@ -47,7 +47,12 @@ def test_first_log_line_counts_the_time_before_it(
     clock = [100.0]
     monkeypatch.setattr(progress_text, "time", SimpleNamespace(monotonic=lambda: clock[0]))
     reader = ProgressReader(
-        cast(Run, SimpleNamespace(remaining=RemainingWork(at_most=0, flights=0.0, seconds=0.0))),
+        cast(
+            Run,
+            SimpleNamespace(
+                remaining=RemainingWork(at_most=0, flights=0.0, seconds=0.0), investigations=None
+            ),
+        ),
         30.0,
     )
     reader.start_clock()
@@ -59,6 +64,13 @@ def test_first_log_line_counts_the_time_before_it(
     found = reader.read(cast(Ledger, ledger))
     assert found is not None
     assert found.seconds == 30.0
+
+
+def test_line_says_that_kinds_are_shrunk_beside_the_search() -> None:
+    both = dataclasses.replace(PROGRESS, investigated=2)
+    assert "A on court g01 3/4  shrinking 2 kinds beside it  0.50 flights/s" in progress_line(
+        both, 200
+    )
 
 
 @pytest.mark.parametrize("width", range(20, 160, 7))

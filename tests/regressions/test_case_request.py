@@ -16,11 +16,10 @@ from tests.support.results import crash, flight_result
 SIMPLE = VIOLATING_SCENARIO.without(*OBJECT_NAMES[1:])
 
 
-def test_scenarios_begin_with_the_simplest() -> None:
-    assert make_case_request(10, VIOLATING_SCENARIO, SIMPLE).scenarios == [
-        SIMPLE,
-        VIOLATING_SCENARIO,
-    ]
+def test_scenarios_begin_with_the_first_then_come_the_simplest() -> None:
+    middle = VIOLATING_SCENARIO.without(*OBJECT_NAMES[2:])
+    found = [VIOLATING_SCENARIO.without(OBJECT_NAMES[1]), middle, SIMPLE]
+    assert make_case_request(10, *found).scenarios == [found[0], SIMPLE, middle]
 
 
 @pytest.mark.parametrize(

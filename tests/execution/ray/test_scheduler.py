@@ -105,7 +105,7 @@ def ledger(tmp_path: Path) -> Ledger:
 def fly(ray: FakeRay, ledger: Ledger, size: int = 2) -> RayScheduler:
     scheduler = RayScheduler(ray, ledger.queue, ActorWorkspace(), size)
     for _ in range(100):
-        if not ledger.unflown("search", 0):
+        if not ledger.queries.unflown("search", 0):
             break
         scheduler.turn()
     return scheduler
@@ -147,7 +147,7 @@ def test_slot_that_loses_actor_after_actor_ends_the_run(ledger: Ledger) -> None:
     )
     with pytest.raises(PoolError, match="the same slot 4 times: out of memory"):
         fly(ray, ledger)
-    assert ledger.unflown("search", 0) == 1
+    assert ledger.queries.unflown("search", 0) == 1
 
 
 def test_actors_that_cannot_start_end_the_run(ledger: Ledger) -> None:
@@ -161,7 +161,7 @@ def test_node_with_other_versions_ends_the_run_before_a_flight(ledger: Ledger) -
     ray = FakeRay(node_and_versions=lambda: ("far-1", versions() | {"numpy": "1.0"}))
     with pytest.raises(PoolError, match=r"node far-1 would not fly the same: it has numpy 1\.0 \("):
         fly(ray, ledger)
-    assert ledger.unflown("search", 0) == 3
+    assert ledger.queries.unflown("search", 0) == 3
 
 
 def test_missing_package_counts_as_another_version() -> None:
@@ -190,7 +190,7 @@ def test_worker_exit_is_handled_as_in_the_local_pool(ledger: Ledger) -> None:
 def test_slot_to_fly_alone_is_flown_even_if_its_actor_is_lost(ledger: Ledger) -> None:
     answers = iter([LANDED, LANDED, KILLED, WorkerLostError("killed"), LANDED])
     fly(FakeRay(fly=lambda claim: next(answers)), ledger, size=1)
-    assert ledger.unflown("search", 0) == 0
+    assert ledger.queries.unflown("search", 0) == 0
 
 
 def test_error_on_a_node_is_raised_without_rays_wrapper(ledger: Ledger) -> None:
