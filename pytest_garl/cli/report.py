@@ -57,8 +57,10 @@ def _text(found: dict[str, Any]) -> str:
             f"gave up: {_counts(search['gave_up'])}"
         )
         for kind in search["signatures"]:
+            took = (kind["severity"] or {}).get("text", "")
             lines += [
                 f"  {kind['count']:4d}  {kind['signature']}: {kind['headline']}",
+                *([f"        at the least: {took}"] if took else []),
                 f"        {kind['repeat']}",
             ]
     return "\n".join([*lines, ""]) if lines else "no flights yet\n"
