@@ -51,7 +51,7 @@ def scenario_table(case: Case, map_folders: tuple[Path, ...]) -> Table:
     table = Table(box=None, header_style="bold")
     for name in ("what", "meaning"):
         table.add_column(name)
-    for row in describe_scenario(case.scenario, map_folders):
+    for row in describe_scenario(case.scenario, map_folders, case.policy):
         table.add_row(*(Text(cell) for cell in row))
     return table
 

@@ -20,6 +20,7 @@ from pytest_garl.regressions.case import Case, NoGateReason
 from pytest_garl.regressions.case_file import load_case
 from pytest_garl.regressions.corpus import Corpus, replace_file
 from pytest_garl.regressions.replay import Replay, replay, system_of
+from pytest_garl.regressions.story_text import grade_in_words
 
 DEFAULT_FOLDER = Path("scenarios/regressions")
 NO_PROOF = 3
@@ -109,7 +110,11 @@ def show(project: _Project, file: Path) -> None:
     case = project.case(file)
     evidence = case.evidence
     _say(f"{case.id}  {case.status}  {case.system}")
-    _say(f"{case.violation.signature}: {case.violation.description}\n")
+    _say(f"{case.violation.signature}: {case.violation.description}")
+    if case.severity.text:
+        means = grade_in_words(case.severity.grade)
+        _say(f"It takes {case.severity.text}{f' ({means})' if means else ''}.")
+    _say("")
     print_table(scenario_table(case, project.maps))
     for key, by in environment_changes(case):
         _say(f"during the flight {key} changes by {by:+.2f}")

@@ -61,9 +61,11 @@ def _text(found: dict[str, Any]) -> str:
         if control:
             lines.append(f"  {control['text']}")
         for kind in search["signatures"]:
-            lines.append(f"  {kind['count']:4d}  {kind['signature']}: {kind['headline']}")
+            took = (kind["severity"] or {}).get("text", "")
             seen = in_control_text(
                 kind["in_control"], control["random"]["flights"] if control else 0
             )
+            lines.append(f"  {kind['count']:4d}  {kind['signature']}: {kind['headline']}")
+            lines += [f"        at the least: {took}"] if took else []
             lines += [f"        {text}" for text in (seen, kind["repeat"]) if text]
     return "\n".join([*lines, ""]) if lines else "no flights yet\n"

@@ -67,6 +67,8 @@ class FlightResult:
         """
         if isinstance(values, Mapping):
             values = {**_DEFAULTS} | {key: value for key, value in values.items() if key in _FIELDS}
+            if isinstance(values["severity"], Mapping):
+                values["severity"] = {"values": [], **values["severity"]}
         return dataclass_from(cls, values)
 
     def dumps(self) -> str:

@@ -12,7 +12,9 @@ from typing import Any, Literal
 from pytest_garl.scenarios.story import GRADES
 
 MOST_LISTED = 4
-"""More conditions than these are counted and not named."""
+"""Of more conditions than these the rest is counted, and no values are named."""
+COUNTED = " values"
+"""Ends the values of a condition that has too many to name: ``5 values``."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -28,9 +30,10 @@ class Severity:
     entry may be shifted within ``window_s`` and the UAV still hits such a body; None if that was
     not measured.
 
-    Of conditions: ``conditions`` are active, objects that are there included; ``largest_share``
-    (0..1) is how far the strongest lies from nominal, as a share of all that can be flown;
-    ``largest`` says it in words.
+    Of conditions: ``conditions`` are active, objects that are there included; ``values`` say for
+    each which of its values are not nominal, or how many, and are empty in files of earlier
+    versions; ``largest_share`` (0..1) is how far the strongest lies from nominal, as a share of all
+    that can be flown; ``largest`` says it in words.
     """
 
     about: Literal["", "body", "conditions"] = ""
@@ -41,6 +44,7 @@ class Severity:
     speed_mps: float = 0.0
     window_s: float | None = None
     conditions: tuple[str, ...] = ()
+    values: tuple[str, ...] = ()
     largest: str = ""
     largest_share: float = 0.0
 
@@ -85,10 +89,20 @@ class Severity:
         names, count = self.conditions, len(self.conditions)
         if not count:
             return "nothing unusual"
+        values = self.values or ("",) * count
         if count == 1:
-            return f"{names[0]} alone{f', {self.largest}' if self.largest else ''}"
-        more = [f"{count - MOST_LISTED} more"] if count > MOST_LISTED else []
-        return f"{count} conditions: {', '.join([*names[:MOST_LISTED], *more])}"
+            told = values[0] or self.largest
+            if values[0].endswith(COUNTED):
+                told = f"{values[0]}, most of all {self.largest}"
+            return f"{names[0]} alone{f', {told}' if told else ''}"
+        if count > MOST_LISTED:
+            more = f"{count - MOST_LISTED} more"
+            return f"{count} conditions: {', '.join([*names[:MOST_LISTED], more])}"
+        named = (
+            f"{name} ({value})" if value else name
+            for name, value in zip(names, values, strict=True)
+        )
+        return f"{count} conditions: {', '.join(named)}"
 
     def to_json(self) -> dict[str, Any]:
         """Return plain values for a report: its text, and the facts of a body or of conditions."""
@@ -102,6 +116,7 @@ class Severity:
         }
         conditions = {
             "conditions": list(self.conditions),
+            "values": list(self.values),
             "largest": self.largest,
             "largest_share": self.largest_share,
         }

@@ -42,6 +42,7 @@ def severity_of(
     return Severity(
         about="conditions",
         conditions=(*(each.cause for each in conditions), *present),
+        values=(*(each.named for each in conditions), *("" for _ in present)),
         largest=strongest.words if strongest else "",
         largest_share=strongest.share if strongest else 0.0,
     )

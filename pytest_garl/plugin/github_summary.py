@@ -9,13 +9,13 @@ from typing import Any
 
 import pytest
 
-from pytest_garl.plugin.keys import SIGNATURE, SLOT
+from pytest_garl.plugin.keys import SEVERITY, SIGNATURE, SLOT
 from pytest_garl.reports.search_summary import WHY_NO_LANDING, SearchSummary, ViolationKind
 from pytest_garl.reports.shares_text import PAPER_DEFINITION, kinds_lines, percent
 
 VARIABLE = "GITHUB_STEP_SUMMARY"
 """GitHub names in this variable the file whose text it shows on the page of the step."""
-COLUMNS = ("where", "what", "flights", "what happened", "see it")
+COLUMNS = ("where", "what", "flights", "what happened", "at the least", "see it")
 SHARES = (
     "where",
     "flown",
@@ -28,7 +28,7 @@ SHARES = (
     "inconclusive",
 )
 
-Row = tuple[str, str, str, str, str]
+Row = tuple[str, str, str, str, str, str]
 
 
 def write_step_summary(
@@ -42,7 +42,14 @@ def write_step_summary(
     if not path:
         return
     rows: list[Row] = [
-        (_where(search), kind.signature, _flights(search, kind), kind.headline, command)
+        (
+            _where(search),
+            kind.signature,
+            _flights(search, kind),
+            kind.headline,
+            kind.severity_text,
+            command,
+        )
         for search, of_search in zip(searches, commands, strict=True)
         for kind, command in zip(search.kinds, of_search, strict=True)
     ]
@@ -109,7 +116,8 @@ def _failed_cases(reporter: Any) -> list[Row]:
         if slot.startswith("case-"):
             headline, _, see_it = _message(report).partition("\n")
             command = see_it.partition(": ")[2]
-            rows.append((slot, str(properties[SIGNATURE]), "1", headline, command))
+            signature, took = str(properties[SIGNATURE]), str(properties.get(SEVERITY, ""))
+            rows.append((slot, signature, "1", headline, took, command))
     return rows
 
 

@@ -27,6 +27,7 @@ from pytest_garl.plugin.keys import (
     NOT_REPEATED,
     REPORTED_FAILURE,
     RUN,
+    SEVERITY,
     SHOWN_VIOLATION,
     STALE,
     UNPROVEN,
@@ -162,6 +163,8 @@ class _Writer:
     ) -> None:
         file = self._case_file
         self._note(CASE, file)
+        if self.result.severity is not None and not failure.user_property:
+            self._note(SEVERITY, self.result.severity.text)
         if decision.outcome == "xfailed":
             return self._expect(report_text.expected_failure(decision, facts, file))
         flown = (failure.signature, self.result.verdict.story)

@@ -153,7 +153,8 @@ def _scenario(config: pytest.Config, run: Run, target: Target) -> list[str]:
     from pytest_garl.regressions.description import scenario_in_words
 
     scenario = run.scenario(target)
-    words = scenario_in_words(scenario, run.options.map_folders)
+    policy = run.searches.policy_name(target)
+    words = scenario_in_words(scenario, run.options.map_folders, policy)
     return [f"Scenario (seed {scenario.seed}): {words}"]
 
 

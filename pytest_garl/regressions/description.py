@@ -8,7 +8,8 @@ from pathlib import Path
 import numpy as np
 
 from pytest_garl.execution.severity import NO_SEVERITY, Severity
-from pytest_garl.scenarios.maps.map import load_map
+from pytest_garl.regressions.story_text import story_in_words
+from pytest_garl.scenarios.maps.map import Map, load_map
 from pytest_garl.scenarios.placement import (
     map_in,
     marker_position_m,
@@ -81,25 +82,37 @@ def _article(word: str) -> str:
     return "An" if word[0] in "aeiou" else "A"
 
 
-def describe_scenario(scenario: Scenario, map_folders: tuple[Path, ...]) -> list[tuple[str, str]]:
-    """Return what is off nominal as (subject, words), in physical units."""
+def describe_scenario(
+    scenario: Scenario, map_folders: tuple[Path, ...], policy: str = "graded"
+) -> list[tuple[str, str]]:
+    """Return what is off nominal as (subject, words), in physical units.
+
+    ``policy`` names the NPC policy: one without grades does not follow the stories.
+    """
     map = load_map(scenario.map, map_folders)
     rows = conditions_in_words(scenario, map)
     x, y = marker_position_m(scenario, map)
     rows.append(("marker", f"at ({x:.1f}, {y:.1f}) m, east and north"))
     for name, kind in map_in(scenario, map).present_objects:
-        x, y = object_start_m(scenario, map, name)
-        speed = object_speed_mps(scenario, map, name)
-        way = f"from ({x:.1f}, {y:.1f}) m"
-        goal = object_destination_m(scenario, map, name)
-        way += f" to ({goal[0]:.1f}, {goal[1]:.1f}) m and back" if goal else ""
-        rows.append((name, f"a {kind} of up to {speed:.2f} m/s, {way}"))
+        story = story_in_words(scenario, map, name, policy)
+        rows.append((name, story or _object_in_words(scenario, map, name, kind)))
     return rows
 
 
-def scenario_in_words(scenario: Scenario, map_folders: tuple[Path, ...]) -> str:
+def _object_in_words(scenario: Scenario, map: Map, name: str, kind: str) -> str:
+    x, y = object_start_m(scenario, map, name)
+    speed = object_speed_mps(scenario, map, name)
+    way = f"from ({x:.1f}, {y:.1f}) m"
+    goal = object_destination_m(scenario, map, name)
+    way += f" to ({goal[0]:.1f}, {goal[1]:.1f}) m and back" if goal else ""
+    return f"a {kind} of up to {speed:.2f} m/s, {way}"
+
+
+def scenario_in_words(
+    scenario: Scenario, map_folders: tuple[Path, ...], policy: str = "graded"
+) -> str:
     """Return what is off nominal in one line; words of weather and light name their subject."""
     return "; ".join(
         f"{subject} {words}" if "." in subject or words.startswith(("at ", "a ")) else words
-        for subject, words in describe_scenario(scenario, map_folders)
+        for subject, words in describe_scenario(scenario, map_folders, policy)
     )

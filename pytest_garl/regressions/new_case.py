@@ -18,10 +18,8 @@ from pytest_garl.regressions.case import (
 from pytest_garl.regressions.case_flights import recorded_behaviour
 from pytest_garl.regressions.case_request import CaseRequest, CaseResult, FailingScenario
 from pytest_garl.regressions.description import describe
-from pytest_garl.regressions.simplification import complexity, genome_of
+from pytest_garl.regressions.removed import Removed
 from pytest_garl.regressions.user_failure import UserFailure
-from pytest_garl.scenarios.maps.map import Map
-from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.simulation.flight import Flight
 from pytest_garl.simulation.flight_file import load
 from pytest_garl.simulation.npc_policy import PolicySpec
@@ -83,7 +81,7 @@ def new_case(
             map_sha256=job.map_sha256,
             neighbours=failing.neighbours_flown,
             neighbours_failed=failing.neighbours_failed,
-            removed=_removed(failing.origin, failing.scenario, request.map),
+            removed=Removed.between(failing.origin, failing.scenario).text,
             versions=flight.versions if flight else (),
             system_sha256=job.system_sha256,
             simulator_sha256=simulator_sha256(job.simulator),
@@ -138,13 +136,3 @@ def _violation(
         unit=margin.unit if margin else "1",
         description=describe(flight, verdict, severity) if flight else verdict.story,
     )
-
-
-def _removed(origin: Scenario, scenario: Scenario, map: Map) -> str:
-    """Return in words what shrinking removed."""
-    before, after = (complexity(each, genome_of(origin, map)) for each in (origin, scenario))
-    if before == after:
-        return "nothing"
-    # A crossing object walks, even if the one that was found stood.
-    objects, genes = before.objects - after.objects, max(0, before.genes - after.genes)
-    return f"{objects} of {before.objects} objects, {genes} of {before.genes} genes off nominal"

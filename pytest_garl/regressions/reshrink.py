@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import dataclasses
 import itertools
-import re
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -26,6 +25,7 @@ from pytest_garl.regressions.case_flights import ESCAPE_FLIGHTS, CaseFlights, fi
 from pytest_garl.regressions.case_request import CaseRequest, CaseResult, FailingScenario
 from pytest_garl.regressions.investigation import simplest_robust, with_shorter_record
 from pytest_garl.regressions.new_case import new_case
+from pytest_garl.regressions.removed import all_removed
 from pytest_garl.regressions.replay import SourceHashes, system_of
 from pytest_garl.regressions.robustness import NEIGHBOURS
 from pytest_garl.regressions.shrink import shrink
@@ -39,7 +39,6 @@ MINIMUM_RESHRINK_FLIGHTS = 1 + 1 + 1 + NEIGHBOURS + ESCAPE_FLIGHTS
 one of that scenario with recorded moves, its neighbours, those that confirm an escape."""
 NOT_REPRODUCED = "it does not fail in the same way any more with its recorded moves"
 NOTHING_SIMPLER = "nothing simpler was found"
-_REMOVED = re.compile(r"(\d+) of (\d+) objects, (\d+) of (\d+) genes off nominal")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -209,7 +208,7 @@ class CaseReshrinker:
     def _replacement(self, failing: FailingScenario, prevention: Prevention) -> Case:
         """Return a failure as the case that replaces the saved one."""
         case, found = self._case, new_case(self._request, failing, prevention)
-        removed = _all_removed(case.evidence.removed, found.evidence.removed)
+        removed = all_removed(case.evidence.removed, found.evidence.removed)
         return dataclasses.replace(
             found,
             status=case.status,
@@ -219,18 +218,6 @@ class CaseReshrinker:
             policy_sha256=case.policy_sha256,
             evidence=dataclasses.replace(found.evidence, removed=removed),
         )
-
-
-def _all_removed(before: str, after: str) -> str:
-    """Return in words what shrinking removed, this time and the times before."""
-    first, second = _REMOVED.fullmatch(before), _REMOVED.fullmatch(after)
-    if first is None or second is None:
-        return before if second is None else after
-    objects, all_objects, genes, all_genes = (int(text) for text in first.groups())
-    return (
-        f"{objects + int(second[1])} of {all_objects} objects, "
-        f"{genes + int(second[3])} of {all_genes} genes off nominal"
-    )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

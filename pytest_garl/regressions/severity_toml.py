@@ -11,7 +11,7 @@ MOST_OBJECTS = 1000
 FASTEST_MPS = 1000.0
 """More is no object of a map, and no speed of a body."""
 _OF_BODY = {"grade", "type", "objects", "interference_s", "speed_mps", "window_s"}
-_OF_CONDITIONS = {"conditions", "largest", "largest_share"}
+_OF_CONDITIONS = {"conditions", "values", "largest", "largest_share"}
 
 
 def severity_lines(severity: Severity) -> list[list[str]]:
@@ -31,12 +31,16 @@ def severity_lines(severity: Severity) -> list[list[str]]:
             ]
         ]
     if severity.about == "conditions":
-        names = ", ".join(quoted(name) for name in severity.conditions)
+        names, values = (
+            ", ".join(quoted(each) for each in texts)
+            for texts in (severity.conditions, severity.values)
+        )
         return [
             [
                 "# The conditions that it takes; the fewer, the worse.",
                 "[severity]",
                 f"conditions = [{names}]",
+                *([f"values = [{values}]"] if severity.values else []),
                 f"largest = {quoted(severity.largest)}",
                 f"largest_share = {severity.largest_share!r}",
             ]
@@ -51,9 +55,15 @@ def read_severity(top: Table) -> Severity:
     table = top.table("severity")
     if "conditions" in table.values:
         table.refuse_unknown(_OF_CONDITIONS)
+        conditions = tuple(table.strings("conditions"))
+        values = tuple(table.strings("values")) if "values" in table.values else ()
+        if values and len(values) != len(conditions):
+            expected = f"one text for each of {len(conditions)} conditions"
+            raise table.error("values", f"found {len(values)} texts, expected {expected}")
         return Severity(
             about="conditions",
-            conditions=tuple(table.strings("conditions")),
+            conditions=conditions,
+            values=values,
             largest=table.string("largest"),
             largest_share=table.number("largest_share", low=0.0, high=1.0),
         )

@@ -11,6 +11,8 @@ import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 
+import numpy as np
+
 from pytest_garl.regressions.simplification import MARKER_PLACE
 from pytest_garl.scenarios.maps.map import Map
 from pytest_garl.scenarios.object_types import HEIGHTS_M, OBJECT_TYPES, ObjectType
@@ -39,13 +41,18 @@ _TURNS_RAD = tuple(sign * turn * math.pi / 8 for turn in range(9) for sign in (1
 """Directions that are tried if the way is not free, from that of the contact on."""
 BIRD_GAP_M = 0.5
 """A bird keeps more than so far from what stands beside its way (`solids_ahead.py`)."""
+THERE_M = 1.0
+"""A UAV so near to a place is there: its own length."""
 _STEP_S = 1 / 60
 """The simulator moves objects so often."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Encounter:
-    """Where and when the UAV was hit: the object's place, course and speed at the contact."""
+    """Where and when the UAV was hit: the object's place, course and speed at the contact.
+
+    ``uav_m`` is where the UAV was then.
+    """
 
     name: str
     type: ObjectType
@@ -54,6 +61,7 @@ class Encounter:
     place_m: tuple[float, float, float]
     course_rad: float
     speed_mps: float
+    uav_m: tuple[float, float, float]
 
     @property
     def usual_speed_mps(self) -> float:
@@ -76,6 +84,7 @@ def encounter_of(flight: Flight, map: Map) -> Encounter | None:
     index = max(0, int(hit.track.time_s.searchsorted(contact.time_s, side="right")) - 1)
     x, y, z = (float(value) for value in hit.track.position_m[index])
     vx, vy = (float(value) for value in hit.track.velocity_mps[index, :2])
+    ux, uy, uz = (float(value) for value in flight.uav.position_m[index])
     return Encounter(
         name=contact.body,
         type=OBJECT_TYPES[hit.type],
@@ -84,7 +93,22 @@ def encounter_of(flight: Flight, map: Map) -> Encounter | None:
         place_m=(x, y, z),
         course_rad=_course_rad(hit, (x, y), (vx, vy)),
         speed_mps=math.hypot(vx, vy),
+        uav_m=(ux, uy, uz),
     )
+
+
+def retimed_encounter(encounter: Encounter, missed: Flight) -> Encounter | None:
+    """Return an encounter at the time at which the UAV was there in a flight that missed it.
+
+    Returns None if the UAV was never there, or at about the encounter's time.
+    """
+    away_m = np.linalg.norm(missed.uav.position_m - np.array(encounter.uav_m), axis=1)
+    if not len(away_m) or away_m.min() > THERE_M:
+        return None
+    time_s = float(missed.uav.time_s[int(away_m.argmin())])
+    if abs(time_s - encounter.time_s) < DECISION_STEP_S:
+        return None
+    return dataclasses.replace(encounter, time_s=time_s)
 
 
 def _course_rad(hit: ObjectRecord, place_m: Plane, velocity_mps: Plane) -> float:

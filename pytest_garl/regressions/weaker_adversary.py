@@ -21,11 +21,12 @@ from pytest_garl.regressions.simplification import (
 from pytest_garl.regressions.straight_crossing import (
     SHIFTS_S,
     encounter_of,
+    retimed_encounter,
     shifted,
     straight_crossing,
 )
 from pytest_garl.scenarios.scenario import Scenario
-from pytest_garl.scenarios.story import GRADES, story_of
+from pytest_garl.scenarios.story import GRADES, Story, story_of
 from pytest_garl.simulation.flight_file import load
 
 CARELESS = "careless"
@@ -39,8 +40,8 @@ policy, one with recorded moves, and those for the scenario as it was found."""
 def confirm_crossing(flights: CaseFlights, first: Scenario) -> FailingScenario | None:
     """Return the straight careless crossing of the place of a collision, if the UAV hits it too.
 
-    First in clear weather, then in the conditions that were found.  The window of its entry is
-    measured in place of neighbours.
+    First in clear weather, there once more if the UAV came to the place at another time, then in
+    the conditions that were found.  The window of its entry is measured in place of neighbours.
     """
     completed = flights.live_flight(first)
     if not flights.request.asks_prevention or not completed.record.exists():
@@ -49,12 +50,12 @@ def confirm_crossing(flights: CaseFlights, first: Scenario) -> FailingScenario |
     if encounter is None:
         return None
     name, map = encounter.name, flights.map
+    clear = bare_scenario_around_marker(first, map, name)
     tried: list[Scenario] = []
-    for bare in (
-        bare_scenario_around_marker(first, map, name),
-        without_other_objects(first, map, name),
-    ):
-        scenario = straight_crossing(bare, encounter, map)
+    left = [(clear, encounter), (without_other_objects(first, map, name), encounter)]
+    while left:
+        bare, met = left.pop(0)
+        scenario = straight_crossing(bare, met, map)
         if scenario is None or scenario in tried or flights.left < 1 + FALLBACK_FLIGHTS:
             continue
         tried.append(scenario)
@@ -65,6 +66,10 @@ def confirm_crossing(flights: CaseFlights, first: Scenario) -> FailingScenario |
                 origin=first, scenario=scenario, behaviour=behaviour, flight=flight
             )
             return _with_window(flights, found, name)
+        if bare is clear and met is encounter and flight.record.exists():
+            again = retimed_encounter(encounter, load(flight.record))
+            if again is not None and flights.left >= 2 + _kept_flights(flights, first):
+                left.insert(0, (clear, again))
     return None
 
 
@@ -106,14 +111,28 @@ def _with_record(flights: CaseFlights, found: FailingScenario) -> FailingScenari
     return None
 
 
+def _kept_flights(flights: CaseFlights, first: Scenario) -> int:
+    """Return the flights that are kept for the ways after a crossing: for a lower grade, if any."""
+    story = _graded_story(flights, first)
+    has_lower_grade = story is not None and story.grade != CARELESS
+    return 1 + BARE_FLIGHTS if has_lower_grade else FALLBACK_FLIGHTS
+
+
+def _graded_story(flights: CaseFlights, first: Scenario) -> Story | None:
+    """Return the story of the object that was hit, None if it does not move by its own grade."""
+    name = find_colliding_object(flights.live_flight(first))
+    story = story_of(first, name) if name else None
+    return None if flights.request.job.npcs.grade else story
+
+
 def confirm_lower_grade(flights: CaseFlights, first: Scenario) -> FailingScenario | None:
     """Return the object that was hit, alone, in the lowest grade in which it is still hit.
 
     Grades are tried one by one, downwards.  Asked only where each object moves by its own story.
     """
     name = find_colliding_object(flights.live_flight(first))
-    story = story_of(first, name) if name else None
-    if story is None or flights.request.job.npcs.grade:
+    story = _graded_story(flights, first)
+    if story is None:
         return None
     alone = bare_scenario_around_marker(first, flights.map, name)
     lowest: Scenario | None = None

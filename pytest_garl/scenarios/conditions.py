@@ -18,6 +18,8 @@ LIGHT_GROUP = "light"
 TOLD_GROUP, TOLD_ERROR = "told", "told.error_m"
 NOON = 0.5
 """The nominal position of the sun."""
+MOST_NAMED = 2
+"""More values of one cause than these are counted and not named."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -26,11 +28,20 @@ class ActiveCondition:
 
     ``share`` (0..1) is how far its strongest value lies from nominal, as a share of all that can be
     flown; 0 if its values are only kinds, directions and times.  ``words`` say that value.
+    ``values`` say all that are not nominal; directions and times only if nothing else is there.
     """
 
     cause: str
     share: float
     words: str
+    values: tuple[str, ...]
+
+    @property
+    def named(self) -> str:
+        """Its values in words, ``dirt 30 %``; more than two are counted, ``5 values``."""
+        if len(self.values) > MOST_NAMED:
+            return f"{len(self.values)} values"
+        return ", ".join(self.values)
 
 
 def active_conditions(scenario: Scenario) -> tuple[ActiveCondition, ...]:
@@ -53,7 +64,9 @@ def _condition(cause: str, values: list[tuple[float, str]]) -> list[ActiveCondit
     if not values:
         return []
     share, words = max(values, key=lambda each: each[0])
-    return [ActiveCondition(cause=cause, share=round(min(1.0, share), 4), words=words)]
+    strong = tuple(text for part, text in values if part > 0)
+    share = round(min(1.0, share), 4)
+    return [ActiveCondition(cause=cause, share=share, words=words, values=strong or (words,))]
 
 
 def _weather(cause: str, name: str, gene: float) -> str:

@@ -15,11 +15,12 @@ def share_interval(count: int, total: int, level: float = 0.95) -> tuple[float, 
     """Return the exact (Clopper-Pearson) interval of ``count / total``, as fractions."""
     if total == 0:
         return 0.0, 1.0
-    from scipy.stats import beta
+    # The quantile of the beta distribution; scipy.stats takes a second to import.
+    from scipy.special import betaincinv
 
     tail = (1 - level) / 2
-    low = float(beta.ppf(tail, count, total - count + 1)) if count else 0.0
-    high = float(beta.ppf(1 - tail, count + 1, total - count)) if count < total else 1.0
+    low = float(betaincinv(count, total - count + 1, tail)) if count else 0.0
+    high = float(betaincinv(count + 1, total - count, 1 - tail)) if count < total else 1.0
     return low, high
 
 

@@ -11,6 +11,7 @@ import pytest
 from click.testing import CliRunner, Result
 
 from pytest_garl.cli import main
+from pytest_garl.execution.severity import Severity
 from pytest_garl.regressions.case import Case, Evidence, Prevention, Violation
 from pytest_garl.regressions.case_file import load_case
 from pytest_garl.regressions.corpus import Corpus, replace_file
@@ -128,6 +129,15 @@ def test_show_says_until_when_a_collision_was_preventable(file: Path) -> None:
     assert "sensor-limited: an escape exists 1.0 s before the contact, none 0.5 s" in output
     assert "It gates nothing: an escape exists, but the camera did not show the body" in output
     assert "open (sensor-limited)" in garl("list").output
+
+
+def test_show_says_which_adversary_the_violation_takes(file: Path) -> None:
+    person = Severity(about="body", grade="careless", type="person", objects=2, speed_mps=1.4)
+    case = dataclasses.replace(load_case(file), severity=person)
+    output = garl("show", replace_file(file, case)).output
+    assert (
+        "\nIt takes a careless person at 1.4 m/s, 1 other there (it knows nothing of the UAV).\n"
+    ) in output
 
 
 def test_promoted_case_gates_again(file: Path) -> None:

@@ -18,6 +18,13 @@ FOG = Severity(
     about="conditions", conditions=("fog",), largest="visibility 11 m", largest_share=0.9
 )
 
+CAMERA = Severity(
+    about="conditions",
+    conditions=("camera", "person-1"),
+    largest="dirt 15 %",
+    largest_share=0.18,
+)
+
 
 @pytest.mark.parametrize(
     ("severity", "text"),
@@ -27,7 +34,24 @@ FOG = Severity(
         (dataclasses.replace(PERSON, objects=2), "a careless person at 1.4 m/s, 1 other there"),
         (dataclasses.replace(PERSON, grade=""), "a person at 1.4 m/s"),
         (FOG, "fog alone, visibility 11 m"),
-        (dataclasses.replace(FOG, conditions=("fog", "wind")), "2 conditions: fog, wind"),
+        (dataclasses.replace(FOG, values=("visibility 11 m",)), "fog alone, visibility 11 m"),
+        (
+            dataclasses.replace(FOG, conditions=("rain",), values=("10 mm/h, wetness 80 %",)),
+            "rain alone, 10 mm/h, wetness 80 %",
+        ),
+        (
+            dataclasses.replace(CAMERA, conditions=("camera",), values=("5 values",)),
+            "camera alone, 5 values, most of all dirt 15 %",
+        ),
+        (
+            dataclasses.replace(CAMERA, values=("5 values", "")),
+            "2 conditions: camera (5 values), person-1",
+        ),
+        (
+            dataclasses.replace(CAMERA, values=("dirt 30 %", "")),
+            "2 conditions: camera (dirt 30 %), person-1",
+        ),
+        (CAMERA, "2 conditions: camera, person-1"),
         (
             dataclasses.replace(FOG, conditions=tuple("abcdef")),
             "6 conditions: a, b, c, d, 2 more",
@@ -73,6 +97,12 @@ def test_result_of_an_earlier_version_has_no_severity() -> None:
     values = json.loads(flight_result("IV:dog:descent:seen").dumps())
     del values["severity"]
     assert FlightResult.from_json(values).severity is None
+
+
+def test_severity_of_an_earlier_version_has_no_values() -> None:
+    values = json.loads(flight_result("II:lost", severity=FOG).dumps())
+    del values["severity"]["values"]
+    assert FlightResult.from_json(values).severity == FOG
 
 
 def test_report_holds_only_facts_that_count() -> None:

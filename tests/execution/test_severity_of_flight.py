@@ -117,6 +117,6 @@ def test_object_that_is_not_recorded_has_its_grade_and_type() -> None:
 def test_other_violation_says_its_conditions_and_its_objects() -> None:
     lost = flight_result("II:lost", outcome="gave_up", primary="time", violation_type="II").verdict
     foggy = ALONE.replace({"environment.fog": 0.5})
-    assert severity(foggy, verdict=lost).text == "2 conditions: fog, person-1"
+    assert severity(foggy, verdict=lost).text == "2 conditions: fog (visibility 20 m), person-1"
     alone = severity(foggy.without("person-1"), verdict=lost)
     assert (alone.text, alone.largest_share) == ("fog alone, visibility 20 m", 0.5)

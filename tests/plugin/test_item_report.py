@@ -125,12 +125,16 @@ def test_open_case_that_fails_in_another_way_fails_the_run(searched: pytest.Pyte
 
 
 def test_fixed_case_must_pass_with_its_moves_and_with_a_live_policy(
-    searched: pytest.Pytester,
+    searched: pytest.Pytester, monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    page = searched.path / "summary.md"
+    monkeypatch.setenv("GITHUB_STEP_SUMMARY", str(page))
     replace_text(cases(searched)[1], 'status = "open"', 'status = "fixed"\nlive = true')
     broken = run(searched)
     broken.assert_outcomes(passed=2, skipped=4, xfailed=1, failed=2)
     broken.stdout.fnmatch_lines(["*case-lawn-IV-dog-*-live*", "*was fixed and fails again.*"])
+    rows = [line for line in page.read_text().splitlines() if "case-lawn-IV-dog-" in line]
+    assert any(" | a hostile dog at 0.0 m/s for 14.2 s | `garl cases " in row for row in rows), rows
     replace_text(searched.path / "tiny_simulator.py", "> 0.7 and", "> 7 and")
     run(searched).assert_outcomes(passed=8, xfailed=1)
 

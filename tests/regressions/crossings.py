@@ -81,6 +81,7 @@ def encounter(
         place_m=(x, y, z if flies else 0.0),
         course_rad=course_rad,
         speed_mps=speed_mps,
+        uav_m=(x, y, z),
     )
 
 

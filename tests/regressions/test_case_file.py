@@ -196,10 +196,12 @@ CONDITIONS = Severity(
     about="conditions", conditions=("fog", "wind"), largest="visibility 11 m", largest_share=0.9
 )
 
+NAMED = dataclasses.replace(CONDITIONS, values=("visibility 11 m", "mean 3 m/s"))
+
 
 @pytest.mark.parametrize(
     "severity",
-    [BODY, dataclasses.replace(BODY, grade="", window_s=None), CONDITIONS, NO_SEVERITY],
+    [BODY, dataclasses.replace(BODY, grade="", window_s=None), CONDITIONS, NAMED, NO_SEVERITY],
 )
 def test_file_keeps_what_the_violation_takes(severity: Severity) -> None:
     severe = dataclasses.replace(case(), severity=severity)

@@ -16,7 +16,6 @@ from pytest_garl.regressions.investigation import MINIMUM_CASE_FLIGHTS
 from pytest_garl.regressions.reshrink import (
     MINIMUM_RESHRINK_FLIGHTS,
     CaseReshrinker,
-    _all_removed,
     is_simpler,
     no_worse,
     simplicity,
@@ -42,7 +41,7 @@ def saved(scenario: Scenario, *, neighbours_failed: int = 3) -> Case:
         system_sha256=JOB.system_sha256,
         simulator_sha256=simulator_sha256(BUILT_IN),
         neighbours_failed=neighbours_failed,
-        removed="0 of 4 objects, 1 of 15 genes off nominal",
+        removed="0 of 4 objects, 1 of 15 conditions",
     )
     names = [name for name in OBJECT_NAMES if name not in scenario.removed_objects]
     moves = tuple((name, ((0.0, 0.0), (0.5, -0.25))) for name in names)
@@ -127,16 +126,6 @@ def test_reshrinker_renews_evidence_of_other_sources() -> None:
     assert (better.id, better.scenario) == (case.id, case.scenario)
     assert better.evidence.simulator_sha256 == simulator_sha256(BUILT_IN)
     assert better.evidence.neighbours_failed == 3
-
-
-def test_removed_objects_and_genes_add_up() -> None:
-    one, two = (
-        "1 of 4 objects, 2 of 14 genes off nominal",
-        "2 of 3 objects, 5 of 12 genes off nominal",
-    )
-    assert _all_removed(one, two) == "3 of 4 objects, 7 of 14 genes off nominal"
-    assert _all_removed(one, "nothing") == one
-    assert _all_removed("nothing", two) == two
 
 
 def test_options_require_the_least_flights_of_their_modules() -> None:

@@ -3,6 +3,7 @@ from __future__ import annotations
 import dataclasses
 import math
 
+import numpy as np
 import pytest
 
 from landing_systems.opencv_mls import OpenCvLandingSystem
@@ -12,6 +13,7 @@ from pytest_garl.regressions.straight_crossing import (
     FARTHEST_M,
     Encounter,
     encounter_of,
+    retimed_encounter,
     shifted,
     straight_crossing,
     walked_m,
@@ -20,8 +22,10 @@ from pytest_garl.scenarios.object_types import OBJECT_TYPES
 from pytest_garl.scenarios.placement import marker_position_m, object_speed_mps, object_start_m
 from pytest_garl.scenarios.story import story_of
 from pytest_garl.scenarios.validity import problems
+from pytest_garl.simulation.flight import Flight
 from pytest_garl.simulation.fly import fly
 from tests.regressions.crossings import LAWN, NOMINAL, crossing, encounter
+from tests.support.collisions import hits_a_person
 
 PERSON = OBJECT_TYPES["person"]
 MET = Encounter(
@@ -32,6 +36,7 @@ MET = Encounter(
     place_m=(0.4, -0.3, 0.0),
     course_rad=0.3,
     speed_mps=2.6,
+    uav_m=(0.4, -0.3, 1.2),
 )
 
 
@@ -157,3 +162,28 @@ def test_flight_without_a_moving_body_met_nobody() -> None:
     # Some simulators record no objects.
     dog = dataclasses.replace(empty, contacts=hit("dog-1", "dog", "dynamic"))
     assert encounter_of(dog, LAWN) is None
+
+
+@pytest.mark.parametrize(
+    ("later_s", "aside_m", "again"),
+    [(2.0, 0.4, True), (-2.0, 0.4, True), (0.2, 0.4, False), (2.0, 3.0, False)],
+)
+def test_encounter_is_retimed_if_the_uav_was_there_at_another_time(
+    later_s: float, aside_m: float, again: bool
+) -> None:
+    met = dataclasses.replace(MET, time_s=10.0)
+    missed = descends(there_s=met.time_s + later_s, aside_m=aside_m)
+    found = retimed_encounter(met, missed)
+    expected = dataclasses.replace(met, time_s=met.time_s + later_s) if again else None
+    assert found == expected
+
+
+def descends(there_s: float, aside_m: float) -> Flight:
+    """Return a flight that is beside the place of ``MET`` at a time, and elsewhere before it."""
+    x, y, z = MET.uav_m
+    time_s = np.array([0.0, there_s - 1, there_s, there_s + 1])
+    heights = np.array([z + 9, z + 5, z, z - 1])
+    flight = hits_a_person()
+    position_m = np.stack([np.full(4, x + aside_m), np.full(4, y), heights], axis=1)
+    track = dataclasses.replace(flight.uav, time_s=time_s, position_m=position_m)
+    return dataclasses.replace(flight, uav=track)

@@ -86,6 +86,44 @@ def test_crossing_leaves_flights_for_the_scenario_as_found(tmp_path: Path) -> No
     assert (flights.flown, flights.left) == (1, 4)
 
 
+def late(folder: Path, later_s: float) -> CompletedFlight:
+    """Return a flight without collision, in which the UAV comes to the place so much later."""
+    flight = hits_a_person()
+    track = dataclasses.replace(flight.uav, time_s=flight.uav.time_s + later_s)
+    record = folder / "missed.npz"
+    save(dataclasses.replace(flight, uav=track, contacts=()), record)
+    return flown("", record)
+
+
+@pytest.mark.parametrize(
+    ("grade", "budget", "flown_crossings"),
+    [("careless", 12, 3), ("chasing", 12, 2), ("chasing", 13, 3)],
+)
+def test_crossing_is_timed_by_the_flight_that_missed_if_flights_are_left(
+    tmp_path: Path, grade: str, budget: int, flown_crossings: int
+) -> None:
+    crossings: list[Scenario] = []
+
+    def fly(job: FlightJob, scenario: Scenario) -> CompletedFlight:
+        assert job.npcs.name == "careless"
+        crossings.append(scenario)
+        return late(tmp_path, 3.0)
+
+    told = with_all_values({"grade": float(GRADES.index(grade))}, "person-1", "person")
+    foggy = dataclasses.replace(PERSON_ALONE, genes=(*PERSON_ALONE.genes, *told.items()))
+    found = repair(foggy.replace({"environment.fog": 0.1}), LAWN)
+    flights = flights_after(tmp_path, found, fly, budget=budget)
+    assert confirm_crossing(flights, found) is None
+    assert len(crossings) == flown_crossings
+    clear, *others = crossings
+    again = [each for each in others if each["environment.fog"] == 0]
+    assert len(again) == flown_crossings - 2
+    assert others[-1]["environment.fog"] == 0.1
+    for each in again:
+        later_s = each["person-1.delay_s"] - clear["person-1.delay_s"]
+        assert later_s == pytest.approx(3.0, abs=0.5)
+
+
 def test_lower_grades_are_tried_downwards(tmp_path: Path) -> None:
     grades: list[str] = []
 

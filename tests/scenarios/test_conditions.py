@@ -49,3 +49,26 @@ def test_direction_has_no_harsher_end() -> None:
     assert found.words == "mean 3 m/s"
     (turned,) = active_conditions(NOMINAL.replace({"light.turn_deg": 90.0}))
     assert (turned.cause, turned.share) == ("light", 0.0)
+
+
+def test_condition_names_two_values_and_counts_more() -> None:
+    camera = {"camera.dirt_percent": 30.0, "camera.exposure_ms": 10.0}
+    (two,) = active_conditions(NOMINAL.replace(camera))
+    assert two.named == "exposure 10 ms, dirt 30 %"
+    (three,) = active_conditions(NOMINAL.replace(camera | {"camera.mounting_yaw_deg": 3.0}))
+    assert three.named == "3 values"
+
+
+@pytest.mark.parametrize(
+    ("values", "named"),
+    [
+        ({"wind.mean_mps": 3.0, "wind.towards_deg": 90.0}, "mean 3 m/s"),
+        ({"decoy-1.kind": 7.0, "decoy-1.x_m": 4.0, "decoy-1.yaw_deg": 9.0}, "qr-code"),
+        ({"light.turn_deg": 90.0}, "sun 60 degrees high"),
+    ],
+)
+def test_place_or_direction_is_not_named_beside_anything_else(
+    values: dict[str, float], named: str
+) -> None:
+    (found,) = active_conditions(NOMINAL.replace(values))
+    assert found.named == named

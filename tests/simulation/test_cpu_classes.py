@@ -99,7 +99,16 @@ SHORT = case_of_each(lambda case: length(case) >= 25, min)
 ROBUST = case_of_each(lambda case: not case.edge, max)
 
 
-def flown_by_a_child(cases: Sequence[Found] = SHORT) -> list[tuple[str, str]]:
+OPENCV, OTHERS = (
+    [each for each in SHORT if ("opencv" in each[1].system) is is_opencv]
+    for is_opencv in (True, False)
+)
+"""The landing system whose flights take a second, and those whose flights take several."""
+ENDS = ("Haswell", "without AVX2")
+"""The setting of the class itself, and that which differs most from it."""
+
+
+def flown_by_a_child(cases: Sequence[Found]) -> list[tuple[str, str]]:
     """Return verdict and hash of each case, flown as a search flies."""
     flown = []
     with temporary_pool(1) as (ledger, pool):
@@ -120,13 +129,13 @@ def flown_by_a_child(cases: Sequence[Found] = SHORT) -> list[tuple[str, str]]:
     return flown
 
 
-def flown_unpinned(setting: dict[str, str]) -> dict[str, Any]:
+def flown_unpinned(setting: dict[str, str], cases: Sequence[Found]) -> dict[str, Any]:
     """Fly in a process that chooses its instructions by itself, as this setting lets it."""
     pinned = cpu_dispatch.environment()
     outside = {name: value for name, value in os.environ.items() if name not in pinned}
     # That NumPy does not know a group, or the CPU does not have it, is only a warning.
     done = subprocess.run(
-        [sys.executable, "-W", "ignore", "-c", FLY, *(str(path) for path, _ in ROBUST)],
+        [sys.executable, "-W", "ignore", "-c", FLY, *(str(path) for path, _ in cases)],
         env={**outside, **cpu_dispatch.THREADS, **setting},
         cwd=ROOT,
         capture_output=True,
@@ -143,22 +152,32 @@ def test_there_is_a_case_of_each_landing_system() -> None:
 
 @needs_avx2
 @pytest.mark.sim
-def test_one_hash_under_every_setting(monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.parametrize(
+    ("cases", "settings"),
+    [
+        pytest.param(OPENCV, tuple(SETTINGS), id="opencv"),
+        *(pytest.param([each], ENDS, id=each[1].system) for each in OTHERS),
+        pytest.param(OTHERS, tuple(SETTINGS), id="others", marks=pytest.mark.long),
+    ],
+)
+def test_one_hash_under_every_setting(
+    monkeypatch: pytest.MonkeyPatch, cases: Sequence[Found], settings: Sequence[str]
+) -> None:
     flown = {}
-    for name, setting in SETTINGS.items():
+    for name in settings:
         with monkeypatch.context() as outside:
-            for key, value in setting.items():
+            for key, value in SETTINGS[name].items():
                 outside.setenv(key, value)
-            flown[name] = flown_by_a_child()
-    assert flown == dict.fromkeys(SETTINGS, flown["Haswell"])
+            flown[name] = flown_by_a_child(cases)
+    assert flown == dict.fromkeys(settings, flown["Haswell"])
 
 
 @needs_avx2
 @pytest.mark.sim
 def test_the_command_flies_as_children_do(tmp_path: Path) -> None:
-    path, case = SHORT[0]
+    path, case = OPENCV[0]
     # The flight of the file may be one of an earlier simulator.
-    ((signature, sha256),) = flown_by_a_child(SHORT[:1])
+    ((signature, sha256),) = flown_by_a_child(OPENCV)
     evidence = replace(case.evidence, trajectory_sha256=sha256, cpu=cpu_dispatch.BASELINE)
     path = tmp_path / path.name
     path.write_text(dump_case(replace(case, evidence=evidence)))
@@ -175,11 +194,19 @@ def test_the_command_flies_as_children_do(tmp_path: Path) -> None:
 
 @needs_avx2
 @pytest.mark.sim
-def test_without_the_pin_bytes_differ_and_are_refused() -> None:
-    avx2, old = flown_unpinned(cpu_dispatch.environment()), flown_unpinned(WITHOUT_AVX2)
+@pytest.mark.parametrize(
+    "cases",
+    [
+        pytest.param(ROBUST[1:], id="two systems"),
+        pytest.param(ROBUST, id="all systems", marks=pytest.mark.long),
+    ],
+)
+def test_without_the_pin_bytes_differ_and_are_refused(cases: Sequence[Found]) -> None:
+    avx2 = flown_unpinned(cpu_dispatch.environment(), cases)
+    old = flown_unpinned(WITHOUT_AVX2, cases)
     assert not avx2["refused"]
     assert "expected x86_64-avx2-haswell" in old["refused"]
-    assert avx2["cpus"] == [cpu_dispatch.BASELINE] * 3
+    assert avx2["cpus"] == [cpu_dispatch.BASELINE] * len(cases)
     assert cpu_dispatch.BASELINE not in old["cpus"]
     assert avx2["product"] != old["product"]
     assert avx2["hashes"] != old["hashes"]

@@ -7,15 +7,13 @@ import functools
 import math
 from typing import Any
 
-import gymnasium
 import numpy as np
-from numpy.typing import NDArray
 
 from pytest_garl.adversary.grades import GRADE_LIMITS
 from pytest_garl.adversary.interference import Belief, Interference
-from pytest_garl.adversary.observations import ENCODINGS, LIMIT
 from pytest_garl.adversary.training import rewards
 from pytest_garl.adversary.training.episode import Episode, draw_episode
+from pytest_garl.adversary.training.one_npc_env import Observation, OneNpcEnv
 from pytest_garl.adversary.training.presets import Surrogate
 from pytest_garl.adversary.training.surrogate import SurrogateEnv
 from pytest_garl.adversary.training.uav_models import (
@@ -33,7 +31,6 @@ from pytest_garl.scenarios.task import Start
 from pytest_garl.scenarios.validity import repair
 from pytest_garl.simulation.npc_policy import Move, Situation
 
-Observation = NDArray[np.float32]
 START_HEIGHTS_M = (3.0, 11.0)
 START_OFFSET_M = 4.0
 LATEST_COMING_S = 8.0
@@ -47,7 +44,7 @@ BEYOND_SIGHT_M = 2.0
 _TRIES = 100
 
 
-class GradedEnv(gymnasium.Env[Observation, np.int64]):
+class GradedEnv(OneNpcEnv):
     """One NPC that decides while it perceives the UAV; a step is one decision of its grade.
 
     The observation and the actions are those of the encoding ``belief``.  ``info`` holds
@@ -55,16 +52,8 @@ class GradedEnv(gymnasium.Env[Observation, np.int64]):
     to leave; a step after the end changes nothing.
     """
 
-    metadata = {"render_modes": []}  # noqa: RUF012
-
     def __init__(self, surrogate: Surrogate) -> None:
-        self.surrogate = surrogate
-        self._encoding = ENCODINGS[surrogate.state]
-        self.observation_space = gymnasium.spaces.Box(
-            -LIMIT, LIMIT, (self._encoding.size,), np.float32
-        )
-        self.action_space = gymnasium.spaces.Discrete(self._encoding.actions)
-        self._episode: Episode | None = None
+        super().__init__(surrogate)
         self.belief: Belief | None = None
         self._state = np.zeros(self._encoding.size, np.float32)
 
@@ -99,12 +88,6 @@ class GradedEnv(gymnasium.Env[Observation, np.int64]):
             discount=self.surrogate.discount,
         )
         return self._state, reward, not goes_on, False, self._info()
-
-    def close(self) -> None:
-        """Free the physics of the last episode."""
-        if self._episode is not None:
-            self._episode.close()
-            self._episode = None
 
     def _begin(self) -> None:
         rng, surrogate = self.np_random, self.surrogate
@@ -147,11 +130,6 @@ class GradedEnv(gymnasium.Env[Observation, np.int64]):
     def _distance_m(self) -> float:
         situation: Situation = self._current().situations[0]
         return rewards.column_distance_m(situation.self.position_m, situation.uav_position_m)
-
-    def _current(self) -> Episode:
-        if self._episode is None:
-            raise gymnasium.error.ResetNeeded("reset() comes before the first step()")
-        return self._episode
 
 
 def env_of(surrogate: Surrogate) -> GradedEnv | SurrogateEnv:

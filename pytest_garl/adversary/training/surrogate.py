@@ -5,14 +5,11 @@ from __future__ import annotations
 import functools
 from typing import Any
 
-import gymnasium
 import numpy as np
-from numpy.typing import NDArray
 
-from pytest_garl.adversary.observations import ENCODINGS, LIMIT
 from pytest_garl.adversary.training import rewards
 from pytest_garl.adversary.training.episode import Episode, draw_episode, in_any_environment
-from pytest_garl.adversary.training.presets import Surrogate
+from pytest_garl.adversary.training.one_npc_env import Observation, OneNpcEnv
 from pytest_garl.adversary.training.uav_models import (
     AvoidanceParameters,
     AvoidingPilot,
@@ -20,27 +17,14 @@ from pytest_garl.adversary.training.uav_models import (
     StraightPilot,
 )
 
-Observation = NDArray[np.float32]
 
-
-class SurrogateEnv(gymnasium.Env[Observation, np.int64]):
+class SurrogateEnv(OneNpcEnv):
     """One NPC, a marker at a fixed place, a UAV from take-off to landing or collision.
 
     Actions are those of the state's encoding, one every 0.5 s; the observation is its vector.
     ``info`` holds ``collided``, ``outcome`` and, with the paper's reward, ``hidden``, the share of
     the marker in the frame that is covered.  A step after the end changes nothing.
     """
-
-    metadata = {"render_modes": []}  # noqa: RUF012
-
-    def __init__(self, surrogate: Surrogate) -> None:
-        self.surrogate = surrogate
-        self._encoding = ENCODINGS[surrogate.state]
-        self.observation_space = gymnasium.spaces.Box(
-            -LIMIT, LIMIT, (self._encoding.size,), np.float32
-        )
-        self.action_space = gymnasium.spaces.Discrete(self._encoding.actions)
-        self._episode: Episode | None = None
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
@@ -91,17 +75,6 @@ class SurrogateEnv(gymnasium.Env[Observation, np.int64]):
                 discount=self.surrogate.discount,
             )
         return observation, reward, ended, late, info
-
-    def close(self) -> None:
-        """Free the physics of the last episode."""
-        if self._episode is not None:
-            self._episode.close()
-            self._episode = None
-
-    def _current(self) -> Episode:
-        if self._episode is None:
-            raise gymnasium.error.ResetNeeded("reset() comes before the first step()")
-        return self._episode
 
     def _observe(self) -> tuple[Observation, dict[str, Any]]:
         episode = self._current()

@@ -17,11 +17,11 @@ class _StopError(Exception):
 
 @pytest.mark.sim
 def test_a_killed_training_continues_to_the_same_weights(tmp_path: Path) -> None:
-    training = Training(episodes=6, warm_up=64)
+    training = Training(episodes=4, warm_up=64)
     whole = train(OURS, training)
 
     def stop(record: EpisodeRecord) -> None:
-        if record.episode == 4:
+        if record.episode == 2:
             raise _StopError
 
     checkpoint = tmp_path / "half.pt"

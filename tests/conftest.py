@@ -1,0 +1,28 @@
+"""What all tests that run pytest in processes of their own share."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import pytest
+
+WITHOUT_HYPOTHESIS = "-p no:hypothesispytest"
+"""Hypothesis's plugin imports all of Hypothesis at the end of each run, which takes longer than
+flying; nothing in the projects of these tests uses it.  The tutorial runs with it."""
+
+
+@pytest.fixture(scope="session", autouse=True)
+def faster_runs() -> Iterator[None]:
+    """Let runs of pytest in other processes start without Hypothesis's plugin."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("PYTEST_ADDOPTS", WITHOUT_HYPOTHESIS)
+        yield
+
+
+@pytest.fixture(autouse=True)
+def faster_runs_of_pytester(request: pytest.FixtureRequest) -> None:
+    """Do so for ``pytester``, too, which drops the options of the environment."""
+    if "pytester" in request.fixturenames:
+        patch: pytest.MonkeyPatch = request.getfixturevalue("monkeypatch")
+        request.getfixturevalue("pytester")
+        patch.setenv("PYTEST_ADDOPTS", WITHOUT_HYPOTHESIS)
