@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from pytest_garl.execution.flight_id import CompletedFlight
@@ -69,12 +69,19 @@ class CaseRequest:
 
         Those of collisions with moving bodies are in the order of severity, weak adversaries first.
         """
-        found = dict(self.violations)
-        first, others = self.violations[:1], self.violations[1:]
         return [
-            *(scenario for scenario, _ in first),
-            *sorted((each for each, _ in others), key=lambda each: self._order(found, each)),
+            *(scenario for scenario, _ in self.violations[:1]),
+            *self._sorted(self.violations[1:]),
         ]
+
+    @property
+    def simplest(self) -> Scenario:
+        """The scenario of the simplest or least severe violation."""
+        return self._sorted(self.violations)[0]
+
+    def _sorted(self, violations: Sequence[tuple[Scenario, CompletedFlight]]) -> list[Scenario]:
+        found = dict(violations)
+        return sorted(found, key=lambda each: self._order(found, each))
 
     def _order(
         self, found: Mapping[Scenario, CompletedFlight], scenario: Scenario

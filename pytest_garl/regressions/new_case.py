@@ -39,7 +39,7 @@ def case_without_flights(request: CaseRequest) -> CaseResult:
             reason="not flown again without people, dogs and birds: no flights are left",
             finding=request.finding,
         )
-    scenario = request.scenarios[0]
+    scenario = request.simplest
     flight = dict(request.violations)[scenario]
     failing = FailingScenario(
         origin=scenario,
