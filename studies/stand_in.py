@@ -13,7 +13,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -23,22 +22,13 @@ from pytest_garl.scenarios.groups.decoys import KINDS
 from pytest_garl.scenarios.maps.map import Map
 from pytest_garl.scenarios.placement import (
     marker_position_m,
-    object_altitude_m,
-    object_speed_mps,
-    object_start_m,
-    object_type,
     told_position_m,
 )
 from pytest_garl.scenarios.scenario import Scenario
-from pytest_garl.scenarios.story import LIMITS_S, Story, story_of
-from pytest_garl.verdicts.verdict import Margin, MarginName, PropertyName, Verdict, ViolationType
+from pytest_garl.verdicts.verdict import Margin, MarginName, Verdict
+from studies.stand_in_way import TAKE_OFF_S, Event, Way, meet_bodies
 
-HIGH_M = 10.0
-TAKE_OFF_S = 5.0
 CRUISE_MPS = 3.0
-DESCENT_MPS = 1.2
-STEP_S = 0.1
-HULL_M = 0.5
 DISTANCE_M, TIME_S = 0.75, 120.0
 READABLE, READ = 0.25, 0.45
 """Clearness from which on the marker could be read, and is read by the landing."""
@@ -58,61 +48,6 @@ LOSSES = (
 """Gene, its largest value, and the optical depth at that value; it grows with the square."""
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class _Event:
-    """Something that ends the landing: when, its signature, type and property."""
-
-    time_s: float
-    signature: str
-    type: ViolationType
-    property: PropertyName
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class _Way:
-    """The way of the UAV: over the told coordinate, to the marker, down."""
-
-    start_m: tuple[float, float]
-    told_m: tuple[float, float]
-    marker_m: tuple[float, float]
-    over_told_s: float
-    descends_s: float
-
-    @property
-    def lands_s(self) -> float:
-        return self.descends_s + HIGH_M / DESCENT_MPS
-
-    @property
-    def phases_s(self) -> tuple[float, float, float, float]:
-        """When the phases of stories begin."""
-        return (
-            0.0,
-            self.descends_s + (HIGH_M - 8.0) / DESCENT_MPS,
-            self.descends_s + (HIGH_M - 3.0) / DESCENT_MPS,
-            self.lands_s,
-        )
-
-    def at(self, time_s: float) -> tuple[float, float, float]:
-        """Return where the UAV is."""
-        if time_s < TAKE_OFF_S:
-            return (*self.start_m, HIGH_M * time_s / TAKE_OFF_S)
-        ends, times = (self.start_m, self.told_m), (TAKE_OFF_S, self.over_told_s)
-        if time_s > self.over_told_s:
-            ends, times = (self.told_m, self.marker_m), (self.over_told_s, self.descends_s)
-        share = min(1.0, (time_s - times[0]) / max(1e-6, times[1] - times[0]))
-        x, y = (a + share * (b - a) for a, b in zip(*ends, strict=True))
-        return x, y, max(0.0, HIGH_M - DESCENT_MPS * max(0.0, time_s - self.descends_s))
-
-    def phase(self, time_s: float) -> str:
-        """Return the name of the phase, as signatures say it."""
-        height = self.at(time_s)[2]
-        if time_s < self.over_told_s:
-            return "take-off" if time_s < TAKE_OFF_S else "transit"
-        if time_s < self.descends_s:
-            return "search"
-        return "last-metre" if height < 1.0 else "descent" if height < 8.0 else "approach"
-
-
 def stand_in(scenario: Scenario, map: Map) -> FlightResult:
     """Return the result of a landing in a scenario of `field`."""
     told, marker = told_position_m(scenario, map), marker_position_m(scenario, map)
@@ -124,7 +59,7 @@ def stand_in(scenario: Scenario, map: Map) -> FlightResult:
     clear = _clearness(scenario)
     if clear < 0.6:
         searches_s *= 1 + 8 * (0.6 - clear)
-    way = _Way(
+    way = Way(
         start_m=(map.uav_start_m[0], map.uav_start_m[1]),
         told_m=told,
         marker_m=marker,
@@ -132,8 +67,8 @@ def stand_in(scenario: Scenario, map: Map) -> FlightResult:
         descends_s=over_told_s + searches_s,
     )
     off_m = _off_m(scenario, way, rng)
-    events: list[_Event] = []
-    gaps = _bodies(scenario, map, way, events)
+    events: list[Event] = []
+    gaps = meet_bodies(scenario, map, way, events)
     static_m = scenario["pad.clearance_m"] - 0.3 - 0.7 * off_m
     margins: dict[MarginName, float] = {
         "distance": DISTANCE_M - off_m,
@@ -171,14 +106,14 @@ def _losses(scenario: Scenario) -> list[tuple[str, float, float]]:
     return [each for each in LOSSES if each[0] in known]
 
 
-def _covers(scenario: Scenario, name: str, way: _Way) -> float:
+def _covers(scenario: Scenario, name: str, way: Way) -> float:
     """Return for how long an event lasts while the UAV comes down."""
     begins = scenario[f"{name}.from_s"]
     ends = begins + scenario[f"{name}.lasts_s"]
     return max(0.0, min(ends, way.lands_s) - max(begins, way.descends_s))
 
 
-def _off_m(scenario: Scenario, way: _Way, rng: np.random.Generator) -> float:
+def _off_m(scenario: Scenario, way: Way, rng: np.random.Generator) -> float:
     """Return how far from the marker the UAV comes down."""
     wind, late_s = scenario["wind.mean_mps"], scenario["timing.latency_ms"] / 1000
     gust = wind * scenario["wind.turbulence"]
@@ -226,10 +161,10 @@ def _nearest_decoy_m(
 
 def _on_the_ground(
     scenario: Scenario,
-    way: _Way,
+    way: Way,
     margins: Mapping[MarginName, float],
     clear: float,
-    events: list[_Event],
+    events: list[Event],
 ) -> bool:
     """Add what goes wrong without a moving body; return whether nobody could have landed."""
     lands = way.lands_s
@@ -241,7 +176,7 @@ def _on_the_ground(
         taken = kind == "same-id-without-margin" or (clear < 0.7 and kind in ("helipad-h", "grate"))
         if nearer and taken:
             events.append(
-                _Event(
+                Event(
                     time_s=lands - 0.5,
                     signature=f"I:decoy-{kind}:seen",
                     type="I",
@@ -253,17 +188,17 @@ def _on_the_ground(
             return True
         cause = "never-seen" if clear < 0.35 else "lost:search"
         events.append(
-            _Event(time_s=way.over_told_s + 30, signature=f"II:{cause}", type="II", property="time")
+            Event(time_s=way.over_told_s + 30, signature=f"II:{cause}", type="II", property="time")
         )
     elif clear < 0.55 and black_s + hidden_s > 1.0:
         events.append(
-            _Event(
+            Event(
                 time_s=way.descends_s + 6, signature="II:lost:descent", type="II", property="time"
             )
         )
     elif black_s + hidden_s > 3.5:
         events.append(
-            _Event(
+            Event(
                 time_s=way.descends_s + 7,
                 signature="II:gave-up-in-sight:descent",
                 type="II",
@@ -274,7 +209,7 @@ def _on_the_ground(
         kind = "tree" if way.marker_m[0] > 0 else "bench"
         phase = "descent" if margins["distance"] < 0.3 else "last-metre"
         events.append(
-            _Event(
+            Event(
                 time_s=lands - 1.0,
                 signature=f"III:{kind}:{phase}",
                 type="III",
@@ -286,88 +221,23 @@ def _on_the_ground(
         far = margins["distance"] < -0.75
         signature = f"I:nothing:{seen}" if far else f"off:{seen}"
         events.append(
-            _Event(
+            Event(
                 time_s=lands, signature=signature, type="I" if far else "off", property="distance"
             )
         )
     if margins["touchdown_speed"] < 0:
-        events.append(
-            _Event(time_s=lands, signature="hard:fast", type="hard", property="collision")
-        )
+        events.append(Event(time_s=lands, signature="hard:fast", type="hard", property="collision"))
     if margins["slide"] < 0:
         events.append(
-            _Event(
-                time_s=lands + 0.5, signature="slid:motors-off", type="slid", property="distance"
-            )
+            Event(time_s=lands + 0.5, signature="slid:motors-off", type="slid", property="distance")
         )
     return False
 
 
-def _bodies(
-    scenario: Scenario, map: Map, way: _Way, events: list[_Event]
-) -> list[tuple[float, str, str]]:
-    """Add the contacts; return each body's least gap, the signature of a contact, its name."""
-    gaps = []
-    for name, _ in map.without(scenario.removed_objects).present_objects:
-        story = story_of(scenario, name)
-        if story is None or object_speed_mps(scenario, map, name) <= 0:
-            continue
-        gap, at_s, seen = _least_gap(scenario, map, way, name, story)
-        kind = object_type(scenario, map, name).name
-        signature = f"IV:{kind}:{way.phase(at_s)}:{'seen' if seen else 'unseen'}"
-        gaps.append((max(0.0, gap), signature, name))
-        if gap <= 0:
-            events.append(_Event(time_s=at_s, signature=signature, type="IV", property="collision"))
-    return gaps
-
-
-def _least_gap(
-    scenario: Scenario, map: Map, way: _Way, name: str, story: Story
-) -> tuple[float, float, bool]:
-    """Return the least gap between the UAV and a body, when it was, and whether it was in view."""
-    kind, speed = object_type(scenario, map, name), object_speed_mps(scenario, map, name)
-    x, y = object_start_m(scenario, map, name)
-    cx, cy = (a + b for a, b in zip(way.marker_m, story.crossing_m, strict=True))
-    begins = story.begins_s(way.phases_s)
-    middle = object_altitude_m(scenario, map, name)
-    stays_until, met_s, crossed = math.inf, math.inf, False
-    best = (10.0, 0.0, False)
-    for step in range(round((way.lands_s + 3) / STEP_S)):
-        now = step * STEP_S
-        ux, uy, uz = way.at(now)
-        if now >= begins:
-            if story.grade == "careless":
-                tx, ty = (cx, cy) if not crossed else (2 * cx - x, 2 * cy - y)
-                if not crossed and math.dist((x, y), (cx, cy)) < speed * STEP_S + 0.05:
-                    crossed, stays_until = True, now + story.pause_s
-                going = not crossed or now >= stays_until
-                tx, ty = (tx, ty) if not crossed else (cx + 30.0, cy)
-            else:
-                sees = math.dist((x, y, 1.0), (ux, uy, uz)) < (
-                    10 if story.grade == "curious" else 20
-                )
-                met_s = min(met_s, now) if sees else met_s
-                over = now > met_s + min(story.lasts_s, LIMITS_S[story.grade])
-                tx, ty = (x + 30.0, y) if over else (ux, uy) if sees else way.marker_m
-                keeps = 2.0 if story.grade == "curious" and not kind.flies else 0.0
-                going = over or math.dist((x, y), (tx, ty)) > max(keeps, 0.1)
-            left = math.dist((x, y), (tx, ty))
-            if going and left > 1e-6:
-                share = min(1.0, speed * STEP_S / left)
-                x, y = x + share * (tx - x), y + share * (ty - y)
-        low = middle - (story.stoop_m if kind.flies else 0.0) + kind.low_m
-        low = max(1.0, low) if kind.flies else 0.0
-        above = max(0.0, uz - (low + kind.height_m), low - uz - 0.5)
-        gap = max(math.dist((x, y), (ux, uy)) - kind.radius_m - HULL_M, above)
-        if gap < best[0]:
-            best = gap, now, speed < 2.5 or uz > 3
-    return best
-
-
 def _result(
-    way: _Way,
+    way: Way,
     margins: Mapping[MarginName, float],
-    events: list[_Event],
+    events: list[Event],
     gaps: list[tuple[float, str, str]],
     off_m: float,
     *,

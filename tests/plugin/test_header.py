@@ -15,7 +15,7 @@ def test_header_forecasts_search_and_shrinking(pytester: pytest.Pytester) -> Non
         [
             "garl: * 1 worker; about 28 s per system and map, shrinking included",
             "garl: 2 searches, about 57 s, shrinking included",
-            "garl: confirming and shrinking 4 new kinds of violation*, at most * flight*, about *s",
+            "garl: confirming and shrinking 3 new kinds of violation*, at most * flight*, about *s",
         ]
     )
 

@@ -59,7 +59,7 @@ def test_violating_abort_fails_an_item_although_the_first_is_skipped(
 def test_passing_item_excuses_no_other(pytester: pytest.Pytester) -> None:
     project(pytester)
     # Both slots are hit by the dog; the only selected test of the first one skips.
-    selected = ("test_it.py::test_time[lawn-g00-s01]", "test_it.py::test_collisions[lawn-g00-s02]")
+    selected = ("test_it.py::test_time[lawn-g00-s02]", "test_it.py::test_collisions[lawn-g00-s07]")
     result = run(pytester, *SEARCH_ALL, *selected)
     result.assert_outcomes(skipped=1, failed=1)
     assert result.ret == pytest.ExitCode.TESTS_FAILED
@@ -134,7 +134,7 @@ def test_pytest_fail_counts_as_an_assertion(pytester: pytest.Pytester) -> None:
     outcomes = result.parseoutcomes()
     assert outcomes["failed"] == 1
     assert outcomes["xfailed"] > 1
-    result.stdout.fnmatch_lines(["*same violation as lawn-g00-s01 (IV:dog:*"])
+    result.stdout.fnmatch_lines(["*same violation as lawn-g00-s02 (IV:dog:*"])
 
 
 OWN = """
@@ -144,7 +144,7 @@ def is_below(value, limit):
     np.testing.assert_array_less(value, limit)
 
 def test_own(landing, scenario):
-    is_below(scenario["environment.snow"], 0.07)
+    is_below(scenario["environment.snow"], 0.12)
     is_below(landing.flight.elapsed_s, 14.0 if scenario["environment.rain"] > 0.07 else 15.0)
 """
 
@@ -210,7 +210,7 @@ def test_rerun_item_does_not_excuse_itself(
     project(pytester, system)
     conftest = (pytester.path / "conftest.py").read_text()
     pytester.makeconftest(f"{conftest}\n{TWICE}")
-    result = run(pytester, "--garl-budget=8", "--garl-workers=0")
+    result = run(pytester, "--garl-budget=16", "--garl-workers=0")
     assert result.parseoutcomes()["failed"] == failures
     assert result.parseoutcomes()["xfailed"] > 1
 
@@ -264,8 +264,8 @@ def test_ground_contact_before_an_abort_fails_the_search(
     conftest.write_text(conftest.read_text().replace("tiny_simulator", "gives_up"))
     # In fog it comes down 3 m off the marker.
     result = run(pytester, "--garl-budget=6", "--garl-workers=0", "--garl-domain=paper-full")
-    outcomes = result.parseoutcomes()
-    assert outcomes["failed"] == 1
+    # Elsewhere it gives up above the marker, needlessly.
+    assert result.parseoutcomes()["failed"] == 2
     assert result.ret == pytest.ExitCode.TESTS_FAILED
     result.stdout.fnmatch_lines(["*Touched the ground 3.0 m off the marker before it gave up*"])
     result.stdout.fnmatch_lines(["* I:nothing:unseen * pytest test_it.py --garl-repeat=lawn-g*"])

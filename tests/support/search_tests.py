@@ -18,7 +18,7 @@ def write_tests(pytester: pytest.Pytester, system: str, tests: str) -> None:
 
 COLLISIONS = "\ndef test_collisions(landing):\n    assert not landing.collisions\n"
 DISTANCE = "\ndef test_distance(landing):\n    assert landing.distance_to_landing_m <= 1.5\n"
-HIT = "collided with dog-1 at 1.0 m/s, 0.0 m up, over the marker"
+HIT = "collided with dog-1 at 1.0 m/s, 0.0 m up, 3.0 m east of the marker"
 """The headline of the dog in the tiny simulator."""
 SEARCH_ALL = ("--garl-budget=24", "--garl-workers=0", "-rfx")
 

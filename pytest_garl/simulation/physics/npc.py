@@ -170,7 +170,7 @@ class Npc:
         )
         self._reserve_m = reserve_after(self.type, self._reserve_m, speed, dt_s)
         vx, vy = speed * math.cos(course), speed * math.sin(course)
-        solids = [*self._solids_in_reach, *self._objects_in_reach(others)]
+        solids = [*self._solids_in_reach, *_objects_in_reach(self, others)]
         if solids:
             least = self.type.least_speed_mps if self.flies else 0.0
             place, radius = (self.x_m, self.y_m), self.type.radius_m
@@ -233,24 +233,25 @@ class Npc:
         for speed in speeds_mps:
             self._reserve_m = reserve_after(self.type, self._reserve_m, speed, dt_s)
 
-    def _objects_in_reach(self, others: Sequence[Npc]) -> list[Disc]:
-        """Return the other objects that it could touch: near enough, and of overlapping heights."""
-        return [
-            Disc(
-                name=other.name,
-                x_m=other.x_m,
-                y_m=other.y_m,
-                radius_m=other.type.radius_m,
-                low_m=other.low_m,
-                high_m=other.high_m,
-            )
-            for other in others
-            if abs(other.x_m - self.x_m) < _CONTACT_RANGE_M
-            and abs(other.y_m - self.y_m) < _CONTACT_RANGE_M
-            and other is not self
-            and other.low_m < self.high_m
-            and self.low_m < other.high_m
-        ]
+
+def _objects_in_reach(npc: Npc, others: Sequence[Npc]) -> list[Disc]:
+    """Return the other objects that it could touch: near enough, and of overlapping heights."""
+    return [
+        Disc(
+            name=other.name,
+            x_m=other.x_m,
+            y_m=other.y_m,
+            radius_m=other.type.radius_m,
+            low_m=other.low_m,
+            high_m=other.high_m,
+        )
+        for other in others
+        if abs(other.x_m - npc.x_m) < _CONTACT_RANGE_M
+        and abs(other.y_m - npc.y_m) < _CONTACT_RANGE_M
+        and other is not npc
+        and other.low_m < npc.high_m
+        and npc.low_m < other.high_m
+    ]
 
 
 def _solids_at_height_of(npc: Npc, lowest_m: float, bodies: Sequence[Body]) -> tuple[Disc, ...]:
