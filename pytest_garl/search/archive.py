@@ -10,7 +10,6 @@ could have seen the marker.
 from __future__ import annotations
 
 from collections import Counter, defaultdict
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -19,7 +18,7 @@ from pytest_garl.execution.result import FlightResult
 from pytest_garl.execution.severity import Severity
 from pytest_garl.search.columns import Columns
 from pytest_garl.search.method import FlownScenario
-from pytest_garl.search.objectives import near_misses, violation_proximity
+from pytest_garl.search.objectives import near_misses
 from pytest_garl.search.operators import Matrix
 
 EXCUSED = "excused"
@@ -39,7 +38,6 @@ ANSWERS = {
     "distance": ("off", "I", "slid"),
     "tracking": ("off", "I"),
     "time": ("late",),
-    "static": ("III",),
     "touchdown_speed": ("hard",),
     "touchdown_tilt": ("hard",),
     "dropout": ("II",),
@@ -117,8 +115,3 @@ class Archive:
         """Return the order within the cell of a violation: least severe, nearest to nominal."""
         key = (result.severity or Severity()).key
         return (*key, self._columns.distance_from_nominal(row))
-
-
-def proximities(flown: Sequence[FlownScenario]) -> list[tuple[float, ...]]:
-    """Return each flight's proximity to a violation, for the ledger."""
-    return [(violation_proximity(item.result),) for item in flown]

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from pytest_garl.scenarios.sparse import OFF, ON
-from pytest_garl.search.columns import Columns, Mask, OptionalGene
+from pytest_garl.search.columns import Columns, Mask
 from pytest_garl.search.exploration import Exploration
 from pytest_garl.search.operators import LARGEST_STEP, Matrix, local_steps
 
@@ -31,9 +31,8 @@ class Breeding:
 
     def __init__(self, columns: Columns, exploration: Exploration) -> None:
         self._columns, self._exploration = columns, exploration
-        self._always = np.array(
-            [name not in {gene.name for gene in columns.optional} for name in columns.owner]
-        )
+        optional = {gene.name for gene in columns.optional}
+        self._always = np.array([name not in optional for name in columns.owner])
 
     def child(
         self,
@@ -49,17 +48,17 @@ class Breeding:
         ``donor`` is the chromosome of another flight, ``body`` the NPC that a near miss or a
         collision is about, empty without one; ``nearness`` is the proximity to a violation.
         """
-        child = row.copy()
-        match way:
-            case "harden":
-                child = self._harden(row, rng)
-            case "soften":
-                child = self._soften(row, rng)
-            case "graft":
-                child = self._graft(row, donor, body, rng)
-            case "redraw":
-                child = self._redraw(row, body, rng)
-        if way == STEP or np.array_equal(child, row):
+        child = row
+        if way == HARDEN:
+            child = self._harden(row, rng)
+        elif way == SOFTEN:
+            child = self._soften(row, rng)
+        elif way == GRAFT:
+            child = self._graft(row, donor, body, rng)
+        elif way == REDRAW:
+            child = self._redraw(row, rng)
+        # A way that changes nothing here is a step.
+        if np.array_equal(child, row):
             child = self._step(row, body, nearness, rng)
         return child
 
@@ -125,12 +124,12 @@ class Breeding:
         child[gene.values] = donor[gene.values]
         return child
 
-    def _redraw(self, row: Matrix, body: str, rng: np.random.Generator) -> Matrix:
+    def _redraw(self, row: Matrix, rng: np.random.Generator) -> Matrix:
         """Return the row with other values of one gene that acts."""
         active = self._columns.active(row)
         if not active:
             return row.copy()
-        gene: OptionalGene = active[int(rng.integers(len(active)))]
+        gene = active[int(rng.integers(len(active)))]
         child = row.copy()
         child[gene.values] = self._exploration.values(gene, rng)[gene.values]
         return child

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import itertools
 from collections import Counter, defaultdict
+from collections.abc import Iterable
 
 import numpy as np
 
@@ -33,7 +34,7 @@ class Exploration:
     def note(self, row: Matrix) -> None:
         """Take in a scenario that will be flown."""
         active = self._columns.active(row)
-        self._pairs.update(itertools.combinations(sorted(gene.name for gene in active), 2))
+        self._pairs.update(_pairs(gene.name for gene in active))
         for gene in active:
             self._values[gene.name].append(self._shares(row, gene))
 
@@ -86,5 +87,5 @@ class Exploration:
         return (*chosen, *drawn)
 
 
-def _pairs(names: tuple[str, ...]) -> list[tuple[str, str]]:
+def _pairs(names: Iterable[str]) -> list[tuple[str, str]]:
     return list(itertools.combinations(sorted(names), 2))

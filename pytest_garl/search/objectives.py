@@ -11,7 +11,7 @@ import numpy as np
 from pytest_garl.execution.result import FlightResult
 from pytest_garl.search.operators import Matrix
 from pytest_garl.verdicts.judge import CLOSE_CALL_M
-from pytest_garl.verdicts.verdict import MarginName
+from pytest_garl.verdicts.verdict import Margin, MarginName
 
 
 def diversity(generation: Matrix) -> Matrix:
@@ -84,10 +84,9 @@ def near_miss(result: FlightResult) -> tuple[str, float]:
         return "", 0.0
     name, nearest = "", 0.0
     for margin in verdict.margins:
-        safe = SAFE_MARGINS.get(margin.property)
-        if safe is None or (verdict.no_landing and margin.property not in BODIES):
+        if verdict.no_landing and margin.property not in BODIES:
             continue
-        nearness = min(NEAREST_MISS, 1 - margin.value / safe)
+        nearness = _nearness(margin)
         if nearness > nearest:
             name, nearest = margin.property, nearness
     return name, nearest
@@ -105,10 +104,9 @@ def near_misses(result: FlightResult) -> dict[str, float]:
     found: dict[str, float] = {}
     body = 0.0
     for margin in verdict.margins:
-        safe = SAFE_MARGINS.get(margin.property)
-        if safe is None or margin.property == "collision":
+        if margin.property == "collision":
             continue
-        nearness = min(NEAREST_MISS, 1 - margin.value / safe)
+        nearness = _nearness(margin)
         if margin.property in BODIES:
             body = max(body, nearness)
         elif nearness > 0:
@@ -116,3 +114,9 @@ def near_misses(result: FlightResult) -> dict[str, float]:
     if result.closest_call and body > 0:
         found[result.closest_call] = body
     return found
+
+
+def _nearness(margin: Margin) -> float:
+    """Return the proximity of a margin to its violation; not above 0 if it has no degrees."""
+    safe = SAFE_MARGINS.get(margin.property)
+    return 0.0 if safe is None else min(NEAREST_MISS, 1 - margin.value / safe)

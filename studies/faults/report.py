@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -120,16 +120,13 @@ def _ratios(found: Found, method: str) -> str:
         "| family | faults | ratio |",
         "| --- | --- | --- |",
     ]
-    chosen: list[tuple[str, Callable[[str], bool]]] = [("all", lambda fault: True)]
-    for family in dict.fromkeys(FAMILY_OF.values()):
-        chosen.append((family, lambda fault, family=family: FAMILY_OF[fault] == family))  # type: ignore[misc]
-    for name, belongs in chosen:
+    for family in ("all", *dict.fromkeys(FAMILY_OF.values())):
         own, rival = flights_by_fault(
-            {key: at for key, at in found.items() if belongs(key[1])}, method
+            {key: at for key, at in found.items() if family in ("all", FAMILY_OF[key[1]])}, method
         )
         if len(own):
             ratio, low, high = ratio_interval(own, rival)
-            lines.append(f"| {name} | {len(own)} | {ratio:.2f} [{low:.2f}, {high:.2f}] |")
+            lines.append(f"| {family} | {len(own)} | {ratio:.2f} [{low:.2f}, {high:.2f}] |")
     return "\n".join(lines) if len(lines) > 4 else ""
 
 

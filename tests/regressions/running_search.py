@@ -20,7 +20,7 @@ LIMITS = {"fog": 0.05, "rain": 0.07, "snow": 0.03, "road_wetness": 0.06}
 """Values of the environment above which a flight fails; the first of them names the signature."""
 
 
-def CorpusOf(*signatures: str) -> Any:  # noqa: N802 (stands for a class)
+def corpus_of(*signatures: str) -> Any:
     """Return what stands for the saved cases: they expect these signatures."""
     return SimpleNamespace(expected_signatures=lambda system, map: dict.fromkeys(signatures))
 

@@ -12,7 +12,7 @@ from pytest_garl.execution.ledger_queue import Claim
 from pytest_garl.regressions.allowance import ShrinkBudget
 from pytest_garl.regressions.case_request import CaseResult
 from pytest_garl.regressions.investigations import Investigations
-from tests.regressions.running_search import CorpusOf, RunningSearch, UnpunctualPool
+from tests.regressions.running_search import RunningSearch, UnpunctualPool, corpus_of
 
 GENERATIONS = (
     ["", "fog", "", "", "rain", "fog", "", ""],
@@ -35,7 +35,9 @@ class Session:
         self.search = RunningSearch(self.ledger, WANTED)
         self.flown: list[str] = []
         self.pool = UnpunctualPool(self.ledger, workers, seed, self._note)
-        self.investigations = Investigations(self.ledger, self.pool, CorpusOf(), shrinking, workers)
+        self.investigations = Investigations(
+            self.ledger, self.pool, corpus_of(), shrinking, workers
+        )
 
     def run(self, on_wait: Callable[[], None] = lambda: None) -> Results:
         """Fly the search and everything that follows it."""

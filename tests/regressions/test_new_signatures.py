@@ -6,7 +6,7 @@ import pytest
 
 from pytest_garl.execution.ledger import Ledger
 from pytest_garl.regressions.new_signatures import NewSignatures
-from tests.regressions.running_search import CorpusOf, RunningSearch
+from tests.regressions.running_search import RunningSearch, corpus_of
 
 FOG, RAIN, SNOW = "off:fog", "off:rain", "off:snow"
 
@@ -22,7 +22,7 @@ def names(search: RunningSearch, found: NewSignatures) -> list[tuple[str, int]]:
 
 
 def test_signature_is_found_when_its_generation_is_flown(search: RunningSearch) -> None:
-    found = NewSignatures(search.ledger, CorpusOf(), 12)
+    found = NewSignatures(search.ledger, corpus_of(), 12)
     search.add_generation(0, ["fog", "", "rain", "fog"])
     search.fly((0, 0), (0, 2), (0, 3))
     assert names(search, found) == []
@@ -32,7 +32,7 @@ def test_signature_is_found_when_its_generation_is_flown(search: RunningSearch) 
 
 
 def test_requests_begin_with_the_lowest_slot(search: RunningSearch) -> None:
-    found = NewSignatures(search.ledger, CorpusOf(), 12)
+    found = NewSignatures(search.ledger, corpus_of(), 12)
     search.add_generation(0, ["", "fog", "fog"])
     search.fly((0, 2), (0, 1), (0, 0))
     (request,) = found.advance()
@@ -41,7 +41,7 @@ def test_requests_begin_with_the_lowest_slot(search: RunningSearch) -> None:
 
 
 def test_later_generation_adds_no_violations_of_a_known_signature(search: RunningSearch) -> None:
-    found = NewSignatures(search.ledger, CorpusOf(), 12)
+    found = NewSignatures(search.ledger, corpus_of(), 12)
     search.add_generation(0, ["fog"])
     search.add_generation(1, ["fog", "rain"])
     search.fly((1, 0), (1, 1))
@@ -56,6 +56,6 @@ def test_saved_case_is_asked_once_so_that_a_resumed_run_finds_the_same(
 ) -> None:
     search.add_generation(0, ["fog", "rain"])
     search.fly((0, 0), (0, 1))
-    assert names(search, NewSignatures(search.ledger, CorpusOf(FOG), 12)) == [(RAIN, 1)]
-    resumed = NewSignatures(search.ledger, CorpusOf(FOG, RAIN), 12)
+    assert names(search, NewSignatures(search.ledger, corpus_of(FOG), 12)) == [(RAIN, 1)]
+    resumed = NewSignatures(search.ledger, corpus_of(FOG, RAIN), 12)
     assert names(search, resumed) == [(RAIN, 1)]

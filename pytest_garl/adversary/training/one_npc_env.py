@@ -16,8 +16,6 @@ Observation = NDArray[np.float32]
 class OneNpcEnv(gymnasium.Env[Observation, np.int64]):
     """An environment whose observation and actions are those of a surrogate's encoding."""
 
-    metadata = {"render_modes": []}  # noqa: RUF012
-
     def __init__(self, surrogate: Surrogate) -> None:
         self.surrogate = surrogate
         self._encoding = ENCODINGS[surrogate.state]

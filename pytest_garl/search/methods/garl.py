@@ -21,7 +21,7 @@ from pytest_garl.scenarios.chromosome import decode, encode
 from pytest_garl.scenarios.files import dump_scenario
 from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.scenarios.validity import repair
-from pytest_garl.search.archive import EXCUSED, Archive, proximities
+from pytest_garl.search.archive import EXCUSED, Archive
 from pytest_garl.search.bandit import Bandit
 from pytest_garl.search.breeding import SOFTEN, WAYS, Breeding
 from pytest_garl.search.columns import Columns
@@ -93,7 +93,7 @@ class Garl:
             row = encode(item.scenario, self._plan.genome)
             success = self._archive.add(item, row)
             self._arms.learn(self._choices[dump_scenario(item.scenario)], success)
-        return proximities(flown)
+        return [(violation_proximity(item.result),) for item in flown]
 
     def _new(self) -> Scenario:
         """Return a scenario that is flown unlike all earlier ones."""
