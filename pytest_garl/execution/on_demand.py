@@ -137,7 +137,8 @@ class OnDemandFlights:
         for procedure in self._procedures.values():
             procedure.stop()
         for procedure in self._procedures.values():
-            if procedure.thread is not None:
+            # A signal may come before the thread has started.
+            if procedure.thread is not None and procedure.thread.is_alive():
                 procedure.thread.join()
         self._procedures.clear()
 

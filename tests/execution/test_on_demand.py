@@ -99,3 +99,14 @@ def test_interruption_ends_the_threads_and_loses_no_flight(job: FlightJob, ledge
     assert 0 < flown < 4
     assert on_demand(ledger).run({"one": foggier(job)})["one"][0] == 0.12
     assert ledger.queries.meters()["on_demand"] == 4
+
+
+def test_signal_before_a_thread_has_started_ends_the_run(
+    job: FlightJob, ledger: Ledger, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def interrupted(thread: threading.Thread) -> None:
+        raise SystemExit(143)
+
+    monkeypatch.setattr(threading.Thread, "start", interrupted)
+    with pytest.raises(SystemExit, match="143"):
+        on_demand(ledger).run({"one": foggier(job)})
