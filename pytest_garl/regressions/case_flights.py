@@ -33,6 +33,7 @@ class CaseFlights:
         self.asked_prevention = False
         self._fly = fly
         self._live: dict[Scenario, CompletedFlight] = dict(request.violations)
+        self._of_search = frozenset(self._live)
 
     @property
     def map(self) -> Map:
@@ -84,13 +85,28 @@ class CaseFlights:
     ) -> FailingScenario | None:
         """Fly a scenario and its neighbours with recorded moves.
 
-        Returns None if it does not fail, or if fewer than ``at_least`` neighbours fail.
+        Returns None if the scenario does not fail, or if fewer than ``at_least`` neighbours fail.
         """
-        flight = self.fly_recorded(scenario, behaviour)
+        flight = self._known_flight(scenario, behaviour) or self.fly_recorded(scenario, behaviour)
         if not self.request.fails(scenario, flight):
             return None
         failing = self.count_neighbours(origin, scenario, behaviour, flight, at_least=at_least)
         return failing if failing.neighbours_failed >= at_least else None
+
+    def to_confirm(self, scenario: Scenario, behaviour: RecordedBehaviour) -> int:
+        """Return how many flights :meth:`confirm` takes at most."""
+        return NEIGHBOURS + (self._known_flight(scenario, behaviour) is None)
+
+    def _known_flight(
+        self, scenario: Scenario, behaviour: RecordedBehaviour
+    ) -> CompletedFlight | None:
+        """Return the live flight of a scenario if nothing moved in it: it is the recorded one.
+
+        A flight of the search is no confirmation.
+        """
+        if behaviour.moves or scenario in self._of_search:
+            return None
+        return self._live.get(scenario)
 
     def count_neighbours(
         self,

@@ -54,6 +54,8 @@ class CaseBuilder:
             return flights.result(None, NOT_REPRODUCED)
         if request.is_exception:
             return self._exception(scenarios[0])
+        if not find_colliding_object(flights.live_flight(scenarios[0])):
+            return self._without_collision(scenarios)
         crossing = confirm_crossing(flights, scenarios[0])
         if crossing is not None and (crossing.is_robust or flights.left <= NEIGHBOURS):
             return self._result(crossing)
@@ -67,6 +69,22 @@ class CaseBuilder:
         if best is None:
             return flights.result(None, NOT_REPRODUCED)
         return self._result(self._shrink(best)[-1])
+
+    def _without_collision(self, scenarios: Sequence[Scenario]) -> CaseResult:
+        """Return the case of a failure in which no moving body was hit.
+
+        It is shrunk first, and the neighbours of the simplest scenario are flown in the end.
+        """
+        flights, first = self._flights, scenarios[0]
+        # The simplest scenario may sit on an edge, and a step back has neighbours as well.
+        budget = flights.left - 2 * NEIGHBOURS
+        found = shrink(first, flights.fails_live, flights.map, budget)
+        best = simplest_robust(flights, first, found.history, flights.live_behaviour)
+        if best is None or (best.neighbours_failed < NEIGHBOURS and flights.left > NEIGHBOURS):
+            best = self._most_robust(scenarios[:CANDIDATES], best)
+        if best is None:
+            return flights.result(None, NOT_REPRODUCED)
+        return self._result(with_shorter_record(flights, best)[-1])
 
     def _result(self, failing: FailingScenario) -> CaseResult:
         """Return the case of a failure, with the answer whether it could have been prevented."""
@@ -88,21 +106,19 @@ class CaseBuilder:
         return flights.result(None, NOT_REPRODUCED)
 
     def _confirm_bare(self, first: Scenario) -> FailingScenario | None:
-        """Return the scenario without all that the failure should not need, if it still fails.
+        """Return the collision with the object that was hit alone, if it still fails.
 
-        First the search's policy steers.  Then the object that was hit repeats its moves around the
-        same marker: in clear weather, and in the weather that was found.
+        First the search's policy steers.  Then the object repeats its moves around the same marker:
+        in clear weather, and in the weather that was found.
         """
         flights, map = self._flights, self._request.map
         name = find_colliding_object(flights.live_flight(first))
         scenario = bare_scenario(first, map, name)
         # The flights that are left must do for the scenario as it was found.
-        if scenario != first and flights.left >= (3 if name else 2) + NEIGHBOURS:
+        if scenario != first and flights.left >= 3 + NEIGHBOURS:
             failing = self._confirm_live(first, scenario)
             if failing is not None:
                 return failing
-        if not name:
-            return None
         behaviour = flights.live_behaviour(first).only(name)
         for scenario in (
             bare_scenario_around_marker(first, map, name),
@@ -120,12 +136,7 @@ class CaseBuilder:
         flights = self._flights
         if not flights.fails_live(scenario):
             return None
-        behaviour = flights.live_behaviour(scenario)
-        if behaviour.moves:
-            return flights.confirm(origin, scenario, behaviour)
-        # If nothing moves, the live flight is the recorded one.
-        flight = flights.live_flight(scenario)
-        return flights.count_neighbours(origin, scenario, behaviour, flight)
+        return flights.confirm(origin, scenario, flights.live_behaviour(scenario))
 
     def _most_robust(
         self, scenarios: Sequence[Scenario], best: FailingScenario | None
@@ -157,32 +168,42 @@ class CaseBuilder:
         found = shrink(
             best.scenario, flights.fails_live, flights.map, budget, colliding_object=name
         )
-        simplest = simplest_robust(flights, best, found.history[1:], flights.live_behaviour)
-        return with_shorter_record(flights, simplest)
+        simplest = simplest_robust(
+            flights,
+            best.origin,
+            found.history[1:],
+            flights.live_behaviour,
+            at_least=best.neighbours_failed,
+        )
+        return with_shorter_record(flights, simplest or best)
 
 
 def simplest_robust(
     flights: CaseFlights,
-    best: FailingScenario,
+    origin: Scenario,
     history: Sequence[Scenario],
     behaviour_of: Callable[[Scenario], RecordedBehaviour],
-) -> FailingScenario:
+    *,
+    at_least: int = 0,
+) -> FailingScenario | None:
     """Return the simplest failing scenario all of whose neighbours fail, or the most robust.
 
-    ``history`` are scenarios that failed, from complex to simple.  Each that is tried is flown once
-    with its recorded moves, as the case will be.
+    ``history`` are scenarios that failed, from complex to simple.  Each that is tried is flown with
+    its recorded moves, as the case will be.  Returns None if not even ``at_least`` neighbours of
+    one fail.
     """
     kept: FailingScenario | None = None
     for scenario in _from_last_to_first(history):
-        if flights.left < 1 + NEIGHBOURS:
-            break
-        if kept is not None and kept.neighbours_failed == NEIGHBOURS:
-            break
-        at_least = best.neighbours_failed if kept is None else kept.neighbours_failed + 1
         behaviour = behaviour_of(scenario)
-        found = flights.confirm(best.origin, scenario, behaviour, at_least=at_least)
-        kept = found or kept
-    return kept or best
+        if flights.left < flights.to_confirm(scenario, behaviour):
+            break
+        found = flights.confirm(origin, scenario, behaviour, at_least=at_least)
+        if found is None:
+            continue
+        kept, at_least = found, found.neighbours_failed + 1
+        if found.neighbours_failed == NEIGHBOURS:
+            break
+    return kept
 
 
 def with_shorter_record(

@@ -187,7 +187,14 @@ class CaseReshrinker:
         found = shrink(
             saved.scenario, fails, flights.map, budget, colliding_object=colliding_object
         )
-        return simplest_robust(flights, saved, found.history[1:], behaviour_of)
+        simplest = simplest_robust(
+            flights,
+            saved.origin,
+            found.history[1:],
+            behaviour_of,
+            at_least=saved.neighbours_failed,
+        )
+        return simplest or saved
 
     def _improved_case(self, saved: FailingScenario, simpler: FailingScenario) -> Case | None:
         """Return the case of a failure, if possible with a shorter record, if it is simpler."""

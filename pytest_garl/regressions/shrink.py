@@ -20,6 +20,7 @@ from pytest_garl.regressions.simplification import (
     simplifications,
     simplified,
 )
+from pytest_garl.scenarios.genes import Property
 from pytest_garl.scenarios.maps.map import Map
 from pytest_garl.scenarios.scenario import Scenario
 
@@ -65,13 +66,17 @@ def shrink(
 
 
 def reset_and_bisect(trials: Trials, colliding_object: str) -> None:
-    """Reset as much as the failure survives, in the largest pieces; bisect the rest."""
-    groups = simplifications(trials.best, trials.genome, colliding_object)
-    everything = [step for group in groups for step in group]
-    if len(groups) > 1 and trials(simplified(trials.best, everything)):
+    """Reset as much as the failure survives, in the largest pieces; bisect the rest.
+
+    Whoever was hit may be enough for a failure.  Any other one needs a condition, or it is found
+    out at the end of a bisection that it needs none.
+    """
+    steps = simplifications(trials.best, trials.genome, colliding_object)
+    is_hit = bool(colliding_object)
+    if is_hit and trials(simplified(trials.best, steps.all)):
         return _bisect(trials)
-    for group in groups:
-        _reset(trials, group)
+    needs_no_object = _reset(trials, steps.objects)
+    _reset(trials, steps.conditions, needs_one=needs_no_object or not is_hit)
     return _bisect(trials)
 
 
@@ -83,17 +88,24 @@ def round_values(trials: Trials, colliding_object: str) -> None:
             return
 
 
-def _reset(trials: Trials, steps: Sequence[Simplification]) -> None:
-    """Apply as many simplifications as the failure survives."""
-    if trials(simplified(trials.best, steps)) or len(steps) == 1:
-        return
+def _reset(trials: Trials, steps: Sequence[Simplification], *, needs_one: bool = False) -> bool:
+    """Apply as many simplifications as the failure survives; return whether it survives all.
+
+    If the failure needs at least one, which may be known, all together are not tried.
+    """
+    if not steps:
+        return True
+    if not needs_one and trials(simplified(trials.best, steps)):
+        return True
+    if len(steps) == 1:
+        return False
     middle = len(steps) // 2
-    _reset(trials, steps[:middle])
-    _reset(trials, steps[middle:])
+    survived = _reset(trials, steps[:middle])
+    return _reset(trials, steps[middle:], needs_one=survived) and survived
 
 
 def _bisect(trials: Trials) -> None:
-    """Bring genes as near to nominal as the failure survives."""
+    """Bring genes as near to nominal as the failure survives, and to nominal after the nearest."""
     for gene in trials.genome.genes:
         start = trials.best
         present = {key for key, _ in start.genes}
@@ -109,11 +121,18 @@ def _bisect(trials: Trials) -> None:
         least, most = 0.0, 1.0
         for _ in range(BISECTIONS):
             share = (least + most) / 2
-            near = {i.key: i.nominal + share * (start[i.key] - i.nominal) for i in moved}
-            if trials(trials.best.replace(near)):
+            if trials(_nearer(start, moved, share)):
                 most = share
             else:
                 least = share
+        if least == 0:
+            trials(_nearer(start, moved, 0.0))
+
+
+def _nearer(scenario: Scenario, items: Sequence[Property], share: float) -> Scenario:
+    """Return a scenario whose genes have only a share of their distance from nominal."""
+    near = {each.key: each.nominal + share * (scenario[each.key] - each.nominal) for each in items}
+    return scenario.replace(near)
 
 
 def shrink_by_hypothesis(trials: Trials, colliding_object: str) -> None:

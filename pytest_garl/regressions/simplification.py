@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
-from pytest_garl.scenarios.genes import Genome
+from pytest_garl.scenarios.genes import Genome, NuclearGene
 from pytest_garl.scenarios.genome_like import genome_like
 from pytest_garl.scenarios.maps.map import Map
 from pytest_garl.scenarios.scenario import Scenario
@@ -17,30 +17,51 @@ MARKER_PLACE = ("marker.x", "marker.y")
 Simplification = Callable[[Scenario], Scenario]
 
 
-def simplifications(
-    scenario: Scenario, genome: Genome, colliding_object: str
-) -> list[list[Simplification]]:
-    """Return the ways to make a scenario simpler in groups: objects, weather, light and places.
+class Simplifications(NamedTuple):
+    """The ways to make a scenario simpler: to remove an object, to make a condition nominal.
+
+    Conditions come with the mildest first, the marker's place before all.
+    """
+
+    objects: list[Simplification]
+    conditions: list[Simplification]
+
+    @property
+    def all(self) -> list[Simplification]:
+        """All of them."""
+        return [*self.objects, *self.conditions]
+
+
+def simplifications(scenario: Scenario, genome: Genome, colliding_object: str) -> Simplifications:
+    """Return the ways to make a scenario simpler.
 
     No way removes the object that the UAV hit, or moves an object.
     """
-    removable = [
+    objects = [
         _removal(key.partition(".")[0])
         for key, _ in scenario.genes
         if key.endswith(".velocity") and key.partition(".")[0] != colliding_object
     ]
-    weather: list[Simplification] = []
-    light_and_places: list[Simplification] = []
+    conditions: list[tuple[float, Simplification]] = []
     for gene in genome.genes:
         nominal = {item.key: item.nominal for item in gene.properties}
-        subject = next(iter(nominal)).partition(".")[0]
         if any(key.endswith(".velocity") for key in nominal):
             continue
         if all(scenario[key] == value for key, value in nominal.items()):
             continue
-        is_weather = subject == "environment" and "environment.sun_position" not in nominal
-        (weather if is_weather else light_and_places).append(_reset(nominal))
-    return [group for group in (removable, weather, light_and_places) if group]
+        conditions.append((_strength(scenario, gene), _reset(nominal)))
+    conditions.sort(key=lambda each: each[0])
+    return Simplifications(objects=objects, conditions=[step for _, step in conditions])
+
+
+def _strength(scenario: Scenario, gene: NuclearGene) -> float:
+    """Return how far a gene is from nominal, 0..1; 0 for the marker's place, seldom a cause."""
+    return max(
+        0.0
+        if item.key in MARKER_PLACE
+        else abs(scenario[item.key] - item.nominal) / (item.high - item.low)
+        for item in gene.properties
+    )
 
 
 def simplified(scenario: Scenario, steps: Sequence[Simplification]) -> Scenario:
@@ -79,8 +100,8 @@ def empty_scenario(scenario: Scenario, map: Map) -> Scenario:
 
 
 def _nominal(scenario: Scenario, map: Map, colliding_object: str) -> Scenario:
-    groups = simplifications(scenario, genome_of(scenario, map), colliding_object)
-    return repair(simplified(scenario, [step for group in groups for step in group]), map)
+    steps = simplifications(scenario, genome_of(scenario, map), colliding_object).all
+    return repair(simplified(scenario, steps), map)
 
 
 def _removal(name: str) -> Simplification:

@@ -100,31 +100,35 @@ def collision_result(signature: str) -> FlightResult:
     return flight_result(signature, collisions=(COLLIDING_OBJECT,) if signature else ())
 
 
+def result_of(signature: str) -> FlightResult:
+    """Return the result of a flight: a collision only if the signature is one with a body."""
+    is_hit = signature.startswith("IV:")
+    return collision_result(signature) if is_hit else flight_result(signature)
+
+
 class FakeFlights:
     """Stands for the simulator: ``fails`` gets scenario and NPC policy; flights are counted."""
 
-    def __init__(self, fails: Fails) -> None:
-        self.fails, self.count = fails, 0
+    def __init__(self, fails: Fails, signature: str = SIGNATURE) -> None:
+        self.fails, self.count, self.signature = fails, 0, signature
 
     def __call__(self, job: FlightJob, scenario: Scenario) -> CompletedFlight:
         self.count += 1
         pilot = job.system.qualname == "ReferencePilot"
         failed = not pilot and self.fails(scenario, job.npcs.name)
         return CompletedFlight(
-            result=collision_result(SIGNATURE if failed else ""),
+            result=result_of(self.signature if failed else ""),
             sha256="cd" * 32,
             record=Path("/nowhere/x"),
         )
 
 
-def make_case_request(budget: int, *scenarios: Scenario) -> CaseRequest:
+def make_case_request(budget: int, *scenarios: Scenario, signature: str = SIGNATURE) -> CaseRequest:
     """Return a request for a case of violating scenarios."""
-    found = CompletedFlight(
-        result=collision_result(SIGNATURE), sha256="", record=Path("/nowhere/x")
-    )
+    found = CompletedFlight(result=result_of(signature), sha256="", record=Path("/nowhere/x"))
     return CaseRequest(
-        name=f"search {SIGNATURE}",
-        signature=SIGNATURE,
+        name=f"search {signature}",
+        signature=signature,
         violations=tuple((each, found) for each in scenarios),
         job=JOB,
         map=LAWN,

@@ -1,19 +1,22 @@
 from __future__ import annotations
 
 import random
+from collections.abc import Callable
 
 import pytest
 
 from pytest_garl.regressions.case import RecordedBehaviour
 from pytest_garl.regressions.case_flights import CaseFlights
-from pytest_garl.regressions.case_request import FailingScenario
+from pytest_garl.regressions.case_request import CaseResult, FailingScenario
 from pytest_garl.regressions.investigation import (
     MINIMUM_CASE_FLIGHTS,
+    NOT_REPRODUCED,
     CaseBuilder,
     simplest_robust,
     with_shorter_record,
 )
 from pytest_garl.regressions.robustness import NEIGHBOURS, neighbours
+from pytest_garl.scenarios.conditions import active_conditions
 from pytest_garl.scenarios.scenario import Scenario
 from tests.regressions.samples import (
     LAWN,
@@ -47,6 +50,60 @@ def test_case_builder_steps_back_until_all_neighbours_fail() -> None:
     assert result.case.scenario["environment.fog"] >= 0.04
 
 
+LATE = "late:no-time"
+
+
+def late_case(fails: Callable[[Scenario], bool], budget: int = 12) -> CaseResult:
+    """Return the result of an investigation of late landings in bad weather."""
+    fly = FakeFlights(lambda scenario, _: fails(scenario), signature=LATE)
+    request = make_case_request(budget, VIOLATING_SCENARIO, signature=LATE)
+    result = CaseBuilder(request, fly).build()
+    assert result.flights == fly.count <= budget
+    return result
+
+
+def test_failure_without_a_collision_is_shrunk_to_one_condition_and_robust() -> None:
+    result = late_case(lambda each: each["environment.fog"] >= 0.04)
+    assert result.case is not None
+    scenario = result.case.scenario
+    assert {*scenario.removed_objects} == {*OBJECT_NAMES}
+    assert [each.cause for each in active_conditions(scenario)] == ["fog"]
+    assert 0.04 <= scenario["environment.fog"] < 0.12
+    assert result.case.evidence.neighbours_failed == NEIGHBOURS
+    assert result.case.reason == ""
+
+
+def test_failure_on_an_edge_steps_back_to_a_robust_one() -> None:
+    def fails(scenario: Scenario) -> bool:
+        fog = scenario["environment.fog"]
+        return fog >= 0.1 or (fog > 0 and round(fog / 0.03, 6).is_integer())
+
+    result = late_case(fails)
+    assert result.case is not None
+    assert result.case.scenario["environment.fog"] >= 0.1
+    assert {*result.case.scenario.removed_objects} == {*OBJECT_NAMES}
+    assert result.case.reason == ""
+
+
+def test_failure_with_everything_nominal_keeps_no_condition() -> None:
+    result = late_case(lambda _: True, budget=20)
+    assert result.case is not None
+    assert active_conditions(result.case.scenario) == ()
+
+
+def test_failure_that_is_not_repeated_is_no_case() -> None:
+    result = late_case(lambda _: False)
+    assert result.case is None
+    assert result.reason == NOT_REPRODUCED
+
+
+@pytest.mark.parametrize("seed", range(20))
+@pytest.mark.parametrize("budget", [8, 12, 30])
+def test_failure_without_a_collision_keeps_the_budget(seed: int, budget: int) -> None:
+    chance = random.Random(seed)
+    late_case(lambda _: chance.random() < 0.5, budget)
+
+
 BEHAVIOUR = RecordedBehaviour(moves=((OBJECT_NAMES[0], ((0.5, 0.0),)),))
 HISTORY = [VIOLATING_SCENARIO.without(*OBJECT_NAMES[count:]) for count in (3, 2, 1)]
 
@@ -62,23 +119,33 @@ def best(flights: CaseFlights) -> FailingScenario:
     )
 
 
-def reduce(fails: set[Scenario]) -> FailingScenario:
+def reduce(fails: set[Scenario], at_least: int = 0) -> FailingScenario | None:
     flights = CaseFlights(
         make_case_request(60, VIOLATING_SCENARIO), FakeFlights(lambda each, _: each in fails)
     )
-    return simplest_robust(flights, best(flights), HISTORY, lambda _: BEHAVIOUR)
+    return simplest_robust(
+        flights, VIOLATING_SCENARIO, HISTORY, lambda _: BEHAVIOUR, at_least=at_least
+    )
 
 
 def test_simplest_robust_steps_back_from_an_edge() -> None:
     complex_, middle, simple = HISTORY
     around = {*neighbours(middle, LAWN)}
-    assert reduce({*HISTORY} | around).scenario == middle
-    assert reduce({*HISTORY} | around | {*neighbours(simple, LAWN)}).scenario == simple
-    assert reduce({*HISTORY, *neighbours(complex_, LAWN)}).scenario == complex_
+    for fails, kept in (
+        ({*HISTORY} | around, middle),
+        ({*HISTORY} | around | {*neighbours(simple, LAWN)}, simple),
+        ({*HISTORY, *neighbours(complex_, LAWN)}, complex_),
+    ):
+        found = reduce(fails)
+        assert found is not None
+        assert found.scenario == kept
 
 
-def test_simplest_robust_keeps_the_best_if_all_sit_on_an_edge() -> None:
-    assert reduce({*HISTORY}).scenario == VIOLATING_SCENARIO
+def test_simplest_robust_keeps_the_simplest_if_all_sit_on_an_edge() -> None:
+    found = reduce({*HISTORY})
+    assert found is not None
+    assert (found.scenario, found.neighbours_failed) == (HISTORY[-1], 0)
+    assert reduce({*HISTORY}, at_least=1) is None
 
 
 def test_flight_without_a_record_has_no_shorter_one() -> None:

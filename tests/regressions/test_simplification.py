@@ -21,15 +21,18 @@ from tests.regressions.samples import COLLIDING_OBJECT, LAWN, OBJECT_NAMES, VIOL
 OTHERS = {*OBJECT_NAMES} - {COLLIDING_OBJECT}
 
 
-def test_simplifications_come_as_objects_weather_and_the_rest() -> None:
-    objects, weather, rest = simplifications(
-        VIOLATING_SCENARIO, genome_of(VIOLATING_SCENARIO, LAWN), COLLIDING_OBJECT
+def test_simplifications_come_as_objects_and_conditions_the_mildest_first() -> None:
+    scenario = VIOLATING_SCENARIO.replace({"environment.fog": 0.15, "environment.dust": 0.01})
+    objects, conditions = simplifications(scenario, genome_of(scenario, LAWN), COLLIDING_OBJECT)
+    assert {*simplified(scenario, objects).removed_objects} == OTHERS
+    first, *others = conditions
+    moved = first(scenario)
+    assert (moved["marker.x"], moved["environment.dust"]) == (0.0, 0.01)
+    dusty, foggy = (
+        next(number for number, step in enumerate(others) if step(scenario)[key] == 0)
+        for key in ("environment.dust", "environment.fog")
     )
-    assert {*simplified(VIOLATING_SCENARIO, objects).removed_objects} == OTHERS
-    calm = simplified(VIOLATING_SCENARIO, weather)
-    assert calm["environment.fog"] == 0.0
-    assert calm["environment.sun_position"] == VIOLATING_SCENARIO["environment.sun_position"]
-    assert simplified(VIOLATING_SCENARIO, rest)["marker.x"] == 0.0
+    assert dusty < foggy
 
 
 def test_bare_scenario_of_a_collision_keeps_the_object_that_was_hit() -> None:
