@@ -2,9 +2,10 @@
 
 Simpler means fewer objects, fewer genes off nominal, nearer to nominal, and numbers with fewer
 digits.  The first pass is cheap: it removes the objects that the failure does not need, resets
-genes to nominal, in halves if all together are too many, and moves the remaining genes nearer to
-nominal by bisection.  The second pass is Hypothesis's shrinker on whole steps from nominal, which
-finds genes that can only be lowered together.  The third rounds the values.
+conditions to nominal, in halves if all together are too many, then single values of those that are
+left, and moves what remains nearer to nominal by bisection.  The second pass is Hypothesis's
+shrinker on whole steps from nominal, which finds genes that can only be lowered together.  The
+third rounds the values.
 """
 
 from __future__ import annotations
@@ -19,6 +20,7 @@ from pytest_garl.regressions.simplification import (
     Trials,
     simplifications,
     simplified,
+    value_simplifications,
 )
 from pytest_garl.scenarios.genes import Property
 from pytest_garl.scenarios.maps.map import Map
@@ -77,6 +79,8 @@ def reset_and_bisect(trials: Trials, colliding_object: str) -> None:
         return _bisect(trials)
     needs_no_object = _reset(trials, steps.objects)
     _reset(trials, steps.conditions, needs_one=needs_no_object or not is_hit)
+    for values in value_simplifications(trials.best, trials.genome):
+        _reset(trials, values, needs_one=True)
     return _bisect(trials)
 
 

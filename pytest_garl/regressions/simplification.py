@@ -5,8 +5,10 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
-from pytest_garl.scenarios.genes import Genome, NuclearGene
+from pytest_garl.scenarios.conditions import has_harsher_end
+from pytest_garl.scenarios.genes import Genome, NuclearGene, Property
 from pytest_garl.scenarios.genome_like import genome_like
+from pytest_garl.scenarios.groups.catalogue import GROUPS
 from pytest_garl.scenarios.maps.map import Map
 from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.scenarios.story import STORY
@@ -54,14 +56,40 @@ def simplifications(scenario: Scenario, genome: Genome, colliding_object: str) -
     return Simplifications(objects=objects, conditions=[step for _, step in conditions])
 
 
+def value_simplifications(scenario: Scenario, genome: Genome) -> list[list[Simplification]]:
+    """Return the ways to make single values nominal, for each condition with several.
+
+    Values come with the mildest first.  Kinds, directions and times stay with them.
+    """
+    found = []
+    for gene in genome.genes:
+        group = GROUPS.get(gene.properties[0].key.partition(".")[0])
+        if group is None:
+            continue
+        harsher = {
+            key
+            for key, each in zip(group.keys, group.parameters, strict=True)
+            if has_harsher_end(each)
+        }
+        values = sorted(
+            (_distance(scenario, item), item.key, item.nominal)
+            for item in gene.properties
+            if item.key in harsher and scenario[item.key] != item.nominal
+        )
+        if len(values) > 1:
+            found.append([_reset({key: nominal}) for _, key, nominal in values])
+    return found
+
+
 def _strength(scenario: Scenario, gene: NuclearGene) -> float:
     """Return how far a gene is from nominal, 0..1; 0 for the marker's place, seldom a cause."""
     return max(
-        0.0
-        if item.key in MARKER_PLACE
-        else abs(scenario[item.key] - item.nominal) / (item.high - item.low)
-        for item in gene.properties
+        0.0 if item.key in MARKER_PLACE else _distance(scenario, item) for item in gene.properties
     )
+
+
+def _distance(scenario: Scenario, item: Property) -> float:
+    return abs(scenario[item.key] - item.nominal) / (item.high - item.low)
 
 
 def simplified(scenario: Scenario, steps: Sequence[Simplification]) -> Scenario:

@@ -89,9 +89,14 @@ def _values(scenario: Scenario, group: Group) -> Iterator[tuple[float, str]]:
             yield _share(each, value), _value_in_words(group.name, each, value)
 
 
+def has_harsher_end(parameter: Parameter) -> bool:
+    """Return whether more of it is harsher, as of no kind, direction, time or switch."""
+    return not (parameter.choices or parameter.even or _is_switch(parameter))
+
+
 def _share(parameter: Parameter, value: float) -> float:
-    """Return how far a value is from nominal; a kind, a direction or a time has no harsher end."""
-    if parameter.choices or parameter.even or _is_switch(parameter):
+    """Return how far a value is from nominal, 0 if it has no harsher end."""
+    if not has_harsher_end(parameter):
         return 0.0
     nominal = parameter.nominal
     reach = max(parameter.high - nominal, nominal - parameter.low)

@@ -11,6 +11,7 @@ from pytest_garl.regressions.simplification import complexity, genome_of
 from pytest_garl.scenarios.chromosome import decode
 from pytest_garl.scenarios.genes import genome_for
 from pytest_garl.scenarios.genome_like import with_destinations
+from pytest_garl.scenarios.groups.catalogue import GROUPS
 from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.scenarios.story import with_all_values
 from pytest_garl.scenarios.validity import problems, repair
@@ -105,6 +106,19 @@ def test_shrinking_rounds_destinations() -> None:
     )
     assert set(found.simplest.removed_objects) == {*OBJECT_NAMES} - {COLLIDING_OBJECT}
     assert not any(key.startswith(OBJECT_NAMES[-1]) for key, _ in found.simplest.genes)
+
+
+def test_single_values_of_a_condition_become_nominal() -> None:
+    camera = GROUPS["camera"]
+    soiled = dict(zip(camera.keys, (0.5, -1.8, 0.7, -2.1, 3.0, 20.0), strict=True))
+    first = dataclasses.replace(
+        VIOLATING_SCENARIO.without(*OBJECT_NAMES),
+        genes=(*VIOLATING_SCENARIO.without(*OBJECT_NAMES).genes, *soiled.items()),
+    )
+    found = shrink(
+        repair(first, LAWN), lambda each: each["camera.dirt_percent"] >= 4, LAWN, 12
+    ).simplest
+    assert {key: found[key] for key in soiled if found[key]} == {"camera.dirt_percent": 5.0}
 
 
 def test_hypothesis_lowers_genes_that_can_only_be_lowered_together() -> None:
