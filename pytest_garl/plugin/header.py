@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from pytest_garl import cpu_dispatch
 from pytest_garl.plugin.run import Run
 from pytest_garl.plugin.terminal_text import counted, duration
-from pytest_garl.regressions.forecast import flights_with_shrinking, seconds_per_new_signature
+from pytest_garl.regressions.forecast import flight_times_with_shrinking, seconds_per_new_signature
 from pytest_garl.reports.shares_text import limits_text
 from pytest_garl.verdicts.verdict import DEFAULT_LIMITS
 
@@ -113,8 +113,9 @@ def _duration_of(run: Run, searches: Sequence[int]) -> str:
     """Return how long searches of so many flights take, with all that the default cap allows."""
     options = run.options
     each = options.shrink if options.shrink_capped else 0
-    flights = sum(flights_with_shrinking(search, each) for search in searches)
-    return f"about {duration(flights * run.flight_s / max(1, options.workers or 1))}"
+    workers = max(1, options.workers or 1)
+    times = sum(flight_times_with_shrinking(search, each, workers) for search in searches)
+    return _about(times * run.flight_s.fastest, times * run.flight_s.slowest)
 
 
 def _shrinking(run: Run) -> str:
@@ -124,5 +125,14 @@ def _shrinking(run: Run) -> str:
         return ""
     if options.shrink_capped:
         return ", shrinking included"
-    seconds = seconds_per_new_signature(options.shrink, run.flight_s, options.workers or 1)
-    return f", and about {duration(seconds)} per new kind of violation"
+    fastest_s, slowest_s = (
+        seconds_per_new_signature(options.shrink, flight_s, options.workers or 1)
+        for flight_s in run.flight_s
+    )
+    return f", and {_about(fastest_s, slowest_s)} per new kind of violation"
+
+
+def _about(fastest_s: float, slowest_s: float) -> str:
+    """Return a duration as a range, if it has one."""
+    fastest, slowest = duration(fastest_s), duration(slowest_s)
+    return f"about {fastest}" if fastest == slowest else f"{fastest} to {slowest}"

@@ -22,7 +22,7 @@ from pytest_garl.execution.reference import BUILT_IN, package_sha256, reference_
 from pytest_garl.execution.stored_ledger import check_stored, stored_flight_s
 from pytest_garl.plugin.keys import RUN, is_xdist_worker
 from pytest_garl.plugin.options import Options
-from pytest_garl.plugin.run import FLIGHT_S, Run
+from pytest_garl.plugin.run import FIRST_RUN, FlightTime, Run
 from pytest_garl.reports.run_report import BEGAN, utc_now
 
 if TYPE_CHECKING:
@@ -185,6 +185,8 @@ def _lock(ledger: Path) -> TextIO:
     return file
 
 
-def _flight_s(ledger: Ledger) -> float:
+def _flight_s(ledger: Ledger) -> FlightTime:
     known = ledger.fact(EARLIER_FLIGHT_S)
-    return float(known) if isinstance(known, int | float) else FLIGHT_S
+    if not isinstance(known, int | float):
+        return FIRST_RUN
+    return FlightTime(float(known), float(known))

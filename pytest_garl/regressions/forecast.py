@@ -37,17 +37,20 @@ def flights_after_search(kinds: int, each: int, cap: int | None) -> float:
     return kinds + max(own, cap)
 
 
-def flights_with_shrinking(search: int, each: int) -> float:
-    """Return the flights of a search with the default cap, those that follow from it included.
+def flight_times_with_shrinking(search: int, each: int, workers: int) -> float:
+    """Return how many times one flight's time a search with the default cap takes, all included.
 
-    Before it begins nobody knows how many kinds it will find.  With none it takes its own flights;
-    with many up to as many again for shrinking, and one for each to see whether it repeats, which
-    is about a tenth.  The geometric mean of both is wrong by a factor of 1.5 at most, if the search
-    has at least as many flights as one kind.
+    Before it begins nobody knows how many kinds it will find.  With none it takes its own flights.
+    With many it takes up to as many again for shrinking, and one for each to see whether it
+    repeats, which is about a tenth; or the flights of the last kind, which follow each other, if
+    that is longer.  The geometric mean of both is wrong by a factor of 1.5 at most, if the search
+    has at least as many flights for each worker as one kind.
     """
+    least = search / workers
     if not each:
-        return search
-    return math.sqrt(search * (search + max(search, each) + REPEATED_SHARE * search))
+        return least
+    shared = (search + max(search, each) + REPEATED_SHARE * search) / workers
+    return math.sqrt(least * max(shared, least + SPENT_SHARE * each))
 
 
 def seconds_per_new_signature(each: int, flight_s: float, workers: int) -> float:

@@ -7,8 +7,8 @@ import pytest
 from pytest_garl.regressions.case_request import CaseRequest
 from pytest_garl.regressions.forecast import (
     SPENT_SHARE,
+    flight_times_with_shrinking,
     flights_after_search,
-    flights_with_shrinking,
     remaining_work,
 )
 from pytest_garl.regressions.investigation import MINIMUM_CASE_FLIGHTS
@@ -79,5 +79,9 @@ def test_forecast_before_a_search_is_right_within_a_factor_of_one_and_a_half(
 ) -> None:
     kinds = round(search * kinds_per_flight)
     most = search + flights_after_search(kinds, 12, search)
-    assert 1 / 1.5 <= flights_with_shrinking(search, 12) / most <= 1.5
-    assert flights_with_shrinking(search, 0) == search
+    assert 1 / 1.5 <= flight_times_with_shrinking(search, 12, 1) / most <= 1.5
+    assert flight_times_with_shrinking(search, 0, 1) == search
+
+
+def test_forecast_knows_that_flights_of_one_kind_follow_each_other() -> None:
+    assert flight_times_with_shrinking(16, 16, 16) == pytest.approx((1 + SPENT_SHARE * 16) ** 0.5)
