@@ -119,7 +119,8 @@ class OpenCvDetector:
         if not ok:
             return None
         back, _ = cv2.projectPoints(self._corners, turn, shift, self._camera.matrix, None)
-        if np.abs(back.reshape(4, 2) - quad).max() > MAX_REPROJECTION_PX:
+        # The pose of a perfect square has no numbers; no comparison with them holds.
+        if not np.abs(back.reshape(4, 2) - quad).max() <= MAX_REPROJECTION_PX:
             return None
         in_body = CAMERA_FROM_BODY.T @ shift.ravel()
         offset = rotation_matrix(observation.attitude) @ in_body

@@ -18,6 +18,7 @@ from pytest_garl.verdicts.sightings import (
     last_report_s,
     last_target,
     readable_steps,
+    reports_detections,
     was_in_view,
 )
 from pytest_garl.verdicts.touchdowns import gave_up_s, landed_s, touchdown_off_marker
@@ -209,8 +210,11 @@ def _no_landing_cause(flight: Flight, limits: Limits, end: str) -> tuple[Violati
 def _report_text(flight: Flight, until_s: float) -> str:
     """Return a sentence about the last report of the marker by the system, if it reports any."""
     last = last_report_s(flight, until_s)
-    if last is not None:
+    if last is not None and reports_detections(flight):
         return f" The system last reported it at {last:.1f} s."
+    if last is not None:
+        # A target may be a memory: it is no sighting.
+        return f" Its place was the system's target up to {last:.1f} s."
     reports = any(
         step.diagnostics and (step.diagnostics.detections or step.diagnostics.target_m)
         for step in flight.steps

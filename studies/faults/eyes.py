@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from typing import Any
 
 import cv2
@@ -33,11 +32,6 @@ class Eyes(OpenCvDetector):
             return ()
         found = self.detect(observation)
         return tuple(each for each in found if self.accepts(each, observation))
-
-    def detect(self, observation: Observation) -> tuple[Detection, ...]:
-        """Return the markers whose place is finite: OpenCV's pose of a perfect square is NaN."""
-        found = super().detect(observation)
-        return tuple(each for each in found if all(map(math.isfinite, each.position_m)))
 
     def is_repeated(self, observation: Observation) -> bool:
         """Whether the picture is the last one again: noise makes two pictures differ."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 
+import cv2
 import numpy as np
 import pytest
 
@@ -70,3 +71,12 @@ def test_the_module_reads_the_marker_from_the_height_of_the_search(
     marker = MarkerSpec(dictionary="DICT_4X4_50", id=7, side_m=side_m)
     found, _ = detections(marker, camera, search_m, search_m)
     assert 7 in [each.marker_id for each in found]
+
+
+def test_a_perfect_square_whose_pose_has_no_numbers_is_no_marker(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    nothing = np.full((3, 1), np.nan)
+    monkeypatch.setattr(cv2, "solvePnP", lambda *_, **__: (True, nothing, nothing))
+    found, _ = detections(MarkerSpec(), Camera(), 5.0)
+    assert found == ()

@@ -137,10 +137,12 @@ def test_reports_of_the_system_change_the_text_and_never_the_type() -> None:
     silent = flight("gave_up", (0.0, 0.0, 8.0), steps=(step(29.0, marker=CLEAR),))
     boasts = dataclasses.replace(silent, steps=(step(29.0, marker=CLEAR, detected=here),))
     raves = dataclasses.replace(silent, steps=(step(29.0, marker=CLEAR, detected=there),))
-    verdicts = [judge(each, Limits()) for each in (silent, boasts, raves)]
+    remembers = dataclasses.replace(silent, steps=(step(29.0, marker=CLEAR, target=here),))
+    verdicts = [judge(each, Limits()) for each in (silent, boasts, raves, remembers)]
     assert {each.signature for each in verdicts} == {"II:gave-up-in-sight:approach"}
     assert "The system last reported it at 29.0 s." in verdicts[1].story
     assert "The system reported other places" in verdicts[2].story
+    assert "Its place was the system's target up to 29.0 s." in verdicts[3].story
 
 
 def test_the_target_is_compared_without_the_error_of_the_position() -> None:
