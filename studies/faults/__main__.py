@@ -11,7 +11,7 @@ import argparse
 import itertools
 import os
 
-from studies.faults.catalogue import FAULTS, fault_named
+from studies.faults.catalogue import FAULTS, PLACEBO, fault_named
 from studies.faults.fault import Fault, finds, result_of
 from studies.faults.report import report
 from studies.faults.search import TABLE, npcs, search_missing
@@ -19,8 +19,10 @@ from studies.table import run_study
 
 
 def check(faults: list[Fault]) -> None:
-    """Fly the hand-made scenarios and print what they show."""
+    """Fly the hand-made scenarios and print what they show; the placebo has none."""
     for fault in faults:
+        if fault is PLACEBO:
+            continue
         faulty = result_of(fault.faulty, fault.scenario, npcs())
         fires = finds(fault, fault.scenario, npcs(), faulty)
         verdict = faulty.verdict
@@ -49,7 +51,7 @@ def main() -> None:
     parser.add_argument("--methods", nargs="+", default=["garl", "random"])
     parser.add_argument("--seeds", type=int, default=5)
     parser.add_argument("--flights", type=int, default=100, help="of a search; default 100")
-    names = [each.name for each in FAULTS]
+    names = [each.name for each in (*FAULTS, PLACEBO)]
     parser.add_argument("--faults", nargs="+", default=names, choices=names, metavar="FAULT")
     parser.add_argument("--workers", type=int, default=os.cpu_count() or 1)
     parser.add_argument("--check", action="store_true", help="fly the hand-made scenarios only")

@@ -12,6 +12,7 @@ from studies.faults.families import (
     perception,
 )
 from studies.faults.fault import Fault
+from studies.faults.placebo import Placebo
 
 GITHUB = "https://github.com/"
 ARDUPILOT, PX4 = f"{GITHUB}ArduPilot/ardupilot", f"{GITHUB}PX4/PX4-Autopilot"
@@ -295,6 +296,17 @@ FAULTS: tuple[Fault, ...] = (
 """Every fault; the names are unique."""
 
 
+PLACEBO = Fault(
+    name="placebo",
+    family="none",
+    links=(),
+    summary="approaches the pad one percent faster, which is no fault",
+    faulty=Placebo,
+    fires="IV",
+)
+"""How often chance finds something; no fault of the suite, and without a scenario."""
+
+
 def fault_named(name: str) -> Fault:
-    """Return a fault of the suite."""
-    return next(each for each in FAULTS if each.name == name)
+    """Return a fault of the suite, or the placebo."""
+    return next(each for each in (*FAULTS, PLACEBO) if each.name == name)

@@ -7,7 +7,7 @@ from collections.abc import Iterable, Mapping, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from studies.faults.catalogue import FAULTS
+from studies.faults.catalogue import FAULTS, PLACEBO
 from studies.table import Row
 
 WITHIN = (25, 50, 100)
@@ -20,15 +20,16 @@ FAMILY_OF = {each.name: each.family for each in FAULTS}
 
 
 def report(rows: list[Row]) -> str:
-    """Return the tables in Markdown."""
-    found: Found = {
+    """Return the tables in Markdown; the placebo is no fault, and has a line of its own."""
+    flown: Found = {
         (row["method"], row["fault"], row["seed"]): int(row["found_at"] or 0) or None
         for row in rows
     }
-    methods = sorted({method for method, _, _ in found})
+    found = {key: at for key, at in flown.items() if key[1] != PLACEBO.name}
+    methods = sorted({method for method, _, _ in flown})
     parts = [_scores(found, methods), _families(found, methods)]
     parts += [_ratios(found, method) for method in methods if method != RIVAL]
-    parts += [_difficulty(found), _misses(found, methods)]
+    parts += [_difficulty(found), _misses(found, methods), _placebo(flown, methods)]
     return "\n\n".join(part for part in parts if part)
 
 
@@ -148,7 +149,13 @@ def found_shares(found: Found, method: str) -> dict[str, tuple[int, int]]:
         if name == method:
             count, total = counts.get(fault, (0, 0))
             counts[fault] = count + (at is not None), total + 1
-    return {fault: counts[fault] for fault in FAMILY_OF if fault in counts}
+    return {fault: counts[fault] for fault in (*FAMILY_OF, PLACEBO.name) if fault in counts}
+
+
+def _placebo(found: Found, methods: Iterable[str]) -> str:
+    counts = {each: found_shares(found, each).get(PLACEBO.name) for each in methods}
+    told = [f"{each} in {count[0]} of {count[1]}" for each, count in counts.items() if count]
+    return f"Searches in which chance found the placebo: {', '.join(told)}." if told else ""
 
 
 def _misses(found: Found, methods: Iterable[str]) -> str:

@@ -151,6 +151,17 @@ def test_the_report_counts_misses_as_100_flights_and_names_them() -> None:
     assert "random finds 0 of 2 faults in under half of the seeds: none." in text
 
 
+def test_the_placebo_counts_in_no_score() -> None:
+    text = report(
+        [
+            *rows("random", {"gate": [50, 50], "placebo": [None, None]}),
+            *rows("garl", {"gate": [25, 25], "placebo": [7, None]}),
+        ]
+    )
+    assert "| garl | 1 | 2 |" in text
+    assert "chance found the placebo: garl in 1 of 2, random in 0 of 2." in text
+
+
 def test_equal_methods_have_a_ratio_of_one() -> None:
     flights = np.array([3.0, 100.0, 40.0])
     assert ratio_interval(flights, flights) == (1.0, 1.0, 1.0)
