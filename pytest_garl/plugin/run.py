@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import functools
 import math
 import os
@@ -35,7 +36,7 @@ if TYPE_CHECKING:
     from pytest_garl.regressions.investigations import Investigations
 
 from pytest_garl.execution.ledger import SESSION_FACT
-from pytest_garl.reports.search_summary import DOMAINS
+from pytest_garl.reports.search_summary import CAMERA, DOMAINS
 
 SELECTED = "selected flights"
 """The ledger's fact: how many flights of searches the selected tests want."""
@@ -181,9 +182,11 @@ class Run:
         """
         files: dict[str, set[str]] = {}
         domains: dict[str, set[str]] = {}
+        systems: dict[str, Target] = {}
         for item in items:
             target = target_of(item)
             if target is not None:
+                systems.setdefault(target.system_name, target)
                 self.searches.select(target)
                 self.items.setdefault(target.flight, []).append(selected(item))
                 search = f"{target.system_name} on {target.map}"
@@ -195,6 +198,10 @@ class Run:
             self.ledger.note_fact(f"files of {search}", " ".join(sorted(names)))
         for search, labels in domains.items():
             self._note_domains(search, labels)
+        for name, target in systems.items():
+            airframe = target.airframe
+            if airframe is not None:
+                self.ledger.note_fact(f"{CAMERA}{name}", dataclasses.asdict(airframe.camera))
         wanted = self.searches.targets.values()
         searched = [slots for slots in wanted if not any(each.entry for each in slots.values())]
         self.search_sizes = [len(slots) for slots in searched]
