@@ -1,0 +1,100 @@
+"""Where an engineer looks first, from the type of a violation and what the record shows."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from pytest_garl.regressions.case import NOT_ASKED, Prevention
+from pytest_garl.reports.html.moments import decisive_s
+from pytest_garl.reports.html.sightings_text import readable_and_reported
+from pytest_garl.simulation.flight import Flight
+from pytest_garl.verdicts.verdict import Verdict
+
+MISSED = 0.5
+"""A system that reports fewer of the readable frames than this share has lost the marker."""
+
+
+def hints_of(
+    flight: Flight | None, verdict: Verdict, prevention: Prevention = NOT_ASKED
+) -> tuple[str, ...]:
+    """Return one or two sentences; none for an assertion of the user's own."""
+    kind = verdict.violation_type
+    if kind == "IV":
+        return (_moving(flight, prevention),)
+    if kind in ("II", "abort") or verdict.signature.startswith("late:not-landed"):
+        return tuple(_not_landed(flight))
+    return {
+        "I": (
+            "It came down somewhere else than on the marker: compare its target with the marker "
+            "in the timeline. A target that is off points to the detector or to the camera's "
+            "calibration, a right one to the control of the descent.",
+        ),
+        "off": (
+            "Compare the system's target with the marker in the timeline: a target that is off "
+            "points to the detector or the estimated position, a right one to wind and control.",
+        ),
+        "III": (
+            "A body that does not move was hit: look at the way that the system took there, and "
+            "at its clearance from what it could see or knew.",
+        ),
+        "V": ("The traceback below names the line that failed, with the frame that it got.",),
+        "late": ("It was too slow: the timeline shows which phase took the time.",),
+        "hard": ("Look at the descent of the last metres: speed and tilt at the touchdown.",),
+        "slid": ("Look at the speed over the ground at the touchdown, and at when motors stop.",),
+    }.get(kind or "", ())
+
+
+def _moving(flight: Flight | None, prevention: Prevention) -> str:
+    answer = prevention.answer
+    if answer == "preventable":
+        return (
+            "An escape existed after the camera could show the body: look at what the system does "
+            "with something that comes into view, and at how low it still gives way."
+        )
+    if answer == "sensor-limited":
+        return (
+            "An escape existed, but the camera did not show the body in time for it: a wider view, "
+            "a slower descent or another sensor would have been needed."
+        )
+    if answer == "unpreventable":
+        return (
+            "No landing system could have escaped: this is about the place and the procedure, not "
+            "about the code."
+        )
+    if flight is None or not flight.contacts:
+        return "Look at what the system does with something that comes near."
+    contact = flight.contacts[-1]
+    times = [step.time_s for step in flight.steps if contact.body in step.objects_visible]
+    if not times:
+        return (
+            f"The camera never showed {contact.body}: look at the field of view and at the "
+            "procedure, before the code."
+        )
+    return (
+        f"{contact.body} was in view {contact.time_s - times[0]:.1f} s before the contact: look at "
+        "what the system does with something that comes into view. Whether an escape existed was "
+        "not asked for this flight."
+    )
+
+
+def _not_landed(flight: Flight | None) -> Iterator[str]:
+    if flight is None:
+        return
+    readable, reported = readable_and_reported(flight)
+    if not readable:
+        yield (
+            "The marker could not be read from where the UAV flew: look at where and how high the "
+            "system searches, and for how long."
+        )
+    elif reported < MISSED * readable:
+        yield (
+            f"The marker could be read in {readable} frames, and the system reported it in "
+            f"{reported} of them: look at the detector under the conditions below."
+        )
+    else:
+        last_s = decisive_s(flight)
+        yield (
+            f"The system reported the marker in {reported} of {readable} readable frames: it is "
+            f"not the detector. Look at why the system did not descend, and at the decision to end "
+            f"the flight at {last_s:.1f} s."
+        )
