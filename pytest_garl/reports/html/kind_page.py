@@ -11,9 +11,11 @@ from typing import Any
 from pytest_garl.execution.job import FlightJob, parse_job
 from pytest_garl.execution.ledger import Ledger
 from pytest_garl.execution.ledger_queries import LedgerFlight
+from pytest_garl.messages import shortened
 from pytest_garl.regressions.case import NO_GATE_TEXTS, Case
 from pytest_garl.regressions.corpus import Corpus, CorpusEntry
 from pytest_garl.regressions.story_text import grade_in_words
+from pytest_garl.reports.html.flight_tables import cut_text
 from pytest_garl.reports.html.flight_task import FlightTask, ShownFlight
 from pytest_garl.reports.html.naming import page_name, shown_file
 from pytest_garl.reports.search_summary import CAMERA, LEGEND, SearchSummary, ViolationKind
@@ -22,6 +24,8 @@ from pytest_garl.scenarios.files import dump_scenario
 from pytest_garl.verdicts.wording import headline
 
 Fact = tuple[str, str]
+MOST_TITLE = 220
+"""Characters of a title: three lines; the description below says all."""
 MOST_SLOTS = 60
 """Names of flights that a page lists; more are counted."""
 
@@ -208,14 +212,14 @@ def _page(
     other: Fact | None,
 ) -> KindPage:
     kind, search = plan.kind, plan.search
-    title = headline(story)
+    title = shortened(headline(story), MOST_TITLE)
     return KindPage(
         name=name,
         title=title[:1].upper() + title[1:],
         signature=kind.signature,
         meaning=LEGEND.get(kind.signature.partition(":")[0], ""),
         where=f"{search.name} on {search.map}",
-        description=description,
+        description=cut_text(description),
         subject=subject,
         facts=tuple(fact for fact in facts if fact[1]),
         commands=_commands(plan),

@@ -9,23 +9,15 @@ from typing import Any
 
 from pytest_garl.reports.html.charts import (
     Plot,
-    Segment,
     kinds_over_flights,
-    outcome_bar,
     violations_over_flights,
 )
 from pytest_garl.reports.html.flight_task import ShownFlight
 from pytest_garl.reports.html.kind_page import Fact, KindPage, KindPlan
 from pytest_garl.reports.html.naming import KINDS, shown_file
-from pytest_garl.reports.search_summary import LEGEND, WHY_NO_LANDING, SearchSummary
-from pytest_garl.reports.shares_text import (
-    PAPER_DEFINITION,
-    in_control_text,
-    kinds_lines,
-    limits_text,
-    percent,
-)
-from pytest_garl.verdicts.statistics import share_interval
+from pytest_garl.reports.html.search_card import SearchCard, cost_rows, domain_rows, search_card
+from pytest_garl.reports.search_summary import LEGEND, SearchSummary
+from pytest_garl.reports.shares_text import in_control_text, kinds_lines, percent
 
 PHASES = ("take-off", "transit", "search", "approach", "descent", "last-metre")
 """Phases of a landing (``verdicts/phases.py``), in its order."""
@@ -33,20 +25,6 @@ NO_PHASE = "no phase"
 MOST_THUMBNAILS = 24
 """So that the index stays below 300 kB: a small picture takes some 6 kB."""
 MOST_FINDINGS = 40
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class SearchCard:
-    """A landing system on a map: how its flights ended, and its figures."""
-
-    name: str
-    map: str
-    flown: int
-    wanted: int
-    bar: tuple[Segment, ...]
-    violating: str
-    figures: tuple[Fact, ...]
-    kinds_text: tuple[str, ...]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -84,6 +62,8 @@ class RunPage:
     searches: tuple[SearchCard, ...]
     kinds: tuple[KindRow, ...]
     not_by_chance: tuple[KindRow, ...]
+    compared: bool
+    """Whether random flights of any kind were counted beside the later ones."""
     control: tuple[Fact, ...]
     kinds_plot: Plot | None
     violations_plot: Plot | None
@@ -108,20 +88,19 @@ def run_page(
     flights = found["flights"]
     violating = sum(each.violating for each in searches)
     kinds.sort(key=lambda row: (-row.count, row.signature, row.where))
-    by_search = {row.address for row in kinds} & {
-        f"{KINDS}/{plan.name}.html" for plan, _ in shown if plan.kind.in_control == 0
-    }
+    not_by_chance = {page.name for plan, page in shown if plan.kind.in_control == 0}
     return RunPage(
         title=_title(searches, len(kinds), violating),
         subtitle=_subtitle(found),
         problem=_problem(found),
         numbers=_numbers(searches, flights["flown"], violating, len(kinds)),
         searches=tuple(
-            _card(search, row["wanted"])
+            search_card(search, row["wanted"])
             for search, row in zip(searches, found["searches"], strict=True)
         ),
         kinds=tuple(kinds),
-        not_by_chance=tuple(row for row in kinds if row.address in by_search),
+        not_by_chance=tuple(row for row in kinds if Path(row.address).stem in not_by_chance),
+        compared=any(plan.kind.in_control is not None for plan, _ in shown),
         control=tuple(
             (f"{each.name} on {each.map}", text) for each in searches for text in kinds_lines(each)
         ),
@@ -134,8 +113,8 @@ def run_page(
             for search in searches
             for each in search.findings
         )[:MOST_FINDINGS],
-        cost=_cost(found),
-        domain=_domain(searches, found),
+        cost=cost_rows(found),
+        domain=domain_rows(searches, found),
         cases=tuple(
             (
                 _file(case["file"]),
@@ -204,47 +183,7 @@ def _numbers(
 
 
 def _share(count: int, total: int) -> str:
-    return f"{100 * count / total:.0f} %" if total else "–"
-
-
-def _card(search: SearchSummary, wanted: int) -> SearchCard:
-    total = len(search.flights)
-    low, high = share_interval(search.violating, total)
-    gave_up, not_landed = (search.without_landing(each) for each in ("gave_up", "not_landed"))
-    figures = [
-        ("landed", _of(search.count("landed"), total)),
-        (PAPER_DEFINITION, _of(search.violating_by_the_paper, total)),
-        ("gave up", ", ".join(f"{why} {gave_up[why]}" for why in WHY_NO_LANDING)),
-        ("ran out of time", ", ".join(f"{why} {not_landed[why]}" for why in WHY_NO_LANDING)),
-        ("crashed", ", ".join(f"{kind} {count}" for kind, count in search.crashes.items())),
-        ("inconclusive", str(search.count("inconclusive") or "")),
-    ]
-    distance_m, time_s = search.landing_distance_m, search.landing_time_s
-    if distance_m and time_s:
-        figures += [
-            (
-                "distance from the marker",
-                f"median {distance_m.median:.2f} m, worst {distance_m.worst:.2f} m",
-            ),
-            ("time to the touchdown", f"median {time_s.median:.1f} s, worst {time_s.worst:.1f} s"),
-        ]
-    return SearchCard(
-        name=search.name,
-        map=search.map,
-        flown=total,
-        wanted=wanted,
-        bar=outcome_bar(search),
-        violating=(
-            f"{percent(search.violating, total)} violate something "
-            f"(95 % interval {100 * low:.1f} to {100 * high:.1f} %)"
-        ),
-        figures=tuple(figure for figure in figures if figure[1]),
-        kinds_text=tuple(kinds_lines(search)),
-    )
-
-
-def _of(count: int, total: int) -> str:
-    return f"{count} ({percent(count, total)})"
+    return percent(count, total) if total else "–"
 
 
 def _kind(plan: KindPlan, page: KindPage, index: int) -> KindRow:
@@ -301,45 +240,6 @@ def _archive(searches: Sequence[SearchSummary]) -> tuple[ArchiveRow, ...]:
 
 def _shade(count: int, most: int) -> int:
     return 0 if not count else min(4, 1 + int(4 * count / (most + 1)))
-
-
-def _cost(found: Mapping[str, Any]) -> tuple[Fact, ...]:
-    flights, time = found["flights"], found["time"]
-    flying_s, idle_s = time["flying_s"], time["idle_s"]
-    in_all = flights["flown"] + flights["beside"]
-    return (
-        ("flights of the search", f"{flights['flown']} of {flights['wanted']}"),
-        ("flights to repeat, confirm and shrink", str(flights["beside"])),
-        ("flown again after a time-out or a kill", str(flights["flown_again"])),
-        ("computing time of all flights", _duration(flying_s)),
-        ("a flight on average", f"{flying_s / in_all:.1f} s" if in_all and flying_s else ""),
-        (
-            "workers idle",
-            f"{100 * idle_s / (flying_s + idle_s):.0f} %" if flying_s + idle_s else "",
-        ),
-        ("began", _utc(time["began"])),
-        ("ended", _utc(time["ended"])),
-    )
-
-
-def _utc(text: object) -> str:
-    return f"{str(text)[:19].replace('T', ' ')} UTC" if text else ""
-
-
-def _duration(seconds: float) -> str:
-    if seconds < 120:
-        return f"{seconds:.0f} s"
-    return f"{seconds / 60:.0f} min" if seconds < 7200 else f"{seconds / 3600:.1f} h"
-
-
-def _domain(searches: Sequence[SearchSummary], found: Mapping[str, Any]) -> tuple[Fact, ...]:
-    rows: list[Fact] = []
-    for search in searches:
-        where = f"{search.name} on {search.map}"
-        domains = " and ".join(search.domains) or str(found["run"]["domain"] or "")
-        limits = "; ".join(limits_text(each) for each in search.limits)
-        rows.append((where, f"domain {domains}, NPCs {' and '.join(search.npcs)}; limits {limits}"))
-    return tuple(rows)
 
 
 def _origin(found: Mapping[str, Any]) -> tuple[Fact, ...]:
