@@ -15,7 +15,7 @@ from pytest_garl.scenarios.maps.map import Map
 from pytest_garl.scenarios.object_types import OBJECT_TYPES
 from pytest_garl.scenarios.placement import pad_of
 from pytest_garl.scenarios.scenario import Scenario
-from pytest_garl.simulation.camera.ground import paint_ground
+from pytest_garl.simulation.camera.ground import Raster, paint_ground
 from pytest_garl.simulation.camera.ground_cover import cover_shift
 from pytest_garl.simulation.camera.meshes import mesh_of, placed_hulls
 from pytest_garl.simulation.camera.projection import View
@@ -85,9 +85,11 @@ class MapPane:
 
     def _ground(self, scenario: Scenario) -> drawing.Image:
         """Return the ground as it was painted for the flight, mixed with white."""
-        rgb = ground_from_above(
-            scenario, self._map, (self._left, self._bottom), self._scale, (WIDTH, HEIGHT)
-        )
+        shift = cover_shift(generator(scenario.seed, "sensor"))
+        pad = pad_of(scenario, self._map)
+        wide = paint_ground(self._map, conditions_of(scenario), shift, pad).wide
+        origin = self._left, self._bottom
+        rgb = ground_from_above(wide, origin, self._scale, (WIDTH, HEIGHT))
         return np.asarray(
             cv2.addWeighted(rgb, 1 - _WHITE_SHARE, rgb, 0.0, 255 * _WHITE_SHARE), np.uint8
         )
@@ -180,18 +182,15 @@ def _radius_m(item: ObjectRecord) -> float:
 
 
 def ground_from_above(
-    scenario: Scenario,
-    map: Map,
+    wide: Raster,
     origin_px: tuple[float, float],
     px_per_m: float,
     size_px: tuple[int, int],
 ) -> drawing.Image:
-    """Return the ground as it was painted for a flight, from above, north up, RGB (H, W, 3).
+    """Return painted ground from above, north up, RGB (H, W, 3).
 
     ``origin_px`` is the pixel of the world's origin, ``size_px`` the picture's width and height.
     """
-    shift = cover_shift(generator(scenario.seed, "sensor"))
-    wide = paint_ground(map, conditions_of(scenario), shift, pad_of(scenario, map)).wide
     coarseness = round(math.log2(max(1.0, 1 / px_per_m / wide.m_per_px)))
     level = min(coarseness, len(wide.levels) - 1)
     left, bottom = origin_px

@@ -32,7 +32,9 @@ from pytest_garl.reports.html.scene import scene_data
 from pytest_garl.reports.html.sightings_text import sighting_sentences
 from pytest_garl.scenarios.files import parse_scenario
 from pytest_garl.scenarios.maps.map import Map
+from pytest_garl.scenarios.placement import map_in
 from pytest_garl.scenarios.scenario import Scenario
+from pytest_garl.simulation.camera.cover_event import renderer_of
 from pytest_garl.simulation.flight import Flight
 from pytest_garl.simulation.flight_file import load
 
@@ -187,12 +189,15 @@ def _drawn(task: FlightTask, flight: Flight, place: Place, moments: tuple[Moment
             )
         )
     try:
-        scene = scene_data(scenario, map)
+        # Without a camera the ground can still be painted.
+        camera = dataclass_from(Camera, dict(task.camera), "camera") if task.camera else Camera()
+        place_flown = map_in(scenario, map)
+        renderer = renderer_of(scenario, place_flown, camera)
+        scene = scene_data(place_flown, renderer)
         if task.camera is None:
             note = "The ledger does not name the camera, as those of earlier versions: no pictures."
             return _Drawn(scene=scene, notes=(note,))
-        camera = dataclass_from(Camera, dict(task.camera), "camera")
-        stills, thumbnail = stills_of(flight, scenario, map, camera, moments)
+        stills, thumbnail = stills_of(flight, scenario, renderer, moments)
     except (GarlError, ValueError) as error:
         return _Drawn(notes=(f"No pictures: {cut_text(str(error), 400)}",))
     film, notes = _film(task, flight, place, camera) if task.with_film else ("", ())

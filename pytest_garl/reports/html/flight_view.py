@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pytest_garl.messages import shortened
-from pytest_garl.reports.html.moments import Moment, decisive_s
+from pytest_garl.reports.html.moments import Moment, decisive_s, reports_other_place
 from pytest_garl.scenarios.object_types import OBJECT_TYPES
 from pytest_garl.simulation.flight import Flight, ObjectRecord, Step, Track
 from pytest_garl.simulation.physics.vehicle import BODY_ABOVE_FEET_M, up_m
@@ -181,7 +181,10 @@ def strips(flight: Flight) -> tuple[Strip, ...]:
     found = [_strip("marker can be read", "readable", steps, lambda s: s.time_s in readable)]
     if reports_detections(flight):
         seen = _strip("system reports it", "reported", steps, lambda s: reports_marker(flight, s))
-        found.append(seen)
+        other = _strip(
+            "system reports another place", "other", steps, lambda s: reports_other_place(flight, s)
+        )
+        found += [each for each in (seen, other) if each.spans or each is seen]
     elif reports_targets(flight):
         found.append(
             _strip("system has a target", "reported", steps, lambda s: target_of(s) is not None)

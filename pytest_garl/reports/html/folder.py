@@ -10,10 +10,8 @@ from pathlib import Path
 
 from pytest_garl.errors import SavingError
 from pytest_garl.messages import shown
-from pytest_garl.reports.html.naming import KINDS
-from pytest_garl.reports.html.rendering import GENERATOR
+from pytest_garl.reports.html.naming import GENERATOR, INDEX, KINDS
 
-INDEX = "index.html"
 _HEAD_BYTES = 4096
 """The generator stands in the first lines of a page."""
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pytest_garl.simulation.flight import Flight
+from pytest_garl.simulation.flight import Flight, Step
 from pytest_garl.simulation.physics.vehicle import up_m
 from pytest_garl.verdicts.margins import COMMIT_M
 from pytest_garl.verdicts.mechanism import NO_LANDING
@@ -50,6 +50,12 @@ def moments_of(flight: Flight) -> tuple[Moment, ...]:
     return tuple(Moment(time_s=m.time_s, label=m.label[:1].upper() + m.label[1:]) for m in merged)
 
 
+def reports_other_place(flight: Flight, step: Step) -> bool:
+    """Whether the system reports detections in a frame, and none of them at the marker."""
+    seen = step.diagnostics.detections if step.diagnostics else ()
+    return bool(seen) and not reports_marker(flight, step)
+
+
 def decisive_s(flight: Flight) -> float:
     """Return when the event happened that decided the flight; the end if nothing tells it."""
     if flight.outcome == "collision" and flight.contacts:
@@ -73,6 +79,9 @@ def _all(flight: Flight, end_s: float) -> Iterator[Moment]:
         yield Moment(time_s=reported[0], label="the system reports the marker for the first time")
     elif targeted:
         yield Moment(time_s=targeted[0], label="the system has a target for the first time")
+    elsewhere = [each.time_s for each in flight.steps if reports_other_place(flight, each)]
+    if elsewhere and elsewhere[0] <= end_s:
+        yield Moment(time_s=elsewhere[0], label="the system reports another place")
     last = last_report_s(flight, end_s)
     if last is not None and end_s - last > BEFORE_END_S:
         yield Moment(time_s=last, label="the system reports the marker for the last time")
@@ -122,14 +131,15 @@ def _descends_below(flight: Flight, height_m: float, end_s: float) -> float | No
 
 
 def _turns_back(flight: Flight, end_s: float) -> float | None:
-    """Return when a descent was lowest, if the UAV climbed again by a metre before the end."""
+    """Return when the UAV was lowest after its take-off, if it came down and rose by a metre."""
     heights, times = flight.uav.position_m[:, 2], flight.uav.time_s
     high = np.flatnonzero((heights >= LOW_M) & (times <= end_s))
     if not len(high):
         return None
     part = heights[high[0] : np.searchsorted(times, end_s)]
     lowest = int(np.argmin(part)) if len(part) else 0
-    if not len(part) or part[lowest:].max() - part[lowest] < 1.0:
+    sides = (part[: lowest + 1], part[lowest:]) if len(part) else ()
+    if not sides or min(side.max() - part[lowest] for side in sides) < 1.0:
         return None
     return float(times[high[0] + lowest])
 

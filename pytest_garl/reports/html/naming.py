@@ -7,6 +7,9 @@ import re
 from pathlib import Path
 
 _UNSAFE = re.compile(r"[^A-Za-z0-9]+")
+GENERATOR = "pytest-garl report"
+"""The generator that each page names, by which a report is known as one."""
+INDEX = "index.html"
 KINDS = "kinds"
 """The folder of the pages of kinds."""
 _MOST_CHARS = 60

@@ -15,9 +15,8 @@ from pytest_garl.landing_system import Camera
 from pytest_garl.reports.html.moments import Moment
 from pytest_garl.reports.html.scene import jpeg_uri
 from pytest_garl.scenarios.maps.map import Map
-from pytest_garl.scenarios.placement import map_in
 from pytest_garl.scenarios.scenario import Scenario
-from pytest_garl.simulation.camera.cover_event import renderer_of
+from pytest_garl.simulation.camera.renderer import Renderer
 from pytest_garl.simulation.environment import environment_at
 from pytest_garl.simulation.flight import Flight, Step
 from pytest_garl.verdicts.detectability import readable_probability
@@ -48,14 +47,12 @@ class Still:
 
 
 def stills_of(
-    flight: Flight, scenario: Scenario, map: Map, camera: Camera, moments: Sequence[Moment]
+    flight: Flight, scenario: Scenario, renderer: Renderer, moments: Sequence[Moment]
 ) -> tuple[tuple[Still, ...], str]:
     """Return the pictures at the moments, and a small one of the last; the marker is outlined.
 
     A picture is that of the last frame up to its moment.
     """
-    place = map_in(scenario, map)
-    renderer = renderer_of(scenario, place, camera)
     pane, shown = CameraPane(renderer), scenario
     found, small = [], ""
     for moment in moments:

@@ -19,11 +19,10 @@ from markupsafe import Markup
 
 from pytest_garl.messages import printable
 from pytest_garl.reports.html.kind_page import KindPage
+from pytest_garl.reports.html.naming import GENERATOR
 from pytest_garl.reports.html.run_page import RunPage
 
 HERE = Path(__file__).parent
-GENERATOR = "pytest-garl report"
-"""The pages' generator, by which a report is known as one."""
 _SCRIPTS = ("cursor.js", "path.js", "timeline.js", "player.js")
 _INDEX, _KIND = "index.html.jinja", "kind.html.jinja"
 

@@ -12,9 +12,9 @@ from pytest_garl.execution.stored_ledger import checked_ledger
 from pytest_garl.regressions.corpus import Corpus
 from pytest_garl.reports.html import MOST_FILMS
 from pytest_garl.reports.html.flight_task import ShownFlight
-from pytest_garl.reports.html.folder import INDEX, check_target, new_folder
+from pytest_garl.reports.html.folder import check_target, new_folder
 from pytest_garl.reports.html.kind_page import KindPlan, found_page, kind_page, plan_kinds
-from pytest_garl.reports.html.naming import KINDS
+from pytest_garl.reports.html.naming import INDEX, KINDS
 from pytest_garl.reports.html.page_workers import shown_flights
 from pytest_garl.reports.html.rendering import render_index, render_kind
 from pytest_garl.reports.html.run_page import run_page

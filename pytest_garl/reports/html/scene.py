@@ -9,9 +9,8 @@ import cv2
 import numpy as np
 
 from pytest_garl.scenarios.maps.map import Map
-from pytest_garl.scenarios.placement import map_in, pad_of
-from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.simulation.camera.meshes import mesh_of, placed_hulls
+from pytest_garl.simulation.camera.renderer import Renderer
 from pytest_garl.video.drawing import Image
 from pytest_garl.video.map_pane import ground_from_above
 
@@ -21,26 +20,28 @@ BORDER_M = 2.0
 GROUND_QUALITY = 70
 
 
-def scene_data(scenario: Scenario, map: Map) -> dict[str, Any]:
+def scene_data(place: Map, renderer: Renderer) -> dict[str, Any]:
     """Return the scene of a flight in the built-in simulator, for JSON.
+
+    ``place`` is the map as it is flown, ``renderer`` that of the flight.
 
     ``ground`` is a picture whose pixel (0, 0) lies at ``x_m`` and ``y_m``, north up.  A body's part
     is an upright prism: its outline, its lowest and highest point, its colour.
     """
-    place = map_in(scenario, map)
     x_min, x_max, y_min, y_max = place.bounds_m
     left, right, low, high = x_min - BORDER_M, x_max + BORDER_M, y_min - BORDER_M, y_max + BORDER_M
     px_per_m = LONGER_SIDE_PX / max(right - left, high - low)
     size = round((right - left) * px_per_m), round((high - low) * px_per_m)
     origin = -left * px_per_m, high * px_per_m
-    picture = ground_from_above(scenario, place, origin, px_per_m, size)
+    assert renderer.ground is not None
+    picture = ground_from_above(renderer.ground.wide, origin, px_per_m, size)
     return {
         "ground": jpeg_uri(picture, GROUND_QUALITY),
         "x_m": round(left, 2),
         "y_m": round(high, 2),
         "m_per_px": round(1 / px_per_m, 5),
         "bounds": [round(each, 2) for each in place.bounds_m],
-        "outline": [[round(x, 2), round(y, 2)] for x, y in pad_of(scenario, place).main.outline_m],
+        "outline": [[round(x, 2), round(y, 2)] for x, y in renderer.pad.main.outline_m],
         "bodies": [{"name": body.name, "parts": _parts(body)} for body in place.bodies],
     }
 
