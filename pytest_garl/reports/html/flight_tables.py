@@ -64,9 +64,11 @@ def nearest_rows(flight: Flight) -> tuple[tuple[str, str, str], ...]:
 def event_rows(flight: Flight) -> tuple[tuple[float, str], ...]:
     """Return (time, what happened): the simulator's events and all contacts."""
     rows = [(each.time_s, each.text) for each in flight.events]
+    told = {(round(each.time_s, 2), word) for each in flight.events for word in each.text.split()}
     rows += [
         (each.time_s, f"contact with {each.body} at {each.speed_mps:.1f} m/s")
         for each in flight.contacts
+        if (round(each.time_s, 2), each.body) not in told
     ]
     rows.sort(key=lambda row: row[0])
     return tuple((time_s, shortened(text, 300)) for time_s, text in rows[:MOST_ROWS])

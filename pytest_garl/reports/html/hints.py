@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
+
+import numpy as np
 
 from pytest_garl.regressions.case import NOT_ASKED, Prevention
 from pytest_garl.reports.html.moments import decisive_s
 from pytest_garl.reports.html.sightings_text import readable_and_reported
 from pytest_garl.simulation.flight import Flight
+from pytest_garl.verdicts.sightings import last_target
 from pytest_garl.verdicts.verdict import Verdict
 
 MISSED = 0.5
@@ -23,16 +27,9 @@ def hints_of(
         return (_moving(flight, prevention),)
     if kind in ("II", "abort") or verdict.signature.startswith("late:not-landed"):
         return tuple(_not_landed(flight))
+    if kind in ("I", "off"):
+        return (_elsewhere(flight),)
     return {
-        "I": (
-            "It came down somewhere else than on the marker: compare its target with the marker "
-            "in the timeline. A target that is off points to the detector or to the camera's "
-            "calibration, a right one to the control of the descent.",
-        ),
-        "off": (
-            "Compare the system's target with the marker in the timeline: a target that is off "
-            "points to the detector or the estimated position, a right one to wind and control.",
-        ),
         "III": (
             "A body that does not move was hit: look at the way that the system took there, and "
             "at its clearance from what it could see or knew.",
@@ -74,6 +71,32 @@ def _moving(flight: Flight | None, prevention: Prevention) -> str:
         f"{contact.body} was in view {contact.time_s - times[0]:.1f} s before the contact: look at "
         "what the system does with something that comes into view. Whether an escape existed was "
         "not asked for this flight."
+    )
+
+
+def _elsewhere(flight: Flight | None) -> str:
+    """Return what a landing beside the marker points to, by the target that the system had."""
+    target = last_target(flight, decisive_s(flight)) if flight else None
+    if flight is None or target is None:
+        return (
+            "The system reported no target: look at how it chooses the place to come down, and "
+            "report it as Diagnostics.target_m."
+        )
+    off_m = math.dist(target, flight.marker_position_m)
+    down = decisive_s(flight)
+    index = max(0, int(np.searchsorted(flight.uav.time_s, down, side="right")) - 1)
+    x, y = (float(value) for value in flight.uav.position_m[index, :2])
+    missed_m = math.dist(target, (x, y))
+    if off_m > missed_m:
+        return (
+            f"Its last target was {off_m:.1f} m off the marker, and the UAV came down "
+            f"{missed_m:.1f} m from that target: look at the detector, the camera's calibration and the estimated "
+            "position before the control."
+        )
+    return (
+        f"Its last target was {off_m:.1f} m off the marker, but the UAV came down {missed_m:.1f} "
+        "m from that target: look at the control of the descent, at wind, and at what the system "
+        "does after it has lost sight of the marker."
     )
 
 

@@ -254,7 +254,7 @@ def _facts(plan: KindPlan, flight: ShownFlight, known: bool) -> tuple[Fact, ...]
         ("Found in", f"{flights}; {seen}" if seen else flights),
         ("Robustness", case.robustness if case else ""),
         ("Preventable?", case.prevention.text if case else ""),
-        ("Gates nothing", NO_GATE_TEXTS[case.reason] if case and case.reason else ""),
+        ("Why it gates nothing", NO_GATE_TEXTS[case.reason] if case and case.reason else ""),
         ("Shrinking removed", case.evidence.removed if case else ""),
         ("Saved case", _status(case, known) if case else "none in this project"),
     )
@@ -263,6 +263,8 @@ def _facts(plan: KindPlan, flight: ShownFlight, known: bool) -> tuple[Fact, ...]
 def _status(case: Case, known: bool) -> str:
     if case.status == "fixed":
         return "fixed: it must pass"
+    if not case.gates:
+        return "known, gates nothing" if known else "new, gates nothing"
     return "known: expected to fail until it is fixed" if known else "new: fails the tests"
 
 

@@ -57,7 +57,7 @@ def search_card(search: SearchSummary, wanted: int) -> SearchCard:
         bar=outcome_bar(search),
         violating=(
             f"{percent(search.violating, total)} violate something "
-            f"(95 % interval {100 * low:.1f} to {100 * high:.1f} %)"
+            f"(95 %: {100 * low:.1f} to {100 * high:.1f} %)"
         ),
         figures=tuple(figure for figure in figures if figure[1]),
         kinds_text=tuple(kinds_lines(search)),

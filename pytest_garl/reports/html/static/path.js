@@ -11,6 +11,7 @@
   const view = { ...START, zoom: 1 };
   const ground = new Image();
   const reach = reachOf();
+  const labels = [];
   let size = { width: 0, height: 0 };
 
   // The middle of the UAV's path and the marker, and how far they reach from it.
@@ -64,10 +65,7 @@
   }
 
   function drawGround(ratio) {
-    if (!scene) {
-      drawGrid();
-      return;
-    }
+    if (!scene) return drawGrid();
     if (!ground.complete || !ground.naturalWidth) return;
     const s = scale() * scene.m_per_px;
     const origin = project([scene.x_m, scene.y_m, 0]);
@@ -82,13 +80,12 @@
     context.restore();
   }
 
+  // Lines 5 m apart, for a flight in another simulator, whose ground nobody can paint.
   function drawGrid() {
-    const step = 5;
-    for (let i = -4; i <= 4; i += 1) {
-      const [mx, my] = flight.marker;
-      const far = 4 * step;
-      stroke([[mx + i * step, my - far, 0], [mx + i * step, my + far, 0]], garl.colour("rule"), 1);
-      stroke([[mx - far, my + i * step, 0], [mx + far, my + i * step, 0]], garl.colour("rule"), 1);
+    const [mx, my] = flight.marker;
+    for (let at = -20; at <= 20; at += 5) {
+      stroke([[mx + at, my - 20, 0], [mx + at, my + 20, 0]], garl.colour("rule"), 1);
+      stroke([[mx - 20, my + at, 0], [mx + 20, my + at, 0]], garl.colour("rule"), 1);
     }
   }
 
@@ -110,17 +107,29 @@
     }
   }
 
-  function label(text, place, colour, lift = 10) {
-    const { x, y } = project(place);
+  // Names wait until all bodies are drawn; one that would cover another goes above it.
+  function label(text, place, colour) {
+    labels.push({ text, colour, ...project(place) });
+  }
+
+  function writeLabels() {
     context.font = "12px system-ui, sans-serif";
-    const wide = context.measureText(text).width;
-    const left = Math.min(Math.max(4, x - wide / 2), size.width - wide - 4);
     context.lineWidth = 3;
     context.lineJoin = "round";
     context.strokeStyle = garl.colour("halo");
-    context.strokeText(text, left, y - lift);
-    context.fillStyle = colour;
-    context.fillText(text, left, y - lift);
+    const written = [];
+    for (const { text, colour, x, y } of labels.splice(0).reverse()) {
+      const wide = context.measureText(text).width;
+      const left = Math.min(Math.max(4, x - wide / 2), size.width - wide - 4);
+      let base = y - 11;
+      const covers = (each) => Math.abs(each.base - base) < 14
+        && left < each.left + each.wide + 4 && each.left < left + wide + 4;
+      while (written.some(covers)) base -= 14;
+      written.push({ left, wide, base });
+      context.strokeText(text, left, base);
+      context.fillStyle = colour;
+      context.fillText(text, left, base);
+    }
   }
 
   function drawMarker() {
@@ -171,15 +180,12 @@
     for (const [a, b] of [[1, 1], [1, -1]]) {
       stroke([[x - a * 0.35, y - b * 0.35, z], [x + a * 0.35, y + b * 0.35, z]], blue, 3);
     }
-    const { x: px, y: py } = project(place);
+    const middle = project(place);
     context.beginPath();
-    context.arc(px, py, 5, 0, 2 * Math.PI);
+    context.arc(middle.x, middle.y, 5, 0, 2 * Math.PI);
     context.fillStyle = blue;
     context.fill();
-    context.strokeStyle = garl.colour("halo");
-    context.lineWidth = 1.5;
-    context.stroke();
-    label(`UAV, ${Math.max(0, z).toFixed(1)} m up`, place, blue, 12);
+    label(`UAV, ${Math.max(0, z).toFixed(1)} m up`, place, blue);
   }
 
   function drawBelief(time) {
@@ -221,18 +227,15 @@
     drawBelief(garl.time);
     for (const item of flight.objects) drawObject(item, garl.time, until);
     drawUav(garl.time, until);
+    writeLabels();
     drawCompass();
     canvas.dataset.time = garl.time.toFixed(2);
   }
 
-  let asked = false;
+  let asked = 0;
   function redraw() {
-    if (asked) return;
-    asked = true;
-    requestAnimationFrame(() => {
-      asked = false;
-      draw();
-    });
+    cancelAnimationFrame(asked);
+    asked = requestAnimationFrame(draw);
   }
 
   function turn(yaw, pitch) {
@@ -241,10 +244,7 @@
     redraw();
   }
 
-  function zoom(factor) {
-    view.zoom = Math.min(12, Math.max(0.3, view.zoom * factor));
-    redraw();
-  }
+  const zoom = (factor) => { view.zoom = Math.min(12, Math.max(0.3, view.zoom * factor)); };
 
   const views = {
     start: () => Object.assign(view, START, { zoom: 1 }),
@@ -278,6 +278,7 @@
     if (!event.ctrlKey && !event.metaKey) return;
     event.preventDefault();
     zoom(event.deltaY < 0 ? 1.15 : 1 / 1.15);
+    redraw();
   }, { passive: false });
   canvas.addEventListener("keydown", (event) => {
     const keys = {
