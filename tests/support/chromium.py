@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import base64
 import contextlib
+import fcntl
 import json
 import os
 import select
@@ -127,6 +128,8 @@ class Browser:
             self.problems.append(json.dumps(parameters["args"])[:500])
         elif method == "Log.entryAdded" and parameters["entry"]["level"] in ("error", "warning"):
             self.problems.append(parameters["entry"]["text"])
+        elif method == "Page.javascriptDialogOpening":
+            self.problems.append(f"a dialog: {parameters['message']}")
         elif method == "Network.requestWillBeSent":
             url = parameters["request"]["url"]
             if not url.startswith(("file:", "data:", "about:")):
@@ -136,13 +139,13 @@ class Browser:
 @contextlib.contextmanager
 def browser() -> Iterator[Browser]:
     """Start Chromium with a profile of its own, and end it."""
-    ours, its_end = os.pipe()
-    its_begin, to = os.pipe()
+    ours, its_end = _pipe()
+    its_begin, to = _pipe()
     with tempfile.TemporaryDirectory(prefix="garl-chromium-") as profile:
         # Chromium reads from descriptor 3 and writes to descriptor 4.
         shell = f'exec "$0" "$@" 3<&{its_begin} 4>&{its_end}'
         process = subprocess.Popen(
-            ["sh", "-c", shell, PROGRAM, *_FLAGS, f"--user-data-dir={profile}"],
+            ["bash", "-c", shell, PROGRAM, *_FLAGS, f"--user-data-dir={profile}"],
             pass_fds=(its_begin, its_end),
             stdout=subprocess.DEVNULL,
             stderr=subprocess.DEVNULL,
@@ -158,3 +161,12 @@ def browser() -> Iterator[Browser]:
             os.close(ours)
             # Its helpers write into the profile for a moment longer.
             time.sleep(0.3)
+
+
+def _pipe() -> tuple[int, int]:
+    """Return a pipe whose descriptors are none of those that Chromium is given."""
+    ends = os.pipe()
+    high = tuple(fcntl.fcntl(end, fcntl.F_DUPFD_CLOEXEC, 10) for end in ends)
+    for end in ends:
+        os.close(end)
+    return high[0], high[1]

@@ -11,7 +11,7 @@ from pytest_garl.regressions.case import NOT_ASKED, Prevention
 from pytest_garl.reports.html.moments import decisive_s
 from pytest_garl.reports.html.sightings_text import readable_and_reported
 from pytest_garl.simulation.flight import Flight
-from pytest_garl.verdicts.sightings import last_target
+from pytest_garl.verdicts.sightings import last_target, reports_detections
 from pytest_garl.verdicts.verdict import Verdict
 
 MISSED = 0.5
@@ -90,8 +90,8 @@ def _elsewhere(flight: Flight | None) -> str:
     if off_m > missed_m:
         return (
             f"Its last target was {off_m:.1f} m off the marker, and the UAV came down "
-            f"{missed_m:.1f} m from that target: look at the detector, the camera's calibration and the estimated "
-            "position before the control."
+            f"{missed_m:.1f} m from that target: look at the detector, the camera's calibration "
+            "and the estimated position before the control."
         )
     return (
         f"Its last target was {off_m:.1f} m off the marker, but the UAV came down {missed_m:.1f} "
@@ -111,13 +111,27 @@ def _not_landed(flight: Flight | None) -> Iterator[str]:
         )
     elif reported < MISSED * readable:
         yield (
-            f"The marker could be read in {readable} frames, and the system reported it in "
+            f"The marker could be read in {readable} frames, and the system {_verb(flight)} in "
             f"{reported} of them: look at the detector under the conditions below."
         )
-    else:
-        last_s = decisive_s(flight)
+    elif reports_detections(flight):
         yield (
             f"The system reported the marker in {reported} of {readable} readable frames: it is "
-            f"not the detector. Look at why the system did not descend, and at the decision to end "
-            f"the flight at {last_s:.1f} s."
+            f"not the detector. {_DECISION.format(decisive_s(flight))}"
         )
+    else:
+        # A target may be a memory: it is no sighting.
+        yield (
+            f"The system had a target at the marker in {reported} of {readable} readable frames, "
+            "but reports no detections, so nothing tells whether it saw the marker. "
+            f"{_DECISION.format(decisive_s(flight))}"
+        )
+
+
+_DECISION = (
+    "Look at why the system did not descend, and at the decision to end the flight at {:.1f} s."
+)
+
+
+def _verb(flight: Flight) -> str:
+    return "reported it" if reports_detections(flight) else "had a target at it"

@@ -13,7 +13,13 @@ from pytest_garl.simulation.physics.vehicle import up_m
 from pytest_garl.verdicts.margins import COMMIT_M
 from pytest_garl.verdicts.mechanism import NO_LANDING
 from pytest_garl.verdicts.phases import LOW_M
-from pytest_garl.verdicts.sightings import last_report_s, readable_steps, reports_marker, target_of
+from pytest_garl.verdicts.sightings import (
+    last_report_s,
+    readable_steps,
+    reports_detections,
+    reports_marker,
+    target_of,
+)
 
 MOST = 8
 """Pictures that fit in two rows and tell a flight."""
@@ -84,7 +90,8 @@ def _all(flight: Flight, end_s: float) -> Iterator[Moment]:
         yield Moment(time_s=elsewhere[0], label="the system reports another place")
     last = last_report_s(flight, end_s)
     if last is not None and end_s - last > BEFORE_END_S:
-        yield Moment(time_s=last, label="the system reports the marker for the last time")
+        verb = "reports the marker" if reports_detections(flight) else "has its target there"
+        yield Moment(time_s=last, label=f"the system {verb} for the last time")
     low = _descends_below(flight, COMMIT_M, end_s)
     if low is not None:
         yield Moment(time_s=low, label=f"the UAV passes {COMMIT_M:g} m")
