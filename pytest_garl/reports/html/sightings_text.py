@@ -36,15 +36,16 @@ def sighting_sentences(flight: Flight) -> tuple[str, ...]:
 def readable_and_reported(flight: Flight) -> tuple[int, int]:
     """Return in how many frames the marker could be read, and in how many of these reported."""
     readable = list(readable_steps(flight, decisive_s(flight)))
-    return len(readable), sum(_reports(flight, step) for step in readable)
+    return len(readable), len(_reporting(flight, readable))
 
 
-def _reports(flight: Flight, step: Step) -> bool:
-    """Whether the system reports the marker in a frame: a detection, or else a target there."""
+def _reporting(flight: Flight, steps: Sequence[Step]) -> list[Step]:
+    """Return the frames in which the system reports the marker: detections, or else a target."""
     if reports_detections(flight):
-        return reports_marker(flight, step)
-    target = target_of(step)
-    return target is not None and math.dist(target, flight.marker_position_m) <= AT_MARKER_M
+        return [step for step in steps if reports_marker(flight, step)]
+    marker = flight.marker_position_m
+    targets = ((step, target_of(step)) for step in steps)
+    return [step for step, place in targets if place and math.dist(place, marker) <= AT_MARKER_M]
 
 
 def _marker(flight: Flight, steps: Sequence[Step], end_s: float) -> Iterator[str]:
@@ -64,11 +65,11 @@ def _marker(flight: Flight, steps: Sequence[Step], end_s: float) -> Iterator[str
         yield "The landing system reports neither detections nor a target."
         return
     what = "reported it" if reports_detections(flight) else "had a target at it"
-    told = [step.time_s for step in steps if _reports(flight, step)]
+    told = [step.time_s for step in _reporting(flight, steps)]
     if not told:
         yield f"The landing system never {what}."
         return
-    both = sum(_reports(flight, step) for step in readable)
+    both = len(_reporting(flight, readable))
     of = f"in {both} of these {len(readable)} frames, " if readable else ""
     yield f"The landing system {what} {of}first at {told[0]:.1f} s and last at {told[-1]:.1f} s."
 
