@@ -16,7 +16,7 @@ from pytest_garl.cli.case_tables import (
 )
 from pytest_garl.errors import GarlError
 from pytest_garl.messages import printable
-from pytest_garl.regressions.case import Case, NoGateReason
+from pytest_garl.regressions.case import NO_GATE_TEXTS, Case, NoGateReason
 from pytest_garl.regressions.case_file import load_case
 from pytest_garl.regressions.corpus import Corpus, replace_file
 from pytest_garl.regressions.replay import Replay, replay, system_of
@@ -26,11 +26,6 @@ DEFAULT_FOLDER = Path("scenarios/regressions")
 NO_PROOF = 3
 """Exit status of a replay that proves nothing."""
 EXIT_STATUS = {"FIXED": 0, "FAILED": 1, "STALE": NO_PROOF, "UNDECIDED": NO_PROOF}
-_NO_GATE = {
-    "edge": "it is an edge case, not all of its neighbours fail",
-    "sensor-limited": "an escape exists, but the camera did not show the body in time for it",
-    "unpreventable": "no landing system could have escaped",
-}
 MINIMUM_RESHRINK_FLIGHTS = 9
 """``reshrink.MINIMUM_RESHRINK_FLIGHTS``, whose module takes long to import."""
 
@@ -121,7 +116,7 @@ def show(project: _Project, file: Path) -> None:
     if case.prevention.text:
         _say(f"\n{case.prevention.text}.")
     if not case.gates:
-        _say(f"\nIt gates nothing: {_NO_GATE[case.reason]}.")
+        _say(f"\nIt gates nothing: {NO_GATE_TEXTS[case.reason]}.")
     tried = f"{case.robustness}; " if case.robustness else ""
     _say(f"\n{tried}shrinking removed {evidence.removed}; objects were moved by {case.policy}")
     _say(f"Fly it: garl cases replay {file}")

@@ -10,7 +10,9 @@ import click
 
 from pytest_garl.cli.cases import FOLDER
 from pytest_garl.files.atomic import write_text_atomically
+from pytest_garl.messages import printable
 from pytest_garl.regressions.corpus import Corpus
+from pytest_garl.reports.html import MOST_FILMS
 from pytest_garl.reports.run_report import run_report_as_json
 from pytest_garl.reports.shares_text import in_control_text
 
@@ -26,21 +28,49 @@ from pytest_garl.reports.shares_text import in_control_text
 )
 @click.option(
     "--out",
-    type=click.Path(path_type=Path, dir_okay=False),
-    help="Write to this file instead of to standard output.",
+    type=click.Path(path_type=Path),
+    help="Write the report as pages into this folder; with --json write the JSON to this file.",
+)
+@click.option(
+    "--films",
+    type=click.IntRange(min=0),
+    default=MOST_FILMS,
+    show_default=True,
+    help="Kinds of violation that have a film in the pages (extra: video).",
+)
+@click.option(
+    "--workers",
+    type=click.IntRange(min=1),
+    help="Number of processes that draw the pages (default: one per core).",
 )
 @FOLDER
-def report(ledger: Path, as_json: bool, out: Path | None, folder: Path) -> None:
+def report(
+    ledger: Path, as_json: bool, out: Path | None, films: int, workers: int | None, folder: Path
+) -> None:
     """Report the findings of the run in LEDGER (default .garl/ledger.sqlite).
 
-    Use it while the run goes on, or after a run was killed.
+    Without options it prints a short form; --out=DIR writes pages for people, which begin with
+    DIR/index.html. Use it while the run goes on, or after a run was killed.
     """
-    found = run_report_as_json(ledger, Corpus(folder, (Path.cwd() / "scenarios" / "maps",)))
+    corpus = Corpus(folder, (Path.cwd() / "scenarios" / "maps",))
+    if out is not None and not as_json:
+        _write_pages(ledger, out, corpus, films, workers)
+        return
+    found = run_report_as_json(ledger, corpus)
     text = json.dumps(found, indent=2) + "\n" if as_json else _text(found)
     if out is None:
         click.echo(text, nl=False)
     else:
         write_text_atomically(out, text)
+
+
+def _write_pages(ledger: Path, out: Path, corpus: Corpus, films: int, workers: int | None) -> None:
+    from pytest_garl.reports.html.report import write_html_report
+
+    written = write_html_report(ledger, out, corpus, films=films, workers=workers)
+    for note in written.notes:
+        click.echo(printable(f"garl: {note}"), err=True)
+    click.echo(printable(f"{written.index}: {written.pages} pages, {written.films} films"))
 
 
 def _counts(counts: dict[str, int]) -> str:

@@ -117,11 +117,18 @@ class LedgerQueries:
             generation,
         )
 
-    def _flights(self, condition: str, *values: str | int | None) -> list[LedgerFlight]:
+    def flight_with_hash(self, sha256: str) -> LedgerFlight | None:
+        """Return a flight whose trajectory has a hash: of a search, or flown on demand."""
+        found = self._flights("slot.sha256 = ?", sha256, kinds="'search', 'case', 'on_demand'")
+        return found[0] if sha256 and found else None
+
+    def _flights(
+        self, condition: str, *values: str | int | None, kinds: str = "'search'"
+    ) -> list[LedgerFlight]:
         rows = self._database.execute(
             "SELECT search, map, generation, slot, system, scenario, result, sha256 FROM slot "
-            "JOIN search ON search.id = slot.search WHERE kind = 'search' AND state = 'flown' "
-            f"AND {condition} ORDER BY system, map, generation, slot",
+            f"JOIN search ON search.id = slot.search WHERE kind IN ({kinds}) AND state = 'flown' "
+            f"AND {condition} ORDER BY kind DESC, system, map, generation, slot",
             values,
         )
         return [

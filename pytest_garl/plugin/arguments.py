@@ -120,6 +120,13 @@ OPTIONS = (
         "is no worse than the baseline, between 0 and 1 (default: 0.05).",
     ),
     Option(
+        name="report",
+        metavar="DIR",
+        help="Write the run as pages into this folder when it ends: what was found, and a page for "
+        "each kind of violation, with films if pytest-garl[video] is installed. `garl report "
+        "--out=DIR` does the same later.",
+    ),
+    Option(
         name="npcs",
         metavar="POLICY",
         help=f"NPC policy, which moves people, dogs and birds: {', '.join(policy_names())}, or "

@@ -236,6 +236,10 @@ def pytest_terminal_summary(terminalreporter: Any, config: pytest.Config) -> Non
 
         try:
             write_run(terminalreporter, run, tally)
+            if run.options.report is not None:
+                from pytest_garl.plugin.pages import write_pages
+
+                write_pages(terminalreporter, run)
         except GarlError as error:
             terminalreporter.write_line(f"garl: {error}", red=True)
     if tally.items:

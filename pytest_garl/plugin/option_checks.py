@@ -65,6 +65,11 @@ def _without_effect(options: Options) -> Iterator[str]:
             "--garl-npcs has no effect without --garl-budget or --garl-repeat: saved cases and "
             "baselines have objects of their own"
         )
+    if "report" in given and not options.searches_or_repeats:
+        yield (
+            "--garl-report has no effect without --garl-budget or --garl-repeat: only a search has "
+            "something to report"
+        )
     if "level" in given and options.baseline is None:
         yield "--garl-level has no effect without --garl-baseline: only that gate uses it"
 

@@ -64,6 +64,8 @@ class Options:
     """The NPC policy that an option names; empty: the domain's, or that of the repeated slot."""
     baseline: Path | None
     level: float
+    report: Path | None
+    """The folder for the pages of the run."""
     shrink: int
     """Flights for each new kind of violation."""
     shrink_capped: bool
@@ -154,6 +156,7 @@ def read_options(config: pytest.Config) -> Options:
         npcs=_npcs(text["npcs"]),
         baseline=_baseline(config),
         level=_number("level", text["level"], 1, "a number between 0 and 1"),
+        report=_report(config),
         shrink=_shrink(text["shrink"]),
         shrink_capped=not text["shrink"],
         xfail_strict=bool(config.getini("garl_xfail_strict")),
@@ -229,6 +232,26 @@ def _baseline(config: pytest.Config) -> Path | None:
     if text and not (folder / text).is_file():
         raise _wrong("baseline", text, "a file that `garl baseline save` wrote")
     return folder / text if text else None
+
+
+def _report(config: pytest.Config) -> Path | None:
+    """Return the folder: the command line's as seen from here, the ini key's from the root.
+
+    It is checked at once: a search of hours shall not end without its report.
+    """
+    given = config.getoption("--garl-report")
+    text, folder = str(given or ""), Path()
+    if not text:
+        text, folder = str(config.getini("garl_report")), config.rootpath
+    if not text:
+        return None
+    from pytest_garl.reports.html.folder import check_target
+
+    try:
+        check_target(folder / text)
+    except GarlError as error:
+        raise pytest.UsageError(f"--garl-report: {error}") from error
+    return folder / text
 
 
 def _among(name: str, text: str, known: tuple[str, ...]) -> str:

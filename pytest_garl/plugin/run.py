@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import functools
 import math
 import os
@@ -35,7 +36,7 @@ if TYPE_CHECKING:
     from pytest_garl.regressions.investigations import Investigations
 
 from pytest_garl.execution.ledger import SESSION_FACT
-from pytest_garl.reports.search_summary import DOMAINS
+from pytest_garl.reports.search_summary import CAMERA, DOMAINS
 
 SELECTED = "selected flights"
 """The ledger's fact: how many flights of searches the selected tests want."""
@@ -194,7 +195,8 @@ class Run:
         for search, names in files.items():
             self.ledger.note_fact(f"files of {search}", " ".join(sorted(names)))
         for search, labels in domains.items():
-            self._note_domains(search, labels)
+            _note_domains(self.ledger, search, labels, resumed=self.options.resume)
+        _note_cameras(self.ledger, items)
         wanted = self.searches.targets.values()
         searched = [slots for slots in wanted if not any(each.entry for each in slots.values())]
         self.search_sizes = [len(slots) for slots in searched]
@@ -202,17 +204,6 @@ class Run:
             self.ledger.note_fact(SELECTED, sum(self.search_sizes))
         if self.options.resume:
             self.searches.check_resumed()
-
-    def _note_domains(self, search: str, wanted: set[str]) -> None:
-        """Note in which domains a system is flown on a map; a resumed run has the same ones."""
-        key = f"{DOMAINS}{search}"
-        known = self.ledger.fact(key)
-        if self.options.resume and known is not None and not wanted <= {*known}:
-            raise LedgerError(
-                f"--garl-resume: the domain of {search} was {' and '.join(known)}, is "
-                f"{' and '.join(sorted(wanted))}; run without --garl-resume to begin anew"
-            )
-        self.ledger.note_fact(key, sorted({*(known or ()), *wanted}))
 
     def note_finding_test(self, search: str, signature: str, nodeid: str) -> None:
         """Note a test that failed for a violation; of several keep the first by name."""
@@ -333,3 +324,24 @@ class Run:
         if self.investigations is not None:
             self.investigations.advance()
         self.on_wait()
+
+
+def _note_cameras(ledger: Ledger, items: Sequence[pytest.Item]) -> None:
+    """Note the camera of each landing system, so that a report can draw its frames again."""
+    targets = {each.system_name: each for item in items if (each := target_of(item)) is not None}
+    for name, target in targets.items():
+        airframe = target.airframe
+        if airframe is not None:
+            ledger.note_fact(f"{CAMERA}{name}", dataclasses.asdict(airframe.camera))
+
+
+def _note_domains(ledger: Ledger, search: str, wanted: set[str], *, resumed: bool) -> None:
+    """Note in which domains a system is flown on a map; a resumed run has the same ones."""
+    key = f"{DOMAINS}{search}"
+    known = ledger.fact(key)
+    if resumed and known is not None and not wanted <= {*known}:
+        raise LedgerError(
+            f"--garl-resume: the domain of {search} was {' and '.join(known)}, is "
+            f"{' and '.join(sorted(wanted))}; run without --garl-resume to begin anew"
+        )
+    ledger.note_fact(key, sorted({*(known or ()), *wanted}))

@@ -14,7 +14,7 @@ from pytest_garl.execution.reference import reference_to
 from pytest_garl.scenarios.task import DEFAULT_TASK, Task
 
 if TYPE_CHECKING:
-    from pytest_garl.landing_system import NavigationKind
+    from pytest_garl.landing_system import Airframe, NavigationKind
     from pytest_garl.regressions.case import Case
     from pytest_garl.regressions.corpus import CorpusEntry
     from pytest_garl.scenarios.domains.domain import Domain
@@ -58,14 +58,21 @@ class Target:
         return f"{self.system.__module__}:{self.system.__qualname__}"
 
     @property
-    def navigation(self) -> NavigationKind:
-        """What the airframe's navigation rests on; of one that cannot be read, the default."""
-        from pytest_garl.landing_system import Airframe, airframe_of
+    def airframe(self) -> Airframe | None:
+        """What the landing system declares of its UAV; None if that cannot be read."""
+        from pytest_garl.landing_system import airframe_of
 
         try:
-            return airframe_of(self.system).navigation
+            return airframe_of(self.system)
         except Exception:  # noqa: BLE001 (code of a landing system; the flights report what it raises)
-            return Airframe().navigation
+            return None
+
+    @property
+    def navigation(self) -> NavigationKind:
+        """What the airframe's navigation rests on; of one that cannot be read, the default."""
+        from pytest_garl.landing_system import Airframe
+
+        return (self.airframe or Airframe()).navigation
 
     @property
     def case(self) -> Case | None:

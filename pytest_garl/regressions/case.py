@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import hashlib
 import re
-from collections.abc import Callable, Collection
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass
+from types import MappingProxyType
 from typing import Literal
 
 from pytest_garl.adversary.recorded import recorded_spec
@@ -23,6 +24,14 @@ nothing was observable in time for it.  Unpreventable: no escape exists.  Not as
 is another one, or no flights were left for the question."""
 NoGateReason = Literal["", "edge", "sensor-limited", "unpreventable"]
 """Why a case gates nothing; empty for one that gates."""
+NO_GATE_TEXTS: Mapping[NoGateReason, str] = MappingProxyType(
+    {
+        "edge": "it is an edge case, not all of its neighbours fail",
+        "sensor-limited": "an escape exists, but the camera did not show the body in time for it",
+        "unpreventable": "no landing system could have escaped",
+    }
+)
+"""The reasons in words."""
 ESCAPE_STEP_S = 0.5
 """Escapes are looked for so long before a collision, and at whole multiples of it."""
 MoveList = tuple[tuple[float, float], ...]

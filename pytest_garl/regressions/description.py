@@ -89,7 +89,13 @@ def describe_scenario(
 
     ``policy`` names the NPC policy: one without grades does not follow the stories.
     """
-    map = load_map(scenario.map, map_folders)
+    return describe_scenario_on(scenario, load_map(scenario.map, map_folders), policy)
+
+
+def describe_scenario_on(
+    scenario: Scenario, map: Map, policy: str = "graded"
+) -> list[tuple[str, str]]:
+    """Return what :func:`describe_scenario` does, for a map that is read already."""
     rows = conditions_in_words(scenario, map)
     x, y = marker_position_m(scenario, map)
     rows.append(("marker", f"at ({x:.1f}, {y:.1f}) m, east and north"))

@@ -6,6 +6,7 @@ its meaning takes a new ``version``.
 
 from __future__ import annotations
 
+import contextlib
 import dataclasses
 from collections import Counter
 from datetime import UTC, datetime
@@ -51,43 +52,50 @@ def run_report_as_json(path: Path, corpus: Corpus) -> dict[str, Any]:
     """
     if not path.is_file():
         raise LedgerError(f"there is no ledger at {path}; run a search first")
-    ledger = Ledger(path)
-    try:
-        failures = [SlotUserFailure(**each) for each in ledger.fact(USER_FAILURES) or ()]
-        summaries = search_summaries(ledger, failures)
-        progress = ledger.queries.progress()
-        slots: Counter[tuple[str, str]] = Counter()
-        for each in progress:
-            slots[each.system, each.map] += each.total
-        saved = _cases(corpus, {summary.system for summary in summaries})
-        searches = [_search(each, slots[each.system, each.map], saved, path) for each in summaries]
-        meters = ledger.queries.meters()
-        return {
-            "schema": "pytest-garl-report",
-            "version": VERSION,
-            "pytest_garl": ledger.fact("version") or version("pytest-garl"),
-            "ledger": str(path),
-            "complete": ledger.fact(ENDED) is not None
-            and all(each.flown == each.total for each in progress),
-            "run": {key: ledger.fact(key) for key in _RUN_FACTS},
-            "results_sha256": ledger.queries.result_hash(),
-            "time": {
-                "began": ledger.fact(BEGAN),
-                "ended": ledger.fact(ENDED),
-                "flying_s": meters.get("flying_s", 0.0),
-                "idle_s": meters.get("idle_s", 0.0),
-            },
-            "flights": {
-                "wanted": sum(each.total for each in progress),
-                "flown": sum(each.flown for each in progress),
-                "flown_again": int(meters.get("retried", 0)),
-                "beside": int(meters.get("on_demand", 0)),
-            },
-            "searches": searches,
-            "cases": saved,
-        }
-    finally:
-        ledger.close()
+    with contextlib.closing(Ledger(path)) as ledger:
+        return run_report_of(ledger, path, corpus)
+
+
+def summaries_of(ledger: Ledger) -> list[SearchSummary]:
+    """Return the summary of each search, with the failed assertions about users' own properties."""
+    failures = [SlotUserFailure(**each) for each in ledger.fact(USER_FAILURES) or ()]
+    return search_summaries(ledger, failures)
+
+
+def run_report_of(ledger: Ledger, path: Path, corpus: Corpus) -> dict[str, Any]:
+    """Return the report of the run in an open ledger, which lies at ``path``."""
+    summaries = summaries_of(ledger)
+    progress = ledger.queries.progress()
+    slots: Counter[tuple[str, str]] = Counter()
+    for each in progress:
+        slots[each.system, each.map] += each.total
+    saved = _cases(corpus, {summary.system for summary in summaries})
+    searches = [_search(each, slots[each.system, each.map], saved, path) for each in summaries]
+    meters = ledger.queries.meters()
+    return {
+        "schema": "pytest-garl-report",
+        "version": VERSION,
+        "pytest_garl": ledger.fact("version") or version("pytest-garl"),
+        "ledger": str(path),
+        "complete": ledger.fact(ENDED) is not None
+        and all(each.flown == each.total for each in progress),
+        "run": {key: ledger.fact(key) for key in _RUN_FACTS},
+        "results_sha256": ledger.queries.result_hash(),
+        "time": {
+            "began": ledger.fact(BEGAN),
+            "ended": ledger.fact(ENDED),
+            "flying_s": meters.get("flying_s", 0.0),
+            "idle_s": meters.get("idle_s", 0.0),
+        },
+        "flights": {
+            "wanted": sum(each.total for each in progress),
+            "flown": sum(each.flown for each in progress),
+            "flown_again": int(meters.get("retried", 0)),
+            "beside": int(meters.get("on_demand", 0)),
+        },
+        "searches": searches,
+        "cases": saved,
+    }
 
 
 def _search(

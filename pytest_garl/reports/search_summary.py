@@ -25,6 +25,8 @@ marker for long enough; something never left it free for long enough."""
 NONE: Mapping[str, Severity] = MappingProxyType({})
 DOMAINS = "domains of "
 """Begins the ledger's fact with the names of the domains of a system on a map."""
+CAMERA = "camera of "
+"""Begins the ledger's fact with the camera of a landing system, which its frames take."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -48,7 +50,7 @@ class ViolationKind:
     ``count`` is the number of flights, ``first`` the slot of the first one, ``story`` what happened
     in it, and ``headline`` the story in short.  ``severity`` is the lowest of these flights, None
     if none is known.  ``in_control`` is the number of random flights that show it, None without a
-    control arm to compare with.
+    control arm to compare with.  ``slots`` are those of the flights.
     """
 
     signature: str
@@ -58,6 +60,7 @@ class ViolationKind:
     headline: str
     severity: Severity | None = None
     in_control: int | None = None
+    slots: tuple[str, ...] = ()
 
     @property
     def severity_text(self) -> str:
@@ -267,6 +270,7 @@ def _kinds(
             in_control=None
             if random_slots is None
             else len({slot for slot, _ in items} & random_slots),
+            slots=tuple(dict.fromkeys(slot for slot, _ in items)),
         )
         for signature, items in stories.items()
     ]

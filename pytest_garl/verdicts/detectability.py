@@ -63,6 +63,7 @@ class Network:
         return chances
 
 
+@functools.lru_cache(maxsize=4096)
 def readable_probability(view: MarkerView | None) -> float:
     """Return the probability that a detector of markers reads the frame.
 

@@ -15,15 +15,17 @@ from pytest_garl.video.drawing import Image
 
 _QUALITY = 27
 """x264's constant rate factor: letters and one-pixel lines stay clear, sensor noise goes."""
-_TOP_KBPS = 350
+TOP_KBPS = 350
 """Limits a video of 60 s to 2.6 MB in any weather."""
-_BUFFER_KBIT = 1400
+_BUFFER_S = 4
+"""The encoder may exceed the limit for so long."""
 
 
-def write(frames: Iterable[Image], path: Path, rate_hz: float) -> None:
+def write(frames: Iterable[Image], path: Path, rate_hz: float, *, top_kbps: int = TOP_KBPS) -> None:
     """Encode pictures, RGB uint8 (H, W, 3) of one even size, into the .mp4 file ``path``.
 
-    The file appears once it is complete.  Raises GarlError where imageio-ffmpeg is missing,
+    The file appears once it is complete, and has ``top_kbps`` kilobits per second at most over any
+    four seconds.  Raises GarlError where imageio-ffmpeg is missing,
     where the pictures do not fit together, or with the encoder's own words where it fails.
     """
     ffmpeg = program()
@@ -39,7 +41,8 @@ def write(frames: Iterable[Image], path: Path, rate_hz: float) -> None:
     path.parent.mkdir(parents=True, exist_ok=True)
     scratch = path.with_name(f".{path.name}.{os.getpid()}")
     try:
-        _encode(_command(ffmpeg, width, height, rate_hz, scratch), chain([first], pictures), path)
+        command = _command(ffmpeg, width, height, rate_hz, scratch, top_kbps)
+        _encode(command, chain([first], pictures), path)
         scratch.replace(path)
     finally:
         scratch.unlink(missing_ok=True)
@@ -76,10 +79,12 @@ def _encode(command: Sequence[str], pictures: Iterable[Image], path: Path) -> No
             )
 
 
-def _command(program: str, width: int, height: int, rate_hz: float, path: Path) -> list[str]:
+def _command(
+    program: str, width: int, height: int, rate_hz: float, path: Path, top_kbps: int
+) -> list[str]:
     source = f"-f rawvideo -pix_fmt rgb24 -s {width}x{height} -r {rate_hz:g} -i -"
     coding = f"-c:v libx264 -preset veryfast -crf {_QUALITY} -pix_fmt yuv420p"
-    bound = f"-maxrate {_TOP_KBPS}k -bufsize {_BUFFER_KBIT}k"
+    bound = f"-maxrate {top_kbps}k -bufsize {_BUFFER_S * top_kbps}k"
     # Untagged, players guess the colours' matrix from the picture's size.
     colours = "-vf scale=out_color_matrix=bt709,"
     colours += "setparams=color_primaries=bt709:color_trc=bt709:colorspace=bt709"

@@ -15,7 +15,7 @@ from pytest_garl.scenarios.maps.map import Map
 from pytest_garl.scenarios.object_types import OBJECT_TYPES
 from pytest_garl.scenarios.placement import pad_of
 from pytest_garl.scenarios.scenario import Scenario
-from pytest_garl.simulation.camera.ground import paint_ground
+from pytest_garl.simulation.camera.ground import Raster, paint_ground
 from pytest_garl.simulation.camera.ground_cover import cover_shift
 from pytest_garl.simulation.camera.meshes import mesh_of, placed_hulls
 from pytest_garl.simulation.camera.projection import View
@@ -86,26 +86,10 @@ class MapPane:
     def _ground(self, scenario: Scenario) -> drawing.Image:
         """Return the ground as it was painted for the flight, mixed with white."""
         shift = cover_shift(generator(scenario.seed, "sensor"))
-        wide = paint_ground(
-            self._map, conditions_of(scenario), shift, pad_of(scenario, self._map)
-        ).wide
-        coarseness = round(math.log2(max(1.0, 1 / self._scale / wide.m_per_px)))
-        level = min(coarseness, len(wide.levels) - 1)
-        world_of_pane = np.array(
-            [
-                [1 / self._scale, 0.0, -self._left / self._scale],
-                [0.0, -1 / self._scale, self._bottom / self._scale],
-                [0.0, 0.0, 1.0],
-            ]
-        )
-        painted = cv2.warpPerspective(
-            wide.levels[level],
-            wide.pixel_of_world(level) @ world_of_pane,
-            (WIDTH, HEIGHT),
-            flags=cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP,
-            borderMode=cv2.BORDER_REFLECT_101,
-        )
-        rgb = cv2.cvtColor(painted, cv2.COLOR_RGBA2RGB)
+        pad = pad_of(scenario, self._map)
+        wide = paint_ground(self._map, conditions_of(scenario), shift, pad).wide
+        origin = self._left, self._bottom
+        rgb = ground_from_above(wide, origin, self._scale, (WIDTH, HEIGHT))
         return np.asarray(
             cv2.addWeighted(rgb, 1 - _WHITE_SHARE, rgb, 0.0, 255 * _WHITE_SHARE), np.uint8
         )
@@ -195,3 +179,33 @@ def _colour(item: ObjectRecord) -> drawing.Colour:
 
 def _radius_m(item: ObjectRecord) -> float:
     return OBJECT_TYPES[item.type].radius_m
+
+
+def ground_from_above(
+    wide: Raster,
+    origin_px: tuple[float, float],
+    px_per_m: float,
+    size_px: tuple[int, int],
+) -> drawing.Image:
+    """Return painted ground from above, north up, RGB (H, W, 3).
+
+    ``origin_px`` is the pixel of the world's origin, ``size_px`` the picture's width and height.
+    """
+    coarseness = round(math.log2(max(1.0, 1 / px_per_m / wide.m_per_px)))
+    level = min(coarseness, len(wide.levels) - 1)
+    left, bottom = origin_px
+    world_of_picture = np.array(
+        [
+            [1 / px_per_m, 0.0, -left / px_per_m],
+            [0.0, -1 / px_per_m, bottom / px_per_m],
+            [0.0, 0.0, 1.0],
+        ]
+    )
+    painted = cv2.warpPerspective(
+        wide.levels[level],
+        wide.pixel_of_world(level) @ world_of_picture,
+        size_px,
+        flags=cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP,
+        borderMode=cv2.BORDER_REFLECT_101,
+    )
+    return np.asarray(cv2.cvtColor(painted, cv2.COLOR_RGBA2RGB), np.uint8)

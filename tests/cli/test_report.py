@@ -146,3 +146,39 @@ def test_a_report_changes_no_result(pytester: pytest.Pytester, searched: Path) -
     shutil.copytree(searched, pytester.path, dirs_exist_ok=True)
     before = result_hash(pytester)
     assert report(pytester.path)["results_sha256"] == before == result_hash(pytester)
+
+
+def test_pages_are_written_into_a_folder(searched: Path) -> None:
+    words = garl(searched, "report", "--out=pages", "--workers=1")
+    assert words.startswith("pages/index.html: ")
+    index = (searched / "pages" / "index.html").read_text()
+    assert "8 of 8 flights violate something" in index
+    names = {each.name for each in (searched / "pages" / "kinds").iterdir()}
+    assert any("IV-dog-last-metre-unseen" in name for name in names)
+    assert all(f'href="kinds/{name}"' in index for name in names if "as-found" not in name)
+    garl(searched, "report", "--out=pages", "--workers=1")
+
+
+def refused(folder: Path, *args: str) -> str:
+    code = "import sys; from pytest_garl.cli import main; main()"
+    command = [sys.executable, "-c", code, "report", *args]
+    done = subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False)
+    assert done.returncode == 1
+    return done.stderr
+
+
+def test_pages_take_the_place_of_nothing_else(searched: Path) -> None:
+    (searched / "mine").mkdir(exist_ok=True)
+    (searched / "mine" / "notes.txt").write_text("mine")
+    error = refused(searched, "--out=mine")
+    assert error.startswith(
+        "Error: mine: found a folder with 'notes.txt', expected an empty folder"
+    )
+    assert (searched / "mine" / "notes.txt").read_text() == "mine"
+    assert "expected a folder for the report" in refused(searched, "--out=systems.py")
+
+
+def test_pages_without_a_ledger_are_one_message(tmp_path: Path) -> None:
+    error = refused(tmp_path, "--out=pages")
+    assert "there is no ledger at .garl/ledger.sqlite; run a search first" in error
+    assert not (tmp_path / "pages").exists()

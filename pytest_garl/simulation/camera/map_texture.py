@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import functools
 import itertools
 import math
@@ -24,9 +25,14 @@ def bounds_of(map: Map) -> Bounds:
     return x_min - _MARGIN_M, x_max + _MARGIN_M, y_min - _MARGIN_M, y_max + _MARGIN_M
 
 
-@functools.lru_cache(maxsize=4)
 def picture(map: Map) -> Image:
     """Paint a map at RESOLUTION_M, read-only; the same for all its scenarios."""
+    # Which objects a scenario removes, and who is a child, changes nothing on the ground.
+    return _picture(dataclasses.replace(map, removed_objects=(), children=()))
+
+
+@functools.lru_cache(maxsize=4)
+def _picture(map: Map) -> Image:
     bounds_m = bounds_of(map)
     rng = np.random.default_rng(map.ground.texture_seed)
     rows, columns = (

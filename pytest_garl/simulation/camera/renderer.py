@@ -120,6 +120,11 @@ class Renderer:
         """The environment that frames show now."""
         return self._look.conditions
 
+    @property
+    def ground(self) -> PaintedGround | None:
+        """The ground as it is painted now; None without colour."""
+        return self._ground
+
     def change(self, scenario: Scenario) -> None:
         """Show the environment of ``scenario`` from the next frame on.
 

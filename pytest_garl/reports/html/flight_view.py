@@ -1,0 +1,250 @@
+"""What a page shows of one flight, as plain values: path, margins over time, events, facts."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pytest_garl.messages import shortened
+from pytest_garl.reports.html.moments import Moment, decisive_s, reports_other_place
+from pytest_garl.scenarios.object_types import OBJECT_TYPES
+from pytest_garl.simulation.flight import Flight, ObjectRecord, Step, Track
+from pytest_garl.simulation.physics.vehicle import BODY_ABOVE_FEET_M, up_m
+from pytest_garl.verdicts.detectability import readable_probability
+from pytest_garl.verdicts.sightings import (
+    readable_steps,
+    reports_detections,
+    reports_marker,
+    reports_targets,
+    target_of,
+)
+
+MOST_SAMPLES = 900
+"""More samples than a chart of a wide screen has pixels for; a page stays small."""
+UAV_RADIUS_M = 0.5
+"""A UAV of 1 m from tip to tip (docs/verdicts.md)."""
+PLAN_STEP_S = 0.5
+MOST_PLAN_POINTS = 24
+WORDS = 80
+MOST_PHASES = 200
+"""A landing system that names each frame a phase of its own fills no page."""
+Array = NDArray[np.float64]
+Span = tuple[float, float]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Strip:
+    """The spans of time in which something held."""
+
+    name: str
+    kind: str
+    spans: tuple[Span, ...]
+
+
+def flight_data(flight: Flight, moments: Sequence[Moment]) -> dict[str, Any]:
+    """Return the values that path, timeline and cursor of a page draw, for JSON."""
+    picked = _picked(flight.uav.time_s)
+    times = flight.uav.time_s[picked]
+    return {
+        "end_s": round(float(flight.elapsed_s), 2),
+        "decisive_s": round(decisive_s(flight), 2),
+        "marker": [round(each, 2) for each in flight.marker_position_m],
+        "t": _rounded(times),
+        "uav": _path(flight.uav, picked, lift_m=-BODY_ABOVE_FEET_M),
+        "objects": [_object(each, picked) for each in flight.objects],
+        "decoys": [
+            [shortened(name, WORDS), round(x, 2), round(y, 2)] for name, x, y in _decoys(flight)
+        ],
+        "metres": _metres(flight, picked),
+        "percent": _percent(flight, times),
+        "strips": [
+            {"name": each.name, "kind": each.kind, "spans": each.spans} for each in strips(flight)
+        ],
+        "phases": [[a, b, name] for a, b, name in phases(flight.steps, flight.elapsed_s)],
+        "targets": _targets(flight),
+        "plans": _plans(flight.steps),
+        "moments": [{"t": round(each.time_s, 2), "label": each.label} for each in moments],
+    }
+
+
+def _decoys(flight: Flight) -> Sequence[tuple[str, float, float]]:
+    return flight.decoys[:50]
+
+
+def _picked(times: Array) -> NDArray[np.intp]:
+    """Return the indices of evenly picked samples, the last one among them."""
+    stride = max(1, math.ceil(len(times) / MOST_SAMPLES))
+    picked = np.arange(0, len(times), stride)
+    last = len(times) - 1
+    return picked if picked[-1] == last else np.append(picked, last)
+
+
+def _rounded(values: Iterable[float], digits: int = 2) -> list[float]:
+    return [round(float(value), digits) for value in values]
+
+
+def _path(track: Track, picked: NDArray[np.intp], lift_m: float = 0.0) -> dict[str, list[float]]:
+    x, y, z = track.position_m[picked].T
+    return {"x": _rounded(x), "y": _rounded(y), "z": _rounded(z + lift_m)}
+
+
+def _object(item: ObjectRecord, picked: NDArray[np.intp]) -> dict[str, Any]:
+    kind = OBJECT_TYPES.get(item.type)
+    return {
+        "name": item.name,
+        "type": item.type,
+        "radius_m": round(kind.radius_m, 2) if kind else 0.3,
+        "height_m": round(kind.height_m, 2) if kind else 1.0,
+        "low_m": round(kind.low_m, 2) if kind else 0.0,
+        **_path(item.track, picked),
+    }
+
+
+def _metres(flight: Flight, picked: NDArray[np.intp]) -> list[dict[str, Any]]:
+    """Return the lines of the chart in metres: name, colour's name, values; gaps are null."""
+    x, y, z = flight.uav.position_m[picked].T
+    mx, my = flight.marker_position_m
+    lines = [
+        _line("height above the ground", "height", [up_m(float(each)) for each in z]),
+        _line("UAV to the marker's centre", "marker", np.hypot(x - mx, y - my)),
+    ]
+    if flight.objects:
+        lines.append(_line("gap to the nearest NPC", "npc", gap_m(flight)[picked]))
+    times = flight.uav.time_s[picked]
+    if reports_targets(flight):
+        off = [(s.time_s, math.dist(p, (mx, my))) for s in flight.steps if (p := target_of(s))]
+        lines.append(_line("system's target off the marker", "target", _held(off, times)))
+    errors = [(s.time_s, math.hypot(*s.estimation_error_m)) for s in flight.steps]
+    if max((error for _, error in errors), default=0.0) >= 0.1:
+        lines.append(_line("error of the estimated position", "error", _held(errors, times)))
+    return lines
+
+
+def _line(name: str, kind: str, values: Iterable[float | None]) -> dict[str, Any]:
+    shown = [None if v is None else round(float(v), 2) for v in values]
+    return {"name": name, "kind": kind, "values": shown}
+
+
+def gap_m(flight: Flight) -> Array:
+    """Return the gap between the UAV and the nearest NPC over the track, shape (n,), in metres.
+
+    Both are upright cylinders here; the record has the exact distances only where they are least.
+    """
+    least = np.full(len(flight.uav.time_s), np.inf)
+    ux, uy, uz = flight.uav.position_m.T
+    for item in flight.objects:
+        kind = OBJECT_TYPES.get(item.type)
+        radius_m, height_m, low_m = (
+            (kind.radius_m, kind.height_m, kind.low_m) if kind else (0.3, 1.0, 0.0)
+        )
+        x, y, z = item.track.position_m.T
+        across = np.maximum(0.0, np.hypot(x - ux, y - uy) - radius_m - UAV_RADIUS_M)
+        bottom = z + low_m
+        above = np.maximum(uz - BODY_ABOVE_FEET_M - (bottom + height_m), bottom - uz)
+        least = np.minimum(least, np.hypot(across, np.maximum(0.0, above)))
+    return least
+
+
+def _held(values: Sequence[tuple[float, float]], times: Array) -> list[float | None]:
+    """Return at each time the last value before it, None if there is none within a second."""
+    if not values:
+        return [None] * len(times)
+    known = np.array([time_s for time_s, _ in values])
+    index = np.searchsorted(known, times, side="right") - 1
+    return [
+        float(values[i][1]) if i >= 0 and time_s - known[i] <= 1.0 else None
+        for i, time_s in zip(index.tolist(), times, strict=True)
+    ]
+
+
+def _percent(flight: Flight, times: Array) -> list[dict[str, Any]]:
+    """Return the lines of the chart in per cent."""
+    steps = flight.steps
+    recorded = any(step.marker is not None for step in steps)
+    visible = [(step.time_s, 100 * step.marker_visible) for step in steps]
+    lines = [_line("marker unhidden in the picture", "visible", _held(visible, times))]
+    if recorded:
+        chance = [(step.time_s, 100 * readable_probability(step.marker)) for step in steps]
+        lines.insert(0, _line("chance that it can be read", "readable", _held(chance, times)))
+    return lines
+
+
+def strips(flight: Flight) -> tuple[Strip, ...]:
+    """Return what held when: the marker could be read, the system reported it, NPCs in view."""
+    steps = flight.steps
+    readable = {step.time_s for step in readable_steps(flight)}
+    found = [_strip("marker can be read", "readable", steps, lambda s: s.time_s in readable)]
+    if reports_detections(flight):
+        seen = _strip("system reports it", "reported", steps, lambda s: reports_marker(flight, s))
+        other = _strip(
+            "system reports another place", "other", steps, lambda s: reports_other_place(flight, s)
+        )
+        found += [each for each in (seen, other) if each.spans or each is seen]
+    elif reports_targets(flight):
+        found.append(
+            _strip("system has a target", "reported", steps, lambda s: target_of(s) is not None)
+        )
+    for item in flight.objects:
+        strip = _strip(
+            f"{item.name} in view",
+            "npc",
+            steps,
+            lambda s, name=item.name: name in s.objects_visible,
+        )
+        if strip.spans:
+            found.append(strip)
+    return tuple(found)
+
+
+def _strip(name: str, kind: str, steps: Sequence[Step], holds: Any) -> Strip:
+    spans: list[Span] = []
+    frame_s = steps[1].time_s - steps[0].time_s if len(steps) > 1 else 0.1
+    for step in steps:
+        if holds(step):
+            end = round(step.time_s + frame_s, 2)
+            if spans and step.time_s - spans[-1][1] < frame_s / 2:
+                spans[-1] = (spans[-1][0], end)
+            else:
+                spans.append((round(step.time_s, 2), end))
+    return Strip(name=name, kind=kind, spans=tuple(spans))
+
+
+def phases(steps: Sequence[Step], end_s: float) -> list[tuple[float, float, str]]:
+    """Return the landing system's own phases: from when to when, and their names."""
+    found: list[tuple[float, float, str]] = []
+    for step in steps:
+        name = step.diagnostics.phase if step.diagnostics else ""
+        name = shortened(name, WORDS)
+        if not found or found[-1][2] != name:
+            found.append((round(step.time_s, 2), round(end_s, 2), name))
+            if len(found) > 1:
+                found[-2] = (found[-2][0], round(step.time_s, 2), found[-2][2])
+    named = [each for each in found if each[2]]
+    return named[:MOST_PHASES]
+
+
+def _targets(flight: Flight) -> list[list[float]]:
+    """Return (time, x, y) of the system's target where it changed by more than a decimetre."""
+    found: list[list[float]] = []
+    for step in flight.steps:
+        place = target_of(step)
+        if place and (not found or math.dist(place, (found[-1][1], found[-1][2])) > 0.1):
+            found.append(_rounded((step.time_s, *place)))
+    return found
+
+
+def _plans(steps: Sequence[Step]) -> list[list[Any]]:
+    """Return (time, points) of the system's planned paths, at most two in a second."""
+    found: list[list[Any]] = []
+    for step in steps:
+        points = step.diagnostics.planned_path_m if step.diagnostics else ()
+        if points and (not found or step.time_s - found[-1][0] >= PLAN_STEP_S):
+            stride = math.ceil(len(points) / MOST_PLAN_POINTS)
+            kept = [*points[::stride], points[-1]]
+            found.append([round(step.time_s, 2), [_rounded(point) for point in kept]])
+    return found

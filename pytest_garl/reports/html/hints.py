@@ -1,0 +1,137 @@
+"""Where an engineer looks first, from the type of a violation and what the record shows."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+
+import numpy as np
+
+from pytest_garl.regressions.case import NOT_ASKED, Prevention
+from pytest_garl.reports.html.moments import decisive_s
+from pytest_garl.reports.html.sightings_text import readable_and_reported
+from pytest_garl.simulation.flight import Flight
+from pytest_garl.verdicts.sightings import last_target, reports_detections
+from pytest_garl.verdicts.verdict import Verdict
+
+MISSED = 0.5
+"""A system that reports fewer of the readable frames than this share has lost the marker."""
+
+
+def hints_of(
+    flight: Flight | None, verdict: Verdict, prevention: Prevention = NOT_ASKED
+) -> tuple[str, ...]:
+    """Return one or two sentences; none for an assertion of the user's own."""
+    kind = verdict.violation_type
+    if kind == "IV":
+        return (_moving(flight, prevention),)
+    if kind in ("II", "abort") or verdict.signature.startswith("late:not-landed"):
+        return tuple(_not_landed(flight))
+    if kind in ("I", "off"):
+        return (_elsewhere(flight),)
+    return {
+        "III": (
+            "A body that does not move was hit: look at the way that the system took there, and "
+            "at its clearance from what it could see or knew.",
+        ),
+        "V": ("The traceback below names the line that failed, with the frame that it got.",),
+        "late": ("It was too slow: the timeline shows which phase took the time.",),
+        "hard": ("Look at the descent of the last metres: speed and tilt at the touchdown.",),
+        "slid": ("Look at the speed over the ground at the touchdown, and at when motors stop.",),
+    }.get(kind or "", ())
+
+
+def _moving(flight: Flight | None, prevention: Prevention) -> str:
+    answer = prevention.answer
+    if answer == "preventable":
+        return (
+            "An escape existed after the camera could show the body: look at what the system does "
+            "with something that comes into view, and at how low it still gives way."
+        )
+    if answer == "sensor-limited":
+        return (
+            "An escape existed, but the camera did not show the body in time for it: a wider view, "
+            "a slower descent or another sensor would have been needed."
+        )
+    if answer == "unpreventable":
+        return (
+            "No landing system could have escaped: this is about the place and the procedure, not "
+            "about the code."
+        )
+    if flight is None or not flight.contacts:
+        return "Look at what the system does with something that comes near."
+    contact = flight.contacts[-1]
+    times = [step.time_s for step in flight.steps if contact.body in step.objects_visible]
+    if not times:
+        return (
+            f"The camera never showed {contact.body}: look at the field of view and at the "
+            "procedure, before the code."
+        )
+    return (
+        f"{contact.body} was in view {contact.time_s - times[0]:.1f} s before the contact: look at "
+        "what the system does with something that comes into view. Whether an escape existed was "
+        "not asked for this flight."
+    )
+
+
+def _elsewhere(flight: Flight | None) -> str:
+    """Return what a landing beside the marker points to, by the target that the system had."""
+    target = last_target(flight, decisive_s(flight)) if flight else None
+    if flight is None or target is None:
+        return (
+            "The system reported no target: look at how it chooses the place to come down, and "
+            "report it as Diagnostics.target_m."
+        )
+    off_m = math.dist(target, flight.marker_position_m)
+    down = decisive_s(flight)
+    index = max(0, int(np.searchsorted(flight.uav.time_s, down, side="right")) - 1)
+    x, y = (float(value) for value in flight.uav.position_m[index, :2])
+    missed_m = math.dist(target, (x, y))
+    if off_m > missed_m:
+        return (
+            f"Its last target was {off_m:.1f} m off the marker, and the UAV came down "
+            f"{missed_m:.1f} m from that target: look at the detector, the camera's calibration "
+            "and the estimated position before the control."
+        )
+    return (
+        f"Its last target was {off_m:.1f} m off the marker, but the UAV came down {missed_m:.1f} "
+        "m from that target: look at the control of the descent, at wind, and at what the system "
+        "does after it has lost sight of the marker."
+    )
+
+
+def _not_landed(flight: Flight | None) -> Iterator[str]:
+    if flight is None:
+        return
+    readable, reported = readable_and_reported(flight)
+    if not readable:
+        yield (
+            "The marker could not be read from where the UAV flew: look at where and how high the "
+            "system searches, and for how long."
+        )
+    elif reported < MISSED * readable:
+        yield (
+            f"The marker could be read in {readable} frames, and the system {_verb(flight)} in "
+            f"{reported} of them: look at the detector under the conditions below."
+        )
+    elif reports_detections(flight):
+        yield (
+            f"The system reported the marker in {reported} of {readable} readable frames: it is "
+            f"not the detector. {_DECISION.format(decisive_s(flight))}"
+        )
+    else:
+        # A target may be a memory: it is no sighting.
+        yield (
+            f"The system had a target at the marker in {reported} of {readable} readable frames, "
+            "but reports no detections, so nothing tells whether it saw the marker. "
+            f"{_DECISION.format(decisive_s(flight))}"
+        )
+
+
+_DECISION = (
+    "Look at why the system did not descend, and at the decision to end the flight at {:.1f} s."
+)
+
+
+def _verb(flight: Flight) -> str:
+    return "reported it" if reports_detections(flight) else "had a target at it"

@@ -1,0 +1,292 @@
+"""The pages of kinds: which flight each shows, and what it says beside the flight."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from pytest_garl.execution.job import FlightJob, parse_job
+from pytest_garl.execution.ledger import Ledger
+from pytest_garl.execution.ledger_queries import LedgerFlight
+from pytest_garl.messages import shortened
+from pytest_garl.regressions.case import NO_GATE_TEXTS, Case
+from pytest_garl.regressions.corpus import Corpus, CorpusEntry
+from pytest_garl.regressions.story_text import grade_in_words
+from pytest_garl.reports.html.flight_tables import cut_text
+from pytest_garl.reports.html.flight_task import FlightTask, ShownFlight
+from pytest_garl.reports.html.naming import page_name, shown_file
+from pytest_garl.reports.search_summary import CAMERA, LEGEND, SearchSummary, ViolationKind
+from pytest_garl.reports.shares_text import in_control_text
+from pytest_garl.scenarios.files import dump_scenario
+from pytest_garl.verdicts.wording import headline
+
+Fact = tuple[str, str]
+MOST_TITLE = 220
+"""Characters of a title: three lines; the description below says all."""
+MOST_SLOTS = 60
+"""Names of flights that a page lists; more are counted."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class KindPlan:
+    """A page of a kind before its flight is worked out.
+
+    ``found`` is the flight as the search found it if the page shows that of a saved case.
+    """
+
+    name: str
+    search: SearchSummary
+    kind: ViolationKind
+    entry: CorpusEntry | None
+    repeat: str
+    task: FlightTask
+    found: FlightTask | None
+
+    @property
+    def case(self) -> Case | None:
+        """The saved case of the kind, None without one."""
+        return self.entry.case if self.entry else None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class KindPage:
+    """What a page of a kind says.
+
+    ``facts`` are (label, text); ``commands`` repeat the flight; ``other`` is the page with the
+    flight as found, or that of the case: (text, address).
+    """
+
+    name: str
+    title: str
+    signature: str
+    meaning: str
+    where: str
+    description: str
+    subject: str
+    facts: tuple[Fact, ...]
+    commands: tuple[Fact, ...]
+    slots: tuple[str, ...]
+    more_slots: int
+    origin: tuple[Fact, ...]
+    other: Fact | None
+    flight: ShownFlight
+
+
+def plan_kinds(
+    ledger: Ledger,
+    searches: Sequence[SearchSummary],
+    found: Mapping[str, Any],
+    corpus: Corpus,
+    films: int,
+) -> list[KindPlan]:
+    """Return the pages of a run, search by search; the most frequent kinds have a film."""
+    plans: list[KindPlan] = []
+    order = [(-kind.count, i, j) for i, s in enumerate(searches) for j, kind in enumerate(s.kinds)]
+    filmed = {(i, j) for _, i, j in sorted(order)[:films]}
+    for i, (search, told) in enumerate(zip(searches, found["searches"], strict=True)):
+        cases = _cases(corpus, search)
+        camera = ledger.fact(f"{CAMERA}{search.system}")
+        for j, (kind, row) in enumerate(zip(search.kinds, told["signatures"], strict=True)):
+            first = search.flight(kind.first)
+            as_found = _task(ledger, first, first.scenario, camera)
+            entry = cases.get(kind.signature)
+            case = _case_task(ledger, entry, as_found) if entry else None
+            task = dataclasses.replace(case or as_found, with_film=(i, j) in filmed)
+            plans.append(
+                KindPlan(
+                    name=page_name(search.system, search.map, kind.signature),
+                    search=search,
+                    kind=kind,
+                    entry=entry,
+                    repeat=row["repeat"],
+                    task=task,
+                    found=as_found if task.sha256 != as_found.sha256 else None,
+                )
+            )
+    return plans
+
+
+def _cases(corpus: Corpus, search: SearchSummary) -> dict[str, CorpusEntry]:
+    """Return the first saved case of each signature of a search."""
+    found: dict[str, CorpusEntry] = {}
+    for entry in corpus.entries(search.system):
+        case = entry.case
+        if case is not None and case.scenario.map == search.map:
+            found.setdefault(case.violation.signature, entry)
+    return found
+
+
+def _task(
+    ledger: Ledger,
+    flight: LedgerFlight,
+    scenario: str,
+    camera: Mapping[str, Any] | None,
+) -> FlightTask:
+    job = parse_job(ledger.job(flight.id.search) or "")
+    return FlightTask(
+        name=flight.id.slot_id,
+        job=job,
+        scenario=scenario,
+        result=flight.result,
+        sha256=flight.sha256,
+        records=_records(ledger, flight, job),
+        camera=camera,
+        policy=job.npcs.name,
+        recorded=bool(flight.sha256),
+    )
+
+
+def _records(ledger: Ledger, flight: LedgerFlight, job: FlightJob) -> tuple[Path, ...]:
+    """Return where the record may lie: beside the ledger, or where it was flown."""
+    beside = flight.id.record(ledger.path.parent / "flights")
+    return tuple(dict.fromkeys((beside, job.record(flight.id))))
+
+
+def _case_task(ledger: Ledger, entry: CorpusEntry, as_found: FlightTask) -> FlightTask | None:
+    """Return the flight of a saved case; None if this ledger does not have it."""
+    case = entry.case
+    assert case is not None
+    flight = ledger.queries.flight_with_hash(case.evidence.trajectory_sha256)
+    if flight is None:
+        return None
+    scenario = dump_scenario(case.scenario)
+    task = _task(ledger, flight, scenario, as_found.camera)
+    return dataclasses.replace(
+        task, name=entry.name, policy=case.policy, prevention=case.prevention
+    )
+
+
+def kind_page(plan: KindPlan, flight: ShownFlight, known: bool) -> KindPage:
+    """Return the page of a kind; ``known`` says whether its case is accepted."""
+    case, is_case = plan.case, _shows_case(plan)
+    story, description = plan.task.result.verdict.story, flight.description
+    if plan.kind.signature.startswith("own:"):
+        story = description = plan.kind.story
+    if case is not None and is_case:
+        description = case.violation.description
+    other = (f"{plan.kind.first}, as the search found it", f"{found_name(plan)}.html")
+    return _page(
+        plan,
+        flight,
+        name=plan.name,
+        story=story,
+        description=description,
+        subject="the saved case, shrunk" if is_case else f"{plan.kind.first}, the first flight",
+        facts=_facts(plan, flight, known),
+        other=other if plan.found else None,
+    )
+
+
+def found_page(plan: KindPlan, flight: ShownFlight) -> KindPage:
+    """Return the page with the flight as the search found it, beside that of the case."""
+    assert plan.found is not None
+    return _page(
+        plan,
+        flight,
+        name=found_name(plan),
+        story=plan.found.result.verdict.story,
+        description=flight.description,
+        subject=f"{plan.kind.first}, as the search found it",
+        facts=(("It took", _took(flight, plan.found)),),
+        other=("the saved case, shrunk", f"{plan.name}.html"),
+    )
+
+
+def found_name(plan: KindPlan) -> str:
+    """Return the name of the page with the flight as found."""
+    return f"{plan.name}-as-found"
+
+
+def _page(
+    plan: KindPlan,
+    flight: ShownFlight,
+    *,
+    name: str,
+    story: str,
+    description: str,
+    subject: str,
+    facts: tuple[Fact, ...],
+    other: Fact | None,
+) -> KindPage:
+    kind, search = plan.kind, plan.search
+    title = shortened(headline(story), MOST_TITLE)
+    return KindPage(
+        name=name,
+        title=title[:1].upper() + title[1:],
+        signature=kind.signature,
+        meaning=LEGEND.get(kind.signature.partition(":")[0], ""),
+        where=f"{search.name} on {search.map}",
+        description=cut_text(description),
+        subject=subject,
+        facts=tuple(fact for fact in facts if fact[1]),
+        commands=_commands(plan),
+        slots=kind.slots[:MOST_SLOTS],
+        more_slots=max(0, len(kind.slots) - MOST_SLOTS),
+        origin=_origin(plan, flight),
+        other=other,
+        flight=flight,
+    )
+
+
+def _shows_case(plan: KindPlan) -> bool:
+    return plan.entry is not None and plan.task.name == plan.entry.name
+
+
+def _took(flight: ShownFlight, task: FlightTask | None) -> str:
+    severity = task.result.severity if task else None
+    return severity.text if severity else ""
+
+
+def _facts(plan: KindPlan, flight: ShownFlight, known: bool) -> tuple[Fact, ...]:
+    kind, search, case = plan.kind, plan.search, plan.case
+    severity = case.severity if case and _shows_case(plan) else plan.task.result.severity
+    took = severity.text if severity else ""
+    means = grade_in_words(severity.grade) if severity and severity.grade else ""
+    least = kind.severity_text
+    seen = in_control_text(kind.in_control, search.random_flights)
+    flights = f"{kind.count} of {len(search.flights)} flights"
+    return (
+        ("It took", f"{took} ({means})" if took and means else took),
+        ("At the least it took", least if least != took else ""),
+        ("Found in", f"{flights}; {seen}" if seen else flights),
+        ("Robustness", case.robustness if case else ""),
+        ("Preventable?", case.prevention.text if case else ""),
+        ("Why it gates nothing", NO_GATE_TEXTS[case.reason] if case and case.reason else ""),
+        ("Shrinking removed", case.evidence.removed if case else ""),
+        ("Saved case", _status(case, known) if case else "none in this project"),
+    )
+
+
+def _status(case: Case, known: bool) -> str:
+    if case.status == "fixed":
+        return "fixed: it must pass"
+    if not case.gates:
+        return "known, gates nothing" if known else "new, gates nothing"
+    return "known: expected to fail until it is fixed" if known else "new: fails the tests"
+
+
+def _commands(plan: KindPlan) -> tuple[Fact, ...]:
+    commands = [("the first flight, as found", plan.repeat)]
+    if plan.entry is not None:
+        file = shown_file(plan.entry.path)
+        commands.insert(0, ("the saved case", f"garl cases replay {file}"))
+    return tuple(commands)
+
+
+def _origin(plan: KindPlan, flight: ShownFlight) -> tuple[Fact, ...]:
+    """Return hashes and versions, so that the page can be traced to what flew."""
+    job = plan.task.job
+    rows = [
+        ("landing system", job.system.name),
+        ("landing system's sources, SHA-256", job.system_sha256),
+        ("simulator", job.simulator.name),
+        ("map, SHA-256", job.map_sha256),
+        ("NPC policy", plan.task.policy),
+        ("trajectory, SHA-256", flight.sha256),
+        ("CPU class", flight.cpu),
+        *flight.versions,
+    ]
+    return tuple((name, value) for name, value in rows if value)

@@ -1,0 +1,164 @@
+"""The moments of a flight that explain it: the marker is seen, lost, the end nears."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from pytest_garl.simulation.flight import Flight, Step
+from pytest_garl.simulation.physics.vehicle import up_m
+from pytest_garl.verdicts.margins import COMMIT_M
+from pytest_garl.verdicts.mechanism import NO_LANDING
+from pytest_garl.verdicts.phases import LOW_M
+from pytest_garl.verdicts.sightings import (
+    last_report_s,
+    readable_steps,
+    reports_detections,
+    reports_marker,
+    target_of,
+)
+
+MOST = 8
+"""Pictures that fit in two rows and tell a flight."""
+BEFORE_END_S = 2.0
+SAME_S = 0.25
+"""Moments that are nearer than this share a picture."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Moment:
+    """A time of the flight, and what happens then."""
+
+    time_s: float
+    label: str
+
+
+def moments_of(flight: Flight) -> tuple[Moment, ...]:
+    """Return the moments in the order of time; those at almost the same time are one.
+
+    Of too many the last ones stay, and the first one.
+    """
+    end_s = decisive_s(flight)
+    merged: list[Moment] = []
+    for each in sorted(_all(flight, end_s), key=lambda each: each.time_s):
+        last = merged[-1] if merged else None
+        if last is not None and each.time_s - last.time_s < SAME_S:
+            if each.label not in last.label:
+                label = f"{last.label}; {each.label}"
+                merged[-1] = Moment(time_s=each.time_s, label=label)
+        else:
+            merged.append(each)
+    if len(merged) > MOST:
+        merged = [merged[0], *merged[1 - MOST :]]
+    return tuple(Moment(time_s=m.time_s, label=m.label[:1].upper() + m.label[1:]) for m in merged)
+
+
+def reports_other_place(flight: Flight, step: Step) -> bool:
+    """Whether the system reports detections in a frame, and none of them at the marker."""
+    seen = step.diagnostics.detections if step.diagnostics else ()
+    return bool(seen) and not reports_marker(flight, step)
+
+
+def decisive_s(flight: Flight) -> float:
+    """Return when the event happened that decided the flight; the end if nothing tells it."""
+    if flight.outcome == "collision" and flight.contacts:
+        return flight.contacts[-1].time_s
+    if flight.outcome in ("landed", "slid") and flight.touchdown:
+        return flight.touchdown.time_s
+    given_up = (each.time_s for each in flight.events if each.name == "abort_command")
+    return next(given_up, flight.elapsed_s)
+
+
+def _all(flight: Flight, end_s: float) -> Iterator[Moment]:
+    readable = [step.time_s for step in readable_steps(flight, end_s)]
+    if readable:
+        yield Moment(time_s=readable[0], label="the marker can be read for the first time")
+        gap = _longest_gap(readable, end_s)
+        if gap:
+            yield Moment(time_s=gap, label="the marker can be read for the last time before a gap")
+    reported = [s.time_s for s in flight.steps if s.time_s <= end_s and reports_marker(flight, s)]
+    targeted = [s.time_s for s in flight.steps if s.time_s <= end_s and target_of(s)]
+    if reported:
+        yield Moment(time_s=reported[0], label="the system reports the marker for the first time")
+    elif targeted:
+        yield Moment(time_s=targeted[0], label="the system has a target for the first time")
+    elsewhere = [each.time_s for each in flight.steps if reports_other_place(flight, each)]
+    if elsewhere and elsewhere[0] <= end_s:
+        yield Moment(time_s=elsewhere[0], label="the system reports another place")
+    last = last_report_s(flight, end_s)
+    if last is not None and end_s - last > BEFORE_END_S:
+        verb = "reports the marker" if reports_detections(flight) else "has its target there"
+        yield Moment(time_s=last, label=f"the system {verb} for the last time")
+    low = _descends_below(flight, COMMIT_M, end_s)
+    if low is not None:
+        yield Moment(time_s=low, label=f"the UAV passes {COMMIT_M:g} m")
+    if flight.outcome in NO_LANDING and (lowest := _turns_back(flight, end_s)) is not None:
+        yield Moment(time_s=lowest, label="the UAV turns back up")
+    body = flight.contacts[-1].body if flight.outcome == "collision" and flight.contacts else ""
+    if body and flight.contacts[-1].body_class == "dynamic":
+        yield from _sightings(flight, body, end_s)
+    if end_s > 2 * BEFORE_END_S:
+        yield Moment(time_s=end_s - BEFORE_END_S, label=f"{BEFORE_END_S:g} s before the end")
+    yield Moment(time_s=end_s, label=_end_label(flight, body))
+    if flight.elapsed_s - end_s > BEFORE_END_S:
+        yield Moment(time_s=flight.elapsed_s, label="the flight ends")
+
+
+def _sightings(flight: Flight, body: str, end_s: float) -> Iterator[Moment]:
+    """Yield when the camera first shows a body, and when it comes into view for the last time."""
+    times = [s.time_s for s in flight.steps if body in s.objects_visible and s.time_s <= end_s]
+    if not times:
+        return
+    yield Moment(time_s=times[0], label=f"{body} is in view for the first time")
+    starts = [after for before, after in itertools.pairwise(times) if after - before > 1]
+    if starts:
+        yield Moment(time_s=starts[-1], label=f"{body} comes into view again")
+
+
+def _longest_gap(readable: list[float], end_s: float) -> float | None:
+    """Return when the marker was last readable before its longest gap, if that is a second."""
+    after = [*readable[1:], end_s]
+    gaps = [(b - a, a) for a, b in zip(readable, after, strict=True)]
+    longest, since = max(gaps)
+    return since if longest > 1.0 else None
+
+
+def _descends_below(flight: Flight, height_m: float, end_s: float) -> float | None:
+    """Return when the feet last came below a height, after the UAV had been high."""
+    heights = np.array([up_m(float(z)) for z in flight.uav.position_m[:, 2]])
+    times = flight.uav.time_s
+    high = np.flatnonzero((heights >= height_m) & (times <= end_s))
+    if not len(high) or heights[: high[-1] + 1].max() < min(LOW_M, heights.max()):
+        return None
+    after = int(high[-1]) + 1
+    return float(times[after]) if after < len(times) and times[after] <= end_s else None
+
+
+def _turns_back(flight: Flight, end_s: float) -> float | None:
+    """Return when the UAV was lowest after its take-off, if it came down and rose by a metre."""
+    heights, times = flight.uav.position_m[:, 2], flight.uav.time_s
+    high = np.flatnonzero((heights >= LOW_M) & (times <= end_s))
+    if not len(high):
+        return None
+    part = heights[high[0] : np.searchsorted(times, end_s)]
+    lowest = int(np.argmin(part)) if len(part) else 0
+    sides = (part[: lowest + 1], part[lowest:]) if len(part) else ()
+    if not sides or min(side.max() - part[lowest] for side in sides) < 1.0:
+        return None
+    return float(times[high[0] + lowest])
+
+
+def _end_label(flight: Flight, body: str) -> str:
+    if body == "ground":
+        return "the UAV hits the ground"
+    if body:
+        return f"the UAV hits {body}"
+    return {
+        "landed": "the UAV touches down",
+        "slid": "the UAV touches down",
+        "gave_up": "the landing system gives up",
+        "crashed": "the landing system fails",
+    }.get(flight.outcome, "the flight ends")

@@ -1,0 +1,30 @@
+"""Names of a report's files, and of what stands in it; names from users' code are cut."""
+
+from __future__ import annotations
+
+import hashlib
+import re
+from pathlib import Path
+
+_UNSAFE = re.compile(r"[^A-Za-z0-9]+")
+GENERATOR = "pytest-garl report"
+"""The generator that each page names, by which a report is known as one."""
+INDEX = "index.html"
+KINDS = "kinds"
+"""The folder of the pages of kinds."""
+_MOST_CHARS = 60
+
+
+def page_name(system: str, map: str, signature: str) -> str:
+    """Return the name of a kind's page without ending, the same for the same kind."""
+    words = f"{system.split(':')[-1]}-{map}-{signature}"
+    safe = _UNSAFE.sub("-", words).strip("-")[:_MOST_CHARS].rstrip("-")
+    digest = hashlib.sha256(f"{system}\n{map}\n{signature}".encode()).hexdigest()
+    return f"{safe}-{digest[:6]}"
+
+
+def shown_file(path: Path) -> str:
+    """Return a path as seen from the present folder, so that a report says the same anywhere."""
+    here = Path.cwd()
+    absolute = path.absolute()
+    return str(absolute.relative_to(here) if absolute.is_relative_to(here) else path)

@@ -1,0 +1,115 @@
+"""Write the report of a run as a folder of pages, from its ledger and its flights' records."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from pytest_garl.errors import GarlError, LedgerError
+from pytest_garl.execution.stored_ledger import checked_ledger
+from pytest_garl.regressions.corpus import Corpus
+from pytest_garl.reports.html import MOST_FILMS
+from pytest_garl.reports.html.flight_task import ShownFlight
+from pytest_garl.reports.html.folder import check_target, new_folder
+from pytest_garl.reports.html.kind_page import KindPlan, found_page, kind_page, plan_kinds
+from pytest_garl.reports.html.naming import INDEX, KINDS
+from pytest_garl.reports.html.page_workers import shown_flights
+from pytest_garl.reports.html.rendering import render_index, render_kind
+from pytest_garl.reports.html.run_page import run_page
+from pytest_garl.reports.run_report import run_report_of, summaries_of
+from pytest_garl.video.encoder import program
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class WrittenReport:
+    """A report that was written: its index, its pages, and what is missing in it."""
+
+    index: Path
+    pages: int
+    films: int
+    notes: tuple[str, ...]
+
+
+def write_html_report(
+    ledger: Path,
+    out: Path,
+    corpus: Corpus,
+    *,
+    films: int = MOST_FILMS,
+    workers: int | None = None,
+    on_done: Callable[[int], None] = lambda done: None,
+) -> WrittenReport:
+    """Write the report of a ledger into the folder ``out``, whole or not at all.
+
+    ``films`` kinds have a film, the most frequent ones, if there is an encoder; ``workers``
+    processes draw, by default one per core.  Raises LedgerError for a ledger that is missing,
+    damaged or of another version, SavingError if ``out`` cannot be written or holds anything but a
+    report.
+    """
+    check_target(out)
+    if not ledger.is_file():
+        raise LedgerError(
+            f"there is no ledger at {ledger}; run a search first, or name the ledger of one"
+        )
+    no_encoder = _no_encoder() if films else ""
+    with checked_ledger(ledger) as opened:
+        searches = summaries_of(opened)
+        found = run_report_of(opened, ledger, corpus)
+        plans = plan_kinds(opened, searches, found, corpus, 0 if no_encoder else films)
+    tasks = [task for plan in plans for task in (plan.task, plan.found) if task is not None]
+    flights = iter(shown_flights(tasks, workers or _cores(), on_done))
+    shown = [(plan, next(flights), next(flights) if plan.found else None) for plan in plans]
+    accepted = {entry.path for entry in corpus.all_entries() if corpus.is_accepted(entry)}
+    notes = _notes([flight for _, *both in shown for flight in both if flight], no_encoder, plans)
+    with new_folder(out) as folder:
+        pages = []
+        for plan, flight, as_found in shown:
+            known = plan.entry is not None and plan.entry.path in accepted
+            page = kind_page(plan, flight, known)
+            pages.append((plan, page))
+            _write(folder / KINDS / f"{page.name}.html", render_kind(page))
+            if as_found is not None:
+                other = found_page(plan, as_found)
+                _write(folder / KINDS / f"{other.name}.html", render_kind(other))
+        _write(folder / INDEX, render_index(run_page(found, searches, pages, notes)))
+    return WrittenReport(
+        index=out / INDEX,
+        pages=len(tasks),
+        films=sum(bool(flight.film) for _, flight, _ in shown),
+        notes=notes,
+    )
+
+
+def _write(path: Path, text: str) -> None:
+    path.write_text(text, encoding="utf-8", newline="")
+
+
+def _cores() -> int:
+    return len(os.sched_getaffinity(0))
+
+
+def _no_encoder() -> str:
+    """Return why there is no encoder; empty if there is one."""
+    try:
+        program()
+    except GarlError as error:
+        return str(error)
+    return ""
+
+
+def _notes(
+    flights: Sequence[ShownFlight], no_encoder: str, plans: Sequence[KindPlan]
+) -> tuple[str, ...]:
+    """Return what is missing in the report, in one line each."""
+    missing = [flight.missing for flight in flights if flight.missing]
+    notes = []
+    if missing:
+        notes.append(
+            f"{len(missing)} of {len(flights)} flights have no record, so their pages have no path "
+            f"and no pictures. The first: {missing[0]}"
+        )
+    if no_encoder and plans:
+        notes.append(f"There are no films: {no_encoder}")
+    return tuple(notes)

@@ -1,0 +1,103 @@
+"""What the camera showed and when, and what the landing system made of it, in sentences."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+
+from pytest_garl.messages import shortened
+from pytest_garl.reports.html.flight_view import gap_m, phases
+from pytest_garl.reports.html.moments import decisive_s
+from pytest_garl.simulation.flight import Flight, Step
+from pytest_garl.simulation.physics.vehicle import up_m
+from pytest_garl.verdicts.sightings import (
+    AT_MARKER_M,
+    readable_steps,
+    reports_detections,
+    reports_marker,
+    reports_targets,
+    target_of,
+)
+
+MOST_PHASES = 8
+
+
+def sighting_sentences(flight: Flight) -> tuple[str, ...]:
+    """Return the sentences in the order of a landing: the marker, the reports, the body."""
+    if not flight.steps:
+        return ("The record holds no camera frames.",)
+    end_s = decisive_s(flight)
+    steps = [step for step in flight.steps if step.time_s <= end_s]
+    return (*_marker(flight, steps, end_s), *_body(flight, steps, end_s), *_phases(steps, end_s))
+
+
+def readable_and_reported(flight: Flight) -> tuple[int, int]:
+    """Return in how many frames the marker could be read, and in how many of these reported."""
+    readable = list(readable_steps(flight, decisive_s(flight)))
+    return len(readable), len(_reporting(flight, readable))
+
+
+def _reporting(flight: Flight, steps: Sequence[Step]) -> list[Step]:
+    """Return the frames in which the system reports the marker: detections, or else a target."""
+    if reports_detections(flight):
+        return [step for step in steps if reports_marker(flight, step)]
+    marker = flight.marker_position_m
+    targets = ((step, target_of(step)) for step in steps)
+    return [step for step, place in targets if place and math.dist(place, marker) <= AT_MARKER_M]
+
+
+def _marker(flight: Flight, steps: Sequence[Step], end_s: float) -> Iterator[str]:
+    readable = list(readable_steps(flight, end_s))
+    if not readable:
+        in_frame = sum(step.marker_visible > 0 for step in steps)
+        yield (
+            f"The marker could not be read in any of {len(steps)} frames; "
+            f"a part of it was in the picture in {in_frame}."
+        )
+    else:
+        yield (
+            f"The marker could be read in {len(readable)} of {len(steps)} frames, first at "
+            f"{readable[0].time_s:.1f} s and last at {readable[-1].time_s:.1f} s."
+        )
+    if not reports_detections(flight) and not reports_targets(flight):
+        yield "The landing system reports neither detections nor a target."
+        return
+    what = "reported it" if reports_detections(flight) else "had a target at it"
+    told = [step.time_s for step in _reporting(flight, steps)]
+    if not told:
+        yield f"The landing system never {what}."
+        return
+    both = len(_reporting(flight, readable))
+    of = f"in {both} of these {len(readable)} frames, " if readable else ""
+    yield f"The landing system {what} {of}first at {told[0]:.1f} s and last at {told[-1]:.1f} s."
+
+
+def _body(flight: Flight, steps: Sequence[Step], end_s: float) -> Iterator[str]:
+    contact = flight.contacts[-1] if flight.outcome == "collision" and flight.contacts else None
+    if contact is None or contact.body_class != "dynamic":
+        return
+    body = contact.body
+    seen = [step.time_s for step in steps if body in step.objects_visible]
+    if not seen:
+        yield f"The camera never showed {body} before the contact at {contact.time_s:.1f} s."
+        return
+    frames = f"{len(seen)} frame{'s' if len(seen) > 1 else ''}"
+    index = min(int(np.searchsorted(flight.uav.time_s, seen[0])), len(flight.uav.time_s) - 1)
+    up = up_m(float(flight.uav.position_m[index, 2]))
+    yield (
+        f"The camera showed {body} in {frames}, first at {seen[0]:.1f} s, which is "
+        f"{end_s - seen[0]:.1f} s before the contact: the UAV was {up:.1f} m up, and the nearest "
+        f"NPC {float(gap_m(flight)[index]):.1f} m away."
+    )
+
+
+def _phases(steps: Sequence[Step], end_s: float) -> Iterator[str]:
+    named = [(start, name) for start, _, name in phases(steps, end_s)]
+    if named:
+        told = [f"{shortened(name, 40)} from {start:.1f} s" for start, name in named]
+        if len(told) > MOST_PHASES:
+            left = len(told) - MOST_PHASES
+            told = [*told[:2], f"{left} more", *told[2 - MOST_PHASES :]]
+        yield f"The system's own phases: {', '.join(told)}."

@@ -1,0 +1,3 @@
+from tests.support.videos import video
+
+__all__ = ["video"]

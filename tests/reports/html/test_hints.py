@@ -1,0 +1,110 @@
+from __future__ import annotations
+
+import dataclasses
+from typing import Any, get_args
+
+import numpy as np
+import pytest
+
+from pytest_garl.landing_system import Diagnostics
+from pytest_garl.regressions.case import Prevention
+from pytest_garl.reports.html.hints import hints_of
+from pytest_garl.reports.html.sightings_text import sighting_sentences
+from pytest_garl.simulation.flight import Contact, Flight
+from pytest_garl.verdicts.verdict import Verdict, ViolationType
+from tests.support.recorded_flights import recorded, seen
+from tests.support.results import flight_result
+
+LATE = Contact(
+    time_s=8.0,
+    body="dog-1",
+    kind="dog",
+    body_class="dynamic",
+    position_m=(0.0, 0.0, 1.0),
+    speed_mps=2.0,
+    tilt_rad=0.0,
+)
+
+
+def verdict(kind: Any, signature: str = "") -> Verdict:
+    return flight_result(signature or f"{kind}:x", violation_type=kind).verdict
+
+
+def collided(frames: range) -> Flight:
+    steps = tuple(
+        dataclasses.replace(each, objects_visible=("dog-1",) if index in frames else ())
+        for index, each in enumerate(seen(range(20, 80)))
+    )
+    return recorded(steps=steps, outcome="collision", contacts=(LATE,), end_s=8.0)
+
+
+@pytest.mark.parametrize("kind", [each for each in get_args(ViolationType) if each != "own"])
+def test_every_type_has_a_hint(kind: str) -> None:
+    flight = collided(range(60, 80)) if kind == "IV" else recorded(steps=seen(range(20, 60)))
+    hints = hints_of(flight, verdict(kind))
+    assert hints
+    assert all(hint.endswith(".") for hint in hints)
+    assert isinstance(hints_of(None, verdict(kind)), tuple)
+
+
+def test_a_marker_that_was_readable_and_not_reported_points_to_the_detector() -> None:
+    missed = recorded(steps=seen(range(20, 60), reported=range(50, 55)), given_up_s=9.0)
+    assert "look at the detector" in hints_of(missed, verdict("II"))[0]
+    assert "reported it in 5 of these 40 frames" in " ".join(sighting_sentences(missed))
+
+
+def test_a_marker_that_was_reported_points_to_the_decision() -> None:
+    told = recorded(steps=seen(range(20, 60), reported=range(20, 60)), given_up_s=9.0)
+    assert "it is not the detector" in hints_of(told, verdict("II"))[0]
+    assert "at 9.0 s" in hints_of(told, verdict("II"))[0]
+
+
+def test_a_target_is_no_sighting() -> None:
+    steps = tuple(
+        dataclasses.replace(each, diagnostics=Diagnostics(target_m=(0.0, 0.0, 0.0)))
+        for each in seen(range(20, 60))
+    )
+    (hint,) = hints_of(recorded(steps=steps, given_up_s=9.0), verdict("II"))
+    assert "it is not the detector" not in hint
+    assert "reports no detections" in hint
+
+
+def test_a_marker_that_could_never_be_read_points_to_the_search() -> None:
+    assert "searches" in hints_of(recorded(steps=seen(())), verdict("II"))[0]
+    (sentence, *_) = sighting_sentences(recorded(steps=seen(())))
+    assert sentence.startswith("The marker could not be read in any of 100 frames")
+
+
+@pytest.mark.parametrize(
+    ("answer", "words"),
+    [
+        ("preventable", "An escape existed after the camera could show the body"),
+        ("sensor-limited", "a wider view"),
+        ("unpreventable", "not about the code"),
+        ("not asked", "2.0 s before the contact"),
+    ],
+)
+def test_a_collision_says_what_could_have_prevented_it(answer: Any, words: str) -> None:
+    prevention = Prevention(answer=answer, inevitable_s=0.5, observed_s=2.0)
+    assert words in hints_of(collided(range(60, 80)), verdict("IV"), prevention)[0]
+
+
+def test_the_sentences_say_when_the_body_was_first_in_view() -> None:
+    told = " ".join(sighting_sentences(collided(range(60, 80))))
+    assert "showed dog-1 in 20 frames, first at 6.0 s, which is 2.0 s before the contact" in told
+    unseen = " ".join(sighting_sentences(collided(range(0))))
+    assert "never showed dog-1 before the contact at 8.0 s" in unseen
+
+
+def test_a_landing_beside_the_marker_is_told_by_its_target() -> None:
+    def landed(target: tuple[float, float, float]) -> str:
+        steps = tuple(
+            dataclasses.replace(each, diagnostics=Diagnostics(target_m=target))
+            for each in seen(range(20, 60))
+        )
+        beside = np.tile([4.0, 0.0, 0.2], (241, 1))
+        flight = recorded(steps=steps, outcome="landed", places=beside)
+        return hints_of(flight, verdict("I"))[0]
+
+    assert "look at the detector" in landed((4.0, 0.0, 0.0))
+    assert "look at the control" in landed((0.0, 0.0, 0.0))

@@ -1,0 +1,80 @@
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+from pytest_garl.reports.html.moments import BEFORE_END_S, MOST, SAME_S, decisive_s, moments_of
+from pytest_garl.simulation.flight import Contact, Flight
+from tests.support.recorded_flights import recorded, seen
+
+
+def labels(flight: Flight) -> list[str]:
+    return [each.label for each in moments_of(flight)]
+
+
+def test_moments_are_in_the_order_of_time_and_end_with_the_event() -> None:
+    flight = recorded(steps=seen(range(20, 60)), outcome="gave_up", given_up_s=6.0, end_s=6.1)
+    found = moments_of(flight)
+    times = [each.time_s for each in found]
+    assert times == sorted(times)
+    assert found[-1].label == "The landing system gives up"
+    assert found[-1].time_s == decisive_s(flight) == 6.0
+    assert found[0].label.startswith("The marker can be read for the first time")
+    assert 6.0 - BEFORE_END_S in times
+
+
+def test_moments_at_almost_the_same_time_share_a_picture() -> None:
+    found = moments_of(recorded(steps=seen(range(30, 60)), given_up_s=3.0 + 0.1))
+    gaps = np.diff([each.time_s for each in found])
+    assert (gaps >= SAME_S).all()
+    assert any("; " in each.label for each in found)
+
+
+def test_no_flight_has_more_moments_than_fit() -> None:
+    contact = Contact(
+        time_s=9.9,
+        body="dog-1",
+        kind="dog",
+        body_class="dynamic",
+        position_m=(0.0, 0.0, 1.0),
+        speed_mps=2.0,
+        tilt_rad=0.0,
+    )
+    views = [*range(20, 30), *range(50, 55), *range(90, 99)]
+    steps = tuple(
+        dataclasses.replace(each, objects_visible=("dog-1",) if index in views else ())
+        for index, each in enumerate(seen(range(20, 40)))
+    )
+    flight = recorded(steps=steps, outcome="collision", contacts=(contact,), end_s=9.9)
+    assert len(moments_of(flight)) <= MOST
+    assert labels(flight)[-1] == "The UAV hits dog-1"
+    assert any("comes into view again" in label for label in labels(flight))
+
+
+def test_a_turn_before_the_descent_is_none() -> None:
+    climbs = np.array([[0.0, 0.0, min(9.0, 1.0 + index / 10)] for index in range(241)])
+    flight = recorded(steps=(), outcome="gave_up", given_up_s=9.0, places=climbs)
+    assert "The UAV turns back up" not in labels(flight)
+    falls_and_climbs = climbs.copy()
+    falls_and_climbs[120:160, 2] = 4.0
+    again = recorded(steps=(), outcome="gave_up", given_up_s=9.0, places=falls_and_climbs)
+    assert "The UAV turns back up" in labels(again)
+
+
+@pytest.mark.parametrize(
+    ("outcome", "label"),
+    [
+        ("landed", "The UAV touches down"),
+        ("not_landed", "The flight ends"),
+        ("crashed", "The landing system fails"),
+    ],
+)
+def test_the_last_moment_says_how_the_flight_ended(outcome: str, label: str) -> None:
+    assert labels(recorded(steps=(), outcome=outcome))[-1] == label
+
+
+def test_a_flight_of_one_sample_has_a_moment() -> None:
+    flight = recorded(steps=(), places=np.zeros((1, 3)), end_s=0.0)
+    assert len(moments_of(flight)) == 1
