@@ -1,0 +1,175 @@
+"""The precise landing of Tiziano Fiorenzani's "How do drones work?": ArUco and GUIDED positions.
+
+The script runs as it is, from its first line to its endless loop.  Replaced are its camera, its
+link to the vehicle (DroneKit) and the old functions of OpenCV.
+"""
+
+from __future__ import annotations
+
+import sys
+from types import ModuleType, SimpleNamespace
+from typing import Any
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from pytest_garl import (
+    Airframe,
+    Camera,
+    Command,
+    Detection,
+    Mission,
+    MotorThrusts,
+    Observation,
+    VehicleState,
+)
+from pytest_garl.fiducial import MarkerSpec
+from studies.foreign.autopilot import CONTROL_RATE_HZ, Autopilot, GlobalPosition
+from studies.foreign.calibration import CalibrationFolder
+from studies.foreign.legacy_opencv import opencv
+from studies.foreign.loading import changed, module_with, run_module, with_print_calls
+from studies.foreign.repository import Repository
+from studies.foreign.script import Script
+
+SCRIPT, TRACKER = "scripts/06_precise_landing.py", "opencv/lib_aruco_pose.py"
+REPOSITORY = Repository(
+    name="tizianofiorenzani/how_do_drones_work",
+    commit="243547be80fa18ccc4c904fd7175ba8dea4613d4",
+    licence="BSD-3-Clause",
+    files={
+        SCRIPT: "e248196e39287011c2e80ccda77b77a5e10ff30e6ca79dd42f475cb5695a7959",
+        TRACKER: "cb3356adc39f7f1a2f689686e4545029be69060485c2a0dbe8aa7f084562076a",
+    },
+)
+MARKER = MarkerSpec(dictionary="DICT_ARUCO_ORIGINAL", id=72, side_m=0.6)
+"""The script's id and dictionary.  It is as large as the camera can see from where the script gives
+the command to land, 0.5 m above the marker."""
+START_HEIGHT_M = 8.0
+"""From higher up the cells of this marker are smaller than two pixels."""
+
+
+class HowDoDronesWorkLandingSystem:
+    """The script, from a hover in GUIDED near the marker on."""
+
+    airframe = Airframe(camera=Camera(width_px=640, height_px=480), control_rate_hz=CONTROL_RATE_HZ)
+
+    def reset(self, mission: Mission) -> None:
+        """Prepare the script; it starts with the first frame."""
+        self._mission = mission
+        self._path = list(sys.path)
+        self._calibration = CalibrationFolder(mission.camera, "raspi")
+        self._autopilot = Autopilot(self.airframe, mission)
+        self._vehicle = _Vehicle(self._autopilot)
+        self._script = Script(self._main)
+        self._seen: tuple[Detection, ...] = ()
+
+    def step(self, observation: Observation) -> Command:
+        """Let the script look at one frame."""
+        self._autopilot.observe(observation)
+        self._seen = ()
+        self._script.resume(observation.time_s)
+        return self._autopilot.command(self._seen)
+
+    def control(self, state: VehicleState) -> MotorThrusts:
+        """Fly the motors, as the autopilot does."""
+        return self._autopilot.control(state)
+
+    def close(self) -> None:
+        """End the script's thread, and take back what it adds to ``sys.path``."""
+        self._script.close()
+        self._calibration.close()
+        sys.path[:] = self._path
+
+    def _main(self) -> None:
+        old_cv2 = opencv(lambda *_: SimpleNamespace(read=self._read, set=lambda *_: True))
+        time = self._script.time_module
+        shared: dict[str, Any] = {"cv2": old_cv2, "cv2.aruco": old_cv2.aruco, "time": time}
+        tracker = run_module(
+            with_print_calls(REPOSITORY.source(TRACKER)),
+            name="opencv.lib_aruco_pose",
+            file=str(REPOSITORY.folder / TRACKER),
+            stand_ins=shared,
+        )
+        self._report_detections(tracker)
+        run_module(
+            changed(with_print_calls(REPOSITORY.source(SCRIPT)), self._changes),
+            name="precise_landing",
+            file=str(REPOSITORY.folder / SCRIPT),
+            stand_ins={**shared, **self._link, "opencv.lib_aruco_pose": tracker},
+        )
+
+    @property
+    def _changes(self) -> dict[str, str]:
+        side_cm = self._mission.marker_side_m * 100
+        return {
+            "parser.parse_args()": "parser.parse_args([])",
+            "marker_size     = 10 ": f"marker_size     = {side_cm!r} ",
+            'cwd+"/../opencv/"': repr(self._calibration.prefix),
+        }
+
+    @property
+    def _link(self) -> dict[str, ModuleType]:
+        def position(lat: float, lon: float, alt: float) -> GlobalPosition:
+            return GlobalPosition(lat=lat, lon=lon, alt=alt)
+
+        dronekit = module_with(
+            "dronekit",
+            connect=lambda *_, **__: self._vehicle,
+            LocationGlobalRelative=position,
+            LocationGlobal=position,
+            VehicleMode=str,
+            Command=object,
+        )
+        return {"dronekit": dronekit, "pymavlink": module_with("pymavlink", mavutil=None)}
+
+    def _read(self) -> tuple[bool, NDArray[np.uint8]]:
+        self._script.wait()
+        image = self._autopilot.observation.image
+        return True, np.asarray(cv2.cvtColor(image, cv2.COLOR_RGB2BGR), np.uint8)
+
+    def _report_detections(self, tracker: ModuleType) -> None:
+        """Note what the tracker finds, for the diagnostics; it is not changed by that."""
+        track = tracker.ArucoSingleTracker.track
+
+        def noted(*arguments: Any, **options: Any) -> Any:
+            found = track(*arguments, **options)
+            if found[0]:
+                place = self._autopilot.beside(-found[2] / 100, found[1] / 100)
+                self._seen = (
+                    Detection(
+                        marker_id=self._mission.marker_id,
+                        confidence=1.0,
+                        position_m=(float(place[0]), float(place[1]), 0.0),
+                    ),
+                )
+            return found
+
+        tracker.ArucoSingleTracker.track = noted
+
+
+class _Vehicle:
+    """DroneKit's vehicle, as far as the script uses it."""
+
+    def __init__(self, autopilot: Autopilot) -> None:
+        self._autopilot = autopilot
+
+    @property
+    def location(self) -> SimpleNamespace:
+        return SimpleNamespace(global_relative_frame=self._autopilot.global_position)
+
+    @property
+    def attitude(self) -> SimpleNamespace:
+        return SimpleNamespace(yaw=self._autopilot.heading_rad)
+
+    @property
+    def mode(self) -> str:
+        return self._autopilot.mode
+
+    @mode.setter
+    def mode(self, mode: str) -> None:
+        if mode == "LAND":
+            self._autopilot.land()
+
+    def simple_goto(self, goal: GlobalPosition) -> None:
+        self._autopilot.go_to(self._autopilot.place_of(goal))
