@@ -29,9 +29,6 @@ from pytest_garl.scenarios.scenario import Scenario
 BISECTIONS = 3
 """Flights that bring one gene nearer to nominal: to an eighth of its distance."""
 
-FEW_CONDITIONS = 5
-"""Of so many at least one is taken to be needed; of more, all are reset in one flight first."""
-
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Shrunk:
@@ -81,9 +78,7 @@ def reset_and_bisect(trials: Trials, colliding_object: str) -> None:
     if is_hit and trials(simplified(trials.best, steps.all)):
         return _bisect(trials)
     needs_no_object = _reset(trials, steps.objects)
-    is_sparse = len(steps.conditions) <= FEW_CONDITIONS
-    needs_one = needs_no_object if is_hit else is_sparse
-    _reset(trials, steps.conditions, needs_one=needs_one)
+    _reset(trials, steps.conditions, needs_one=needs_no_object or not is_hit)
     for values in value_simplifications(trials.best, trials.genome):
         _reset(trials, values, needs_one=True)
     return _bisect(trials)
