@@ -109,7 +109,7 @@ def _reset(trials: Trials, steps: Sequence[Simplification], *, needs_one: bool =
 
 
 def _bisect(trials: Trials) -> None:
-    """Bring genes as near to nominal as the failure survives, and to nominal after the nearest."""
+    """Bring genes as near to nominal as the failure survives."""
     for gene in trials.genome.genes:
         start = trials.best
         present = {key for key, _ in start.genes}
@@ -123,14 +123,15 @@ def _bisect(trials: Trials) -> None:
         if not moved:
             continue
         least, most = 0.0, 1.0
-        for _ in range(BISECTIONS):
+        for step in range(BISECTIONS):
+            # What survives two halvings may need nothing of it.
+            if step == BISECTIONS - 1 and least == 0 and trials(_nearer(start, moved, 0.0)):
+                break
             share = (least + most) / 2
             if trials(_nearer(start, moved, share)):
                 most = share
             else:
                 least = share
-        if least == 0:
-            trials(_nearer(start, moved, 0.0))
 
 
 def _nearer(scenario: Scenario, items: Sequence[Property], share: float) -> Scenario:
