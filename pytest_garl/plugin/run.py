@@ -4,11 +4,10 @@ from __future__ import annotations
 
 import dataclasses
 import functools
-import math
 import os
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, NamedTuple, TextIO
+from typing import TYPE_CHECKING, TextIO
 
 import pytest
 
@@ -19,6 +18,7 @@ from pytest_garl.execution.ledger import Ledger
 from pytest_garl.execution.pool import Pool, wait_for
 from pytest_garl.execution.reference import Reference, simulator_sha256
 from pytest_garl.execution.sources import combined_sha256
+from pytest_garl.plugin.flight_time import FIRST_RUN, FlightTime
 from pytest_garl.plugin.keys import target_of
 from pytest_garl.plugin.options import Options
 from pytest_garl.plugin.search_setup import Searches
@@ -40,22 +40,6 @@ from pytest_garl.reports.search_summary import CAMERA, DOMAINS
 
 SELECTED = "selected flights"
 """The ledger's fact: how many flights of searches the selected tests want."""
-
-
-class FlightTime(NamedTuple):
-    """Wall time of one flight on one core, in seconds: a range where no earlier run tells it."""
-
-    fastest: float
-    slowest: float
-
-    @property
-    def typical(self) -> float:
-        """Their geometric mean."""
-        return math.sqrt(self.fastest * self.slowest)
-
-
-FIRST_RUN = FlightTime(1.3, 3.9)
-"""OpenCV-MLS, and three times as much: MM-MLS, or OpenCV-MLS on a core half as fast."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

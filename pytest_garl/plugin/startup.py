@@ -20,9 +20,10 @@ from pytest_garl.execution.processes import alive
 from pytest_garl.execution.ray.pool import check_ray, ray_pool
 from pytest_garl.execution.reference import BUILT_IN, package_sha256, reference_to
 from pytest_garl.execution.stored_ledger import check_stored, stored_flight_s
+from pytest_garl.plugin.flight_time import FIRST_RUN, FlightTime
 from pytest_garl.plugin.keys import RUN, is_xdist_worker
 from pytest_garl.plugin.options import Options
-from pytest_garl.plugin.run import FIRST_RUN, FlightTime, Run
+from pytest_garl.plugin.run import Run
 from pytest_garl.reports.run_report import BEGAN, utc_now
 
 if TYPE_CHECKING:

@@ -7,7 +7,7 @@ of the landing system only add to the text.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 
 from pytest_garl.simulation.flight import Flight, Step
 from pytest_garl.verdicts.detectability import READABLE, readable_probability
@@ -67,6 +67,12 @@ def reports_marker(flight: Flight, step: Step) -> bool:
     )
 
 
+def reports_other_place(flight: Flight, step: Step) -> bool:
+    """Whether the system reports detections in a frame, and none of them at the marker."""
+    seen = step.diagnostics.detections if step.diagnostics else ()
+    return bool(seen) and not reports_marker(flight, step)
+
+
 def target_of(step: Step) -> Place | None:
     """Return the place (x, y) in the world that the system reports as its target, None if none.
 
@@ -89,16 +95,20 @@ def last_report_s(flight: Flight, until_s: float) -> float | None:
 
     None if it never did.
     """
-    if reports_detections(flight):
-        times = [each.time_s for each in flight.steps if reports_marker(flight, each)]
-    else:
-        times = [
-            each.time_s
-            for each in flight.steps
-            if (target := target_of(each))
-            and math.dist(target, flight.marker_position_m) <= AT_MARKER_M
-        ]
+    times = (step.time_s for step in reporting_steps(flight, flight.steps))
     return max((time_s for time_s in times if time_s <= until_s), default=None)
+
+
+def reporting_steps(flight: Flight, steps: Iterable[Step]) -> list[Step]:
+    """Return the frames in which the system reports the marker at its place.
+
+    By a detection; of a system that reports none, by a target.
+    """
+    if reports_detections(flight):
+        return [step for step in steps if reports_marker(flight, step)]
+    marker = flight.marker_position_m
+    targets = ((step, target_of(step)) for step in steps)
+    return [step for step, place in targets if place and math.dist(place, marker) <= AT_MARKER_M]
 
 
 def _in_world(step: Step, place: tuple[float, ...]) -> Place:

@@ -35,6 +35,7 @@ from pytest_garl import (
     PositionSetpoint,
     VehicleState,
 )
+from studies.foreign.repository import ForeignCodeError
 
 CONTROL_RATE_HZ = 240.0
 BODY_ABOVE_FEET_M = 0.2
@@ -172,8 +173,9 @@ class Autopilot:
 
     def landing_target(self, message: Mapping[str, Any]) -> None:
         """Take a LANDING_TARGET with angles; without a range to the ground it is of no use."""
-        if message["frame"]["type"] != LEVEL_FRAME:
-            raise NotImplementedError(f"LANDING_TARGET in the frame {message['frame']['type']}")
+        frame = message["frame"]["type"]
+        if frame != LEVEL_FRAME:
+            raise ForeignCodeError(f"LANDING_TARGET: found frame {frame}, expected {LEVEL_FRAME}")
         measured = self.observation.rangefinder_m
         if measured is None:
             return

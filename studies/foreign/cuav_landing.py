@@ -9,27 +9,14 @@ from __future__ import annotations
 from types import SimpleNamespace
 from typing import Any
 
-import cv2
-import numpy as np
-from numpy.typing import NDArray
-
-from pytest_garl import (
-    Airframe,
-    Camera,
-    Command,
-    Detection,
-    Mission,
-    MotorThrusts,
-    Observation,
-    VehicleState,
-)
+from pytest_garl import Camera, Command, Mission, Observation
 from pytest_garl.fiducial import MarkerSpec
-from studies.foreign.autopilot import CONTROL_RATE_HZ, Autopilot
-from studies.foreign.calibration import CalibrationFolder
+from studies.foreign.autopilot import Autopilot
 from studies.foreign.legacy_opencv import opencv
 from studies.foreign.loading import changed, module_with, run_module
 from studies.foreign.repository import Repository
 from studies.foreign.script import Script
+from studies.foreign.scripted import ScriptedLandingSystem, airframe_with
 
 SCRIPT, DETECTOR = "python_sim/cuav_landing.py", "python_sim/aruco_calc.py"
 REPOSITORY = Repository(
@@ -61,45 +48,31 @@ MAVLINK = {
 """Numbers of MAVLink's common messages."""
 
 
-class CuavLandingSystem:
+class CuavLandingSystem(ScriptedLandingSystem):
     """The script, from a hover above the told coordinate on."""
 
-    airframe = Airframe(camera=Camera(width_px=640, height_px=480), control_rate_hz=CONTROL_RATE_HZ)
+    airframe = airframe_with(Camera(width_px=640, height_px=480))
+    calibration_name = "webcam"
 
     def reset(self, mission: Mission) -> None:
-        """Prepare the script; it starts with the first frame."""
-        self._mission = mission
-        self._calibration = CalibrationFolder(mission.camera, "webcam")
-        self._autopilot = Autopilot(self.airframe, mission)
-        self._script = Script(self._main)
-        self._link = _Link(self._autopilot, self._script, mission)
-        self._seen: tuple[Detection, ...] = ()
+        """Prepare the script and its link."""
+        super().reset(mission)
+        self._link = _Link(self.autopilot, self.script, mission)
 
     def step(self, observation: Observation) -> Command:
-        """Let the script go on for one frame."""
-        self._autopilot.observe(observation)
+        """Let the script go on for one frame, with new telemetry."""
         self._link.unread = set(_Link.TELEMETRY)
-        self._seen = ()
-        self._script.resume(observation.time_s)
-        return self._autopilot.command(self._seen)
+        return super().step(observation)
 
-    def control(self, state: VehicleState) -> MotorThrusts:
-        """Fly the motors, as the autopilot does."""
-        return self._autopilot.control(state)
-
-    def close(self) -> None:
-        """End the script's thread."""
-        self._script.close()
-        self._calibration.close()
-
-    def _main(self) -> None:
+    def run(self) -> None:
+        """Load the detector, then execute the script."""
         old_cv2 = opencv(lambda *_: None)
         quiet = module_with("logging", basicConfig=_nothing, info=_nothing, warning=_nothing)
         shared: dict[str, Any] = {
             "cv2": old_cv2,
             "cv2.aruco": old_cv2.aruco,
             "tf": module_with("tf"),
-            "time": self._script.time_module,
+            "time": self.script.time_module,
             "signal": module_with("signal", SIGINT=2, signal=_nothing),
             "logging": module_with("logging", **vars(quiet), NOTSET=0),
         }
@@ -108,7 +81,7 @@ class CuavLandingSystem:
                 REPOSITORY.source(DETECTOR),
                 {
                     "marker_size  = 58.5937500001": f"marker_size = {100 * MARKER.side_m!r}",
-                    'calib_path  = ""': f"calib_path = {self._calibration.prefix!r}",
+                    'calib_path  = ""': f"calib_path = {self.calibration.prefix!r}",
                 },
             ),
             name="aruco_calc",
@@ -138,11 +111,7 @@ class CuavLandingSystem:
         )
 
     def _stream(self) -> SimpleNamespace:
-        return SimpleNamespace(setup=self._frame, frame_available=lambda: True)
-
-    def _frame(self) -> NDArray[np.uint8]:
-        image = self._autopilot.observation.image
-        return np.asarray(cv2.cvtColor(image, cv2.COLOR_RGB2BGR), np.uint8)
+        return SimpleNamespace(setup=lambda: self.picture, frame_available=lambda: True)
 
     def _report_detections(self, detector: Any) -> None:
         """Note what the detector finds, for the diagnostics; it is not changed by that."""
@@ -151,10 +120,7 @@ class CuavLandingSystem:
         def noted(frame: Any) -> Any:
             found = find(frame)
             if found:
-                place = self._autopilot.beside(float(found[1]), float(found[0]))
-                self._seen = (
-                    Detection(marker_id=MARKER.id, confidence=1.0, position_m=(*place, 0.0)),
-                )
+                self.note_sighting(float(found[1]), float(found[0]))
             return found
 
         detector.aru = noted
@@ -183,7 +149,10 @@ class _Link:
         return True
 
     def recv_match(self, *, type: str, blocking: bool) -> SimpleNamespace | None:  # noqa: A002
-        """Return the newest message of a type; one that was read before is waited for."""
+        """Return the newest message of a type; one that was read before is waited for.
+
+        The argument has pymavlink's name, with which the script calls it.
+        """
         if type == "COMMAND_ACK":
             return SimpleNamespace()
         while type not in self.unread:

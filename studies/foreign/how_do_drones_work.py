@@ -10,27 +10,16 @@ import sys
 from types import ModuleType, SimpleNamespace
 from typing import Any
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from pytest_garl import (
-    Airframe,
-    Camera,
-    Command,
-    Detection,
-    Mission,
-    MotorThrusts,
-    Observation,
-    VehicleState,
-)
+from pytest_garl import Camera, Mission
 from pytest_garl.fiducial import MarkerSpec
-from studies.foreign.autopilot import CONTROL_RATE_HZ, Autopilot, GlobalPosition
-from studies.foreign.calibration import CalibrationFolder
+from studies.foreign.autopilot import Autopilot, GlobalPosition
 from studies.foreign.legacy_opencv import opencv
 from studies.foreign.loading import changed, module_with, run_module, with_print_calls
 from studies.foreign.repository import Repository
-from studies.foreign.script import Script
+from studies.foreign.scripted import ScriptedLandingSystem, airframe_with
 
 SCRIPT, TRACKER = "scripts/06_precise_landing.py", "opencv/lib_aruco_pose.py"
 REPOSITORY = Repository(
@@ -42,48 +31,33 @@ REPOSITORY = Repository(
         TRACKER: "cb3356adc39f7f1a2f689686e4545029be69060485c2a0dbe8aa7f084562076a",
     },
 )
-MARKER = MarkerSpec(dictionary="DICT_ARUCO_ORIGINAL", id=72, side_m=0.6)
-"""The script's id and dictionary.  It is as large as the camera can see from where the script gives
-the command to land, 0.5 m above the marker."""
+MARKER = MarkerSpec(dictionary="DICT_ARUCO_ORIGINAL", id=72, side_m=0.4)
+"""The script's id and dictionary.  From where the script gives the command to land, 0.5 m above the
+marker, its diagonal fills three quarters of the picture's height."""
 START_HEIGHT_M = 8.0
-"""From higher up the cells of this marker are smaller than two pixels."""
+"""From higher up the cells of this marker are smaller than three pixels."""
 
 
-class HowDoDronesWorkLandingSystem:
+class HowDoDronesWorkLandingSystem(ScriptedLandingSystem):
     """The script, from a hover in GUIDED near the marker on."""
 
-    airframe = Airframe(camera=Camera(width_px=640, height_px=480), control_rate_hz=CONTROL_RATE_HZ)
+    airframe = airframe_with(Camera(width_px=960, height_px=720))
+    calibration_name = "raspi"
 
     def reset(self, mission: Mission) -> None:
-        """Prepare the script; it starts with the first frame."""
-        self._mission = mission
+        """Prepare the script."""
+        super().reset(mission)
         self._path = list(sys.path)
-        self._calibration = CalibrationFolder(mission.camera, "raspi")
-        self._autopilot = Autopilot(self.airframe, mission)
-        self._vehicle = _Vehicle(self._autopilot)
-        self._script = Script(self._main)
-        self._seen: tuple[Detection, ...] = ()
-
-    def step(self, observation: Observation) -> Command:
-        """Let the script look at one frame."""
-        self._autopilot.observe(observation)
-        self._seen = ()
-        self._script.resume(observation.time_s)
-        return self._autopilot.command(self._seen)
-
-    def control(self, state: VehicleState) -> MotorThrusts:
-        """Fly the motors, as the autopilot does."""
-        return self._autopilot.control(state)
 
     def close(self) -> None:
         """End the script's thread, and take back what it adds to ``sys.path``."""
-        self._script.close()
-        self._calibration.close()
+        super().close()
         sys.path[:] = self._path
 
-    def _main(self) -> None:
+    def run(self) -> None:
+        """Load the tracker, then execute the script."""
         old_cv2 = opencv(lambda *_: SimpleNamespace(read=self._read, set=lambda *_: True))
-        time = self._script.time_module
+        time = self.script.time_module
         shared: dict[str, Any] = {"cv2": old_cv2, "cv2.aruco": old_cv2.aruco, "time": time}
         tracker = run_module(
             with_print_calls(REPOSITORY.source(TRACKER)),
@@ -101,11 +75,11 @@ class HowDoDronesWorkLandingSystem:
 
     @property
     def _changes(self) -> dict[str, str]:
-        side_cm = self._mission.marker_side_m * 100
+        side_cm = self.mission.marker_side_m * 100
         return {
             "parser.parse_args()": "parser.parse_args([])",
             "marker_size     = 10 ": f"marker_size     = {side_cm!r} ",
-            'cwd+"/../opencv/"': repr(self._calibration.prefix),
+            'cwd+"/../opencv/"': repr(self.calibration.prefix),
         }
 
     @property
@@ -115,7 +89,7 @@ class HowDoDronesWorkLandingSystem:
 
         dronekit = module_with(
             "dronekit",
-            connect=lambda *_, **__: self._vehicle,
+            connect=lambda *_, **__: _Vehicle(self.autopilot),
             LocationGlobalRelative=position,
             LocationGlobal=position,
             VehicleMode=str,
@@ -124,9 +98,8 @@ class HowDoDronesWorkLandingSystem:
         return {"dronekit": dronekit, "pymavlink": module_with("pymavlink", mavutil=None)}
 
     def _read(self) -> tuple[bool, NDArray[np.uint8]]:
-        self._script.wait()
-        image = self._autopilot.observation.image
-        return True, np.asarray(cv2.cvtColor(image, cv2.COLOR_RGB2BGR), np.uint8)
+        self.script.wait()
+        return True, self.picture
 
     def _report_detections(self, tracker: ModuleType) -> None:
         """Note what the tracker finds, for the diagnostics; it is not changed by that."""
@@ -135,14 +108,7 @@ class HowDoDronesWorkLandingSystem:
         def noted(*arguments: Any, **options: Any) -> Any:
             found = track(*arguments, **options)
             if found[0]:
-                place = self._autopilot.beside(-found[2] / 100, found[1] / 100)
-                self._seen = (
-                    Detection(
-                        marker_id=self._mission.marker_id,
-                        confidence=1.0,
-                        position_m=(float(place[0]), float(place[1]), 0.0),
-                    ),
-                )
+                self.note_sighting(-found[2] / 100, found[1] / 100)
             return found
 
         tracker.ArucoSingleTracker.track = noted

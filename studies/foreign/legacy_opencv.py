@@ -55,10 +55,13 @@ def detect_markers(
     The camera served a refinement that is off by default.
     """
     detector = cv2.aruco.ArucoDetector(dictionary, parameters or cv2.aruco.DetectorParameters())
+    corners: Any
+    ids: Any
+    rejected: Any
     corners, ids, rejected = detector.detectMarkers(image)
     # OpenCV 5 gives (n,).
     rows = None if ids is None or not len(corners) else np.asarray(ids, np.int32).reshape(-1, 1)
-    return tuple(corners), rows, tuple(rejected)  # type: ignore[arg-type]
+    return tuple(corners), rows, tuple(rejected)
 
 
 def estimate_pose_single_markers(

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pytest_garl.messages import shortened
-from pytest_garl.reports.html.moments import Moment, decisive_s, reports_other_place
+from pytest_garl.reports.html.moments import Moment, decisive_s
 from pytest_garl.scenarios.object_types import OBJECT_TYPES
 from pytest_garl.simulation.flight import Flight, ObjectRecord, Step, Track
 from pytest_garl.simulation.physics.vehicle import BODY_ABOVE_FEET_M, up_m
@@ -20,6 +20,7 @@ from pytest_garl.verdicts.sightings import (
     readable_steps,
     reports_detections,
     reports_marker,
+    reports_other_place,
     reports_targets,
     target_of,
 )
@@ -33,6 +34,9 @@ MOST_PLAN_POINTS = 24
 WORDS = 80
 MOST_PHASES = 200
 """A landing system that names each frame a phase of its own fills no page."""
+MOST_DECOYS = 50
+UNKNOWN_SIZE_M = (0.3, 1.0, 0.0)
+"""Radius, height and lower end that stand for an NPC of a simulator of the user's own."""
 Array = NDArray[np.float64]
 Span = tuple[float, float]
 
@@ -58,7 +62,8 @@ def flight_data(flight: Flight, moments: Sequence[Moment]) -> dict[str, Any]:
         "uav": _path(flight.uav, picked, lift_m=-BODY_ABOVE_FEET_M),
         "objects": [_object(each, picked) for each in flight.objects],
         "decoys": [
-            [shortened(name, WORDS), round(x, 2), round(y, 2)] for name, x, y in _decoys(flight)
+            [shortened(name, WORDS), round(x, 2), round(y, 2)]
+            for name, x, y in flight.decoys[:MOST_DECOYS]
         ],
         "metres": _metres(flight, picked),
         "percent": _percent(flight, times),
@@ -70,10 +75,6 @@ def flight_data(flight: Flight, moments: Sequence[Moment]) -> dict[str, Any]:
         "plans": _plans(flight.steps),
         "moments": [{"t": round(each.time_s, 2), "label": each.label} for each in moments],
     }
-
-
-def _decoys(flight: Flight) -> Sequence[tuple[str, float, float]]:
-    return flight.decoys[:50]
 
 
 def _picked(times: Array) -> NDArray[np.intp]:
@@ -94,15 +95,21 @@ def _path(track: Track, picked: NDArray[np.intp], lift_m: float = 0.0) -> dict[s
 
 
 def _object(item: ObjectRecord, picked: NDArray[np.intp]) -> dict[str, Any]:
-    kind = OBJECT_TYPES.get(item.type)
+    radius_m, height_m, low_m = _size_m(item)
     return {
         "name": item.name,
         "type": item.type,
-        "radius_m": round(kind.radius_m, 2) if kind else 0.3,
-        "height_m": round(kind.height_m, 2) if kind else 1.0,
-        "low_m": round(kind.low_m, 2) if kind else 0.0,
+        "radius_m": round(radius_m, 2),
+        "height_m": round(height_m, 2),
+        "low_m": round(low_m, 2),
         **_path(item.track, picked),
     }
+
+
+def _size_m(item: ObjectRecord) -> tuple[float, float, float]:
+    """Return radius, height and lower end of the upright cylinder that stands for an NPC."""
+    kind = OBJECT_TYPES.get(item.type)
+    return (kind.radius_m, kind.height_m, kind.low_m) if kind else UNKNOWN_SIZE_M
 
 
 def _metres(flight: Flight, picked: NDArray[np.intp]) -> list[dict[str, Any]]:
@@ -138,10 +145,7 @@ def gap_m(flight: Flight) -> Array:
     least = np.full(len(flight.uav.time_s), np.inf)
     ux, uy, uz = flight.uav.position_m.T
     for item in flight.objects:
-        kind = OBJECT_TYPES.get(item.type)
-        radius_m, height_m, low_m = (
-            (kind.radius_m, kind.height_m, kind.low_m) if kind else (0.3, 1.0, 0.0)
-        )
+        radius_m, height_m, low_m = _size_m(item)
         x, y, z = item.track.position_m.T
         across = np.maximum(0.0, np.hypot(x - ux, y - uy) - radius_m - UAV_RADIUS_M)
         bottom = z + low_m

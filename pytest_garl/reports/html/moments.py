@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pytest_garl.simulation.flight import Flight, Step
+from pytest_garl.simulation.flight import Flight
 from pytest_garl.simulation.physics.vehicle import up_m
 from pytest_garl.verdicts.margins import COMMIT_M
 from pytest_garl.verdicts.mechanism import NO_LANDING
@@ -18,6 +18,7 @@ from pytest_garl.verdicts.sightings import (
     readable_steps,
     reports_detections,
     reports_marker,
+    reports_other_place,
     target_of,
 )
 
@@ -54,12 +55,6 @@ def moments_of(flight: Flight) -> tuple[Moment, ...]:
     if len(merged) > MOST:
         merged = [merged[0], *merged[1 - MOST :]]
     return tuple(Moment(time_s=m.time_s, label=m.label[:1].upper() + m.label[1:]) for m in merged)
-
-
-def reports_other_place(flight: Flight, step: Step) -> bool:
-    """Whether the system reports detections in a frame, and none of them at the marker."""
-    seen = step.diagnostics.detections if step.diagnostics else ()
-    return bool(seen) and not reports_marker(flight, step)
 
 
 def decisive_s(flight: Flight) -> float:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator, Sequence
 
 import numpy as np
@@ -13,12 +12,10 @@ from pytest_garl.reports.html.moments import decisive_s
 from pytest_garl.simulation.flight import Flight, Step
 from pytest_garl.simulation.physics.vehicle import up_m
 from pytest_garl.verdicts.sightings import (
-    AT_MARKER_M,
     readable_steps,
+    reporting_steps,
     reports_detections,
-    reports_marker,
     reports_targets,
-    target_of,
 )
 
 MOST_PHASES = 8
@@ -36,16 +33,7 @@ def sighting_sentences(flight: Flight) -> tuple[str, ...]:
 def readable_and_reported(flight: Flight) -> tuple[int, int]:
     """Return in how many frames the marker could be read, and in how many of these reported."""
     readable = list(readable_steps(flight, decisive_s(flight)))
-    return len(readable), len(_reporting(flight, readable))
-
-
-def _reporting(flight: Flight, steps: Sequence[Step]) -> list[Step]:
-    """Return the frames in which the system reports the marker: detections, or else a target."""
-    if reports_detections(flight):
-        return [step for step in steps if reports_marker(flight, step)]
-    marker = flight.marker_position_m
-    targets = ((step, target_of(step)) for step in steps)
-    return [step for step, place in targets if place and math.dist(place, marker) <= AT_MARKER_M]
+    return len(readable), len(reporting_steps(flight, readable))
 
 
 def _marker(flight: Flight, steps: Sequence[Step], end_s: float) -> Iterator[str]:
@@ -65,11 +53,11 @@ def _marker(flight: Flight, steps: Sequence[Step], end_s: float) -> Iterator[str
         yield "The landing system reports neither detections nor a target."
         return
     what = "reported it" if reports_detections(flight) else "had a target at it"
-    told = [step.time_s for step in _reporting(flight, steps)]
+    told = [step.time_s for step in reporting_steps(flight, steps)]
     if not told:
         yield f"The landing system never {what}."
         return
-    both = len(_reporting(flight, readable))
+    both = len(reporting_steps(flight, readable))
     of = f"in {both} of these {len(readable)} frames, " if readable else ""
     yield f"The landing system {what} {of}first at {told[0]:.1f} s and last at {told[-1]:.1f} s."
 
