@@ -118,7 +118,8 @@ def show(project: _Project, file: Path) -> None:
     if not case.gates:
         _say(f"\nIt gates nothing: {NO_GATE_TEXTS[case.reason]}.")
     tried = f"{case.robustness}; " if case.robustness else ""
-    _say(f"\n{tried}shrinking removed {evidence.removed}; objects were moved by {case.policy}")
+    moved = f"; objects were moved by {case.policy}" if case.moves else ""
+    _say(f"\n{tried}shrinking removed {evidence.removed}{moved}")
     _say(f"Fly it: garl cases replay {file}")
 
 

@@ -19,9 +19,10 @@ from pytest_garl.scenarios.domains.reader import domain_named
 from pytest_garl.scenarios.maps.map import load_map
 from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.scenarios.validity import repair
+from pytest_garl.simulation.flight import Flight
 from pytest_garl.simulation.fly import fly
 from pytest_garl.verdicts.judge import judge
-from pytest_garl.verdicts.verdict import DEFAULT_LIMITS, default_distance_m
+from pytest_garl.verdicts.verdict import DEFAULT_LIMITS, Verdict, default_distance_m
 from studies.foreign.catalogue import SYSTEMS, Foreign
 
 MAPS = ("court", "lawn")
@@ -59,14 +60,16 @@ def main() -> None:
                 print(row(foreign, map_name, off_m), flush=True)
 
 
+def flown(foreign: Foreign, scenario: Scenario) -> tuple[Flight, Verdict]:
+    """Fly one scenario, without anybody who moves, and judge it."""
+    flight = fly(scenario, foreign.system, policy_spec("stationary"))
+    distance_m = default_distance_m(foreign.marker.side_m)
+    return flight, judge(flight, dataclasses.replace(DEFAULT_LIMITS, distance_m=distance_m))
+
+
 def row(foreign: Foreign, map_name: str, off_m: float) -> str:
     """Fly one scenario and return its row of the table."""
-    scenario = nominal(foreign, map_name, off_m)
-    flight = fly(scenario, foreign.system, policy_spec("stationary"))
-    limits = dataclasses.replace(
-        DEFAULT_LIMITS, distance_m=default_distance_m(foreign.marker.side_m)
-    )
-    verdict = judge(flight, limits)
+    flight, verdict = flown(foreign, nominal(foreign, map_name, off_m))
     return (
         f"| {foreign.name} | {map_name} | {off_m:.0f} m | {flight.outcome} "
         f"| {flight.final_distance_m:.2f} m | {flight.elapsed_s:.1f} s "

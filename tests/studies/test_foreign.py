@@ -14,8 +14,9 @@ import numpy as np
 import pytest
 
 from pytest_garl import Airframe, Camera, Mission, Observation, VehicleState
+from pytest_garl.scenarios.files import load
 from studies.foreign import legacy_opencv
-from studies.foreign.__main__ import row
+from studies.foreign.__main__ import flown, row
 from studies.foreign.autopilot import CONTROL_RATE_HZ, Autopilot
 from studies.foreign.calibration import CalibrationFolder
 from studies.foreign.catalogue import SYSTEMS, Foreign
@@ -254,3 +255,25 @@ def test_foreign_system_lands_above_its_marker(foreign: Foreign) -> None:
     if foreign.name == "blueos":
         pytest.importorskip("apriltag")
     assert "| good |" in row(foreign, "court", 0.0)
+
+
+REPORTED = {
+    "cuav-beside": "off:unseen",
+    "cuav-other-marker": "late:not-landed:approach",
+    "cuav-wind": "off:seen",
+    "how-other-marker": "late:not-landed:descent",
+}
+"""Scenarios of docs/foreign-systems.md."""
+
+
+@pytest.mark.sim
+@pytest.mark.filterwarnings("ignore::PendingDeprecationWarning")  # scripts that use np.matrix
+@pytest.mark.parametrize("name", REPORTED)
+def test_scenario_of_a_bug_report_shows_the_bug(name: str) -> None:
+    file = Path("studies/foreign/scenarios") / f"{name}.toml"
+    scenario = load(file)
+    foreign = next(each for each in SYSTEMS if each.name.startswith(name.partition("-")[0]))
+    assert scenario.task == foreign.task
+    if foreign.repository.problem:
+        pytest.skip(foreign.repository.problem)
+    assert flown(foreign, scenario)[1].signature == REPORTED[name]

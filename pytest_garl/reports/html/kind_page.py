@@ -250,7 +250,7 @@ def _facts(plan: KindPlan, flight: ShownFlight, known: bool) -> tuple[Fact, ...]
     flights = f"{kind.count} of {len(search.flights)} flights"
     return (
         ("It took", f"{took} ({means})" if took and means else took),
-        ("At the least it took", least if least != took else ""),
+        ("At the least in the search", least if least != took else ""),
         ("Found in", f"{flights}; {seen}" if seen else flights),
         ("Robustness", case.robustness if case else ""),
         ("Preventable?", case.prevention.text if case else ""),
