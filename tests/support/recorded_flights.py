@@ -9,7 +9,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pytest_garl.landing_system import Detection, Diagnostics
-from pytest_garl.simulation.flight import TRACK_RATE_HZ, Event, Flight, MarkerView, Step, Track
+from pytest_garl.simulation.flight import (
+    TRACK_RATE_HZ,
+    Contact,
+    Event,
+    Flight,
+    MarkerView,
+    Step,
+    Track,
+)
 
 END_S = 10.0
 READABLE = MarkerView(
@@ -21,6 +29,19 @@ READABLE = MarkerView(
     noise=2.0,
     blur_px=0.0,
 )
+
+
+def hit_by_dog(time_s: float) -> Contact:
+    """Return a contact with a dog, a metre up."""
+    return Contact(
+        time_s=time_s,
+        body="dog-1",
+        kind="dog",
+        body_class="dynamic",
+        position_m=(0.0, 0.0, 1.0),
+        speed_mps=2.0,
+        tilt_rad=0.0,
+    )
 
 
 def seen(

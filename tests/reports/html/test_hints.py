@@ -10,20 +10,10 @@ from pytest_garl.landing_system import Diagnostics
 from pytest_garl.regressions.case import Prevention
 from pytest_garl.reports.html.hints import hints_of
 from pytest_garl.reports.html.sightings_text import sighting_sentences
-from pytest_garl.simulation.flight import Contact, Flight
+from pytest_garl.simulation.flight import Flight
 from pytest_garl.verdicts.verdict import Verdict, ViolationType
-from tests.support.recorded_flights import recorded, seen
+from tests.support.recorded_flights import hit_by_dog, recorded, seen
 from tests.support.results import flight_result
-
-LATE = Contact(
-    time_s=8.0,
-    body="dog-1",
-    kind="dog",
-    body_class="dynamic",
-    position_m=(0.0, 0.0, 1.0),
-    speed_mps=2.0,
-    tilt_rad=0.0,
-)
 
 
 def verdict(kind: Any, signature: str = "") -> Verdict:
@@ -35,7 +25,7 @@ def collided(frames: range) -> Flight:
         dataclasses.replace(each, objects_visible=("dog-1",) if index in frames else ())
         for index, each in enumerate(seen(range(20, 80)))
     )
-    return recorded(steps=steps, outcome="collision", contacts=(LATE,), end_s=8.0)
+    return recorded(steps=steps, outcome="collision", contacts=(hit_by_dog(8.0),), end_s=8.0)
 
 
 @pytest.mark.parametrize("kind", [each for each in get_args(ViolationType) if each != "own"])

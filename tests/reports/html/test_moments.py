@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from pytest_garl.reports.html.moments import BEFORE_END_S, MOST, SAME_S, decisive_s, moments_of
-from pytest_garl.simulation.flight import Contact, Flight
-from tests.support.recorded_flights import recorded, seen
+from pytest_garl.simulation.flight import Flight
+from tests.support.recorded_flights import hit_by_dog, recorded, seen
 
 
 def labels(flight: Flight) -> list[str]:
@@ -33,21 +33,12 @@ def test_moments_at_almost_the_same_time_share_a_picture() -> None:
 
 
 def test_no_flight_has_more_moments_than_fit() -> None:
-    contact = Contact(
-        time_s=9.9,
-        body="dog-1",
-        kind="dog",
-        body_class="dynamic",
-        position_m=(0.0, 0.0, 1.0),
-        speed_mps=2.0,
-        tilt_rad=0.0,
-    )
     views = [*range(20, 30), *range(50, 55), *range(90, 99)]
     steps = tuple(
         dataclasses.replace(each, objects_visible=("dog-1",) if index in views else ())
         for index, each in enumerate(seen(range(20, 40)))
     )
-    flight = recorded(steps=steps, outcome="collision", contacts=(contact,), end_s=9.9)
+    flight = recorded(steps=steps, outcome="collision", contacts=(hit_by_dog(9.9),), end_s=9.9)
     assert len(moments_of(flight)) <= MOST
     assert labels(flight)[-1] == "The UAV hits dog-1"
     assert any("comes into view again" in label for label in labels(flight))
