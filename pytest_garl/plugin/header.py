@@ -126,10 +126,10 @@ def _shrinking(run: Run) -> str:
     if options.shrink_capped:
         return ", shrinking included"
     fastest_s, slowest_s = (
-        seconds_per_new_signature(options.shrink, flight_s, options.workers or 1)
-        for flight_s in run.flight_s
+        seconds_per_new_signature(options.shrink, flight_s) for flight_s in run.flight_s
     )
-    return f", and {_about(fastest_s, slowest_s)} per new kind of violation"
+    beside = ", on one worker" if (options.workers or 1) > 1 else ""
+    return f", and {_about(fastest_s, slowest_s)} per new kind of violation{beside}"
 
 
 def _about(fastest_s: float, slowest_s: float) -> str:

@@ -53,9 +53,9 @@ def flight_times_with_shrinking(search: int, each: int, workers: int) -> float:
     return math.sqrt(least * max(shared, least + SPENT_SHARE * each))
 
 
-def seconds_per_new_signature(each: int, flight_s: float, workers: int) -> float:
-    """Return how long one of several new kinds of violation takes."""
-    return (1 + SPENT_SHARE * each) * flight_s / max(1, workers)
+def seconds_per_new_signature(each: int, flight_s: float) -> float:
+    """Return how long a new kind of violation takes: its flights follow each other."""
+    return (1 + SPENT_SHARE * each) * flight_s
 
 
 def remaining_work(

@@ -20,6 +20,13 @@ def test_header_forecasts_search_and_shrinking(pytester: pytest.Pytester) -> Non
     )
 
 
+def test_header_says_that_each_kind_takes_one_worker(pytester: pytest.Pytester) -> None:
+    project(pytester)
+    args = ("--garl-budget=2", "--garl-workers=2", "-k", "test_time", "--garl-shrink=12")
+    result = pytester.runpytest_subprocess("-p", "no:cacheprovider", *args)
+    result.stdout.fnmatch_lines(["*, and 15 s to 44 s per new kind of violation, on one worker"])
+
+
 @pytest.mark.parametrize(
     ("shrink", "words"), [("12", ", and 15 s to 44 s per new kind of violation"), ("0", "")]
 )
