@@ -45,18 +45,18 @@ class GarlParameters:
     ``python -m studies.ablations`` measures what each part of the search is worth.
     """
 
-    explore_share: float = 0.25
+    explore_share: float = 0.5
     """Least share of scenarios without parents, so that kinds are still found late in a search."""
     learns_arms: bool = True
     """Whether cells and strata are chosen by their success; otherwise all alike."""
-    covers_pairs: bool = True
-    """Whether scenarios without parents switch on genes whose pairs were flown least."""
     has_strata: bool = True
     """Whether scenarios without parents are drawn in strata; otherwise as the domain draws them."""
     breeds_near_misses: bool = True
     """Whether near misses have cells."""
     archive: Callable[..., Archive] = Archive
     """What keeps the flights, and says which cells are bred from."""
+    exploration: Callable[[Columns], Exploration] = Exploration
+    """What draws scenarios without parents."""
 
 
 class Garl:
@@ -70,7 +70,7 @@ class Garl:
         self._columns = Columns(plan.genome)
         has_near = self._parameters.breeds_near_misses
         self._archive = self._parameters.archive(self._columns, has_near=has_near)
-        self._exploration = Exploration(self._columns, covers=self._parameters.covers_pairs)
+        self._exploration = self._parameters.exploration(self._columns)
         self._breeding = Breeding(self._columns, self._exploration)
         self._arms = Bandit()
         self._choices: dict[str, str] = {}
@@ -83,8 +83,7 @@ class Garl:
         if self._generation > 1:
             return [self._new() for _ in range(plan.population)]
         control = random_scenarios(plan.map, plan.genome, plan.seed, 0, plan.population)
-        for scenario in control:
-            self._note(scenario, "")
+        self._choices.update((dump_scenario(scenario), "") for scenario in control)
         return control
 
     def tell(self, flown: Sequence[FlownScenario]) -> Sequence[tuple[float, ...]]:
@@ -105,12 +104,8 @@ class Garl:
                 row, seed = self._child(arm, way)
             scenario = self._scenario(row, seed)
             if dump_scenario(scenario) not in self._choices:
-                self._note(scenario, arm)
+                self._choices[dump_scenario(scenario)] = arm
                 return scenario
-
-    def _note(self, scenario: Scenario, arm: str) -> None:
-        self._choices[dump_scenario(scenario)] = arm
-        self._exploration.note(encode(scenario, self._plan.genome))
 
     def _choose(self) -> tuple[str, str]:
         """Return an arm, and a way to breed for a cell."""
