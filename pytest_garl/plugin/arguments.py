@@ -127,6 +127,12 @@ OPTIONS = (
         "--out=DIR` does the same later.",
     ),
     Option(
+        name="report-url",
+        metavar="URL",
+        help="Where the folder of --garl-report will be published, such as a site of GitHub Pages: "
+        "GitHub's step summary shows its pictures and links to its pages, and so does JUnit XML.",
+    ),
+    Option(
         name="npcs",
         metavar="POLICY",
         help=f"NPC policy, which moves people, dogs and birds: {', '.join(policy_names())}, or "

@@ -10,12 +10,18 @@ from typing import Any
 import pytest
 
 from pytest_garl.plugin.keys import SEVERITY, SIGNATURE, SLOT
+from pytest_garl.plugin.run import Run
+from pytest_garl.plugin.suggested_commands import repeat_kind_command
+from pytest_garl.reports.html.index_markdown import index_parts, page_link
+from pytest_garl.reports.html.report import WrittenReport
+from pytest_garl.reports.html.run_page import KindRow
+from pytest_garl.reports.markdown import code, escaped, table
 from pytest_garl.reports.search_summary import WHY_NO_LANDING, SearchSummary, ViolationKind
 from pytest_garl.reports.shares_text import PAPER_DEFINITION, kinds_lines, percent
 
 VARIABLE = "GITHUB_STEP_SUMMARY"
 """GitHub names in this variable the file whose text it shows on the page of the step."""
-COLUMNS = ("where", "what", "flights", "what happened", "at the least", "see it")
+COLUMNS = ("where", "what", "flights", "what happened", "at the least", "see it", "page")
 SHARES = (
     "where",
     "flown",
@@ -28,40 +34,44 @@ SHARES = (
     "inconclusive",
 )
 
-Row = tuple[str, str, str, str, str, str]
+Row = tuple[str, ...]
 
 
 def write_step_summary(
-    reporter: Any, searches: Sequence[SearchSummary], commands: Sequence[Sequence[str]]
+    reporter: Any, run: Run, searches: Sequence[SearchSummary], report: WrittenReport | None
 ) -> None:
     """Append the shares, the kinds of violation and the failed cases, if GitHub names a file.
 
-    ``commands`` fly the first flight of each kind of each search again.
+    ``report`` is the folder of pages of the run, if one was written.
     """
     path = os.environ.get(VARIABLE)
     if not path:
         return
+    url = run.options.report_url
+    pages = {(kind.where, kind.signature): kind for kind in report.page.kinds} if report else {}
     rows: list[Row] = [
         (
-            _where(search),
-            kind.signature,
-            _flights(search, kind),
-            kind.headline,
-            kind.severity_text,
-            command,
+            escaped(_where(search)),
+            escaped(kind.signature),
+            escaped(_flights(search, kind)),
+            escaped(kind.headline),
+            escaped(kind.severity_text),
+            code(repeat_kind_command(search, kind, reporter.config)),
+            _link(pages.get((_where(search), kind.signature)), report, url),
         )
-        for search, of_search in zip(searches, commands, strict=True)
-        for kind, command in zip(search.kinds, of_search, strict=True)
+        for search in searches
+        for kind in search.kinds
     ]
     rows += _failed_cases(reporter)
     flown = sum(len(search.verdicts) for search in searches)
-    tables = [_table(SHARES, [_shares(search) for search in searches])] if searches else []
+    parts = [table(SHARES, [_shares(search) for search in searches])] if searches else []
     none = f"No violation{f' in {flown} flights' if flown else ''}."
-    tables += [
-        f"{_where(search)}: {_escaped(line)}" for search in searches for line in kinds_lines(search)
+    parts += [
+        f"{_where(search)}: {escaped(line)}" for search in searches for line in kinds_lines(search)
     ]
-    tables.append(_table(COLUMNS, rows) if rows else none)
-    text = "\n\n".join(tables)
+    parts.append(_kinds_table(rows) if rows else none)
+    parts += index_parts(report.page, report.index.parent, url) if report else ()
+    text = "\n\n".join(parts)
     try:
         with Path(path).open("a", encoding="utf-8") as file:
             file.write(f"## pytest-garl\n\n{text}\n\n")
@@ -69,16 +79,14 @@ def write_step_summary(
         reporter.write_line(f"garl: {VARIABLE}: {path}: cannot be written ({error})")
 
 
-def _table(columns: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
-    """Return a table in Markdown."""
-    lines = [f"| {' | '.join(columns)} |", f"|{' --- |' * len(columns)}"]
-    for row in rows:
-        cells = [
-            _code(cell) if column == "see it" else _escaped(cell)
-            for column, cell in zip(columns, row, strict=True)
-        ]
-        lines.append(f"| {' | '.join(cells)} |")
-    return "\n".join(lines)
+def _kinds_table(rows: Sequence[Row]) -> str:
+    """Return the table of kinds; without links to pages it has no column for them."""
+    columns = len(COLUMNS) - (not any(row[-1] for row in rows))
+    return table(COLUMNS[:columns], [row[:columns] for row in rows])
+
+
+def _link(kind: KindRow | None, report: WrittenReport | None, url: str) -> str:
+    return page_link(kind, report.index.parent, url) if kind and report else ""
 
 
 def _where(search: SearchSummary) -> str:
@@ -104,7 +112,7 @@ def _shares(search: SearchSummary) -> tuple[str, ...]:
         sum(search.crashes.values()),
         search.count("inconclusive"),
     ]
-    return _where(search), str(total), *(percent(count, total) for count in counts)
+    return escaped(_where(search)), str(total), *(percent(count, total) for count in counts)
 
 
 def _failed_cases(reporter: Any) -> list[Row]:
@@ -117,23 +125,11 @@ def _failed_cases(reporter: Any) -> list[Row]:
             headline, _, see_it = _message(report).partition("\n")
             command = see_it.partition(": ")[2]
             signature, took = str(properties[SIGNATURE]), str(properties.get(SEVERITY, ""))
-            rows.append((slot, signature, "1", headline, took, command))
+            texts = (escaped(text) for text in (slot, signature, "1", headline, took))
+            rows.append((*texts, code(command), ""))
     return rows
 
 
 def _message(report: pytest.TestReport) -> str:
     crash = getattr(report.longrepr, "reprcrash", None)
     return str(crash.message) if crash is not None else str(report.longrepr)
-
-
-def _escaped(text: str) -> str:
-    """Return text without meaning in Markdown or HTML."""
-    for mark in "\\`*_[]<>|#~":
-        text = text.replace(mark, f"\\{mark}")
-    return " ".join(text.split())
-
-
-def _code(text: str) -> str:
-    """Return text as code in a cell of a table, or nothing."""
-    plain = " ".join(text.replace("`", "").replace("|", "\\|").split())
-    return f"`{plain}`" if plain else ""

@@ -232,14 +232,14 @@ def pytest_terminal_summary(terminalreporter: Any, config: pytest.Config) -> Non
         join_workers(config, options_of(config))
     run = config.stash.get(RUN, None)
     if run is not None:
+        from pytest_garl.plugin.github_summary import write_step_summary
+        from pytest_garl.plugin.pages import write_pages
         from pytest_garl.plugin.summary import write_run
 
         try:
-            write_run(terminalreporter, run, tally)
-            if run.options.report is not None:
-                from pytest_garl.plugin.pages import write_pages
-
-                write_pages(terminalreporter, run)
+            searches = write_run(terminalreporter, run, tally)
+            report = write_pages(terminalreporter, run)
+            write_step_summary(terminalreporter, run, searches, report)
         except GarlError as error:
             terminalreporter.write_line(f"garl: {error}", red=True)
     if tally.items:

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import dataclasses
 import json
+import os
+from pathlib import Path
 
 import pytest
 
@@ -25,6 +27,7 @@ from pytest_garl.plugin.keys import (
     LEFT_TO_ANOTHER,
     MAYBE_FIXED,
     NOT_REPEATED,
+    PAGE,
     REPORTED_FAILURE,
     RUN,
     SEVERITY,
@@ -48,6 +51,7 @@ from pytest_garl.plugin.run import Run
 from pytest_garl.plugin.suggested_commands import shown_path
 from pytest_garl.plugin.target import Target
 from pytest_garl.regressions.case import Case
+from pytest_garl.reports.html.naming import page_address, page_name
 
 
 def end_unjudged(item: pytest.Item) -> None:
@@ -178,6 +182,8 @@ class _Writer:
             self._note(NOT_REPEATED, json.dumps(slot))
         elif decision.reason is Reason.DUPLICATE:
             self._note(DUPLICATE_OF, key)
+        if self.run.options.report is not None:
+            self._note_page(self.run.options.report, failure.signature)
         if decision.outcome == "xfailed":
             return self._expect(report_text.expected_failure(decision, facts, ""))
         self._note(REPORTED_FAILURE, key)
@@ -187,6 +193,21 @@ class _Writer:
                 self.item, self.run, target, failure, self.result, facts.reflights
             )
         )
+
+    def _note_page(self, folder: Path, signature: str) -> None:
+        """Note where the page of a violation will be, for JUnit XML.
+
+        Jenkins and GitLab take a file that the captured output names so for an attachment; pytest
+        writes that output if the ini key ``junit_logging`` asks for it.
+        """
+        config, target = self.item.config, self.target
+        file = folder / page_address(page_name(target.system_name, target.map, signature))
+        url = self.run.options.report_url
+        shown = os.path.relpath(file, config.rootpath)
+        address = f"{url}/{file.relative_to(folder).as_posix()}" if url else shown
+        # JUnit XML has the properties and the output of the last report, that of the teardown.
+        self.item.user_properties.append((PAGE, address))
+        self.item.add_report_section("call", "stdout", f"[[ATTACHMENT|{file.absolute()}]]\n")
 
     def _note_user_failure(self, failure: ItemFailure) -> None:
         """Note a failure of the user's own property for the summary, whatever its outcome is."""

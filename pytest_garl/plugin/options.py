@@ -5,6 +5,7 @@ from __future__ import annotations
 import functools
 import os
 import re
+import urllib.parse
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, cast
@@ -66,6 +67,8 @@ class Options:
     level: float
     report: Path | None
     """The folder for the pages of the run."""
+    report_url: str
+    """Where that folder will be published, without a slash at the end; may be empty."""
     shrink: int
     """Flights for each new kind of violation."""
     shrink_capped: bool
@@ -157,6 +160,7 @@ def read_options(config: pytest.Config) -> Options:
         baseline=_baseline(config),
         level=_number("level", text["level"], 1, "a number between 0 and 1"),
         report=_report(config),
+        report_url=_report_url(text["report-url"]),
         shrink=_shrink(text["shrink"]),
         shrink_capped=not text["shrink"],
         xfail_strict=bool(config.getini("garl_xfail_strict")),
@@ -252,6 +256,17 @@ def _report(config: pytest.Config) -> Path | None:
     except GarlError as error:
         raise pytest.UsageError(f"--garl-report: {error}") from error
     return folder / text
+
+
+_URL = re.compile(r"[\w.~:/?#@!$&*+,;=%-]+", re.ASCII)
+"""An address without what ends it in Markdown or HTML."""
+
+
+def _report_url(text: str) -> str:
+    parts = urllib.parse.urlsplit(text)
+    if text and not (parts.scheme in ("http", "https") and parts.netloc and _URL.fullmatch(text)):
+        raise _wrong("report-url", text, "an address such as https://example.org/report")
+    return text.rstrip("/")
 
 
 def _among(name: str, text: str, known: tuple[str, ...]) -> str:

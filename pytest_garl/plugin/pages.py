@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from pytest_garl.errors import GarlError
 from pytest_garl.messages import printable
@@ -10,12 +10,15 @@ from pytest_garl.plugin.run import Run
 from pytest_garl.plugin.suggested_commands import shown_path
 from pytest_garl.plugin.terminal_text import counted, width_of, wrapped
 
+if TYPE_CHECKING:
+    from pytest_garl.reports.html.report import WrittenReport
 
-def write_pages(reporter: Any, run: Run) -> None:
+
+def write_pages(reporter: Any, run: Run) -> WrittenReport | None:
     """Write the report of the run, and say where it is, or in one line why there is none."""
     options = run.options
     if options.report is None or not options.searches_or_repeats:
-        return
+        return None
     from pytest_garl.reports.html.report import write_html_report
 
     width = width_of(reporter.config)
@@ -26,8 +29,9 @@ def write_pages(reporter: Any, run: Run) -> None:
         )
     except GarlError as error:
         reporter.write_line(wrapped(f"garl: {printable(str(error))}", width), red=True)
-        return
+        return None
     pages = f"{counted(written.pages, 'page')}, {counted(written.films, 'film')}"
     where = shown_path(written.index.absolute(), reporter.config)
     for line in (f"{where}: {pages}", *written.notes):
         reporter.write_line(wrapped(printable(line), width, others="  "))
+    return written

@@ -12,6 +12,7 @@ from pytest_garl.messages import printable
 
 if TYPE_CHECKING:
     from pytest_garl.plugin.target import Target
+    from pytest_garl.reports.search_summary import SearchSummary, ViolationKind
 
 _FOLDERS = ("garl_dir", "garl_cases")
 
@@ -47,3 +48,9 @@ def shown_path(path: Path, config: pytest.Config) -> str:
     here = config.invocation_params.dir
     found = path.relative_to(here) if path.is_relative_to(here) else path
     return printable(str(found), keep="")
+
+
+def repeat_kind_command(search: SearchSummary, kind: ViolationKind, config: pytest.Config) -> str:
+    """Return the command that repeats the first flight of a kind."""
+    files = " ".join(shown_path(config.rootpath / file, config) for file in search.files)
+    return repeat_command(config, files, kind.first)

@@ -8,13 +8,12 @@ from typing import Any
 
 import pytest
 
-from pytest_garl.plugin.github_summary import write_step_summary
 from pytest_garl.plugin.header import cpu_dispatch_warning
 from pytest_garl.plugin.keys import CASE, MAYBE_FIXED, OUTSIDE, STALE
 from pytest_garl.plugin.run import Run
 from pytest_garl.plugin.save_cases import saved_lines
 from pytest_garl.plugin.session_status import notes
-from pytest_garl.plugin.suggested_commands import repeat_command, shown_path
+from pytest_garl.plugin.suggested_commands import repeat_kind_command
 from pytest_garl.plugin.tally import Tally
 from pytest_garl.plugin.terminal_text import width_of, wrapped
 from pytest_garl.reports.run_report import ENDED, USER_FAILURES, utc_now
@@ -29,10 +28,13 @@ from pytest_garl.reports.shares_text import (
 _UNDECIDED = "Skipped: not decided:"
 
 
-def write_run(reporter: Any, run: Run, tally: Tally) -> None:
-    """Write a table per system and map, then the saved cases, and those that may be fixed."""
+def write_run(reporter: Any, run: Run, tally: Tally) -> list[SearchSummary]:
+    """Write a table per system and map, then the saved cases, and those that may be fixed.
+
+    Returns what it told of each search.
+    """
     fold_skips(reporter)
-    _write_searches(reporter, run, tally)
+    searches = _write_searches(reporter, run, tally)
     lines = [
         *saved_lines(run.investigated, reporter.config),
         *([f"nothing more was saved: {run.save_problem}"] if run.save_problem else []),
@@ -44,6 +46,7 @@ def write_run(reporter: Any, run: Run, tally: Tally) -> None:
         reporter.section("garl: cases", sep="=")
     for line in lines:
         reporter.write_line(line)
+    return searches
 
 
 def write_status(reporter: Any, tally: Tally) -> None:
@@ -87,22 +90,17 @@ def _property_values(reporter: Any, outcomes: tuple[str, ...], key: str) -> set[
     }
 
 
-def _write_searches(reporter: Any, run: Run, tally: Tally) -> None:
+def _write_searches(reporter: Any, run: Run, tally: Tally) -> list[SearchSummary]:
     searches = tally.search_summaries(run.ledger)
     if run.options.searches_or_repeats:
         failures = [dataclasses.asdict(each) for each in tally.user_failures]
         run.ledger.note_fact(USER_FAILURES, failures)
         run.ledger.note_fact(ENDED, utc_now())
-    config = reporter.config
-    commands = [
-        [repeat_kind_command(search, kind, config) for kind in search.kinds] for search in searches
-    ]
-    write_step_summary(reporter, searches, commands)
-    if not searches:
-        return
-    reporter.section("garl: violations", sep="=")
-    for line in _lines_about(searches, run, reporter):
-        reporter.write_line(line)
+    if searches:
+        reporter.section("garl: violations", sep="=")
+        for line in _lines_about(searches, run, reporter):
+            reporter.write_line(line)
+    return searches
 
 
 def _lines_about(searches: list[SearchSummary], run: Run, reporter: Any) -> list[str]:
@@ -198,9 +196,3 @@ def _kind_lines(
         if facts:
             lines.append(wrapped(facts, width, first=" " * 8, others=" " * 10))
     return lines
-
-
-def repeat_kind_command(search: SearchSummary, kind: ViolationKind, config: pytest.Config) -> str:
-    """Return the command that repeats the first flight of a kind."""
-    files = " ".join(shown_path(config.rootpath / file, config) for file in search.files)
-    return repeat_command(config, files, kind.first)

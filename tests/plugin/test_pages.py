@@ -1,12 +1,17 @@
 from __future__ import annotations
 
+import html
+import re
 import shutil
 import subprocess
 import sys
+import xml.etree.ElementTree as ET
 
 import pytest
 
 from tests.support.landing_project import project, run
+
+SEARCH = ("--garl-budget=8", "--garl-workers=1")
 
 
 def files(pytester: pytest.Pytester, folder: str) -> dict[str, bytes]:
@@ -56,3 +61,85 @@ def test_a_report_without_a_search_is_a_usage_error(pytester: pytest.Pytester) -
     project(pytester)
     result = run(pytester, "--garl-report=pages")
     result.stderr.fnmatch_lines(["*--garl-report has no effect without --garl-budget*"])
+
+
+def junit(pytester: pytest.Pytester) -> list[ET.Element]:
+    """Return the test cases of JUnit XML that have a page."""
+    cases = ET.parse(pytester.path / "junit.xml").iter("testcase")
+    return [case for case in cases if "garl.page" in properties(case)]
+
+
+def properties(case: ET.Element) -> dict[str, str]:
+    return {each.attrib["name"]: each.attrib["value"] for each in case.iter("property")}
+
+
+@pytest.mark.parametrize("workers", [(), ("-n2",)])
+def test_junit_names_the_page_of_a_violation(
+    pytester: pytest.Pytester, workers: tuple[str, ...]
+) -> None:
+    project(pytester)
+    logging = ("-o", "junit_logging=system-out")
+    run(pytester, *SEARCH, "--garl-report=out/pages", "--junitxml=junit.xml", *logging, *workers)
+    found = junit(pytester)
+    assert found
+    for case in found:
+        page = pytester.path / properties(case)["garl.page"]
+        assert page.is_file()
+        assert properties(case)["garl.signature"] in html.unescape(page.read_text())
+        if case.find("failure") is not None:
+            assert f"[[ATTACHMENT|{page}]]" in "".join(case.itertext())
+
+
+def test_without_a_log_junit_has_no_attachment(pytester: pytest.Pytester) -> None:
+    project(pytester)
+    result = run(pytester, *SEARCH, "--garl-report=pages", "--junitxml=junit.xml")
+    assert junit(pytester)
+    assert "ATTACHMENT" not in (pytester.path / "junit.xml").read_text()
+    assert "ATTACHMENT" not in result.stdout.str()
+
+
+def test_summary_and_junit_link_to_the_published_report(
+    pytester: pytest.Pytester, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    project(pytester)
+    page, url = pytester.path / "summary.md", "https://example.org/nightly"
+    monkeypatch.setenv("GITHUB_STEP_SUMMARY", str(page))
+    published = ("--garl-report=pages", f"--garl-report-url={url}/", "--junitxml=junit.xml")
+    run(pytester, *SEARCH, *published)
+    text = page.read_text()
+    assert f"[The whole report]({url}/index.html)" in text
+    for case in junit(pytester):
+        address = properties(case)["garl.page"]
+        assert address.startswith(f"{url}/kinds/")
+        assert f"[page]({address})" in text
+        assert (pytester.path / "pages" / address.removeprefix(f"{url}/")).is_file()
+
+
+def test_summary_names_the_files_of_a_report_that_is_published_nowhere(
+    pytester: pytest.Pytester, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    project(pytester)
+    page = pytester.path / "summary.md"
+    monkeypatch.setenv("GITHUB_STEP_SUMMARY", str(page))
+    run(pytester, *SEARCH, "--garl-report=pages")
+    text = page.read_text()
+    assert "The whole report is `pages/index.html`." in text
+    pages = re.findall(r"`(pages/kinds/[^`]+)`", text)
+    assert pages
+    assert all((pytester.path / each).is_file() for each in pages)
+    assert "| type | take-off |" in text
+    assert "<details><summary>Cost</summary>" in text
+
+
+@pytest.mark.parametrize("url", ["pages", "ftp://example.org", "https://a b", "https://a/)("])
+def test_an_address_that_is_none_is_a_usage_error(pytester: pytest.Pytester, url: str) -> None:
+    project(pytester)
+    result = run(pytester, *SEARCH, "--garl-report=pages", f"--garl-report-url={url}")
+    result.stderr.fnmatch_lines(["*--garl-report-url: found *expected an address such as*"])
+    assert result.ret == pytest.ExitCode.USAGE_ERROR
+
+
+def test_an_address_without_a_report_is_a_usage_error(pytester: pytest.Pytester) -> None:
+    project(pytester)
+    result = run(pytester, *SEARCH, "--garl-report-url=https://example.org")
+    result.stderr.fnmatch_lines(["*--garl-report-url has no effect without --garl-report*"])

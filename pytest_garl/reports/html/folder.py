@@ -10,7 +10,7 @@ from pathlib import Path
 
 from pytest_garl.errors import SavingError
 from pytest_garl.messages import shown
-from pytest_garl.reports.html.naming import GENERATOR, INDEX, KINDS
+from pytest_garl.reports.html.naming import GENERATOR, INDEX, KINDS, STILLS
 
 _HEAD_BYTES = 4096
 """The generator stands in the first lines of a page."""
@@ -25,7 +25,7 @@ def check_target(folder: Path) -> None:
                 f"{folder}: found a file, expected a folder for the report; name another one"
             )
         held = sorted(each.name for each in where.iterdir()) if where.is_dir() else []
-        foreign = [name for name in held if name not in (INDEX, KINDS)]
+        foreign = [name for name in held if name not in (INDEX, KINDS, STILLS)]
         if held and (foreign or not _is_report(where)):
             what = shown(foreign[0]) if foreign else f"an {INDEX} that is not of {GENERATOR}"
             raise SavingError(
@@ -61,7 +61,8 @@ def new_folder(folder: Path) -> Iterator[Path]:
         try:
             where.parent.mkdir(parents=True, exist_ok=True)
             incomplete.mkdir()
-            (incomplete / KINDS).mkdir()
+            for name in (KINDS, STILLS):
+                (incomplete / name).mkdir()
             yield incomplete
             if where.is_dir():
                 where.replace(before)

@@ -12,6 +12,8 @@ GENERATOR = "pytest-garl report"
 INDEX = "index.html"
 KINDS = "kinds"
 """The folder of the pages of kinds."""
+STILLS = "stills"
+"""The folder of the pictures that others show, such as the summary of a build: one per kind."""
 _MOST_CHARS = 60
 
 
@@ -21,6 +23,16 @@ def page_name(system: str, map: str, signature: str) -> str:
     safe = _UNSAFE.sub("-", words).strip("-")[:_MOST_CHARS].rstrip("-")
     digest = hashlib.sha256(f"{system}\n{map}\n{signature}".encode()).hexdigest()
     return f"{safe}-{digest[:6]}"
+
+
+def page_address(name: str) -> str:
+    """Return where a kind's page lies in the folder of a report."""
+    return f"{KINDS}/{name}.html"
+
+
+def still_address(name: str) -> str:
+    """Return where a kind's picture lies in the folder of a report."""
+    return f"{STILLS}/{name}.jpg"
 
 
 def shown_file(path: Path) -> str:

@@ -106,6 +106,11 @@ def film_of(flight: Flight, scenario: Scenario, map: Map, camera: Camera, signat
         return path.read_bytes()
 
 
+def picture_bytes(address: str) -> bytes:
+    """Return the file of a picture that a page holds itself."""
+    return base64.b64decode(address.partition(",")[2])
+
+
 def film_uri(film: bytes) -> str:
     """Return the address of a film that a page holds itself."""
     return f"data:video/mp4;base64,{base64.b64encode(film).decode()}"

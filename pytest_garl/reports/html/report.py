@@ -14,19 +14,24 @@ from pytest_garl.reports.html import MOST_FILMS
 from pytest_garl.reports.html.flight_task import ShownFlight
 from pytest_garl.reports.html.folder import check_target, new_folder
 from pytest_garl.reports.html.kind_page import KindPlan, found_page, kind_page, plan_kinds
-from pytest_garl.reports.html.naming import INDEX, KINDS
+from pytest_garl.reports.html.naming import INDEX, page_address, still_address
 from pytest_garl.reports.html.page_workers import shown_flights
+from pytest_garl.reports.html.pictures import picture_bytes
 from pytest_garl.reports.html.rendering import render_index, render_kind
-from pytest_garl.reports.html.run_page import run_page
+from pytest_garl.reports.html.run_page import RunPage, run_page
 from pytest_garl.reports.run_report import run_report_of, summaries_of
 from pytest_garl.video.encoder import program
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class WrittenReport:
-    """A report that was written: its index, its pages, and what is missing in it."""
+    """A report that was written: its index, its pages, and what is missing in it.
+
+    ``page`` is what the index says.
+    """
 
     index: Path
+    page: RunPage
     pages: int
     films: int
     notes: tuple[str, ...]
@@ -69,13 +74,18 @@ def write_html_report(
             known = plan.entry is not None and plan.entry.path in accepted
             page = kind_page(plan, flight, known)
             pages.append((plan, page))
-            _write(folder / KINDS / f"{page.name}.html", render_kind(page))
+            _write(folder / page_address(page.name), render_kind(page))
+            if flight.stills:
+                picture = picture_bytes(flight.stills[-1].picture)
+                (folder / still_address(page.name)).write_bytes(picture)
             if as_found is not None:
                 other = found_page(plan, as_found)
-                _write(folder / KINDS / f"{other.name}.html", render_kind(other))
-        _write(folder / INDEX, render_index(run_page(found, searches, pages, notes)))
+                _write(folder / page_address(other.name), render_kind(other))
+        index = run_page(found, searches, pages, notes)
+        _write(folder / INDEX, render_index(index))
     return WrittenReport(
         index=out / INDEX,
+        page=index,
         pages=len(tasks),
         films=sum(bool(flight.film) for _, flight, _ in shown),
         notes=notes,

@@ -14,7 +14,7 @@ from pytest_garl.reports.html.charts import (
 )
 from pytest_garl.reports.html.flight_task import ShownFlight
 from pytest_garl.reports.html.kind_page import Fact, KindPage, KindPlan
-from pytest_garl.reports.html.naming import KINDS, shown_file
+from pytest_garl.reports.html.naming import page_address, shown_file, still_address
 from pytest_garl.reports.html.search_card import SearchCard, cost_rows, domain_rows, search_card
 from pytest_garl.reports.search_summary import LEGEND, SearchSummary
 from pytest_garl.reports.shares_text import in_control_text, kinds_lines, percent
@@ -29,9 +29,13 @@ MOST_FINDINGS = 40
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class KindRow:
-    """A kind of violation in the index, with the address of its page."""
+    """A kind of violation in the index, with the addresses of its page and its picture's file.
+
+    ``still`` is empty if there is no picture.
+    """
 
     address: str
+    still: str
     title: str
     signature: str
     where: str
@@ -199,7 +203,8 @@ def _kind(plan: KindPlan, page: KindPage, index: int) -> KindRow:
     if case and case.reason:
         tag = f"{tag}, gates nothing: {case.reason}"
     return KindRow(
-        address=f"{KINDS}/{plan.name}.html",
+        address=page_address(plan.name),
+        still=still_address(plan.name) if page.flight.stills else "",
         title=page.title,
         signature=kind.signature,
         where=page.where,

@@ -26,7 +26,7 @@ def test_a_report_takes_the_place_of_an_older_one(tmp_path: Path) -> None:
     (tmp_path / "deep" / "report" / "kinds" / "old.html").write_text("old")
     write(tmp_path / "deep" / "report", "second")
     assert (tmp_path / "deep" / "report" / INDEX).read_text().endswith("second")
-    assert names(tmp_path / "deep" / "report") == [INDEX, "kinds"]
+    assert names(tmp_path / "deep" / "report") == [INDEX, "kinds", "stills"]
     assert not names(tmp_path / "deep" / "report" / "kinds")
     assert names(tmp_path / "deep") == ["report"]
 

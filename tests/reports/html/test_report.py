@@ -8,11 +8,13 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
+import cv2
 import pytest
 
 from pytest_garl.errors import LedgerError
 from pytest_garl.execution.reference import Reference
 from pytest_garl.regressions.corpus import Corpus
+from pytest_garl.reports.html.index_markdown import index_parts
 from pytest_garl.reports.html.report import WrittenReport, write_html_report
 from pytest_garl.simulation.flight import Crash
 from tests.reports.html.test_rendering import HOSTILE, Elements
@@ -43,6 +45,11 @@ def write(folder: Path, ledger: Path | None = None, **more: Any) -> WrittenRepor
 def pages(folder: Path) -> dict[str, str]:
     files = sorted((folder / "report").rglob("*.html"))
     return {each.relative_to(folder / "report").as_posix(): each.read_text() for each in files}
+
+
+def files(folder: Path) -> dict[str, bytes]:
+    found = (each for each in sorted((folder / "report").rglob("*")) if each.is_file())
+    return {each.relative_to(folder / "report").as_posix(): each.read_bytes() for each in found}
 
 
 def kind_page(folder: Path) -> str:
@@ -80,9 +87,35 @@ def test_a_report_has_an_index_and_a_page_for_each_kind(run: Path) -> None:
 
 def test_the_same_ledger_gives_the_same_bytes(run: Path) -> None:
     write(run)
-    first = pages(run)
+    first = files(run)
     write(run, workers=2)
-    assert pages(run) == first
+    assert files(run) == first
+
+
+def test_each_kind_has_a_picture_for_the_summary_of_a_build(run: Path) -> None:
+    written = write(run)
+    (kind,) = written.page.kinds
+    picture = cv2.imread(str(written.index.parent / kind.still))
+    assert picture is not None
+    assert picture.shape == (300, 400, 3)
+    url = "https://example.org/report"
+    shown = "\n".join(index_parts(written.page, written.index.parent, url))
+    assert f'<a href="{url}/{kind.address}"><img src="{url}/{kind.still}"' in shown
+    assert "data:" not in shown
+    unpublished = "\n".join(index_parts(written.page, written.index.parent, ""))
+    assert "<img" not in unpublished
+    assert "`report/index.html`" in unpublished
+
+
+def test_hostile_text_gives_the_summary_of_a_build_no_element(tmp_path: Path, video: Video) -> None:
+    hurt = lost(signature=f"own:{HOSTILE}", story=HOSTILE)
+    write_ledger(tmp_path, [Flown(result=hurt, flight=video.flight)])
+    written = write(tmp_path)
+    for url in ("", "https://example.org"):
+        text = "\n".join(index_parts(written.page, written.index.parent, url))
+        names = re.findall(r"(?<!\\)<(\w+)", text)
+        assert set(names) <= {"a", "img", "br", "details", "summary"}
+        assert "\x1b" not in text
 
 
 def test_pages_stay_small(run: Path) -> None:

@@ -1,0 +1,62 @@
+"""The index of a report as Markdown: the parts that the summary of a build shows below its tables.
+
+GitHub removes pictures that a text holds itself (``data:`` addresses), so pictures and links need
+the address under which the folder of the report is published.
+"""
+
+from __future__ import annotations
+
+from html import escape
+from pathlib import Path
+
+from pytest_garl.reports.html.kind_page import Fact
+from pytest_garl.reports.html.naming import INDEX
+from pytest_garl.reports.html.run_page import KindRow, RunPage
+from pytest_garl.reports.markdown import code, escaped, table
+
+PICTURE_WIDTH = 320
+MOST_PICTURES = 24
+
+
+def page_link(kind: KindRow, folder: Path, url: str) -> str:
+    """Return a link to the page of a kind, or its file if the report is published nowhere."""
+    return f"[page]({url}/{kind.address})" if url else code(f"{folder.name}/{kind.address}")
+
+
+def index_parts(page: RunPage, folder: Path, url: str) -> list[str]:
+    """Return the parts of a summary: where the pages are, pictures, archive, domain and cost."""
+    if url:
+        where = f"[The whole report]({url}/{INDEX})"
+    else:
+        where = (
+            f"The whole report is {code(f'{folder.name}/{INDEX}')}. With `--garl-report-url` this "
+            "summary links to it and shows a picture of each kind."
+        )
+    parts = [where, *(escaped(note) for note in page.notes)]
+    parts += _pictures(page, url) if url else []
+    if page.archive:
+        rows = [
+            (escaped(row.type), *(str(count or "") for count, _ in row.cells), escaped(row.meaning))
+            for row in page.archive
+        ]
+        parts.append(table(("type", *page.phases, "what it means"), rows))
+    facts = (("Domain", page.domain), ("Cost", page.cost), ("Hashes and versions", page.origin))
+    return parts + [_folded(title, pairs) for title, pairs in facts if pairs]
+
+
+def _pictures(page: RunPage, url: str) -> list[str]:
+    """Return what the camera saw last in a flight of each kind, the most frequent first."""
+    shown = [kind for kind in page.kinds if kind.still]
+    parts = [
+        f'<a href="{url}/{kind.address}"><img src="{url}/{kind.still}" width="{PICTURE_WIDTH}" '
+        f'alt="{escape(kind.signature)}"></a><br>'
+        f"{escaped(kind.signature)}, {escaped(kind.where)}: {escaped(kind.title)}"
+        for kind in shown[:MOST_PICTURES]
+    ]
+    left = len(shown) - len(parts)
+    return [*parts, f"{left} more kinds have pictures in the report."] if left > 0 else parts
+
+
+def _folded(title: str, pairs: tuple[Fact, ...]) -> str:
+    rows = [(escaped(label), escaped(text)) for label, text in pairs]
+    return f"<details><summary>{title}</summary>\n\n{table(('', ''), rows)}\n\n</details>"
