@@ -5,7 +5,6 @@ from __future__ import annotations
 import functools
 import os
 import re
-import urllib.parse
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, cast
@@ -17,6 +16,7 @@ from pytest_garl.adversary.domain_policy import domain_with_policy, policy_in
 from pytest_garl.errors import GarlError
 from pytest_garl.execution.flight_id import Slot
 from pytest_garl.plugin.arguments import OPTIONS, Option
+from pytest_garl.plugin.report_options import report_folder, report_url, wrong_value
 from pytest_garl.scenarios.domains.names import DEFAULT_DOMAIN, OLD_WEATHER
 from pytest_garl.search.catalogue import default_policy, find_method, method_names
 
@@ -159,8 +159,8 @@ def read_options(config: pytest.Config) -> Options:
         npcs=_npcs(text["npcs"]),
         baseline=_baseline(config),
         level=_number("level", text["level"], 1, "a number between 0 and 1"),
-        report=_report(config),
-        report_url=_report_url(text["report-url"]),
+        report=report_folder(config),
+        report_url=report_url(text["report-url"]),
         shrink=_shrink(text["shrink"]),
         shrink_capped=not text["shrink"],
         xfail_strict=bool(config.getini("garl_xfail_strict")),
@@ -192,13 +192,9 @@ def _given(config: pytest.Config) -> frozenset[str]:
     return frozenset([*names, *(["resume"] if config.getoption("--garl-resume") else [])])
 
 
-def _wrong(name: str, found: str, expected: str) -> pytest.UsageError:
-    return pytest.UsageError(f"--garl-{name}: found {found!r}, expected {expected}")
-
-
 def _integer(name: str, text: str, low: int) -> int:
     if not re.fullmatch(r"\d+", text) or int(text) < low:
-        raise _wrong(name, text, f"a whole number of at least {low}")
+        raise wrong_value(name, text, f"a whole number of at least {low}")
     return int(text)
 
 
@@ -214,7 +210,7 @@ def _shrink(text: str) -> int:
         return SHRINK
     number = _integer("shrink", text, 0)
     if 0 < number < MINIMUM_SHRINK:
-        raise _wrong("shrink", text, f"0, or at least {MINIMUM_SHRINK} flights per new kind")
+        raise wrong_value("shrink", text, f"0, or at least {MINIMUM_SHRINK} flights per new kind")
     return number
 
 
@@ -225,7 +221,7 @@ def _number(name: str, text: str, below: float, expected: str) -> float:
     except ValueError:
         value = -1.0
     if not 0 < value < below:
-        raise _wrong(name, text, expected)
+        raise wrong_value(name, text, expected)
     return value
 
 
@@ -234,44 +230,13 @@ def _baseline(config: pytest.Config) -> Path | None:
     given = config.getoption("--garl-baseline")
     text, folder = (given, Path()) if given else (config.getini("garl_baseline"), config.rootpath)
     if text and not (folder / text).is_file():
-        raise _wrong("baseline", text, "a file that `garl baseline save` wrote")
+        raise wrong_value("baseline", text, "a file that `garl baseline save` wrote")
     return folder / text if text else None
-
-
-def _report(config: pytest.Config) -> Path | None:
-    """Return the folder: the command line's as seen from here, the ini key's from the root.
-
-    It is checked at once: a search of hours shall not end without its report.
-    """
-    given = config.getoption("--garl-report")
-    text, folder = str(given or ""), Path()
-    if not text:
-        text, folder = str(config.getini("garl_report")), config.rootpath
-    if not text:
-        return None
-    from pytest_garl.reports.html.folder import check_target
-
-    try:
-        check_target(folder / text)
-    except GarlError as error:
-        raise pytest.UsageError(f"--garl-report: {error}") from error
-    return folder / text
-
-
-_URL = re.compile(r"[\w.~:/?#@!$&*+,;=%-]+", re.ASCII)
-"""An address without what ends it in Markdown or HTML."""
-
-
-def _report_url(text: str) -> str:
-    parts = urllib.parse.urlsplit(text)
-    if text and not (parts.scheme in ("http", "https") and parts.netloc and _URL.fullmatch(text)):
-        raise _wrong("report-url", text, "an address such as https://example.org/report")
-    return text.rstrip("/")
 
 
 def _among(name: str, text: str, known: tuple[str, ...]) -> str:
     if text not in known:
-        raise _wrong(name, text, f"one of {', '.join(known)}")
+        raise wrong_value(name, text, f"one of {', '.join(known)}")
     return text
 
 
@@ -329,7 +294,7 @@ def _npcs(text: str) -> str:
         return text
     if not text.endswith(".npz"):
         expected = f"one of {', '.join(policy_names())}, or weights (.npz) that `garl train` wrote"
-        raise _wrong("npcs", text, expected)
+        raise wrong_value("npcs", text, expected)
     return text
 
 
@@ -346,7 +311,9 @@ def _seed(config: pytest.Config, text: str) -> int:
 
 def _repeat(text: str) -> str:
     if text and not SLOT_ID.fullmatch(text) and not Path(text).is_file():
-        raise _wrong("repeat", text, "a slot such as court-g03-s17, or an existing scenario file")
+        raise wrong_value(
+            "repeat", text, "a slot such as court-g03-s17, or an existing scenario file"
+        )
     return text
 
 
