@@ -17,7 +17,6 @@ TOPIC = "/events"
 SIMULATOR, SYSTEM, VERDICT = "simulator", "landing system", "verdict"
 MOST_CHARS = 1000
 _LEVELS = {
-    "contact": LogLevel.Error,
     "crashed": LogLevel.Error,
     "close_failed": LogLevel.Error,
     "gave_up": LogLevel.Warning,
@@ -64,10 +63,14 @@ def _is_turned(place: Place) -> bool:
 
 
 def _happened(flight: Flight) -> Iterator[tuple[int, LogLevel, str, str]]:
+    # Feet touch the ground in each landing; the last contact of a collision ended the flight.
+    hit_s = flight.contacts[-1].time_s if flight.outcome == "collision" else None
     for event in flight.events:
         # The system's phases are told with its notes below.
         if event.name != "phase":
             level = _LEVELS.get(event.name, LogLevel.Info)
+            if event.name == "contact" and event.time_s == hit_s:
+                level = LogLevel.Error
             yield ns(event.time_s), level, SIMULATOR, f"{event.name}: {event.text}"
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import importlib.util
+import importlib
 
 from pytest_garl.errors import GarlError
 
@@ -10,11 +10,10 @@ from pytest_garl.errors import GarlError
 def check_sdk() -> None:
     """Raise GarlError if Foxglove's SDK is not installed."""
     try:
-        found = importlib.util.find_spec("foxglove.mcap") is not None
-    except (ImportError, ValueError):
-        found = False
-    if not found:
+        for name in ("foxglove", "foxglove.mcap"):
+            importlib.import_module(name)
+    except ImportError as error:
         raise GarlError(
             "an MCAP file needs the package foxglove-sdk, which is not installed; install it with: "
             "pip install 'pytest-garl[mcap]'"
-        )
+        ) from error

@@ -110,12 +110,14 @@ class ShownPictures:
 def taken_s(steps: tuple[Step, ...], scenario: Scenario, camera: Camera) -> tuple[float, ...]:
     """Return when the picture of each step was taken.
 
-    For a step that does not fit the scenario's delays it is the time of the step.
+    These are the times of the steps if they do not fit the delays of the scenario.
     """
     under_way, times, over = _Deliveries(scenario, camera), [], False
     for step in steps:
-        taken = None if over else under_way.taken_s(step.time_s)
-        times.append(step.time_s if taken is None else taken)
+        taken = step.time_s if over else under_way.taken_s(step.time_s)
+        if taken is None:
+            return tuple(each.time_s for each in steps)
+        times.append(taken)
         # After it the simulator goes on looking, and hands over no pictures.
         over = over or step.command == "Abort"
     return tuple(times)
