@@ -226,7 +226,7 @@ def _place(ledger: Ledger, found: LedgerFlight, job: FlightJob, flight: Flight) 
     else:
         try:
             seen = _camera(flight, dataclass_from(Camera, dict(known), "camera"))
-        except (GarlError, ValueError) as error:
+        except (GarlError, TypeError, ValueError) as error:
             seen = {"notes": (f"The ledger's camera cannot be read: no pictures. {error}",)}
     if map.sha256 != job.map_sha256:
         changed = f"The map {map.name} has changed since the flight: pictures may differ."
