@@ -22,6 +22,7 @@ COMMANDS = {
     "diff": "baseline",
     "domain": "domain",
     "experiment": "experiment",
+    "export": "export",
     "report": "report",
     "train": "train",
 }

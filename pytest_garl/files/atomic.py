@@ -6,6 +6,7 @@ import contextlib
 import fcntl
 import os
 import re
+import tempfile
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -25,6 +26,21 @@ def write_text_atomically(path: Path, text: str) -> Path:
     except OSError as error:
         raise SavingError(f"{path}: cannot be saved ({error})") from error
     return path
+
+
+def check_writable(path: Path) -> None:
+    """Raise SavingError unless a file can be written to ``path``; nothing is left there."""
+    if path.is_dir():
+        raise SavingError(f"{path}: found a folder, expected the name of a file")
+    folder = next(each for each in path.absolute().parents if each.exists())
+    try:
+        # Access rights alone say nothing of a file system that is full or cannot be written.
+        with tempfile.TemporaryFile(dir=folder):
+            pass
+    except OSError as error:
+        raise SavingError(
+            f"{path}: cannot be written ({error.strerror}); name a file elsewhere"
+        ) from error
 
 
 @contextlib.contextmanager

@@ -48,7 +48,7 @@ def frames(
     one of this scenario.
     """
     place = map_in(scenario, map)
-    _check(flight, scenario, place)
+    check_scenario(flight, scenario, place)
     renderer = renderer_of(scenario, place, camera)
     left, right = CameraPane(renderer), MapPane(flight, scenario, place, camera)
     below = Timeline(flight, signature)
@@ -75,7 +75,11 @@ def rate_hz(flight: Flight, camera: Camera) -> float:
     return round((len(flight.steps) - 1) / span, 3)
 
 
-def _check(flight: Flight, scenario: Scenario, map: Map) -> None:
+def check_scenario(flight: Flight, scenario: Scenario, map: Map) -> None:
+    """Raise GarlError where the flight is not one of this scenario.
+
+    ``map`` has the objects that are there in the scenario (``map_in``).
+    """
     marker = marker_position_m(scenario, map)
     if math.dist(marker, flight.marker_position_m) > 1e-6:
         x, y = flight.marker_position_m

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from pytest_garl.errors import SavingError
-from pytest_garl.files.atomic import locked, write_text_atomically
+from pytest_garl.files.atomic import check_writable, locked, write_text_atomically
 
 
 def add_one(path: Path) -> None:
@@ -43,3 +43,15 @@ def test_an_unwritable_place_is_named(tmp_path: Path) -> None:
         locked(tmp_path / "file"),
     ):
         pass
+
+
+def test_a_target_is_checked_and_left_as_it_is(tmp_path: Path) -> None:
+    check_writable(tmp_path / "new" / "file")
+    assert list(tmp_path.iterdir()) == []
+    (tmp_path / "file").write_text("earlier")
+    check_writable(tmp_path / "file")
+    assert (tmp_path / "file").read_text() == "earlier"
+    with pytest.raises(SavingError, match=r"cannot be written \(Not a directory\)"):
+        check_writable(tmp_path / "file" / "below")
+    with pytest.raises(SavingError, match="found a folder, expected the name of a file"):
+        check_writable(tmp_path)

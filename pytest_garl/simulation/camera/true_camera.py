@@ -24,11 +24,11 @@ class Mounting:
             about_z = (0.0, 0.0, math.sin(yaw), math.cos(yaw))
             about_y = (0.0, math.sin(pitch), 0.0, math.cos(pitch))
             about_x = (math.sin(roll), 0.0, 0.0, math.cos(roll))
-            self._turn = _product(_product(about_z, about_y), about_x)
+            self._turn = product(product(about_z, about_y), about_x)
 
     def attitude(self, attitude: Quaternion) -> Quaternion:
         """Return the attitude of the camera on a UAV with an attitude."""
-        return attitude if self._turn is None else _product(attitude, self._turn)
+        return attitude if self._turn is None else product(attitude, self._turn)
 
 
 def true_camera(camera: Camera, scenario: Scenario) -> Camera:
@@ -41,7 +41,7 @@ def true_camera(camera: Camera, scenario: Scenario) -> Camera:
     return dataclasses.replace(camera, field_of_view_rad=min(3.0, max(0.05, angle)))
 
 
-def _product(a: Quaternion, b: Quaternion) -> Quaternion:
+def product(a: Quaternion, b: Quaternion) -> Quaternion:
     """Return the quaternion that turns by ``b``, then by ``a``."""
     ax, ay, az, aw = a
     bx, by, bz, bw = b

@@ -1,0 +1,38 @@
+"""What an export is made of: a flight, the limits that judge it, and the place if it is known."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from pytest_garl.landing_system import Camera
+from pytest_garl.scenarios.maps.map import Map
+from pytest_garl.scenarios.scenario import Scenario
+from pytest_garl.simulation.flight import Flight
+from pytest_garl.verdicts.verdict import DEFAULT_LIMITS, Limits
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Place:
+    """Where a flight of the built-in simulator was flown, and with which camera.
+
+    ``map`` has the objects that are there in the scenario (``map_in``).  ``camera`` is the one that
+    the landing system declares, None if its pictures cannot be drawn again.
+    """
+
+    scenario: Scenario
+    map: Map
+    camera: Camera | None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Export:
+    """A flight to export; ``place`` is None for a flight of a simulator of the user's own.
+
+    ``name`` says which flight it is, ``signature`` what it violates, empty if nothing.
+    """
+
+    name: str
+    flight: Flight
+    signature: str = ""
+    limits: Limits = DEFAULT_LIMITS
+    place: Place | None = None
