@@ -23,6 +23,7 @@ from pytest_garl.reports.shares_text import in_control_text
     type=click.Path(path_type=Path, dir_okay=False),
     default=Path(".garl/ledger.sqlite"),
 )
+@click.argument("later", type=click.Path(path_type=Path, dir_okay=False), required=False)
 @click.option(
     "--json", "as_json", is_flag=True, help="Write JSON; docs/report.md explains the keys."
 )
@@ -45,19 +46,49 @@ from pytest_garl.reports.shares_text import in_control_text
 )
 @FOLDER
 def report(
-    ledger: Path, as_json: bool, out: Path | None, films: int, workers: int | None, folder: Path
+    ledger: Path,
+    later: Path | None,
+    as_json: bool,
+    out: Path | None,
+    films: int,
+    workers: int | None,
+    folder: Path,
 ) -> None:
     """Report the findings of the run in LEDGER (default .garl/ledger.sqlite).
 
     Without options it prints a short form; --out=DIR writes pages for people, which begin with
     DIR/index.html. Use it while the run goes on, or after a run was killed.
+
+    With the ledger of a LATER run it shows the two side by side: which kinds of violation came and
+    went, landed and gave up. To compare two versions of a landing system in the same scenarios, use
+    `garl diff`.
     """
     corpus = Corpus(folder, (Path.cwd() / "scenarios" / "maps",))
+    if later is not None:
+        _compare(ledger, later, as_json, out, corpus)
+        return
     if out is not None and not as_json:
         _write_pages(ledger, out, corpus, films, workers)
         return
     found = run_report_as_json(ledger, corpus)
-    text = json.dumps(found, indent=2) + "\n" if as_json else _text(found)
+    _tell(json.dumps(found, indent=2) + "\n" if as_json else _text(found), out)
+
+
+def _compare(ledger: Path, later: Path, as_json: bool, out: Path | None, corpus: Corpus) -> None:
+    from pytest_garl.reports.run_comparison import compare_runs, comparison_text
+
+    found = compare_runs(run_report_as_json(ledger, corpus), run_report_as_json(later, corpus))
+    if as_json:
+        _tell(json.dumps(found.to_json(), indent=2) + "\n", out)
+    elif out is None:
+        click.echo(comparison_text(found), nl=False)
+    else:
+        from pytest_garl.reports.html.report import write_comparison
+
+        click.echo(printable(str(write_comparison(found, out))))
+
+
+def _tell(text: str, out: Path | None) -> None:
     if out is None:
         click.echo(text, nl=False)
     else:

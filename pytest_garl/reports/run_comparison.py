@@ -7,6 +7,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
+from pytest_garl.messages import printable
 from pytest_garl.reports.search_summary import WHY_NO_LANDING
 from pytest_garl.reports.shares_text import percent
 
@@ -202,7 +203,9 @@ def comparison_text(found: RunComparison) -> str:
             for change in changes:
                 lines.append(f"    {change.signature}: {change_text(change, search.flown)}")
                 lines.append(f"        {change.headline}")
-    return "\n".join([*lines, ""]) if found.searches else "no flights yet\n"
+    if not found.searches:
+        return "no flights yet\n"
+    return "".join(f"{printable(line, keep='')}\n" for line in lines)
 
 
 def _titled(search: SearchComparison) -> Iterable[tuple[str, tuple[KindChange, ...]]]:

@@ -1,6 +1,8 @@
 from __future__ import annotations
 
+import html
 import json
+import re
 import shutil
 import sqlite3
 import subprocess
@@ -45,6 +47,63 @@ def searched(tmp_path_factory: pytest.TempPathFactory) -> Path:
     tests.write_text(tests.read_text() + own)
     search(folder)
     return folder
+
+
+@pytest.fixture(scope="module")
+def searched_again(searched: Path) -> Path:
+    """Return a folder with a second ledger, of a run without the own property."""
+    shutil.copytree(searched / ".garl", searched / "first")
+    tests = searched / "test_it.py"
+    text = tests.read_text()
+    tests.write_text(text.replace("< 14.0", "< 15.0"))
+    search(searched, "-o", "garl_dir=later", "--garl-seed=3")
+    tests.write_text(text)
+    return searched
+
+
+def test_two_runs_are_shown_side_by_side(searched_again: Path) -> None:
+    told = garl(searched_again, "report", "first/ledger.sqlite", "later/ledger.sqlite")
+    assert "before: first/ledger.sqlite" in told
+    assert "not alike: seed 0 -> 3" in told
+    assert re.search(r"Good on lawn\n +before +after\n +flights +8 +8\n", told)
+    before, after = (
+        {
+            kind["signature"]: kind["count"]
+            for kind in report(searched_again, each)["searches"][0]["signatures"]
+        }
+        for each in ("first/ledger.sqlite", "later/ledger.sqlite")
+    )
+    found = json.loads(
+        garl(searched_again, "report", "first/ledger.sqlite", "later/ledger.sqlite", "--json")
+    )
+    (one,) = found["searches"]
+    assert {each["signature"] for each in one["gained"]} == set(after) - set(before)
+    assert {each["signature"] for each in one["lost"]} == set(before) - set(after)
+    assert {each["signature"]: (each["before"], each["after"]) for each in one["kept"]} == {
+        name: (before[name], after[name]) for name in set(before) & set(after)
+    }
+    assert one["lost"], "nothing to look at"
+    for each in one["lost"]:
+        assert each["by_chance"] == pytest.approx((1 - each["before"] / 8) ** 8)
+        assert f"{each['signature']}: {each['before']} of 8 -> 0 of 8, by chance with" in told
+
+
+def test_a_run_is_like_itself(searched: Path) -> None:
+    ledger = ".garl/ledger.sqlite"
+    found = json.loads(garl(searched, "report", ledger, ledger, "--json"))
+    (one,) = found["searches"]
+    assert (found["unlike"], one["gained"], one["lost"]) == ([], [], [])
+    assert all(side["before"] == side["after"] for side in one["sides"])
+
+
+def test_two_runs_have_a_page(searched_again: Path) -> None:
+    told = garl(
+        searched_again, "report", "first/ledger.sqlite", "later/ledger.sqlite", "--out=compared"
+    )
+    assert told == "compared/index.html\n"
+    page = html.unescape((searched_again / "compared" / "index.html").read_text())
+    assert "default-src 'none'" in page
+    assert "The runs are not alike: seed was 0, and is 3." in page
 
 
 def test_the_schema_is_valid() -> None:

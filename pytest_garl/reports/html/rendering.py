@@ -21,10 +21,11 @@ from pytest_garl.messages import printable
 from pytest_garl.reports.html.kind_page import KindPage
 from pytest_garl.reports.html.naming import GENERATOR
 from pytest_garl.reports.html.run_page import RunPage
+from pytest_garl.reports.run_comparison import RunComparison, change_text
 
 HERE = Path(__file__).parent
 _SCRIPTS = ("cursor.js", "path.js", "timeline.js", "player.js")
-_INDEX, _KIND = "index.html.jinja", "kind.html.jinja"
+_INDEX, _KIND, _COMPARISON = "index.html.jinja", "kind.html.jinja", "comparison.html.jinja"
 
 
 def render_index(page: RunPage) -> str:
@@ -37,6 +38,15 @@ def render_kind(page: KindPage) -> str:
     data = page.flight.data
     scripts = (_text("vendor/uPlot.iife.min.js"), *(_text(f"static/{s}") for s in _SCRIPTS))
     return _render(_KIND, page=page, data=data, scripts=scripts if data else ())
+
+
+def render_comparison(found: RunComparison) -> str:
+    """Return the page that shows two runs side by side."""
+    gained, lost = (
+        sum(len(getattr(search, name)) for search in found.searches) for name in ("gained", "lost")
+    )
+    values = {"found": found, "gained": gained, "lost": lost, "change_text": change_text}
+    return _render(_COMPARISON, scripts=(), **values)
 
 
 def _render(template: str, *, scripts: tuple[str, ...], **values: Any) -> str:

@@ -17,8 +17,9 @@ from pytest_garl.reports.html.kind_page import KindPlan, found_page, kind_page, 
 from pytest_garl.reports.html.naming import INDEX, page_address, still_address
 from pytest_garl.reports.html.page_workers import shown_flights
 from pytest_garl.reports.html.pictures import picture_bytes
-from pytest_garl.reports.html.rendering import render_index, render_kind
+from pytest_garl.reports.html.rendering import render_comparison, render_index, render_kind
 from pytest_garl.reports.html.run_page import RunPage, run_page
+from pytest_garl.reports.run_comparison import RunComparison
 from pytest_garl.reports.run_report import run_report_of, summaries_of
 from pytest_garl.video.encoder import program
 
@@ -90,6 +91,13 @@ def write_html_report(
         films=sum(bool(flight.film) for _, flight, _ in shown),
         notes=notes,
     )
+
+
+def write_comparison(found: RunComparison, out: Path) -> Path:
+    """Write two runs side by side into the folder ``out``, whole or not at all; return the page."""
+    with new_folder(out) as folder:
+        _write(folder / INDEX, render_comparison(found))
+    return out / INDEX
 
 
 def _write(path: Path, text: str) -> None:
