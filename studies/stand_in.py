@@ -26,12 +26,12 @@ from pytest_garl.scenarios.placement import (
 )
 from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.verdicts.verdict import Margin, MarginName, Verdict
-from studies.stand_in_way import TAKE_OFF_S, Event, Way, meet_bodies
+from studies.stand_in_way import ORDINARY, TAKE_OFF_S, Event, LandingModel, Way, meet_bodies
 
 CRUISE_MPS = 3.0
 DISTANCE_M, TIME_S = 0.75, 120.0
-READABLE, READ = 0.25, 0.45
-"""Clearness from which on the marker could be read, and is read by the landing."""
+READABLE = 0.25
+"""Clearness from which on the marker could be read."""
 LOSSES = (
     ("environment.dust", 1.0, 1.1),
     ("environment.fog", 1.0, 1.6),
@@ -48,7 +48,7 @@ LOSSES = (
 """Gene, its largest value, and the optical depth at that value; it grows with the square."""
 
 
-def stand_in(scenario: Scenario, map: Map) -> FlightResult:
+def stand_in(scenario: Scenario, map: Map, landing: LandingModel = ORDINARY) -> FlightResult:
     """Return the result of a landing in a scenario of `field`."""
     told, marker = told_position_m(scenario, map), marker_position_m(scenario, map)
     told = _moved(told, scenario["told.error_m"], scenario["told.towards_deg"])
@@ -66,25 +66,25 @@ def stand_in(scenario: Scenario, map: Map) -> FlightResult:
         over_told_s=over_told_s,
         descends_s=over_told_s + searches_s,
     )
-    off_m = _off_m(scenario, way, rng)
+    off_m = landing.drift * _off_m(scenario, way, rng)
     events: list[Event] = []
-    gaps = meet_bodies(scenario, map, way, events)
+    gaps = meet_bodies(scenario, map, way, events, landing.gives_way_m)
     static_m = scenario["pad.clearance_m"] - 0.3 - 0.7 * off_m
     margins: dict[MarginName, float] = {
         "distance": DISTANCE_M - off_m,
         "time": TIME_S - way.lands_s,
         "moving": min([10.0, *(gap for gap, _, _ in gaps)]),
         "static": max(0.0, static_m) if static_m < 3.0 else 3.0,
-        "touchdown_speed": 2.0 - _sink_mps(scenario),
+        "touchdown_speed": 2.0 - landing.sink * _sink_mps(scenario),
         "touchdown_tilt": 0.35 - 0.05 * scenario["wind.turbulence"],
         "dropout": 3.0 - max(0.0, 8 * (0.75 - clear)),
-        "decoy": _nearest_decoy_m(scenario, told, marker),
+        "decoy": _nearest_decoy_m(scenario, told, marker) if landing.follows_decoys else 10.0,
         "tracking": DISTANCE_M - 0.9 * off_m,
-        "slide": 0.5 - _slide_m(scenario),
+        "slide": 0.5 - landing.slide * _slide_m(scenario),
         "crash": 1.0,
     }
     margins["collision"] = min(margins["moving"], margins["static"])
-    excused = _on_the_ground(scenario, way, margins, clear, events)
+    excused = _on_the_ground(scenario, way, margins, clear, events, landing)
     return _result(way, margins, events, gaps, off_m, excused=excused)
 
 
@@ -165,13 +165,14 @@ def _on_the_ground(
     margins: Mapping[MarginName, float],
     clear: float,
     events: list[Event],
+    landing: LandingModel,
 ) -> bool:
     """Add what goes wrong without a moving body; return whether nobody could have landed."""
     lands = way.lands_s
     black_s = 0.0 if scenario["outage.frozen"] >= 0.5 else _covers(scenario, "outage", way)
     hidden_s = _covers(scenario, "cover", way) * (scenario["cover.share_percent"] > 40)
     own = math.dist(way.told_m, way.marker_m)
-    for kind, (x, y) in _decoys(scenario):
+    for kind, (x, y) in _decoys(scenario) if landing.follows_decoys else ():
         nearer = math.hypot(x, y) < own - 1.0
         taken = kind == "same-id-without-margin" or (clear < 0.7 and kind in ("helipad-h", "grate"))
         if nearer and taken:
@@ -183,7 +184,7 @@ def _on_the_ground(
                     property="distance",
                 )
             )
-    if clear < READ:
+    if clear < landing.read:
         if clear < READABLE:
             return True
         cause = "never-seen" if clear < 0.35 else "lost:search"

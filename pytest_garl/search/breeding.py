@@ -7,7 +7,7 @@ import numpy as np
 from pytest_garl.scenarios.sparse import OFF, ON
 from pytest_garl.search.columns import Columns, Mask
 from pytest_garl.search.exploration import Exploration
-from pytest_garl.search.operators import LARGEST_STEP, Matrix, local_steps
+from pytest_garl.search.operators import Matrix, local_steps
 
 STEP, HARDEN, SOFTEN, GRAFT, REDRAW = "step", "harden", "soften", "graft", "redraw"
 WAYS = (STEP, HARDEN, SOFTEN, GRAFT, REDRAW)
@@ -15,13 +15,13 @@ WAYS = (STEP, HARDEN, SOFTEN, GRAFT, REDRAW)
 STEP_SHARE = 0.5
 """Share of the values that count which a step changes."""
 AIMED_SHARE = 0.8
-"""Share of the steps that change only the body which the parent came nearest to, or hit."""
+"""Share of the steps that change only the NPC which the parent came nearest to, or hit."""
 HARDEN_SHARE = 0.7
 """Share of the harsher values' way to the end of their range, at most, and of those that move."""
 SOFTEN_SHARE = 0.6
 """Share of the way back to nominal, at most."""
-LEAST_STEP_SHARE = 0.1
-"""The largest step shrinks with the distance to a violation, down to this share of it."""
+LARGEST_STEP = 0.03
+"""The largest standard deviation of a step, as a share of the value's range."""
 PLACE_SHARE = 0.2
 """Share of children whose marker moves too."""
 
@@ -35,18 +35,12 @@ class Breeding:
         self._always = np.array([name not in optional for name in columns.owner])
 
     def child(
-        self,
-        way: str,
-        row: Matrix,
-        donor: Matrix,
-        body: str,
-        nearness: float,
-        rng: np.random.Generator,
+        self, way: str, row: Matrix, donor: Matrix, body: str, rng: np.random.Generator
     ) -> Matrix:
         """Return a child of ``row``.
 
-        ``donor`` is the chromosome of another flight, ``body`` the NPC that a near miss or a
-        collision is about, empty without one; ``nearness`` is the proximity to a violation.
+        ``donor`` is the chromosome of another flight, ``body`` the NPC that ``row`` came nearest
+        to, empty without one.
         """
         child = row
         if way == HARDEN:
@@ -59,10 +53,10 @@ class Breeding:
             child = self._redraw(row, rng)
         # A way that changes nothing here is a step.
         if np.array_equal(child, row):
-            child = self._step(row, body, nearness, rng)
+            child = self._step(row, body, rng)
         return child
 
-    def _step(self, row: Matrix, body: str, nearness: float, rng: np.random.Generator) -> Matrix:
+    def _step(self, row: Matrix, body: str, rng: np.random.Generator) -> Matrix:
         columns = self._columns
         mask = columns.counting(row)
         if columns.optional and rng.random() >= PLACE_SHARE:
@@ -73,14 +67,18 @@ class Breeding:
             mask &= about
         if not mask.any():
             mask = columns.counting(row)
-        largest = LARGEST_STEP * max(LEAST_STEP_SHARE, 1 - nearness)
         moved = local_steps(
-            row[None], columns.lower, columns.upper, rng, probability=STEP_SHARE, largest=largest
+            row[None],
+            columns.lower,
+            columns.upper,
+            rng,
+            probability=STEP_SHARE,
+            largest=LARGEST_STEP,
         )[0]
         child: Matrix = np.where(mask, moved, row)
         if np.array_equal(child, row):
             column = int(rng.choice(np.flatnonzero(mask)))
-            step = rng.normal(0, largest) * (columns.upper - columns.lower)[column]
+            step = rng.normal(0, LARGEST_STEP) * (columns.upper - columns.lower)[column]
             child[column] = np.clip(
                 row[column] + step, columns.lower[column], columns.upper[column]
             )

@@ -86,37 +86,13 @@ def near_miss(result: FlightResult) -> tuple[str, float]:
     for margin in verdict.margins:
         if verdict.no_landing and margin.property not in BODIES:
             continue
-        nearness = _nearness(margin)
+        nearness = nearness_of(margin)
         if nearness > nearest:
             name, nearest = margin.property, nearness
     return name, nearest
 
 
-def near_misses(result: FlightResult) -> dict[str, float]:
-    """Return how near a flight came to each kind of failure that it did not show, 0 to 1.
-
-    By the signature of a collision with the nearest body, and by the property else.  A flight that
-    violates something, or in which nobody could have landed, shows nothing else.
-    """
-    verdict = result.verdict
-    if verdict.violation or verdict.no_landing:
-        return {}
-    found: dict[str, float] = {}
-    body = 0.0
-    for margin in verdict.margins:
-        if margin.property == "collision":
-            continue
-        nearness = _nearness(margin)
-        if margin.property in BODIES:
-            body = max(body, nearness)
-        elif nearness > 0:
-            found[margin.property] = nearness
-    if result.closest_call and body > 0:
-        found[result.closest_call] = body
-    return found
-
-
-def _nearness(margin: Margin) -> float:
+def nearness_of(margin: Margin) -> float:
     """Return the proximity of a margin to its violation; not above 0 if it has no degrees."""
     safe = SAFE_MARGINS.get(margin.property)
     return 0.0 if safe is None else min(NEAREST_MISS, 1 - margin.value / safe)

@@ -11,10 +11,10 @@ from pytest_garl.scenarios.chromosome import decode
 from pytest_garl.scenarios.domains.genome import genome_of
 from pytest_garl.scenarios.domains.reader import domain_named
 from pytest_garl.scenarios.maps.map import load_map
-from pytest_garl.search.archive import EXCUSED, PROGRESS_WORTH, Archive
+from pytest_garl.search.archive import Archive
 from pytest_garl.search.columns import Columns
 from pytest_garl.search.method import FlownScenario
-from pytest_garl.verdicts.verdict import Finding, Margin, MarginName
+from pytest_garl.verdicts.verdict import Finding, Margin
 from tests.support.results import flight_result
 
 COLUMNS = Columns(genome_of(domain_named("field"), load_map("court")))
@@ -26,52 +26,11 @@ def flown(result: FlightResult) -> FlownScenario:
     return FlownScenario(scenario=SCENARIO, result=result)
 
 
-def near(name: MarginName, value: float, call: str = "") -> FlownScenario:
-    margins = (Margin(property=name, value=value, unit="m"),)
-    return flown(flight_result(margins=margins, closest_call=call))
-
-
 def test_the_first_violation_of_a_kind_is_worth_more_than_the_fourth() -> None:
     archive, item = Archive(COLUMNS), flown(flight_result("IV:dog:descent:seen"))
     worths = [archive.add(item, ROW) for _ in range(4)]
     assert worths == pytest.approx([1.0, 1 / 2, 1 / 3, 1 / 4])
     assert archive.names() == ["IV:dog:descent:seen"]
-
-
-def test_a_flight_that_comes_nearer_to_an_unknown_kind_is_a_success() -> None:
-    archive = Archive(COLUMNS)
-    assert archive.add(near("moving", 2.0, "IV:dog:descent:seen"), ROW) == PROGRESS_WORTH
-    assert archive.add(near("moving", 2.0, "IV:dog:descent:seen"), ROW) == 0.0
-    assert archive.add(near("moving", 0.5, "IV:dog:descent:seen"), ROW) == PROGRESS_WORTH
-    assert archive.names() == ["near IV:dog:descent:seen"]
-
-
-def test_a_flight_is_in_the_cell_of_each_property_that_it_nearly_violates() -> None:
-    archive = Archive(COLUMNS)
-    margins = (
-        Margin(property="distance", value=0.1, unit="m"),
-        Margin(property="slide", value=0.1, unit="m"),
-        Margin(property="time", value=90.0, unit="s"),
-    )
-    archive.add(flown(flight_result(margins=margins)), ROW)
-    assert archive.names() == ["near distance", "near slide"]
-
-
-@pytest.mark.parametrize(
-    ("margin", "call", "signature"),
-    [
-        ("moving", "IV:dog:descent:seen", "IV:dog:descent:seen"),
-        ("slide", "", "slid:motors-off"),
-        ("touchdown_speed", "", "hard:fast"),
-    ],
-)
-def test_near_misses_of_what_was_found_are_not_bred_from(
-    margin: MarginName, call: str, signature: str
-) -> None:
-    archive = Archive(COLUMNS)
-    archive.add(near(margin, 0.2, call), ROW)
-    archive.add(flown(flight_result(signature)), ROW)
-    assert archive.names() == [signature]
 
 
 def test_the_parents_of_a_cell_are_its_least_severe_violations_nearest_to_nominal() -> None:
@@ -100,9 +59,9 @@ def test_what_had_gone_wrong_before_is_a_cell_of_its_own_and_worth_half_a_violat
     assert archive.names() == ["off:elsewhere"]
 
 
-def test_flights_in_which_nobody_could_have_landed_have_a_cell_and_are_no_success() -> None:
+def test_flights_in_which_nobody_could_have_landed_are_no_success() -> None:
     archive = Archive(COLUMNS)
     margins = (Margin(property="distance", value=-4.0, unit="m"),)
     excused = flight_result(outcome="gave_up", excuse="undetectable", margins=margins)
     assert archive.add(flown(excused), ROW) == 0.0
-    assert archive.names() == [EXCUSED]
+    assert archive.names() == []

@@ -27,7 +27,7 @@ def test_a_child_is_another_sparse_chromosome_in_the_domain(way: str) -> None:
     parent, donor = row_with("wind", "fog", "dog-1"), row_with("rain", "pad", seed=1)
     rng = np.random.default_rng(2)
     for _ in range(50):
-        child = BREEDING.child(way, parent, donor, "dog-1", 0.5, rng)
+        child = BREEDING.child(way, parent, donor, "dog-1", rng)
         assert not np.array_equal(child, parent)
         assert ((child >= COLUMNS.lower) & (child <= COLUMNS.upper)).all()
         assert len(COLUMNS.active(child)) == 3
@@ -40,33 +40,22 @@ def test_harder_children_lie_farther_from_nominal_and_milder_ones_nearer() -> No
     parent, rng = row_with("wind", "fog", "snow"), np.random.default_rng(3)
     far = COLUMNS.distance_from_nominal(parent)
     for way, sign in (("harden", 1), ("soften", -1)):
-        children = [BREEDING.child(way, parent, parent, "", 0.5, rng) for _ in range(20)]
+        children = [BREEDING.child(way, parent, parent, "", rng) for _ in range(20)]
         changes = [sign * (COLUMNS.distance_from_nominal(each) - far) for each in children]
         assert min(changes) >= -1e-9
         assert max(changes) > 0.05
 
 
-def test_a_graft_keeps_the_npc_that_a_near_miss_is_about() -> None:
+def test_a_graft_keeps_the_npc_that_the_flight_came_nearest_to() -> None:
     parent, donor = row_with("wind", "fog", "dog-1"), row_with("rain", "pad", seed=1)
     rng = np.random.default_rng(4)
     for _ in range(30):
         names = {
             gene.name
-            for gene in COLUMNS.active(BREEDING.child("graft", parent, donor, "dog-1", 0.5, rng))
+            for gene in COLUMNS.active(BREEDING.child("graft", parent, donor, "dog-1", rng))
         }
         assert "dog-1" in names
         assert len(names & {"rain", "pad"}) == 1
-
-
-def test_steps_become_small_near_a_violation() -> None:
-    parent, rng = row_with("wind", "fog", "camera"), np.random.default_rng(5)
-
-    def largest(nearness: float) -> float:
-        children = [BREEDING.child("step", parent, parent, "", nearness, rng) for _ in range(100)]
-        shares = (np.array(children) - parent) / (COLUMNS.upper - COLUMNS.lower)
-        return float(np.abs(shares).max())
-
-    assert largest(0.99) < largest(0.0) / 3
 
 
 def test_a_genome_without_optional_genes_is_bred_by_steps() -> None:
@@ -75,5 +64,5 @@ def test_a_genome_without_optional_genes_is_bred_by_steps() -> None:
     rng = np.random.default_rng(6)
     parent, donor = columns.genome.random(rng), columns.genome.random(rng)
     for way in WAYS:
-        child = breeding.child(way, parent, donor, "", 0.5, rng)
+        child = breeding.child(way, parent, donor, "", rng)
         assert not np.array_equal(child, parent)

@@ -46,7 +46,7 @@ def test_the_table_of_policies_shows_both_definitions() -> None:
 def test_ablations_are_compared_seed_by_seed() -> None:
     def row(variant: str, seed: int, kinds: int) -> dict[str, str]:
         counts = {f"IV:{number}": 10 for number in range(kinds)}
-        facts = {"map": "court", "budget": "400", "early": "2", "excused": "0"}
+        facts = {"map": "court", "budget": "400", "early": "2", "first": "9", "landing": "sturdy"}
         return {"variant": variant, "seed": str(seed), **facts, "kinds": json.dumps(counts)}
 
     seeds = (1, 2, 3)

@@ -4,7 +4,7 @@ The first generation is plain random scenarios of the domain: the control, to wh
 search is compared.  After it a bandit divides the flights between scenarios without parents, in
 strata without NPCs, with careless ones and with those that know of the UAV, and children of the
 archive's cells.  The first violation of a kind counts as a success and each further one less, so
-that what comes near to another kind is worth more than one more of the same.
+that a new kind is worth more than one more of the same.
 
 A scenario that is flown like an earlier one is not flown again: its difference is a value that
 does not count.
@@ -21,9 +21,9 @@ from pytest_garl.scenarios.chromosome import decode, encode
 from pytest_garl.scenarios.files import dump_scenario
 from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.scenarios.validity import repair
-from pytest_garl.search.archive import EXCUSED, Archive
+from pytest_garl.search.archive import Archive
 from pytest_garl.search.bandit import Bandit
-from pytest_garl.search.breeding import SOFTEN, WAYS, Breeding
+from pytest_garl.search.breeding import WAYS, Breeding
 from pytest_garl.search.columns import Columns
 from pytest_garl.search.exploration import Exploration
 from pytest_garl.search.method import FlownScenario, MethodDeclaration, SearchPlan
@@ -45,15 +45,13 @@ class GarlParameters:
     ``python -m studies.ablations`` measures what each part of the search is worth.
     """
 
-    explore_share: float = 0.5
+    explore_share: float = 0.75
     """Least share of scenarios without parents, so that kinds are still found late in a search."""
     learns_arms: bool = True
     """Whether cells and strata are chosen by their success; otherwise all alike."""
     has_strata: bool = True
     """Whether scenarios without parents are drawn in strata; otherwise as the domain draws them."""
-    breeds_near_misses: bool = True
-    """Whether near misses have cells."""
-    archive: Callable[..., Archive] = Archive
+    archive: Callable[[Columns], Archive] = Archive
     """What keeps the flights, and says which cells are bred from."""
     exploration: Callable[[Columns], Exploration] = Exploration
     """What draws scenarios without parents."""
@@ -68,8 +66,7 @@ class Garl:
         self._plan, self._parameters = plan, parameters or GarlParameters()
         self._rng = np.random.default_rng(seed_sequence("garl", plan.map.name, plan.seed))
         self._columns = Columns(plan.genome)
-        has_near = self._parameters.breeds_near_misses
-        self._archive = self._parameters.archive(self._columns, has_near=has_near)
+        self._archive = self._parameters.archive(self._columns)
         self._exploration = self._parameters.exploration(self._columns)
         self._breeding = Breeding(self._columns, self._exploration)
         self._arms = Bandit()
@@ -115,11 +112,7 @@ class Garl:
         if not cells or self._rng.random() < self._parameters.explore_share:
             return self._pick(explore), ""
         arm = self._pick([*explore, *cells])
-        if arm in explore:
-            return arm, ""
-        if arm == EXCUSED:
-            return arm, SOFTEN
-        return arm, str(self._rng.choice(WAYS))
+        return arm, "" if arm in explore else str(self._rng.choice(WAYS))
 
     def _pick(self, names: Sequence[str]) -> str:
         if self._parameters.learns_arms:
@@ -138,10 +131,8 @@ class Garl:
         """
         parent = self._archive.parent(name, self._rng)
         donor = self._archive.parent(str(self._rng.choice(self._archive.names())), self._rng)
-        result = parent.flown.result
-        body = result.closest_body
-        nearness = violation_proximity(result)
-        row = self._breeding.child(way, parent.row, donor.row, body, nearness, self._rng)
+        body = parent.flown.result.closest_body
+        row = self._breeding.child(way, parent.row, donor.row, body, self._rng)
         return row, parent.flown.scenario.seed
 
     def _new_seed(self) -> int:

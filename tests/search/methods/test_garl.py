@@ -18,7 +18,6 @@ from pytest_garl.search.method import FlownScenario, SearchPlan
 from pytest_garl.search.methods.garl import Garl, GarlParameters
 from pytest_garl.search.methods.random import RandomSearch
 from studies.stand_in import stand_in
-from tests.support.results import flight_result
 
 MAP = load_map("court")
 GENOME = genome_of(domain_named("field"), MAP)
@@ -70,20 +69,3 @@ def test_a_scenario_that_is_flown_like_an_earlier_one_is_not_flown_again() -> No
         texts.update(dump_scenario(each) for each in scenarios)
         method.tell(told(scenarios, [stand_in(each, MAP) for each in scenarios]))
     assert set(texts.values()) == {1}
-
-
-def test_children_of_excused_flights_are_milder() -> None:
-    method = Garl(PLAN, GarlParameters(explore_share=0.0))
-    excused = flight_result(outcome="gave_up", excuse="undetectable")
-    first = method.ask()
-    method.tell(told(first, [excused] * len(first)))
-    columns = method._columns
-    parents = {
-        entry.flown.scenario.seed: columns.distance_from_nominal(entry.row)
-        for entry in method._archive.cells["excused"]
-    }
-    for _ in range(20):
-        row, seed = method._child("excused", "soften")
-        if parents[seed] > 0:
-            assert columns.distance_from_nominal(row) <= parents[seed] + 1e-9
-    assert np.isfinite(list(parents.values())).all()
