@@ -104,6 +104,8 @@ class OnDemandFlights:
         self._ledger, self._pool, self._on_wait = ledger, pool, on_wait
         self._priority = priority
         self._procedures: dict[str, _Procedure] = {}
+        self.flown = 0
+        """How many flights the procedures were given."""
         # In this process a flight and a procedure must not compute at the same time.
         self._patience_s = None if pool.in_process else PATIENCE_S
 
@@ -162,6 +164,7 @@ class OnDemandFlights:
                     return False
                 procedure.awaited = None
                 procedure.results.put(done)
+                self.flown += 1
             try:
                 request = procedure.requests.get(timeout=self._patience_s)
             except queue.Empty:

@@ -144,7 +144,7 @@ def _costs(run: Run) -> str:
     """Return how many flights the run needed beside the budget, and how busy its workers were."""
     meters = run.ledger.queries.meters()
     flying, idle = meters.get("flying_s", 0.0), meters.get("idle_s", 0.0)
-    confirming = sum(each.result.flights for each in run.investigated)
+    confirming = run.investigations.flown if run.investigations else 0
     repeating = meters.get("on_demand", 0) - confirming
     counts = {
         "flown again after a time-out or a kill": meters.get("retried", 0),

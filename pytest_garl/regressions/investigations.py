@@ -110,6 +110,11 @@ class Investigations:
         """How many investigations have ended."""
         return len(self._started) - self.running
 
+    @property
+    def flown(self) -> int:
+        """How many flights they had, also those that were stopped."""
+        return self._flights.flown
+
     def advance(self) -> None:
         """Start the investigations of the generations that are flown, and go on with all."""
         if self._beside:

@@ -101,6 +101,17 @@ def test_interruption_ends_the_threads_and_loses_no_flight(job: FlightJob, ledge
     assert ledger.queries.meters()["on_demand"] == 4
 
 
+def test_flights_of_a_procedure_that_was_stopped_are_counted(
+    job: FlightJob, ledger: Ledger
+) -> None:
+    flights = on_demand(ledger)
+    flights.start("one", foggier(job))
+    while flights.flown < 2:
+        flights.turn()
+    flights.close()
+    assert flights.flown == 2
+
+
 def test_signal_before_a_thread_has_started_ends_the_run(
     job: FlightJob, ledger: Ledger, monkeypatch: pytest.MonkeyPatch
 ) -> None:
