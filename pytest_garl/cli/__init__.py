@@ -22,6 +22,7 @@ COMMANDS = {
     "diff": "baseline",
     "domain": "domain",
     "experiment": "experiment",
+    "film": "film",
     "report": "report",
     "train": "train",
 }
