@@ -235,6 +235,10 @@ def pytest_terminal_summary(terminalreporter: Any, config: pytest.Config) -> Non
         from pytest_garl.plugin.summary import write_run
 
         try:
+            if run.options.film:
+                from pytest_garl.plugin.films import draw_failures
+
+                run.films = draw_failures(terminalreporter, run, tally)
             write_run(terminalreporter, run, tally)
             if run.options.report is not None:
                 from pytest_garl.plugin.pages import write_pages

@@ -8,7 +8,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from pytest_garl.errors import GarlError
+from pytest_garl.errors import GarlError, SavingError
 from pytest_garl.execution.ledger import Ledger
 from pytest_garl.execution.ledger_queries import LedgerFlight
 from pytest_garl.execution.reference import BUILT_IN
@@ -52,23 +52,33 @@ def check_simulator(simulator: str) -> None:
         )
 
 
+def why_no_film(flight: FlightTask) -> str:
+    """Return why a flight can have no film, whatever its record holds; empty if it can."""
+    try:
+        check_simulator(flight.job.simulator.name)
+    except GarlError as error:
+        return str(error)
+    if flight.camera is None:
+        return (
+            "the ledger does not name the camera, as those of earlier versions: search again, or "
+            "fly it with --garl-repeat"
+        )
+    return "" if flight.recorded else NO_RECORD
+
+
 def draw_film(task: FilmTask, last_s: float | None = None) -> Flight:
     """Draw the film of a flight from its record, and return the flight.
 
     Raises GarlError, which says what is missing, if that cannot be done.
     """
     flight = task.flight
-    check_simulator(flight.job.simulator.name)
-    if flight.camera is None:
-        raise GarlError(
-            "the ledger does not name the camera, as those of earlier versions: search again, or "
-            "fly it with --garl-repeat"
-        )
+    if problem := why_no_film(flight):
+        raise GarlError(problem)
     record, missing = record_of(flight)
     if record is None:
-        raise GarlError(missing or NO_RECORD)
+        raise GarlError(missing)
     try:
-        camera = dataclass_from(Camera, dict(flight.camera), "camera")
+        camera = dataclass_from(Camera, dict(flight.camera or {}), "camera")
     except ValueError as error:
         raise GarlError(f"the camera in the ledger is damaged: {error}") from error
     scenario, map = parse_scenario(flight.scenario), flight.job.load_map()
@@ -88,7 +98,10 @@ def draw_films(
     if not tasks:
         return []
     folder = tasks[0].file.parent
-    folder.mkdir(parents=True, exist_ok=True)
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise SavingError(f"{folder}: no films can be written here ({error})") from error
     # A process that is ended while it draws leaves its unfinished file in here.
     with tempfile.TemporaryDirectory(prefix=".drawn-", dir=folder) as scratch:
         works = [_Work(task=task, scratch=Path(scratch, task.file.name)) for task in tasks]
@@ -112,9 +125,9 @@ def _problem_of(work: _Work) -> str:
     """Draw a film; return why it cannot be drawn, empty if it was."""
     try:
         draw_film(replace(work.task, file=work.scratch))
-    except GarlError as error:
+        work.scratch.replace(work.task.file)
+    except (GarlError, OSError) as error:
         return str(error)
-    work.scratch.replace(work.task.file)
     return ""
 
 
