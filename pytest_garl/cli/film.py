@@ -80,7 +80,7 @@ def film(
             "--scenario and --system have no effect here: they say what was flown in a flight's "
             "file (.npz); a slot and a case know it"
         )
-    name = file.stem if file.suffix in (".npz", ".toml") else flight
+    name = file.stem if file.suffix in (".npz", ".toml") else file.name
     path = out or Path(f"{name}.mp4")
     check_film_file(path)
     from pytest_garl.cli.film_sources import Film

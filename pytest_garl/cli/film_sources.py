@@ -66,7 +66,7 @@ class Film:
     def of_case(self, file: Path, *, live: bool = False) -> tuple[str, Flight]:
         """Draw a saved case from the record of its flight if the ledger has it; else fly it."""
         case, root = load_case(file, MAPS), Path.cwd()
-        task = None if live else self._with_hash(case.evidence.trajectory_sha256)
+        task = None if live else self._recorded_case(case)
         if task is not None and any(record.is_file() for record in task.records):
             return FROM_RECORD, self._draw(task)
         from pytest_garl.plugin.case_tests import case_setup
@@ -85,7 +85,7 @@ class Film:
         """Draw a flight's own file, whose scenario and camera the ledger knows, or options tell."""
         flight = load(file)
         if scenario is None and system is None:
-            task = self._with_hash(flight.sha256)
+            task = self._of_record(flight, file)
             if task is None:
                 raise GarlError(
                     f"{file}: found a flight that {self.ledger} does not hold. A flight's file "
@@ -128,15 +128,37 @@ class Film:
             f"its search:\n{lines}"
         )
 
-    def _with_hash(self, sha256: str) -> FlightTask | None:
-        """Return the ledger's flight with this trajectory; None without one."""
-        if not sha256 or (not self.ledger.is_file() and not self.ledger_given):
+    def _recorded_case(self, case: Case) -> FlightTask | None:
+        """Return the flight that a case describes, if the ledger has it."""
+        try:
+            task = self._with_hash(case.evidence.trajectory_sha256, self.ledger)
+        except LedgerError as error:
+            if self.ledger_given:
+                raise
+            # It is of no use here, and the case can be flown all the same.
+            say(f"{error}")
             return None
-        if not self.ledger.is_file():
-            raise LedgerError(f"there is no ledger at {self.ledger}; name another one")
-        with checked_ledger(self.ledger) as opened:
-            flight = opened.queries.flight_with_hash(sha256)
-            return recorded_flight(opened, flight) if flight is not None else None
+        return task if task is not None and task.job.system.name == case.system else None
+
+    def _of_record(self, flight: Flight, file: Path) -> FlightTask | None:
+        """Return what a ledger knows of a flight: the one that is named, or those near the file."""
+        run = file.absolute().parents[1] if file.parent.name == "flights" else self.ledger.parent
+        near = (self.ledger, run / "ledger.sqlite", run / "repeat.sqlite")
+        found = (
+            self._with_hash(flight.sha256, ledger)
+            for ledger in (near[:1] if self.ledger_given else near)
+        )
+        return next((task for task in found if task is not None), None)
+
+    def _with_hash(self, sha256: str, ledger: Path) -> FlightTask | None:
+        """Return a ledger's flight with this trajectory; None without one."""
+        if not ledger.is_file() and self.ledger_given:
+            raise LedgerError(f"there is no ledger at {ledger}; name another one")
+        if not sha256 or not ledger.is_file():
+            return None
+        with checked_ledger(ledger) as opened:
+            known = opened.queries.flight_with_hash(sha256)
+            return recorded_flight(opened, known) if known is not None else None
 
 
 def draw_replay(

@@ -183,6 +183,18 @@ def test_a_flights_file_is_drawn_as_its_ledger_says(run: Path, video: Video) -> 
     assert pictures_in(run / "mine.mp4") == 30 + CLOSING_FRAMES
 
 
+def test_a_record_finds_the_ledger_of_its_run(
+    run: Path, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    record = run / ".garl" / "flights" / f"01234567-{SLOT}.npz"
+    (tmp_path / "elsewhere").mkdir()
+    monkeypatch.chdir(tmp_path / "elsewhere")
+    drawn(record, "-o", "it.mp4")
+    shutil.move(run / ".garl" / "ledger.sqlite", run / ".garl" / "repeat.sqlite")
+    drawn(record, "-o", "it.mp4")
+    assert "there is no ledger at nowhere.sqlite" in refused(record, "--ledger=nowhere.sqlite")
+
+
 def test_a_flights_file_of_no_ledger_needs_scenario_and_system(
     tmp_path: Path, video: Video, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -219,9 +231,11 @@ def test_a_saved_case_is_flown_again_by_its_name_or_its_file(case: Path) -> None
     assert words.startswith(f"flying {case.stem} again: no record of its flight at .garl/")
     assert f"\n{case.stem}.mp4: 0.0 s, " in words
     assert words.endswith(", flown again\n")
-    for name in (case.stem, f"case-{case.stem}", f"{case.parent.name}/{case.stem}"):
-        drawn(name, "-o", "it.mp4")
-    assert Path("it.mp4").read_bytes()[4:8] == b"ftyp"
+    assert Path(f"{case.stem}.mp4").read_bytes()[4:8] == b"ftyp"
+    assert f"\n{case.stem}.mp4: " in drawn(f"{case.parent.name}/{case.stem}")
+    assert f"\ncase-{case.stem}.mp4: " in drawn(f"case-{case.stem}")
+    # Its policy stands still, so a live one flies the same.
+    assert f"\ncase-{case.stem}-live.mp4: " in drawn(f"case-{case.stem}-live")
 
 
 def test_a_saved_case_is_drawn_from_the_record_that_the_ledger_has(
@@ -231,9 +245,25 @@ def test_a_saved_case_is_drawn_from_the_record_that_the_ledger_has(
     saved = load_case(case)
     evidence = dataclasses.replace(saved.evidence, trajectory_sha256=video.flight.sha256)
     file = replace_file(case, dataclasses.replace(saved, evidence=evidence))
+    assert "flown again" in drawn(file, "-o", "it.mp4"), "of another system"
+    shutil.rmtree(".garl")
+    flown = [Flown(result=lost(), flight=video.flight)]
+    write_ledger(Path.cwd(), flown, system=saved.system)
     assert drawn(file, "-o", "it.mp4").startswith("it.mp4: 3.0 s")
     shutil.rmtree(".garl/flights")
     assert "flown again" in drawn(file, "-o", "it.mp4")
+
+
+def test_a_ledger_that_cannot_be_read_keeps_no_case_from_being_flown(case: Path) -> None:
+    evidence = dataclasses.replace(load_case(case).evidence, trajectory_sha256="f" * 64)
+    file = replace_file(case, dataclasses.replace(load_case(case), evidence=evidence))
+    Path(".garl").mkdir()
+    Path(".garl/ledger.sqlite").write_text("no ledger")
+    words = drawn(file, "-o", "it.mp4")
+    assert words.startswith(".garl/ledger.sqlite: file is not a database")
+    assert "flown again" in words
+    assert "file is not a database" in refused(file, "--ledger=.garl/ledger.sqlite")
+    assert "there is no ledger at nowhere.sqlite" in refused(file, "--ledger=nowhere.sqlite")
 
 
 def test_a_case_that_is_not_there_is_told_with_similar_ones(case: Path) -> None:
