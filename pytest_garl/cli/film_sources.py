@@ -55,13 +55,9 @@ class Film:
         try:
             return FROM_RECORD, self._draw(task)
         except GarlError as error:
-            again = f"pytest --garl-repeat={task.name}"
-            hint = (
-                f"To fly it again: {again}, then garl film {task.name} "
-                f"--ledger={self.ledger.with_name('repeat.sqlite')}"
-            )
             missing = not any(each.is_file() for each in task.records)
-            raise GarlError(f"{name}: {error}{f' {hint}' if missing else ''}") from error
+            hint = self._how_to_fly_again(task) if missing else ""
+            raise GarlError(f"{name}: {error}{hint}") from error
 
     def of_case(self, file: Path, *, live: bool = False) -> tuple[str, Flight]:
         """Draw a saved case from the record of its flight if the ledger has it; else fly it."""
@@ -104,6 +100,17 @@ class Film:
         map = load_map(flown.map, MAPS)
         save_video(self.path, flight, flown, map, camera, NOT_JUDGED, last_s=self.last_s)
         return FROM_RECORD, flight
+
+    def _how_to_fly_again(self, task: FlightTask) -> str:
+        """Return the commands that fly a slot again; none for a ledger pytest does not read."""
+        if self.ledger.name != "ledger.sqlite":
+            return ""
+        folder = self.ledger.parent
+        where = "" if folder == Path(".garl") else f" -o garl_dir={folder}"
+        return (
+            f" To fly it again: pytest --garl-repeat={task.name}{where}, then garl film "
+            f"{task.name} --ledger={folder / 'repeat.sqlite'}"
+        )
 
     def _draw(self, task: FlightTask, record: Path | None = None) -> Flight:
         known = replace(task, records=(record,)) if record is not None else task

@@ -124,6 +124,13 @@ def test_a_missing_record_says_what_to_do(run: Path) -> None:
         "--ledger=.garl/repeat.sqlite"
     ) in error
     assert not list(run.glob("*.mp4"))
+    shutil.move(run / ".garl", run / "ci")
+    error = refused(SLOT, "--ledger=ci/ledger.sqlite")
+    assert (
+        f"pytest --garl-repeat={SLOT} -o garl_dir=ci, then garl film {SLOT} --ledger=ci/" in error
+    )
+    (run / "ci" / "ledger.sqlite").rename(run / "ci" / "ledger-previous.sqlite")
+    assert "To fly it again" not in refused(SLOT, "--ledger=ci/ledger-previous.sqlite")
 
 
 def test_a_record_that_a_later_run_wrote_is_not_taken_for_the_flight(

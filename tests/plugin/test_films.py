@@ -13,6 +13,7 @@ from typing import Any
 
 import pytest
 
+from pytest_garl.execution.flight_id import FlightId, Slot
 from pytest_garl.execution.stored_ledger import checked_ledger
 from pytest_garl.plugin import films
 from pytest_garl.plugin.tally import Tally
@@ -184,9 +185,12 @@ def test_without_an_encoder_nothing_is_flown(
     assert not (pytester.path / ".garl").exists()
 
 
-def test_an_interrupted_run_draws_nothing(pytester: pytest.Pytester) -> None:
+@IN_PARALLEL
+def test_an_interrupted_run_draws_nothing(
+    pytester: pytest.Pytester, parallel: tuple[str, ...]
+) -> None:
     slow_project(pytester)
-    process = start(pytester, "--garl-film=failures")
+    process = start(pytester, "--garl-film=failures", *parallel)
     wait_for(pytester.path / ".garl" / "ledger.sqlite", 8, process, patience_s=120)
     process.send_signal(signal.SIGINT)
     output, _ = process.communicate(timeout=120)
@@ -248,6 +252,17 @@ def test_the_most_frequent_kinds_have_films_and_the_others_are_named(
     assert found.notes[1:] == (
         "10 films are drawn at most; `garl film SLOT` draws the others: lawn-g00-s11, lawn-g00-s12",
     )
+
+
+def test_a_slot_of_two_systems_has_two_films() -> None:
+    def failure(system: str, search: str, index: int) -> films._Failure:
+        flight: Any = SimpleNamespace(
+            id=FlightId(search=search * 16, map="lawn", slot=Slot(generation=0, index=index))
+        )
+        return films._Failure(key=(system, "lawn", "I"), name=flight.id.slot_id, flight=flight)
+
+    both = [failure("a:A", "a", 1), failure("b:B", "b", 1), failure("b:B", "b", 2)]
+    assert films._names(both) == ["aaaaaaaa-lawn-g00-s01", "bbbbbbbb-lawn-g00-s01", "lawn-g00-s02"]
 
 
 def test_a_reason_is_told_once(session: Any, monkeypatch: pytest.MonkeyPatch) -> None:
