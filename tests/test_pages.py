@@ -141,7 +141,7 @@ def test_readme_shows_output_of_the_tutorial() -> None:
 
 def test_picture_of_the_readme_loads_quickly() -> None:
     (picture,) = re.findall(r"!\[.*?\]\((.*?)\)", README.read_text())
-    assert (ROOT / picture).stat().st_size < 400_000
+    assert (ROOT / picture).stat().st_size < 1_000_000
 
 
 def test_every_command_of_the_readme_is_run() -> None:

@@ -23,6 +23,7 @@ COMMANDS = {
     "domain": "domain",
     "experiment": "experiment",
     "export": "export",
+    "film": "film",
     "report": "report",
     "train": "train",
 }

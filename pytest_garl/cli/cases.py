@@ -64,7 +64,7 @@ def cases(context: click.Context, folder: Path) -> None:
     context.obj = _Project(root=root, corpus=Corpus(folder, (root / "scenarios" / "maps",)))
 
 
-def _say(text: str, *, err: bool = False) -> None:
+def say(text: str, *, err: bool = False) -> None:
     """Print a text that may hold names and content of files, without control characters."""
     click.echo(printable(text), err=err)
 
@@ -78,12 +78,12 @@ def list_(project: _Project) -> None:
     """List all cases with status, signature, robustness and number of objects."""
     found = project.corpus.all_entries()
     if not found:
-        _say(f"no cases in {project.corpus.folder}; a search saves what it finds")
+        say(f"no cases in {project.corpus.folder}; a search saves what it finds")
         return
     print_table(case_table(found))
     for entry in found:
         if entry.case is None:
-            _say(entry.problem)
+            say(entry.problem)
     new = [
         str(entry.path)
         for entry in found
@@ -93,8 +93,8 @@ def list_(project: _Project) -> None:
         and not project.corpus.is_accepted(entry)
     ]
     if new:
-        _say("\nNew, so that pytest fails on them until they are fixed, committed or accepted:")
-        _say("    garl cases accept " + " \\\n        ".join(shlex.quote(each) for each in new))
+        say("\nNew, so that pytest fails on them until they are fixed, committed or accepted:")
+        say("    garl cases accept " + " \\\n        ".join(shlex.quote(each) for each in new))
 
 
 @cases.command()
@@ -104,23 +104,23 @@ def show(project: _Project, file: Path) -> None:
     """Show what happens in a case, in words and physical units."""
     case = project.case(file)
     evidence = case.evidence
-    _say(f"{case.id}  {case.status}  {case.system}")
-    _say(f"{case.violation.signature}: {case.violation.description}")
+    say(f"{case.id}  {case.status}  {case.system}")
+    say(f"{case.violation.signature}: {case.violation.description}")
     if case.severity.text:
         means = grade_in_words(case.severity.grade)
-        _say(f"It takes {case.severity.text}{f' ({means})' if means else ''}.")
-    _say("")
+        say(f"It takes {case.severity.text}{f' ({means})' if means else ''}.")
+    say("")
     print_table(scenario_table(case, project.maps))
     for key, by in environment_changes(case):
-        _say(f"during the flight {key} changes by {by:+.2f}")
+        say(f"during the flight {key} changes by {by:+.2f}")
     if case.prevention.text:
-        _say(f"\n{case.prevention.text}.")
+        say(f"\n{case.prevention.text}.")
     if not case.gates:
-        _say(f"\nIt gates nothing: {NO_GATE_TEXTS[case.reason]}.")
+        say(f"\nIt gates nothing: {NO_GATE_TEXTS[case.reason]}.")
     tried = f"{case.robustness}; " if case.robustness else ""
     moved = f"; objects were moved by {case.policy}" if case.moves else ""
-    _say(f"\n{tried}shrinking removed {evidence.removed}{moved}")
-    _say(f"Fly it: garl cases replay {file}")
+    say(f"\n{tried}shrinking removed {evidence.removed}{moved}")
+    say(f"Fly it: garl cases replay {file}")
 
 
 @cases.command("replay")
@@ -133,7 +133,8 @@ def show(project: _Project, file: Path) -> None:
 @click.option(
     "--video",
     type=click.Path(path_type=Path, dir_okay=False),
-    help="Draw the flight as an .mp4: the camera's view beside a map (extra: video).",
+    help="Draw the flight as an .mp4, or a small .gif: the camera's view beside a map (needs "
+    "ffmpeg, or the extra: video).",
 )
 @click.pass_context
 def replay_(context: click.Context, file: Path, live: bool, video: Path | None) -> None:
@@ -145,33 +146,29 @@ def replay_(context: click.Context, file: Path, live: bool, video: Path | None) 
     project: _Project = context.obj
     case = project.case(file)
     if video is not None:
-        from pytest_garl.video.encoder import program
+        from pytest_garl.video.film_file import check_film_file
 
         # Checked before the flight, which takes longer.
-        program()
+        check_film_file(video, makes_folder=True)
     replayed = replay(case, project.root, project.maps, live=live)
     _show_replay(replayed)
     if video is not None:
-        if replayed.flight is None:
-            raise GarlError(f"{file}: its process ended before the flight was recorded: no video")
-        from pytest_garl.landing_system import airframe_of
-        from pytest_garl.video import save_video
+        from pytest_garl.cli.film_sources import draw_replay
 
-        camera = airframe_of(system_of(case, project.root)).camera
-        save_video(video, replayed.flight, case.scenario, replayed.map, camera, replayed.signature)
-        _say(f"drawn: {video}")
+        draw_replay(video, file, case, replayed, project.root)
+        say(f"drawn: {video}")
     context.exit(EXIT_STATUS[replayed.result])
 
 
 def _show_replay(replayed: Replay) -> None:
     click.secho(replayed.result, bold=True, fg="green" if replayed.result == "FIXED" else "red")
-    _say(f"{replayed.signature or 'no violation'}: {replayed.description}")
+    say(f"{replayed.signature or 'no violation'}: {replayed.description}")
     for reason in replayed.reasons:
-        _say(reason)
-    _say(f"judged by {replayed.judged_by}")
+        say(reason)
+    say(f"judged by {replayed.judged_by}")
     if replayed.same_flight is not None:
         same = replayed.same_flight
-        _say("the same flight to the byte" if same else "another flight than the recorded one")
+        say("the same flight to the byte" if same else "another flight than the recorded one")
 
 
 @cases.command()
@@ -191,7 +188,7 @@ def accept(project: _Project, files: tuple[Path, ...]) -> None:
     found = [(file, project.case(file)) for file in files]
     for file, case in found:
         replace_file(file, dataclasses.replace(case, accepted=True), project.maps)
-        _say(f"{file}: accepted; it is expected to fail ({case.violation.signature})")
+        say(f"{file}: accepted; it is expected to fail ({case.violation.signature})")
 
 
 @cases.command()
@@ -218,9 +215,9 @@ def promote(project: _Project, file: Path) -> None:
     # What passes is not unpreventable.
     reason: NoGateReason = "edge" if case.edge else ""
     replace_file(file, dataclasses.replace(case, status="fixed", reason=reason), project.maps)
-    _say(f"{file}: fixed; from now on it must pass")
+    say(f"{file}: fixed; from now on it must pass")
     for line in remarks:
-        _say(line)
+        say(line)
 
 
 def _refusal(replayed: Replay, how: str) -> str:
@@ -257,13 +254,13 @@ def shrink(project: _Project, file: Path, flights: int, workers: int) -> None:
     if result.case is None and result.reason != NOTHING_SIMPLER:
         raise GarlError(f"{file}: {result.reason}; `garl cases replay {file}` shows how it ends")
     if result.case is None:
-        _say(f"{file}: {result.reason} ({spent}); it stays as it is")
+        say(f"{file}: {result.reason} ({spent}); it stays as it is")
         return
     path = replace_file(file, result.case, project.maps)
     evidence = result.case.evidence
     renewed = result.case.id == case.id
     done = "its evidence is renewed" if renewed else f"removed {evidence.removed} in all"
-    _say(f"{path}: {done} ({spent})")
+    say(f"{path}: {done} ({spent})")
 
 
 @cases.command()
@@ -283,10 +280,10 @@ def prune(project: _Project, yes: bool) -> None:
         if replayed.result != "STALE":
             kept += 1
             continue
-        _say(f"{entry.path}: passes, but {'; '.join(replayed.reasons)}")
+        say(f"{entry.path}: passes, but {'; '.join(replayed.reasons)}")
         if yes or click.confirm("delete it?"):
             entry.path.unlink()
-    _say(f"{kept} cases are not stale")
+    say(f"{kept} cases are not stale")
 
 
 @cases.command()
@@ -313,7 +310,7 @@ def check(project: _Project) -> None:
         except GarlError as error:
             problems.append(f"{entry.path}: {error}")
     for problem in problems:
-        _say(problem, err=True)
-    _say(f"{len(found)} cases, {len(problems)} problems")
+        say(problem, err=True)
+    say(f"{len(found)} cases, {len(problems)} problems")
     if problems:
         raise SystemExit(1)

@@ -48,7 +48,7 @@ def check(
     # Nothing else interrupts a call that hangs in C code and holds the interpreter.
     faulthandler.dump_traceback_later(LIMIT_S, exit=True, file=sys.__stderr__ or 2)
     try:
-        found = _imported(system)
+        found = imported_system(system)
         for name in maps:
             result = check_landing_system(
                 found, map=name, seconds=seconds, deterministic=not nondeterministic
@@ -58,7 +58,8 @@ def check(
         faulthandler.cancel_dump_traceback_later()
 
 
-def _imported(name: str) -> type:
+def imported_system(name: str) -> type:
+    """Return a landing system's class, imported as from the current folder."""
     if str(Path.cwd()) not in sys.path:
         sys.path.insert(0, str(Path.cwd()))
     from pytest_garl.execution.reference import system_named

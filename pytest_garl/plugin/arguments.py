@@ -133,6 +133,13 @@ OPTIONS = (
         "GitHub's step summary shows its pictures and links to its pages, and so does JUnit XML.",
     ),
     Option(
+        name="film",
+        metavar="failures",
+        help="Draw films when the run ends, into .garl/films: of each saved case that fails, and "
+        "of the first flight of each kind of violation, ten at most. It needs ffmpeg, or "
+        "pytest-garl[video]. `garl film` draws any other flight.",
+    ),
+    Option(
         name="npcs",
         metavar="POLICY",
         help=f"NPC policy, which moves people, dogs and birds: {', '.join(policy_names())}, or "
@@ -179,7 +186,7 @@ def is_enabled(config: pytest.Config) -> bool:
     if config.getoption("--garl-resume"):
         return True
     return any(config.getoption(f"--garl-{name}") is not None for name in names) or any(
-        config.getini(f"garl_{name}") for name in ("budget", "repeat", "baseline")
+        config.getini(f"garl_{name}") for name in ("budget", "repeat", "baseline", "film")
     )
 
 

@@ -15,6 +15,7 @@ from pytest_garl.plugin.keys import (
     OUTSIDE,
     RUN,
     SIGNATURE,
+    TRAJECTORY,
     UNPROVEN,
 )
 
@@ -74,7 +75,7 @@ def landing(request: pytest.FixtureRequest, garl_slot: Target, npcs: PolicySpec 
         ("garl.excuse", result.verdict.excuse_text or result.verdict.excuse),
         ("garl.final_distance_m", result.final_distance_m),
         ("garl.elapsed_s", result.elapsed_s),
-        ("garl.trajectory_sha256", flight.sha256),
+        (TRAJECTORY, flight.sha256),
     ]
     if outside := run.outside_domain(garl_slot):
         item.user_properties.append((OUTSIDE, outside))

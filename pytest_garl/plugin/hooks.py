@@ -237,6 +237,10 @@ def pytest_terminal_summary(terminalreporter: Any, config: pytest.Config) -> Non
         from pytest_garl.plugin.summary import write_run
 
         try:
+            if run.options.film:
+                from pytest_garl.plugin.films import draw_failures
+
+                run.films = draw_failures(terminalreporter, run, tally)
             searches = write_run(terminalreporter, run, tally)
             report = write_pages(terminalreporter, run)
             write_step_summary(terminalreporter, run, searches, report)

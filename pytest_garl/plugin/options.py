@@ -16,7 +16,9 @@ from pytest_garl.adversary.domain_policy import domain_with_policy, policy_in
 from pytest_garl.errors import GarlError
 from pytest_garl.execution.flight_id import Slot
 from pytest_garl.plugin.arguments import OPTIONS, Option
-from pytest_garl.plugin.report_options import report_folder, report_url, wrong_value
+from pytest_garl.plugin.keys import is_xdist_worker
+from pytest_garl.plugin.option_values import among, filmed, integer, number, wrong
+from pytest_garl.plugin.report_options import report_folder, report_url
 from pytest_garl.scenarios.domains.names import DEFAULT_DOMAIN, OLD_WEATHER
 from pytest_garl.search.catalogue import default_policy, find_method, method_names
 
@@ -69,6 +71,8 @@ class Options:
     """The folder for the pages of the run."""
     report_url: str
     """Where that folder will be published, without a slash at the end; may be empty."""
+    film: Literal["", "failures"]
+    """Which flights of the run have films."""
     shrink: int
     """Flights for each new kind of violation."""
     shrink_capped: bool
@@ -114,6 +118,11 @@ class Options:
         """The folder of the flights' records."""
         return self.folder / "flights"
 
+    @property
+    def films(self) -> Path:
+        """The folder of the films of failing flights."""
+        return self.folder / "films"
+
 
 _OPTIONS = pytest.StashKey[Options]()
 
@@ -131,8 +140,8 @@ def options_of(config: pytest.Config) -> Options:
 def read_options(config: pytest.Config) -> Options:
     """Read the options; call ``options_of``, which does it once."""
     text = {option.name: _value(config, option) for option in OPTIONS}
-    budget = _integer("budget", text["budget"], 1) if text["budget"] else 0
-    size = _integer("population", text["population"], 1) if text["population"] else 0
+    budget = integer("budget", text["budget"], 1) if text["budget"] else 0
+    size = integer("population", text["population"], 1) if text["population"] else 0
     address = os.environ.get("RAY_ADDRESS", "")
     address = "" if address == "local" else address
     folder = config.rootpath / str(config.getini("garl_dir"))
@@ -146,21 +155,22 @@ def read_options(config: pytest.Config) -> Options:
         seed=_seed(config, text["seed"]),
         method=_method(text["method"]),
         maps=tuple(part.strip() for part in text["map"].split(",") if part.strip()),
-        pool=cast(Literal["local", "ray"], _among("pool", text["pool"], ("local", "ray"))),
+        pool=cast(Literal["local", "ray"], among("pool", text["pool"], ("local", "ray"))),
         workers=_workers(text["workers"], text["pool"], address),
         ray_address=address,
         domain=_domain(config),
-        timeout_s=_number("timeout", text["timeout"], 1e6, "a positive number of seconds"),
+        timeout_s=number("timeout", text["timeout"], 1e6, "a positive number of seconds"),
         repeat=repeat,
         repeated_slot=slot,
         duplicates=cast(
-            Literal["xfail", "fail"], _among("duplicates", text["duplicates"], ("xfail", "fail"))
+            Literal["xfail", "fail"], among("duplicates", text["duplicates"], ("xfail", "fail"))
         ),
         npcs=_npcs(text["npcs"]),
         baseline=_baseline(config),
-        level=_number("level", text["level"], 1, "a number between 0 and 1"),
+        level=number("level", text["level"], 1, "a number between 0 and 1"),
         report=report_folder(config),
         report_url=report_url(text["report-url"]),
+        film=filmed(text["film"], draws=not is_xdist_worker(config)),
         shrink=_shrink(text["shrink"]),
         shrink_capped=not text["shrink"],
         xfail_strict=bool(config.getini("garl_xfail_strict")),
@@ -192,37 +202,20 @@ def _given(config: pytest.Config) -> frozenset[str]:
     return frozenset([*names, *(["resume"] if config.getoption("--garl-resume") else [])])
 
 
-def _integer(name: str, text: str, low: int) -> int:
-    if not re.fullmatch(r"\d+", text) or int(text) < low:
-        raise wrong_value(name, text, f"a whole number of at least {low}")
-    return int(text)
-
-
 def _workers(text: str, pool: str, ray_address: str) -> int | None:
     if text:
         # None of Ray's workers is the pytest process.
-        return _integer("workers", text, 1 if pool == "ray" else 0)
+        return integer("workers", text, 1 if pool == "ray" else 0)
     return None if pool == "ray" and ray_address else os.cpu_count() or 1
 
 
 def _shrink(text: str) -> int:
     if not text:
         return SHRINK
-    number = _integer("shrink", text, 0)
+    number = integer("shrink", text, 0)
     if 0 < number < MINIMUM_SHRINK:
-        raise wrong_value("shrink", text, f"0, or at least {MINIMUM_SHRINK} flights per new kind")
+        raise wrong("shrink", text, f"0, or at least {MINIMUM_SHRINK} flights per new kind")
     return number
-
-
-def _number(name: str, text: str, below: float, expected: str) -> float:
-    """Return a number between 0 and ``below``, both excluded."""
-    try:
-        value = float(text)
-    except ValueError:
-        value = -1.0
-    if not 0 < value < below:
-        raise wrong_value(name, text, expected)
-    return value
 
 
 def _baseline(config: pytest.Config) -> Path | None:
@@ -230,19 +223,13 @@ def _baseline(config: pytest.Config) -> Path | None:
     given = config.getoption("--garl-baseline")
     text, folder = (given, Path()) if given else (config.getini("garl_baseline"), config.rootpath)
     if text and not (folder / text).is_file():
-        raise wrong_value("baseline", text, "a file that `garl baseline save` wrote")
+        raise wrong("baseline", text, "a file that `garl baseline save` wrote")
     return folder / text if text else None
-
-
-def _among(name: str, text: str, known: tuple[str, ...]) -> str:
-    if text not in known:
-        raise wrong_value(name, text, f"one of {', '.join(known)}")
-    return text
 
 
 def _method(text: str) -> str:
     if ":" not in text:
-        return _among("method", text, method_names())
+        return among("method", text, method_names())
     try:
         find_method(text)
     except GarlError as error:
@@ -266,7 +253,7 @@ def _domain(config: pytest.Config) -> Domain:
                 "bad the weather may become; give only --garl-domain"
             )
         if weather:
-            domain = OLD_WEATHER[_among("weather", weather, tuple(OLD_WEATHER))]
+            domain = OLD_WEATHER[among("weather", weather, tuple(OLD_WEATHER))]
             _warn_of_weather(config, weather, domain)
         if domain:
             return _read_domain(domain, folder)
@@ -294,7 +281,7 @@ def _npcs(text: str) -> str:
         return text
     if not text.endswith(".npz"):
         expected = f"one of {', '.join(policy_names())}, or weights (.npz) that `garl train` wrote"
-        raise wrong_value("npcs", text, expected)
+        raise wrong("npcs", text, expected)
     return text
 
 
@@ -306,14 +293,12 @@ def _seed(config: pytest.Config, text: str) -> int:
         import secrets
 
         return secrets.randbelow(2**32)
-    return _integer("seed", text, 0)
+    return integer("seed", text, 0)
 
 
 def _repeat(text: str) -> str:
     if text and not SLOT_ID.fullmatch(text) and not Path(text).is_file():
-        raise wrong_value(
-            "repeat", text, "a slot such as court-g03-s17, or an existing scenario file"
-        )
+        raise wrong("repeat", text, "a slot such as court-g03-s17, or an existing scenario file")
     return text
 
 

@@ -9,14 +9,10 @@ from pathlib import Path
 import pytest
 
 from pytest_garl.errors import GarlError
+from pytest_garl.plugin.option_values import wrong
 
 _URL = re.compile(r"[\w.~:/?#@!$&*+,;=%-]+", re.ASCII)
 """An address without what ends it in Markdown or HTML."""
-
-
-def wrong_value(name: str, found: str, expected: str) -> pytest.UsageError:
-    """Return the error for a value of ``--garl-{name}``."""
-    return pytest.UsageError(f"--garl-{name}: found {found!r}, expected {expected}")
 
 
 def report_folder(config: pytest.Config) -> Path | None:
@@ -43,5 +39,5 @@ def report_url(text: str) -> str:
     """Return the address without a slash at its end."""
     parts = urllib.parse.urlsplit(text)
     if text and not (parts.scheme in ("http", "https") and parts.netloc and _URL.fullmatch(text)):
-        raise wrong_value("report-url", text, "an address such as https://example.org/report")
+        raise wrong("report-url", text, "an address such as https://example.org/report")
     return text.rstrip("/")

@@ -30,6 +30,7 @@ from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.simulation.npc_policy import PolicySpec
 
 if TYPE_CHECKING:
+    from pytest_garl.plugin.films import Films
     from pytest_garl.plugin.user_assertions import ItemAssertion
     from pytest_garl.regressions.follow_up import InvestigatedSignature
     from pytest_garl.regressions.forecast import RemainingWork
@@ -144,6 +145,8 @@ class Run:
     """Whether all tests ran and nobody interrupted them."""
     investigated: tuple[InvestigatedSignature, ...] = ()
     """Results of the investigation of new signatures."""
+    films: Films | None = None
+    """The films of what failed, if an option asks for them."""
     remaining: RemainingWork | None = None
     """The work that follows the search, once it is known."""
     save_problem: str = ""

@@ -3,17 +3,20 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from types import MappingProxyType
 from typing import Any
 
 import pytest
 
+from pytest_garl.plugin.films import film_lines
 from pytest_garl.plugin.header import cpu_dispatch_warning
 from pytest_garl.plugin.keys import CASE, MAYBE_FIXED, OUTSIDE, STALE
 from pytest_garl.plugin.run import Run
 from pytest_garl.plugin.save_cases import saved_lines
 from pytest_garl.plugin.session_status import notes
-from pytest_garl.plugin.suggested_commands import repeat_kind_command
+from pytest_garl.plugin.suggested_commands import repeat_kind_command, shown_path
 from pytest_garl.plugin.tally import Tally
 from pytest_garl.plugin.terminal_text import width_of, wrapped
 from pytest_garl.reports.run_report import ENDED, USER_FAILURES, utc_now
@@ -25,6 +28,7 @@ from pytest_garl.reports.shares_text import (
     share_lines,
 )
 
+NO_FILMS: Mapping[str, Path] = MappingProxyType({})
 _UNDECIDED = "Skipped: not decided:"
 
 
@@ -42,10 +46,12 @@ def write_run(reporter: Any, run: Run, tally: Tally) -> list[SearchSummary]:
         *_cases_outside(reporter),
         *(wrapped(line, width_of(reporter.config)) for line in cpu_dispatch_warning(run)),
     ]
-    if lines:
-        reporter.section("garl: cases", sep="=")
-    for line in lines:
-        reporter.write_line(line)
+    films = film_lines(run.films, reporter.config) if run.films else []
+    for title, text in (("cases", lines), ("films", films)):
+        if text:
+            reporter.section(f"garl: {title}", sep="=")
+        for line in text:
+            reporter.write_line(line)
     return searches
 
 
@@ -105,7 +111,11 @@ def _write_searches(reporter: Any, run: Run, tally: Tally) -> list[SearchSummary
 
 def _lines_about(searches: list[SearchSummary], run: Run, reporter: Any) -> list[str]:
     width = width_of(reporter.config)
-    lines = [line for each in searches for line in search_table(each, reporter.config, width)]
+    lines = [
+        line
+        for each in searches
+        for line in search_table(each, reporter.config, width, _films_of(run, each))
+    ]
     types = legend(kind for search in searches for kind in (*search.kinds, *search.findings))
     lines += [wrapped(text, width) for text in (types, _costs(run)) if text]
     progress = run.ledger.queries.progress()
@@ -160,10 +170,20 @@ def _costs(run: Run) -> str:
     return ", ".join(words)
 
 
-def search_table(search: SearchSummary, config: pytest.Config, width: int) -> list[str]:
+def _films_of(run: Run, search: SearchSummary) -> Mapping[str, Path]:
+    return run.films.of_search(search.system, search.map) if run.films else {}
+
+
+def search_table(
+    search: SearchSummary,
+    config: pytest.Config,
+    width: int,
+    films: Mapping[str, Path] = NO_FILMS,
+) -> list[str]:
     """Return the shares of a system on a map, then each kind of violation and how to see it.
 
-    What had gone wrong before another event follows; no item fails for it.
+    ``films`` are those of the kinds by signature.  What had gone wrong before another event
+    follows; no item fails for it.
     """
     lines = [
         wrapped(f"{search.name} on {search.map}: {headline_shares(search)}", width, others="  "),
@@ -171,7 +191,7 @@ def search_table(search: SearchSummary, config: pytest.Config, width: int) -> li
             wrapped(line, width, first="  ", others="    ")
             for line in (*share_lines(search), *kinds_lines(search))
         ),
-        *_kind_lines(search, search.kinds, config, width),
+        *_kind_lines(search, search.kinds, config, width, films),
     ]
     if search.findings:
         lines.append("  before another event:")
@@ -180,7 +200,11 @@ def search_table(search: SearchSummary, config: pytest.Config, width: int) -> li
 
 
 def _kind_lines(
-    search: SearchSummary, kinds: Sequence[ViolationKind], config: pytest.Config, width: int
+    search: SearchSummary,
+    kinds: Sequence[ViolationKind],
+    config: pytest.Config,
+    width: int,
+    films: Mapping[str, Path] = NO_FILMS,
 ) -> list[str]:
     lines = []
     longest = max((len(kind.signature) for kind in kinds), default=0)
@@ -195,4 +219,6 @@ def _kind_lines(
         facts = "; ".join(fact for fact in (least, seen) if fact)
         if facts:
             lines.append(wrapped(facts, width, first=" " * 8, others=" " * 10))
+        if kind.signature in films:
+            lines.append(f"{'':8}film: {shown_path(films[kind.signature], config)}")
     return lines

@@ -35,6 +35,8 @@ class Tally:
         self.flown = False
         self.not_repeated: set[tuple[str, ...]] = set()
         self.problems: list[str] = []
+        self.interrupted = False
+        """Whether somebody ended the session with Ctrl-C."""
         self._signatures: dict[tuple[str, str], str] = {}
         self._failing_flights: set[tuple[str, str]] = set()
         self._failures: dict[str, str] = {}
@@ -76,6 +78,11 @@ class Tally:
             self._user_failures.setdefault(report.nodeid, []).append(str(properties[USER_FAILURE]))
         if NOT_REPEATED in properties:
             self.not_repeated.add(tuple(json.loads(str(properties[NOT_REPEATED]))))
+
+    def pytest_keyboard_interrupt(self, excinfo: pytest.ExceptionInfo[BaseException]) -> None:
+        """Note that somebody wants the session to end."""
+        # pytest and xdist stop after -x by exceptions that inherit from this one.
+        self.interrupted = excinfo.type is KeyboardInterrupt
 
     @property
     def user_failures(self) -> list[SlotUserFailure]:

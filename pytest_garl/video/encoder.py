@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import os
+import shutil
 import subprocess
 import tempfile
 from collections.abc import Iterable, Sequence
@@ -19,20 +20,22 @@ TOP_KBPS = 350
 """Limits a video of 60 s to 2.6 MB in any weather."""
 _BUFFER_S = 4
 """The encoder may exceed the limit for so long."""
+_PATIENCE_S = 30
+"""An ffmpeg lists its encoders in a tenth of a second."""
 
 
 def write(frames: Iterable[Image], path: Path, rate_hz: float, *, top_kbps: int = TOP_KBPS) -> None:
     """Encode pictures, RGB uint8 (H, W, 3) of one even size, into the .mp4 file ``path``.
 
     The file appears once it is complete, and has ``top_kbps`` kilobits per second at most over any
-    four seconds.  Raises GarlError where imageio-ffmpeg is missing,
-    where the pictures do not fit together, or with the encoder's own words where it fails.
+    four seconds.  Raises GarlError where there is no encoder, where the pictures do not fit
+    together, or with the encoder's own words where it fails.
     """
     ffmpeg = program()
     pictures = iter(frames)
     first = next(pictures, None)
     if first is None:
-        raise GarlError(f"{path}: a video needs at least one picture; the flight gave none")
+        raise no_picture(path)
     height, width = first.shape[:2]
     if height % 2 or width % 2:
         raise GarlError(
@@ -42,13 +45,19 @@ def write(frames: Iterable[Image], path: Path, rate_hz: float, *, top_kbps: int 
     scratch = path.with_name(f".{path.name}.{os.getpid()}")
     try:
         command = _command(ffmpeg, width, height, rate_hz, scratch, top_kbps)
-        _encode(command, chain([first], pictures), path)
+        encode(command, chain([first], pictures), path)
         scratch.replace(path)
     finally:
         scratch.unlink(missing_ok=True)
 
 
-def _encode(command: Sequence[str], pictures: Iterable[Image], path: Path) -> None:
+def no_picture(path: Path) -> GarlError:
+    """Return the error of a film without any picture."""
+    return GarlError(f"{path}: a video needs at least one picture; the flight gave none")
+
+
+def encode(command: Sequence[str], pictures: Iterable[Image], path: Path) -> None:
+    """Let ffmpeg read pictures from its standard input; errors name ``path``."""
     shape = None
     with tempfile.TemporaryFile() as said:
         with subprocess.Popen(
@@ -93,15 +102,51 @@ def _command(
 
 
 def program() -> str:
-    """Return where ffmpeg is; raise GarlError where there is none."""
+    """Return an ffmpeg that writes H.264: the one on PATH, else that of imageio-ffmpeg.
+
+    Raises GarlError, which says what was found, if there is none.
+    """
+    found = []
+    on_path = shutil.which("ffmpeg")
+    if on_path is None:
+        found.append("there is no ffmpeg on PATH")
+    elif problem := _problem(on_path):
+        found.append(problem)
+    else:
+        return on_path
     try:
         import imageio_ffmpeg
-    except ImportError as error:
-        raise GarlError(
-            "a video needs the package imageio-ffmpeg, which is not installed; "
-            "install it with: pip install 'pytest-garl[video]'"
-        ) from error
-    try:
-        return str(imageio_ffmpeg.get_ffmpeg_exe())
+
+        packaged = str(imageio_ffmpeg.get_ffmpeg_exe())
+    except ImportError:
+        found.append("the package imageio-ffmpeg is not installed")
     except RuntimeError as error:
-        raise GarlError(f"imageio-ffmpeg has no ffmpeg for this machine: {error}") from error
+        found.append(f"imageio-ffmpeg has no ffmpeg for this machine ({error})")
+    else:
+        if not (problem := _problem(packaged)):
+            return packaged
+        found.append(problem)
+    raise GarlError(
+        f"a video needs an ffmpeg with the encoder libx264: {'; '.join(found)}. Install ffmpeg, "
+        "or: pip install 'pytest-garl[video]'"
+    )
+
+
+def _problem(ffmpeg: str) -> str:
+    """Return why an ffmpeg cannot encode; empty if it can."""
+    command = [ffmpeg, "-nostdin", "-hide_banner", "-encoders"]
+    try:
+        done = subprocess.run(
+            command,
+            stdin=subprocess.DEVNULL,
+            capture_output=True,
+            text=True,
+            errors="replace",
+            timeout=_PATIENCE_S,
+            check=False,
+        )
+    except (OSError, subprocess.TimeoutExpired) as error:
+        return f"{ffmpeg} cannot be run ({error})"
+    if done.returncode:
+        return f"{ffmpeg} ended with status {done.returncode} when asked for its encoders"
+    return "" if " libx264 " in done.stdout else f"{ffmpeg} has no libx264"

@@ -18,7 +18,7 @@ from pytest_garl.simulation.environment import environment_at
 from pytest_garl.simulation.flight import Flight
 from pytest_garl.video.camera_pane import CameraPane
 from pytest_garl.video.drawing import Image
-from pytest_garl.video.encoder import write
+from pytest_garl.video.film_file import write_film
 from pytest_garl.video.map_pane import MapPane
 from pytest_garl.video.pose import poses_at
 from pytest_garl.video.timeline import Timeline
@@ -28,24 +28,39 @@ CLOSING_S = 2.0
 
 
 def save_video(
-    path: Path, flight: Flight, scenario: Scenario, map: Map, camera: Camera, signature: str = ""
+    path: Path,
+    flight: Flight,
+    scenario: Scenario,
+    map: Map,
+    camera: Camera,
+    signature: str = "",
+    *,
+    last_s: float | None = None,
 ) -> None:
-    """Write the video of a flight to ``path`` (.mp4); it plays at the flight's own speed.
+    """Write the video of a flight to ``path``; it plays at the flight's own speed.
 
-    Raises GarlError where the flight is not one of this scenario, or imageio-ffmpeg is missing.
+    A file .mp4 has the full size, a file .gif half of it.  ``last_s`` shows the last seconds only.
+    Raises GarlError where the flight is not one of this scenario, or there is no encoder.
     """
-    write(frames(flight, scenario, map, camera, signature), path, rate_hz(flight, camera))
+    pictures = frames(flight, scenario, map, camera, signature, last_s=last_s)
+    write_film(pictures, path, rate_hz(flight, camera))
 
 
 def frames(
-    flight: Flight, scenario: Scenario, map: Map, camera: Camera, signature: str = ""
+    flight: Flight,
+    scenario: Scenario,
+    map: Map,
+    camera: Camera,
+    signature: str = "",
+    *,
+    last_s: float | None = None,
 ) -> Iterator[Image]:
     """Yield the video's pictures, RGB uint8 (656, 1024, 3): one per camera frame, then the end.
 
     ``map`` is the scenario's, with or without its removed objects; ``camera`` the one that
-    flew; ``signature`` the verdict's, empty for a flight without violation.  The end is the
-    last moment with the outcome, for ``CLOSING_S``.  Raises GarlError where the flight is not
-    one of this scenario.
+    flew; ``signature`` the verdict's, empty for a flight without violation.  ``last_s`` leaves out
+    all frames before the last seconds.  The end is the last moment with the outcome, for
+    ``CLOSING_S``.  Raises GarlError where the flight is not one of this scenario.
     """
     place = map_in(scenario, map)
     check_scenario(flight, scenario, place)
@@ -53,7 +68,10 @@ def frames(
     left, right = CameraPane(renderer), MapPane(flight, scenario, place, camera)
     below = Timeline(flight, signature)
     shown = scenario
+    first_s = -math.inf if last_s is None else flight.elapsed_s - last_s
     for step in flight.steps:
+        if step.time_s < first_s:
+            continue
         if (now := environment_at(scenario, flight, step.time_s)) != shown:
             renderer.change(now)
             shown = now

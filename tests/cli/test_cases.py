@@ -21,6 +21,7 @@ from pytest_garl.scenarios.maps.map import load_map
 from pytest_garl.scenarios.validity import repair
 from pytest_garl.verdicts.verdict import Limits
 from tests.regressions.samples import case as dog_case
+from tests.support.ffmpeg import hide_encoders
 
 SYSTEM = """
 from pathlib import Path
@@ -302,7 +303,7 @@ def test_list_in_a_pipe_keeps_whole_names(file: Path, monkeypatch: pytest.Monkey
 def test_video_without_an_encoder_is_refused_before_the_flight(
     file: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setitem(sys.modules, "imageio_ffmpeg", None)
+    hide_encoders(monkeypatch)
     result = garl("replay", file, "--video=flight.mp4")
     assert result.exit_code == 1
     assert "pip install 'pytest-garl[video]'" in result.output

@@ -60,6 +60,16 @@ def shrunk(file: Path, flights: int) -> str:
     return done.stdout
 
 
+def test_a_case_of_a_simulator_of_the_project_has_no_film(project: Path) -> None:
+    start = "from pytest_garl.cli import main; main()"
+    command = [sys.executable, "-c", start, "film", saved(project, "IV-dog").stem]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert done.returncode == 1
+    assert "flown by tiny_simulator:fly, a simulator of your own" in done.stderr
+    assert "flying" not in done.stdout
+    assert not list(project.glob("*.mp4"))
+
+
 def saved(project: Path, kind: str) -> Path:
     (path,) = (project / "scenarios/regressions/systems").glob(f"lawn-{kind}-*.toml")
     return path.relative_to(project)

@@ -34,6 +34,7 @@ def test_a_budget_makes_exactly_so_many_slots(budget: int) -> None:
         (("--garl-budget=8", "--garl-npcs=magic"), "*--garl-npcs: found 'magic', expected one of*"),
         (("--garl-budget=8", "--garl-npcs=mine.npz"), "*there are no weights at mine.npz*"),
         (("--garl-budget=8", "--garl-repeat=nowhere"), "*--garl-repeat: found 'nowhere'*"),
+        (("--garl-film=all",), "*--garl-film: found 'all', expected one of failures*"),
         (("--garl-budget=8", "-o", "garl_dir=/proc/garl"), "*cannot be written*garl_dir*"),
     ],
 )

@@ -15,6 +15,8 @@ import pytest
 from pytest_garl.errors import GarlError
 from pytest_garl.video import save_video, write
 from pytest_garl.video.drawing import Image
+from pytest_garl.video.encoder import program
+from tests.support.ffmpeg import LISTS, an_ffmpeg
 from tests.support.videos import FLOWN_S, LAWN, SCENARIO, Hovers, Video
 
 
@@ -53,21 +55,46 @@ def decoded(path: Path) -> Iterator[Image]:
     video.release()
 
 
-def test_without_the_encoder_the_error_names_the_extra(
+def test_the_ffmpeg_on_path_comes_first(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    on_path = an_ffmpeg(tmp_path / "bin", LISTS)
+    monkeypatch.setenv("PATH", str(on_path.parent), prepend=":")
+    assert program() == str(on_path)
+
+
+@pytest.mark.parametrize(
+    "lines", [['echo " V....D mpeg4  MPEG-4"'], ["exit 3"]], ids=["no-libx264", "ends-at-once"]
+)
+def test_an_ffmpeg_that_cannot_encode_is_passed_over(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, lines: list[str]
+) -> None:
+    on_path = an_ffmpeg(tmp_path / "bin", *lines)
+    monkeypatch.setenv("PATH", str(on_path.parent), prepend=":")
+    assert program() == imageio_ffmpeg.get_ffmpeg_exe()
+    monkeypatch.setitem(sys.modules, "imageio_ffmpeg", None)
+    with pytest.raises(
+        GarlError, match=f"libx264: {on_path} .*; the package imageio-ffmpeg is not"
+    ):
+        program()
+
+
+def test_without_an_encoder_the_error_says_what_was_looked_for(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    monkeypatch.setenv("PATH", str(tmp_path))
     monkeypatch.setitem(sys.modules, "imageio_ffmpeg", None)
-    with pytest.raises(GarlError, match=r"pip install 'pytest-garl\[video\]'"):
+    words = (
+        r"there is no ffmpeg on PATH; the package imageio-ffmpeg is not installed. Install ffmpeg, "
+        r"or: pip install 'pytest-garl\[video\]'"
+    )
+    with pytest.raises(GarlError, match=words):
         write([np.zeros((16, 16, 3), np.uint8)], tmp_path / "a.mp4", 10.0)
 
 
 def test_an_encoder_that_fails_is_quoted_and_leaves_nothing(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    broken = tmp_path / "ffmpeg"
-    broken.write_text("#!/bin/sh\necho 'Unknown encoder' >&2\nexit 3\n")
-    broken.chmod(0o755)
-    monkeypatch.setattr(imageio_ffmpeg, "get_ffmpeg_exe", lambda: str(broken))
+    broken = an_ffmpeg(tmp_path / "bin", LISTS, "echo 'Unknown encoder' >&2", "exit 3")
+    monkeypatch.setenv("PATH", str(broken.parent), prepend=":")
     pictures = [np.zeros((656, 1024, 3), np.uint8)] * 5
     with pytest.raises(GarlError, match=r"exit status 3\): Unknown encoder"):
         write(pictures, tmp_path / "videos" / "a.mp4", 10.0)

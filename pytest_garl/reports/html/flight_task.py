@@ -8,7 +8,9 @@ from pathlib import Path
 from typing import Any
 
 from pytest_garl.errors import GarlError
-from pytest_garl.execution.job import FlightJob
+from pytest_garl.execution.job import FlightJob, parse_job
+from pytest_garl.execution.ledger import Ledger
+from pytest_garl.execution.ledger_queries import LedgerFlight
 from pytest_garl.execution.reference import BUILT_IN
 from pytest_garl.execution.result import FlightResult
 from pytest_garl.execution.severity import NO_SEVERITY
@@ -89,13 +91,35 @@ class ShownFlight:
     versions: tuple[tuple[str, str], ...] = ()
 
 
+def task_of(
+    ledger: Ledger, flight: LedgerFlight, scenario: str, camera: Mapping[str, Any] | None
+) -> FlightTask:
+    """Return a flight of a ledger with all that is needed to show it.
+
+    Its record may lie beside the ledger, or where it was flown.
+    """
+    job = parse_job(ledger.job(flight.id.search) or "")
+    beside = flight.id.record(ledger.path.parent / "flights")
+    return FlightTask(
+        name=flight.id.slot_id,
+        job=job,
+        scenario=scenario,
+        result=flight.result,
+        sha256=flight.sha256,
+        records=tuple(dict.fromkeys((beside, job.record(flight.id)))),
+        camera=camera,
+        policy=job.npcs.name,
+        recorded=bool(flight.sha256),
+    )
+
+
 def shown_flight(task: FlightTask) -> ShownFlight:
     """Return what a page shows of a flight; what cannot be shown is named in the notes."""
     verdict, crash = task.result.verdict, task.result.crash
     severity = task.result.severity or NO_SEVERITY
     conditions, place, notes = _conditions(task)
     traceback = cut_text(crash.traceback or crash.message) if crash else ""
-    flight, missing = _record(task)
+    flight, missing = record_of(task)
     if flight is None:
         return ShownFlight(
             description=verdict.story,
@@ -156,7 +180,7 @@ def _conditions(task: FlightTask) -> tuple[tuple[ConditionRow, ...], Place | Non
         return (), None, [f"The scenario cannot be shown: {cut_text(str(error), 400)}"]
 
 
-def _record(task: FlightTask) -> tuple[Flight | None, str]:
+def record_of(task: FlightTask) -> tuple[Flight | None, str]:
     """Return the flight's record, or why it is missing; an empty reason if there was none."""
     if not task.recorded:
         return None, ""
@@ -166,12 +190,18 @@ def _record(task: FlightTask) -> tuple[Flight | None, str]:
         name = task.records[0].name
         return None, (
             f"The record of this flight is missing: expected {name} in {folders}. Copy the folder "
-            "flights beside the ledger, and write the report again."
+            "flights beside the ledger, and try again."
         )
     try:
-        return load(path), ""
+        flight = load(path)
     except GarlError as error:
         return None, f"The record of this flight cannot be read: {cut_text(str(error), 400)}"
+    if flight.sha256 and flight.sha256 != task.sha256:
+        return None, (
+            f"{path} is the record of another flight than the ledger's: a later run flew a slot of "
+            "this name and wrote over it. Name the ledger of the later run, or search anew."
+        )
+    return flight, ""
 
 
 def _film_start_s(flight: Flight) -> float:

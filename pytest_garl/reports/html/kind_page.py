@@ -5,18 +5,15 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
-from pytest_garl.execution.job import FlightJob, parse_job
 from pytest_garl.execution.ledger import Ledger
-from pytest_garl.execution.ledger_queries import LedgerFlight
 from pytest_garl.messages import shortened
 from pytest_garl.regressions.case import NO_GATE_TEXTS, Case
 from pytest_garl.regressions.corpus import Corpus, CorpusEntry
 from pytest_garl.regressions.story_text import grade_in_words
 from pytest_garl.reports.html.flight_tables import cut_text
-from pytest_garl.reports.html.flight_task import FlightTask, ShownFlight
+from pytest_garl.reports.html.flight_task import FlightTask, ShownFlight, task_of
 from pytest_garl.reports.html.naming import page_name, shown_file
 from pytest_garl.reports.search_summary import CAMERA, LEGEND, SearchSummary, ViolationKind
 from pytest_garl.reports.shares_text import in_control_text
@@ -91,7 +88,7 @@ def plan_kinds(
         camera = ledger.fact(f"{CAMERA}{search.system}")
         for j, (kind, row) in enumerate(zip(search.kinds, told["signatures"], strict=True)):
             first = search.flight(kind.first)
-            as_found = _task(ledger, first, first.scenario, camera)
+            as_found = task_of(ledger, first, first.scenario, camera)
             entry = cases.get(kind.signature)
             case = _case_task(ledger, entry, as_found) if entry else None
             task = dataclasses.replace(case or as_found, with_film=(i, j) in filmed)
@@ -119,32 +116,6 @@ def _cases(corpus: Corpus, search: SearchSummary) -> dict[str, CorpusEntry]:
     return found
 
 
-def _task(
-    ledger: Ledger,
-    flight: LedgerFlight,
-    scenario: str,
-    camera: Mapping[str, Any] | None,
-) -> FlightTask:
-    job = parse_job(ledger.job(flight.id.search) or "")
-    return FlightTask(
-        name=flight.id.slot_id,
-        job=job,
-        scenario=scenario,
-        result=flight.result,
-        sha256=flight.sha256,
-        records=_records(ledger, flight, job),
-        camera=camera,
-        policy=job.npcs.name,
-        recorded=bool(flight.sha256),
-    )
-
-
-def _records(ledger: Ledger, flight: LedgerFlight, job: FlightJob) -> tuple[Path, ...]:
-    """Return where the record may lie: beside the ledger, or where it was flown."""
-    beside = flight.id.record(ledger.path.parent / "flights")
-    return tuple(dict.fromkeys((beside, job.record(flight.id))))
-
-
 def _case_task(ledger: Ledger, entry: CorpusEntry, as_found: FlightTask) -> FlightTask | None:
     """Return the flight of a saved case; None if this ledger does not have it."""
     case = entry.case
@@ -153,7 +124,7 @@ def _case_task(ledger: Ledger, entry: CorpusEntry, as_found: FlightTask) -> Flig
     if flight is None:
         return None
     scenario = dump_scenario(case.scenario)
-    task = _task(ledger, flight, scenario, as_found.camera)
+    task = task_of(ledger, flight, scenario, as_found.camera)
     return dataclasses.replace(
         task, name=entry.name, policy=case.policy, prevention=case.prevention
     )

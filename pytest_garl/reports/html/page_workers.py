@@ -1,4 +1,4 @@
-"""Processes that work out the flights of a report, one flight at a time."""
+"""Processes that work out the flights of a report, or draw films, one flight at a time."""
 
 from __future__ import annotations
 
@@ -10,12 +10,15 @@ import subprocess
 import sys
 import threading
 from collections.abc import Callable, Iterator, Sequence
+from typing import Any, TypeVar
 
 from pytest_garl import cpu_dispatch
 from pytest_garl.errors import GarlError
 from pytest_garl.execution.processes import end_with_parent, ignore_ctrl_c
 from pytest_garl.reports.html.flight_task import FlightTask, ShownFlight, shown_flight
 
+Task = TypeVar("Task")
+Answer = TypeVar("Answer")
 START_S = 1.0
 """A process takes so long to start as two or three flights without a film take to draw."""
 
@@ -35,28 +38,38 @@ def shown_flights(
             found.append(shown_flight(task))
             on_done(len(found))
         return found
-    return _in_processes(tasks, workers, on_done)
-
-
-def _in_processes(
-    tasks: Sequence[FlightTask], workers: int, on_done: Callable[[int], None]
-) -> list[ShownFlight]:
     # Films first: the longest task should not be the last.
     order = sorted(range(len(tasks)), key=lambda index: not tasks[index].with_film)
+    ready = in_processes(shown_flight, [tasks[index] for index in order], workers, on_done)
+    shown = dict(zip(order, ready, strict=True))
+    return [shown[index] for index in range(len(tasks))]
+
+
+def in_processes(
+    work: Callable[[Task], Answer],
+    tasks: Sequence[Task],
+    workers: int,
+    on_done: Callable[[int], None] = lambda done: None,
+) -> list[Answer]:
+    """Return what ``work``, a function of a module, makes of each task, in order.
+
+    ``workers`` processes work, and each takes the next task.  ``on_done`` gets the number that are
+    ready.  Raises GarlError if ``work`` does, or if a process ends.
+    """
     waiting: queue.SimpleQueue[int] = queue.SimpleQueue()
-    for index in order:
+    for index in range(len(tasks)):
         waiting.put(index)
-    done: dict[int, ShownFlight] = {}
-    answers: queue.SimpleQueue[tuple[int, ShownFlight | str]] = queue.SimpleQueue()
+    done: dict[int, Answer] = {}
+    answers: queue.SimpleQueue[tuple[int, tuple[bool, Any]]] = queue.SimpleQueue()
     with contextlib.ExitStack() as stack:
-        for _ in range(workers):
+        for _ in range(min(workers, len(tasks))):
             process = stack.enter_context(_worker())
-            arguments = (process, tasks, waiting, answers)
+            arguments = (process, [(work, task) for task in tasks], waiting, answers)
             threading.Thread(target=_feed, args=arguments, daemon=True).start()
         while len(done) < len(tasks):
-            index, answer = answers.get()
-            if isinstance(answer, str):
-                raise GarlError(f"the report: {tasks[index].name}: {answer}")
+            index, (succeeded, answer) = answers.get()
+            if not succeeded:
+                raise GarlError(f"{getattr(tasks[index], 'name', 'a film')}: {answer}")
             done[index] = answer
             on_done(len(done))
     return [done[index] for index in range(len(tasks))]
@@ -84,9 +97,9 @@ def _worker() -> Iterator[subprocess.Popen[bytes]]:
 
 def _feed(
     process: subprocess.Popen[bytes],
-    tasks: Sequence[FlightTask],
+    orders: Sequence[tuple[Callable[[Any], Any], Any]],
     waiting: queue.SimpleQueue[int],
-    answers: queue.SimpleQueue[tuple[int, ShownFlight | str]],
+    answers: queue.SimpleQueue[tuple[int, tuple[bool, Any]]],
 ) -> None:
     """Give a process one task after the other."""
     assert process.stdin is not None
@@ -97,12 +110,13 @@ def _feed(
         except queue.Empty:
             return
         try:
-            pickle.dump(tasks[index], process.stdin)
+            pickle.dump(orders[index], process.stdin)
             process.stdin.flush()
             answers.put((index, pickle.load(process.stdout)))
         except (OSError, EOFError, ValueError, pickle.UnpicklingError):
             status = process.poll()
-            answers.put((index, f"the process that drew it ended (exit status {status})"))
+            words = f"the process that drew it ended (exit status {status})"
+            answers.put((index, (False, words)))
             return
 
 
@@ -115,13 +129,13 @@ def main(parent: str) -> None:
     os.dup2(2, 1)
     while True:
         try:
-            task = pickle.load(sys.stdin.buffer)
+            work, task = pickle.load(sys.stdin.buffer)
         except EOFError:
             return
         try:
-            answer: ShownFlight | str = shown_flight(task)
+            answer: tuple[bool, Any] = (True, work(task))
         except GarlError as error:
-            answer = str(error)
+            answer = (False, str(error))
         pickle.dump(answer, answers)
         answers.flush()
 

@@ -48,5 +48,5 @@ def test_a_process_that_ends_is_one_message(tasks: list[FlightTask]) -> None:
 def test_few_flights_start_no_process(
     tasks: list[FlightTask], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(page_workers, "_in_processes", None)
+    monkeypatch.setattr(page_workers, "in_processes", None)
     assert len(shown_flights(tasks[:2], 2)) == 2

@@ -18,6 +18,7 @@ from pytest_garl.reports.html.index_markdown import index_parts
 from pytest_garl.reports.html.report import WrittenReport, write_html_report
 from pytest_garl.simulation.flight import Crash
 from tests.reports.html.test_rendering import HOSTILE, Elements
+from tests.support.ffmpeg import hide_encoders
 from tests.support.report_ledgers import Flown, write_ledger
 from tests.support.results import flight_result
 from tests.support.videos import Video
@@ -263,9 +264,9 @@ def test_a_ledger_that_cannot_be_read_is_one_message_and_no_report(run: Path) ->
 def test_without_an_encoder_there_are_stills_and_a_note(
     run: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setitem(__import__("sys").modules, "imageio_ffmpeg", None)
+    hide_encoders(monkeypatch)
     (note,) = write(run, films=1).notes
-    assert note.startswith("There are no films: a video needs the package imageio-ffmpeg")
+    assert note.startswith("There are no films: a video needs an ffmpeg with the encoder libx264")
     assert "<video" not in kind_page(run)
     assert "data-moment=" in kind_page(run)
 

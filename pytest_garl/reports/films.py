@@ -1,0 +1,136 @@
+"""Films of flights: where each is drawn from, why one cannot be drawn, and many at a time."""
+
+from __future__ import annotations
+
+import os
+import tempfile
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from pytest_garl.errors import GarlError, SavingError
+from pytest_garl.execution.ledger import Ledger
+from pytest_garl.execution.ledger_queries import LedgerFlight
+from pytest_garl.execution.reference import BUILT_IN
+from pytest_garl.files.json_values import dataclass_from
+from pytest_garl.landing_system import Camera
+from pytest_garl.messages import shortened
+from pytest_garl.reports.html.flight_task import FlightTask, record_of, task_of
+from pytest_garl.reports.html.page_workers import in_processes
+from pytest_garl.reports.search_summary import CAMERA
+from pytest_garl.scenarios.files import parse_scenario
+from pytest_garl.simulation.flight import Flight
+from pytest_garl.video import save_video
+
+NO_RECORD = "its process ended before the flight's record was written: no film can be drawn"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class FilmTask:
+    """A flight of a ledger, and the file of its film."""
+
+    flight: FlightTask
+    file: Path
+
+    @property
+    def name(self) -> str:
+        """The flight's slot."""
+        return self.flight.name
+
+
+def recorded_flight(ledger: Ledger, flight: LedgerFlight) -> FlightTask:
+    """Return a flight of a ledger with all that its film needs."""
+    return task_of(ledger, flight, flight.scenario, ledger.fact(f"{CAMERA}{flight.system}"))
+
+
+def check_simulator(simulator: str) -> None:
+    """Raise GarlError for a simulator of a user's own, whose flights have no camera here."""
+    if simulator != BUILT_IN.name:
+        raise GarlError(
+            f"flown by {shortened(simulator)}, a simulator of your own, whose camera cannot be "
+            "drawn again: only flights of the built-in simulator have films"
+        )
+
+
+def why_no_film(flight: FlightTask) -> str:
+    """Return why a flight can have no film, whatever its record holds; empty if it can."""
+    try:
+        check_simulator(flight.job.simulator.name)
+    except GarlError as error:
+        return str(error)
+    if flight.camera is None:
+        return (
+            "the ledger does not name the camera, as those of earlier versions: search again, or "
+            "fly it with --garl-repeat"
+        )
+    return "" if flight.recorded else NO_RECORD
+
+
+def draw_film(task: FilmTask, last_s: float | None = None) -> Flight:
+    """Draw the film of a flight from its record, and return the flight.
+
+    Raises GarlError, which says what is missing, if that cannot be done.
+    """
+    flight = task.flight
+    if problem := why_no_film(flight):
+        raise GarlError(problem)
+    record, missing = record_of(flight)
+    if record is None:
+        raise GarlError(missing)
+    try:
+        camera = dataclass_from(Camera, dict(flight.camera or {}), "camera")
+    except ValueError as error:
+        raise GarlError(f"the camera in the ledger is damaged: {error}") from error
+    scenario, map = parse_scenario(flight.scenario), flight.job.load_map()
+    signature = flight.result.signature
+    save_video(task.file, record, scenario, map, camera, signature, last_s=last_s)
+    return record
+
+
+def draw_films(
+    tasks: Sequence[FilmTask], workers: int, on_done: Callable[[int], None] = lambda done: None
+) -> list[str]:
+    """Draw films in ``workers`` processes; return for each why it was not drawn, or nothing.
+
+    All films lie in one folder, which is made.  A film is there whole or not at all, also if this
+    process is interrupted.
+    """
+    if not tasks:
+        return []
+    folder = tasks[0].file.parent
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise SavingError(f"{folder}: no films can be written here ({error})") from error
+    # A process that is ended while it draws leaves its unfinished file in here.
+    with tempfile.TemporaryDirectory(prefix=".drawn-", dir=folder) as scratch:
+        works = [_Work(task=task, scratch=Path(scratch, task.file.name)) for task in tasks]
+        return in_processes(_problem_of, works, workers, on_done)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Work:
+    """A film, and where it is drawn before it takes its place."""
+
+    task: FilmTask
+    scratch: Path
+
+    @property
+    def name(self) -> str:
+        """The flight's slot."""
+        return self.task.name
+
+
+def _problem_of(work: _Work) -> str:
+    """Draw a film; return why it cannot be drawn, empty if it was."""
+    try:
+        draw_film(replace(work.task, file=work.scratch))
+        work.scratch.replace(work.task.file)
+    except (GarlError, OSError) as error:
+        return str(error)
+    return ""
+
+
+def cores() -> int:
+    """Return how many processes can draw at once."""
+    return len(os.sched_getaffinity(0))
