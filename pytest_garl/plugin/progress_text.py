@@ -42,18 +42,31 @@ class RunProgress:
     @property
     def flown(self) -> float:
         """How many flights have been flown."""
-        return sum(each.flown for each in self.searches) + self.flown_after
+        return self._searched + self.flown_after
 
     @property
     def total(self) -> float:
         """How many flights of searches and beside them are expected."""
-        needed = max(self.selected, sum(each.total for each in self.searches))
-        return needed + max(self.expected_after, self.flown_after)
+        return self._wanted + self._after
+
+    @property
+    def _searched(self) -> int:
+        return sum(each.flown for each in self.searches)
+
+    @property
+    def _wanted(self) -> int:
+        return max(self.selected, sum(each.total for each in self.searches))
+
+    @property
+    def _after(self) -> float:
+        return max(self.expected_after, self.flown_after)
 
     @property
     def phrases(self) -> list[str]:
         """The parts of the line, the most important first."""
-        phrases = [f"{self.flown:.0f}/{self.total:.0f} flights"]
+        # Each new kind adds flights to shrink it, so that one total of all would jump.
+        after = f", {self.flown_after:.0f}/{self._after:.0f} to shrink" if self._after else ""
+        phrases = [f"{self._searched}/{self._wanted} flights{after}"]
         left_s = self.left_s
         if left_s is None and self.seconds > 0 and 0 < self.flown < self.total:
             left_s = (self.total - self.flown) * self.seconds / self.flown

@@ -30,13 +30,13 @@ PROGRESS = RunProgress(
 )
 
 
-def test_line_has_one_total_and_puts_important_phrases_first() -> None:
+def test_line_tells_the_flights_that_shrink_from_those_of_the_search() -> None:
     assert progress_line(PROGRESS, 160) == (
-        "garl [#####---------------]  4/16 flights  24 s left  I:2 IV:1  A on court g01 3/4  "
-        "0.50 flights/s  nearest collision 0.25 m, time 90 s"
+        "garl [#####---------------]  4/8 flights, 0/8 to shrink  24 s left  I:2 IV:1  "
+        "A on court g01 3/4  0.50 flights/s  nearest collision 0.25 m, time 90 s"
     )
     more = dataclasses.replace(PROGRESS, selected=40)
-    assert "4/48 flights" in progress_line(more, 160)
+    assert "4/40 flights, 0/8 to shrink" in progress_line(more, 160)
     new = RunProgress(searches=TWO[1:], kinds={}, nearest={}, seconds=0.0)
     assert progress_line(new, 160) == "garl [#####---------------]  1/4 flights  A on lawn g00 1/4"
 
@@ -79,7 +79,7 @@ def test_narrow_terminal_gets_whole_phrases(width: int) -> None:
     assert len(line) <= max(width, len("garl [##--------]"))
     assert {*line.split("  ")[1:]} <= {*PROGRESS.phrases}
     if width >= 80:
-        assert "garl [##--------]  4/16 flights  24 s left  I:2 IV:1" in line or width >= 100
+        assert "garl [##--------]  4/8 flights, 0/8 to shrink  24 s left" in line or width >= 100
 
 
 def test_line_follows_the_forecast_once_there_is_one() -> None:
@@ -93,6 +93,6 @@ def test_line_follows_the_forecast_once_there_is_one() -> None:
         expected_after=12,
         left_s=33,
     )
-    assert progress_line(shrinking, 79) == (
-        "garl [###-------]  6/16 flights  33 s left  IV:3  confirming and shrinking"
+    assert progress_line(shrinking, 99) == (
+        "garl [###-------]  4/4 flights, 2/12 to shrink  33 s left  IV:3  confirming and shrinking"
     )
