@@ -29,7 +29,7 @@ class GroundStays:
     """Follows the stays of the UAV on the ground; ``touchdowns`` has one per stay, in order.
 
     ``was_pushed`` is whether a moving body touched the UAV after its motors had stopped: how it
-    moves from then on is no longer the landing system's doing.
+    moves from then on is no longer the landing system's doing, so the flight ends there.
     """
 
     def __init__(
@@ -130,11 +130,14 @@ class GroundStays:
         stopped_s = self.touchdowns[-1].stopped_s
         if stopped_s is None:
             return None
-        if tilt_rad >= UPRIGHT_RAD and not self.was_pushed:
+        if self.was_pushed:
+            self._recorder.event("landed", "at rest on the ground until a moving body touched it")
+            return "landed"
+        if tilt_rad >= UPRIGHT_RAD:
             self._recorder.contact("ground", position, abs(velocity[2]), tilt_rad)
             return "collision"
         still = math.sqrt(sum(value * value for value in velocity)) < STILL_MPS
-        if time_s - stopped_s < WATCHED_S or not (still or self.was_pushed):
+        if time_s - stopped_s < WATCHED_S or not still:
             return None
         self._recorder.event("landed", "at rest on the ground")
         return "landed"
