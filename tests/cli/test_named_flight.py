@@ -158,6 +158,13 @@ def test_a_slot_of_two_searches_is_named_by_its_search(run: Path) -> None:
     assert find(f"01234567-{SLOT}").name == f"01234567-{SLOT}"
 
 
+def test_a_map_that_has_changed_since_the_flight_is_noted(run: Path) -> None:
+    assert find(SLOT).notes == ()
+    with sqlite3.connect(run) as opened:
+        opened.execute("UPDATE search SET job = replace(job, ?, ?)", (LAWN.sha256, "0" * 64))
+    assert find(SLOT).notes == ("The map lawn has changed since the flight: pictures may differ.",)
+
+
 @pytest.mark.parametrize("content", [b"", b"PK not a record"])
 def test_a_file_that_is_no_flight_is_named(run: Path, content: bytes) -> None:
     Path("mine.npz").write_bytes(content)
