@@ -153,9 +153,10 @@ def replay_(context: click.Context, file: Path, live: bool, video: Path | None) 
     replayed = replay(case, project.root, project.maps, live=live)
     _show_replay(replayed)
     if video is not None:
-        from pytest_garl.cli.film_sources import draw_replay
+        from pytest_garl.cli.film import draw
+        from pytest_garl.cli.named_flight import flown_again
 
-        draw_replay(video, file, case, replayed, project.root)
+        draw(flown_again(file, case, replayed, project.root, live=live), video)
         say(f"drawn: {video}")
     context.exit(EXIT_STATUS[replayed.result])
 

@@ -2,27 +2,24 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import Any
 
 import click
 
-from pytest_garl.cli.cases import FOLDER
+from pytest_garl.cli.cases import say
+from pytest_garl.cli.flight_options import names_flight
+from pytest_garl.cli.named_flight import FlightName, NamedFlight
 from pytest_garl.errors import OptionError
 from pytest_garl.files.atomic import check_writable
-from pytest_garl.messages import printable
-from pytest_garl.regressions.corpus import Corpus
 from pytest_garl.reports.mcap.sdk import check_sdk
-
-if TYPE_CHECKING:
-    from pytest_garl.cli.named_flight import NamedFlight
-    from pytest_garl.reports.mcap.source import Place
 
 SUFFIX = ".mcap"
 
 
 @click.command()
-@click.argument("flight", metavar="SLOT|CASE|FILE")
+@names_flight
 @click.option(
     "--mcap",
     metavar="FILE",
@@ -30,18 +27,12 @@ SUFFIX = ".mcap"
     required=True,
     help="Write an MCAP file for Foxglove and Rerun, such as flight.mcap (extra: mcap).",
 )
-@click.option(
-    "--ledger",
-    type=click.Path(path_type=Path, dir_okay=False),
-    help="Ledger of the run with the slot or the record (default: .garl/ledger.sqlite).",
-)
-@FOLDER
-def export(flight: str, mcap: Path, ledger: Path | None, folder: Path) -> None:
+def export(mcap: Path, **named: Any) -> None:
     """Write a flight with its pictures, poses, bodies, plans, events and margins as an MCAP file.
 
-    SLOT is a flight of the run, such as court-g03-s17; nothing is flown. CASE is a saved case, by
-    file or id; it is flown again, as `garl cases replay` does. FILE is a flight's record (.npz).
-    docs/export.md lists the topics.
+    SLOT is a slot of the last run, such as court-g03-s17; nothing is flown. CASE is a saved case,
+    by its name or its .toml file; it is flown again if the ledger has no record of its flight. FILE
+    is a flight's record (.npz). docs/export.md lists the topics.
     """
     if mcap.suffix != SUFFIX:
         raise OptionError(
@@ -51,41 +42,25 @@ def export(flight: str, mcap: Path, ledger: Path | None, folder: Path) -> None:
     # Checked before anything is flown or drawn.
     check_sdk()
     check_writable(mcap)
-    from pytest_garl.cli.named_flight import named_flight
-
-    root = Path.cwd()
-    corpus = Corpus(folder, (root / "scenarios" / "maps",))
-    found = named_flight(flight, corpus, root, ledger)
-    from pytest_garl.reports.mcap.source import Export
+    found = _without_unused_camera(FlightName(**named).find())
     from pytest_garl.reports.mcap.writer import write_mcap
 
-    written = write_mcap(
-        Export(
-            name=found.name,
-            flight=found.flight,
-            signature=found.signature,
-            limits=found.limits,
-            place=_place(found),
-        ),
-        mcap,
-    )
+    written = write_mcap(found, mcap)
+    if found.no_pictures:
+        without = "no pictures" if found.place else "no pictures, no bodies"
+        say(f"garl: {without}: {found.no_pictures}", err=True)
     for note in found.notes:
-        click.echo(printable(f"garl: {note}"), err=True)
-    megabytes = written.bytes / 1e6
-    click.echo(
-        printable(
-            f"{mcap}: {found.flight.elapsed_s:.1f} s of flight, {written.messages} messages, "
-            f"{written.pictures} pictures, {megabytes:.1f} MB"
-        )
+        say(f"garl: {note}", err=True)
+    say(
+        f"{mcap}: {found.flight.elapsed_s:.1f} s of flight, {written.messages} messages, "
+        f"{written.pictures} pictures, {written.bytes / 1e6:.1f} MB, {found.how}"
     )
 
 
-def _place(found: NamedFlight) -> Place | None:
-    from pytest_garl.reports.mcap.source import Place
-    from pytest_garl.scenarios.placement import map_in
-
-    if found.scenario is None or found.map is None:
-        return None
-    return Place(
-        scenario=found.scenario, map=map_in(found.scenario, found.map), camera=found.camera
-    )
+def _without_unused_camera(found: NamedFlight) -> NamedFlight:
+    steps, place = found.flight.steps, found.place
+    # A camera that is on knows how large the marker would be, whatever it shows.
+    if place is None or place.camera is None or any(step.marker_px > 0 for step in steps):
+        return found
+    why = "the landing system used no camera" if steps else "the record holds no camera frames"
+    return replace(found, place=replace(place, camera=None), no_pictures=why)

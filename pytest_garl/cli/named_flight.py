@@ -1,244 +1,309 @@
-"""A flight that a command names: a slot of a run, a saved case, or the file of a record."""
+"""A flight that a command names: a slot of a run, a saved case, or a flight's own file."""
 
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
 
-from pytest_garl.errors import CorpusError, GarlError, LedgerError
-from pytest_garl.execution.flight_id import Slot
-from pytest_garl.execution.job import FlightJob, parse_job
-from pytest_garl.execution.ledger import Ledger
-from pytest_garl.execution.ledger_queries import LedgerFlight
-from pytest_garl.execution.reference import BUILT_IN
-from pytest_garl.execution.stored_ledger import checked_ledger, read_slot
-from pytest_garl.files.json_values import dataclass_from
-from pytest_garl.landing_system import Camera, airframe_of
-from pytest_garl.messages import listed, shortened, shown
+from pytest_garl.cli.cases import say
+from pytest_garl.cli.check import imported_system
+from pytest_garl.cli.flight_options import LEDGER
+from pytest_garl.errors import GarlError, LedgerError
+from pytest_garl.execution.flight_id import FIRST_SLOT
+from pytest_garl.execution.stored_ledger import checked_ledger, flown_slots
+from pytest_garl.files.reading import read_text
+from pytest_garl.files.toml import parse
+from pytest_garl.landing_system import airframe_of
+from pytest_garl.messages import shortened
 from pytest_garl.regressions.case import Case
 from pytest_garl.regressions.case_file import load_case
 from pytest_garl.regressions.corpus import Corpus
-from pytest_garl.regressions.replay import replay, system_of
-from pytest_garl.reports.search_summary import CAMERA
+from pytest_garl.regressions.replay import Replay, replay, system_of
+from pytest_garl.reports.films import NO_RECORD, camera_of, recorded_flight, why_no_camera
+from pytest_garl.reports.html.flight_task import FlightTask, record_of
+from pytest_garl.reports.mcap.source import Export, Place
+from pytest_garl.scenarios.files import load as load_scenario
 from pytest_garl.scenarios.files import parse_scenario
-from pytest_garl.scenarios.maps.map import Map
-from pytest_garl.scenarios.scenario import Scenario
+from pytest_garl.scenarios.maps.map import load_map
+from pytest_garl.scenarios.placement import map_in
 from pytest_garl.simulation.flight import Flight
 from pytest_garl.simulation.flight_file import load
 from pytest_garl.verdicts.judge import judge
-from pytest_garl.verdicts.verdict import DEFAULT_LIMITS, Limits
+from pytest_garl.verdicts.verdict import DEFAULT_LIMITS
 
-LEDGER = Path(".garl/ledger.sqlite")
+REPEATED = "repeat.sqlite"
+"""The ledger of ``--garl-repeat``, beside that of the run."""
 RECORD, CASE = ".npz", ".toml"
-_SLOT = re.compile(r"(?:[0-9a-f]{8}-)?(?P<map>.+)-g(?P<generation>\d+)-s(?P<index>\d+)")
-"""A slot as pytest names it, or the name of its record, which begins with the search's key."""
-_ITEM = "case-"
-"""What the ids of items put before a case's name."""
+_MAPS = (Path("scenarios/maps"),)
+_SLOT = re.compile(r".+-g\d{2,}-s\d{2,}")
+"""A slot as pytest names it, also with the first digits of its search's key before it."""
+_ITEM, _LIVE = "case-", "-live"
+"""What the ids of items put before a case's name, and behind it."""
 
 
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class NamedFlight:
+@dataclass(frozen=True, slots=True, kw_only=True)
+class NamedFlight(Export):
     """A recorded flight, and all that is known of it.
 
-    ``scenario`` and ``map`` are None if they are not known, or if the flight is one of a simulator
-    of the user's own; ``camera`` is the declared one, None if no picture can be drawn again.
-    ``map`` is as its file says, with all objects.  ``notes`` say what is missing, and why.
+    ``how`` says where it comes from.  ``no_pictures`` is why its pictures cannot be drawn again;
+    empty if they can.  ``notes`` say what else a user should know.
     """
 
-    name: str
-    flight: Flight
-    signature: str
-    limits: Limits
-    scenario: Scenario | None = None
-    map: Map | None = None
-    camera: Camera | None = None
+    how: str = "from its record"
+    no_pictures: str = ""
     notes: tuple[str, ...] = ()
 
 
-def named_flight(name: str, corpus: Corpus, root: Path, ledger: Path | None = None) -> NamedFlight:
-    """Return the flight that ``name`` means; raise GarlError if there is none, or several.
+@dataclass(frozen=True, slots=True, kw_only=True)
+class FlightName:
+    """A flight's name, and the options that say where it is found (``flight_options.py``)."""
 
-    A slot and the file of a record are read; a case, by file or by id, is flown again as from
-    ``root``.  ``ledger`` is that of the run; by default the one of the last run there or, for the
-    file of a record, the one beside it.
-    """
-    path = Path(name)
-    if path.suffix == RECORD:
-        return _of_record(path, ledger, root)
-    if path.suffix == CASE:
+    flight: str
+    ledger: Path | None
+    scenario: Path | None
+    system: str | None
+    folder: Path
+
+    def find(self, *, pictures: bool = False) -> NamedFlight:
+        """Return the flight; raise GarlError if there is none, or several.
+
+        A case is flown again if no ledger has its record.  ``pictures`` refuses one before that if
+        its pictures could not be drawn.
+        """
+        file = Path(self.flight)
+        if file.suffix == RECORD:
+            return self._of_file(file)
+        if self.scenario is not None or self.system is not None:
+            raise GarlError(
+                "--scenario and --system have no effect here: they say what was flown in a "
+                f"flight's file ({RECORD}); a slot and a case know it"
+            )
+        if file.suffix == CASE:
+            return self._of_case(_case_file(file), live=False, pictures=pictures)
+        if _SLOT.fullmatch(self.flight):
+            return self._of_slot()
+        live = self.flight.endswith(_LIVE)
+        return self._of_case(self._case_named(), live=live, pictures=pictures)
+
+    def _of_slot(self) -> NamedFlight:
+        name, path = self.flight, self.ledger or LEDGER
         if not path.is_file():
-            raise GarlError(f"{name}: there is no such file; expected a saved case")
-        return _of_case(load_case(path, corpus.map_folders), root, corpus)
-    entries = [each for each in corpus.all_entries() if each.name == name.removeprefix(_ITEM)]
-    if len(entries) > 1:
-        raise CorpusError(
-            f"{shown(name)} is the name of several cases: {listed(e.path for e in entries)}; "
-            "name one of these files"
-        )
-    if entries:
-        case = entries[0].case
-        if case is None:
-            raise CorpusError(entries[0].problem)
-        return _of_case(case, root, corpus)
-    slot = _SLOT.fullmatch(name)
-    if slot is None:
-        raise GarlError(
-            f"found no flight {shown(name)}; expected a slot of the run such as court-g03-s17, a "
-            f"saved case (its file or its id; {corpus.folder} holds "
-            f"{listed(each.name for each in corpus.all_entries()) or 'none'}), or the file of a "
-            f"record ({RECORD})"
-        )
-    numbers = Slot(generation=int(slot["generation"]), index=int(slot["index"]))
-    return _of_slot(name, slot["map"], numbers, ledger or root / LEDGER)
+            raise _no_ledger(path)
+        with checked_ledger(path) as opened:
+            flights = opened.queries.flights()
+            found = [each for each in flights if name in (each.id.slot_id, each.id.name)]
+            if not found:
+                raise LedgerError(
+                    f"{name}: no such flight in {path}, or not flown yet; it holds "
+                    f"{flown_slots(opened)}"
+                )
+            if len(found) > 1:
+                lines = "".join(
+                    f"\n    {each.id.name}    # {each.system}: "
+                    f"{each.signature or each.result.outcome}"
+                    for each in found
+                )
+                raise LedgerError(
+                    f"{name}: found {len(found)} flights of this name in {path}; name one by its "
+                    f"search:{lines}"
+                )
+            task = recorded_flight(opened, found[0])
+        flight, missing = record_of(task)
+        if flight is None:
+            lost = missing and not any(each.is_file() for each in task.records)
+            hint = _how_to_fly_again(task.name, path) if lost else ""
+            raise GarlError(f"{name}: {missing or NO_RECORD}{hint}")
+        return _recorded(task, flight)
 
+    def _of_case(self, file: Path, *, live: bool, pictures: bool) -> NamedFlight:
+        case, root = load_case(file, _MAPS), Path.cwd()
+        reason = "with a live policy"
+        if not live:
+            found, reason = self._recorded_case(case)
+            if found is not None:
+                return found
+        from pytest_garl.plugin.case_tests import case_setup
 
-def _of_case(case: Case, root: Path, corpus: Corpus) -> NamedFlight:
-    camera = airframe_of(system_of(case, root)).camera
-    replayed = replay(case, root, corpus.map_folders)
-    flight = replayed.flight
-    if flight is None:
-        raise GarlError(
-            f"case {case.id}: its process ended before the flight was recorded; "
-            "`garl cases replay` says how it ends"
+        unseen = why_no_camera(case_setup(case, root).simulator.name)
+        if unseen and pictures:
+            raise GarlError(f"{file}: {unseen}")
+        say(f"flying {file.stem} again: {reason}", err=True)
+        flown = flown_again(file, case, replay(case, root, _MAPS, live=live), root, live=live)
+        return replace(flown, place=None, no_pictures=unseen) if unseen else flown
+
+    def _recorded_case(self, case: Case) -> tuple[NamedFlight | None, str]:
+        """Return the flight that a case describes if a ledger has its record, or why not."""
+        task = self._with_hash(case.evidence.trajectory_sha256, LEDGER.parent)
+        if task is None or task.job.system.name != case.system:
+            return None, f"no record of its flight at {self.ledger or LEDGER}"
+        flight, missing = record_of(task)
+        if flight is None:
+            return None, missing
+        # These are also the values of the same flight when it is flown again.
+        signature, limits = case.violation.signature, case.limits
+        known = _recorded(task, flight)
+        return replace(known, name=case.id, signature=signature, limits=limits), ""
+
+    def _of_file(self, file: Path) -> NamedFlight:
+        flight, place = load(file), None
+        if self.scenario is not None and self.system is not None:
+            is_case = "evidence" in parse(read_text(self.scenario), str(self.scenario))
+            scenario = (
+                load_case(self.scenario, _MAPS).scenario
+                if is_case
+                else load_scenario(self.scenario, _MAPS)
+            )
+            place = Place(
+                scenario=scenario,
+                map=map_in(scenario, load_map(scenario.map, _MAPS)),
+                camera=airframe_of(imported_system(self.system)).camera,
+            )
+        elif self.scenario is not None or self.system is not None:
+            missing = "--scenario" if self.scenario is None else "--system"
+            raise GarlError(
+                f"{file}: found no {missing}, expected --scenario and --system together: pictures "
+                "need the scenario and the camera that were flown"
+            )
+        elif task := self._with_hash(flight.sha256, file.absolute().parent.parent):
+            return _recorded(task, flight)
+        unknown = (
+            f"{file}: found a flight that {self.ledger or LEDGER} does not hold. A flight's file "
+            "holds neither its scenario nor its camera: name the ledger of its run with --ledger, "
+            "or give --scenario=FILE and --system=MODULE:CLASS"
         )
-    # The simulator of the package notes the versions that determine its bytes.
-    if not flight.versions:
         return NamedFlight(
-            name=case.id,
+            name=file.stem,
             flight=flight,
-            signature=replayed.signature,
-            limits=case.limits,
-            notes=("The case is flown by a simulator of your own: no pictures, no bodies.",),
+            signature=judge(flight, DEFAULT_LIMITS).signature,
+            place=place,
+            no_pictures="" if place else unknown,
+            notes=("The limits of its test are not known: the default ones judge it.",),
         )
+
+    def _with_hash(self, sha256: str, run: Path) -> FlightTask | None:
+        """Return the flight with this trajectory in the ledger that is given, or in those near."""
+        if self.ledger is not None and not self.ledger.is_file():
+            raise _no_ledger(self.ledger)
+        near = {
+            path.absolute(): path
+            for folder in (run, LEDGER.parent)
+            for path in (folder / LEDGER.name, folder / REPEATED)
+        }
+        for path in [self.ledger] if self.ledger is not None else near.values():
+            if not sha256 or not path.is_file():
+                continue
+            try:
+                with checked_ledger(path) as opened:
+                    known = opened.queries.flight_with_hash(sha256)
+                    if known is not None:
+                        return recorded_flight(opened, known)
+            except LedgerError as error:
+                if self.ledger is not None:
+                    raise
+                # Nobody named it, and the flight may be found without it.
+                say(str(error), err=True)
+        return None
+
+    def _case_named(self) -> Path:
+        """Return the file of the case with this name, as pytest or `garl cases list` prints it."""
+        wanted = self.flight.removesuffix(_LIVE).removeprefix(_ITEM).rpartition("/")[2]
+        entries = Corpus(self.folder, _MAPS).all_entries()
+        found = [entry.path for entry in entries if entry.name == wanted]
+        if len(found) == 1:
+            return found[0]
+        if found:
+            files = "".join(f"\n    {path}" for path in found)
+            raise GarlError(
+                f"{self.flight}: {len(found)} cases have this name; name one by its file:{files}"
+            )
+        from difflib import get_close_matches
+
+        near = get_close_matches(wanted, [entry.name for entry in entries], n=3)
+        hint = f"did you mean {' or '.join(near)}?" if near else "`garl cases list` lists the cases"
+        raise GarlError(
+            f"{self.flight}: found neither a slot such as court-g03-s17, nor a case of this name "
+            f"in {self.folder}, nor a file {CASE} or {RECORD}; {hint}"
+        )
+
+
+def flown_again(
+    file: Path, case: Case, replayed: Replay, root: Path, *, live: bool = False
+) -> NamedFlight:
+    """Return the flight of a case that was replayed; raise GarlError if it left no record."""
+    if replayed.flight is None:
+        raise GarlError(f"{file}: {NO_RECORD}; `garl cases replay {file}` says how it ends")
+    other = " (another flight than the saved one)" if replayed.same_flight is False else ""
     return NamedFlight(
-        name=case.id,
-        flight=flight,
+        name=f"{case.id}{_LIVE if live else ''}",
+        flight=replayed.flight,
         signature=replayed.signature,
         limits=case.limits,
-        scenario=case.scenario,
-        map=replayed.map,
-        **_camera(flight, camera),
+        place=Place(
+            scenario=case.scenario,
+            map=map_in(case.scenario, replayed.map),
+            camera=airframe_of(system_of(case, root)).camera,
+        ),
+        how=f"flown again{other}",
     )
 
 
-def _of_slot(name: str, map: str, slot: Slot, path: Path) -> NamedFlight:
-    if not path.is_file():
-        raise LedgerError(
-            f"there is no ledger at {path}; run a search first, or name the ledger of one with "
-            "--ledger"
-        )
-    with checked_ledger(path) as ledger:
-        found = [f for f in ledger.queries.flights() if name in (f.id.slot_id, f.id.name)]
-        if not found:
-            # It says which slots there are; those that it knows are not flown yet.
-            read_slot(path, map, slot)
-            raise LedgerError(f"{name} is not flown in {path}; wait for it, or go on with the run")
-        if len(found) > 1:
-            raise LedgerError(
-                f"{path} holds several flights {name}: "
-                f"{listed(f'{each.id.name} ({each.system})' for each in found)}; name one of these"
-            )
-        (chosen,) = found
-        return _stored(ledger, chosen, load(_record(ledger, chosen)))
-
-
-def _record(ledger: Ledger, found: LedgerFlight) -> Path:
-    """Return the file of a record; raise LedgerError, with what to do, if it is missing."""
-    if not found.sha256:
-        raise LedgerError(
-            f"{found.id.slot_id} has no record: its process ended before the flight was recorded"
-        )
-    beside = found.id.record(ledger.path.parent / "flights")
-    places = tuple(dict.fromkeys((beside, _job(ledger, found).record(found.id))))
-    path = next((each for each in places if each.is_file()), None)
-    if path is None:
-        raise LedgerError(
-            f"the record of {found.id.slot_id} is missing: expected {beside.name} in "
-            f"{' and '.join(str(each.parent) for each in places)}; copy the folder flights beside "
-            f"the ledger, or fly it again: pytest --garl-repeat={found.id.slot_id}"
-        )
-    return path
-
-
-def _of_record(path: Path, given: Path | None, root: Path) -> NamedFlight:
-    """Return a record with what the ledger of its run knows of it, if there is one."""
-    flight = load(path)
-    if given is not None and not given.is_file():
-        raise LedgerError(f"there is no ledger at {given}")
-    beside = path.absolute().parent.parent / LEDGER.name
-    for place in (given,) if given is not None else (beside, root / LEDGER):
-        if place.is_file():
-            with checked_ledger(place) as ledger:
-                found = ledger.queries.flight_with_hash(flight.sha256)
-                if found is not None:
-                    return _stored(ledger, found, flight)
-    note = (
-        "No ledger knows this record, so that its scenario is not known: no pictures, no bodies. "
-        "Name the ledger of its run with --ledger."
-    )
-    return NamedFlight(
-        name=path.stem,
+def _recorded(task: FlightTask, flight: Flight) -> NamedFlight:
+    """Return a flight of a ledger, whose record this is, with what the ledger knows of it."""
+    found = NamedFlight(
+        # A record has the flight's whole name.
+        name=task.records[0].stem,
         flight=flight,
-        signature=judge(flight, DEFAULT_LIMITS).signature,
-        limits=DEFAULT_LIMITS,
-        notes=(note,),
+        signature=task.result.signature,
+        limits=task.job.limits,
     )
-
-
-def _stored(ledger: Ledger, found: LedgerFlight, flight: Flight) -> NamedFlight:
-    job = _job(ledger, found)
-    place = _place(ledger, found, job, flight)
-    return NamedFlight(
-        name=found.id.name,
-        flight=flight,
-        signature=found.signature,
-        limits=job.limits,
-        **place,
-    )
-
-
-def _job(ledger: Ledger, found: LedgerFlight) -> FlightJob:
-    return parse_job(ledger.job(found.id.search) or "")
-
-
-def _place(ledger: Ledger, found: LedgerFlight, job: FlightJob, flight: Flight) -> dict[str, Any]:
-    """Return scenario, map and camera as far as they are known, and notes."""
-    if job.simulator != BUILT_IN:
-        return {
-            "notes": (
-                f"Flown by {shortened(job.simulator.name)}, whose camera cannot be drawn again: no "
-                "pictures, no bodies.",
-            )
-        }
+    if unseen := why_no_camera(task.job.simulator.name):
+        return replace(found, no_pictures=unseen)
     try:
-        map = job.load_map()
+        map = task.job.load_map()
     except GarlError as error:
-        return {"notes": (f"The map cannot be read: no pictures, no bodies. {error}",)}
-    known = ledger.fact(f"{CAMERA}{found.system}")
-    if known is None:
-        seen: dict[str, Any] = {
-            "notes": (
-                "The ledger does not name the camera, as those of earlier versions: no pictures.",
-            )
-        }
-    else:
-        try:
-            seen = _camera(flight, dataclass_from(Camera, dict(known), "camera"))
-        except (GarlError, TypeError, ValueError) as error:
-            seen = {"notes": (f"The ledger's camera cannot be read: no pictures. {error}",)}
-    if map.sha256 != job.map_sha256:
-        changed = f"The map {map.name} has changed since the flight: pictures may differ."
-        seen["notes"] = (*seen["notes"], changed)
-    return {"scenario": parse_scenario(found.scenario), "map": map, **seen}
+        return replace(found, no_pictures=f"its map cannot be read: {error}")
+    changed = f"The map {map.name} has changed since the flight: pictures may differ."
+    notes = (changed,) if map.sha256 != task.job.map_sha256 else ()
+    camera, unseen = None, ""
+    try:
+        camera = camera_of(task)
+    except GarlError as error:
+        unseen = str(error)
+    scenario = parse_scenario(task.scenario)
+    place = Place(scenario=scenario, map=map_in(scenario, map), camera=camera)
+    return replace(found, place=place, no_pictures=unseen, notes=notes)
 
 
-def _camera(flight: Flight, camera: Camera) -> dict[str, Any]:
-    """Return the camera, or why no picture can be drawn again."""
-    if not flight.steps:
-        return {"notes": ("The record holds no camera frames: no pictures.",)}
-    # A camera that is on knows how large the marker would be, whatever it shows.
-    if not any(step.marker_px > 0 for step in flight.steps):
-        return {"notes": ("The landing system used no camera: no pictures.",)}
-    return {"camera": camera, "notes": ()}
+def _no_ledger(path: Path) -> LedgerError:
+    return LedgerError(
+        f"there is no ledger at {path}; run a search first, or name the ledger of one with --ledger"
+    )
+
+
+def _how_to_fly_again(slot: str, ledger: Path) -> str:
+    """Return the commands that fly a slot again; none for a ledger that pytest does not read."""
+    if ledger.name != LEDGER.name:
+        return ""
+    where = "" if ledger.parent == LEDGER.parent else f" -o garl_dir={ledger.parent}"
+    return (
+        f" To fly it again: pytest --garl-repeat={slot}{where}, then name {slot} with "
+        f"--ledger={ledger.with_name(REPEATED)}"
+    )
+
+
+def _case_file(file: Path) -> Path:
+    """Return the file if it is a case; raise GarlError if it is none, or a scenario."""
+    if not file.is_file():
+        raise GarlError(
+            f"{file}: found nothing, expected a saved case; `garl cases list` lists them"
+        )
+    values = parse(read_text(file), str(file))
+    if "evidence" not in values:
+        slot = FIRST_SLOT.id(shortened(str(values.get("map", "MAP"))))
+        raise GarlError(
+            f"{file}: found no evidence of a flight, expected a saved case. If it is a scenario, "
+            f"fly it first: pytest --garl-repeat={file}, then name {slot} with "
+            f"--ledger={LEDGER.with_name(REPEATED)}"
+        )
+    return file

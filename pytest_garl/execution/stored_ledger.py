@@ -68,7 +68,7 @@ def read_slot(path: Path, map: str, slot: Slot) -> StoredSlot:
     with checked_ledger(path) as ledger:
         found = ledger.queries.scenarios(slot.generation, slot.index, map)
         if not found:
-            raise LedgerError(f"no such slot in {path}; it holds {_flown_slots(ledger)}")
+            raise LedgerError(f"no such slot in {path}; it holds {flown_slots(ledger)}")
         jobs = [parse_job(job) for _, job in ledger.searches()]
         return StoredSlot(
             map=map,
@@ -97,7 +97,7 @@ def stored_flight_s(path: Path) -> float | None:
         return None
 
 
-def _flown_slots(ledger: Ledger) -> str:
+def flown_slots(ledger: Ledger) -> str:
     """Return which slots a ledger holds, as one range for each map."""
     slots: dict[str, list[Slot]] = {}
     for flight in ledger.queries.flights():

@@ -19,10 +19,9 @@ from pytest_garl.reports.html.flight_task import FlightTask, record_of, task_of
 from pytest_garl.reports.html.page_workers import in_processes
 from pytest_garl.reports.search_summary import CAMERA
 from pytest_garl.scenarios.files import parse_scenario
-from pytest_garl.simulation.flight import Flight
 from pytest_garl.video import save_video
 
-NO_RECORD = "its process ended before the flight's record was written: no film can be drawn"
+NO_RECORD = "its process ended before its record was written"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -43,48 +42,52 @@ def recorded_flight(ledger: Ledger, flight: LedgerFlight) -> FlightTask:
     return task_of(ledger, flight, flight.scenario, ledger.fact(f"{CAMERA}{flight.system}"))
 
 
-def check_simulator(simulator: str) -> None:
-    """Raise GarlError for a simulator of a user's own, whose flights have no camera here."""
-    if simulator != BUILT_IN.name:
+def why_no_camera(simulator: str) -> str:
+    """Return why flights of a simulator of a user's own have no camera; empty for the built-in."""
+    if simulator == BUILT_IN.name:
+        return ""
+    return (
+        f"flown by {shortened(simulator)}, a simulator of your own, whose camera cannot be drawn "
+        "again"
+    )
+
+
+def camera_of(flight: FlightTask) -> Camera:
+    """Return the camera that flew; raise GarlError if its pictures cannot be drawn again."""
+    if problem := why_no_camera(flight.job.simulator.name):
+        raise GarlError(problem)
+    if flight.camera is None:
         raise GarlError(
-            f"flown by {shortened(simulator)}, a simulator of your own, whose camera cannot be "
-            "drawn again: only flights of the built-in simulator have films"
+            "the ledger does not name the camera, as those of earlier versions: search again, or "
+            "fly it with --garl-repeat"
         )
+    try:
+        return dataclass_from(Camera, dict(flight.camera), "camera")
+    except (GarlError, TypeError, ValueError) as error:
+        raise GarlError(f"the camera in the ledger is damaged: {error}") from error
 
 
 def why_no_film(flight: FlightTask) -> str:
     """Return why a flight can have no film, whatever its record holds; empty if it can."""
     try:
-        check_simulator(flight.job.simulator.name)
+        camera_of(flight)
     except GarlError as error:
         return str(error)
-    if flight.camera is None:
-        return (
-            "the ledger does not name the camera, as those of earlier versions: search again, or "
-            "fly it with --garl-repeat"
-        )
     return "" if flight.recorded else NO_RECORD
 
 
-def draw_film(task: FilmTask, last_s: float | None = None) -> Flight:
-    """Draw the film of a flight from its record, and return the flight.
+def draw_film(task: FilmTask) -> None:
+    """Draw the film of a flight from its record.
 
     Raises GarlError, which says what is missing, if that cannot be done.
     """
     flight = task.flight
-    if problem := why_no_film(flight):
-        raise GarlError(problem)
+    camera = camera_of(flight)
     record, missing = record_of(flight)
     if record is None:
-        raise GarlError(missing)
-    try:
-        camera = dataclass_from(Camera, dict(flight.camera or {}), "camera")
-    except ValueError as error:
-        raise GarlError(f"the camera in the ledger is damaged: {error}") from error
+        raise GarlError(missing or NO_RECORD)
     scenario, map = parse_scenario(flight.scenario), flight.job.load_map()
-    signature = flight.result.signature
-    save_video(task.file, record, scenario, map, camera, signature, last_s=last_s)
-    return record
+    save_video(task.file, record, scenario, map, camera, flight.result.signature)
 
 
 def draw_films(

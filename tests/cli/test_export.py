@@ -12,7 +12,10 @@ from click.testing import CliRunner, Result
 from pytest_garl.cli import main
 from pytest_garl.execution.reference import Reference
 from pytest_garl.landing_system import Camera
-from pytest_garl.regressions.corpus import Corpus
+from pytest_garl.regressions.case_file import load_case
+from pytest_garl.regressions.corpus import Corpus, replace_file
+from pytest_garl.regressions.replay import replay
+from pytest_garl.scenarios.files import dumps
 from pytest_garl.simulation.flight import Flight
 from pytest_garl.simulation.flight_file import hash_of, save
 from tests.cli.test_cases import SYSTEM, case_of_broken_lander
@@ -20,7 +23,7 @@ from tests.support.mcap_files import needs_extra, read_mcap
 from tests.support.recorded_flights import recorded
 from tests.support.report_ledgers import Flown, write_ledger
 from tests.support.results import flight_result
-from tests.support.videos import Hovers, Video, video
+from tests.support.videos import LAWN, SCENARIO, Hovers, Video, video
 
 needs_extra()
 __all__ = ["video"]
@@ -75,54 +78,13 @@ def test_a_record_that_no_ledger_knows_has_no_pictures(tmp_path: Path, video: Vi
     save(dataclasses.replace(moved, sha256=hash_of(moved)), record)
     done = garl(record, "--mcap=flight.mcap")
     assert done.exit_code == 0
-    assert "its scenario is not known: no pictures, no bodies" in done.output
+    assert "garl: no pictures, no bodies: " in done.output
+    assert "holds neither its scenario nor its camera" in done.output
+    assert "The limits of its test are not known" in done.output
     assert "/camera/image" not in read_mcap(Path("flight.mcap")).topics
-
-
-@pytest.mark.usefixtures("ledger")
-def test_a_slot_without_a_record_says_what_to_do(ledger: Path) -> None:
-    assert "its process ended before the flight was recorded" in refused(
-        "lawn-g00-s01", "--mcap=x.mcap"
-    )
-    (record,) = (ledger.parent / "flights").iterdir()
-    record.unlink()
-    words = refused(SLOT, "--mcap=x.mcap")
-    assert f"expected {record.name} in " in words
-    assert f"fly it again: pytest --garl-repeat={SLOT}" in words
-
-
-@pytest.mark.usefixtures("ledger")
-def test_unknown_names_say_what_there_is(tmp_path: Path) -> None:
-    words = refused("lawn-g07-s00", "--mcap=x.mcap")
-    assert "no such slot in " in words
-    assert "it holds lawn-g00-s00 to lawn-g00-s01" in words
-    words = refused("flight", "--mcap=x.mcap")
-    assert "found no flight 'flight'; expected a slot of the run such as court-g03-s17" in words
-    assert "x.toml: there is no such file" in refused("x.toml", "--mcap=x.mcap")
-    assert "x.npz" in refused("x.npz", "--mcap=x.mcap")
-    assert "there is no ledger at no.sqlite" in refused(SLOT, "--ledger=no.sqlite", "--mcap=x.mcap")
-    (tmp_path / "broken.npz").write_bytes(b"PK")
-    assert "broken.npz: not a saved flight" in refused("broken.npz", "--mcap=x.mcap")
-
-
-def test_a_slot_of_two_systems_asks_which(ledger: Path, video: Video) -> None:
-    from pytest_garl.execution.job import parse_job
-    from pytest_garl.execution.ledger import Ledger
-
-    opened = Ledger(ledger)
-    job = parse_job(opened.job("0123456789abcdef") or "")
-    opened.add_search("fedcba9876543210", "my_stack:Other", "lawn", 1, job.dumps())
-    opened.database.execute(
-        "INSERT INTO slot SELECT 'fedcba9876543210', generation, slot, scenario, state, pid, "
-        "lease, attempts, after, priority, result, objectives, sha256, wall_s FROM slot "
-        "WHERE slot = 0"
-    )
-    opened.close()
-    words = refused(SLOT, "--mcap=x.mcap")
-    assert "several flights lawn-g00-s00: " in words
-    assert "01234567-lawn-g00-s00 (my_stack:Hovers)" in words
-    assert "fedcba98-lawn-g00-s00 (my_stack:Other)" in words
-    assert garl("01234567-lawn-g00-s00", "--mcap=x.mcap").exit_code == 0
+    (tmp_path / "it.toml").write_text(dumps(SCENARIO, LAWN))
+    told = ("--scenario=it.toml", "--system=tests.support.videos:Hovers")
+    assert ", 30 pictures, " in garl(record, *told, "--mcap=flight.mcap").output
 
 
 def written(folder: Path, flight: Flight, **facts: object) -> str:
@@ -141,13 +103,13 @@ def test_what_is_missing_is_said(
     own = Reference(module="my_simulator", file="", qualname="fly")
     bare = dataclasses.replace(recorded(steps=()), sha256="ab" * 32)
     words = written(tmp_path, bare, simulator=own)
-    assert "Flown by my_simulator:fly, whose camera cannot be drawn again: no pictures" in words
+    assert "no pictures, no bodies: flown by my_simulator:fly, a simulator of your own" in words
     words = written(tmp_path, video.flight, camera=None)
-    assert "The ledger does not name the camera" in words
+    assert "no pictures: the ledger does not name the camera" in words
     assert "/map" in read_mcap(Path("flight.mcap")).topics
     dark = tuple(dataclasses.replace(step, marker_px=0.0) for step in video.flight.steps)
     words = written(tmp_path, dataclasses.replace(video.flight, steps=dark))
-    assert "The landing system used no camera: no pictures." in words
+    assert "no pictures: the landing system used no camera" in words
 
 
 def test_a_ledger_with_a_camera_that_is_none_gives_no_pictures(
@@ -158,10 +120,12 @@ def test_a_ledger_with_a_camera_that_is_none_gives_no_pictures(
     object.__setattr__(broken, "rate_hz", -1.0)
     assert isinstance(broken, Camera)
     words = written(tmp_path, video.flight, camera=broken)
-    assert "The ledger's camera cannot be read: no pictures." in words
+    assert "no pictures: the camera in the ledger is damaged" in words
 
 
-def test_a_case_is_flown_again(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_case_is_flown_again_and_its_record_gives_the_same_bytes(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(sys, "path", [*sys.path])
     (tmp_path / "stack_of_test.py").write_text(SYSTEM)
@@ -174,11 +138,17 @@ def test_a_case_is_flown_again(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) 
         found = read_mcap(Path("flight.mcap"))
         assert found.topics["/events"][0][1].message.startswith(f"flight {path.stem}, ")
         assert len(found.topics["/camera/image"]) > 1
-        twin = path.parent.with_name("twin")
-        twin.mkdir()
-        (twin / path.name).write_text(path.read_text())
-        Path("flight.mcap").unlink()
-        assert "is the name of several cases" in refused(path.stem, "--mcap=flight.mcap")
+        (tmp_path / "broken").touch()
+        assert garl(path, "--mcap=flown.mcap").output.endswith(", flown again\n")
+        case = load_case(path)
+        flight = replay(case, tmp_path).flight
+        assert flight is not None
+        evidence = dataclasses.replace(case.evidence, trajectory_sha256=flight.sha256)
+        replace_file(path, dataclasses.replace(case, evidence=evidence))
+        flown = [Flown(result=flight_result(), flight=flight, scenario=case.scenario)]
+        write_ledger(tmp_path, flown, system=case.system, camera=Camera())
+        assert garl(path, "--mcap=recorded.mcap").output.endswith(", from its record\n")
+        assert Path("recorded.mcap").read_bytes() == Path("flown.mcap").read_bytes()
     finally:
         sys.modules.pop("stack_of_test", None)
 

@@ -153,7 +153,7 @@ def test_a_simulator_of_a_users_own_has_no_films(
             "*garl: films*",
             "0 films of what failed in .garl/films",
             "no film of lawn-g00-s02, lawn-g00-s00: flown by tiny_simulator:fly, a simulator",
-            "  of your own, whose camera cannot be drawn again: *",
+            "  of your own, whose camera cannot be drawn again",
         ]
     )
     result.stdout.no_fnmatch_line("garl: drawing*")
