@@ -172,7 +172,7 @@ def _figures(search: Mapping[str, Any] | None) -> list[tuple[str, str]]:
         *((f"gave up, {why}", share(gave_up.get(why, 0))) for why in WHY_NO_LANDING),
         ("not landed", share(sum(found.get("not_landed", {}).values()))),
         ("violate something", share(found.get("violating", 0))),
-        ("crashes of the system", share(sum(found.get("crashes", {}).values()))),
+        ("software crashes", share(sum(found.get("crashes", {}).values()))),
         ("kinds of violation", str(len(found["signatures"])) if search else NOTHING),
         ("effective kinds", f"{found['effective_kinds']:.1f}" if search else NOTHING),
         ("median distance of landings", spread("landing_distance_m", "m", 2)),

@@ -185,7 +185,7 @@ def _no_landing_cause(flight: Flight, limits: Limits, end: str) -> tuple[Violati
     when = f" at {at_s:.1f} s" if flight.outcome == "gave_up" else ""
     if not readable:
         # A detector may read a frame that a good one reads with less than one half.
-        view = "in view" if last_report_s(flight, at_s) is None else "in good view"
+        view = "readable" if last_report_s(flight, at_s) is None else "well readable"
         return "II", "II:never-seen", f"{end}{when}; the marker was never {view}.{report}"
     last = readable[-1]
     lost = at_s - last > LOST_AFTER_S
@@ -252,7 +252,7 @@ def _missed(
         )
     on = _ground_under(flight, touchdown)
     seen = "seen" if readable else "unseen"
-    view = "had been in view" if readable else "was never in view"
+    view = "had been in view" if readable else "was never readable"
     what = "on open ground" if on == "nothing" else f"on a {on}" if on in _PLAIN else f"on {on}"
     return Mechanism(
         primary="distance",

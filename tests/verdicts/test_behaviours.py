@@ -76,7 +76,7 @@ def test_a_blind_landing_is_a_landing_on_nothing_that_was_seen() -> None:
     flight = FAR_NORTH.fly(Route((0.0, -13.2), last=land))
     verdict = judge(flight, Limits())
     assert verdict.signature == "I:line:unseen"
-    assert "the marker was never in view" in verdict.story
+    assert "the marker was never readable" in verdict.story
 
 
 def test_a_landing_in_a_shadow_names_the_shadow() -> None:

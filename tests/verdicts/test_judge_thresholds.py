@@ -119,7 +119,7 @@ def test_giving_up_in_the_last_15_percent_of_the_time_is_for_want_of_time(
     ("visible", "kind", "words"),
     [
         (0.51, "late", "although the marker was in view to the end"),
-        (0.5, "II", "the marker was never in view"),
+        (0.5, "II", "the marker was never readable"),
     ],
 )
 def test_without_records_of_the_marker_its_visible_share_counts(

@@ -11,9 +11,11 @@ from pytest_garl.regressions.case import NOT_ASKED, Prevention
 from pytest_garl.reports.html.moments import decisive_s
 from pytest_garl.reports.html.sightings_text import readable_and_reported
 from pytest_garl.simulation.flight import Flight
-from pytest_garl.verdicts.sightings import last_target, reports_detections
+from pytest_garl.verdicts.sightings import last_target, reports_detections, target_of
 from pytest_garl.verdicts.verdict import Verdict
 
+AT_MARKER_M = 1.0
+"""A target within so much of the marker's centre is meant for the marker."""
 MISSED = 0.5
 """A system that reports fewer of the readable frames than this share has lost the marker."""
 
@@ -27,18 +29,49 @@ def hints_of(
         return (_moving(flight, prevention),)
     if kind in ("II", "abort") or verdict.signature.startswith("late:not-landed"):
         return tuple(_not_landed(flight))
+    decoy = next((name for name in _signatures(verdict) if name.startswith(_DECOY)), "")
+    if decoy:
+        first = _decoy(flight, decoy.split(":")[1])
+        return (first,) if kind == "I" else (first, *_OF_TYPE.get(kind or "", ()))
     if kind in ("I", "off"):
         return (_elsewhere(flight),)
-    return {
-        "III": (
-            "A body that does not move was hit: look at the way that the system took there, and "
-            "at its clearance from what it could see or knew.",
-        ),
-        "V": ("The traceback below names the line that failed, with the frame that it got.",),
-        "late": ("It was too slow: the timeline shows which phase took the time.",),
-        "hard": ("Look at the descent of the last metres: speed and tilt at the touchdown.",),
-        "slid": ("Look at the speed over the ground at the touchdown, and at when motors stop.",),
-    }.get(kind or "", ())
+    return _OF_TYPE.get(kind or "", ())
+
+
+_DECOY = "I:decoy-"
+_OF_TYPE = {
+    "III": (
+        "A body that does not move was hit: look at the way that the system took there, and "
+        "at its clearance from what it could see or knew.",
+    ),
+    "V": ("The traceback below names the line that failed, with the frame that it got.",),
+    "late": ("It was too slow: the timeline shows which phase took the time.",),
+    "hard": ("Look at the descent of the last metres: speed and tilt at the touchdown.",),
+    "slid": ("Look at the speed over the ground at the touchdown, and at when motors stop.",),
+}
+
+
+def _signatures(verdict: Verdict) -> Iterator[str]:
+    """Yield the signature of the event, and of what had gone wrong before it."""
+    yield verdict.signature
+    yield from (finding.signature for finding in verdict.findings)
+
+
+def _decoy(flight: Flight | None, kind: str) -> str:
+    """Return what a descent to a decoy points to, and when the target became another one."""
+    text = (
+        f"It came down towards a {kind}: look at how the system chooses among the markers that it "
+        "detects."
+    )
+    targets = [(step.time_s, target_of(step)) for step in flight.steps] if flight else []
+    known = [(time_s, target) for time_s, target in targets if target is not None]
+    if flight is None or not known:
+        return text
+    marker = flight.marker_position_m
+    right = [time_s for time_s, target in known if math.dist(target, marker) < AT_MARKER_M]
+    if not right:
+        return f"{text} Its target was never the marker."
+    return f"{text} Its target was last at the marker at {right[-1]:.1f} s."
 
 
 def _moving(flight: Flight | None, prevention: Prevention) -> str:

@@ -181,7 +181,7 @@ def _numbers(
         ("landed", _share(landed, flown)),
         ("violate something", _share(violating, flown)),
         ("did not land, needlessly", _share(needless, flown)),
-        ("crashes of the system", str(crashes)),
+        ("software crashes", str(crashes)),
         ("kinds of violation", str(kinds)),
     )
 

@@ -11,7 +11,7 @@ from pytest_garl.regressions.case import Prevention
 from pytest_garl.reports.html.hints import hints_of
 from pytest_garl.reports.html.sightings_text import sighting_sentences
 from pytest_garl.simulation.flight import Flight
-from pytest_garl.verdicts.verdict import Verdict, ViolationType
+from pytest_garl.verdicts.verdict import Finding, Verdict, ViolationType
 from tests.support.recorded_flights import hit_by_dog, recorded, seen
 from tests.support.results import flight_result
 
@@ -98,3 +98,21 @@ def test_a_landing_beside_the_marker_is_told_by_its_target() -> None:
 
     assert "look at the detector" in landed((4.0, 0.0, 0.0))
     assert "look at the control" in landed((0.0, 0.0, 0.0))
+
+
+def test_a_decoy_points_to_the_choice_of_the_target_and_says_when_it_left_the_marker() -> None:
+    steps = tuple(
+        dataclasses.replace(
+            each,
+            diagnostics=Diagnostics(target_m=(0.0 if each.time_s < 4.05 else 6.0, 0.0, 0.0)),
+        )
+        for each in seen(range(20, 60))
+    )
+    decoy = "I:decoy-same-id-without-margin"
+    (hint,) = hints_of(recorded(steps=steps), verdict("I", f"{decoy}:seen"))
+    assert "how the system chooses among the markers" in hint
+    assert hint.endswith("Its target was last at the marker at 4.0 s.")
+    finding = Finding(signature=decoy, margin=-1.0, unit="m", time_s=5.0, story="A.")
+    tree = dataclasses.replace(verdict("III", "III:tree:descent"), findings=(finding,))
+    first, second = hints_of(recorded(steps=steps), tree)
+    assert (first, second) == (hint, *hints_of(None, verdict("III")))
