@@ -26,10 +26,14 @@ NO_RECORD = "its process ended before its record was written"
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FilmTask:
-    """A flight of a ledger, and the file of its film."""
+    """A flight of a ledger, and the file of its film.
+
+    ``drawn`` is where a process of its own draws before the film takes its place.
+    """
 
     flight: FlightTask
     file: Path
+    drawn: Path | None = None
 
     @property
     def name(self) -> str:
@@ -107,28 +111,16 @@ def draw_films(
         raise SavingError(f"{folder}: no films can be written here ({error})") from error
     # A process that is ended while it draws leaves its unfinished file in here.
     with tempfile.TemporaryDirectory(prefix=".drawn-", dir=folder) as scratch:
-        works = [_Work(task=task, scratch=Path(scratch, task.file.name)) for task in tasks]
+        works = [replace(task, drawn=Path(scratch, task.file.name)) for task in tasks]
         return in_processes(_problem_of, works, workers, on_done)
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class _Work:
-    """A film, and where it is drawn before it takes its place."""
-
-    task: FilmTask
-    scratch: Path
-
-    @property
-    def name(self) -> str:
-        """The flight's slot."""
-        return self.task.name
-
-
-def _problem_of(work: _Work) -> str:
+def _problem_of(task: FilmTask) -> str:
     """Draw a film; return why it cannot be drawn, empty if it was."""
+    drawn = task.drawn or task.file
     try:
-        draw_film(replace(work.task, file=work.scratch))
-        work.scratch.replace(work.task.file)
+        draw_film(replace(task, file=drawn))
+        drawn.replace(task.file)
     except (GarlError, OSError) as error:
         return str(error)
     return ""

@@ -101,6 +101,21 @@ def _command(
     return [program, *words.split(), "-f", "mp4", str(path)]
 
 
+def finished(
+    command: Sequence[str], timeout_s: float | None = None
+) -> subprocess.CompletedProcess[str]:
+    """Run a command that reads nothing; return its exit status and what it said."""
+    return subprocess.run(
+        command,
+        stdin=subprocess.DEVNULL,
+        capture_output=True,
+        text=True,
+        errors="replace",
+        timeout=timeout_s,
+        check=False,
+    )
+
+
 def program() -> str:
     """Return an ffmpeg that writes H.264: the one on PATH, else that of imageio-ffmpeg.
 
@@ -136,15 +151,7 @@ def _problem(ffmpeg: str) -> str:
     """Return why an ffmpeg cannot encode; empty if it can."""
     command = [ffmpeg, "-nostdin", "-hide_banner", "-encoders"]
     try:
-        done = subprocess.run(
-            command,
-            stdin=subprocess.DEVNULL,
-            capture_output=True,
-            text=True,
-            errors="replace",
-            timeout=_PATIENCE_S,
-            check=False,
-        )
+        done = finished(command, timeout_s=_PATIENCE_S)
     except (OSError, subprocess.TimeoutExpired) as error:
         return f"{ffmpeg} cannot be run ({error})"
     if done.returncode:

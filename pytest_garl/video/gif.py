@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import subprocess
 import tempfile
 from collections.abc import Iterable, Iterator, Sequence
 from itertools import chain
@@ -15,7 +14,7 @@ import numpy as np
 from pytest_garl.errors import GarlError
 from pytest_garl.video import camera_pane
 from pytest_garl.video.drawing import Image
-from pytest_garl.video.encoder import encode, no_picture, program
+from pytest_garl.video.encoder import encode, finished, no_picture, program
 
 RATE_HZ = 5.0
 """A second of a moving camera takes 0.14 MB at this rate, and twice as much at 10 Hz: measured on
@@ -75,14 +74,7 @@ def _small(picture: Image) -> Image:
 
 
 def _run(command: Sequence[str], path: Path) -> None:
-    done = subprocess.run(
-        command,
-        stdin=subprocess.DEVNULL,
-        capture_output=True,
-        text=True,
-        errors="replace",
-        check=False,
-    )
+    done = finished(command)
     if done.returncode:
         raise GarlError(
             f"{path}: the encoder {command[0]} gave up (exit status {done.returncode}): "

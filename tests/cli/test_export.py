@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import sys
 from pathlib import Path
+from typing import Any
 
 import pytest
 from click.testing import CliRunner, Result
@@ -18,7 +19,7 @@ from pytest_garl.regressions.replay import replay
 from pytest_garl.scenarios.files import dumps
 from pytest_garl.simulation.flight import Flight
 from pytest_garl.simulation.flight_file import hash_of, save
-from tests.cli.test_cases import SYSTEM, case_of_broken_lander
+from tests.support.broken_lander import SYSTEM, case_of_broken_lander
 from tests.support.mcap_files import needs_extra, read_mcap
 from tests.support.recorded_flights import recorded
 from tests.support.report_ledgers import Flown, write_ledger
@@ -87,9 +88,9 @@ def test_a_record_that_no_ledger_knows_has_no_pictures(tmp_path: Path, video: Vi
     assert ", 30 pictures, " in garl(record, *told, "--mcap=flight.mcap").output
 
 
-def written(folder: Path, flight: Flight, **facts: object) -> str:
+def written(folder: Path, flight: Flight, **facts: Any) -> str:
     """Return what is said of the export of a ledger's only flight."""
-    write_ledger(folder, [Flown(result=flight_result(), flight=flight)], **facts)  # type: ignore[arg-type]
+    write_ledger(folder, [Flown(result=flight_result(), flight=flight)], **facts)
     done = garl(SLOT, "--mcap=flight.mcap")
     assert done.exit_code == 0, done.output
     assert "/camera/image" not in read_mcap(Path("flight.mcap")).topics

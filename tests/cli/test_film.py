@@ -19,11 +19,11 @@ from click.testing import CliRunner, Result
 from pytest_garl.cli import main
 from pytest_garl.execution.reference import Reference
 from pytest_garl.regressions.case_file import load_case
-from pytest_garl.regressions.corpus import Corpus, replace_file
+from pytest_garl.regressions.corpus import replace_file
 from pytest_garl.scenarios.files import dumps
 from pytest_garl.simulation.flight_file import save
-from tests.cli.test_cases import SYSTEM, case_of_broken_lander
 from tests.reports.html.test_report import lost
+from tests.support.broken_lander import broken_project
 from tests.support.ffmpeg import hide_encoders
 from tests.support.report_ledgers import Flown, write_ledger
 from tests.support.results import flight_result
@@ -79,14 +79,7 @@ def run(tmp_path: Path, video: Video, monkeypatch: pytest.MonkeyPatch) -> Path:
 @pytest.fixture
 def case(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
     """Return the case file of a project whose lander is broken, relative to the project."""
-    monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr(sys, "path", [*sys.path])
-    (tmp_path / "stack_of_test.py").write_text(SYSTEM)
-    (tmp_path / "broken").touch()
-    path = Corpus(tmp_path / "scenarios" / "regressions").save(case_of_broken_lander())
-    assert path is not None
-    yield path.relative_to(tmp_path)
-    sys.modules.pop("stack_of_test", None)
+    yield from broken_project(tmp_path, monkeypatch)
 
 
 def test_a_slot_is_drawn_from_its_record(run: Path) -> None:

@@ -13,7 +13,7 @@ import pytest
 
 from pytest_garl.execution.processes import any_command_contains
 from pytest_garl.regressions.corpus import Corpus
-from tests.cli.test_cases import case_of_broken_lander
+from tests.support.broken_lander import case_of_broken_lander
 
 SLOW = """
 import time

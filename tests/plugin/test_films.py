@@ -18,9 +18,9 @@ from pytest_garl.execution.stored_ledger import checked_ledger
 from pytest_garl.plugin import films
 from pytest_garl.plugin.tally import Tally
 from pytest_garl.regressions.corpus import Corpus
-from tests.cli.test_cases import case_of_broken_lander
 from tests.plugin.test_resume import slow_project, start, wait_for
 from tests.reports.html.test_report import lost
+from tests.support.broken_lander import case_of_broken_lander
 from tests.support.landing_project import project
 from tests.support.report_ledgers import Flown, write_ledger
 from tests.support.videos import Video, video

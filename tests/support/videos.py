@@ -44,18 +44,27 @@ PLAN = ((0.0, -16.5, 3.0), (-5.0, -12.0, 3.0))
 CAMERA_PART, STRIP, MAP_PART = np.s_[:480, :640], np.s_[480:, :640], np.s_[:, 640:]
 
 
-class Hovers:
-    """Climbs to 3 m, keeps what it sees, and after a while believes something."""
+class KeepsPictures:
+    """Keeps what it sees in a flight; a subclass has a list of its own."""
 
-    airframe = Airframe(latency_s=0.0, camera=Camera(width_px=640, height_px=480))
-    seen: ClassVar[list[Image]] = []
+    seen: ClassVar[list[Image]]
 
     def reset(self, mission: Mission) -> None:
         self.home = mission.home_m
         self.seen.clear()
 
-    def step(self, observation: Observation) -> Command:
+    def keep(self, observation: Observation) -> None:
         self.seen.append(observation.image.copy())
+
+
+class Hovers(KeepsPictures):
+    """Climbs to 3 m, and after a while believes something."""
+
+    airframe = Airframe(latency_s=0.0, camera=Camera(width_px=640, height_px=480))
+    seen: ClassVar[list[Image]] = []
+
+    def step(self, observation: Observation) -> Command:
+        self.keep(observation)
         diagnostics = None
         if observation.time_s >= SPEAKS_FROM_S:
             found = Detection(marker_id=0, confidence=0.9, position_m=TARGET, corners_px=CORNERS)

@@ -7,7 +7,7 @@ from typing import ClassVar
 import numpy as np
 import pytest
 
-from pytest_garl import Abort, Command, Mission, Observation, PositionSetpoint
+from pytest_garl import Abort, Command, Observation, PositionSetpoint
 from pytest_garl.adversary.catalogue import policy_spec
 from pytest_garl.landing_system import Airframe, Camera
 from pytest_garl.reports.mcap.shown_pictures import ShownPictures, taken_s
@@ -17,7 +17,7 @@ from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.simulation.flight import Flight
 from pytest_garl.simulation.fly import fly
 from pytest_garl.video.drawing import Image
-from tests.support.videos import LAWN, SCENARIO
+from tests.support.videos import LAWN, SCENARIO, KeepsPictures
 
 pytestmark = pytest.mark.sim
 LATE = {
@@ -35,18 +35,14 @@ TURNED = {
 OUTAGE = {"outage.from_s": 1.05, "outage.lasts_s": 0.6}
 
 
-class Watches:
-    """Climbs while it turns, keeps what it sees, and gives up near the end."""
+class Watches(KeepsPictures):
+    """Climbs while it turns, and gives up near the end."""
 
     airframe = Airframe(latency_s=0.0, camera=Camera(width_px=160, height_px=120))
     seen: ClassVar[list[Image]] = []
 
-    def reset(self, mission: Mission) -> None:
-        self.home = mission.home_m
-        self.seen.clear()
-
     def step(self, observation: Observation) -> Command:
-        self.seen.append(observation.image.copy())
+        self.keep(observation)
         if observation.time_s > 2.2:
             return Abort()
         return PositionSetpoint(position_m=(*self.home[:2], 4.0), yaw_rad=1.0)
