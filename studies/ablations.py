@@ -76,28 +76,16 @@ def _pairs(names: Iterable[str]) -> list[tuple[str, str]]:
     return list(itertools.combinations(sorted(names), 2))
 
 
-class HarshExploration(Exploration):
-    """Gives a condition the values of three draws that lie farthest from nominal."""
-
-    draws = 3
+class PlainExploration(Exploration):
+    """Gives a gene the first values drawn, be they mild or harsh."""
 
     def __init__(self, columns: Columns) -> None:
         super().__init__(columns)
-        self._columns_of_values = columns
+        self._genome = columns.genome
 
     def values(self, gene: OptionalGene, rng: np.random.Generator) -> Matrix:
-        """Return a chromosome in which a gene acts; any values of an NPC."""
-        columns = self._columns_of_values
-        draws = 1 if gene.is_npc else self.draws
-        drawn = [columns.genome.random_active(rng, (gene.name,)) for _ in range(draws)]
-        outward = columns.outward[gene.values]
-        span = (columns.upper - columns.lower)[gene.values]
-
-        def harshness(row: Matrix) -> float:
-            away = np.abs(row - columns.nominal)[gene.values] / span
-            return float(np.sum(away[outward]))
-
-        return max(drawn, key=harshness)
+        """Return a chromosome in which a gene acts."""
+        return self._genome.random_active(rng, (gene.name,))
 
 
 class SpreadExploration(Exploration):
@@ -129,7 +117,7 @@ def garl_with(**parameters: Any) -> Callable[[SearchPlan], Method]:
 VARIANTS: dict[str, Callable[[SearchPlan], Method]] = {
     "garl": find_method("garl"),
     "without strata": garl_with(has_strata=False),
-    "harsh values": garl_with(exploration=HarshExploration),
+    "plain values": garl_with(exploration=PlainExploration),
     "pairs of groups covered": garl_with(exploration=PairExploration),
     "values away from earlier ones": garl_with(exploration=SpreadExploration),
     "near misses": garl_with(archive=NearMissArchive),

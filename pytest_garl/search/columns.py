@@ -95,6 +95,11 @@ class Columns:
         grades = [row[gene.grade] if gene.grade >= 0 else len(GRADES) for gene in npcs]
         return STRATA[1] if max(grades) < 1 else STRATA[2]
 
+    def harshness(self, row: Matrix, gene: OptionalGene) -> float:
+        """Return how far a gene's outward values lie from nominal: the sum of shares of ranges."""
+        shares = np.abs(row - self.nominal)[gene.values] / (self.upper - self.lower)[gene.values]
+        return float(np.sum(shares[self.outward[gene.values]]))
+
     def distance_from_nominal(self, row: Matrix) -> float:
         """Return how far the counting outward values lie from nominal, in shares of ranges."""
         mask = self.counting(row) & self.outward

@@ -9,6 +9,8 @@ from pytest_garl.search.operators import Matrix
 
 LONE_NPC_SHARE = 0.8
 """Share of scenarios with NPCs that have one: it says more than two, and severity counts it."""
+DRAWS = 3
+"""Draws of a condition's values of which the harshest are flown: mild ones seldom show anything."""
 
 
 class Exploration:
@@ -35,8 +37,10 @@ class Exploration:
         return row
 
     def values(self, gene: OptionalGene, rng: np.random.Generator) -> Matrix:
-        """Return a chromosome in which a gene acts with values drawn as the domain draws them."""
-        return self._columns.genome.random_active(rng, (gene.name,))
+        """Return a chromosome in which a gene acts; the values of a condition are harsh."""
+        draws = 1 if gene.is_npc else DRAWS
+        drawn = [self._columns.genome.random_active(rng, (gene.name,)) for _ in range(draws)]
+        return max(drawn, key=lambda row: self._columns.harshness(row, gene))
 
     def names(self, stratum: str, rng: np.random.Generator) -> tuple[str, ...]:
         """Return a random set of genes of a stratum, as many as may act."""
