@@ -31,8 +31,7 @@ class Breeder:
     def advance(self) -> None:
         """Add every generation whose parents are flown to the ledger."""
         while self._next_generation <= self._last_generation and self._parents_are_flown():
-            if self._next_generation > 0:
-                self._learn(self._next_generation - 1)
+            self._learn()
             scenarios = self._method.ask()
             slots = self._wanted.get(self._next_generation, ())
             if self._method.learns and self._next_generation < self._last_generation:
@@ -41,13 +40,19 @@ class Breeder:
             self._ledger.add_slots(self._search, self._next_generation, texts)
             self._next_generation += 1
 
-    def _parents_are_flown(self) -> bool:
-        if self._next_generation == 0 or not self._method.learns:
-            return True
-        return self._ledger.queries.unflown(self._search, self._next_generation - 1) == 0
-
-    def _learn(self, generation: int) -> None:
+    @property
+    def _parents(self) -> int:
+        """The generation that the next one needs the results of; negative if there is none."""
         if not self._method.learns:
+            return -1
+        return self._next_generation - (2 if self._method.overlaps else 1)
+
+    def _parents_are_flown(self) -> bool:
+        return self._parents < 0 or self._ledger.queries.unflown(self._search, self._parents) == 0
+
+    def _learn(self) -> None:
+        generation = self._parents
+        if generation < 0:
             return
         flown = [
             FlownScenario(scenario=parse_scenario(text), result=result)

@@ -13,6 +13,7 @@ class FixedScenarios:
     """Proposes each given scenario in its slot, and one of them in every other slot."""
 
     learns = False
+    overlaps = False
 
     def __init__(self, scenarios: Mapping[Slot, Scenario]) -> None:
         self._scenarios, self._generation = scenarios, -1

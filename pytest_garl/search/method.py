@@ -33,13 +33,21 @@ class FlownScenario:
 class Method(Protocol):
     """Breeds whole generations, so that the outcome does not depend on the workers.
 
-    ``ask`` and ``tell`` alternate.  The scenarios that ``ask`` returns depend only on the plan and
-    on the results given to ``tell``.  ``tell`` is never called on a method that does not learn.
+    ``ask`` and ``tell`` alternate, or ``tell`` is one generation behind if the method overlaps.
+    The scenarios that ``ask`` returns depend only on the plan and on the results given to ``tell``.
+    ``tell`` is never called on a method that does not learn.
     """
 
     @property
     def learns(self) -> bool:
-        """Whether a generation depends on the results of the one before."""
+        """Whether a generation depends on the results of earlier ones."""
+
+    @property
+    def overlaps(self) -> bool:
+        """Whether a generation may be asked for before the one before it is told.
+
+        It depends on the results of those before that, and no worker waits for the last flight.
+        """
 
     def ask(self) -> Sequence[Scenario]:
         """Return the next generation: ``population`` scenarios, all of them new."""

@@ -35,6 +35,7 @@ class Nsga2:
     """
 
     learns = True
+    overlaps = False
 
     def __init__(
         self,

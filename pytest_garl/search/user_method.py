@@ -34,8 +34,13 @@ class UserMethod:
 
     @property
     def learns(self) -> bool:
-        """Whether a generation depends on the results of the one before."""
+        """Whether a generation depends on the results of earlier ones."""
         return bool(self._method.learns)
+
+    @property
+    def overlaps(self) -> bool:
+        """Whether a generation may be asked for before the one before it is told; may be absent."""
+        return bool(getattr(self._method, "overlaps", False))
 
     def ask(self) -> Sequence[Scenario]:
         """Return the next generation."""

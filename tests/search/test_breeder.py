@@ -12,7 +12,7 @@ from pytest_garl.scenarios.genes import genome_for
 from pytest_garl.scenarios.maps.map import load_map
 from pytest_garl.search.breeder import Breeder
 from pytest_garl.search.catalogue import make_method, method_names
-from pytest_garl.search.method import SearchPlan
+from pytest_garl.search.method import FlownScenario, SearchPlan
 from tests.search.searches import result
 
 MAP = load_map("court")
@@ -78,3 +78,38 @@ def test_objectives_of_every_learned_generation_are_noted(tmp_path: Path) -> Non
     database.close()
     # The last generation has no successor that would learn from it.
     assert rows == [(0, 8), (1, 8), (2, 8), (3, 8), (4, 0)]
+
+
+def test_a_generation_of_a_method_that_overlaps_is_added_while_the_one_before_is_flown(
+    tmp_path: Path,
+) -> None:
+    for name, ahead in (("garl", 2), ("garl-paper", 1)):
+        plan = SearchPlan(map=MAP, genome=GENOME, seed=1, population=4)
+        ledger = Ledger.create(tmp_path / f"{name}.sqlite", {})
+        ledger.add_search("s", "m:S", "court", 16, "{}")
+        wanted = {generation: range(4) for generation in range(4)}
+        breeder = Breeder(ledger, "s", make_method(name, plan), wanted)
+        for flown in range(4):
+            breeder.advance()
+            added = [bool(ledger.generation("s", generation)) for generation in range(4)]
+            assert added == [generation < flown + ahead for generation in range(4)]
+            for _ in range(4):
+                claim = ledger.queue.claim()
+                assert claim is not None
+                ledger.queue.record(claim, result(parse_scenario(claim.scenario)), "", 0.0)
+        ledger.close()
+
+
+def test_a_method_that_overlaps_proposes_the_same_if_it_is_told_at_once() -> None:
+    plan = SearchPlan(map=MAP, genome=GENOME, seed=1, population=8)
+    prompt, late = make_method("garl", plan), make_method("garl", plan)
+    generations = []
+    for _ in range(4):
+        scenarios = prompt.ask()
+        flown = [FlownScenario(scenario=each, result=result(each)) for each in scenarios]
+        prompt.tell(flown)
+        generations.append((scenarios, flown))
+    for number, (scenarios, _) in enumerate(generations):
+        if number > 1:
+            late.tell(generations[number - 2][1])
+        assert late.ask() == scenarios

@@ -6,12 +6,16 @@ strata without NPCs, with careless ones and with those that know of the UAV, and
 archive's cells.  The first violation of a kind counts as a success and each further one less, so
 that a new kind is worth more than one more of the same.
 
+A generation is bred while the one before it is flown, and from the results of those before that:
+no worker waits for the last flight of a generation.
+
 A scenario that is flown like an earlier one is not flown again: its difference is a value that
 does not count.
 """
 
 from __future__ import annotations
 
+from collections import deque
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
@@ -61,6 +65,7 @@ class Garl:
     """The archive of cells, and the breeding from it."""
 
     learns = True
+    overlaps = True
 
     def __init__(self, plan: SearchPlan, parameters: GarlParameters | None = None) -> None:
         self._plan, self._parameters = plan, parameters or GarlParameters()
@@ -73,23 +78,31 @@ class Garl:
         self._choices: dict[str, str] = {}
         """The arm of each scenario, by its text."""
         self._generation = 0
+        self._unlearned: deque[Sequence[FlownScenario]] = deque()
+        """Generations that were flown, and that the next one is not bred from yet."""
 
     def ask(self) -> Sequence[Scenario]:
         """Return the next generation; the first one is that of ``random``."""
         plan, self._generation = self._plan, self._generation + 1
         if self._generation > 1:
+            if self._generation > 2:
+                self._learn(self._unlearned.popleft())
             return [self._new() for _ in range(plan.population)]
         control = random_scenarios(plan.map, plan.genome, plan.seed, 0, plan.population)
         self._choices.update((dump_scenario(scenario), "") for scenario in control)
         return control
 
     def tell(self, flown: Sequence[FlownScenario]) -> Sequence[tuple[float, ...]]:
-        """Put each flight into its cells; return its proximity to a violation."""
+        """Keep the flights for the generation after the next; return proximities to a violation."""
+        self._unlearned.append(flown)
+        return [(violation_proximity(item.result),) for item in flown]
+
+    def _learn(self, flown: Sequence[FlownScenario]) -> None:
+        """Put each flight into its cells."""
         for item in flown:
             row = encode(item.scenario, self._plan.genome)
             success = self._archive.add(item, row)
             self._arms.learn(self._choices[dump_scenario(item.scenario)], success)
-        return [(violation_proximity(item.result),) for item in flown]
 
     def _new(self) -> Scenario:
         """Return a scenario that is flown unlike all earlier ones."""

@@ -84,6 +84,7 @@ class OfflineRl:
     """The chains, one for each slot index, and the network that they share."""
 
     learns = True
+    overlaps = False
 
     def __init__(self, plan: SearchPlan) -> None:
         self._map, self._population = plan.map, plan.population

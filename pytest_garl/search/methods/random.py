@@ -26,6 +26,7 @@ class RandomSearch:
     """Learns nothing: a generation does not depend on the ones before."""
 
     learns = False
+    overlaps = False
 
     def __init__(self, plan: SearchPlan) -> None:
         self._plan, self._generation = plan, 0
