@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import functools
 import math
+from collections.abc import Sequence
+from typing import NamedTuple
 
 import cv2
 import numpy as np
@@ -43,19 +45,18 @@ def _leaves() -> tuple[NDArray[np.float32], Image]:
     """
     size = round(TILE_M / _CELL_M)
     rng = np.random.default_rng(7)
-    order = np.full((size, size), 0, np.int32)
-    colours = np.zeros((size, size, 3), np.uint8)
+    order = np.zeros((size, size), np.int32)
     palette = np.array([[176, 92, 28], [198, 132, 40], [150, 58, 32], [122, 88, 46]])
     count = 24000
-    for index in range(count, 0, -1):
-        outline = _leaf_outline(rng) + rng.uniform(0, size, 2)
-        points = np.round(outline).astype(np.int32)
-        colour = palette[rng.integers(len(palette))] + rng.normal(0, 10, 3)
-        tint = tuple(float(value) for value in np.clip(colour, 0, 255))
-        cv2.fillPoly(order, [points], index)
-        cv2.fillPoly(colours, [points], tint)
+    leaves = [_Leaf.drawn(rng, size, len(palette)) for _ in range(count)]
+    tints = palette[[leaf.shade for leaf in leaves]] + np.array([leaf.tint for leaf in leaves])
+    colours = np.vstack([np.zeros(3), np.clip(tints[::-1], 0, 255)])
+    for index, outline in zip(range(count, 0, -1), _outlines(leaves), strict=True):
+        cv2.fillPoly(order, [outline], index)
+    image = np.rint(colours).astype(np.uint8)[order]
     order[order == 0] = count + 1
-    return _ranks(order.astype(np.float32)), colours
+    shares = np.cumsum(np.bincount(order.ravel())) / order.size
+    return shares.astype(np.float32)[order], image
 
 
 @functools.cache
@@ -107,20 +108,37 @@ def _snow_opacity(share: float) -> NDArray[np.uint8]:
     return opacity
 
 
-def _leaf_outline(rng: np.random.Generator) -> NDArray[np.float64]:
-    """Five-lobed outline, 8 to 15 cm across as maple leaves are, in tile pixels."""
+class _Leaf(NamedTuple):
+    """Half its width in metres, its turn, its place in cells, its colour."""
+
+    radius_m: float
+    turn: float
+    place: NDArray[np.float64]
+    shade: int
+    tint: NDArray[np.float64]
+
+    @classmethod
+    def drawn(cls, rng: np.random.Generator, size: int, shades: int) -> _Leaf:
+        """Return a leaf 8 to 15 cm across, as maple leaves are, on a tile of ``size`` cells."""
+        return cls(
+            radius_m=rng.uniform(0.04, 0.075),
+            turn=rng.uniform(0, 2 * math.pi),
+            place=rng.uniform(0, size, 2),
+            shade=int(rng.integers(shades)),
+            tint=rng.normal(0, 10, 3),
+        )
+
+
+def _outlines(leaves: Sequence[_Leaf]) -> NDArray[np.int32]:
+    """Return outlines with five lobes, in cells of the tile: shape (leaves, 20, 2)."""
     angles = np.linspace(0, 2 * math.pi, 20, endpoint=False)
     lobes = 0.72 + 0.28 * np.cos(5 * angles)
-    radius = rng.uniform(0.04, 0.075) / _CELL_M * lobes
-    turn = rng.uniform(0, 2 * math.pi)
-    return np.column_stack([radius * np.cos(angles + turn), radius * np.sin(angles + turn)])
-
-
-def _ranks(values: NDArray[np.float32]) -> NDArray[np.float32]:
-    flat = values.ravel()
-    ordered = np.sort(flat)
-    share = np.searchsorted(ordered, flat, side="right") / flat.size
-    return share.reshape(values.shape).astype(np.float32)
+    radius = np.array([leaf.radius_m for leaf in leaves])[:, None] / _CELL_M * lobes
+    turned = angles + np.array([leaf.turn for leaf in leaves])[:, None]
+    outlines = np.stack([radius * np.cos(turned), radius * np.sin(turned)], axis=-1)
+    places = np.array([leaf.place for leaf in leaves])[:, None]
+    cells: NDArray[np.int32] = np.round(outlines + places).astype(np.int32)
+    return cells
 
 
 def cover_shift(rng: np.random.Generator) -> NDArray[np.float64]:
