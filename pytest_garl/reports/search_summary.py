@@ -22,7 +22,7 @@ WHY_NO_LANDING: tuple[NoLanding, ...] = ("needless", "excused", "blocked")
 marker for long enough; something never left it free for long enough."""
 
 
-NONE: Mapping[str, Severity] = MappingProxyType({})
+NONE: Mapping[str, tuple[Severity, str]] = MappingProxyType({})
 DOMAINS = "domains of "
 """Begins the ledger's fact with the names of the domains of a system on a map."""
 CAMERA = "camera of "
@@ -49,8 +49,9 @@ class ViolationKind:
 
     ``count`` is the number of flights, ``first`` the slot of the first one, ``story`` what happened
     in it, and ``headline`` the story in short.  ``severity`` is the lowest of these flights, None
-    if none is known.  ``in_control`` is the number of random flights that show it, None without a
-    control arm to compare with.  ``slots`` are those of the flights.
+    if none is known, and ``severest`` the first slot with it.  ``in_control`` is the number of
+    random flights that show it, None without a control arm to compare with.  ``slots`` are those of
+    the flights.
     """
 
     signature: str
@@ -59,6 +60,7 @@ class ViolationKind:
     story: str
     headline: str
     severity: Severity | None = None
+    severest: str = ""
     in_control: int | None = None
     slots: tuple[str, ...] = ()
 
@@ -241,21 +243,21 @@ def _summary(
     )
 
 
-def _lowest_severities(flights: Sequence[LedgerFlight]) -> dict[str, Severity]:
-    """Return the lowest severity of the violations, by signature."""
-    lowest: dict[str, Severity] = {}
+def _lowest_severities(flights: Sequence[LedgerFlight]) -> dict[str, tuple[Severity, str]]:
+    """Return the lowest severity of the violations and its first slot, by signature."""
+    lowest: dict[str, tuple[Severity, str]] = {}
     for flight in flights:
         result = flight.result
         if result.verdict.violation and result.severity is not None:
-            lowest[result.signature] = min(
-                lowest.get(result.signature, result.severity), result.severity
-            )
+            known = lowest.get(result.signature)
+            if known is None or result.severity < known[0]:
+                lowest[result.signature] = (result.severity, flight.id.slot_id)
     return lowest
 
 
 def _kinds(
     stories: Mapping[str, Sequence[tuple[str, str]]],
-    severities: Mapping[str, Severity] = NONE,
+    severities: Mapping[str, tuple[Severity, str]] = NONE,
     random_slots: Set[str] | None = None,
 ) -> tuple[ViolationKind, ...]:
     """Return the kinds in (slot, story) by signature, the most frequent first."""
@@ -266,7 +268,8 @@ def _kinds(
             first=items[0][0],
             story=items[0][1],
             headline=headline(items[0][1]),
-            severity=severities.get(signature),
+            severity=severities[signature][0] if signature in severities else None,
+            severest=severities[signature][1] if signature in severities else "",
             in_control=None
             if random_slots is None
             else len({slot for slot, _ in items} & random_slots),

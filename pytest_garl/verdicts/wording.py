@@ -30,7 +30,8 @@ _RAISED = f"{_CRASH}raised: "
 def headline(description: str) -> str:
     """Shorten a verdict's description to half a line.
 
-    Example: ``collided with person-2 at 2.6 m/s, 1.4 m up, over the marker``.
+    Example: ``collided with person-2 at 2.6 m/s, 1.4 m up, over the marker``, or ``gave up at
+    45.2 s, 9.8 m up, over the marker; the marker was never well readable``.
     """
     found = _WHERE.fullmatch(description.strip())
     what, where = (found["what"], f", {found['where']}") if found else (description.strip(), "")
@@ -45,9 +46,11 @@ def headline(description: str) -> str:
         elif " of the marker" in what:
             where = where.rpartition(", ")[0]
     what = what.partition("\n")[0].removesuffix(".")
-    if not what.startswith("Python"):
-        what = what[:1].lower() + what[1:]
-    return f"{what}{where}"
+    if what.startswith(("Python", _CRASH)):
+        return f"{what[:1].lower() if what.startswith(_CRASH) else 'P'}{what[1:]}{where}"
+    # The place is that of what happened, not of what had been before.
+    happened, mark, before = what.partition("; ")
+    return f"{happened[:1].lower()}{happened[1:]}{where}{mark}{before}"
 
 
 def decided_text(verdicts: Sequence[Verdict]) -> str:

@@ -37,13 +37,13 @@ PLACE = "At 32.7 s the UAV was 1.4 m up, over the marker."
         ),
         (
             f"Gave up at 108.0 s for want of time; the marker was last in view at 22.3 s. {PLACE}",
-            "gave up at 108.0 s for want of time; the marker was last in view at 22.3 s, 1.4 m up, "
-            "over the marker",
+            "gave up at 108.0 s for want of time, 1.4 m up, over the marker; the marker was last in "
+            "view at 22.3 s",
         ),
         (
             "Not landed; the marker was never detected. "
             "At 120.0 s the UAV was 9.1 m up, 4.0 m east of the marker.",
-            "not landed; the marker was never detected, 9.1 m up, 4.0 m east of the marker",
+            "not landed, 9.1 m up, 4.0 m east of the marker; the marker was never detected",
         ),
         ("The landing system hung: step took 10 s.", "the landing system hung: step took 10 s"),
         (f"Landed after 21.3 s. {PLACE}", "landed after 21.3 s, 1.4 m up, over the marker"),

@@ -221,7 +221,7 @@ def _facts(plan: KindPlan, flight: ShownFlight, known: bool) -> tuple[Fact, ...]
     flights = f"{kind.count} of {len(search.flights)} flights"
     return (
         ("It took", f"{took} ({means})" if took and means else took),
-        ("At the least in the search", least if least != took else ""),
+        (f"At the least, in {kind.severest}", least if least != took else ""),
         ("Found in", f"{flights}; {seen}" if seen else flights),
         ("Robustness", case.robustness if case else ""),
         ("Preventable?", case.prevention.text if case else ""),

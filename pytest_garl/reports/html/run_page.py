@@ -21,7 +21,7 @@ from pytest_garl.reports.shares_text import in_control_text, kinds_lines, percen
 
 PHASES = ("take-off", "transit", "search", "approach", "descent", "last-metre")
 """Phases of a landing (``verdicts/phases.py``), in its order."""
-NO_PHASE = "no phase"
+NO_PHASE = "not of a phase"
 MOST_THUMBNAILS = 24
 """So that the index stays below 300 kB: a small picture takes some 6 kB."""
 MOST_FINDINGS = 40

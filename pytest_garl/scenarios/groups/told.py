@@ -15,8 +15,8 @@ GROUP = Group(
             low=0.0,
             high=1.0,
             whole=True,
-            meaning="1: the pad was surveyed, the coordinate is the marker's and has an error; "
-            "0: it is the map's, wherever the marker lies",
+            meaning="whether the pad was surveyed: if so (1), the coordinate is the marker's and "
+            "has an error; if not (0), it is the map's, wherever the marker lies",
             source="0 is the paper's world: the marker lies up to 7.5 m from the coordinate",
         ),
         Parameter(
