@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import math
 
 from pytest_garl.execution.flight_id import CompletedFlight
 from pytest_garl.execution.job import FlightJob
@@ -165,7 +166,11 @@ class CaseFlights:
 
 
 def recorded_behaviour(flight: CompletedFlight, scenario: Scenario, map: Map) -> RecordedBehaviour:
-    """Return what each object did in a flight; no moves if the flight left no record."""
+    """Return what each object did in a flight; no moves if the flight left no record.
+
+    Moves have four digits after the point, so that a file of many moves stays short: a case is
+    flown with them before it is saved.
+    """
     names = [name for name, _ in map.without(scenario.removed_objects).present_objects]
     if not flight.record.exists():
         return RecordedBehaviour(moves=tuple((name, ()) for name in names))
@@ -173,10 +178,18 @@ def recorded_behaviour(flight: CompletedFlight, scenario: Scenario, map: Map) ->
     made = {item.name: item.moves for item in objects}
     return RecordedBehaviour(
         moves=tuple(
-            (name, tuple((float(x), float(y)) for x, y in made.get(name, ()))) for name in names
+            (name, tuple((_short(x), _short(y)) for x, y in made.get(name, ()))) for name in names
         ),
         changes=tuple((item.name, item.changes) for item in objects if item.changes),
     )
+
+
+def _short(share: float) -> float:
+    """Return a share with four digits after the point that is no larger: a move is at most 1."""
+    near = round(float(share), 4)
+    if abs(near) > abs(share):
+        near = round(near - math.copysign(1e-4, near), 4)
+    return near + 0.0  # no negative zero
 
 
 def find_colliding_object(flight: CompletedFlight) -> str:

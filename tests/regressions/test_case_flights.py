@@ -1,9 +1,15 @@
 from __future__ import annotations
 
 import dataclasses
+import types
+from pathlib import Path
 
+import numpy as np
+import pytest
+
+from pytest_garl.regressions import case_flights
 from pytest_garl.regressions.case import RecordedBehaviour
-from pytest_garl.regressions.case_flights import ESCAPE_FLIGHTS, CaseFlights
+from pytest_garl.regressions.case_flights import ESCAPE_FLIGHTS, CaseFlights, recorded_behaviour
 from pytest_garl.regressions.robustness import NEIGHBOURS, neighbours
 from tests.regressions.samples import (
     LAWN,
@@ -63,3 +69,18 @@ def test_confirm_flies_no_neighbours_of_a_scenario_that_passes() -> None:
         is None
     )
     assert fly.count == 1
+
+
+def test_recorded_moves_have_four_digits_and_are_no_longer_than_they_were(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    made = np.array([[0.8080573960675794, -0.5891037639164115], [-1.0, 0.0], [0.57, -0.0]])
+    dog = types.SimpleNamespace(name="dog-1", moves=made, changes=())
+    monkeypatch.setattr(case_flights, "load", lambda path: types.SimpleNamespace(objects=[dog]))
+    record = tmp_path / "flight.npz"
+    record.touch()
+    flight = types.SimpleNamespace(record=record)
+    found = recorded_behaviour(flight, VIOLATING_SCENARIO, LAWN)  # type: ignore[arg-type]
+    moves = dict(found.moves)["dog-1"]
+    assert moves == ((0.808, -0.5891), (-1.0, 0.0), (0.57, 0.0))
+    assert "-0.0)" not in repr(moves)

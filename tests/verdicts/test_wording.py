@@ -37,8 +37,8 @@ PLACE = "At 32.7 s the UAV was 1.4 m up, over the marker."
         ),
         (
             f"Gave up at 108.0 s for want of time; the marker was last in view at 22.3 s. {PLACE}",
-            "gave up at 108.0 s for want of time, 1.4 m up, over the marker; the marker was last in "
-            "view at 22.3 s",
+            "gave up at 108.0 s for want of time, 1.4 m up, over the marker; the marker was last "
+            "in view at 22.3 s",
         ),
         (
             "Not landed; the marker was never detected. "
