@@ -23,7 +23,7 @@ from scipy.stats import t
 
 from pytest_garl.scenarios.domains.genome import genome_of
 from pytest_garl.scenarios.domains.reader import domain_named
-from pytest_garl.scenarios.maps.map import load_map
+from pytest_garl.scenarios.maps.map import Map, load_map
 from pytest_garl.search.catalogue import find_method
 from pytest_garl.search.columns import Columns, OptionalGene
 from pytest_garl.search.exploration import Exploration
@@ -59,8 +59,8 @@ class PairExploration(Exploration):
     sets = 12
     """Sets of groups of which the one with the most new pairs is taken."""
 
-    def __init__(self, columns: Columns) -> None:
-        super().__init__(columns)
+    def __init__(self, columns: Columns, map: Map) -> None:
+        super().__init__(columns, map)
         self._pairs: Counter[tuple[str, str]] = Counter()
 
     def names(self, stratum: str, rng: np.random.Generator) -> tuple[str, ...]:
@@ -77,15 +77,30 @@ def _pairs(names: Iterable[str]) -> list[tuple[str, str]]:
 
 
 class PlainExploration(Exploration):
-    """Gives a gene the first values drawn, be they mild or harsh."""
+    """Gives a condition the first values drawn, be they mild or harsh."""
 
-    def __init__(self, columns: Columns) -> None:
-        super().__init__(columns)
-        self._genome = columns.genome
+    draws = 1
 
-    def values(self, gene: OptionalGene, rng: np.random.Generator) -> Matrix:
-        """Return a chromosome in which a gene acts."""
-        return self._genome.random_active(rng, (gene.name,))
+
+class TimelessExploration(Exploration):
+    """Lets an event begin at any time, before or after the flight's end."""
+
+    def while_flying(self, gene: OptionalGene, values: Matrix) -> Matrix:
+        """Return the values as they were drawn."""
+        return values
+
+    def let_coincide(
+        self, row: Matrix, active: Sequence[OptionalGene], rng: np.random.Generator
+    ) -> None:
+        """Leave all events where they are."""
+
+
+class ScatteredExploration(Exploration):
+    """Puts a decoy anywhere."""
+
+    def nearest_to_way(self, gene: OptionalGene, row: Matrix, drawn: Sequence[Matrix]) -> Matrix:
+        """Return the first place that was drawn."""
+        return drawn[0]
 
 
 class SpreadExploration(Exploration):
@@ -93,16 +108,14 @@ class SpreadExploration(Exploration):
 
     draws = 4
 
-    def __init__(self, columns: Columns) -> None:
-        super().__init__(columns)
-        self._genome, self._span = columns.genome, columns.upper - columns.lower
+    def __init__(self, columns: Columns, map: Map) -> None:
+        super().__init__(columns, map)
+        self._span = columns.upper - columns.lower
         self._earlier: defaultdict[str, list[Matrix]] = defaultdict(list)
 
-    def values(self, gene: OptionalGene, rng: np.random.Generator) -> Matrix:
-        """Return a chromosome in which a gene acts."""
-        drawn = [self._genome.random_active(rng, (gene.name,)) for _ in range(self.draws)]
-        span = self._span[gene.values]
-        shares = np.array([row[gene.values] / span for row in drawn])
+    def choose(self, gene: OptionalGene, row: Matrix, drawn: Sequence[Matrix]) -> Matrix:
+        """Return the values farthest from the earlier ones."""
+        shares = np.array(drawn) / self._span[gene.values]
         earlier = self._earlier[gene.name]
         best = farthest_from_nearest(shares, np.array(earlier)) if earlier else 0
         earlier.append(shares[best])
@@ -118,6 +131,8 @@ VARIANTS: dict[str, Callable[[SearchPlan], Method]] = {
     "garl": find_method("garl"),
     "without strata": garl_with(has_strata=False),
     "plain values": garl_with(exploration=PlainExploration),
+    "events at any time": garl_with(exploration=TimelessExploration),
+    "decoys anywhere": garl_with(exploration=ScatteredExploration),
     "pairs of groups covered": garl_with(exploration=PairExploration),
     "values away from earlier ones": garl_with(exploration=SpreadExploration),
     "near misses": garl_with(archive=NearMissArchive),

@@ -129,5 +129,5 @@ class Breeding:
             return row.copy()
         gene = active[int(rng.integers(len(active)))]
         child = row.copy()
-        child[gene.values] = self._exploration.values(gene, rng)[gene.values]
+        child[gene.values] = self._exploration.values(gene, row, rng)
         return child

@@ -22,7 +22,8 @@ class OptionalGene:
     """An optional gene: its columns, and what is special about it.
 
     ``bit`` is the column of its bit of activity, ``values`` those behind it.  ``grade`` is the
-    column of an NPC's grade, -1 without one.
+    column of an NPC's grade, ``begins`` that of an event's begin, ``lasts`` that of how long it
+    lasts, ``place`` that of a decoy's place to the east, before that to the north; -1 without one.
     """
 
     name: str
@@ -30,6 +31,9 @@ class OptionalGene:
     values: slice
     is_npc: bool
     grade: int = -1
+    begins: int = -1
+    lasts: int = -1
+    place: int = -1
 
 
 class Columns:
@@ -95,9 +99,10 @@ class Columns:
         grades = [row[gene.grade] if gene.grade >= 0 else len(GRADES) for gene in npcs]
         return STRATA[1] if max(grades) < 1 else STRATA[2]
 
-    def harshness(self, row: Matrix, gene: OptionalGene) -> float:
+    def harshness(self, values: Matrix, gene: OptionalGene) -> float:
         """Return how far a gene's outward values lie from nominal: the sum of shares of ranges."""
-        shares = np.abs(row - self.nominal)[gene.values] / (self.upper - self.lower)[gene.values]
+        span = (self.upper - self.lower)[gene.values]
+        shares = np.abs(values - self.nominal[gene.values]) / span
         return float(np.sum(shares[self.outward[gene.values]]))
 
     def distance_from_nominal(self, row: Matrix) -> float:
@@ -109,11 +114,18 @@ class Columns:
 
 def _optional_gene(gene: NuclearGene, first: int) -> OptionalGene:
     keys = [item.key for item in gene.properties]
-    grade = f"{gene.name}.grade"
+
+    def column(name: str) -> int:
+        key = f"{gene.name}.{name}"
+        return first + keys.index(key) if key in keys else -1
+
     return OptionalGene(
         name=gene.name,
         bit=first,
         values=slice(first + 1, first + len(keys)),
         is_npc=f"{gene.name}.velocity" in keys,
-        grade=first + keys.index(grade) if grade in keys else -1,
+        grade=column("grade"),
+        begins=column("from_s"),
+        lasts=column("lasts_s"),
+        place=column("x_m"),
     )

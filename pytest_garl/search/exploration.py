@@ -1,23 +1,37 @@
-"""Scenarios without parents, of a stratum: a few of the optional genes act."""
+"""Scenarios without parents, of a stratum: a few of the optional genes act, so that it shows."""
 
 from __future__ import annotations
 
+import itertools
+from collections.abc import Sequence
+
 import numpy as np
 
+from pytest_garl.scenarios.chromosome import decode
+from pytest_garl.scenarios.maps.map import Map
+from pytest_garl.scenarios.placement import told_position_m
 from pytest_garl.search.columns import STRATA, Columns, OptionalGene
 from pytest_garl.search.operators import Matrix
 
 LONE_NPC_SHARE = 0.8
 """Share of scenarios with NPCs that have one: it says more than two, and severity counts it."""
-DRAWS = 3
-"""Draws of a condition's values of which the harshest are flown: mild ones seldom show anything."""
+COINCIDENT_SHARE = 0.5
+"""Share of the events in a scenario with an earlier one that begin while that one lasts."""
 
 
 class Exploration:
-    """Draws scenarios without parents."""
+    """Draws scenarios without parents.
 
-    def __init__(self, columns: Columns) -> None:
-        self._columns = columns
+    An event is drawn into the time that a flight takes.  ``flight_s`` is the time of those flown so
+    far; infinite before the first.
+    """
+
+    draws = 3
+    """Draws of a condition's values, of which those are flown that show most."""
+
+    def __init__(self, columns: Columns, map: Map) -> None:
+        self._columns, self._map = columns, map
+        self.flight_s = float("inf")
 
     def new(self, stratum: str, rng: np.random.Generator) -> Matrix:
         """Return a chromosome of a stratum."""
@@ -27,20 +41,28 @@ class Exploration:
             return row
         names = self.names(stratum, rng)
         row = columns.with_active(row, names)
-        for gene in columns.optional:
-            if gene.name in names:
-                row[gene.values] = self.values(gene, rng)[gene.values]
-            if gene.is_npc and gene.name in names and gene.grade >= 0:
+        active = [gene for gene in columns.optional if gene.name in names]
+        for gene in active:
+            row[gene.values] = self.values(gene, row, rng)
+            if gene.is_npc and gene.grade >= 0:
                 low, high = (0.0, 1.0) if stratum == STRATA[1] else (1.0, columns.upper[gene.grade])
                 top = np.nextafter(min(high, columns.upper[gene.grade]), low)
                 row[gene.grade] = rng.uniform(low, top) if top > low else low
+        self.let_coincide(row, active, rng)
         return row
 
-    def values(self, gene: OptionalGene, rng: np.random.Generator) -> Matrix:
-        """Return a chromosome in which a gene acts; the values of a condition are harsh."""
-        draws = 1 if gene.is_npc else DRAWS
-        drawn = [self._columns.genome.random_active(rng, (gene.name,)) for _ in range(draws)]
-        return max(drawn, key=lambda row: self._columns.harshness(row, gene))
+    def values(self, gene: OptionalGene, row: Matrix, rng: np.random.Generator) -> Matrix:
+        """Return values with which a gene acts in a chromosome; those of a condition show most."""
+        draws = 1 if gene.is_npc else self.draws
+        genome = self._columns.genome
+        drawn = [genome.random_active(rng, (gene.name,))[gene.values] for _ in range(draws)]
+        return self.while_flying(gene, self.choose(gene, row, drawn))
+
+    def choose(self, gene: OptionalGene, row: Matrix, drawn: Sequence[Matrix]) -> Matrix:
+        """Return the values that show most: a decoy near the UAV's way, others far from nominal."""
+        if gene.place >= 0:
+            return self.nearest_to_way(gene, row, drawn)
+        return max(drawn, key=lambda values: self._columns.harshness(values, gene))
 
     def names(self, stratum: str, rng: np.random.Generator) -> tuple[str, ...]:
         """Return a random set of genes of a stratum, as many as may act."""
@@ -55,3 +77,43 @@ class Exploration:
         left = min(size - count, len(others))
         drawn = [others[index] for index in rng.choice(len(others), left, replace=False)]
         return (*chosen, *drawn)
+
+    def while_flying(self, gene: OptionalGene, values: Matrix) -> Matrix:
+        """Return values whose event begins before a flight ends."""
+        if gene.begins < 0:
+            return values
+        low, high = self._columns.lower[gene.begins], self._columns.upper[gene.begins]
+        share = min(1.0, max(0.0, self.flight_s - low) / (high - low))
+        moved, index = values.copy(), gene.begins - gene.values.start
+        moved[index] = low + share * (values[index] - low)
+        return moved
+
+    def let_coincide(
+        self, row: Matrix, active: Sequence[OptionalGene], rng: np.random.Generator
+    ) -> None:
+        """Let some events begin while another lasts, in place: what they do together shows then."""
+        events = [gene for gene in active if gene.begins >= 0]
+        for first, second in itertools.pairwise(events):
+            if rng.random() >= COINCIDENT_SHARE:
+                continue
+            begin = row[first.begins] - self._lasts(second, row)
+            end = row[first.begins] + self._lasts(first, row)
+            low, high = self._columns.lower[second.begins], self._columns.upper[second.begins]
+            row[second.begins] = np.clip(rng.uniform(begin, end), low, high)
+
+    def _lasts(self, gene: OptionalGene, row: Matrix) -> float:
+        return float(row[gene.lasts]) if gene.lasts >= 0 else 0.0
+
+    def nearest_to_way(self, gene: OptionalGene, row: Matrix, drawn: Sequence[Matrix]) -> Matrix:
+        """Return the decoy that lies nearest to the way to the coordinate that the UAV is told."""
+        scenario = decode(row, self._columns.genome, map=self._map.name, seed=0)
+        start, middle = np.array(self._map.uav_start_m[:2]), np.array(self._map.gps_position_m)
+        way = np.array(told_position_m(scenario, self._map)) - start
+        first = gene.place - gene.values.start
+
+        def off_way_m(values: Matrix) -> float:
+            place = middle + values[first : first + 2] - start
+            along = np.clip(np.dot(place, way) / max(1e-9, np.dot(way, way)), 0, 1)
+            return float(np.linalg.norm(place - along * way))
+
+        return min(drawn, key=off_way_m)

@@ -14,7 +14,7 @@ from pytest_garl.search.operators import Matrix
 
 MAP = load_map("court")
 COLUMNS = Columns(genome_of(domain_named("field"), MAP))
-BREEDING = Breeding(COLUMNS, Exploration(COLUMNS))
+BREEDING = Breeding(COLUMNS, Exploration(COLUMNS, MAP))
 
 
 def row_with(*names: str, seed: int = 0) -> Matrix:
@@ -60,7 +60,7 @@ def test_a_graft_keeps_the_npc_that_the_flight_came_nearest_to() -> None:
 
 def test_a_genome_without_optional_genes_is_bred_by_steps() -> None:
     columns = Columns(genome_for(MAP))
-    breeding = Breeding(columns, Exploration(columns))
+    breeding = Breeding(columns, Exploration(columns, MAP))
     rng = np.random.default_rng(6)
     parent, donor = columns.genome.random(rng), columns.genome.random(rng)
     for way in WAYS:

@@ -3,33 +3,87 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from pytest_garl.scenarios.chromosome import decode
 from pytest_garl.scenarios.domains.genome import genome_of
 from pytest_garl.scenarios.domains.reader import domain_named
 from pytest_garl.scenarios.maps.map import load_map
+from pytest_garl.scenarios.placement import told_position_m
 from pytest_garl.search.columns import STRATA, Columns
 from pytest_garl.search.exploration import Exploration
 
-COLUMNS = Columns(genome_of(domain_named("field"), load_map("court")))
+MAP = load_map("court")
+COLUMNS = Columns(genome_of(domain_named("field"), MAP))
+GENES = {gene.name: gene for gene in COLUMNS.optional}
+
+
+def exploration(flight_s: float = float("inf")) -> Exploration:
+    found = Exploration(COLUMNS, MAP)
+    found.flight_s = flight_s
+    return found
 
 
 @pytest.mark.parametrize("stratum", STRATA)
 def test_a_scenario_belongs_to_its_stratum_and_is_sparse(stratum: str) -> None:
-    exploration, rng = Exploration(COLUMNS), np.random.default_rng(0)
+    ours, rng = exploration(20.0), np.random.default_rng(0)
     for _ in range(50):
-        row = exploration.new(stratum, rng)
+        row = ours.new(stratum, rng)
         assert COLUMNS.stratum(row) == stratum
         assert len(COLUMNS.active(row)) == 3
         assert ((row >= COLUMNS.lower) & (row <= COLUMNS.upper)).all()
 
 
 def test_conditions_are_harsher_than_the_domain_draws_them() -> None:
-    exploration, rng = Exploration(COLUMNS), np.random.default_rng(0)
+    ours, rng = exploration(), np.random.default_rng(0)
+    row = COLUMNS.genome.random(rng)
     for gene in COLUMNS.optional:
         if gene.is_npc or not COLUMNS.outward[gene.values].any():
             continue
-        harsh = [COLUMNS.harshness(exploration.values(gene, rng), gene) for _ in range(200)]
-        plain = [
-            COLUMNS.harshness(COLUMNS.genome.random_active(rng, (gene.name,)), gene)
-            for _ in range(200)
-        ]
+        drawn = [COLUMNS.genome.random_active(rng, (gene.name,))[gene.values] for _ in range(200)]
+        plain = [COLUMNS.harshness(values, gene) for values in drawn]
+        harsh = [COLUMNS.harshness(ours.values(gene, row, rng), gene) for _ in range(200)]
         assert np.mean(harsh) > np.mean(plain), gene.name
+
+
+@pytest.mark.parametrize("name", ["jump", "outage", "burst", "cover"])
+@pytest.mark.parametrize(("flight_s", "latest_s"), [(20.0, 20.0), (90.0, 40.0)])
+def test_events_begin_while_flights_last(name: str, flight_s: float, latest_s: float) -> None:
+    ours, rng, gene = exploration(flight_s), np.random.default_rng(0), GENES[name]
+    row = COLUMNS.genome.random(rng)
+    begins = [ours.values(gene, row, rng)[gene.begins - gene.values.start] for _ in range(200)]
+    assert 0.9 * latest_s < max(begins) <= latest_s
+
+
+def test_half_of_the_pairs_of_events_coincide() -> None:
+    ours, rng = exploration(), np.random.default_rng(0)
+    outage, cover = GENES["outage"], GENES["cover"]
+    together = pairs = 0
+    for _ in range(4000):
+        row = ours.new("nobody", rng)
+        if {"outage", "cover"} <= {gene.name for gene in COLUMNS.active(row)}:
+            pairs += 1
+            spans = [
+                (row[each.begins], row[each.begins] + row[each.lasts]) for each in (outage, cover)
+            ]
+            together += max(start for start, _ in spans) < min(end for _, end in spans)
+    assert pairs > 20
+    assert 0.4 < together / pairs < 0.8
+
+
+def test_decoys_lie_nearer_to_the_way_than_the_domain_puts_them() -> None:
+    rng, gene = np.random.default_rng(0), GENES["decoy-1"]
+    start, middle = np.array(MAP.uav_start_m[:2]), np.array(MAP.gps_position_m)
+
+    def off_way_m(draws: int) -> float:
+        ours = exploration()
+        ours.draws, distances = draws, []
+        for _ in range(100):
+            row = COLUMNS.with_active(COLUMNS.genome.random(rng), ("decoy-1",))
+            row[gene.values] = ours.values(gene, row, rng)
+            scenario = decode(row, COLUMNS.genome, map=MAP.name, seed=0)
+            told = np.array(told_position_m(scenario, MAP))
+            place = middle + row[gene.place : gene.place + 2]
+            line = [start + share * (told - start) for share in np.linspace(0, 1, 200)]
+            distances.append(min(float(np.linalg.norm(place - each)) for each in line))
+        return float(np.mean(distances))
+
+    assert off_way_m(3) < 0.7 * off_way_m(1)

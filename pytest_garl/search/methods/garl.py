@@ -23,6 +23,7 @@ import numpy as np
 
 from pytest_garl.scenarios.chromosome import decode, encode
 from pytest_garl.scenarios.files import dump_scenario
+from pytest_garl.scenarios.maps.map import Map
 from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.scenarios.validity import repair
 from pytest_garl.search.archive import Archive
@@ -57,7 +58,7 @@ class GarlParameters:
     """Whether scenarios without parents are drawn in strata; otherwise as the domain draws them."""
     archive: Callable[[Columns], Archive] = Archive
     """What keeps the flights, and says which cells are bred from."""
-    exploration: Callable[[Columns], Exploration] = Exploration
+    exploration: Callable[[Columns, Map], Exploration] = Exploration
     """What draws scenarios without parents."""
 
 
@@ -72,12 +73,14 @@ class Garl:
         self._rng = np.random.default_rng(seed_sequence("garl", plan.map.name, plan.seed))
         self._columns = Columns(plan.genome)
         self._archive = self._parameters.archive(self._columns)
-        self._exploration = self._parameters.exploration(self._columns)
+        self._exploration = self._parameters.exploration(self._columns, plan.map)
         self._breeding = Breeding(self._columns, self._exploration)
         self._arms = Bandit()
         self._choices: dict[str, str] = {}
         """The arm of each scenario, by its text."""
         self._generation = 0
+        self._flights_s: list[float] = []
+        """How long each flight took, simulated."""
         self._unlearned: deque[Sequence[FlownScenario]] = deque()
         """Generations that were flown, and that the next one is not bred from yet."""
 
@@ -98,7 +101,9 @@ class Garl:
         return [(violation_proximity(item.result),) for item in flown]
 
     def _learn(self, flown: Sequence[FlownScenario]) -> None:
-        """Put each flight into its cells."""
+        """Put each flight into its cells, and draw events into the time that flights take."""
+        self._flights_s += [item.result.elapsed_s for item in flown]
+        self._exploration.flight_s = float(np.median(self._flights_s))
         for item in flown:
             row = encode(item.scenario, self._plan.genome)
             success = self._archive.add(item, row)
