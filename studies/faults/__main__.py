@@ -17,6 +17,9 @@ from studies.faults.report import report
 from studies.faults.search import TABLE, npcs, search_missing
 from studies.table import run_study
 
+SEEDS = (1, 2, 3, 4, 5)
+"""Seed 0 was looked at while ``garl`` was developed."""
+
 
 def check(faults: list[Fault]) -> None:
     """Fly the hand-made scenarios and print what they show; the placebo has none."""
@@ -38,9 +41,7 @@ def search(arguments: argparse.Namespace) -> None:
         return
     keys = (
         (method, fault.name, str(seed))
-        for seed, fault, method in itertools.product(
-            range(arguments.seeds), faults, arguments.methods
-        )
+        for seed, fault, method in itertools.product(arguments.seeds, faults, arguments.methods)
     )
     search_missing(keys, arguments.flights, arguments.workers)
 
@@ -49,7 +50,7 @@ def main() -> None:
     """Parse the command line."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--methods", nargs="+", default=["garl", "random"])
-    parser.add_argument("--seeds", type=int, default=5)
+    parser.add_argument("--seeds", type=int, nargs="+", default=SEEDS)
     parser.add_argument("--flights", type=int, default=100, help="of a search; default 100")
     names = [each.name for each in (*FAULTS, PLACEBO)]
     parser.add_argument("--faults", nargs="+", default=names, choices=names, metavar="FAULT")
