@@ -19,7 +19,7 @@ Found = Mapping[tuple[str, str, str], int | None]
 FAMILY_OF = {each.name: each.family for each in FAULTS}
 
 
-def report(rows: list[Row]) -> str:
+def report(rows: Sequence[Row]) -> str:
     """Return the tables in Markdown; the placebo is no fault, and has a line of its own."""
     flown: Found = {
         (row["method"], row["fault"], row["seed"]): int(row["found_at"] or 0) or None
@@ -29,7 +29,7 @@ def report(rows: list[Row]) -> str:
     methods = sorted({method for method, _, _ in flown})
     parts = [_scores(found, methods), _families(found, methods)]
     parts += [_ratios(found, method) for method in methods if method != RIVAL]
-    parts += [_difficulty(found), _misses(found, methods), _placebo(flown, methods)]
+    parts += [_difficulty(found), _misses(found, methods, rows), _placebo(flown, methods)]
     return "\n\n".join(part for part in parts if part)
 
 
@@ -158,12 +158,27 @@ def _placebo(found: Found, methods: Iterable[str]) -> str:
     return f"Searches in which chance found the placebo: {', '.join(told)}." if told else ""
 
 
-def _misses(found: Found, methods: Iterable[str]) -> str:
+def _misses(found: Found, methods: Iterable[str], rows: Sequence[Row]) -> str:
     lines = []
     for method in methods:
         shares = found_shares(found, method).items()
         missed = [
-            f"{fault} ({count} of {total})" for fault, (count, total) in shares if count < total
+            f"{fault} ({count} of {total}{_why(rows, method, fault)})"
+            for fault, (count, total) in shares
+            if count < total
         ]
         lines.append(f"Not found by {method} in every seed: {', '.join(missed) or 'none'}.")
     return "\n".join(lines)
+
+
+def _why(rows: Sequence[Row], method: str, fault: str) -> str:
+    """Return how often what fires a fault acted in the searches that missed it, and what hid it."""
+    own = [
+        row
+        for row in rows
+        if (row["method"], row["fault"], row["found_at"]) == (method, fault, "") and row["acted"]
+    ]
+    if not own:
+        return ""
+    acted, masked = (np.mean([int(row[name]) for row in own]) for name in ("acted", "masked"))
+    return f"; all that acts in its scenario acted in {acted:.0f} flights, {masked:.0f} masked"

@@ -15,12 +15,13 @@ from pytest_garl.scenarios.maps.map import Map, load_map
 from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.scenarios.sparse import MOST_ACTIVE, ON_ABOVE
 from pytest_garl.scenarios.validity import problems, repair
+from pytest_garl.search.columns import Columns
 from studies.faults import search
 from studies.faults.catalogue import FAULTS, fault_named
 from studies.faults.control import ControlSystem
 from studies.faults.fault import SCENARIOS, Fault, finds, result_of
 from studies.faults.report import mean_text, ratio_interval, report
-from studies.faults.search import DOMAIN, found_at, npcs
+from studies.faults.search import DOMAIN, npcs, search_for
 from tests.support.results import flight_result
 
 NAMES = [each.name for each in FAULTS]
@@ -111,7 +112,7 @@ def test_a_control_compared_with_itself_is_never_found(
     null = Fault(
         name="null", family="none", links=(), summary="no fault", faulty=ControlSystem, fires="off"
     )
-    assert found_at(null, method, 0, 30) is None
+    assert search_for(null, method, 0, 30).found_at is None
 
 
 @pytest.mark.parametrize("method", ["random", "garl"])
@@ -125,17 +126,40 @@ def test_a_search_ends_at_its_first_find(method: str, monkeypatch: pytest.Monkey
 
     monkeypatch.setattr(search, "result_of", flying)
     monkeypatch.setattr("studies.faults.fault.result_of", flying)
-    found = found_at(fault_named("gate"), method, 3, 60)
-    assert found == len(flown)
+    found = search_for(fault_named("gate"), method, 3, 60)
+    assert found.found_at == found.flights == len(flown)
+    assert 0 <= found.acted <= found.flights
+    assert found.masked == 0
     assert [each.seed % 8 == 0 for each in flown].index(True) == len(flown) - 1
 
 
-def rows(method: str, found: dict[str, list[int | None]]) -> list[dict[str, str]]:
+def test_what_fires_a_fault_is_counted_by_its_kind() -> None:
+    columns = Columns(genome_of(DOMAIN, load_map("lawn")))
+    assert search.acting(fault_named("mean").scenario, columns) == {"jump"}
+    assert search.acting(fault_named("unfresh").scenario, columns) == {"jump", "outage"}
+    assert search.acting(fault_named("no-margin").scenario, columns) == {"decoy", "told"}
+
+
+def rows(
+    method: str, found: dict[str, list[int | None]], acted: str = "", masked: str = ""
+) -> list[dict[str, str]]:
     return [
-        {"method": method, "fault": fault, "seed": str(seed), "found_at": str(at or "")}
+        {
+            "method": method,
+            "fault": fault,
+            "seed": str(seed),
+            "found_at": str(at or ""),
+            "acted": acted,
+            "masked": masked,
+        }
         for fault, seeds in found.items()
         for seed, at in enumerate(seeds)
     ]
+
+
+def test_the_report_says_how_often_what_fires_a_missed_fault_acted() -> None:
+    text = report(rows("garl", {"gate": [50, None, None]}, acted="7", masked="12"))
+    assert "gate (1 of 3; all that acts in its scenario acted in 7 flights, 12 masked)" in text
 
 
 def test_the_report_counts_misses_as_100_flights_and_names_them() -> None:
