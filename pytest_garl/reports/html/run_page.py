@@ -163,7 +163,10 @@ def _problem(found: Mapping[str, Any]) -> str:
             f"This run is not finished: {flights['flown']} of {flights['wanted']} flights. The "
             "same pytest command with --garl-resume goes on."
         )
-    return "All flights are flown, but pytest has not come to its end: tests may be missing."
+    return (
+        "All flights are flown, but pytest has not come to its end: cases may be missing. The same "
+        "pytest command with --garl-resume goes on."
+    )
 
 
 def _numbers(
