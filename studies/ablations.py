@@ -50,7 +50,17 @@ TABLE = ResultTable(
 )
 
 
-class PairExploration(Exploration):
+class UnevenExploration(Exploration):
+    """Lets genes act at random, some of them more often than others."""
+
+    def least_flown(
+        self, names: Sequence[str], count: int, rng: np.random.Generator
+    ) -> Sequence[str]:
+        """Return some genes."""
+        return [names[index] for index in rng.choice(len(names), count, replace=False)]
+
+
+class PairExploration(UnevenExploration):
     """Switches on the groups whose pairs were flown least.
 
     Most faults show with two interacting conditions (Kuhn, Wallace and Gallo 2004).
@@ -131,6 +141,8 @@ VARIANTS: dict[str, Callable[[SearchPlan], Method]] = {
     "garl": find_method("garl"),
     "without strata": garl_with(has_strata=False),
     "plain values": garl_with(exploration=PlainExploration),
+    "genes at random": garl_with(exploration=UnevenExploration),
+    "breeding from the start": garl_with(explores_first=0),
     "events at any time": garl_with(exploration=TimelessExploration),
     "decoys anywhere": garl_with(exploration=ScatteredExploration),
     "pairs of groups covered": garl_with(exploration=PairExploration),

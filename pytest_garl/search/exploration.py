@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+from collections import Counter
 from collections.abc import Sequence
 
 import numpy as np
@@ -15,6 +16,9 @@ from pytest_garl.search.operators import Matrix
 
 LONE_NPC_SHARE = 0.8
 """Share of scenarios with NPCs that have one: it says more than two, and severity counts it."""
+SLACK = 2.0
+"""Times that a gene may have acted more often than another and still be chosen before it, so that
+which genes act together is random."""
 COINCIDENT_SHARE = 0.5
 """Share of the events in a scenario with an earlier one that begin while that one lasts."""
 
@@ -32,6 +36,8 @@ class Exploration:
     def __init__(self, columns: Columns, map: Map) -> None:
         self._columns, self._map = columns, map
         self.flight_s = float("inf")
+        self._times: Counter[str] = Counter()
+        """How often each gene was chosen to act."""
 
     def new(self, stratum: str, rng: np.random.Generator) -> Matrix:
         """Return a chromosome of a stratum."""
@@ -65,7 +71,7 @@ class Exploration:
         return max(drawn, key=lambda values: self._columns.harshness(values, gene))
 
     def names(self, stratum: str, rng: np.random.Generator) -> tuple[str, ...]:
-        """Return a random set of genes of a stratum, as many as may act."""
+        """Return a set of genes of a stratum, as many as may act, of those that acted least."""
         columns = self._columns
         npcs = [gene.name for gene in columns.optional if gene.is_npc]
         others = [gene.name for gene in columns.optional if not gene.is_npc]
@@ -73,10 +79,16 @@ class Exploration:
         count = 0
         if stratum != STRATA[0]:
             count = 1 if rng.random() < LONE_NPC_SHARE else min(2, len(npcs), size)
-        chosen = [npcs[index] for index in rng.choice(len(npcs), count, replace=False)]
         left = min(size - count, len(others))
-        drawn = [others[index] for index in rng.choice(len(others), left, replace=False)]
-        return (*chosen, *drawn)
+        return (*self.least_flown(npcs, count, rng), *self.least_flown(others, left, rng))
+
+    def least_flown(
+        self, names: Sequence[str], count: int, rng: np.random.Generator
+    ) -> Sequence[str]:
+        """Return the genes that acted least often so far, up to a random number of times."""
+        order = sorted(names, key=lambda name: self._times[name] + SLACK * rng.random())
+        self._times.update(order[:count])
+        return order[:count]
 
     def while_flying(self, gene: OptionalGene, values: Matrix) -> Matrix:
         """Return values whose event begins before a flight ends."""

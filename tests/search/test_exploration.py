@@ -1,5 +1,7 @@
 from __future__ import annotations
 
+from collections import Counter
+
 import numpy as np
 import pytest
 
@@ -87,3 +89,14 @@ def test_decoys_lie_nearer_to_the_way_than_the_domain_puts_them() -> None:
         return float(np.mean(distances))
 
     assert off_way_m(3) < 0.7 * off_way_m(1)
+
+
+def test_all_conditions_act_about_equally_often() -> None:
+    ours, rng = exploration(), np.random.default_rng(0)
+    acted: Counter[str] = Counter()
+    for _ in range(60):
+        row = ours.new("nobody", rng)
+        acted.update(gene.name for gene in COLUMNS.active(row))
+    conditions = [gene.name for gene in COLUMNS.optional if not gene.is_npc]
+    assert {*acted} == {*conditions}
+    assert max(acted.values()) - min(acted.values()) <= 3

@@ -50,8 +50,11 @@ class GarlParameters:
     ``python -m studies.ablations`` measures what each part of the search is worth.
     """
 
+    explores_first: int = 100
+    """So many scenarios are random or without parents before any is bred: a search finds more in
+    conditions that did not act yet than near what it has found."""
     explore_share: float = 0.75
-    """Least share of scenarios without parents, so that kinds are still found late in a search."""
+    """Least share of scenarios without parents after that, so that kinds are still found late."""
     learns_arms: bool = True
     """Whether cells and strata are chosen by their success; otherwise all alike."""
     has_strata: bool = True
@@ -127,7 +130,9 @@ class Garl:
         strata = self._columns.strata if self._parameters.has_strata else ()
         explore = [f"{EXPLORE}{each}" for each in strata or (ALL,)]
         cells = self._archive.names()
-        if not cells or self._rng.random() < self._parameters.explore_share:
+        # A dense scenario has all conditions, so that there is nothing to explore first.
+        is_early = self._columns.strata and len(self._choices) < self._parameters.explores_first
+        if is_early or not cells or self._rng.random() < self._parameters.explore_share:
             return self._pick(explore), ""
         arm = self._pick([*explore, *cells])
         return arm, "" if arm in explore else str(self._rng.choice(WAYS))

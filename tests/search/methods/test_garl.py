@@ -11,6 +11,7 @@ from pytest_garl.scenarios.chromosome import encode
 from pytest_garl.scenarios.domains.genome import genome_of
 from pytest_garl.scenarios.domains.reader import domain_named
 from pytest_garl.scenarios.files import dump_scenario
+from pytest_garl.scenarios.genes import genome_for
 from pytest_garl.scenarios.maps.map import load_map
 from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.search.columns import STRATA, Columns
@@ -52,6 +53,20 @@ def test_a_search_finds_kinds_more_evenly_than_chance() -> None:
 
 def test_the_first_generation_is_the_one_that_random_flies() -> None:
     assert Garl(PLAN).ask() == RandomSearch(PLAN).ask()
+
+
+def test_nothing_is_bred_before_a_hundred_scenarios_but_in_a_dense_world() -> None:
+    for genome, bred_from in ((GENOME, 5), (genome_for(MAP), 2)):
+        plan = SearchPlan(map=MAP, genome=genome, seed=0, population=20)
+        method, known = Garl(plan), set[int]()
+        inherited = []
+        for _ in range(12):
+            scenarios = method.ask()
+            inherited.append(any(each.seed in known for each in scenarios))
+            known |= {each.seed for each in scenarios}
+            method.tell(told(scenarios, [stand_in(each, MAP) for each in scenarios]))
+        # A child has its parent's seed.
+        assert inherited.index(True) == bred_from
 
 
 def test_all_strata_are_flown() -> None:
