@@ -52,6 +52,8 @@ def score(found: Found, method: str, within: int) -> list[float]:
 
 def mean_text(values: Sequence[float]) -> str:
     """Return the mean in percent, with its 95 % t-interval if there are several values."""
+    if not values:
+        return "not flown"
     mean = 100 * float(np.mean(values))
     if len(values) < 2:
         return f"{mean:.0f} %"
@@ -83,7 +85,7 @@ def _families(found: Found, methods: list[str]) -> str:
     for family in dict.fromkeys(FAMILY_OF.values()):
         own = {key: at for key, at in found.items() if FAMILY_OF[key[1]] == family}
         if own:
-            cells = (mean_text(score(own, each, WITHIN[-1]) or [0.0]) for each in methods)
+            cells = (mean_text(score(own, each, WITHIN[-1])) for each in methods)
             lines.append(f"| {family} | {' | '.join(cells)} |")
     return "\n".join(lines)
 
@@ -180,5 +182,10 @@ def _why(rows: Sequence[Row], method: str, fault: str) -> str:
     ]
     if not own:
         return ""
-    acted, masked = (np.mean([int(row[name]) for row in own]) for name in ("acted", "masked"))
-    return f"; all that acts in its scenario acted in {acted:.0f} flights, {masked:.0f} masked"
+    acted, masked = (
+        100 * np.mean([int(row[name]) / int(row["flights"]) for row in own])
+        for name in ("acted", "masked")
+    )
+    return (
+        f"; all that acts in its scenario acted in {acted:.0f} % of flights, {masked:.0f} % masked"
+    )

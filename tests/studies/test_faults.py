@@ -151,6 +151,7 @@ def rows(
             "found_at": str(at or ""),
             "acted": acted,
             "masked": masked,
+            "flights": str(at or 100),
         }
         for fault, seeds in found.items()
         for seed, at in enumerate(seeds)
@@ -159,7 +160,9 @@ def rows(
 
 def test_the_report_says_how_often_what_fires_a_missed_fault_acted() -> None:
     text = report(rows("garl", {"gate": [50, None, None]}, acted="7", masked="12"))
-    assert "gate (1 of 3; all that acts in its scenario acted in 7 flights, 12 masked)" in text
+    assert (
+        "gate (1 of 3; all that acts in its scenario acted in 7 % of flights, 12 % masked)" in text
+    )
 
 
 def test_the_report_counts_misses_as_100_flights_and_names_them() -> None:
