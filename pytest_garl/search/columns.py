@@ -127,5 +127,6 @@ def _optional_gene(gene: NuclearGene, first: int) -> OptionalGene:
         grade=column("grade"),
         begins=column("from_s"),
         lasts=column("lasts_s"),
-        place=column("x_m"),
+        # A domain may take away one of the two.
+        place=column("x_m") if "y_m" in {key.partition(".")[2] for key in keys} else -1,
     )

@@ -1,5 +1,7 @@
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
@@ -8,6 +10,7 @@ from pytest_garl.scenarios.domains.reader import domain_named
 from pytest_garl.scenarios.genes import genome_for
 from pytest_garl.scenarios.maps.map import load_map
 from pytest_garl.search.columns import Columns
+from pytest_garl.search.exploration import Exploration
 
 MAP = load_map("court")
 FIELD = Columns(genome_of(domain_named("field"), MAP))
@@ -22,6 +25,24 @@ FIELD = Columns(genome_of(domain_named("field"), MAP))
 )
 def test_a_domain_has_the_strata_that_its_npcs_allow(domain: str, strata: tuple[str, ...]) -> None:
     assert Columns(genome_of(domain_named(domain), MAP)).strata == strata
+
+
+@pytest.mark.parametrize(
+    ("ranges", "has_place"),
+    [("x_m = [-1, 1]\ny_m = [-2, 2]", True), ("y_m = false", False), ("x_m = false", False)],
+)
+def test_a_decoy_has_a_place_unless_the_domain_takes_it_away(
+    ranges: str, has_place: bool, tmp_path: Path
+) -> None:
+    file = tmp_path / "mine.toml"
+    file.write_text(f'extends = "field"\n[decoy-1]\n{ranges}\n')
+    columns = Columns(genome_of(domain_named(str(file)), MAP))
+    (decoy,) = (gene for gene in columns.optional if gene.name == "decoy-1")
+    assert (decoy.place >= 0) == has_place
+    exploration, rng = Exploration(columns, MAP), np.random.default_rng(0)
+    for _ in range(40):
+        row = exploration.new("nobody", rng)
+        assert ((row >= columns.lower) & (row <= columns.upper)).all()
 
 
 def test_the_world_of_the_paper_has_no_strata_and_all_values_count() -> None:
