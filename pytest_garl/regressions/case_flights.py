@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import dataclasses
-import math
 
 from pytest_garl.execution.flight_id import CompletedFlight
 from pytest_garl.execution.job import FlightJob
 from pytest_garl.execution.on_demand import FlyFunction
 from pytest_garl.regressions.case import NOT_ASKED, Case, Prevention, RecordedBehaviour
 from pytest_garl.regressions.case_request import CaseRequest, CaseResult, FailingScenario
+from pytest_garl.regressions.move_reduction import short_moves
 from pytest_garl.regressions.prevention import collision_of, prevention_of
 from pytest_garl.regressions.robustness import NEIGHBOURS, neighbours
 from pytest_garl.scenarios.maps.map import Map
@@ -178,18 +178,11 @@ def recorded_behaviour(flight: CompletedFlight, scenario: Scenario, map: Map) ->
     made = {item.name: item.moves for item in objects}
     return RecordedBehaviour(
         moves=tuple(
-            (name, tuple((_short(x), _short(y)) for x, y in made.get(name, ()))) for name in names
+            (name, short_moves((float(x), float(y)) for x, y in made.get(name, ())))
+            for name in names
         ),
         changes=tuple((item.name, item.changes) for item in objects if item.changes),
     )
-
-
-def _short(share: float) -> float:
-    """Return a share with four digits after the point that is no larger: a move is at most 1."""
-    near = round(float(share), 4)
-    if abs(near) > abs(share):
-        near = round(near - math.copysign(1e-4, near), 4)
-    return near + 0.0  # no negative zero
 
 
 def find_colliding_object(flight: CompletedFlight) -> str:

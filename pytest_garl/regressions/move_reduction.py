@@ -1,9 +1,9 @@
-"""Shorter records of moves: whole hundredths, and an object that stands still at first."""
+"""Shorter records of moves: fewer digits, and an object that stands still at first."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 
 from pytest_garl.regressions.case import MoveList, Moves, RecordedBehaviour
 from pytest_garl.scenarios.maps.map import Map
@@ -34,6 +34,18 @@ def rounded(behaviour: RecordedBehaviour) -> RecordedBehaviour:
     """Return the behaviour with moves in whole hundredths."""
     moves = tuple((name, _rounded(own)) for name, own in behaviour.moves)
     return RecordedBehaviour(moves=moves, changes=behaviour.changes)
+
+
+def short_moves(moves: Iterable[tuple[float, float]]) -> MoveList:
+    """Return moves with four digits after the point, none longer than it was."""
+    return tuple((_short(x), _short(y)) for x, y in moves)
+
+
+def _short(share: float) -> float:
+    near = round(share, 4)
+    if abs(near) > abs(share):
+        near = round(near - math.copysign(1e-4, near), 4)
+    return near + 0.0  # no negative zero
 
 
 def _rounded(moves: MoveList) -> MoveList:

@@ -128,5 +128,5 @@ def _optional_gene(gene: NuclearGene, first: int) -> OptionalGene:
         begins=column("from_s"),
         lasts=column("lasts_s"),
         # A domain may take away one of the two.
-        place=column("x_m") if "y_m" in {key.partition(".")[2] for key in keys} else -1,
+        place=column("x_m") if column("y_m") >= 0 else -1,
     )

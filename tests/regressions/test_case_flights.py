@@ -3,6 +3,7 @@ from __future__ import annotations
 import dataclasses
 import types
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -79,8 +80,8 @@ def test_recorded_moves_have_four_digits_and_are_no_longer_than_they_were(
     monkeypatch.setattr(case_flights, "load", lambda path: types.SimpleNamespace(objects=[dog]))
     record = tmp_path / "flight.npz"
     record.touch()
-    flight = types.SimpleNamespace(record=record)
-    found = recorded_behaviour(flight, VIOLATING_SCENARIO, LAWN)  # type: ignore[arg-type]
+    flight: Any = types.SimpleNamespace(record=record)
+    found = recorded_behaviour(flight, VIOLATING_SCENARIO, LAWN)
     moves = dict(found.moves)["dog-1"]
     assert moves == ((0.808, -0.5891), (-1.0, 0.0), (0.57, 0.0))
     assert "-0.0)" not in repr(moves)
