@@ -87,7 +87,7 @@ def _pairs(names: Iterable[str]) -> list[tuple[str, str]]:
 
 
 class PlainExploration(Exploration):
-    """Gives a condition the first values drawn, be they mild or harsh."""
+    """Gives a condition the first values drawn, be they mild or harsh, and a decoy any place."""
 
     draws = 1
 
