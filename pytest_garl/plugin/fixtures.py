@@ -77,7 +77,7 @@ def landing(request: pytest.FixtureRequest, garl_slot: Target, npcs: PolicySpec 
         ("garl.elapsed_s", result.elapsed_s),
         (TRAJECTORY, flight.sha256),
     ]
-    if outside := run.outside_domain(garl_slot):
+    if outside := garl_slot.outside_domain(run.options.map_folders):
         item.user_properties.append((OUTSIDE, outside))
     if reasons := run.unproven(garl_slot):
         request.node.user_properties.append((UNPROVEN, "; ".join(reasons)))

@@ -11,6 +11,7 @@ import pytest
 
 from pytest_garl.execution.flight_id import CompletedFlight
 from pytest_garl.execution.result import FlightResult
+from pytest_garl.plugin.early_reflights import REFLIGHTS
 from pytest_garl.plugin.failed_statement import failure_of
 from pytest_garl.plugin.keys import LANDING
 from pytest_garl.plugin.outcomes import (
@@ -101,10 +102,6 @@ def slot_claim(run: Run, target: Target, nodeid: str) -> Callable[[Need, F], F]:
         return dataclasses.replace(facts, first=run.claims.claim_slot(target, nodeid))
 
     return claim
-
-
-REFLIGHTS = 4
-"""A violation of a system that need not be deterministic is flown so many times more."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

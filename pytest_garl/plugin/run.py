@@ -13,11 +13,12 @@ import pytest
 
 from pytest_garl.errors import LedgerError
 from pytest_garl.execution.batch import fly_all
-from pytest_garl.execution.flight_id import CompletedFlight, FlightId
+from pytest_garl.execution.flight_id import CompletedFlight, FlightId, Slot
 from pytest_garl.execution.ledger import Ledger
 from pytest_garl.execution.pool import Pool, wait_for
 from pytest_garl.execution.reference import Reference, simulator_sha256
 from pytest_garl.execution.sources import combined_sha256
+from pytest_garl.plugin.early_reflights import EarlyReflights
 from pytest_garl.plugin.flight_time import FIRST_RUN, FlightTime
 from pytest_garl.plugin.keys import target_of
 from pytest_garl.plugin.options import Options
@@ -159,8 +160,12 @@ class Run:
     reported_failures: dict[str, str] = field(default_factory=dict)
     """Signatures of failed assertions in xdist's workers, by node id."""
 
+    _flown_to: dict[str, Slot] = field(init=False, default_factory=dict)
+    """The slot of each search up to which all selected slots are flown."""
+
     def __post_init__(self) -> None:
         self.searches = Searches(options=self.options, ledger=self.ledger, simulator=self.simulator)
+        self._early_reflights = EarlyReflights(self)
 
     def select(self, items: Sequence[pytest.Item]) -> None:
         """Remember which flights the selected items want.
@@ -222,8 +227,9 @@ class Run:
         """Return a slot's flight after it and all lower selected slots are flown."""
         self.searches.register(target.system, npcs)
         try:
-            for lower in self.searches.lower(target):
+            for lower in self.searches.lower(target, self._flown_to.get(target.search)):
                 self.flight(lower)
+                self._flown_to[target.search] = lower.slot
             return self.flight(target)
         finally:
             self.on_wait_end()
@@ -246,19 +252,6 @@ class Run:
         excused = (f"nobody could have landed ({excuse})",) if excuse else ()
         return *excused, *stale_reasons(target.case, sources, flight.sha256)
 
-    def outside_domain(self, target: Target) -> str:
-        """Return the file of a case and its values outside the test's domain; empty if it has none.
-
-        The case is flown all the same: what was found once must not come back unnoticed.
-        """
-        if target.case is None or target.entry is None or target.domain is None:
-            return ""
-        scenario = target.case.scenario
-        map = load_map(target.map, self.options.map_folders)
-        values = "; ".join(target.domain.outside(scenario, map))
-        file = target.entry.path.name
-        return f"{file} is outside the domain {target.domain.name}: {values}" if values else ""
-
     def scenario(self, target: Target) -> Scenario:
         """Return the scenario of a slot."""
         text = self.ledger.scenario(target.flight)
@@ -279,6 +272,10 @@ class Run:
 
     def refly(self, target: Target, count: int) -> list[CompletedFlight]:
         """Fly a flown slot ``count`` times more."""
+        return [self._wait(flight) for flight in self.request_reflights(target, count)]
+
+    def request_reflights(self, target: Target, count: int) -> list[FlightId]:
+        """Request that a flown slot is flown ``count`` times more, unless it was already."""
         job = self.ledger.job(target.search)
         assert job is not None
         text = self.ledger.scenario(target.flight)
@@ -286,7 +283,7 @@ class Run:
         flights = [target.reflight(index) for index in range(count)]
         for flight in flights:
             self.ledger.add_flight(flight, target.system_name, job, text)
-        return [self._wait(flight) for flight in flights]
+        return flights
 
     def fly_all(
         self, target: Target, npcs: PolicySpec, scenarios: Sequence[Scenario]
@@ -308,6 +305,7 @@ class Run:
 
     def _advance(self) -> None:
         self.searches.advance()
+        self._early_reflights.advance()
         if self.investigations is not None:
             self.investigations.advance()
         self.on_wait()

@@ -48,10 +48,14 @@ class Searches:
         """Add the target of a selected item."""
         self.targets.setdefault(target.search, {})[target.slot] = target
 
-    def lower(self, target: Target) -> list[Target]:
-        """Return the targets of the selected items of lower slots of the same search."""
+    def lower(self, target: Target, above: Slot | None = None) -> list[Target]:
+        """Return the targets of the selected items of lower slots of the same search.
+
+        With ``above``, of those that are higher than this slot.
+        """
         wanted = self.targets[target.search]
-        return [wanted[slot] for slot in sorted(wanted) if slot < target.slot]
+        slots = (slot for slot in wanted if slot < target.slot and (not above or slot > above))
+        return [wanted[slot] for slot in sorted(slots)]
 
     def register(self, system: type, npcs: PolicySpec | None) -> None:
         """Put all searches of a landing system into the ledger.

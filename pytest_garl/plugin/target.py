@@ -11,9 +11,12 @@ from typing import TYPE_CHECKING, Any
 
 from pytest_garl.execution.flight_id import FIRST_SLOT, FlightId, Slot, search_key
 from pytest_garl.execution.reference import reference_to
+from pytest_garl.scenarios.maps.map import load_map
 from pytest_garl.scenarios.task import DEFAULT_TASK, Task
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from pytest_garl.landing_system import Airframe, NavigationKind
     from pytest_garl.regressions.case import Case
     from pytest_garl.regressions.corpus import CorpusEntry
@@ -111,6 +114,18 @@ class Target:
     def flight(self) -> FlightId:
         """The flight that the item judges."""
         return FlightId(search=self.search, map=self.map, slot=self.slot)
+
+    def outside_domain(self, map_folders: Sequence[Path]) -> str:
+        """Return the file of a case and its values outside the test's domain; empty if it has none.
+
+        The case is flown all the same: what was found once must not come back unnoticed.
+        """
+        if self.case is None or self.entry is None or self.domain is None:
+            return ""
+        map = load_map(self.map, map_folders)
+        values = "; ".join(self.domain.outside(self.case.scenario, map))
+        file = self.entry.path.name
+        return f"{file} is outside the domain {self.domain.name}: {values}" if values else ""
 
     def reflight(self, index: int) -> FlightId:
         """Return the flight that repeats the item's flight for the ``index``-th time."""
