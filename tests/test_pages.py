@@ -28,7 +28,7 @@ RUN_BY = {
     "garl check my_landing:MyLandingSystem": ("tests/cli/test_check.py", "check"),
     "pytest --garl-budget=40 test_my_landing.py": ("tests/test_pages.py", "--garl-budget"),
     TRY: ("tests/test_tutorial.py", "copytree"),
-    "pytest --garl-budget=16 --garl-shrink=16 test_my_landing.py": (
+    "pytest --garl-budget=16 --garl-shrink=12 test_my_landing.py": (
         "tests/test_tutorial.py",
         "transcript",
     ),
