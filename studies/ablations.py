@@ -105,6 +105,15 @@ class TimelessExploration(Exploration):
         """Leave all events where they are."""
 
 
+class SingleEventExploration(Exploration):
+    """Lets events act like other conditions, seldom together."""
+
+    def pair_of_events(self, rng: np.random.Generator) -> Sequence[str]:
+        """Return none."""
+        del rng
+        return ()
+
+
 class ScatteredExploration(Exploration):
     """Puts a decoy anywhere."""
 
@@ -144,6 +153,7 @@ VARIANTS: dict[str, Callable[[SearchPlan], Method]] = {
     "genes at random": garl_with(exploration=UnevenExploration),
     "breeding from the start": garl_with(explores_first=0),
     "events at any time": garl_with(exploration=TimelessExploration),
+    "no pairs of events": garl_with(exploration=SingleEventExploration),
     "decoys anywhere": garl_with(exploration=ScatteredExploration),
     "pairs of groups covered": garl_with(exploration=PairExploration),
     "values away from earlier ones": garl_with(exploration=SpreadExploration),

@@ -19,6 +19,10 @@ LONE_NPC_SHARE = 0.8
 SLACK = 2.0
 """Times that a gene may have acted more often than another and still be chosen before it, so that
 which genes act together is random."""
+EVENT_PAIR_SHARE = 1 / 3
+"""Share of scenarios that have two events, if there is room: how a system handles one of them shows
+when another comes.  Most failures of large systems take more than one event, and few more than
+three (Yuan et al., Simple Testing Can Prevent Most Critical Failures, OSDI 2014)."""
 COINCIDENT_SHARE = 0.5
 """Share of the events in a scenario with an earlier one that begin while that one lasts."""
 
@@ -38,6 +42,8 @@ class Exploration:
         self.flight_s = float("inf")
         self._times: Counter[str] = Counter()
         """How often each gene was chosen to act."""
+        self._pairs: Counter[tuple[str, str]] = Counter()
+        """How often two events were chosen to act together."""
 
     def new(self, stratum: str, rng: np.random.Generator) -> Matrix:
         """Return a chromosome of a stratum."""
@@ -80,7 +86,20 @@ class Exploration:
         if stratum != STRATA[0]:
             count = 1 if rng.random() < LONE_NPC_SHARE else min(2, len(npcs), size)
         left = min(size - count, len(others))
-        return (*self.least_flown(npcs, count, rng), *self.least_flown(others, left, rng))
+        pair = self.pair_of_events(rng) if left >= 2 else ()
+        others = [name for name in others if name not in pair]
+        rest = self.least_flown(others, left - len(pair), rng)
+        return (*self.least_flown(npcs, count, rng), *pair, *rest)
+
+    def pair_of_events(self, rng: np.random.Generator) -> Sequence[str]:
+        """Return two events that acted together least often so far, or none."""
+        events = [gene.name for gene in self._columns.optional if gene.begins >= 0]
+        if len(events) < 2 or rng.random() >= EVENT_PAIR_SHARE:
+            return ()
+        pairs = itertools.combinations(events, 2)
+        pair = min(pairs, key=lambda each: self._pairs[each] + rng.random())
+        self._pairs[pair] += 1
+        return pair
 
     def least_flown(
         self, names: Sequence[str], count: int, rng: np.random.Generator
