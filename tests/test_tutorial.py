@@ -54,7 +54,7 @@ def test_every_command_of_the_tutorial_prints_what_it_says(
     for command in ("git init -q", "git add *.py *.patch", "git commit -qm stack"):
         subprocess.run(command, shell=True, cwd=stack, check=True)
     commands = transcript()
-    assert len(commands) == 14
+    assert len(commands) == 13
     for command, told in commands:
         if SEARCH in command and not searches:
             continue
