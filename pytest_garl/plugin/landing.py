@@ -171,8 +171,8 @@ class Landing:
             return f"inconclusive: {self._result.undecided}"
         verdict = self._result.verdict
         if verdict.primary == "crash":
-            return f"not decided: {verdict.story}"
-        return "not decided: the landing system gave up" if verdict.primary == "abort" else ""
+            return f"not judged: {verdict.story}"
+        return "not judged: the landing system gave up" if verdict.primary == "abort" else ""
 
     @property
     def complaint(self) -> str:
@@ -198,10 +198,10 @@ class Landing:
         if self._is_shown_elsewhere():
             self.left_to_another_test = True
             signature = self._result.signature
-            pytest.skip(f"not decided: another test of this flight fails for {signature}")
+            pytest.skip(f"not judged: another test of this flight fails for {signature}")
 
     def _undecided(self) -> NoReturn:
-        pytest.skip(f"not decided: {self.excused or self._result.undecided}")
+        pytest.skip(f"not judged: {self.excused or self._result.undecided}")
 
     def _note(self, name: str) -> None:
         """Remember what the test reads, and in which line of its own body."""

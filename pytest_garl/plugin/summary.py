@@ -29,7 +29,7 @@ from pytest_garl.reports.shares_text import (
 )
 
 NO_FILMS: Mapping[str, Path] = MappingProxyType({})
-_UNDECIDED = "Skipped: not decided:"
+_UNJUDGED = "Skipped: not judged:"
 
 
 def write_run(reporter: Any, run: Run, tally: Tally) -> list[SearchSummary]:
@@ -144,9 +144,9 @@ def fold_skips(reporter: Any) -> None:
         if not isinstance(report.longrepr, tuple):
             continue
         reason = str(report.longrepr[2])
-        if reason.startswith(_UNDECIDED):
+        if reason.startswith(_UNJUDGED):
             file = reporter.config.rootpath / report.nodeid.partition("::")[0]
-            folded = f"{_UNDECIDED} the flight ended before, or another test fails (-v: which)"
+            folded = f"{_UNJUDGED} the flight ended before, or another test fails (-v: which)"
             report.longrepr = (str(file), None, folded)
 
 

@@ -49,7 +49,7 @@ NEEDLESS: dict[str, Any] = {
     "primary": "time",
     "undecided": "gave up at 30.0 s",
 }
-SHOWN = "not decided: another test of this flight fails for "
+SHOWN = "not judged: another test of this flight fails for "
 
 
 @pytest.mark.parametrize(
@@ -70,29 +70,29 @@ SHOWN = "not decided: another test of this flight fails for "
             {"outcome": "slid", "signature": "slid:motors-off", "primary": "distance"}
             | {"undecided": "slid"},
             math.inf,
-            "not decided: slid",
+            "not judged: slid",
             False,
             "",
         ),
-        (NEEDLESS, "not decided: gave up at 30.0 s", math.inf, False, ""),
+        (NEEDLESS, "not judged: gave up at 30.0 s", math.inf, False, ""),
         (
             {**NEEDLESS, "signature": "I:nothing:seen", "primary": "distance", "off_marker_m": 9.0},
             9.0,
-            "not decided: gave up at 30.0 s",
+            "not judged: gave up at 30.0 s",
             False,
             "",
         ),
         (
             {"outcome": "gave_up", "excuse": "blocked", "excuse_text": BLOCKED},
-            f"not decided: {BLOCKED}",
-            f"not decided: {BLOCKED}",
+            f"not judged: {BLOCKED}",
+            f"not judged: {BLOCKED}",
             False,
             BLOCKED,
         ),
         (
             {"outcome": "not_landed", "signature": "late:not-landed:search", "primary": "time"}
             | {"undecided": "not landed after 120 s"},
-            "not decided: not landed after 120 s",
+            "not judged: not landed after 120 s",
             math.inf,
             False,
             "",
@@ -100,9 +100,9 @@ SHOWN = "not decided: another test of this flight fails for "
         # limits(abort="ok") allows it.
         (
             {"outcome": "gave_up", "undecided": "gave up at 30.0 s"},
-            "not decided: gave up at 30.0 s",
-            "not decided: gave up at 30.0 s",
-            "not decided: gave up at 30.0 s",
+            "not judged: gave up at 30.0 s",
+            "not judged: gave up at 30.0 s",
+            "not judged: gave up at 30.0 s",
             "",
         ),
     ],

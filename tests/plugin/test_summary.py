@@ -103,7 +103,7 @@ def test_step_summary_holds_a_table_of_violations(
         "`pytest test_it.py --garl-repeat=lawn-g00-s02 -o garl_dir=elsewhere` |"
     ) in lines
     folded = [line for line in result.outlines if line.startswith("SKIPPED")]
-    reason = "not decided: the flight ended before, or another test fails (-v: which)"
+    reason = "not judged: the flight ended before, or another test fails (-v: which)"
     assert folded == [f"SKIPPED [4] test_it.py: {reason}"]
 
 
