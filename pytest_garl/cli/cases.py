@@ -70,6 +70,13 @@ def say(text: str, *, err: bool = False) -> None:
 
 
 FILE = click.argument("file", type=click.Path(path_type=Path, exists=True, dir_okay=False))
+FILES = click.argument(
+    "files",
+    metavar="FILE...",
+    nargs=-1,
+    required=True,
+    type=click.Path(path_type=Path, exists=True, dir_okay=False),
+)
 
 
 @cases.command("list")
@@ -173,13 +180,7 @@ def _show_replay(replayed: Replay) -> None:
 
 
 @cases.command()
-@click.argument(
-    "files",
-    metavar="FILE...",
-    nargs=-1,
-    required=True,
-    type=click.Path(path_type=Path, exists=True, dir_okay=False),
-)
+@FILES
 @click.pass_obj
 def accept(project: _Project, files: tuple[Path, ...]) -> None:
     """Make cases known: they are expected to fail until they are fixed.
@@ -193,17 +194,35 @@ def accept(project: _Project, files: tuple[Path, ...]) -> None:
 
 
 @cases.command()
-@FILE
+@FILES
 @click.pass_obj
-def promote(project: _Project, file: Path) -> None:
-    """Mark a case as fixed: from now on it must pass.
+def promote(project: _Project, files: tuple[Path, ...]) -> None:
+    """Mark cases as fixed: from now on they must pass.
 
-    The command flies the case first, with its recorded moves and, if an escape from a live policy
-    exists, with that policy too. The case stays open if it fails, if the landing system gives up
+    The command flies each case first, with its recorded moves and, if an escape from a live policy
+    exists, with that policy too. A case stays open if it fails, if the landing system gives up
     needlessly, if it is undecided, or if nothing shows that a repair of the landing system made it
-    pass.
+    pass; the others are marked all the same.
     """
-    case, remarks = project.case(file), []
+    refused = []
+    for file, case in [(file, project.case(file)) for file in files]:
+        try:
+            remarks = _flown_as_fixed(project, file, case)
+        except GarlError as error:
+            refused.append(str(error))
+            continue
+        # What passes is not unpreventable.
+        reason: NoGateReason = "edge" if case.edge else ""
+        replace_file(file, dataclasses.replace(case, status="fixed", reason=reason), project.maps)
+        for line in (f"{file}: fixed; from now on it must pass", *remarks):
+            say(line)
+    if refused:
+        raise GarlError("\n".join(refused))
+
+
+def _flown_as_fixed(project: _Project, file: Path, case: Case) -> list[str]:
+    """Fly a case that is said to be fixed; return remarks, or raise GarlError if it is not."""
+    remarks = []
     for live in (False, True) if case.live else (False,):
         replayed = replay(case, project.root, project.maps, live=live)
         how = "a live policy" if live else "its recorded moves"
@@ -213,12 +232,7 @@ def promote(project: _Project, file: Path) -> None:
             remarks.append(f"with {how} the landing system gave up, which its limits allow")
         if not live:
             remarks.append(f"judged by {replayed.judged_by}")
-    # What passes is not unpreventable.
-    reason: NoGateReason = "edge" if case.edge else ""
-    replace_file(file, dataclasses.replace(case, status="fixed", reason=reason), project.maps)
-    say(f"{file}: fixed; from now on it must pass")
-    for line in remarks:
-        say(line)
+    return remarks
 
 
 def _refusal(replayed: Replay, how: str) -> str:

@@ -94,6 +94,20 @@ def test_promote_refuses_a_lander_that_gives_up_needlessly(file: Path) -> None:
     assert load_case(file).status == "open"
 
 
+def test_promote_marks_those_that_are_fixed_of_several_cases(file: Path) -> None:
+    copy = file.with_name("copy.toml")
+    copy.write_text(file.read_text())
+    case = load_case(file)
+    another = dataclasses.replace(case.scenario, seed=case.scenario.seed + 1)
+    needless = replace_file(copy, dataclasses.replace(case, scenario=another, limits=Limits()))
+    repair_lander()
+    done = garl("promote", needless, file)
+    assert done.exit_code != 0
+    assert f"{needless}: still fails with its recorded moves (II:" in done.output
+    assert f"{file}: fixed; from now on it must pass" in done.output
+    assert (load_case(needless).status, load_case(file).status) == ("open", "fixed")
+
+
 def test_promote_requires_a_replay_that_is_fixed(file: Path) -> None:
     failed = garl("replay", file)
     assert failed.output.startswith("FAILED\nV:ZeroDivisionError@stack_of_test.step")
