@@ -19,6 +19,7 @@ ROOT = Path(__file__).parents[1]
 README, DOCS = ROOT / "README.md", ROOT / "docs"
 PAGES = [*sorted(ROOT.glob("*.md")), *sorted(DOCS.rglob("*.md"))]
 LINK = re.compile(r"\]\(([^)\s]+)\)")
+SIGNATURE = re.compile(r"[IV]+:")
 MOST_LINES = 15
 
 TRY = "cp -r docs/tutorial /tmp/my-stack && cd /tmp/my-stack && rm -r scenarios"
@@ -133,7 +134,7 @@ def test_readme_explains_every_type_of_violation() -> None:
 
 
 def test_readme_shows_output_of_the_tutorial() -> None:
-    (output,) = (block for block in indented(README) if block[0].startswith("II:"))
+    (output,) = (block for block in indented(README) if SIGNATURE.match(block[0]))
     assert len(output) <= MOST_LINES
     tutorial = [line.split() for line in (DOCS / "tutorial.md").read_text().splitlines()]
     assert [line for line in output if line.split() not in [*tutorial, ["..."]]] == []
@@ -148,7 +149,7 @@ def test_every_command_of_the_readme_is_run() -> None:
     shown = {
         line.partition("#")[0].strip()
         for block in indented(README)
-        if not block[0].startswith("II:")
+        if not SIGNATURE.match(block[0])
         for line in block
     }
     assert shown == set(RUN_BY)

@@ -34,7 +34,7 @@ class Exploration:
     far; infinite before the first.
     """
 
-    draws = 3
+    draws = 8
     """Draws of a condition's values, of which those are flown that show most."""
 
     def __init__(self, columns: Columns, map: Map) -> None:
