@@ -21,8 +21,8 @@ SLACK = 2.0
 which genes act together is random."""
 EVENT_PAIR_SHARE = 1 / 3
 """Share of scenarios that have two events, if there is room: how a system handles one of them shows
-when another comes.  Most failures of large systems take more than one event, and few more than
-three (Yuan et al., Simple Testing Can Prevent Most Critical Failures, OSDI 2014)."""
+when another comes.  Most failures of distributed systems take two or three events, few take more
+(Yuan et al., Simple Testing Can Prevent Most Critical Failures, OSDI 2014)."""
 COINCIDENT_SHARE = 0.5
 """Share of the events in a scenario with an earlier one that begin while that one lasts."""
 
