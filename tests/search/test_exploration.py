@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import itertools
 from collections import Counter
 
 import numpy as np
@@ -16,6 +17,7 @@ from pytest_garl.search.exploration import Exploration
 MAP = load_map("court")
 COLUMNS = Columns(genome_of(domain_named("field"), MAP))
 GENES = {gene.name: gene for gene in COLUMNS.optional}
+EVENTS = {"jump", "outage", "burst", "cover"}
 
 
 def exploration(flight_s: float = float("inf")) -> Exploration:
@@ -91,12 +93,27 @@ def test_decoys_lie_nearer_to_the_way_than_the_domain_puts_them() -> None:
     assert off_way_m(3) < 0.7 * off_way_m(1)
 
 
-def test_all_conditions_act_about_equally_often() -> None:
+def drawn_genes(count: int) -> list[set[str]]:
+    """Return which conditions act in scenarios without NPCs."""
     ours, rng = exploration(), np.random.default_rng(0)
-    acted: Counter[str] = Counter()
-    for _ in range(60):
-        row = ours.new("nobody", rng)
-        acted.update(gene.name for gene in COLUMNS.active(row))
-    conditions = [gene.name for gene in COLUMNS.optional if not gene.is_npc]
-    assert {*acted} == {*conditions}
-    assert max(acted.values()) - min(acted.values()) <= 3
+    rows = [ours.new("nobody", rng) for _ in range(count)]
+    return [{gene.name for gene in COLUMNS.active(row)} for row in rows]
+
+
+def test_all_conditions_act_about_equally_often_and_events_more() -> None:
+    acted = Counter(itertools.chain.from_iterable(drawn_genes(60)))
+    conditions = {gene.name for gene in COLUMNS.optional if not gene.is_npc}
+    assert {*acted} == conditions
+    other = [acted[name] for name in conditions - EVENTS]
+    assert max(other) - min(other) <= 3
+    events = [acted[name] for name in EVENTS]
+    assert max(events) - min(events) <= 3
+    assert min(events) > max(other)
+
+
+def test_a_third_of_the_scenarios_have_two_events_all_pairs_equally_often() -> None:
+    pairs = [frozenset(names & EVENTS) for names in drawn_genes(600)]
+    counts = Counter(pair for pair in pairs if len(pair) == 2)
+    assert {*counts} == {frozenset(pair) for pair in itertools.combinations(EVENTS, 2)}
+    assert 0.3 < counts.total() / len(pairs) < 0.45
+    assert max(counts.values()) - min(counts.values()) < 0.1 * counts.total()
