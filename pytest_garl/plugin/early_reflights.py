@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections import defaultdict
 from typing import TYPE_CHECKING
 
-from pytest_garl.execution.flight_id import Slot
+from pytest_garl.execution.first_violations import FirstViolations
 
 if TYPE_CHECKING:
     from pytest_garl.plugin.run import Run
+    from pytest_garl.plugin.target import Target
 
 REFLIGHTS = 4
 """A violation of a system that need not be deterministic is flown so many times more."""
@@ -23,26 +23,24 @@ class EarlyReflights:
 
     def __init__(self, run: Run) -> None:
         self._run = run
-        self._latest: dict[str, int] = {}
-        """The last generation of each search that was looked at."""
-        self._seen: defaultdict[str, set[str]] = defaultdict(set)
-        """The signatures of each search."""
+        self._violations = FirstViolations(run.ledger.queries)
 
     def advance(self) -> None:
         """Request the flights for the generations that were flown since this was called last."""
-        queries = self._run.ledger.queries
-        for search in self._run.searches.breeders:
-            for generation in queries.closed_generations(search, self._latest.get(search, -1)):
-                self._latest[search] = generation
-                for flight in queries.violating(search, generation):
-                    if flight.signature not in self._seen[search]:
-                        self._seen[search].add(flight.signature)
-                        self._request(search, flight.id.slot, flight.signature)
+        searches = self._run.searches
+        for search in searches.breeders:
+            wanted = searches.targets[search]
+            # Saved cases may be many, and nothing in them is new.
+            if not next(iter(wanted.values())).is_searched:
+                continue
+            for first, *_ in self._violations.advance(search):
+                target = wanted.get(first.id.slot)
+                if target is not None and self._is_reported(target, first.signature):
+                    count = 1 if target.deterministic else REFLIGHTS
+                    self._run.request_reflights(target, count)
 
-    def _request(self, search: str, slot: Slot, signature: str) -> None:
+    def _is_reported(self, target: Target, signature: str) -> bool:
+        """Whether a test can fail for a violation that no saved case expects."""
         run = self._run
-        target = run.searches.targets[search].get(slot)
-        if target is None or signature in run.expected_signatures(target):
-            return
-        if any(item.shows for item in run.items.get(target.flight, ())):
-            run.request_reflights(target, 1 if target.deterministic else REFLIGHTS)
+        shown = any(item.shows for item in run.items.get(target.flight, ()))
+        return shown and signature not in run.expected_signatures(target)

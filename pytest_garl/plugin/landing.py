@@ -20,6 +20,10 @@ if TYPE_CHECKING:
     from pytest_garl.simulation.flight import Flight
     from pytest_garl.verdicts.verdict import Limits, Verdict
 
+NOT_JUDGED = "not judged"
+"""Begins why a test is skipped whose property the flight did not decide, or that leaves a violation
+to another test: one event fails one test."""
+
 
 class Landing:
     """One flown landing, as a test sees it.
@@ -171,8 +175,9 @@ class Landing:
             return f"inconclusive: {self._result.undecided}"
         verdict = self._result.verdict
         if verdict.primary == "crash":
-            return f"not judged: {verdict.story}"
-        return "not judged: the landing system gave up" if verdict.primary == "abort" else ""
+            return f"{NOT_JUDGED}: {verdict.story}"
+        gave_up = verdict.primary == "abort"
+        return f"{NOT_JUDGED}: the landing system gave up" if gave_up else ""
 
     @property
     def complaint(self) -> str:
@@ -198,10 +203,10 @@ class Landing:
         if self._is_shown_elsewhere():
             self.left_to_another_test = True
             signature = self._result.signature
-            pytest.skip(f"not judged: another test of this flight fails for {signature}")
+            pytest.skip(f"{NOT_JUDGED}: another test of this flight fails for {signature}")
 
     def _undecided(self) -> NoReturn:
-        pytest.skip(f"not judged: {self.excused or self._result.undecided}")
+        pytest.skip(f"{NOT_JUDGED}: {self.excused or self._result.undecided}")
 
     def _note(self, name: str) -> None:
         """Remember what the test reads, and in which line of its own body."""

@@ -160,6 +160,7 @@ class Run:
     reported_failures: dict[str, str] = field(default_factory=dict)
     """Signatures of failed assertions in xdist's workers, by node id."""
 
+    _early_reflights: EarlyReflights = field(init=False)
     _flown_to: dict[str, Slot] = field(init=False, default_factory=dict)
     """The slot of each search up to which all selected slots are flown."""
 

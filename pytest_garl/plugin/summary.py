@@ -13,6 +13,7 @@ import pytest
 from pytest_garl.plugin.films import film_lines
 from pytest_garl.plugin.header import cpu_dispatch_warning
 from pytest_garl.plugin.keys import CASE, MAYBE_FIXED, OUTSIDE, STALE
+from pytest_garl.plugin.landing import NOT_JUDGED
 from pytest_garl.plugin.run import Run
 from pytest_garl.plugin.save_cases import saved_lines
 from pytest_garl.plugin.session_status import notes
@@ -29,7 +30,8 @@ from pytest_garl.reports.shares_text import (
 )
 
 NO_FILMS: Mapping[str, Path] = MappingProxyType({})
-_UNJUDGED = "Skipped: not judged:"
+_SKIPPED = f"Skipped: {NOT_JUDGED}:"
+"""Begins pytest's reason for a test that its flight does not judge."""
 
 
 def write_run(reporter: Any, run: Run, tally: Tally) -> list[SearchSummary]:
@@ -136,7 +138,7 @@ def _world(search: SearchSummary) -> str:
 
 
 def fold_skips(reporter: Any) -> None:
-    """Give the undecided tests of a file one reason, so that pytest writes them in one line.
+    """Give one reason to the tests of a file that are not judged: pytest writes them in one line.
 
     Each reason holds a time of its own, by which pytest would keep them apart.
     """
@@ -144,9 +146,9 @@ def fold_skips(reporter: Any) -> None:
         if not isinstance(report.longrepr, tuple):
             continue
         reason = str(report.longrepr[2])
-        if reason.startswith(_UNJUDGED):
+        if reason.startswith(_SKIPPED):
             file = reporter.config.rootpath / report.nodeid.partition("::")[0]
-            folded = f"{_UNJUDGED} the flight ended before, or another test fails (-v: which)"
+            folded = f"{_SKIPPED} the flight ended before, or another test fails (-v: which)"
             report.longrepr = (str(file), None, folded)
 
 

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections import defaultdict
 from collections.abc import Sequence
 from pathlib import Path
 
+from pytest_garl.execution.first_violations import FirstViolations
 from pytest_garl.execution.job import FlightJob, parse_job
 from pytest_garl.execution.ledger import Ledger
 from pytest_garl.execution.ledger_queries import LedgerFlight
@@ -29,8 +29,7 @@ class NewSignatures:
 
     def __init__(self, ledger: Ledger, corpus: Corpus, budget: int) -> None:
         self._ledger, self._corpus, self._budget = ledger, corpus, budget
-        self._latest: dict[str, int] = {}
-        self._seen: defaultdict[str, set[str]] = defaultdict(set)
+        self._violations = FirstViolations(ledger.queries)
 
     def advance(self) -> list[CaseRequest]:
         """Return the requests of the generations that were flown since it was called last.
@@ -39,27 +38,19 @@ class NewSignatures:
         """
         found = []
         for search, text in self._ledger.searches():
-            latest = self._latest.get(search, -1)
-            for generation in self._ledger.queries.closed_generations(search, latest):
-                self._latest[search] = generation
-                found += self._requests(search, generation, text)
+            if new := self._violations.advance(search):
+                found += self._requests(search, new, parse_job(text))
         return found
 
-    def _requests(self, search: str, generation: int, text: str) -> list[CaseRequest]:
-        """Return the requests of a generation that is flown."""
-        by_signature: defaultdict[str, list[LedgerFlight]] = defaultdict(list)
-        for flight in self._ledger.queries.violating(search, generation):
-            by_signature[flight.signature].append(flight)
-        new = [each for each in by_signature if each not in self._seen[search]]
-        if not new:
-            return []
-        self._seen[search].update(new)
-        job = parse_job(text)
+    def _requests(
+        self, search: str, new: Sequence[Sequence[LedgerFlight]], job: FlightJob
+    ) -> list[CaseRequest]:
+        """Return the requests of the new signatures that no saved case expects."""
         expected = expected_signatures(self._ledger, self._corpus, search, job)
         return [
-            request_of(search, signature, by_signature[signature], job, self._budget)
-            for signature in new
-            if signature not in expected
+            request_of(search, flights[0].signature, flights, job, self._budget)
+            for flights in new
+            if flights[0].signature not in expected
         ]
 
 

@@ -42,7 +42,7 @@ class Exploration:
         self.flight_s = float("inf")
         self._times: Counter[str] = Counter()
         """How often each gene was chosen to act."""
-        self._pairs: Counter[tuple[str, str]] = Counter()
+        self._event_pairs: Counter[tuple[str, str]] = Counter()
         """How often two events were chosen to act together."""
 
     def new(self, stratum: str, rng: np.random.Generator) -> Matrix:
@@ -92,13 +92,16 @@ class Exploration:
         return (*self.least_flown(npcs, count, rng), *pair, *rest)
 
     def pair_of_events(self, rng: np.random.Generator) -> Sequence[str]:
-        """Return two events that acted together least often so far, or none."""
+        """Return two events that acted together least often so far, or none.
+
+        A pair does not count for ``least_flown``, so that events act without another one as well.
+        """
         events = [gene.name for gene in self._columns.optional if gene.begins >= 0]
         if len(events) < 2 or rng.random() >= EVENT_PAIR_SHARE:
             return ()
         pairs = itertools.combinations(events, 2)
-        pair = min(pairs, key=lambda each: self._pairs[each] + rng.random())
-        self._pairs[pair] += 1
+        pair = min(pairs, key=lambda each: self._event_pairs[each] + rng.random())
+        self._event_pairs[pair] += 1
         return pair
 
     def least_flown(

@@ -90,7 +90,7 @@ def test_decoys_lie_nearer_to_the_way_than_the_domain_puts_them() -> None:
             distances.append(min(float(np.linalg.norm(place - each)) for each in line))
         return float(np.mean(distances))
 
-    assert off_way_m(3) < 0.7 * off_way_m(1)
+    assert off_way_m(Exploration.draws) < 0.7 * off_way_m(1)
 
 
 def drawn_genes(count: int) -> list[set[str]]:

@@ -1,0 +1,39 @@
+"""The first violations of each signature, found as soon as their generation is flown."""
+
+from __future__ import annotations
+
+from collections import defaultdict
+
+from pytest_garl.execution.ledger_queries import LedgerFlight, LedgerQueries
+
+
+class FirstViolations:
+    """Follows searches, generation by generation.
+
+    The violations of the generation in which a signature occurs first are known as soon as this
+    generation and all before it are flown.  They are the same for any number of workers and in a
+    resumed run.
+    """
+
+    def __init__(self, queries: LedgerQueries) -> None:
+        self._queries = queries
+        self._latest: dict[str, int] = {}
+        """The last generation of each search that was looked at."""
+        self._seen: defaultdict[str, set[str]] = defaultdict(set)
+        """The signatures of each search."""
+
+    def advance(self, search: str) -> list[list[LedgerFlight]]:
+        """Return the first violations of each new signature since this was called last.
+
+        The signatures are in the order in which they are found, their flights in that of the slots.
+        """
+        found: list[list[LedgerFlight]] = []
+        for generation in self._queries.closed_generations(search, self._latest.get(search, -1)):
+            self._latest[search] = generation
+            by_signature: defaultdict[str, list[LedgerFlight]] = defaultdict(list)
+            for flight in self._queries.violating(search, generation):
+                by_signature[flight.signature].append(flight)
+            new = [each for each in by_signature if each not in self._seen[search]]
+            self._seen[search].update(new)
+            found += [by_signature[each] for each in new]
+        return found
