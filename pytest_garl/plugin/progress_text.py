@@ -36,6 +36,8 @@ class RunProgress:
     """Flights expected beside the searches, those flown included."""
     left_s: float | None = None
     """A forecast of the time left, if there is a better one than the mean."""
+    shrinks: bool = True
+    """Whether kinds are confirmed and shrunk; if not, their violations are flown again only."""
     investigated: int = 0
     """Kinds of violation that are confirmed and shrunk beside the search at the moment."""
 
@@ -65,7 +67,8 @@ class RunProgress:
     def phrases(self) -> list[str]:
         """The parts of the line, the most important first."""
         # Each new kind adds flights to shrink it, so that one total of all would jump.
-        after = f", {self.flown_after:.0f}/{self._after:.0f} to shrink" if self._after else ""
+        purpose = "to shrink" if self.shrinks else "to repeat"
+        after = f", {self.flown_after:.0f}/{self._after:.0f} {purpose}" if self._after else ""
         phrases = [f"{self._searched}/{self._wanted} flights{after}"]
         left_s = self.left_s
         if left_s is None and self.seconds > 0 and 0 < self.flown < self.total:
@@ -81,7 +84,7 @@ class RunProgress:
             if self.investigated:
                 phrases.append(f"shrinking {counted(self.investigated, 'kind')} beside it")
         elif self.left_s is not None:
-            phrases.append("confirming and shrinking")
+            phrases.append("confirming and shrinking" if self.shrinks else "repeating")
         if self.flown and self.seconds > 0:
             phrases.append(f"{self.flown / self.seconds:.2f} flights/s")
         margins = [
@@ -143,6 +146,7 @@ class ProgressReader:
             flown_after=flown_after,
             expected_after=self._expected_after,
             left_s=left_s,
+            shrinks=self._run.options.shrink > 0,
             investigated=investigations.running if investigations else 0,
         )
 

@@ -50,7 +50,9 @@ def test_first_log_line_counts_the_time_before_it(
         cast(
             Run,
             SimpleNamespace(
-                remaining=RemainingWork(at_most=0, flights=0.0, seconds=0.0), investigations=None
+                remaining=RemainingWork(at_most=0, flights=0.0, seconds=0.0),
+                investigations=None,
+                options=SimpleNamespace(shrink=20),
             ),
         ),
         30.0,
@@ -70,6 +72,17 @@ def test_line_says_that_kinds_are_shrunk_beside_the_search() -> None:
     both = dataclasses.replace(PROGRESS, investigated=2)
     assert "A on court g01 3/4  shrinking 2 kinds beside it  0.50 flights/s" in progress_line(
         both, 200
+    )
+
+
+def test_line_of_a_run_that_does_not_shrink_speaks_of_repeating_only() -> None:
+    repeating = dataclasses.replace(PROGRESS, shrinks=False, flown_after=3.0, expected_after=4.0)
+    line = progress_line(repeating, 200)
+    assert "4/8 flights, 3/4 to repeat" in line
+    done = SearchProgress(system="m:A", map="court", flown=8, total=8, generation=1)
+    ended = dataclasses.replace(repeating, searches=[done], left_s=3.0)
+    assert progress_line(ended, 200).startswith(
+        "garl [##################--]  8/8 flights, 3/4 to repeat  3 s left  I:2 IV:1  repeating  "
     )
 
 
