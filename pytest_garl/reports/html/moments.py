@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -27,6 +27,8 @@ MOST = 8
 BEFORE_END_S = 2.0
 SAME_S = 0.25
 """Moments that are nearer than this share a picture."""
+CLOSE_M = 1.0
+"""Below this height the camera sees little more than a part of what the UAV lands on."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -65,6 +67,15 @@ def decisive_s(flight: Flight) -> float:
         return flight.touchdown.time_s
     given_up = (each.time_s for each in flight.events if each.name == "abort_command")
     return next(given_up, flight.elapsed_s)
+
+
+def last_far(flight: Flight, moments: Sequence[Moment]) -> Moment | None:
+    """Return the last moment at which the UAV is not close to the ground; without one the last."""
+    heights = flight.uav.position_m[:, 2]
+    for moment in reversed(moments):
+        if up_m(float(np.interp(moment.time_s, flight.uav.time_s, heights))) >= CLOSE_M:
+            return moment
+    return moments[-1] if moments else None
 
 
 def _all(flight: Flight, end_s: float) -> Iterator[Moment]:

@@ -12,7 +12,7 @@ import cv2
 import numpy as np
 
 from pytest_garl.landing_system import Camera
-from pytest_garl.reports.html.moments import Moment
+from pytest_garl.reports.html.moments import Moment, last_far
 from pytest_garl.reports.html.scene import jpeg_uri
 from pytest_garl.scenarios.maps.map import Map
 from pytest_garl.scenarios.scenario import Scenario
@@ -49,12 +49,13 @@ class Still:
 def stills_of(
     flight: Flight, scenario: Scenario, renderer: Renderer, moments: Sequence[Moment]
 ) -> tuple[tuple[Still, ...], str]:
-    """Return the pictures at the moments, and a small one of the last; the marker is outlined.
+    """Return the pictures at the moments, and a small one of the last that shows the surroundings.
 
-    A picture is that of the last frame up to its moment.
+    A picture is that of the last frame up to its moment.  The marker is outlined.
     """
     pane, shown = CameraPane(renderer), scenario
     found, small = [], ""
+    far = last_far(flight, moments)
     for moment in moments:
         step = _step_at(flight.steps, moment.time_s)
         time_s = step.time_s if step else moment.time_s
@@ -67,8 +68,9 @@ def stills_of(
         found.append(
             Still(time_s=moment.time_s, label=moment.label, picture=uri, facts=tuple(_facts(step)))
         )
-        least = np.asarray(cv2.resize(drawn, THUMBNAIL_PX, interpolation=cv2.INTER_AREA), np.uint8)
-        small = jpeg_uri(least, THUMBNAIL_QUALITY)
+        if moment is far:
+            least = cv2.resize(drawn, THUMBNAIL_PX, interpolation=cv2.INTER_AREA)
+            small = jpeg_uri(np.asarray(least, np.uint8), THUMBNAIL_QUALITY)
     return tuple(found), small
 
 

@@ -5,7 +5,14 @@ import dataclasses
 import numpy as np
 import pytest
 
-from pytest_garl.reports.html.moments import BEFORE_END_S, MOST, SAME_S, decisive_s, moments_of
+from pytest_garl.reports.html.moments import (
+    BEFORE_END_S,
+    MOST,
+    SAME_S,
+    decisive_s,
+    last_far,
+    moments_of,
+)
 from pytest_garl.simulation.flight import Flight
 from tests.support.recorded_flights import hit_by_dog, recorded, seen
 
@@ -42,6 +49,20 @@ def test_no_flight_has_more_moments_than_fit() -> None:
     assert len(moments_of(flight)) <= MOST
     assert labels(flight)[-1] == "The UAV hits dog-1"
     assert any("comes into view again" in label for label in labels(flight))
+
+
+def test_the_small_picture_is_the_last_from_above_the_ground() -> None:
+    sinks = np.array([[0.0, 0.0, max(0.2, 9.0 - index / 20)] for index in range(241)])
+    flight = recorded(steps=seen(range(20, 60)), outcome="landed", places=sinks, end_s=12.0)
+    found = moments_of(flight)
+    assert found[-1].label == "The UAV touches down"
+    far = last_far(flight, found)
+    assert far is not None
+    assert far.time_s < 9.5
+    assert far == max((each for each in found if each.time_s < 8.5), key=lambda each: each.time_s)
+    stays = recorded(steps=seen(range(20, 60)), outcome="landed", places=0 * sinks, end_s=12.0)
+    assert last_far(stays, moments_of(stays)) == moments_of(stays)[-1]
+    assert last_far(stays, ()) is None
 
 
 def test_a_turn_before_the_descent_is_none() -> None:
