@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Sequence
 
-from studies import ablations, adversary, preventability
+from studies import ablations, adversary, kinds, preventability
 from studies.table import Row
 
 OLD = {
@@ -55,6 +55,29 @@ def test_ablations_are_compared_seed_by_seed() -> None:
     last = ablations.report(rows).splitlines()[-1]
     cells = [cell.strip() for cell in last.strip("|").split("|")]
     assert cells[:6] == ["random", "3", "4.0", "-2.0 ± 0.0", "4.0", "-2.0 ± 0.0"]
+
+
+def test_kinds_of_two_methods_are_compared_at_equal_flights_and_violations() -> None:
+    def row(method: str, seed: int, counts: Sequence[int]) -> Row:
+        flights = {f"IV:{number}": list(range(count)) for number, count in enumerate(counts)}
+        facts = {"map": "court", "flights": "400", "landed": "300", "excused": "0"}
+        quiet = {"quiet": "200", "quiet_decided": "190"}
+        key = {"method": method, "system": "mm", "seed": str(seed)}
+        return {**key, **facts, **quiet, "kinds": json.dumps(flights)}
+
+    rows = [row("garl", seed, [5] * 8) for seed in range(5)]
+    rows += [row("random", seed, [5] * 4) for seed in range(5)]
+    lines = kinds.report(rows).splitlines()
+    titles, ours, theirs = ([cell.strip() for cell in lines[n].split("|")] for n in (0, 2, 3))
+    found = dict(zip(titles, ours, strict=True))
+    assert found["effective kinds"] == "8.0 (8.0 to 8.0)"
+    assert found["times random's"] == "2.00"
+    assert float(found["p (Holm)"]) < 0.05
+    assert found["decided without interference, %"] == "95.0"
+    assert dict(zip(titles, theirs, strict=True))["kinds at equal violations"] == "4.0 of 20"
+    assert 7 < float(found["kinds at equal violations"].split()[0]) < 8
+    alone = kinds.report(rows[:5]).splitlines()[2].split("|")
+    assert alone[titles.index("times random's")].strip() == "nan"
 
 
 def collision(
