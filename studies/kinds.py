@@ -141,14 +141,14 @@ def report(rows: list[Row]) -> str:
             continue
         least = min(sum(counts_of(row)) for name in METHODS for row in of[system, name])
         effective = [hill_number(counts_of(row), 1) for row in own]
-        is_first = method == METHODS[0]
+        is_garl = method == METHODS[0]
         cells = (
             f"{_percent(own, 'landed', 'flights'):.1f}",
             f"{np.mean([100 * sum(counts_of(row)) / int(row['flights']) for row in own]):.1f}",
             f"{np.mean([len(counts_of(row)) for row in own]):.1f}",
             f"{np.mean(effective):.1f} ({min(effective):.1f} to {max(effective):.1f})",
-            f"{_times(own, of[system, METHODS[1]]):.2f}" if is_first else "–",
-            f"{adjusted[system]:.2g}" if is_first else "–",
+            f"{_times(own, of[system, METHODS[1]]):.2f}" if is_garl else "–",
+            f"{adjusted[system]:.2g}" if is_garl else "–",
             f"{np.mean([kinds_in_violations(counts_of(row), least) for row in own]):.1f} "
             f"of {least}",
             f"{_percent(own, 'quiet_decided', 'quiet'):.1f}",

@@ -22,18 +22,17 @@ class FirstViolations:
         self._seen: defaultdict[str, set[str]] = defaultdict(set)
         """The signatures of each search."""
 
-    def advance(self, search: str) -> list[list[LedgerFlight]]:
-        """Return the first violations of each new signature since this was called last.
+    def advance(self, search: str) -> dict[str, list[LedgerFlight]]:
+        """Return, by signature, the first violations of those new since this was called last.
 
         The signatures are in the order in which they are found, their flights in that of the slots.
         """
-        found: list[list[LedgerFlight]] = []
+        found: dict[str, list[LedgerFlight]] = {}
         for generation in self._queries.closed_generations(search, self._latest.get(search, -1)):
             self._latest[search] = generation
-            by_signature: defaultdict[str, list[LedgerFlight]] = defaultdict(list)
+            seen = frozenset(self._seen[search])
             for flight in self._queries.violating(search, generation):
-                by_signature[flight.signature].append(flight)
-            new = [each for each in by_signature if each not in self._seen[search]]
-            self._seen[search].update(new)
-            found += [by_signature[each] for each in new]
+                if flight.signature not in seen:
+                    found.setdefault(flight.signature, []).append(flight)
+            self._seen[search].update(found)
         return found

@@ -33,9 +33,9 @@ class EarlyReflights:
             # Saved cases may be many, and nothing in them is new.
             if not next(iter(wanted.values())).is_searched:
                 continue
-            for first, *_ in self._violations.advance(search):
+            for signature, (first, *_) in self._violations.advance(search).items():
                 target = wanted.get(first.id.slot)
-                if target is not None and self._is_reported(target, first.signature):
+                if target is not None and self._is_reported(target, signature):
                     count = 1 if target.deterministic else REFLIGHTS
                     self._run.request_reflights(target, count)
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from pytest_garl.execution.first_violations import FirstViolations
@@ -22,9 +22,8 @@ the same new signatures."""
 class NewSignatures:
     """Makes a request of each signature that no saved case expects, generation by generation.
 
-    A request holds the violations of the generation in which its signature occurs first, from the
-    lowest slot on, and none of later generations.  So it is known as soon as this generation and
-    all before it are flown, and it is the same for any number of workers and in a resumed run.
+    A request holds the first violations of its signature, so it is the same for any number of
+    workers and in a resumed run.
     """
 
     def __init__(self, ledger: Ledger, corpus: Corpus, budget: int) -> None:
@@ -43,14 +42,14 @@ class NewSignatures:
         return found
 
     def _requests(
-        self, search: str, new: Sequence[Sequence[LedgerFlight]], job: FlightJob
+        self, search: str, new: Mapping[str, Sequence[LedgerFlight]], job: FlightJob
     ) -> list[CaseRequest]:
         """Return the requests of the new signatures that no saved case expects."""
         expected = expected_signatures(self._ledger, self._corpus, search, job)
         return [
-            request_of(search, flights[0].signature, flights, job, self._budget)
-            for flights in new
-            if flights[0].signature not in expected
+            request_of(search, signature, flights, job, self._budget)
+            for signature, flights in new.items()
+            if signature not in expected
         ]
 
 
