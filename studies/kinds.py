@@ -13,7 +13,7 @@ import itertools
 import json
 import os
 from collections import defaultdict
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from multiprocessing import get_context
 from pathlib import Path
@@ -154,7 +154,19 @@ def report(rows: list[Row]) -> str:
             f"{_percent(own, 'quiet_decided', 'quiet'):.1f}",
         )
         lines.append(f"| {system} | {method} | {len(own)} | {' | '.join(cells)} |")
-    return "\n".join(lines)
+    return "\n".join([*lines, "", *(_only_random(system, of) for system in systems)])
+
+
+def _only_random(system: str, of: Mapping[tuple[str, str], Sequence[Row]]) -> str:
+    """Return how many kinds all searches of each method found, and how many only random's."""
+    garl, chance = (
+        {kind for row in of[system, method] for kind in json.loads(row["kinds"])}
+        for method in METHODS
+    )
+    return (
+        f"{system}: {len(garl)} kinds in all searches of garl, {len(chance)} in those of random, "
+        f"{len(chance - garl)} in those of random alone."
+    )
 
 
 def _times(rows: Sequence[Row], others: Sequence[Row]) -> float:

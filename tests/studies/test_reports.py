@@ -76,6 +76,9 @@ def test_kinds_of_two_methods_are_compared_at_equal_flights_and_violations() -> 
     assert found["decided without interference, %"] == "95.0"
     assert dict(zip(titles, theirs, strict=True))["kinds at equal violations"] == "4.0 of 20"
     assert 7 < float(found["kinds at equal violations"].split()[0]) < 8
+    assert lines[-1] == (
+        "mm: 8 kinds in all searches of garl, 4 in those of random, 0 in those of random alone."
+    )
     alone = kinds.report(rows[:5]).splitlines()[2].split("|")
     assert alone[titles.index("times random's")].strip() == "nan"
 
