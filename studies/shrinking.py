@@ -26,7 +26,7 @@ from pytest_garl import cpu_dispatch
 from pytest_garl.adversary.catalogue import DEFAULT_POLICY, policy_spec
 from pytest_garl.adversary.domain_policy import policy_in
 from pytest_garl.execution.flight import fly_job
-from pytest_garl.execution.flight_id import CompletedFlight, FlightId, Slot
+from pytest_garl.execution.flight_id import CompletedFlight, FlightId, Slot, search_key
 from pytest_garl.execution.job import FlightJob
 from pytest_garl.execution.reference import Reference
 from pytest_garl.regressions.case_file import dump_case
@@ -108,12 +108,12 @@ class Flights:
     """Flies in this process, each flight into a file of its own."""
 
     def __init__(self, name: str) -> None:
-        self._name, self._count = name, 0
+        self._search, self._count = search_key(name), 0
 
     def __call__(self, job: FlightJob, scenario: Scenario) -> CompletedFlight:
         """Fly a scenario."""
         flight = FlightId(
-            search=self._name, map=job.map, slot=Slot(generation=0, index=self._count)
+            search=self._search, map=job.map, slot=Slot(generation=0, index=self._count)
         )
         self._count += 1
         job.record(flight).parent.mkdir(parents=True, exist_ok=True)
