@@ -54,6 +54,7 @@ SYSTEMS = {
     "two-markers": "studies.faults.families.identity:TwoMarkers",
     "fast-touchdown": "studies.faults.families.flight_control:FastTouchdown",
     "tight-gate": "studies.faults.families.decision:TightGate",
+    "low-transit": "studies.faults.families.avoidance:LowTransit",
 }
 MAPS = ("court", "lawn")
 FOLDER = Path(".garl/shrinking")
@@ -161,14 +162,19 @@ def file_of(key: SearchKey) -> Path:
 
 
 def violations(count: int) -> list[Violation]:
-    """Return violations of all searches, one of each kind, then a second of each, and so on."""
+    """Return violations of all searches, with as many signatures as possible.
+
+    First comes one of each signature, then one of each that a system has on a map, then a second.
+    """
     kinds: defaultdict[tuple[str, str, str], list[Violation]] = defaultdict(list)
     for key in itertools.product(SYSTEMS, MAPS):
         for line in file_of(key).read_text().splitlines():
             each = Violation.parse(line)
             kinds[each.system, each.map, each.signature].append(each)
     turns = itertools.zip_longest(*kinds.values())
-    return [each for turn in turns for each in turn if each is not None][:count]
+    ordered = [each for turn in turns for each in turn if each is not None]
+    first = {each.signature: each for each in reversed(ordered)}
+    return sorted(ordered, key=lambda each: first[each.signature] is not each)[:count]
 
 
 def investigate(violation: Violation, budget: int) -> dict[str, Any]:

@@ -1,11 +1,13 @@
 """Tests of the study of shrinking."""
 
+import itertools
+import json
 from pathlib import Path
 
 import pytest
 
 from studies import shrinking
-from studies.shrinking import Flights, job_of
+from studies.shrinking import MAPS, SYSTEMS, Flights, file_of, job_of, violations
 from tests.execution.flying import scenario
 from tests.support.results import flight_result
 
@@ -21,3 +23,32 @@ def test_flights_of_two_investigations_have_records_of_their_own(
         for _ in range(2)
     ]
     assert len(set(flown)) == 4
+
+
+def test_one_violation_of_each_signature_comes_first(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(shrinking, "FOLDER", tmp_path)
+    found = {("opencv", "court"): ["I", "I", "II"], ("low-transit", "lawn"): ["I", "III"]}
+    for key in itertools.product(SYSTEMS, MAPS):
+        lines = [
+            json.dumps(
+                {
+                    "system": key[0],
+                    "map": key[1],
+                    "slot": f"s{index}",
+                    "signature": signature,
+                    "scenario": "",
+                }
+            )
+            for index, signature in enumerate(found.get(key, ()))
+        ]
+        file_of(key).write_text("\n".join(lines))
+    chosen = violations(4)
+    assert [(each.system, each.signature) for each in chosen] == [
+        ("opencv", "I"),
+        ("opencv", "II"),
+        ("low-transit", "III"),
+        ("low-transit", "I"),
+    ]
+    assert [each.slot for each in violations(60)][4:] == ["s1"]
