@@ -96,7 +96,7 @@ def main() -> None:
                 }
     ordered = [lines[key] for key in rows if key in lines]
     with COUNTS_FILE.open("w", newline="") as file:
-        writer = csv.DictWriter(file, list(ordered[0]))
+        writer = csv.DictWriter(file, list(ordered[0]), lineterminator="\n")
         writer.writeheader()
         writer.writerows(ordered)
     print(f"{len(ordered)} of {len(rows)} searches are counted in {COUNTS_FILE}")

@@ -41,7 +41,7 @@ class ResultTable:
         """Add rows at once, so that an interruption loses no finished row, and print them."""
         self._add_columns()
         with self.file.open("a", newline="") as file:
-            writer = csv.DictWriter(file, self.columns)
+            writer = csv.DictWriter(file, self.columns, lineterminator="\n")
             for row in rows:
                 writer.writerow(row)
                 print(", ".join(f"{name} {value}" for name, value in row.items()), flush=True)
@@ -53,7 +53,7 @@ class ResultTable:
             return
         rows = self.rows()
         with self.file.open("w", newline="") as file:
-            writer = csv.DictWriter(file, self.columns)
+            writer = csv.DictWriter(file, self.columns, lineterminator="\n")
             writer.writeheader()
             writer.writerows(rows)
 

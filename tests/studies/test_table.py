@@ -27,7 +27,7 @@ def test_a_table_without_a_file_is_empty(table: ResultTable) -> None:
 def test_fly_missing_appends_a_row_for_each_key_without_one(table: ResultTable) -> None:
     table.append([{"number": 2, "square": "kept"}])
     table.fly_missing([("2",), ("3",)], squared, workers=1)
-    assert table.file.read_text() == "number,square\n2,kept\n3,9\n"
+    assert table.file.read_bytes() == b"number,square\n2,kept\n3,9\n"
     assert table.keys() == {("2",), ("3",)}
 
 
