@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 
 import numpy as np
@@ -20,7 +21,11 @@ FAMILY_OF = {each.name: each.family for each in FAULTS}
 
 
 def report(rows: Sequence[Row]) -> str:
-    """Return the tables in Markdown; the placebo is no fault, and has a line of its own."""
+    """Return the tables in Markdown; the placebo is no fault, and has a line of its own.
+
+    A seed of which a method has flown fewer faults than of another one is left out.
+    """
+    rows, begun = whole_seeds(rows)
     flown: Found = {
         (row["method"], row["fault"], row["seed"]): int(row["found_at"] or 0) or None
         for row in rows
@@ -30,7 +35,18 @@ def report(rows: Sequence[Row]) -> str:
     parts = [_scores(found, methods), _families(found, methods)]
     parts += [_ratios(found, method) for method in methods if method != RIVAL]
     parts += [_difficulty(found), _misses(found, methods, rows), _placebo(flown, methods)]
+    if begun:
+        parts.append(f"Not counted, because not all faults are flown: {', '.join(begun)}.")
     return "\n\n".join(part for part in parts if part)
+
+
+def whole_seeds(rows: Sequence[Row]) -> tuple[list[Row], list[str]]:
+    """Return the rows of seeds of which a method has flown all faults, and names of the others."""
+    flown = Counter((row["method"], row["seed"]) for row in rows)
+    whole = {method: max(flown[key] for key in flown if key[0] == method) for method, _ in flown}
+    begun = {key for key, count in flown.items() if count < whole[key[0]]}
+    names = [f"seed {seed} of {method}" for method, seed in sorted(begun)]
+    return [row for row in rows if (row["method"], row["seed"]) not in begun], names
 
 
 def score(found: Found, method: str, within: int) -> list[float]:

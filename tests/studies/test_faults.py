@@ -189,6 +189,13 @@ def test_the_placebo_counts_in_no_score() -> None:
     assert "chance found the placebo: garl in 1 of 2, random in 0 of 2." in text
 
 
+def test_a_seed_that_is_not_wholly_flown_does_not_count() -> None:
+    text = report(rows("garl", {"gate": [25, 25], "mean": [None]}))
+    assert "| garl | 2 | 1 | 50 % | 50 % | 50 % |" in text
+    assert text.endswith("Not counted, because not all faults are flown: seed 1 of garl.")
+    assert "Not counted" not in report(rows("garl", {"gate": [25, 25]}))
+
+
 def test_equal_methods_have_a_ratio_of_one() -> None:
     flights = np.array([3.0, 100.0, 40.0])
     assert ratio_interval(flights, flights) == (1.0, 1.0, 1.0)
