@@ -15,7 +15,7 @@ import os
 from collections import Counter, defaultdict
 from collections.abc import Callable, Iterable
 from concurrent.futures import ProcessPoolExecutor, as_completed
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from multiprocessing import get_context
 from pathlib import Path
 from typing import Any, Self
@@ -96,6 +96,10 @@ class Violation:
         """Return the violation in a line of a search's file."""
         return cls(**json.loads(line))
 
+    def line(self) -> str:
+        """Return its line in a search's file."""
+        return f"{json.dumps(asdict(self))}\n"
+
 
 def job_of(system: str, map_name: str, folder: Path) -> FlightJob:
     """Return the job of all flights of a system on a map in `field`."""
@@ -139,21 +143,16 @@ def search(key: SearchKey) -> None:
         flown = [(each, fly(job, each)) for each in scenarios]
         for index, (scenario, flight) in enumerate(flown):
             if flight.signature:
-                text = dump_scenario(scenario)
-                slot = f"g{generation:02d}-s{index:02d}"
-                lines.append(
-                    json.dumps(
-                        {
-                            "system": system,
-                            "map": map_name,
-                            "slot": slot,
-                            "signature": flight.signature,
-                            "scenario": text,
-                        }
-                    )
+                violation = Violation(
+                    system=system,
+                    map=map_name,
+                    slot=f"g{generation:02d}-s{index:02d}",
+                    signature=flight.signature,
+                    scenario=dump_scenario(scenario),
                 )
+                lines.append(violation.line())
         method.tell([FlownScenario(scenario=each, result=got.result) for each, got in flown])
-    file_of(key).write_text("".join(f"{line}\n" for line in lines))
+    file_of(key).write_text("".join(lines))
 
 
 def file_of(key: SearchKey) -> Path:

@@ -1,13 +1,12 @@
 """Tests of the study of shrinking."""
 
 import itertools
-import json
 from pathlib import Path
 
 import pytest
 
 from studies import shrinking
-from studies.shrinking import MAPS, SYSTEMS, Flights, file_of, job_of, violations
+from studies.shrinking import MAPS, SYSTEMS, Flights, Violation, file_of, job_of, violations
 from tests.execution.flying import scenario
 from tests.support.results import flight_result
 
@@ -32,18 +31,12 @@ def test_one_violation_of_each_signature_comes_first(
     found = {("opencv", "court"): ["I", "I", "II"], ("low-transit", "lawn"): ["I", "III"]}
     for key in itertools.product(SYSTEMS, MAPS):
         lines = [
-            json.dumps(
-                {
-                    "system": key[0],
-                    "map": key[1],
-                    "slot": f"s{index}",
-                    "signature": signature,
-                    "scenario": "",
-                }
-            )
+            Violation(
+                system=key[0], map=key[1], slot=f"s{index}", signature=signature, scenario=""
+            ).line()
             for index, signature in enumerate(found.get(key, ()))
         ]
-        file_of(key).write_text("\n".join(lines))
+        file_of(key).write_text("".join(lines))
     chosen = violations(4)
     assert [(each.system, each.signature) for each in chosen] == [
         ("opencv", "I"),
