@@ -1,11 +1,13 @@
 """End a session that cannot go on: without its ledger or NPC policy no other item can be flown.
 
 A worker of pytest-xdist cannot end the session.  It tells the controller by a user property.
+A session that somebody interrupts ends with its summary.
 """
 
 from __future__ import annotations
 
-from typing import NoReturn
+from types import TracebackType
+from typing import NoReturn, cast
 
 import pytest
 
@@ -32,3 +34,27 @@ def abort_if_reported(report: pytest.TestReport) -> None:
     for key, value in report.user_properties:
         if key == FATAL:
             raise pytest.exit.Exception(f"garl: {value}", pytest.ExitCode.INTERNAL_ERROR)
+
+
+def drop_entries_without_line(error: BaseException | None) -> None:
+    """Take out of an error's tracebacks what pytest cannot show: entries without a line number.
+
+    Python 3.11 compiles some instructions, such as the jump back to the start of a loop, without a
+    line.  If Ctrl-C interrupts one of them, ``tb_lineno`` is None, and pytest 9.2 ends in a
+    TypeError instead of its summary.
+    """
+    seen: set[int] = set()
+    while error is not None and id(error) not in seen:
+        seen.add(id(error))
+        entry = error.__traceback__
+        while entry is not None and not _has_line(entry):
+            error.__traceback__ = entry = entry.tb_next
+        while entry is not None:
+            while entry.tb_next is not None and not _has_line(entry.tb_next):
+                entry.tb_next = entry.tb_next.tb_next
+            entry = entry.tb_next
+        error = error.__context__ if error.__cause__ is None else error.__cause__
+
+
+def _has_line(entry: TracebackType) -> bool:
+    return cast("int | None", entry.tb_lineno) is not None

@@ -10,7 +10,7 @@ import pytest
 
 from pytest_garl.errors import GarlError
 from pytest_garl.plugin import hookspecs
-from pytest_garl.plugin.abort import abort_if_reported, fail_report
+from pytest_garl.plugin.abort import abort_if_reported, drop_entries_without_line, fail_report
 from pytest_garl.plugin.arguments import add_options, computes, is_enabled
 from pytest_garl.plugin.fixtures import garl_slot, landing, npcs, scenario
 from pytest_garl.plugin.keys import (
@@ -187,6 +187,12 @@ def pytest_runtest_logreport(report: pytest.TestReport) -> None:
     run = worker.config.stash.get(RUN, None) if worker is not None else None
     if run is not None and run.investigations is not None:
         _investigate(run)
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_keyboard_interrupt(excinfo: pytest.ExceptionInfo[BaseException]) -> None:
+    """See that pytest can show where it was interrupted, and then its summary."""
+    drop_entries_without_line(excinfo.value)
 
 
 def _investigate(run: Any) -> None:

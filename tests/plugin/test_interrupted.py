@@ -16,6 +16,33 @@ def pytest_keyboard_interrupt(excinfo):
     raise KeyboardInterrupt
 """
 """A second Ctrl-C while pytest tells of the first one."""
+WITHOUT_LINE = """
+import dis, sys, types
+
+def loop():
+    for each in (1, 2):
+        if each == 1:
+            if sys:
+                each += 1
+        elif each == 2:
+            each += 1
+    return sys._getframe()
+
+def interrupt():
+    frame = loop()
+    jump = next(i.offset for i in dis.get_instructions(loop) if i.positions.lineno is None)
+    last = types.TracebackType(None, frame, jump, -1)
+    assert last.tb_lineno is None
+    return KeyboardInterrupt().with_traceback(last)
+
+def pytest_runtest_setup(item):
+    if item.name.endswith("g00-s01]"):
+        try:
+            raise interrupt()
+        finally:
+            raise interrupt()
+"""
+"""Two interrupts on a jump back to the start of a loop, to which Python 3.11 gives no line."""
 
 
 def cases(folder: Path) -> dict[str, bytes]:
@@ -81,6 +108,16 @@ def test_ctrl_c_saves_nothing_of_half_a_search(pytester: pytest.Pytester, confte
     resumed = run(pytester, *BUDGET, "--garl-shrink=12", "--garl-resume")
     resumed.stdout.fnmatch_lines(["*confirming and shrinking*"])
     assert cases(pytester.path)
+
+
+def test_ctrl_c_on_an_instruction_without_line_still_ends_with_the_summary(
+    pytester: pytest.Pytester,
+) -> None:
+    project(pytester, "Good", "['lawn']")
+    pytester.makeconftest(CONFTEST + WITHOUT_LINE)
+    result = run(pytester, "--garl-budget=8", "--full-trace")
+    assert result.ret == pytest.ExitCode.INTERRUPTED
+    result.stdout.fnmatch_lines(["*garl: violations*", "*! KeyboardInterrupt !*", "*1 failed in*"])
 
 
 @pytest.mark.parametrize("parallel", [(), pytest.param(("-n2",), marks=pytest.mark.long)])

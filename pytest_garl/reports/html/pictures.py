@@ -44,6 +44,8 @@ class Still:
     label: str
     picture: str
     facts: tuple[str, ...]
+    far: bool = False
+    """Whether it is the last of its flight that shows the surroundings."""
 
 
 def stills_of(
@@ -66,7 +68,13 @@ def stills_of(
         picture = np.asarray(cv2.resize(drawn, STILL_PX, interpolation=cv2.INTER_AREA), np.uint8)
         uri = jpeg_uri(picture, STILL_QUALITY)
         found.append(
-            Still(time_s=moment.time_s, label=moment.label, picture=uri, facts=tuple(_facts(step)))
+            Still(
+                time_s=moment.time_s,
+                label=moment.label,
+                picture=uri,
+                facts=tuple(_facts(step)),
+                far=moment is far,
+            )
         )
         if moment is far:
             least = cv2.resize(drawn, THUMBNAIL_PX, interpolation=cv2.INTER_AREA)

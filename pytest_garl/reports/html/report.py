@@ -76,9 +76,10 @@ def write_html_report(
             page = kind_page(plan, flight, known)
             pages.append((plan, page))
             _write(folder / page_address(page.name), render_kind(page))
-            if flight.stills:
-                picture = picture_bytes(flight.stills[-1].picture)
-                (folder / still_address(page.name)).write_bytes(picture)
+            for still in flight.stills:
+                if still.far:
+                    picture = picture_bytes(still.picture)
+                    (folder / still_address(page.name)).write_bytes(picture)
             if as_found is not None:
                 other = found_page(plan, as_found)
                 _write(folder / page_address(other.name), render_kind(other))

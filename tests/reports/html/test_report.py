@@ -1,5 +1,7 @@
 from __future__ import annotations
 
+import base64
+import dataclasses
 import json
 import re
 import shutil
@@ -15,6 +17,7 @@ from pytest_garl.errors import LedgerError
 from pytest_garl.execution.reference import Reference
 from pytest_garl.regressions.corpus import Corpus
 from pytest_garl.reports.html.index_markdown import index_parts
+from pytest_garl.reports.html.moments import last_far, moments_of
 from pytest_garl.reports.html.report import WrittenReport, write_html_report
 from pytest_garl.simulation.flight import Crash
 from tests.reports.html.test_rendering import HOSTILE, Elements
@@ -252,6 +255,25 @@ def broken_ledgers(run: Path) -> Iterator[tuple[Path, str]]:
     with sqlite3.connect(damaged) as ledger:
         ledger.execute("UPDATE slot SET result = '{' WHERE slot = 1")
     yield damaged, "is damaged or no ledger of this version"
+
+
+def test_the_picture_of_a_build_is_the_last_that_shows_the_surroundings(
+    tmp_path: Path, video: Video
+) -> None:
+    uav = video.flight.uav
+    sinks = uav.position_m.copy()
+    sinks[uav.time_s > 2.5, 2] = 0.2
+    flight = dataclasses.replace(video.flight, uav=dataclasses.replace(uav, position_m=sinks))
+    write_ledger(tmp_path, [Flown(result=lost(), flight=flight)])
+    (kind,) = write(tmp_path).page.kinds
+    moments = moments_of(flight)
+    far = last_far(flight, moments)
+    assert far is not None
+    assert far != moments[-1]
+    page = kind_page(tmp_path)
+    shown = re.findall(r'class="moment".*?src="data:image/jpeg;base64,([^"]+)"', page, re.DOTALL)
+    expected = base64.b64decode(shown[moments.index(far)])
+    assert (tmp_path / "report" / kind.still).read_bytes() == expected
 
 
 def test_a_ledger_that_cannot_be_read_is_one_message_and_no_report(run: Path) -> None:
