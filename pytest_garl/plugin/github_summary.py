@@ -5,19 +5,20 @@ from __future__ import annotations
 import os
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import pytest
 
 from pytest_garl.plugin.keys import SEVERITY, SIGNATURE, SLOT
 from pytest_garl.plugin.run import Run
 from pytest_garl.plugin.suggested_commands import repeat_kind_command
-from pytest_garl.reports.html.index_markdown import index_parts, page_link
-from pytest_garl.reports.html.report import WrittenReport
-from pytest_garl.reports.html.run_page import KindRow
 from pytest_garl.reports.markdown import code, escaped, table
 from pytest_garl.reports.search_summary import WHY_NO_LANDING, SearchSummary, ViolationKind
 from pytest_garl.reports.shares_text import PAPER_DEFINITION, kinds_lines, percent
+
+if TYPE_CHECKING:
+    from pytest_garl.reports.html.report import WrittenReport
+    from pytest_garl.reports.html.run_page import KindRow
 
 VARIABLE = "GITHUB_STEP_SUMMARY"
 """GitHub names in this variable the file whose text it shows on the page of the step."""
@@ -70,7 +71,7 @@ def write_step_summary(
         f"{_where(search)}: {escaped(line)}" for search in searches for line in kinds_lines(search)
     ]
     parts.append(_kinds_table(rows) if rows else none)
-    parts += index_parts(report.page, report.index.parent, url) if report else ()
+    parts += _report_parts(report, url) if report else ()
     text = "\n\n".join(parts)
     try:
         with Path(path).open("a", encoding="utf-8") as file:
@@ -85,8 +86,18 @@ def _kinds_table(rows: Sequence[Row]) -> str:
     return table(COLUMNS[:columns], [row[:columns] for row in rows])
 
 
+def _report_parts(report: WrittenReport, url: str) -> list[str]:
+    from pytest_garl.reports.html.index_markdown import index_parts
+
+    return index_parts(report.page, report.index.parent, url)
+
+
 def _link(kind: KindRow | None, report: WrittenReport | None, url: str) -> str:
-    return page_link(kind, report.index.parent, url) if kind and report else ""
+    if kind is None or report is None:
+        return ""
+    from pytest_garl.reports.html.index_markdown import page_link
+
+    return page_link(kind, report.index.parent, url)
 
 
 def _where(search: SearchSummary) -> str:

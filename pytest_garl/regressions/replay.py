@@ -23,7 +23,6 @@ from pytest_garl.regressions.case_test_run import CaseTestResult, run_case_tests
 from pytest_garl.scenarios.maps.map import Map, load_map
 from pytest_garl.simulation.flight import Flight
 from pytest_garl.simulation.flight_file import load
-from pytest_garl.simulation.fly import fly
 from pytest_garl.verdicts.judge import judge
 
 ReplayResult = Literal["FIXED", "FAILED", "STALE", "UNDECIDED"]
@@ -139,6 +138,8 @@ def _by_verdict(case: Case, folder: Path, map: Map, judged_by: str, live: bool) 
     system = system_of(case, folder)
     cpu_dispatch.check()
     npcs = policy_spec(case.policy) if live else case.behaviour.policy
+    from pytest_garl.simulation.fly import fly
+
     flight = fly(case.scenario, system, npcs, map=map, time_limit_s=time_limit_s(case.limits))
     verdict = judge(flight, case.limits)
     sources = SourceHashes(

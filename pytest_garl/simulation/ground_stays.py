@@ -5,11 +5,14 @@ from __future__ import annotations
 import dataclasses
 import math
 from collections.abc import Callable
+from typing import TYPE_CHECKING
 
 from pytest_garl.simulation.flight import Outcome, Touchdown
 from pytest_garl.simulation.land_detector import LandDetector
 from pytest_garl.simulation.physics.vehicle import Vector, VehicleModel
-from pytest_garl.simulation.recorder import Recorder
+
+if TYPE_CHECKING:
+    from pytest_garl.simulation.recorder import Recorder
 
 BOUNCE_S = 0.25
 """A shorter loss of contact does not end a stay.  A UAV that rebounds at 1 m/s, half the speed of

@@ -45,7 +45,7 @@ def index_parts(page: RunPage, folder: Path, url: str) -> list[str]:
 
 
 def _pictures(page: RunPage, url: str) -> list[str]:
-    """Return what the camera saw last in a flight of each kind, the most frequent first."""
+    """Return the last picture of each kind that shows the surroundings, frequent kinds first."""
     shown = [kind for kind in page.kinds if kind.still]
     parts = [
         f'<a href="{url}/{kind.address}"><img src="{url}/{kind.still}" width="{PICTURE_WIDTH}" '
