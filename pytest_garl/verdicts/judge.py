@@ -16,7 +16,7 @@ from pytest_garl.verdicts.excuses import excuse
 from pytest_garl.verdicts.findings import findings
 from pytest_garl.verdicts.margins import margins
 from pytest_garl.verdicts.mechanism import NO_LANDING, collision_signature, mechanism_of
-from pytest_garl.verdicts.touchdowns import gave_up_s, touchdown_off_marker
+from pytest_garl.verdicts.touchdowns import ON_GROUND_M, gave_up_s, touchdown_off_marker
 from pytest_garl.verdicts.verdict import (
     PAPER_LIMITS,
     Excuse,
@@ -52,7 +52,7 @@ def judge(flight: Flight, limits: Limits) -> Verdict:
         signature=mechanism.signature,
         paper_violation=far if came_down else True,
         margins=margins(flight, limits, violates_time=mechanism.primary in ("time", "abort")),
-        story=f"{mechanism.sentence} {_where(flight)}".strip(),
+        story=f"{mechanism.sentence}{_standing(flight)} {_where(flight)}".strip(),
         completed=flight.outcome == "landed" and mechanism.primary != "distance",
         excuse=why,
         excuse_text=why_text,
@@ -109,6 +109,16 @@ def _excuse(flight: Flight, limits: Limits) -> tuple[Excuse, str]:
     if flight.outcome not in NO_LANDING or touchdown_off_marker(flight, limits):
         return "", ""
     return excuse(flight, gave_up_s(flight))
+
+
+def _standing(flight: Flight) -> str:
+    """Return a sentence about a UAV that stands on the ground at the end and has not landed."""
+    touchdown, height_m = flight.touchdown, up_m(float(flight.uav.position_m[-1, 2]))
+    if flight.outcome != "not_landed" or not touchdown or touchdown.stopped_s is not None:
+        return ""
+    if height_m > ON_GROUND_M:
+        return ""
+    return f" It stood on the ground from {touchdown.time_s:.1f} s on; its motors never stopped."
 
 
 def _where(flight: Flight) -> str:

@@ -8,6 +8,7 @@ import pytest
 from pytest_garl.simulation.flight import Flight
 from pytest_garl.verdicts.judge import closest_call, judge, off_marker_m, why_undecided
 from pytest_garl.verdicts.verdict import Limits
+from pytest_garl.verdicts.wording import headline
 from tests.verdicts.flights import (
     CLEAR,
     CRASH,
@@ -97,6 +98,19 @@ def test_the_first_event_decides_the_verdict(subject: Flight, primary: Any, sign
     assert verdict.primary == primary
     assert verdict.signature == signature
     assert verdict.story
+
+
+@pytest.mark.parametrize(
+    ("height_m", "stopped_s", "stands"), [(0.2, None, True), (0.2, 29.5, False), (9.0, None, False)]
+)
+def test_a_story_says_that_the_uav_stands_with_running_motors(
+    height_m: float, stopped_s: float | None, stands: bool
+) -> None:
+    last = touchdown(0.1, on="marker", stopped_s=stopped_s)
+    story = judge(flight("not_landed", (0.1, 0.0, height_m), touchdown=last), Limits()).story
+    told = "It stood on the ground from 27.0 s on; its motors never stopped. At 30.0 s the UAV"
+    assert (told in story) == stands
+    assert headline(story).startswith("not landed, ")
 
 
 def test_the_paper_counts_no_landing_but_no_late_landing() -> None:
