@@ -6,6 +6,7 @@ A session that somebody interrupts ends with its summary.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from types import TracebackType
 from typing import NoReturn, cast
 
@@ -46,14 +47,19 @@ def drop_entries_without_line(error: BaseException | None) -> None:
     seen: set[int] = set()
     while error is not None and id(error) not in seen:
         seen.add(id(error))
-        entry = error.__traceback__
-        while entry is not None and not _has_line(entry):
-            error.__traceback__ = entry = entry.tb_next
-        while entry is not None:
-            while entry.tb_next is not None and not _has_line(entry.tb_next):
-                entry.tb_next = entry.tb_next.tb_next
-            entry = entry.tb_next
+        kept: TracebackType | None = None
+        for entry in reversed([each for each in _entries(error) if _has_line(each)]):
+            entry.tb_next = kept
+            kept = entry
+        error.__traceback__ = kept
         error = error.__context__ if error.__cause__ is None else error.__cause__
+
+
+def _entries(error: BaseException) -> Iterator[TracebackType]:
+    entry = error.__traceback__
+    while entry is not None:
+        yield entry
+        entry = entry.tb_next
 
 
 def _has_line(entry: TracebackType) -> bool:

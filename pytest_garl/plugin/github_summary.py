@@ -12,6 +12,7 @@ import pytest
 from pytest_garl.plugin.keys import SEVERITY, SIGNATURE, SLOT
 from pytest_garl.plugin.run import Run
 from pytest_garl.plugin.suggested_commands import repeat_kind_command
+from pytest_garl.reports.html.index_markdown import index_parts, page_link
 from pytest_garl.reports.markdown import code, escaped, table
 from pytest_garl.reports.search_summary import WHY_NO_LANDING, SearchSummary, ViolationKind
 from pytest_garl.reports.shares_text import PAPER_DEFINITION, kinds_lines, percent
@@ -71,7 +72,7 @@ def write_step_summary(
         f"{_where(search)}: {escaped(line)}" for search in searches for line in kinds_lines(search)
     ]
     parts.append(_kinds_table(rows) if rows else none)
-    parts += _report_parts(report, url) if report else ()
+    parts += index_parts(report.page, report.index.parent, url) if report else ()
     text = "\n\n".join(parts)
     try:
         with Path(path).open("a", encoding="utf-8") as file:
@@ -86,18 +87,8 @@ def _kinds_table(rows: Sequence[Row]) -> str:
     return table(COLUMNS[:columns], [row[:columns] for row in rows])
 
 
-def _report_parts(report: WrittenReport, url: str) -> list[str]:
-    from pytest_garl.reports.html.index_markdown import index_parts
-
-    return index_parts(report.page, report.index.parent, url)
-
-
 def _link(kind: KindRow | None, report: WrittenReport | None, url: str) -> str:
-    if kind is None or report is None:
-        return ""
-    from pytest_garl.reports.html.index_markdown import page_link
-
-    return page_link(kind, report.index.parent, url)
+    return page_link(kind, report.index.parent, url) if kind and report else ""
 
 
 def _where(search: SearchSummary) -> str:

@@ -189,18 +189,18 @@ def pytest_runtest_logreport(report: pytest.TestReport) -> None:
         _investigate(run)
 
 
-@pytest.hookimpl(tryfirst=True)
-def pytest_keyboard_interrupt(excinfo: pytest.ExceptionInfo[BaseException]) -> None:
-    """See that pytest can show where it was interrupted, and then its summary."""
-    drop_entries_without_line(excinfo.value)
-
-
 def _investigate(run: Any) -> None:
     """Go on with investigations in xdist's controller, which waits for no flight."""
     try:
         run.investigations.advance()
     except GarlError as error:
         run.save_problem = str(error)
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_keyboard_interrupt(excinfo: pytest.ExceptionInfo[BaseException]) -> None:
+    """See that pytest can show where it was interrupted, and then its summary."""
+    drop_entries_without_line(excinfo.value)
 
 
 def pytest_report_header(config: pytest.Config) -> str | None:

@@ -135,11 +135,11 @@ def _recorded_flight(folder: Path, sha256: str) -> Flight | None:
 
 
 def _by_verdict(case: Case, folder: Path, map: Map, judged_by: str, live: bool) -> Replay:
+    from pytest_garl.simulation.fly import fly
+
     system = system_of(case, folder)
     cpu_dispatch.check()
     npcs = policy_spec(case.policy) if live else case.behaviour.policy
-    from pytest_garl.simulation.fly import fly
-
     flight = fly(case.scenario, system, npcs, map=map, time_limit_s=time_limit_s(case.limits))
     verdict = judge(flight, case.limits)
     sources = SourceHashes(

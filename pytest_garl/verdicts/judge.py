@@ -52,7 +52,7 @@ def judge(flight: Flight, limits: Limits) -> Verdict:
         signature=mechanism.signature,
         paper_violation=far if came_down else True,
         margins=margins(flight, limits, violates_time=mechanism.primary in ("time", "abort")),
-        story=f"{mechanism.sentence}{_standing(flight)} {_where(flight)}".strip(),
+        story=" ".join(filter(None, (mechanism.sentence, _standing(flight), _where(flight)))),
         completed=flight.outcome == "landed" and mechanism.primary != "distance",
         excuse=why,
         excuse_text=why_text,
@@ -113,12 +113,12 @@ def _excuse(flight: Flight, limits: Limits) -> tuple[Excuse, str]:
 
 def _standing(flight: Flight) -> str:
     """Return a sentence about a UAV that stands on the ground at the end and has not landed."""
-    touchdown, height_m = flight.touchdown, up_m(float(flight.uav.position_m[-1, 2]))
-    if flight.outcome != "not_landed" or not touchdown or touchdown.stopped_s is not None:
+    touchdown = flight.touchdown
+    if flight.outcome != "not_landed" or touchdown is None or touchdown.stopped_s is not None:
         return ""
-    if height_m > ON_GROUND_M:
+    if up_m(float(flight.uav.position_m[-1, 2])) > ON_GROUND_M:
         return ""
-    return f" It stood on the ground from {touchdown.time_s:.1f} s on; its motors never stopped."
+    return f"It stood on the ground from {touchdown.time_s:.1f} s on; its motors never stopped."
 
 
 def _where(flight: Flight) -> str:

@@ -137,6 +137,21 @@ def test_importlib_mode_reaches_the_workers(pytester: pytest.Pytester) -> None:
     result.stdout.fnmatch_lines(["*8 flown*"])
 
 
+def test_a_search_leaves_the_camera_to_its_workers(pytester: pytest.Pytester) -> None:
+    project(pytester, "Good", "['lawn']")
+    code = (
+        "import sys, pytest\n"
+        "pytest.main(['-q', '-p', 'no:cacheprovider', '--garl-budget=4', '--garl-shrink=0', "
+        "'--garl-workers=1'])\n"
+        "print('HEAVY', sorted({'cv2', 'jinja2'} & set(sys.modules)))\n"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, check=True, cwd=pytester.path
+    )
+    assert "4 flown" in done.stdout
+    assert "HEAVY []" in done.stdout
+
+
 def test_a_run_without_landing_tests_imports_nothing_heavy(pytester: pytest.Pytester) -> None:
     pytester.makepyfile(test_plain="def test_plain(): pass")
     code = (

@@ -8,11 +8,14 @@ from __future__ import annotations
 
 from html import escape
 from pathlib import Path
+from typing import TYPE_CHECKING
 
-from pytest_garl.reports.html.kind_page import Fact
 from pytest_garl.reports.html.naming import INDEX
-from pytest_garl.reports.html.run_page import KindRow, RunPage
 from pytest_garl.reports.markdown import code, escaped, table
+
+if TYPE_CHECKING:
+    from pytest_garl.reports.html.kind_page import Fact
+    from pytest_garl.reports.html.run_page import KindRow, RunPage
 
 PICTURE_WIDTH = 320
 MOST_PICTURES = 24

@@ -76,10 +76,8 @@ def write_html_report(
             page = kind_page(plan, flight, known)
             pages.append((plan, page))
             _write(folder / page_address(page.name), render_kind(page))
-            for still in flight.stills:
-                if still.far:
-                    picture = picture_bytes(still.picture)
-                    (folder / still_address(page.name)).write_bytes(picture)
+            for still in (each for each in flight.stills if each.far):
+                (folder / still_address(page.name)).write_bytes(picture_bytes(still.picture))
             if as_found is not None:
                 other = found_page(plan, as_found)
                 _write(folder / page_address(other.name), render_kind(other))
