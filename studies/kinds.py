@@ -11,9 +11,10 @@ from __future__ import annotations
 import argparse
 import itertools
 import json
+import math
 import os
-from collections import defaultdict
-from collections.abc import Iterable, Mapping, Sequence
+from collections import Counter, defaultdict
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from multiprocessing import get_context
 from pathlib import Path
@@ -38,7 +39,7 @@ from pytest_garl.search.method import FlownScenario, SearchPlan
 from pytest_garl.simulation.fly import fly
 from pytest_garl.verdicts.kinds import hill_number, kinds_in_violations
 from pytest_garl.verdicts.statistics import mann_whitney
-from pytest_garl.verdicts.verdict import DEFAULT_LIMITS
+from pytest_garl.verdicts.verdict import DEFAULT_LIMITS, cause_of
 from studies.table import Key, ResultTable, Row, run_study
 
 MAPS = ("court", "lawn")
@@ -46,6 +47,8 @@ SYSTEMS = ("opencv", "mm")
 METHODS = ("garl", "random")
 BUDGET, POPULATION = 400, 20
 FIRST_SEED = 1000
+CountsOf = Callable[[Row], list[int]]
+"""What counts the violations of each kind in a row."""
 TABLE = ResultTable(
     file=Path("docs/kinds.csv"),
     columns=(
@@ -120,6 +123,14 @@ def counts_of(row: Row) -> list[int]:
     return [len(flights) for flights in json.loads(row["kinds"]).values()]
 
 
+def causes_of(row: Row) -> list[int]:
+    """Return how many violations a search found of each type and cause, a coarser kind."""
+    counts: Counter[str] = Counter()
+    for kind, flights in json.loads(row["kinds"]).items():
+        counts[cause_of(kind)] += len(flights)
+    return list(counts.values())
+
+
 def report(rows: list[Row]) -> str:
     """Return a Markdown table of means over seeds, and what Mann-Whitney's test says."""
     lines = [
@@ -135,7 +146,7 @@ def report(rows: list[Row]) -> str:
         ]
         for system, method in itertools.product(systems, METHODS)
     }
-    adjusted = dict(zip(systems, _p_values(of, systems), strict=True))
+    adjusted = _p_values(of, systems, counts_of)
     for (system, method), own in of.items():
         if not own:
             continue
@@ -147,14 +158,23 @@ def report(rows: list[Row]) -> str:
             f"{np.mean([100 * sum(counts_of(row)) / int(row['flights']) for row in own]):.1f}",
             f"{np.mean([len(counts_of(row)) for row in own]):.1f}",
             f"{np.mean(effective):.1f} ({min(effective):.1f} to {max(effective):.1f})",
-            f"{_times(own, of[system, METHODS[1]]):.2f}" if is_garl else "–",
+            f"{_times(own, of[system, METHODS[1]], counts_of):.2f}" if is_garl else "–",
             f"{adjusted[system]:.2g}" if is_garl else "–",
             f"{np.mean([kinds_in_violations(counts_of(row), least) for row in own]):.1f} "
             f"of {least}",
             f"{_percent(own, 'quiet_decided', 'quiet'):.1f}",
         )
         lines.append(f"| {system} | {method} | {len(own)} | {' | '.join(cells)} |")
-    return "\n".join([*lines, "", *(_only_random(system, of) for system in systems)])
+    coarser = _p_values(of, systems, causes_of)
+    for system in systems:
+        own, others = (of[system, method] for method in METHODS)
+        lines += ["", _only_random(system, of)]
+        lines += [
+            f"{system} by type and cause alone: {_effective(own, causes_of):.1f} effective ones of "
+            f"garl, {_effective(others, causes_of):.1f} of random, "
+            f"{_times(own, others, causes_of):.2f} times, p = {coarser[system]:.2g} (Holm)."
+        ]
+    return "\n".join(lines)
 
 
 def _only_random(system: str, of: Mapping[tuple[str, str], Sequence[Row]]) -> str:
@@ -169,23 +189,25 @@ def _only_random(system: str, of: Mapping[tuple[str, str], Sequence[Row]]) -> st
     )
 
 
-def _times(rows: Sequence[Row], others: Sequence[Row]) -> float:
+def _effective(rows: Sequence[Row], counts: CountsOf) -> float:
+    """Return the mean effective number of kinds of searches."""
+    return float(np.mean([hill_number(counts(row), 1) for row in rows])) if rows else math.nan
+
+
+def _times(rows: Sequence[Row], others: Sequence[Row], counts: CountsOf) -> float:
     """Return the mean effective number of kinds as a multiple of that of other searches."""
-    if not others:
-        return float("nan")
-    means = [np.mean([hill_number(counts_of(row), 1) for row in each]) for each in (rows, others)]
-    return float(means[0] / means[1])
+    return _effective(rows, counts) / _effective(others, counts)
 
 
-def _p_values(of: dict[tuple[str, str], list[Row]], systems: Sequence[str]) -> list[float]:
+def _p_values(
+    of: Mapping[tuple[str, str], Sequence[Row]], systems: Sequence[str], counts: CountsOf
+) -> dict[str, float]:
     """Return, for each system, the p value that effective kinds are alike, adjusted."""
     found = []
     for system in systems:
-        values = [
-            [hill_number(counts_of(row), 1) for row in of[system, method]] for method in METHODS
-        ]
+        values = [[hill_number(counts(row), 1) for row in of[system, method]] for method in METHODS]
         found.append(mann_whitney(values[0], values[1])[1] if min(map(len, values)) > 1 else 1.0)
-    return list(holm_adjusted(found))
+    return dict(zip(systems, holm_adjusted(found), strict=True))
 
 
 def _percent(rows: Sequence[Row], part: str, whole: str) -> float:

@@ -76,11 +76,25 @@ def test_kinds_of_two_methods_are_compared_at_equal_flights_and_violations() -> 
     assert found["decided without interference, %"] == "95.0"
     assert dict(zip(titles, theirs, strict=True))["kinds at equal violations"] == "4.0 of 20"
     assert 7 < float(found["kinds at equal violations"].split()[0]) < 8
-    assert lines[-1] == (
+    assert lines[-2] == (
         "mm: 8 kinds in all searches of garl, 4 in those of random, 0 in those of random alone."
     )
     alone = kinds.report(rows[:5]).splitlines()[2].split("|")
     assert alone[titles.index("times random's")].strip() == "nan"
+
+
+def test_kinds_are_compared_by_type_and_cause_alone_too() -> None:
+    def row(method: str, seed: int, kinds: Sequence[str]) -> Row:
+        facts = {"map": "court", "flights": "400", "landed": "300", "quiet": "9"}
+        key = {"method": method, "system": "mm", "seed": str(seed), "quiet_decided": "9"}
+        return {**key, **facts, "kinds": json.dumps({kind: [1, 2] for kind in kinds})}
+
+    dogs = ["IV:dog:descent:seen", "IV:dog:descent:unseen", "IV:dog:last-metre:seen", "off:seen"]
+    rows = [row("garl", seed, dogs) for seed in range(5)]
+    rows += [row("random", seed, ["off:seen"]) for seed in range(5)]
+    last = kinds.report(rows).splitlines()[-1]
+    # A dog in six flights and a landing beside the marker in two: not 4 kinds, but 1.75.
+    assert "1.8 effective ones of garl, 1.0 of random, 1.75 times" in last
 
 
 def collision(
