@@ -137,33 +137,31 @@ def test_importlib_mode_reaches_the_workers(pytester: pytest.Pytester) -> None:
     result.stdout.fnmatch_lines(["*8 flown*"])
 
 
-def test_a_search_leaves_the_camera_to_its_workers(pytester: pytest.Pytester) -> None:
-    project(pytester, "Good", "['lawn']")
+def output_and_imports(pytester: pytest.Pytester, arguments: str, modules: str) -> str:
+    """Return what pytest prints, and a last line that says which modules its process imported."""
     code = (
         "import sys, pytest\n"
-        "pytest.main(['-q', '-p', 'no:cacheprovider', '--garl-budget=4', '--garl-shrink=0', "
-        "'--garl-workers=1'])\n"
-        "print('HEAVY', sorted({'cv2', 'jinja2'} & set(sys.modules)))\n"
+        f"pytest.main({['-q', '-p', 'no:cacheprovider', *arguments.split()]})\n"
+        f"print('HEAVY', sorted(set({modules.split()}) & set(sys.modules)))\n"
     )
     done = subprocess.run(
         [sys.executable, "-c", code], capture_output=True, text=True, check=True, cwd=pytester.path
     )
-    assert "4 flown" in done.stdout
-    assert "HEAVY []" in done.stdout
+    return done.stdout
+
+
+def test_a_search_leaves_the_camera_to_its_workers(pytester: pytest.Pytester) -> None:
+    project(pytester, "Good", "['lawn']")
+    arguments = "--garl-budget=4 --garl-shrink=0 --garl-workers=1"
+    output = output_and_imports(pytester, arguments, "cv2 jinja2")
+    assert "4 flown" in output
+    assert "HEAVY []" in output
 
 
 def test_a_run_without_landing_tests_imports_nothing_heavy(pytester: pytest.Pytester) -> None:
     pytester.makepyfile(test_plain="def test_plain(): pass")
-    code = (
-        "import sys, pytest\n"
-        "pytest.main(['-q', '-p', 'no:hypothesispytest', '-p', 'no:cacheprovider'])\n"
-        "heavy = {'numpy', 'cv2', 'pybullet', 'pymoo', 'torch', 'hypothesis', 'scipy'}\n"
-        "print('HEAVY', sorted(heavy & set(sys.modules)))\n"
-    )
-    done = subprocess.run(
-        [sys.executable, "-c", code], capture_output=True, text=True, check=True, cwd=pytester.path
-    )
-    assert "HEAVY []" in done.stdout
+    heavy = "numpy cv2 pybullet pymoo torch hypothesis scipy"
+    assert "HEAVY []" in output_and_imports(pytester, "-p no:hypothesispytest", heavy)
 
 
 def test_the_plugin_can_be_left_out(pytester: pytest.Pytester) -> None:
