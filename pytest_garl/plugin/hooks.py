@@ -133,8 +133,9 @@ def pytest_runtestloop(session: pytest.Session) -> Generator[None, object, objec
     if run is None:
         return (yield)
     from pytest_garl.plugin.progress_display import show_progress
+    from pytest_garl.plugin.termination import telling_workers
 
-    with show_progress(run, session.config):
+    with show_progress(run, session.config), telling_workers(run.ledger):
         result = yield
     run.loop_finished = True
     return result

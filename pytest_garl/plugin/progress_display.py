@@ -20,6 +20,7 @@ from pytest_garl.plugin.keys import is_xdist_worker
 from pytest_garl.plugin.progress_text import ProgressReader, RunProgress, progress_line
 from pytest_garl.plugin.run import Run
 from pytest_garl.plugin.terminal_text import begin_line, width_of
+from pytest_garl.plugin.termination import ControllerWatch
 
 REFRESH_S = 0.5
 LOG_PERIOD_S = 30.0
@@ -35,7 +36,8 @@ def show_progress(run: Run, config: pytest.Config) -> Iterator[None]:
     removes the line while pytest writes.  Without a terminal a line is written now and then.
     """
     if is_xdist_worker(config):
-        yield
+        with _call_on_wait(run, ControllerWatch().look, lambda: None):
+            yield
     elif not _is_terminal():
         log = ProgressLog(run, config)
         with _call_on_wait(run, log.refresh, lambda: None), _call_on_reports(run, config):

@@ -144,6 +144,8 @@ class Run:
     """Called when the waiting is over."""
     loop_finished: bool = False
     """Whether all tests ran and nobody interrupted them."""
+    interrupted: bool = False
+    """Whether somebody interrupted the work that follows the tests."""
     investigated: tuple[InvestigatedSignature, ...] = ()
     """Results of the investigation of new signatures."""
     films: Films | None = None

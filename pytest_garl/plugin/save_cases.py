@@ -56,6 +56,7 @@ def save_cases(run: Run, session: pytest.Session) -> None:
                 investigations, requests, run.finding_tests, _saver(run), run.on_wait
             )
     except KeyboardInterrupt:
+        run.interrupted = True
         begin_line(reporter)
         reporter.write_line(
             "garl: interrupted before everything was saved; the same command with --garl-resume "

@@ -29,6 +29,8 @@ class SessionFacts:
 
     nothing_compared: bool = False
     """Whether the command line asks for a gate and none was flown."""
+    interrupted: bool = False
+    """Whether somebody interrupted the work that follows the tests."""
     broken: bool = False
     """Whether the ledger was lost, or cases could not be saved."""
     problems: bool = False
@@ -42,6 +44,8 @@ def exit_status(status: int, facts: SessionFacts) -> int:
     passes = (pytest.ExitCode.OK, pytest.ExitCode.NO_TESTS_COLLECTED)
     if facts.nothing_compared and status in passes:
         return pytest.ExitCode.USAGE_ERROR
+    if facts.interrupted and status in (*passes, pytest.ExitCode.TESTS_FAILED):
+        return pytest.ExitCode.INTERRUPTED
     if facts.problems and status == pytest.ExitCode.OK:
         return pytest.ExitCode.TESTS_FAILED
     return status
@@ -66,6 +70,7 @@ def set_exit_status(
                 run.save_problem = run.save_problem or str(error)
     facts = SessionFacts(
         nothing_compared=nothing_compared,
+        interrupted=run is not None and run.interrupted,
         broken=broken,
         problems=tally is not None and bool(tally.problems),
     )

@@ -24,6 +24,7 @@ from pytest_garl.plugin.flight_time import FIRST_RUN, FlightTime
 from pytest_garl.plugin.keys import RUN, is_xdist_worker
 from pytest_garl.plugin.options import Options
 from pytest_garl.plugin.run import Run
+from pytest_garl.plugin.termination import interrupt_on_sigterm
 from pytest_garl.reports.run_report import BEGAN, utc_now
 
 if TYPE_CHECKING:
@@ -55,6 +56,7 @@ def begin_run(config: pytest.Config, options: Options) -> None:
             lock=lock,
             flight_s=_flight_s(ledger),
         )
+        interrupt_on_sigterm(config)
     except GarlError as error:
         raise pytest.UsageError(str(error)) from error
 

@@ -106,12 +106,12 @@ def _write_searches(reporter: Any, run: Run, tally: Tally) -> list[SearchSummary
         run.ledger.note_fact(ENDED, utc_now())
     if searches:
         reporter.section("garl: violations", sep="=")
-        for line in _lines_about(searches, run, reporter):
+        for line in _lines_about(searches, run, tally, reporter):
             reporter.write_line(line)
     return searches
 
 
-def _lines_about(searches: list[SearchSummary], run: Run, reporter: Any) -> list[str]:
+def _lines_about(searches: list[SearchSummary], run: Run, tally: Tally, reporter: Any) -> list[str]:
     width = width_of(reporter.config)
     lines = [
         line
@@ -120,16 +120,25 @@ def _lines_about(searches: list[SearchSummary], run: Run, reporter: Any) -> list
     ]
     types = legend(kind for search in searches for kind in (*search.kinds, *search.findings))
     lines += [wrapped(text, width) for text in (types, _costs(run)) if text]
-    progress = run.ledger.queries.progress()
-    done, total = sum(each.flown for each in progress), sum(each.total for each in progress)
-    if done < total and not run.options.repeat:
-        lines.append(
-            f"not finished: {done} of {total} flown; the same command with --garl-resume goes on"
-        )
+    lines += _not_finished(run, tally)
     results_hash = run.ledger.queries.result_hash()[:16]
     worlds = dict.fromkeys(_world(search) for search in searches if search.domains)
     lines += [wrapped(world, width, others="  ") for world in worlds]
     return [*lines, f"ledger: {run.ledger.path}  results {results_hash}"]
+
+
+def _not_finished(run: Run, tally: Tally) -> list[str]:
+    """Return a line with the way to continue, if the search or its shrinking was interrupted."""
+    progress = run.ledger.queries.progress()
+    done, total = sum(each.flown for each in progress), sum(each.total for each in progress)
+    if run.options.repeat:
+        return []
+    goes_on = "the same command with --garl-resume goes on"
+    if done < total:
+        return [f"not finished: {done} of {total} flown; {goes_on}"]
+    if tally.interrupted and run.investigations is not None:
+        return [f"not finished: all {total} flown, but no case is saved; {goes_on}"]
+    return []
 
 
 def _world(search: SearchSummary) -> str:

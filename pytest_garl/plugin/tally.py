@@ -36,7 +36,7 @@ class Tally:
         self.not_repeated: set[tuple[str, ...]] = set()
         self.problems: list[str] = []
         self.interrupted = False
-        """Whether somebody ended the session with Ctrl-C."""
+        """Whether somebody ended the session with Ctrl-C or SIGTERM."""
         self._signatures: dict[tuple[str, str], str] = {}
         self._failing_flights: set[tuple[str, str]] = set()
         self._failures: dict[str, str] = {}
@@ -81,8 +81,11 @@ class Tally:
 
     def pytest_keyboard_interrupt(self, excinfo: pytest.ExceptionInfo[BaseException]) -> None:
         """Note that somebody wants the session to end."""
-        # pytest and xdist stop after -x by exceptions that inherit from this one.
-        self.interrupted = excinfo.type is KeyboardInterrupt
+        from pytest_garl.plugin.termination import ignore_further_sigterm, is_interrupted_by_user
+
+        self.interrupted = is_interrupted_by_user(excinfo.type)
+        if self.interrupted:
+            ignore_further_sigterm()
 
     @property
     def user_failures(self) -> list[SlotUserFailure]:

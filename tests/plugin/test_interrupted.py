@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.plugin.test_resume import BUDGET, query, slow_project, start, wait_for
+from tests.plugin.test_resume import BUDGET, SLOW, alive, query, slow_project, start, wait_for
 from tests.support.landing_project import CONFTEST, project, run
 
 SEARCH = ("--garl-budget=24", "--garl-shrink=12", "--garl-workers=2", "--garl-map=lawn")
@@ -108,6 +108,67 @@ def test_ctrl_c_saves_nothing_of_half_a_search(pytester: pytest.Pytester, confte
     resumed = run(pytester, *BUDGET, "--garl-shrink=12", "--garl-resume")
     resumed.stdout.fnmatch_lines(["*confirming and shrinking*"])
     assert cases(pytester.path)
+
+
+PARALLEL = pytest.mark.parametrize(
+    "parallel", [(), pytest.param(("-n2",), marks=pytest.mark.long)], ids=["alone", "xdist"]
+)
+
+
+@PARALLEL
+def test_sigterm_ends_a_search_with_its_summary_and_the_way_to_continue(
+    pytester: pytest.Pytester, parallel: tuple[str, ...]
+) -> None:
+    slow_project(pytester)
+    # Not so fast that xdist's workers fly all while they end.
+    pytester.makepyfile(systems=SLOW.replace("0.03", "0.5" if parallel else "0.03"))
+    ledger = pytester.path / ".garl" / "ledger.sqlite"
+    process = start(pytester, *parallel)
+    wait_for(ledger, 2, process)
+    workers = [pid for (pid,) in query(ledger, "SELECT pid FROM worker")]
+    # `timeout` sends the signal twice.
+    process.send_signal(signal.SIGTERM)
+    process.send_signal(signal.SIGTERM)
+    output, _ = process.communicate(timeout=60)
+    assert process.returncode == pytest.ExitCode.INTERRUPTED, output
+    assert "garl: violations" in output
+    assert "of 30 flown; the same command with --garl-resume goes on" in output
+    assert "Terminated: SIGTERM" in output
+    assert workers
+    assert not any(alive(pid) for pid in workers)
+
+
+def test_sigterm_while_kinds_are_shrunk_names_the_way_to_continue(
+    pytester: pytest.Pytester,
+) -> None:
+    slow_project(pytester)
+    conftest = (
+        "import os, signal\n"
+        "from pytest_garl.regressions.investigations import Investigations\n"
+        "def finish(*args):\n"
+        "    os.kill(os.getpid(), signal.SIGTERM)\n"
+        "Investigations.finish = finish\n"
+    )
+    pytester.makeconftest(CONFTEST + conftest)
+    ended = run(pytester, *SEARCH)
+    assert ended.ret == pytest.ExitCode.INTERRUPTED
+    ended.stdout.fnmatch_lines(
+        ["garl: interrupted before everything was saved; *--garl-resume goes on", "*in *s*"]
+    )
+    assert cases(pytester.path) == {}
+
+
+def test_sigterm_handler_of_the_user_stays(pytester: pytest.Pytester) -> None:
+    project(pytester, "Good", "['lawn']")
+    conftest = (
+        "import signal\n"
+        "signal.signal(signal.SIGTERM, lambda number, frame: None)\n"
+        "mine = signal.getsignal(signal.SIGTERM)\n"
+        "def pytest_sessionfinish():\n"
+        "    assert signal.getsignal(signal.SIGTERM) is mine\n"
+    )
+    pytester.makeconftest(CONFTEST + conftest)
+    assert run(pytester, "--garl-budget=2").ret in (0, 1)
 
 
 def test_ctrl_c_on_an_instruction_without_line_still_ends_with_the_summary(

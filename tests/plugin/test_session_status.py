@@ -37,6 +37,9 @@ INTERRUPTED, USAGE, INTERNAL = (
         (EMPTY, SessionFacts(nothing_compared=True), USAGE),
         (RED, SessionFacts(nothing_compared=True), RED),
         (GREEN, SessionFacts(nothing_compared=True, problems=True), USAGE),
+        (GREEN, SessionFacts(interrupted=True), INTERRUPTED),
+        (RED, SessionFacts(interrupted=True, problems=True), INTERRUPTED),
+        (GREEN, SessionFacts(interrupted=True, broken=True), INTERNAL),
     ],
 )
 def test_exit_status_is_worst_of_items_and_session(
