@@ -215,11 +215,16 @@ class _Checker:
             )
         if not any(step.diagnostics for step in flight.steps):
             warn(
-                "returns no diagnostics: reports cannot say what it saw or intended to do "
-                "(Land(diagnostics=Diagnostics(...)))"
+                "returns no diagnostics: reports cannot say what it saw or intended to do. Return "
+                "with each command diagnostics=Diagnostics(target_m=(x, y, 0.0), detections=..., "
+                "phase=...): the place that it takes for the marker, the markers that it sees in "
+                "the frame, what it does"
             )
         elif self._whole and not (reports_detections(flight) or reports_targets(flight)):
-            warn("its diagnostics never name a detection or a target")
+            warn(
+                "its diagnostics never name a detection (Diagnostics.detections) or a target "
+                "(Diagnostics.target_m)"
+            )
         if first.cpu_s > SLOW_FLIGHT_S:
             warn(
                 f"slow: {first.cpu_s:.0f} s of computing for {flight.elapsed_s:.0f} s of flight, "

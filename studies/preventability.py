@@ -31,10 +31,10 @@ from pytest_garl.execution.on_demand import FlyFunction, OnDemandFlights
 from pytest_garl.execution.reference import reference_to
 from pytest_garl.experiments.pytest_run import run_pytest
 from pytest_garl.experiments.spec import ExperimentRun
+from pytest_garl.regressions.case import REACTION_S
 from pytest_garl.regressions.case_flights import ESCAPE_FLIGHTS, recorded_behaviour
 from pytest_garl.regressions.clearance import touched_nothing
 from pytest_garl.regressions.prevention import (
-    REACTION_S,
     Collision,
     collision_of,
     prevention_of,

@@ -34,6 +34,13 @@ NO_GATE_TEXTS: Mapping[NoGateReason, str] = MappingProxyType(
 """The reasons in words."""
 ESCAPE_STEP_S = 0.5
 """Escapes are looked for so long before a collision, and at whole multiples of it."""
+LONGEST_ESCAPE_S = 5.0
+"""Escapes begin at most so long before the contact."""
+REACTION_S = 0.3
+"""From the first observation to the first command of an escape takes so long: three frames at the
+default rate, in which a system notices, decides and its latency passes; engineering estimate."""
+OBSERVED_WITHIN_S = LONGEST_ESCAPE_S + REACTION_S
+"""What the camera showed earlier does not count: no escape begins so early."""
 MoveList = tuple[tuple[float, float], ...]
 Moves = tuple[tuple[str, MoveList], ...]
 ChangeList = tuple[tuple[int, str, float], ...]
@@ -80,7 +87,7 @@ class Prevention:
 
     ``inevitable_s`` is the time to inevitable collision: the longest time before the contact from
     which no escape exists.  ``observed_s`` is how long before the contact the camera had shown the
-    body well enough for the first time; None if it never had.
+    body well enough for the first time within ``OBSERVED_WITHIN_S``; None if it had not.
     """
 
     answer: Preventable = "not asked"
@@ -103,7 +110,7 @@ class Prevention:
         else:
             escape = f"an escape exists {ESCAPE_STEP_S:.1f} s before the contact"
         seen = (
-            "the camera did not show the body before it"
+            f"the camera did not show the body well enough within the last {OBSERVED_WITHIN_S:g} s"
             if self.observed_s is None
             else f"the camera showed the body {self.observed_s:.1f} s before it"
         )

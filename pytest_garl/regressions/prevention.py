@@ -22,7 +22,14 @@ from pytest_garl.execution.flight import time_limit_s
 from pytest_garl.execution.flight_id import CompletedFlight
 from pytest_garl.execution.job import FlightJob
 from pytest_garl.landing_system import Airframe, airframe_of
-from pytest_garl.regressions.case import ESCAPE_STEP_S, NOT_ASKED, Prevention, RecordedBehaviour
+from pytest_garl.regressions.case import (
+    ESCAPE_STEP_S,
+    LONGEST_ESCAPE_S,
+    NOT_ASKED,
+    REACTION_S,
+    Prevention,
+    RecordedBehaviour,
+)
 from pytest_garl.regressions.clearance import escaped, world_of
 from pytest_garl.regressions.escape_model import Chase, EscapeModel
 from pytest_garl.regressions.escape_plan import HOVERS_S, find_escape
@@ -37,11 +44,6 @@ from pytest_garl.simulation.npc_policy import PolicySpec
 from pytest_garl.simulation.physics.world import PHYSICS_RATE_HZ, World
 from pytest_garl.simulation.system_under_test.takeover import Leg, Takeover
 
-LONGEST_ESCAPE_S = 5.0
-"""Escapes begin at most so long before the contact."""
-REACTION_S = 0.3
-"""From the first observation to the first command of an escape takes so long: three frames at the
-default rate, in which a system notices, decides and its latency passes; engineering estimate."""
 EXTRA_S = 0.5
 """The flight of an escape goes on so long after it is judged."""
 

@@ -287,7 +287,7 @@ def _jobs(ledger: Ledger, flights: Sequence[LedgerFlight]) -> list[FlightJob]:
 
 LEGEND = {
     "I": "came down off the marker, on something else or on nothing",
-    "II": "did not land: the marker was never seen, lost, or given up in plain sight",
+    "II": "did not land: the marker could never be read, was lost, or was readable to the end",
     "III": "hit a fixed body",
     "IV": "hit a moving body",
     "V": "Python error, death or hang of the landing system",
@@ -298,7 +298,7 @@ LEGEND = {
     "abort": 'gave up where nobody could land, with limits(abort="violation")',
     "own": "an assertion of a test",
     "slow": "took three times as long as the reference pilot",
-    "lost-while-detectable": "did not see the marker while it could be read",
+    "lost-while-detectable": "did not report the marker while it could be read",
 }
 """Meanings of the types of violations and findings: a signature's part before the first colon."""
 

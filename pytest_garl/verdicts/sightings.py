@@ -58,6 +58,11 @@ def reports_targets(flight: Flight) -> bool:
     return any(step.diagnostics and step.diagnostics.target_m for step in flight.steps)
 
 
+def reports_anything(flight: Flight) -> bool:
+    """Whether the diagnostics of any step hold a detection or a target."""
+    return reports_detections(flight) or reports_targets(flight)
+
+
 def reports_marker(flight: Flight, step: Step) -> bool:
     """Whether the system reports a detection at the marker's place in a frame."""
     found = step.diagnostics.detections if step.diagnostics else ()

@@ -77,7 +77,7 @@ def test_case_of_an_own_assertion_belongs_to_its_test_in_any_file() -> None:
         (
             Prevention(answer="sensor-limited", inevitable_s=1.5),
             "sensor-limited: an escape exists 2.0 s before the contact, none 1.5 s before it, the "
-            "camera did not show the body before it",
+            "camera did not show the body well enough within the last 5.3 s",
         ),
         (
             Prevention(answer="unpreventable", inevitable_s=5.0, observed_s=4.0),

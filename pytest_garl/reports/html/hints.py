@@ -1,8 +1,13 @@
-"""Where an engineer looks first, from the type of a violation and what the record shows."""
+"""Where an engineer looks first, from the type of a violation and what the record shows.
+
+A landing system that reports neither detections nor a target is not judged by what it saw: nobody
+knows.  The hints then say what was commanded and where the UAV flew, and how to report a target.
+"""
 
 from __future__ import annotations
 
 import math
+from collections import Counter
 from collections.abc import Iterator
 
 import numpy as np
@@ -11,11 +16,19 @@ from pytest_garl.regressions.case import NOT_ASKED, Prevention
 from pytest_garl.reports.html.moments import decisive_s
 from pytest_garl.reports.html.sightings_text import readable_and_reported
 from pytest_garl.simulation.flight import Flight
-from pytest_garl.verdicts.sightings import last_target, reports_detections, target_of
+from pytest_garl.simulation.physics.vehicle import up_m
+from pytest_garl.verdicts.sightings import (
+    last_target,
+    reports_anything,
+    reports_detections,
+    target_of,
+)
 from pytest_garl.verdicts.verdict import Verdict
 
 AT_MARKER_M = 1.0
 """A target within so much of the marker's centre is meant for the marker."""
+FLYING_M = 0.5
+"""Below this height of its feet a UAV has not taken off yet, or has landed."""
 MISSED = 0.5
 """A system that reports fewer of the readable frames than this share has lost the marker."""
 
@@ -112,8 +125,9 @@ def _elsewhere(flight: Flight | None) -> str:
     target = last_target(flight, decisive_s(flight)) if flight else None
     if flight is None or target is None:
         return (
-            "The system reported no target: look at how it chooses the place to come down, and "
-            "report it as Diagnostics.target_m."
+            "Look at how the system chooses the place to come down. It reported no target in this "
+            "flight, so this page cannot tell a wrong target from a wrong way there. "
+            f"{_patch(flight)}"
         )
     off_m = math.dist(target, flight.marker_position_m)
     down = decisive_s(flight)
@@ -142,6 +156,8 @@ def _not_landed(flight: Flight | None) -> Iterator[str]:
             "The marker could not be read from where the UAV flew: look at where and how high the "
             "system searches, and for how long."
         )
+    elif not reports_anything(flight):
+        yield from _nothing_reported(flight, readable)
     elif reported < MISSED * readable:
         yield (
             f"The marker could be read in {readable} frames, and the system {_verb(flight)} in "
@@ -168,3 +184,61 @@ _DECISION = (
 
 def _verb(flight: Flight) -> str:
     return "reported it" if reports_detections(flight) else "had a target at it"
+
+
+def _nothing_reported(flight: Flight, readable: int) -> Iterator[str]:
+    """Yield what is known of a flight whose system reported neither detections nor a target."""
+    yield (
+        f"The marker could be read in {readable} frames. The system reported neither detections "
+        "nor a target in this flight, so nothing tells whether it saw the marker. "
+        f"{_path_at_marker(flight)} {_commanded(flight)}"
+    )
+    yield _patch(flight)
+
+
+def _path_at_marker(flight: Flight) -> str:
+    """Return for how long the UAV was above the marker, and how low it came there."""
+    track, end_s = flight.uav, decisive_s(flight)
+    marker = flight.marker_position_m
+    away = np.hypot(track.position_m[:, 0] - marker[0], track.position_m[:, 1] - marker[1])
+    heights = np.array([up_m(float(z)) for z in track.position_m[:, 2]])
+    counted = (track.time_s <= end_s) & (heights >= FLYING_M)
+    if not counted.any():
+        return "The UAV did not leave the ground."
+    above = np.flatnonzero(counted & (away <= AT_MARKER_M))
+    if not len(above):
+        nearest = np.flatnonzero(counted)[int(np.argmin(away[counted]))]
+        return (
+            f"The UAV was never nearer than {away[nearest]:.1f} m to the marker, seen from above; "
+            f"that was at {track.time_s[nearest]:.1f} s, {heights[nearest]:.1f} m up."
+        )
+    steps = np.diff(track.time_s, prepend=track.time_s[:1])
+    lowest = above[int(np.argmin(heights[above]))]
+    return (
+        f"The UAV was within {AT_MARKER_M:g} m of the marker, seen from above, for "
+        f"{float(steps[above].sum()):.1f} s, first at {track.time_s[above[0]]:.1f} s, and came "
+        f"down to {heights[lowest]:.1f} m there, at {track.time_s[lowest]:.1f} s."
+    )
+
+
+def _commanded(flight: Flight) -> str:
+    """Return whether the system ever said Land(), and how it ended the flight."""
+    given_up = [each.time_s for each in flight.events if each.name == "abort_command"]
+    until = f"; it said Abort() at {given_up[0]:.1f} s" if given_up else ""
+    land = [step.time_s for step in flight.steps if step.command == "Land"]
+    if not land:
+        return f"It never said Land(){until}."
+    return f"It said Land() in {len(land)} frames, first at {land[0]:.1f} s{until}."
+
+
+def _patch(flight: Flight | None) -> str:
+    """Return the line of code that would report a target, with the command that is used most."""
+    used = Counter(step.command for step in flight.steps) if flight else Counter[str]()
+    for command in ("Land", "Abort"):
+        used.pop(command, None)
+    name = used.most_common(1)[0][0] if used else "PositionSetpoint"
+    return (
+        "To see its target here, return it with each command: "
+        f"{name}(..., diagnostics=Diagnostics(target_m=(x, y, 0.0))), where x, y is the place that "
+        "your system takes for the marker."
+    )

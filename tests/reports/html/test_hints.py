@@ -59,6 +59,33 @@ def test_a_target_is_no_sighting() -> None:
     assert "reports no detections" in hint
 
 
+def test_a_system_that_reports_nothing_is_not_accused() -> None:
+    places = np.tile([5.0, 0.0, 9.0], (241, 1))
+    places[:24, 2] = 0.1
+    # Two seconds above the marker, at the lowest 3.9 m up.
+    places[96:144] = (0.5, 0.0, 4.1)
+    flight = recorded(steps=seen(range(20, 60)), given_up_s=9.0, places=places)
+    first, patch = hints_of(flight, verdict("II"))
+    assert "detector" not in first
+    assert "nothing tells whether it saw the marker" in first
+    assert "within 1 m of the marker, seen from above, for 2.0 s, first at 4.0 s" in first
+    assert "came down to 3.9 m there" in first
+    assert "It never said Land(); it said Abort() at 9.0 s." in first
+    assert "PositionSetpoint(..., diagnostics=Diagnostics(target_m=(x, y, 0.0)))" in patch
+
+
+def test_a_system_that_reports_nothing_and_flies_elsewhere_is_told_how_near_it_came() -> None:
+    far = np.tile([5.0, 0.0, 9.0], (241, 1))
+    (first, _) = hints_of(recorded(steps=seen(range(20, 60)), places=far), verdict("II"))
+    assert "never nearer than 5.0 m to the marker" in first
+
+
+def test_a_landing_elsewhere_without_a_target_blames_neither_detector_nor_control() -> None:
+    (hint,) = hints_of(recorded(steps=seen(range(20, 60)), outcome="landed"), verdict("I"))
+    assert "cannot tell a wrong target from a wrong way there" in hint
+    assert "Diagnostics(target_m=(x, y, 0.0))" in hint
+
+
 def test_a_marker_that_could_never_be_read_points_to_the_search() -> None:
     assert "searches" in hints_of(recorded(steps=seen(())), verdict("II"))[0]
     (sentence, *_) = sighting_sentences(recorded(steps=seen(())))
