@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import reprlib
+import sys
 import unicodedata
 from collections.abc import Iterable
 
@@ -65,3 +66,14 @@ _REPR = reprlib.Repr()
 _REPR.maxlevel = 4
 _REPR.maxstring = _REPR.maxlong = _REPR.maxother = SHOWN
 _REPR.maxlist = _REPR.maxtuple = _REPR.maxdict = 8
+
+
+def python_that_lacks(error: str) -> str:
+    """Return which Python could not import a module, if the text of an error says that one fails.
+
+    A module such as ``rclpy`` is often installed for another Python than the one that runs.
+    """
+    if "ModuleNotFoundError" not in error and "ImportError" not in error:
+        return ""
+    version = ".".join(str(each) for each in sys.version_info[:3])
+    return f"; this is Python {version} at {sys.executable}"

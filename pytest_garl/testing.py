@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import dataclasses
 import inspect
+import math
 import threading
 import time
 from collections.abc import Callable, Iterator
@@ -13,26 +14,48 @@ from typing import Any, NamedTuple
 
 from pytest_garl import cpu_dispatch
 from pytest_garl.adversary.catalogue import policy_spec
+from pytest_garl.adversary.domain_policy import domain_with_policy
 from pytest_garl.errors import LandingSystemError
+from pytest_garl.execution.flight import time_limit_s
 from pytest_garl.execution.metering import CallMeter, OutOfTimeError
 from pytest_garl.execution.reference import check_system
 from pytest_garl.execution.separate_process import call_in_separate_process
-from pytest_garl.landing_system import Mission, Observation, airframe_of
+from pytest_garl.fiducial import MarkerSpec
+from pytest_garl.files.json_values import dataclass_from
+from pytest_garl.landing_system import (
+    Mission,
+    Observation,
+    PositionSetpoint,
+    VelocitySetpoint,
+    airframe_of,
+)
 from pytest_garl.scenarios.chromosome import decode
-from pytest_garl.scenarios.genes import genome_for
+from pytest_garl.scenarios.domains.domain import Domain
+from pytest_garl.scenarios.domains.genome import genome_of
+from pytest_garl.scenarios.domains.names import DEFAULT_DOMAIN
 from pytest_garl.scenarios.maps.map import Map, load_map
 from pytest_garl.scenarios.scenario import Scenario
+from pytest_garl.scenarios.task import Start, Task
 from pytest_garl.scenarios.validity import repair
 from pytest_garl.search.methods.random import random_scenarios
 from pytest_garl.simulation.flight import Flight
 from pytest_garl.simulation.flight_file import divergence_time_s
 from pytest_garl.simulation.fly import fly
+from pytest_garl.simulation.physics.vehicle import up_m
+from pytest_garl.simulation.system_under_test.reading import finite
+from pytest_garl.simulation.system_under_test.texts import shown
 from pytest_garl.verdicts.judge import judge
+from pytest_garl.verdicts.phases import landing_phase
 from pytest_garl.verdicts.sightings import reports_detections, reports_targets
-from pytest_garl.verdicts.verdict import PAPER_LIMITS, Limits
+from pytest_garl.verdicts.verdict import Limits, default_distance_m
 
 FLIGHTS = 40
 """Flights of the search whose time the check estimates: the README's first budget."""
+FLIGHTS_OF_FAILURES = 4
+"""A search takes up to so many times its flights' time: flights that fail are longer than landings,
+and shrinking what they show takes as many flights again."""
+LARGEST_YAW_RAD = 2 * math.pi
+"""A heading beyond a full turn is taken for degrees."""
 SLOW_FLIGHT_S = 10.0
 """Computing time of one flight above which the check warns: a night has some 3,000 such flights."""
 SLOW_CALL_S = 3.0
@@ -44,24 +67,49 @@ SHORTEST_S = 2.0
 
 @dataclasses.dataclass(frozen=True, slots=True, kw_only=True)
 class Check:
-    """The result of a check: how the flights ended, warnings, and the cost of a flight.
+    """The result of a check: how the flights ended, faults, warnings, and the cost of a flight.
 
-    ``flights`` and ``warnings`` are sentences; ``cpu_s`` is the computing time of one flight in
-    seconds, the simulator's included.
+    ``flights``, ``faults`` and ``warnings`` are sentences; a search would meet a fault in every
+    flight.  ``cpu_s`` is the computing time of one flight in seconds, the simulator's included.
     """
 
     system: str
     flights: tuple[str, ...]
     warnings: tuple[str, ...]
     cpu_s: float
+    faults: tuple[str, ...] = ()
+
+    @property
+    def passed(self) -> bool:
+        """Whether there is no fault."""
+        return not self.faults
 
     def __str__(self) -> str:
+        low, high = FLIGHTS * self.cpu_s, FLIGHTS * FLIGHTS_OF_FAILURES * self.cpu_s
         cost = (
-            f"a flight takes {self.cpu_s:.1f} s of computing: {FLIGHTS} flights take about "
-            f"{FLIGHTS * self.cpu_s:.0f} s, divided by the number of workers"
+            f"a flight takes {self.cpu_s:.1f} s of computing; a search of {FLIGHTS} flights takes "
+            f"{low:.0f} s of it if all land, and up to {high:.0f} s if many fail and are shrunk"
         )
-        warned = [f"warning: {text}" for text in self.warnings]
-        return "\n".join([f"{self.system}: {text}" for text in (*self.flights, cost)] + warned)
+        found = [f"fault: {text}" for text in self.faults]
+        found += [f"warning: {text}" for text in self.warnings]
+        return "\n".join([f"{self.system}: {text}" for text in (*self.flights, cost)] + found)
+
+
+@dataclasses.dataclass(frozen=True, slots=True, kw_only=True)
+class CheckPlan:
+    """What a check flies: one map with the task, the domain and the limits of a test.
+
+    ``seconds`` ends each flight early; None flies until it landed, or for the limit of time.
+    ``limit_s`` is the computing time (CPU) for all flights.
+    """
+
+    map: Map
+    task: Task
+    domain: Domain
+    limits: Limits
+    seconds: float | None = None
+    deterministic: bool = True
+    limit_s: float = 120.0
 
 
 def check_landing_system(
@@ -71,6 +119,10 @@ def check_landing_system(
     map: str = "lawn",
     deterministic: bool = True,
     limit_s: float = 120.0,
+    marker: MarkerSpec | None = None,
+    start: Start | None = None,
+    domain: str = DEFAULT_DOMAIN,
+    limits: Limits | None = None,
 ) -> Check:
     """Fly a class in two scenarios and return the result; raise LandingSystemError for a fault.
 
@@ -80,16 +132,15 @@ def check_landing_system(
     first scenario, the second and the first again, and each flight is compared with that of a fresh
     instance.
 
+    ``marker``, ``start``, ``domain`` (a name, or a TOML file) and ``limits`` are those of a test;
+    without a marker the map's lies there.  The first scenario is the mildest one of the domain.
     ``seconds`` ends each flight early (simulated time; by default it flies until it landed, or
     120 s).  ``deterministic=False`` turns a difference between equal flights into a warning.
     ``limit_s`` is the computing time (CPU) for all flights; a slow system is compared over shorter
     ones.  A call that takes 30 s counts as hanging.  If NumPy was loaded earlier and computes with
     other instructions than a search, the check runs in a separate process.
     """
-    check_system(system)
-    _check_airframe(system)
-    _check_signature(system, "reset", 1)
-    _check_signature(system, "step", 1)
+    check_contract(system)
     if not cpu_dispatch.pin():
         # NumPy was loaded earlier, and computes with other instructions than a search.
         options = {
@@ -97,15 +148,68 @@ def check_landing_system(
             "map": map,
             "deterministic": deterministic,
             "limit_s": limit_s,
+            "marker": marker and dataclasses.asdict(marker),
+            "start": start and dataclasses.asdict(start),
+            "domain": domain,
+            "limits": limits and dataclasses.asdict(limits),
         }
         values = call_in_separate_process("pytest_garl.testing:_check_as_values", system, options)
-        lists = {"flights": (*values["flights"],), "warnings": (*values["warnings"],)}
-        return Check(**{**values, **lists})
-    return _Checker(system, map, seconds, deterministic, limit_s).run()
+        return dataclass_from(Check, values)
+    plan = plan_for(map=map, marker=marker, start=start, domain=domain, limits=limits)
+    return check_as_planned(
+        system,
+        dataclasses.replace(plan, seconds=seconds, deterministic=deterministic, limit_s=limit_s),
+    )
 
 
-def _check_as_values(system: type, **options: Any) -> dict[str, Any]:
-    return dataclasses.asdict(check_landing_system(system, **options))
+def plan_for(
+    *,
+    map: str,
+    marker: MarkerSpec | None = None,
+    start: Start | None = None,
+    domain: str = DEFAULT_DOMAIN,
+    limits: Limits | None = None,
+) -> CheckPlan:
+    """Return the plan for a class that no test names: what is not given is a test's default."""
+    ground = load_map(map, (Path.cwd() / "scenarios" / "maps",))
+    spec = marker or ground.marker
+    return CheckPlan(
+        map=ground,
+        task=Task(marker=spec, start=start or Start()),
+        domain=domain_with_policy(domain, Path.cwd()),
+        limits=limits or Limits(distance_m=default_distance_m(spec.side_m)),
+    )
+
+
+def check_as_planned(system: type, plan: CheckPlan) -> Check:
+    """Fly a class as a plan says, as ``check_landing_system`` does, in this process."""
+    check_contract(system)
+    return _Checker(system, plan).run()
+
+
+def check_contract(system: type) -> None:
+    """Raise LandingSystemError if a class has not the methods and the airframe of the contract."""
+    check_system(system)
+    _check_airframe(system)
+    _check_signature(system, "reset", 1)
+    _check_signature(system, "step", 1)
+
+
+def _check_as_values(
+    system: type,
+    marker: dict[str, Any] | None,
+    start: dict[str, Any] | None,
+    limits: dict[str, Any] | None,
+    **options: Any,
+) -> dict[str, Any]:
+    found = check_landing_system(
+        system,
+        marker=dataclass_from(MarkerSpec, marker) if marker else None,
+        start=dataclass_from(Start, start) if start else None,
+        limits=dataclass_from(Limits, limits) if limits else None,
+        **options,
+    )
+    return dataclasses.asdict(found)
 
 
 class _TimedFlight(NamedTuple):
@@ -116,17 +220,17 @@ class _TimedFlight(NamedTuple):
 class _Checker:
     """Flies one class in a calm scenario and in a drawn one, both without moving objects."""
 
-    def __init__(
-        self, system: type, map: str, seconds: float | None, deterministic: bool, limit_s: float
-    ) -> None:
-        self._system, self._deterministic = system, deterministic
-        self._seconds = seconds or PAPER_LIMITS.time_s
-        self._whole = seconds is None or seconds >= PAPER_LIMITS.time_s
-        self._map = load_map(map, (Path.cwd() / "scenarios" / "maps",))
-        self._calm, self._drawn = _scenarios(self._map)
-        self._meter = CallMeter(limit_s)
-        self._limit_s = limit_s
+    def __init__(self, system: type, plan: CheckPlan) -> None:
+        self._system, self._plan = system, plan
+        longest_s = time_limit_s(plan.limits)
+        self._seconds = plan.seconds or longest_s
+        self._whole = plan.seconds is None or plan.seconds >= longest_s
+        self._map = plan.map
+        self._calm, self._drawn = _scenarios(plan)
+        self._limit_s = plan.limit_s
+        self._meter = CallMeter(plan.limit_s)
         self._warnings: list[str] = []
+        self._faults: list[str] = []
 
     def run(self) -> Check:
         """Fly the scenarios and compare the flights."""
@@ -135,11 +239,11 @@ class _Checker:
         with _warning_of_leftovers(self._warnings.append):
             try:
                 first = self._fly(self._system, self._calm, self._seconds)
-                flights.append(f"{self._map.name}: {_ending(first.flight)}")
+                flights.append(f"{self._map.name}: {self._ending(first.flight)}")
                 cpu_s = first.cpu_s
-                self._warn_of_flight(first)
+                self._judge(first)
                 other = self._compare(first)
-                flights.append(f"{self._map.name}, another scenario: {_ending(other.flight)}")
+                flights.append(f"{self._map.name}, another scenario: {self._ending(other.flight)}")
                 if {first.flight.outcome, other.flight.outcome} == {"gave_up"}:
                     self._warnings.append("gave up in both scenarios; a search would learn nothing")
             except OutOfTimeError:
@@ -155,6 +259,7 @@ class _Checker:
             system=self._system.__name__,
             flights=tuple(flights),
             warnings=tuple(self._warnings),
+            faults=tuple(self._faults),
             cpu_s=cpu_s,
         )
 
@@ -166,16 +271,27 @@ class _Checker:
             seconds = max(SHORTEST_S, share * first.flight.elapsed_s)
             first = self._fly(self._system, self._calm, seconds)
         other = self._fly(self._system, self._drawn, seconds)
-        reused = _reusing_one_instance(self._system)
+        yaws: list[tuple[float, float]] = []
+        reused = _reusing_one_instance(self._system, yaws)
         for fresh, scenario, problem in (
             (first, self._calm, "two flights of the same scenario differ"),
             (other, self._drawn, _REMEMBERS),
             (first, self._calm, _REMEMBERS),
         ):
             again = self._fly(reused, scenario, seconds)
+            self._check_yaw(again.flight, yaws)
             self._check_equal(fresh.flight, again.flight, problem)
         reused.close_instance()
         return other
+
+    def _check_yaw(self, flight: Flight, yaws: list[tuple[float, float]]) -> None:
+        """Refuse a heading of several turns, which radians rarely are."""
+        for time_s, yaw in yaws:
+            raise LandingSystemError(
+                f"{self._system.__name__}.step: {_place(flight, time_s)}: returned yaw_rad = "
+                f"{yaw:g}; expected radians from -2π to 2π. Are these degrees? "
+                f"math.radians({yaw:g}) is {math.radians(yaw):.3g}"
+            )
 
     def _check_equal(self, fresh: Flight, again: Flight, problem: str) -> None:
         if fresh.sha256 == again.sha256:
@@ -183,31 +299,24 @@ class _Checker:
         text = (
             f"{self._system.__name__}: {problem}, first at {divergence_time_s(fresh, again):.2f} s"
         )
-        if self._deterministic:
+        if self._plan.deterministic:
             raise LandingSystemError(
                 f"{text}; if that is intended, pass deterministic=False here and in the marker"
             )
         if text not in self._warnings:
             self._warnings.append(text)
 
-    def _warn_of_flight(self, first: _TimedFlight) -> None:
-        """Warn of problems that a search would have."""
+    def _judge(self, first: _TimedFlight) -> None:
+        """Note whether it lands in clear air, and warn of problems that a search would have."""
         flight, warn = first.flight, self._warnings.append
-        limits = Limits()
-        if flight.outcome == "not_landed" and self._whole:
-            warn(f"did not land within {self._seconds:.0f} s, in a calm scenario without objects")
-        if flight.outcome == "gave_up":
-            warn("gave up in a calm scenario without objects")
-        if flight.outcome == "collision":
-            warn("collided in a calm scenario without moving objects")
-        touchdown = flight.touchdown
-        if flight.outcome == "landed" and touchdown and touchdown.distance_m > limits.distance_m:
-            warn(
-                f"landed {touchdown.distance_m:.1f} m off in a calm scenario; the limit is "
-                f"{limits.distance_m:g} m"
+        verdict = judge(flight, self._plan.limits)
+        if self._whole and (verdict.violation or not verdict.completed):
+            self._faults.append(
+                "your system does not land in clear air, on "
+                f"{self._map.name} without moving objects; a search would report that again and "
+                "again"
             )
-        if flight.outcome == "slid":
-            warn("slid over the ground after its touchdown in a calm scenario")
+        touchdown = flight.touchdown
         if touchdown and touchdown.stopped_s is None and flight.outcome == "not_landed":
             warn(
                 "touched the ground, but its motors did not stop; that takes Land(), or a thrust "
@@ -231,6 +340,12 @@ class _Checker:
                 f"{self._meter.mean_s * 1e3:.0f} ms in each call"
             )
 
+    def _ending(self, flight: Flight) -> str:
+        touchdown, verdict = flight.touchdown, judge(flight, self._plan.limits)
+        if flight.outcome == "landed" and touchdown and not verdict.violation:
+            return f"landed {touchdown.distance_m:.2f} m off after {touchdown.time_s:.0f} s"
+        return verdict.story
+
     def _fly(self, system: Any, scenario: Scenario, seconds: float) -> _TimedFlight:
         began = time.process_time()
         with self._meter.timed():
@@ -246,9 +361,8 @@ class _Checker:
             crash, hint = flight.crash, ""
             if "read-only" in crash.message:
                 hint = "; observations are read-only, copy the array before changing it"
-            raise LandingSystemError(
-                f"{crash.where}: {crash.error}: {crash.message}{hint}\n{crash.traceback}".rstrip()
-            )
+            what = f"{crash.error}: {crash.message}{hint}\n{crash.traceback}".rstrip()
+            raise LandingSystemError(f"{crash.where}: {_last_place(flight)}: {what}")
         return _TimedFlight(flight, time.process_time() - began)
 
 
@@ -258,20 +372,37 @@ _REMEMBERS = (
 )
 
 
-def _scenarios(map: Map) -> tuple[Scenario, Scenario]:
-    """Return the map's nominal scenario and one that a search might draw, without objects."""
-    genome = genome_for(map)
-    names = [name for name, _ in map.present_objects]
-    calm = repair(decode(genome.nominal, genome, map=map.name, seed=1), map)
-    drawn = random_scenarios(map, genome, 1, 0, 1)[0]
-    return calm.without(*names), drawn.without(*names)
+def _scenarios(plan: CheckPlan) -> tuple[Scenario, Scenario]:
+    """Return the domain's mildest scenario and one that a search might draw; no NPC is there."""
+    genome = genome_of(plan.domain, plan.map, plan.task)
+    calm = repair(decode(genome.nominal, genome, map=plan.map.name, seed=1), plan.map)
+    drawn = random_scenarios(plan.map, genome, 1, 0, 1)[0]
+    return _without_objects(calm, plan.map), _without_objects(drawn, plan.map)
 
 
-def _ending(flight: Flight) -> str:
-    touchdown = flight.touchdown
-    if flight.outcome == "landed" and touchdown:
-        return f"landed {touchdown.distance_m:.2f} m off after {touchdown.time_s:.0f} s"
-    return judge(flight, Limits()).story
+def _without_objects(scenario: Scenario, map: Map) -> Scenario:
+    names = {name for name, _ in map.all_objects} - {*scenario.removed_objects}
+    return scenario.without(*sorted(names))
+
+
+def _last_place(flight: Flight) -> str:
+    """Return when and where a flight ended that an error ended."""
+    if not flight.steps:
+        return "before its first command"
+    phase = next((s.diagnostics.phase for s in reversed(flight.steps) if s.diagnostics), "")
+    own = f"; its own phase was {shown(phase)}" if phase else ""
+    return f"{_place(flight, flight.elapsed_s)}{own}"
+
+
+def _place(flight: Flight, time_s: float) -> str:
+    """Return such as ``at 14.0 s, in the phase descent, 4.6 m up and 0.3 m from the marker``."""
+    index = max(0, int(flight.uav.time_s.searchsorted(time_s, side="right")) - 1)
+    x, y, z = (float(value) for value in flight.uav.position_m[index])
+    beside_m = math.dist((x, y), flight.marker_position_m)
+    return (
+        f"at {time_s:.1f} s, in the phase {landing_phase(flight, time_s)}, {up_m(z):.1f} m up and "
+        f"{beside_m:.1f} m from the marker"
+    )
 
 
 def _check_airframe(system: type) -> None:
@@ -284,8 +415,15 @@ def _check_airframe(system: type) -> None:
 
 
 def _check_signature(system: type, method: str, count: int) -> None:
+    code = getattr(system, method)
+    if inspect.iscoroutinefunction(code) or inspect.isasyncgenfunction(code):
+        raise LandingSystemError(
+            f"{system.__name__}.{method} is `async def`; expected a plain `def`: the simulator "
+            "calls it once for each camera frame and waits for no event loop. Run your own loop "
+            "in it, as loop.run_until_complete(...)"
+        )
     try:
-        inspect.signature(getattr(system, method)).bind(*[None] * (count + 1))
+        inspect.signature(code).bind(*[None] * (count + 1))
     except TypeError as error:
         raise LandingSystemError(
             f"{system.__name__}.{method}: {error}; expected one argument beside self"
@@ -310,8 +448,11 @@ def _children() -> set[str]:
     return {pid for file in files for pid in file.read_text().split()}
 
 
-def _reusing_one_instance(system: type) -> Any:
-    """Return a stand-in for the class that always gives the same instance."""
+def _reusing_one_instance(system: type, yaws: list[tuple[float, float]]) -> Any:
+    """Return a stand-in for the class that always gives the same instance.
+
+    It notes time and value of each commanded yaw beyond a full turn.
+    """
     instances: list[Any] = []
 
     class Reused:
@@ -329,7 +470,12 @@ def _reusing_one_instance(system: type) -> Any:
             self._instance.reset(mission)
 
         def step(self, observation: Observation) -> Any:
-            return self._instance.step(observation)
+            answer = self._instance.step(observation)
+            if isinstance(answer, PositionSetpoint | VelocitySetpoint):
+                yaw = finite(answer.yaw_rad)
+                if yaw is not None and abs(yaw) > LARGEST_YAW_RAD:
+                    yaws.append((observation.time_s, yaw))
+            return answer
 
         def close(self) -> None:
             """Leave the instance open for its next flight."""

@@ -1,7 +1,9 @@
 from __future__ import annotations
 
 import contextlib
+import dataclasses
 import itertools
+import math
 import subprocess
 import threading
 import time
@@ -16,9 +18,12 @@ from pytest_garl import (
     Command,
     Diagnostics,
     Land,
+    Limits,
+    MarkerSpec,
     Mission,
     Observation,
     PositionSetpoint,
+    Start,
     VelocitySetpoint,
     testing,
 )
@@ -149,6 +154,51 @@ class Misnamed(Climbs):
         return PositionSetpoint(position_m=(0.0, 0.0, 2.0), speed_mps=-1.0)
 
 
+class NotANumber(Climbs):
+    def step(self, observation: Observation) -> Command:
+        if observation.time_s < 3:
+            return super().step(observation)
+        diagnostics = Diagnostics(phase="outward")
+        if observation.time_s > 3.05:
+            velocity = (math.nan, 0.0, 0.0)
+            return VelocitySetpoint(velocity_mps=velocity, diagnostics=diagnostics)
+        return VelocitySetpoint(velocity_mps=(0.0, 0.0, 0.0), diagnostics=diagnostics)
+
+
+class Misspelled(Climbs):
+    def step(self, observation: Any) -> Command:
+        return PositionSetpoint(position_m=observation.position)
+
+
+class Degrees(Climbs):
+    def step(self, observation: Observation) -> Command:
+        yaw = 90 if observation.time_s > 2 else 0
+        return PositionSetpoint(position_m=(0.0, -16.5, 3.0), yaw_rad=yaw)
+
+
+class TurnsOnce(Climbs):
+    def step(self, observation: Observation) -> Command:
+        return PositionSetpoint(position_m=(0.0, -16.5, 3.0), yaw_rad=-2 * math.pi)
+
+
+class Asynchronous(Climbs):
+    async def step(self, observation: Observation) -> Command:  # type: ignore[override]
+        return super().step(observation)
+
+
+class TellsItsMission(Climbs):
+    def reset(self, mission: Mission) -> None:
+        super().reset(mission)
+        marker = mission.marker_dictionary, mission.marker_id, mission.marker_side_m
+        TOLD.append((*marker, mission.home_m[2]))
+
+    def step(self, observation: Observation) -> Command:
+        return Abort()
+
+
+TOLD: list[tuple[str, int, float, float]] = []
+
+
 @pytest.mark.parametrize("system", [Climbs, OpenCvLandingSystem])
 def test_check_accepts_a_good_system(system: type) -> None:
     check_landing_system(system, seconds=2)
@@ -187,11 +237,12 @@ def test_check_flies_until_landed_and_reports_the_distance() -> None:
     assert len(check.flights) == 2
     assert check.flights[0].startswith("lawn: landed 0.0")
     assert " m off after 2" in check.flights[0]
+    assert check.passed
     (warning,) = check.warnings
     assert warning.startswith("returns no diagnostics: reports cannot say what it saw or intended")
     assert all(f"{name}=" in warning for name in ("target_m", "detections", "phase"))
     assert "ReferencePilot: a flight takes" in str(check)
-    assert "40 flights take about" in str(check)
+    assert "a search of 40 flights takes" in str(check)
 
 
 def test_check_finds_a_flight_that_depends_on_the_one_before() -> None:
@@ -202,17 +253,75 @@ def test_check_finds_a_flight_that_depends_on_the_one_before() -> None:
 @pytest.mark.parametrize(
     ("system", "words"),
     [
-        (GivesUp, ["gave up in a calm scenario", "gave up in both", "no diagnostics"]),
-        (LandsAtHome, ["landed 16.5 m off", "never name a detection"]),
-        (Climbs, ["did not land within 120 s"]),
+        (GivesUp, ["Gave up at", "gave up in both", "no diagnostics"]),
+        (LandsAtHome, ["Landed 16.5 m off the marker", "never name a detection"]),
+        (Climbs, ["Not landed"]),
         (StandsOnItsFeet, ["touched the ground, but its motors did not stop"]),
-        (Skids, ["slid over the ground after its touchdown"]),
+        (Skids, ["and slid on"]),
     ],
 )
-def test_check_warns_of_problems_of_a_search(system: type, words: list[str]) -> None:
-    warnings = check_landing_system(system).warnings
+def test_check_says_that_a_system_does_not_land_in_clear_air(
+    system: type, words: list[str]
+) -> None:
+    check = check_landing_system(system)
+    (fault,) = check.faults
+    assert not check.passed
+    assert fault.startswith("your system does not land in clear air, on lawn")
     for each in words:
-        assert any(each in warning for warning in warnings), warnings
+        assert each in str(check), str(check)
+
+
+def test_a_flight_that_ends_early_is_no_fault() -> None:
+    assert check_landing_system(Climbs, seconds=2).passed
+
+
+def test_check_says_when_and_where_a_command_is_nonsense() -> None:
+    with pytest.raises(LandingSystemError) as raised:
+        check_landing_system(NotANumber)
+    text = str(raised.value)
+    assert "NotANumber.step: at 3.1 s, in the phase take-off, 2." in text
+    assert "m up and 16.5 m from the marker; its own phase was 'outward'" in text
+    assert "velocity_mps = (nan, 0.0, 0.0); expected 3 finite numbers" in text
+
+
+def test_check_says_that_nothing_was_commanded_before_an_error() -> None:
+    with pytest.raises(LandingSystemError, match="before its first command: AttributeError"):
+        check_landing_system(Misspelled)
+
+
+def test_check_names_the_field_that_was_meant() -> None:
+    with pytest.raises(LandingSystemError) as raised:
+        check_landing_system(Misspelled)
+    assert "Observation has no 'position'; did you mean position_m?" in str(raised.value)
+    assert "Lazy" not in str(raised.value)
+
+
+def test_check_refuses_a_yaw_in_degrees() -> None:
+    words = r"at 2\.\d s, in the phase .* returned yaw_rad = 90; expected radians .* degrees\?"
+    with pytest.raises(LandingSystemError, match=words):
+        check_landing_system(Degrees, seconds=4)
+
+
+def test_check_accepts_a_full_turn() -> None:
+    assert check_landing_system(TurnsOnce, seconds=2).passed
+
+
+def test_check_refuses_a_coroutine() -> None:
+    with pytest.raises(LandingSystemError, match=r"Asynchronous\.step is `async def`; expected a"):
+        check_landing_system(Asynchronous)
+
+
+def test_check_flies_the_marker_the_start_and_the_limits_that_are_given() -> None:
+    check = check_landing_system(
+        TellsItsMission,
+        seconds=1,
+        marker=MarkerSpec(dictionary="DICT_4X4_50", id=7, side_m=0.4),
+        start=Start(mode="hover", height_m=5.0),
+        domain="calm",
+        limits=Limits(abort="ok"),
+    )
+    assert TOLD[0] == ("DICT_4X4_50", 7, 0.4, 5.0)
+    assert any("Gave up" in text for text in check.flights)
 
 
 def test_check_of_a_nondeterministic_system_may_only_warn() -> None:
@@ -228,7 +337,8 @@ def test_check_stops_when_its_computing_time_is_used_up() -> None:
 
 
 def test_check_compares_a_slow_system_over_shorter_flights() -> None:
-    calm = testing._Checker(Climbs, "lawn", 20.0, True, 10.0)
+    plan = dataclasses.replace(testing.plan_for(map="lawn"), seconds=20.0, limit_s=10.0)
+    calm = testing._Checker(Climbs, plan)
     first = calm._fly(Climbs, calm._calm, 20.0)
     other = calm._compare(first._replace(cpu_s=5.0))
     assert 2.0 <= other.flight.elapsed_s < 5.0

@@ -4,25 +4,31 @@ from __future__ import annotations
 
 import faulthandler
 import sys
+from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import click
 
 from pytest_garl.errors import LandingSystemError
+from pytest_garl.messages import python_that_lacks
+
+if TYPE_CHECKING:
+    from pytest_garl.testing import CheckPlan
 
 LIMIT_S = 1800.0
 """The command ends after this wall time in any case, with a traceback."""
+DEFAULT_MAP = "lawn"
 
 
 @click.command()
-@click.argument("system", metavar="MODULE:CLASS")
+@click.argument("targets", metavar="TEST_FILE|MODULE:CLASS", nargs=-1, required=True)
 @click.option(
     "--map",
     "maps",
     multiple=True,
-    default=("lawn",),
-    show_default=True,
-    help="Map to fly on; may be given several times.",
+    help="Map to fly on; may be given several times.  [default: the maps of the test, or lawn]",
 )
 @click.option(
     "--seconds",
@@ -35,27 +41,76 @@ LIMIT_S = 1800.0
     help="Only warn if equal flights differ (as deterministic=False in the marker).",
 )
 def check(
-    system: str, maps: tuple[str, ...], seconds: float | None, nondeterministic: bool
+    targets: tuple[str, ...], maps: tuple[str, ...], seconds: float | None, nondeterministic: bool
 ) -> None:
     """Fly a landing system without moving objects and name its faults.
 
-    It flies two scenarios, and the first one again. Run it where you run pytest. The exit status is
-    1 if there is a fault that a search would meet in every flight. Warnings name other problems of
-    a search.
-    """
-    from pytest_garl.testing import check_landing_system
+    Of a test file, such as test_my_landing.py, also with ::test_name, it takes landing system,
+    marker, start, domain, limits and maps. A class, such as my_landing:MyLandingSystem, is flown
+    from the ground to the marker of the map.
 
+    It flies two scenarios, and the first one again. Run it where you run pytest. The exit status is
+    1 if there is a fault that a search would meet in every flight, as if it does not land in clear
+    air. Warnings name other problems of a search.
+    """
+    from pytest_garl.testing import check_as_planned
+
+    planned = [each for target in targets for each in _planned(target, maps)]
+    passed = True
     # Nothing else interrupts a call that hangs in C code and holds the interpreter.
     faulthandler.dump_traceback_later(LIMIT_S, exit=True, file=sys.__stderr__ or 2)
     try:
-        found = imported_system(system)
-        for name in maps:
-            result = check_landing_system(
-                found, map=name, seconds=seconds, deterministic=not nondeterministic
-            )
+        for system, plan in planned:
+            deterministic = plan.deterministic and not nondeterministic
+            plan = replace(plan, seconds=seconds, deterministic=deterministic)
+            result = check_as_planned(system, plan)
             click.echo(result)
+            passed &= result.passed
     finally:
         faulthandler.cancel_dump_traceback_later()
+    if not passed:
+        raise SystemExit(1)
+
+
+def _planned(target: str, maps: tuple[str, ...]) -> Iterator[tuple[type, CheckPlan]]:
+    """Yield what is to be flown for a test file or a class."""
+    file = Path(target.partition("::")[0])
+    if file.exists() or file.suffix == ".py" or "::" in target:
+        yield from _planned_for_tests(target, maps)
+        return
+    from pytest_garl.testing import plan_for
+
+    system = imported_system(target)
+    for name in maps or (DEFAULT_MAP,):
+        yield system, plan_for(map=name)
+
+
+def _planned_for_tests(target: str, maps: tuple[str, ...]) -> Iterator[tuple[type, CheckPlan]]:
+    """Yield what the tests in a file fly; several tests of one landing system fly it once."""
+    from pytest_garl.plugin.tests_of_file import targets_of
+    from pytest_garl.scenarios.maps.map import load_map
+    from pytest_garl.testing import CheckPlan
+
+    flown: list[tuple[type, CheckPlan]] = []
+    for found, folders in targets_of(target):
+        assert found.domain is not None, "a marker's target has a domain"
+        if maps and found.map not in maps:
+            continue
+        plan = CheckPlan(
+            map=load_map(found.map, folders),
+            task=found.task,
+            domain=found.domain,
+            limits=found.limits,
+            deterministic=found.deterministic,
+        )
+        if (found.system, plan) not in flown:
+            flown.append((found.system, plan))
+    if not flown:
+        raise LandingSystemError(
+            f"{target}: its tests do not fly on {', '.join(maps)}; give a map that their markers "
+            "name"
+        )
+    yield from flown
 
 
 def imported_system(name: str) -> type:
@@ -67,8 +122,10 @@ def imported_system(name: str) -> type:
     try:
         system: type = system_named(name)
     except LandingSystemError as error:
+        python = python_that_lacks(str(error))
         raise LandingSystemError(
-            f"{name!r}: cannot be imported as a landing system ({error}); expected "
-            "MODULE:CLASS, as my_landing:MyLandingSystem, found from the current folder"
+            f"{name!r}: cannot be imported as a landing system ({error}){python}; "
+            "expected MODULE:CLASS, as my_landing:MyLandingSystem, found from the current folder, "
+            "or a test file"
         ) from error
     return system

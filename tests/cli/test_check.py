@@ -1,12 +1,15 @@
 from __future__ import annotations
 
+import platform
 import sys
 from pathlib import Path
 
 import pytest
 from click.testing import CliRunner, Result
 
+from pytest_garl import Start
 from pytest_garl.cli import main
+from pytest_garl.cli.check import _planned
 
 SYSTEM = """
 from pytest_garl import PositionSetpoint
@@ -28,6 +31,36 @@ class Backwards(Climbs):
 
 class Big(Climbs):
     airframe = "big"
+
+
+class Other(Climbs):
+    pass
+"""
+TESTS = """
+import pytest
+from pytest_garl import MarkerSpec, Start, limits
+from checked_stack import Climbs, Other
+
+HOVER = Start(mode="hover", height_m=5.0)
+
+
+class TestClimbs:
+    pytestmark = pytest.mark.garl(system=Climbs, maps=["court", "lawn"], domain="calm")
+
+    def test_lands(self, landing):
+        assert False
+
+    def test_lands_in_time(self, landing):
+        assert False
+
+
+@pytest.mark.garl(system=Other, maps=["lawn"], start=HOVER, limits=limits(time_s=3, abort="ok"))
+def test_other(landing):
+    assert False
+
+
+def test_without_flights():
+    assert False
 """
 
 
@@ -35,11 +68,16 @@ class Big(Climbs):
 def project(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(sys, "path", [*sys.path])
+    for name in ("checked_stack", "test_checked"):
+        monkeypatch.delitem(sys.modules, name, raising=False)
     (tmp_path / "checked_stack.py").write_text(SYSTEM)
     (tmp_path / "heavy_stack.py").write_text(
         "from pytest_garl import Airframe\nAIRFRAME = Airframe(mass_kg=-1)\n"
     )
     (tmp_path / "broken_stack.py").write_text("1 / 0\n")
+    (tmp_path / "test_checked.py").write_text(TESTS)
+    (tmp_path / "test_unknown_module.py").write_text("import no_such_module\n")
+    (tmp_path / "pytest.ini").write_text("[pytest]\naddopts = -q\n")
 
 
 def garl(*arguments: str) -> Result:
@@ -54,6 +92,65 @@ def test_check_prints_its_observations_and_exits_with_zero() -> None:
     assert "warning: returns no diagnostics" in done.output
 
 
+def test_check_exits_with_one_if_a_system_does_not_land() -> None:
+    done = garl("test_checked.py::test_other")
+    assert done.exit_code == 1
+    assert "fault: your system does not land in clear air, on lawn" in done.output
+
+
+def test_check_takes_systems_and_maps_from_the_tests_of_a_file_and_runs_none() -> None:
+    done = garl("test_checked.py", "--seconds=1")
+    assert done.exit_code == 0, done.output
+    lines = [line for line in done.output.splitlines() if ": Not landed" in line]
+    flown = [line.partition(": Not landed")[0] for line in lines]
+    assert flown == [
+        "Climbs: court",
+        "Climbs: court, another scenario",
+        "Climbs: lawn",
+        "Climbs: lawn, another scenario",
+        "Other: lawn",
+        "Other: lawn, another scenario",
+    ]
+    assert "5.0 s the UAV" not in done.output
+
+
+def test_check_takes_the_task_of_one_test() -> None:
+    (system, plan), *others = _planned("test_checked.py::test_other", ())
+    assert not others
+    assert system.__name__ == "Other"
+    assert plan.task.start == Start(mode="hover", height_m=5.0)
+    assert (plan.limits.time_s, plan.limits.abort) == (3, "ok")
+    assert plan.domain.name == "field"
+    (_, first), (_, second) = _planned("test_checked.py::TestClimbs", ())
+    assert first.domain.name == "calm"
+    assert (first.map.name, second.map.name) == ("court", "lawn")
+    ((_, selected),) = _planned("test_checked.py::TestClimbs::test_lands", ("lawn",))
+    assert selected == second
+
+
+@pytest.mark.parametrize(
+    ("target", "words"),
+    [
+        ("test_checked.py::test_without_flights", "found no landing test; expected one that takes"),
+        ("test_checked.py::test_missing", "test_missing"),
+        ("test_missing.py", "file or directory not found: test_missing.py"),
+        ("test_unknown_module.py", f"this is Python {platform.python_version()}"),
+        ("test_unknown_module.py", "No module named 'no_such_module'"),
+    ],
+)
+def test_check_says_why_a_file_has_nothing_to_fly(target: str, words: str) -> None:
+    done = garl(target)
+    assert done.exit_code == 1
+    assert words in done.output
+    assert "INTERNALERROR" not in done.output
+
+
+def test_check_flies_on_no_map_that_the_tests_do_not_name() -> None:
+    done = garl("test_checked.py::test_other", "--map=court")
+    assert done.exit_code == 1
+    assert "its tests do not fly on court" in done.output
+
+
 @pytest.mark.parametrize(
     ("system", "words"),
     [
@@ -62,6 +159,7 @@ def test_check_prints_its_observations_and_exits_with_zero() -> None:
         ("checked_stack:Nothing", "has no attribute 'Nothing'"),
         ("checked_stack", "expected MODULE:CLASS"),
         ("no_stack:Climbs", "No module named 'no_stack'"),
+        ("no_stack:Climbs", f"this is Python {platform.python_version()} at {sys.executable}"),
         ("heavy_stack:Climbs", "Airframe.mass_kg = -1; expected a number from 0.1 to 100 kg"),
         ("broken_stack:Climbs", "cannot be imported as a landing system (ZeroDivisionError"),
     ],

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Callable
 from typing import Any, TypeVar
 
@@ -26,7 +27,17 @@ class LazyObservation(Observation):
     """
 
     __slots__ = ("_paint",)
+    __qualname__ = "Observation"  # It shows itself under the name that users know.
     _paint: Callable[[], NDArray[np.uint8]]
+
+    def __getattr__(self, name: str) -> Any:
+        """Say which field was meant; Python calls this for names that are not there."""
+        from difflib import get_close_matches
+
+        fields = [each.name for each in dataclasses.fields(Observation)]
+        near = get_close_matches(name, fields, n=1)
+        hint = f"did you mean {near[0]}?" if near else f"it has {', '.join(fields)}"
+        raise AttributeError(f"Observation has no {name!r}; {hint}")
 
     @property
     def image(self) -> NDArray[np.uint8]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import inspect
 import math
 from typing import Any
 
@@ -41,6 +42,12 @@ def read_command(answer: Any, quota: DiagnosticsQuota) -> Command:
     flight's record still takes of diagnostics.
     """
     kind = next((kind for kind in COMMANDS if isinstance(answer, kind)), None)
+    if inspect.iscoroutine(answer):
+        answer.close()  # Python would warn that nobody awaited it.
+        raise NonsenseError(
+            "step is `async def`: it returned a coroutine, which nobody awaits; expected a plain "
+            "`def` that returns a command"
+        )
     if kind is None:
         names = ", ".join(kind.__name__ for kind in COMMANDS)
         raise NonsenseError(f"step returned {shown(answer)}; expected one of {names}")

@@ -71,6 +71,10 @@ def to(*position: Any, **more: Any) -> PositionSetpoint:
     return PositionSetpoint(position_m=position, **more)
 
 
+async def asynchronous() -> Command:
+    return Land()
+
+
 WRONG: list[tuple[Callable[[], Any], str, str]] = [
     # Limits of a setpoint.
     (lambda: to(0.0, 0.0, 1.0, acceleration_mps2=0.0), "BadCommand", "acceleration_mps2 = 0"),
@@ -116,6 +120,7 @@ WRONG: list[tuple[Callable[[], Any], str, str]] = [
     (lambda: land_with(phase=Raises()), "RuntimeError", "no text"),
     (lambda: land_with(note=Raises()), "RuntimeError", "no text"),
     # Commands.
+    (lambda: asynchronous(), "BadCommand", "step is `async def`: it returned a coroutine"),
     (lambda: to(HUGE, 0.0, 2.0), "BadCommand", "position_m"),
     (lambda: to(1e9, 0.0, 2.0), "BadCommand", "expected each from -1000 to 1000 m"),
     (lambda: to(0.0, 2.0), "BadCommand", "expected 3 finite numbers"),
