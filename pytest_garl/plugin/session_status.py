@@ -89,6 +89,8 @@ def problems(tally: Tally, run: Run | None, options: Options) -> Iterator[str]:
         searches = tally.search_summaries(run.ledger)
         yield from _inconclusive(searches)
         yield from _unrepeated(tally, searches)
+        if not run.options.repeat:
+            yield from _without_landing(searches)
     if (options.searches_or_repeats or "map" in options.given) and tally.items and not tally.flown:
         yield f"nothing was flown, although flights were asked for: {_why_nothing_flew(tally)}"
 
@@ -124,6 +126,16 @@ def _inconclusive(searches: Sequence[SearchSummary]) -> Iterator[str]:
                 f"{search.name} on {search.map}: {len(slots)} of {flown} flights are inconclusive, "
                 f"at most {allowed} may be: {_names(slots)}. Fly them while the machine has "
                 "nothing else to do, or allow more time with --garl-timeout"
+            )
+
+
+def _without_landing(searches: Sequence[SearchSummary]) -> Iterator[str]:
+    """Yield in which searches no flight landed within the limits, whatever is known of them."""
+    for search in searches:
+        if not any(each.completed and not each.violation for each in search.verdicts):
+            yield (
+                f"{search.name} on {search.map}: landed within the limits in none of "
+                f"{counted(len(search.flights), 'flight')}, so nothing shows that it can land"
             )
 
 

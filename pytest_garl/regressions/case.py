@@ -219,9 +219,10 @@ class Case:
     def expects_signature(self) -> bool:
         """Whether it excuses other violations with its signature.
 
-        A case that nobody could prevent excuses only itself: the next one may be preventable.
+        A case that gates nothing excuses nothing but itself.  The next collision may be
+        preventable, and one on an edge says little about violations that are not.
         """
-        return self.status == "open" and self.reason not in ("sensor-limited", "unpreventable")
+        return self.status == "open" and self.gates
 
     @property
     def id(self) -> str:

@@ -99,7 +99,7 @@ class Corpus:
     ) -> dict[str, CorpusEntry]:
         """Return the signatures that open cases expect of a system on a map, with their files.
 
-        A case that nobody could prevent says nothing about other violations with its signature.
+        A case that gates nothing says nothing about other violations with its signature.
         ``accepted`` leaves out cases that are not accepted.
         """
         return {
@@ -141,12 +141,14 @@ class Corpus:
     def _find(self, case: Case) -> CorpusEntry | None:
         """Return the file that expects the same failure: system, map, signature and test.
 
-        A case that nobody could prevent expects no failure but its own.
+        A case that gates nothing expects no failure but its own, so that a robust one of its
+        signature is saved beside it.  A second case on an edge would say nothing more.
         """
         for entry in self.entries(case.system):
             if entry.case is None or _failure(entry.case) != _failure(case):
                 continue
-            if entry.case.expects_signature or entry.name == case.id:
+            both_on_edge = case.edge and entry.case.edge and entry.case.status == "open"
+            if entry.case.expects_signature or both_on_edge or entry.name == case.id:
                 return entry
         return None
 

@@ -109,8 +109,8 @@ def test_summary_says_why_nothing_was_flown(pytester: pytest.Pytester) -> None:
 
 def test_summary_notes_a_violation_that_no_test_asserts(pytester: pytest.Pytester) -> None:
     write_tests(pytester, "Good", COLLISIONS)
-    result = run(pytester, "--garl-budget=1", "--garl-workers=0")
-    result.assert_outcomes(passed=1)
+    result = run(pytester, "--garl-budget=2", "--garl-workers=0")
+    result.assert_outcomes(passed=2)
     result.stdout.fnmatch_lines(["garl: no selected test fails for *: I:nothing:unseen (1 flight)"])
 
 

@@ -88,14 +88,28 @@ def test_open_case_expects_its_signature_on_its_map(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize(
     ("status", "reason"),
-    [("fixed", ""), ("open", "sensor-limited"), ("open", "unpreventable")],
+    [("fixed", ""), ("open", "edge"), ("open", "sensor-limited"), ("open", "unpreventable")],
 )
-def test_fixed_and_unpreventable_cases_expect_no_signature(
+def test_cases_that_are_fixed_or_gate_nothing_expect_no_signature(
     tmp_path: Path, status: Status, reason: NoGateReason
 ) -> None:
     corpus = Corpus(tmp_path)
     corpus.save(dataclasses.replace(case(), status=status, reason=reason))
     assert corpus.expected_signatures(SYSTEM, "lawn") == {}
+
+
+def test_robust_case_is_saved_beside_one_on_an_edge_and_a_second_one_on_an_edge_is_not(
+    tmp_path: Path,
+) -> None:
+    corpus = Corpus(tmp_path)
+    edge = dataclasses.replace(case(), reason="edge")
+    other_moves = dataclasses.replace(edge, moves=((edge.moves[0][0], ((0.1, 0.0),)),))
+    assert corpus.save(edge) is not None
+    assert corpus.save(other_moves) is None
+    robust = dataclasses.replace(other_moves, reason="")
+    assert corpus.save(robust) is not None
+    assert [*corpus.expected_signatures(SYSTEM, "lawn")] == [robust.violation.signature]
+    assert corpus.save(dataclasses.replace(robust, moves=())) is None
 
 
 def test_save_sees_cases_of_other_processes(tmp_path: Path) -> None:
