@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import re
 import reprlib
+import shlex
 import sys
 import unicodedata
 from collections.abc import Iterable
@@ -16,11 +18,20 @@ def printable(text: str, *, keep: str = "\n\t") -> str:
 
     These are control characters, the escape sequences that begin with one, marks that turn the
     direction of writing, and halves of characters that no terminal can encode.  What is in
-    ``keep`` stays; pass an empty string for what must be one line.
+    ``keep`` stays; pass an empty string for what must be one line.  The commands of build servers
+    get a backslash: ``\::error`` (GitHub obeys it at the start of a line, after spaces, too) and
+    ``#\#[error]`` (anywhere; also ``##vso[`` and ``##teamcity[``).
     """
+    if "::" in text or "##" in text:
+        text = _LOG_COMMAND.sub(lambda found: _defused(found[0]), text)
     if text.isprintable():
         return text
     return "".join(char if char in keep or _is_seen(char) else _written_out(char) for char in text)
+
+
+def _defused(command: str) -> str:
+    # Not an invisible mark: a comparison that heeds the language skips it.
+    return f"\\{command}" if command.startswith(":") else "#\\#"
 
 
 def _is_seen(char: str) -> bool:
@@ -30,6 +41,11 @@ def _is_seen(char: str) -> bool:
 
 def _written_out(char: str) -> str:
     return char.encode("unicode_escape").decode("ascii")
+
+
+def command(*words: object) -> str:
+    """Return a command that somebody may paste into a shell, whatever its words hold."""
+    return " ".join(shlex.quote(printable(str(word), keep="")) for word in words)
 
 
 def shortened(text: str, limit: int = SHOWN) -> str:
@@ -62,6 +78,7 @@ def brief(value: object) -> str:
     return _REPR.repr(value)
 
 
+_LOG_COMMAND = re.compile(r"(?<!\S)::|##(?=\w*\[)")
 _REPR = reprlib.Repr()
 _REPR.maxlevel = 4
 _REPR.maxstring = _REPR.maxlong = _REPR.maxother = SHOWN

@@ -1,11 +1,13 @@
 from __future__ import annotations
 
+import shlex
+
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from pytest_garl.errors import GarlError, ScenarioError
-from pytest_garl.messages import SHOWN, listed, printable, shortened, shown
+from pytest_garl.messages import SHOWN, command, listed, printable, shortened, shown
 
 
 @pytest.mark.parametrize(
@@ -23,6 +25,30 @@ from pytest_garl.messages import SHOWN, listed, printable, shortened, shown
 )
 def test_control_characters_are_written_out_and_text_stays(found: str, seen: str) -> None:
     assert printable(found) == seen
+
+
+@pytest.mark.parametrize(
+    ("found", "seen"),
+    [
+        ("::error::no plan", "\\::error::no plan"),
+        ("no plan\n  ::add-mask::a", "no plan\n  \\::add-mask::a"),
+        # Wrapped, any word may begin a line.
+        ("no plan ::stop-commands::x", "no plan \\::stop-commands::x"),
+        ("so ##[error]no plan", "so #\\#[error]no plan"),
+        ("##vso[task.complete]", "#\\#vso[task.complete]"),
+        ("std::vector in test_it.py::test_x, ## 3", "std::vector in test_it.py::test_x, ## 3"),
+    ],
+)
+def test_text_cannot_command_a_build_server(found: str, seen: str) -> None:
+    assert printable(found) == seen
+    assert printable(seen) == seen
+
+
+def test_command_keeps_each_word_in_any_shell() -> None:
+    words = ("pytest", "test_it.py::test[a b]", "--garl-repeat=$(touch x)`;`'\"!-g00-s00", "\x1b")
+    text = command(*words)
+    assert shlex.split(text) == [*words[:-1], "\\x1b"]
+    assert command("garl", "cases", "show", "a/b-1.toml") == "garl cases show a/b-1.toml"
 
 
 def test_one_line_is_one_line() -> None:

@@ -14,6 +14,7 @@ from rich.table import Table
 from rich.text import Text
 
 from pytest_garl.errors import OptionError
+from pytest_garl.messages import command
 from pytest_garl.scenarios.domains.names import DEFAULT_DOMAIN, OLD_WEATHER
 from pytest_garl.verdicts.verdict import DEFAULT_LIMITS
 
@@ -155,7 +156,7 @@ def save(
     save_baseline(out, recorded)
     for each in recorded.sets:
         _show_set(each)
-    click.echo(f"saved {out}; compare with it: pytest --garl-baseline={out}")
+    click.echo(f"saved {out}; compare with it: {command('pytest', f'--garl-baseline={out}')}")
 
 
 @baseline.command()

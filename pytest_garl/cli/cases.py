@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-import shlex
 from pathlib import Path
 
 import click
@@ -15,7 +14,7 @@ from pytest_garl.cli.case_tables import (
     scenario_table,
 )
 from pytest_garl.errors import GarlError
-from pytest_garl.messages import printable
+from pytest_garl.messages import command, printable
 from pytest_garl.regressions.case import NO_GATE_TEXTS, Case, NoGateReason
 from pytest_garl.regressions.case_file import load_case
 from pytest_garl.regressions.corpus import Corpus, replace_file
@@ -101,7 +100,7 @@ def list_(project: _Project) -> None:
     ]
     if new:
         say("\nNew, so that pytest fails on them until they are fixed, committed or accepted:")
-        say("    garl cases accept " + " \\\n        ".join(shlex.quote(each) for each in new))
+        say("    garl cases accept " + " \\\n        ".join(command(each) for each in new))
 
 
 @cases.command()
@@ -127,7 +126,7 @@ def show(project: _Project, file: Path) -> None:
     tried = f"{case.robustness}; " if case.robustness else ""
     moved = f"; objects were moved by {case.policy}" if case.moves else ""
     say(f"\n{tried}shrinking removed {evidence.removed}{moved}")
-    say(f"Fly it: garl cases replay {file}")
+    say(f"Fly it: {command('garl', 'cases', 'replay', file)}")
 
 
 @cases.command("replay")
@@ -267,7 +266,8 @@ def shrink(project: _Project, file: Path, flights: int, workers: int) -> None:
     result = shrink_case(case, project.root, project.maps, flights, workers, setup)
     spent = f"{result.flights} flights"
     if result.case is None and result.reason != NOTHING_SIMPLER:
-        raise GarlError(f"{file}: {result.reason}; `garl cases replay {file}` shows how it ends")
+        replay = command("garl", "cases", "replay", file)
+        raise GarlError(f"{file}: {result.reason}; `{replay}` shows how it ends")
     if result.case is None:
         say(f"{file}: {result.reason} ({spent}); it stays as it is")
         return

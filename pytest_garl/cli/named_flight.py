@@ -15,7 +15,7 @@ from pytest_garl.execution.stored_ledger import checked_ledger, flown_slots
 from pytest_garl.files.reading import read_text
 from pytest_garl.files.toml import parse
 from pytest_garl.landing_system import airframe_of
-from pytest_garl.messages import shortened
+from pytest_garl.messages import command, shortened
 from pytest_garl.regressions.case import Case
 from pytest_garl.regressions.case_file import load_case
 from pytest_garl.regressions.corpus import Corpus
@@ -232,7 +232,8 @@ def flown_again(
 ) -> NamedFlight:
     """Return the flight of a case that was replayed; raise GarlError if it left no record."""
     if replayed.flight is None:
-        raise GarlError(f"{file}: {NO_RECORD}; `garl cases replay {file}` says how it ends")
+        replay = command("garl", "cases", "replay", file)
+        raise GarlError(f"{file}: {NO_RECORD}; `{replay}` says how it ends")
     other = " (another flight than the saved one)" if replayed.same_flight is False else ""
     return NamedFlight(
         name=f"{case.id}{_LIVE if live else ''}",
@@ -285,9 +286,9 @@ def _how_to_fly_again(slot: str, ledger: Path) -> str:
     """Return the commands that fly a slot again; none for a ledger that pytest does not read."""
     if ledger.name != LEDGER.name:
         return ""
-    where = "" if ledger.parent == LEDGER.parent else f" -o garl_dir={ledger.parent}"
-    return (
-        f" To fly it again: pytest --garl-repeat={slot}{where}, then name {slot} with "
+    where = () if ledger.parent == LEDGER.parent else ("-o", f"garl_dir={ledger.parent}")
+    repeat = command("pytest", f"--garl-repeat={slot}", *where)
+    return f" To fly it again: {repeat}, then name {slot} with " + command(
         f"--ledger={ledger.with_name(REPEATED)}"
     )
 
@@ -303,7 +304,7 @@ def _case_file(file: Path) -> Path:
         slot = FIRST_SLOT.id(shortened(str(values.get("map", "MAP"))))
         raise GarlError(
             f"{file}: found no evidence of a flight, expected a saved case. If it is a scenario, "
-            f"fly it first: pytest --garl-repeat={file}, then name {slot} with "
+            f"fly it first: {command('pytest', f'--garl-repeat={file}')}, then name {slot} with "
             f"--ledger={LEDGER.with_name(REPEATED)}"
         )
     return file

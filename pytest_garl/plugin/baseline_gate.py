@@ -17,15 +17,13 @@ from pytest_garl.baselines.file import Baseline, BaselineSet, load_baseline
 from pytest_garl.baselines.gate import compare_flights
 from pytest_garl.baselines.pairs import PairResult
 from pytest_garl.errors import GarlError
+from pytest_garl.messages import command
 from pytest_garl.plugin.abort import abort_session
-from pytest_garl.plugin.keys import GATE_PLUGIN, RUN, is_xdist_worker
+from pytest_garl.plugin.keys import GATE_PLUGIN, GATE_REPORT, RUN, is_xdist_worker
 from pytest_garl.plugin.marker import read_marker
 from pytest_garl.plugin.options import Options
 from pytest_garl.plugin.run import Run
 from pytest_garl.plugin.target import Target
-
-GATE_REPORT = "garl.gate"
-"""The user property with one line that a gate reports; the summary writes them all."""
 
 
 def register(config: pytest.Config, options: Options) -> None:
@@ -97,8 +95,8 @@ class BaselineGateItem(pytest.Item):
         names += [each.worst[0] for each in comparison.sizes if comparison.is_significant(each)]
         if names:
             yield (
-                f"fly it: garl baseline scenario {file} {names[0]} > one.toml; "
-                f"pytest --garl-repeat=one.toml --garl-npcs={self.garl_gate.npcs}"
+                f"fly it: {command('garl', 'baseline', 'scenario', file, names[0])} > one.toml; "
+                + command("pytest", "--garl-repeat=one.toml", f"--garl-npcs={self.garl_gate.npcs}")
             )
 
     def reportinfo(self) -> tuple[os.PathLike[str] | str, int | None, str]:

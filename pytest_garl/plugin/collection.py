@@ -10,6 +10,7 @@ import pytest
 
 from pytest_garl.errors import GarlError
 from pytest_garl.execution.flight_id import slots
+from pytest_garl.messages import command
 from pytest_garl.plugin.marker import MarkerArguments, read_marker
 from pytest_garl.plugin.options import Options
 from pytest_garl.plugin.target import Target
@@ -77,9 +78,10 @@ def _repeated_targets(arguments: MarkerArguments, map: str, options: Options) ->
 
         text = Path(options.repeat).read_text(encoding="utf-8")
         if "violation" in parse(text, options.repeat):
+            replay = command("garl", "cases", "replay", options.repeat)
             raise GarlError(
                 f"--garl-repeat={options.repeat}: found a saved case, expected a slot or a file "
-                f"with a scenario; cases are flown by: garl cases replay {options.repeat}"
+                f"with a scenario; cases are flown by: {replay}"
             )
         if map_name_in(text, source=options.repeat) != map:
             return []

@@ -69,7 +69,7 @@ def write_step_summary(
     parts = [table(SHARES, [_shares(search) for search in searches])] if searches else []
     none = f"No violation{f' in {flown} flights' if flown else ''}."
     parts += [
-        f"{_where(search)}: {escaped(line)}" for search in searches for line in kinds_lines(search)
+        escaped(f"{_where(search)}: {line}") for search in searches for line in kinds_lines(search)
     ]
     parts.append(_kinds_table(rows) if rows else none)
     parts += index_parts(report.page, report.index.parent, url) if report else ()

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import pytest
 
 from pytest_garl.execution.result import FlightResult
+from pytest_garl.messages import command
 from pytest_garl.plugin.item_facts import ItemFailure, divergence_s
 from pytest_garl.plugin.outcomes import CaseState, Decision, FailedItem, Reason, Reflights
 from pytest_garl.plugin.run import Run
@@ -65,7 +66,7 @@ def passing_failure(decision: Decision, file: str, unproven: str) -> str:
     maybe = f"stale, {unproven}" if decision.reason is Reason.STALE else "maybe fixed"
     return (
         f"{file} is open but passes (garl_xfail_strict): {maybe}; "
-        f"if it is fixed: garl cases promote {file}"
+        f"if it is fixed: {command('garl', 'cases', 'promote', file)}"
     )
 
 
@@ -118,11 +119,12 @@ def case_text(
         f"Saved: {case.violation.signature}. {case.violation.description}",
         f"Flown: {signature}. {story}",
     ]
-    replay = f"See it: garl cases replay {file}"
+    replay = f"See it: {command('garl', 'cases', 'replay', file)}"
     # The first line holds a path, so it is not wrapped.
     lines = [f"The case {file} {state}.", *_wrapped(paragraphs, config), replay]
     if decision.reason is Reason.NEW_CASE:
-        lines.append(f"If that is known: commit it, or: garl cases accept {file}")
+        accept = command("garl", "cases", "accept", file)
+        lines.append(f"If that is known: commit it, or: {accept}")
     # What happened comes first because pytest cuts the line at its end.
     return FailureText(
         lines=tuple(lines), headline=f"{headline(story)}; this case {state}", command=replay

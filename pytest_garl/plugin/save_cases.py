@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import functools
 import os
-import shlex
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
@@ -12,6 +11,7 @@ from typing import Any
 import pytest
 
 from pytest_garl.errors import GarlError
+from pytest_garl.messages import command
 from pytest_garl.plugin.keys import is_xdist_worker
 from pytest_garl.plugin.options import SHRINK
 from pytest_garl.plugin.progress_display import show_progress
@@ -111,7 +111,7 @@ def saved_lines(investigated: Sequence[InvestigatedSignature], config: pytest.Co
     width = width_of(config)
     lines = [line for each in investigated for line in _lines_about(each, config, width)]
     files = [each.file for each in investigated if each.file is not None]
-    patches = [shlex.quote(shown_path(file, config)) for file in files if file.suffix == _PATCH]
+    patches = [command(shown_path(file, config)) for file in files if file.suffix == _PATCH]
     if patches:
         lines.append("Nothing in the tree was changed (CI is set). To keep the cases:")
         lines.append(" \\\n        ".join(["    git apply", *patches]))

@@ -97,7 +97,7 @@ def problems(tally: Tally, run: Run | None, options: Options) -> Iterator[str]:
 
 def notes(tally: Tally) -> Iterator[str]:
     """Yield what a green session leaves open."""
-    if tally.items and not tally.flown:
+    if tally.items and not tally.flown and not tally.gated:
         yield f"nothing was flown: {_why_nothing_flew(tally)}"
     if tally.unasserted:
         kinds = [f"{name} ({counted(n, 'flight')})" for name, n in tally.unasserted.most_common()]

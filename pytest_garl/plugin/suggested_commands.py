@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import shlex
+from collections.abc import Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import pytest
 
-from pytest_garl.messages import printable
+from pytest_garl.messages import command, printable
 
 if TYPE_CHECKING:
     from pytest_garl.plugin.target import Target
@@ -17,18 +17,17 @@ if TYPE_CHECKING:
 _FOLDERS = ("garl_dir", "garl_cases")
 
 
-def repeat_command(config: pytest.Config, test: str, scenario: str) -> str:
-    """Return the command that flies a scenario again in ``test``, a node id or several files."""
-    return " ".join(
-        filter(None, ["pytest", test, f"--garl-repeat={scenario}", *_location_options(config)])
-    )
+def repeat_command(config: pytest.Config, tests: Iterable[str], scenario: str) -> str:
+    """Return the command that flies a scenario again in ``tests``, a node id or several files."""
+    repeat = f"--garl-repeat={scenario}"
+    return command("pytest", *tests, repeat, *_location_options(config))
 
 
 def repeat_line(item: pytest.Item, target: Target) -> str:
     """Return the line of a failure with the command that repeats its scenario."""
     nodeid: Any = item.nodeid
-    test = f'"{item.config.cwd_relative_nodeid(nodeid)}"'
-    return f"Repeat: {repeat_command(item.config, test, target.file or target.name)}"
+    test = str(item.config.cwd_relative_nodeid(nodeid))
+    return f"Repeat: {repeat_command(item.config, [test], target.file or target.name)}"
 
 
 def _location_options(config: pytest.Config) -> list[str]:
@@ -36,10 +35,10 @@ def _location_options(config: pytest.Config) -> list[str]:
     found = []
     for option, value in (("-c", config.option.inifilename), ("--rootdir", config.option.rootdir)):
         if value:
-            found += [option, shlex.quote(str(value))]
+            found += [option, str(value)]
     for given in config.option.override_ini or ():
         if given.partition("=")[0].strip() in _FOLDERS:
-            found += ["-o", shlex.quote(given)]
+            found += ["-o", given]
     return found
 
 
@@ -52,5 +51,5 @@ def shown_path(path: Path, config: pytest.Config) -> str:
 
 def repeat_kind_command(search: SearchSummary, kind: ViolationKind, config: pytest.Config) -> str:
     """Return the command that repeats the first flight of a kind."""
-    files = " ".join(shown_path(config.rootpath / file, config) for file in search.files)
+    files = [shown_path(config.rootpath / file, config) for file in search.files]
     return repeat_command(config, files, kind.first)

@@ -10,6 +10,7 @@ from typing import Any
 
 import pytest
 
+from pytest_garl.messages import command
 from pytest_garl.plugin.films import film_lines
 from pytest_garl.plugin.header import cpu_dispatch_warning
 from pytest_garl.plugin.keys import CASE, MAYBE_FIXED, OUTSIDE, STALE
@@ -74,10 +75,11 @@ def _passing_cases(reporter: Any) -> list[str]:
     failing = _property_values(reporter, ("failed", "xfailed"), CASE)
     fixed = _property_values(reporter, ("passed",), MAYBE_FIXED) - failing
     stale = _property_values(reporter, ("passed",), STALE)
+    promote = {file: command("garl", "cases", "promote", file) for file in sorted(fixed)}
     return [
         *(
-            f"maybe fixed: {file} passes; if it is fixed:\n    garl cases promote {file}"
-            for file in sorted(fixed)
+            f"maybe fixed: {file} passes; if it is fixed:\n    {text}"
+            for file, text in promote.items()
         ),
         *(f"stale: {text}" for text in sorted(stale)),
     ]

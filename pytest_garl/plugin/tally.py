@@ -10,6 +10,7 @@ import pytest
 
 from pytest_garl.plugin.keys import (
     DUPLICATE_OF,
+    GATE_REPORT,
     LEFT_TO_ANOTHER,
     NO_FLIGHT,
     NOT_REPEATED,
@@ -33,6 +34,8 @@ class Tally:
         self.items: set[str] = set()
         self.no_flight: Counter[str] = Counter()
         self.flown = False
+        self.gated = False
+        """Whether a baseline's gate has flown."""
         self.not_repeated: set[tuple[str, ...]] = set()
         self.problems: list[str] = []
         self.interrupted = False
@@ -55,6 +58,7 @@ class Tally:
             for noted in (self._user_failures, self._shown, self._left_to_others):
                 noted.pop(report.nodeid, None)
         properties = dict(report.user_properties)
+        self.gated = self.gated or GATE_REPORT in properties
         if SLOT not in properties or report.when == "teardown":
             return
         if NO_FLIGHT in properties and report.nodeid not in self.items:

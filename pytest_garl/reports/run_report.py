@@ -17,6 +17,7 @@ from typing import Any
 from pytest_garl.errors import LedgerError
 from pytest_garl.execution.ledger import Ledger
 from pytest_garl.execution.ledger_queries import LedgerFlight
+from pytest_garl.messages import command
 from pytest_garl.regressions.corpus import Corpus
 from pytest_garl.reports.search_summary import (
     SearchSummary,
@@ -197,7 +198,7 @@ def _flight(flight: LedgerFlight) -> dict[str, Any]:
 def _repeat_command(summary: SearchSummary, slot: str, path: Path) -> str:
     folder = path.parent.name
     words = ["pytest", *summary.files, f"--garl-repeat={slot}"]
-    return " ".join(words if folder == ".garl" else [*words, "-o", f"garl_dir={folder}"])
+    return command(*words, *(() if folder == ".garl" else ("-o", f"garl_dir={folder}")))
 
 
 def _cases(corpus: Corpus, systems: set[str]) -> list[dict[str, Any]]:

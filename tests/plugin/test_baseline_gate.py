@@ -57,6 +57,7 @@ def saved(pytester: pytest.Pytester, template: Path) -> pytest.Pytester:
 def test_unchanged_system_passes_with_the_same_flights(saved: pytest.Pytester) -> None:
     result = run(saved)
     result.assert_outcomes(passed=1, skipped=3)
+    assert "nothing was flown" not in result.stdout.str()
     result.stdout.fnmatch_lines(
         [
             "garl: gate against base.toml: 40 of Good-lawn, level 0.05",

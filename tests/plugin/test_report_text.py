@@ -3,18 +3,21 @@
 from __future__ import annotations
 
 import re
+import shutil
+import subprocess
 import xml.etree.ElementTree as ElementTree
 from pathlib import Path
 
 import pytest
 
+from pytest_garl.scenarios.maps import map as map_module
 from tests.support.landing_project import project, run
 from tests.support.search_tests import HIT
 
 PARALLEL = pytest.mark.parametrize("parallel", [(), pytest.param(("-n2",), marks=pytest.mark.long)])
 SEARCH = ("--garl-budget=8", "--garl-workers=1", "-o", "garl_dir=elsewhere")
 AGAIN = (
-    'Repeat: pytest "test_it.py::test_collisions[lawn-g00-s02]" --garl-repeat=lawn-g00-s02 '
+    "Repeat: pytest 'test_it.py::test_collisions[lawn-g00-s02]' --garl-repeat=lawn-g00-s02 "
     "-o garl_dir=elsewhere"
 )
 
@@ -50,11 +53,30 @@ def test_printed_command_repeats_the_failure(pytester: pytest.Pytester) -> None:
     project(pytester)
     first = run(pytester, *SEARCH)
     (line,) = [each for each in first.outlines if each.startswith(AGAIN[:50])]
-    words = re.fullmatch(r'Repeat: pytest "(.+)" (--garl-repeat=\S+) (-o) (\S+)', line)
+    words = re.fullmatch(r"Repeat: pytest '(.+)' (--garl-repeat=\S+) (-o) (\S+)", line)
     assert words
     again = run(pytester, *words.groups())
     again.assert_outcomes(failed=1)
     assert f"{HIT}" in again.stdout.str()
+
+
+def test_pasted_command_runs_nothing_that_a_name_holds(pytester: pytest.Pytester) -> None:
+    name = "a-$(touch EXECUTED)"
+    maps = pytester.path / "scenarios" / "maps"
+    maps.mkdir(parents=True)
+    shutil.copy(Path(map_module.__file__).with_name("lawn.toml"), maps / f"{name}.toml")
+    project(pytester, maps=f"[{name!r}]")
+    output = run(pytester, *SEARCH).stdout.str()
+    line = next(each for each in output.splitlines() if each.startswith("Repeat: "))
+    shell = subprocess.run(
+        ["bash", "-c", line.replace("Repeat: pytest", "printf '%s '")],
+        cwd=pytester.path,
+        check=True,
+        capture_output=True,
+        text=True,
+    )
+    assert f"--garl-repeat={name}-g00-s" in shell.stdout
+    assert not (pytester.path / "EXECUTED").exists()
 
 
 def test_verbose_report_shows_the_scenario_in_physical_units(pytester: pytest.Pytester) -> None:

@@ -228,3 +228,18 @@ def test_junit_carries_properties_of_the_flight(
         assert f"[{found['garl.slot']}]" in str(case.get("name"))
         assert float(found["garl.elapsed_s"]) == 14.2
         assert found["garl.trajectory_sha256"]
+
+
+def test_step_summary_escapes_names_outside_its_tables(
+    pytester: pytest.Pytester, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    project(pytester)
+    page = pytester.path / "summary.md"
+    monkeypatch.setenv("GITHUB_STEP_SUMMARY", str(page))
+    name = "<img src=x>[x](y)"
+    systems = pytester.path / "systems.py"
+    systems.write_text(f"{systems.read_text()}\nGood.__qualname__ = {name!r}\n")
+    run(pytester, *SEARCH)
+    assert name.replace("<", "") in page.read_text().replace("\\", "").replace("<", "")
+    assert "<img" not in page.read_text().replace("\\<", "")
+    assert not re.search(r"(?<!\\)\[x", page.read_text())

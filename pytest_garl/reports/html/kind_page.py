@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from pytest_garl.execution.ledger import Ledger
-from pytest_garl.messages import shortened
+from pytest_garl.messages import command, shortened
 from pytest_garl.regressions.case import NO_GATE_TEXTS, Case
 from pytest_garl.regressions.corpus import Corpus, CorpusEntry
 from pytest_garl.regressions.story_text import grade_in_words
@@ -243,7 +243,7 @@ def _commands(plan: KindPlan) -> tuple[Fact, ...]:
     commands = [("the first flight, as found", plan.repeat)]
     if plan.entry is not None:
         file = shown_file(plan.entry.path)
-        commands.insert(0, ("the saved case", f"garl cases replay {file}"))
+        commands.insert(0, ("the saved case", command("garl", "cases", "replay", file)))
     return tuple(commands)
 
 
