@@ -291,7 +291,8 @@ LEGEND = {
     "III": "hit a fixed body",
     "IV": "hit a moving body",
     "V": "Python error, death or hang of the landing system",
-    "late": "landed too late, or did not land for want of time",
+    "late": "landed too late, or let the time run out in sight of the marker, on the ground or "
+    "without giving up",
     "off": "came down too far from the marker, up to 1.5 m",
     "hard": "touched down too fast or tilted",
     "slid": "moved on over the ground after its touchdown",

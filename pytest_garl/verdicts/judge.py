@@ -15,8 +15,20 @@ from pytest_garl.simulation.physics.vehicle import up_m
 from pytest_garl.verdicts.excuses import excuse
 from pytest_garl.verdicts.findings import findings
 from pytest_garl.verdicts.margins import margins
-from pytest_garl.verdicts.mechanism import NO_LANDING, collision_signature, mechanism_of
-from pytest_garl.verdicts.touchdowns import ON_GROUND_M, gave_up_s, touchdown_off_marker
+from pytest_garl.verdicts.mechanism import (
+    NO_LANDING,
+    collision_signature,
+    hops_text,
+    mechanism_of,
+    must_give_up,
+)
+from pytest_garl.verdicts.touchdowns import (
+    dragged,
+    gave_up_s,
+    stands_since_s,
+    stays,
+    touchdown_off_marker,
+)
 from pytest_garl.verdicts.verdict import (
     PAPER_LIMITS,
     Excuse,
@@ -43,6 +55,9 @@ def judge(flight: Flight, limits: Limits) -> Verdict:
     """
     why, why_text = _excuse(flight, limits)
     mechanism = mechanism_of(flight, limits, why, why_text)
+    if must_give_up(flight, limits):
+        # What excuses giving up does not excuse waiting until the time is up.
+        why, why_text = "", ""
     far = flight.final_distance_m > PAPER_LIMITS.distance_m
     came_down = flight.outcome in ("landed", "slid")
     return Verdict(
@@ -101,24 +116,44 @@ def off_marker_m(flight: Flight, limits: Limits) -> float | None:
     touchdown = touchdown_off_marker(flight, limits)
     if touchdown is not None:
         return touchdown.distance_m
+    stay = dragged(flight, limits)
+    if stay is not None:
+        return stay.farthest_m
     return flight.final_distance_m if flight.outcome == "landed" else None
 
 
 def _excuse(flight: Flight, limits: Limits) -> tuple[Excuse, str]:
-    """Return the excuse of a flight without landing; a touchdown elsewhere has none."""
+    """Return the excuse of a flight without landing.
+
+    A touchdown elsewhere has none, and neither has a UAV that stands on the marker.
+    """
     if flight.outcome not in NO_LANDING or touchdown_off_marker(flight, limits):
         return "", ""
-    return excuse(flight, gave_up_s(flight))
+    at_s = gave_up_s(flight)
+    if dragged(flight, limits) or stands_since_s(flight, at_s) is not None:
+        return "", ""
+    return excuse(flight, at_s)
 
 
 def _standing(flight: Flight) -> str:
-    """Return a sentence about a UAV that stands on the ground at the end and has not landed."""
-    touchdown = flight.touchdown
-    if flight.outcome != "not_landed" or touchdown is None or touchdown.stopped_s is not None:
+    """Return a sentence about a UAV that stood on the ground and did not stop its motors."""
+    found = stays(flight)
+    if not found or flight.outcome in ("landed", "slid"):
         return ""
-    if up_m(float(flight.uav.position_m[-1, 2])) > ON_GROUND_M:
+    stay, end_s = found[-1], flight.elapsed_s
+    if stay.stopped_s is not None:
         return ""
-    return f"It stood on the ground from {touchdown.time_s:.1f} s on; its motors never stopped."
+    hops = hops_text(stay)
+    if flight.outcome == "not_landed" and stay.end_s is None:
+        since = f"It stood on the ground from {stay.since_s:.1f} s on{hops.rstrip(',')}"
+        return f"{since}; its motors never stopped."
+    if stay.stands_at(end_s):
+        since = f"It had stood on the ground since {stay.since_s:.1f} s{hops}"
+        return f"{since} and had not stopped its motors."
+    if stay.end_s is not None and stay.stands_at(stay.end_s):
+        span = f"from {stay.since_s:.1f} s to {stay.end_s:.1f} s{hops}"
+        return f"It had stood on the ground {span} and had not stopped its motors."
+    return ""
 
 
 def _where(flight: Flight) -> str:

@@ -11,13 +11,13 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from pytest_garl.simulation.flight import Flight
+from pytest_garl.simulation.flight import Flight, Touchdown
 from pytest_garl.simulation.ground_stays import HARD_TOUCHDOWN_MPS, SLID_M, UPRIGHT_RAD
 from pytest_garl.simulation.physics.vehicle import BODY_ABOVE_FEET_M
 from pytest_garl.verdicts.findings import UNDETECTED_S, undetected_s
-from pytest_garl.verdicts.phases import LOW_M
+from pytest_garl.verdicts.phases import flying_from
 from pytest_garl.verdicts.sightings import target_of
-from pytest_garl.verdicts.touchdowns import landed_s, touchdown_off_marker
+from pytest_garl.verdicts.touchdowns import Stay, dragged, landed_s, stays, touchdown_off_marker
 from pytest_garl.verdicts.verdict import Limits, Margin, MarginName
 
 COMMIT_M = 2.0
@@ -39,7 +39,9 @@ def margins(flight: Flight, limits: Limits, *, violates_time: bool) -> tuple[Mar
     """
     decided = flight.outcome in ("landed", "slid", "gave_up", "not_landed")
     reason = "" if decided else f"the flight ended at {flight.elapsed_s:.1f} s"
-    down = flight.outcome in ("landed", "slid") or touchdown_off_marker(flight, limits) is not None
+    stay = dragged(flight, limits)
+    came_down = stay is not None or touchdown_off_marker(flight, limits) is not None
+    down = flight.outcome in ("landed", "slid") or came_down
     low = _low(flight)
     moving, static = _separation(flight, "dynamic"), _separation(flight, "static")
     reported = any(target_of(step) for step in flight.steps)
@@ -72,7 +74,7 @@ def margins(flight: Flight, limits: Limits, *, violates_time: bool) -> tuple[Mar
             known=reported and bool(low.any()),
             why="the system reports no target, or did not come down",
         ),
-        margin("slide", SLID_M - _slid_m(flight), "m", known=down),
+        margin("slide", SLID_M - _slid_m(flight, stay), "m", known=down),
         margin("crash", 0.0 if flight.outcome == "crashed" else 1.0, "1", known=True),
     )
 
@@ -89,14 +91,13 @@ def commit_distance_m(flight: Flight, place: tuple[float, float]) -> float:
 
 
 def _after_take_off(flight: Flight) -> NDArray[np.float64]:
-    """Return the positions (n, 3) from the first one at the height of the search on."""
+    """Return the positions (n, 3) from the end of the take-off on, or the last one."""
     places = flight.uav.position_m
     return places[_start(flight) :]
 
 
 def _start(flight: Flight) -> int:
-    high = flight.uav.position_m[:, 2] >= LOW_M
-    return int(np.argmax(high)) if high.any() else len(high) - 1
+    return min(flying_from(flight), len(flight.uav.time_s) - 1)
 
 
 def _low(flight: Flight) -> NDArray[np.bool_]:
@@ -111,8 +112,11 @@ def _distance_m(flight: Flight, limits: Limits) -> float:
     touchdown = touchdown_off_marker(flight, limits)
     if touchdown is not None:
         return touchdown.distance_m
-    if flight.outcome in ("landed", "slid"):
+    stay = dragged(flight, limits)
+    if flight.outcome == "slid" or (flight.outcome == "landed" and stay is None):
         return flight.final_distance_m
+    if stay is not None:
+        return stay.farthest_m
     return commit_distance_m(flight, flight.marker_position_m)
 
 
@@ -138,7 +142,7 @@ def _separation(flight: Flight, body_class: str) -> float:
 def _sink_mps(flight: Flight, low: NDArray[np.bool_]) -> float:
     """Return the touchdown's vertical speed, or the fastest sinking below the commit height."""
     if flight.touchdown:
-        return flight.touchdown.speed_mps
+        return max(each.speed_mps for each in _last_touchdowns(flight))
     ground = [each.speed_mps for each in flight.contacts if each.body_class == "ground"]
     sinking = -flight.uav.velocity_mps[low, 2]
     return max([0.0, *ground]) if ground else float(max(0.0, sinking.max(initial=0.0)))
@@ -146,10 +150,18 @@ def _sink_mps(flight: Flight, low: NDArray[np.bool_]) -> float:
 
 def _tilt_rad(flight: Flight, low: NDArray[np.bool_]) -> float:
     if flight.touchdown:
-        return flight.touchdown.tilt_rad
+        return max(each.tilt_rad for each in _last_touchdowns(flight))
     x, y = flight.uav.attitude[low, 0], flight.uav.attitude[low, 1]
     tilts = np.arccos(np.clip(1 - 2 * (x * x + y * y), -1.0, 1.0))
     return float(tilts.max(initial=0.0))
+
+
+def _last_touchdowns(flight: Flight) -> tuple[Touchdown, ...]:
+    """Return the last touchdown, with those of the same stay on the ground before its hops."""
+    found = stays(flight)
+    if found and found[-1].touchdowns[-1] is flight.touchdown:
+        return found[-1].touchdowns
+    return (flight.touchdown,) if flight.touchdown else ()
 
 
 def _decoy_m(flight: Flight) -> float:
@@ -185,5 +197,7 @@ def _tracking_error_m(flight: Flight) -> float:
     return max(errors, default=0.0)
 
 
-def _slid_m(flight: Flight) -> float:
+def _slid_m(flight: Flight, stay: Stay | None) -> float:
+    if stay is not None:
+        return stay.moved_m
     return flight.touchdown.slid_m if flight.touchdown else 0.0

@@ -21,7 +21,17 @@ from pytest_garl.verdicts.sightings import (
     reports_detections,
     was_in_view,
 )
-from pytest_garl.verdicts.touchdowns import gave_up_s, landed_s, touchdown_off_marker
+from pytest_garl.verdicts.touchdowns import (
+    STANDS_S,
+    Stay,
+    dragged,
+    gave_up_s,
+    landed_s,
+    said_abort_s,
+    stands_since_s,
+    stays,
+    touchdown_off_marker,
+)
 from pytest_garl.verdicts.verdict import (
     PAPER_LIMITS,
     Excuse,
@@ -61,10 +71,11 @@ def mechanism_of(flight: Flight, limits: Limits, why: Excuse, why_text: str) -> 
     if touchdown := touchdown_off_marker(flight, limits):
         beginning = f"Touched the ground {{}}{_then(flight)}"
         return _missed(flight, limits, touchdown, touchdown.distance_m, beginning)
+    stay = dragged(flight, limits)
+    if stay or flight.outcome == "slid":
+        return _slid(flight, stay)
     if flight.outcome == "collision":
         return _collision(flight, flight.contacts[-1], limits)
-    if flight.outcome == "slid":
-        return _slid(flight)
     if flight.outcome in NO_LANDING:
         return _no_landing(flight, limits, why, why_text)
     at_s = landed_s(flight)
@@ -133,22 +144,32 @@ def collision_signature(flight: Flight, body: Contact | Separation) -> str:
     return f"IV:{body.kind}:{phase}:{sight}"
 
 
-def _slid(flight: Flight) -> Mechanism:
-    touchdown = flight.touchdown
-    if touchdown is None:
+def _slid(flight: Flight, stay: Stay | None) -> Mechanism:
+    if stay is None:
         text, motors = "Slid over the ground after its touchdown.", "motors-on"
     else:
         slid_s = next((e.time_s for e in flight.events if e.name == "slid"), flight.elapsed_s)
-        stopped = touchdown.stopped_s is not None and touchdown.stopped_s <= slid_s
+        stopped = stay.stopped_s is not None and stay.stopped_s <= slid_s
         motors = "motors-off" if stopped else "motors-on"
         still = f"with the motors {'stopped' if stopped else 'running'}"
+        stood = ""
+        if stay.left_s is not None and stay.left_s - stay.since_s >= STANDS_S:
+            stood = f"stood there with running motors until {stay.left_s:.1f} s, "
         text = (
-            f"Touched down {touchdown.distance_m:.1f} m off the marker at {touchdown.time_s:.1f} "
-            f"s, then slid {touchdown.slid_m:.1f} m over the ground {still}."
+            f"Touched down {stay.first.distance_m:.1f} m off the marker at {stay.since_s:.1f} s, "
+            f"{stood}then slid {stay.moved_m:.1f} m over the ground{hops_text(stay)} "
+            f"{still}{'' if flight.outcome == 'slid' else _then(flight)}."
         )
     return Mechanism(
         primary="distance", violation_type="slid", signature=f"slid:{motors}", sentence=text
     )
+
+
+def hops_text(stay: Stay) -> str:
+    """Return how high a UAV hopped in its stay on the ground; empty if it did not."""
+    if len(stay.touchdowns) < 2:
+        return ""
+    return f", with hops of up to {max(1.0, 100 * stay.hop_m):.0f} cm,"
 
 
 def _no_landing(flight: Flight, limits: Limits, why: Excuse, why_text: str) -> Mechanism:
@@ -163,6 +184,13 @@ def _no_landing(flight: Flight, limits: Limits, why: Excuse, why_text: str) -> M
             signature=f"abort:{why}",
             sentence=f"{end}. {why_text}",
         )
+    if why and must_give_up(flight, limits):
+        return Mechanism(
+            primary="time",
+            violation_type="late",
+            signature="late:never-gave-up",
+            sentence=f"{end}, and never gave up where nobody could have landed. {why_text}",
+        )
     if why:
         return Mechanism(sentence=f"{end}, excused. {why_text}")
     violation_type, signature, sentence = _no_landing_cause(flight, limits, end)
@@ -176,9 +204,24 @@ def _no_landing(flight: Flight, limits: Limits, why: Excuse, why_text: str) -> M
     )
 
 
+def must_give_up(flight: Flight, limits: Limits) -> bool:
+    """Whether a flight ran out of time without giving up, by limits that allow to give up.
+
+    Where nobody can land, the right answer is to give up in time.  Where giving up is forbidden, no
+    right answer is left but to wait.
+    """
+    waited = flight.outcome == "not_landed" and said_abort_s(flight) is None
+    return waited and limits.abort != "violation"
+
+
 def _no_landing_cause(flight: Flight, limits: Limits, end: str) -> tuple[ViolationType, str, str]:
     """Distinguish a marker never seen or lost (II), one in sight, and a lack of time (late)."""
     at_s = gave_up_s(flight)
+    if stands_since_s(flight, at_s) is not None:
+        off_m = stays(flight)[-1].first.distance_m
+        when = f" at {at_s:.1f} s" if flight.outcome == "gave_up" else ""
+        text = f"{end}{when}, although it stood {off_m:.1f} m off the marker."
+        return "late", "late:standing", text
     phase = landing_phase(flight, at_s)
     readable = [step.time_s for step in readable_steps(flight, at_s)]
     report = f"{_report_text(flight, at_s)}{_opportunity_text(flight)}"

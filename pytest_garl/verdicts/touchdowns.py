@@ -1,41 +1,200 @@
-"""Touchdowns in a flight's record, and when a flight landed or was given up."""
+"""Stays on the ground in a flight's record, and when a flight landed or was given up.
+
+The simulator notes a touchdown whenever the UAV has lost contact for more than a quarter of a
+second, which is right for its land detector.  A UAV that holds its place with running motors skips
+for seconds at a few centimetres, and that is one stay: it stands, or is dragged.
+"""
 
 from __future__ import annotations
 
+import itertools
 import math
+from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from pytest_garl.simulation.flight import Flight, Touchdown
+from pytest_garl.simulation.ground_stays import HARD_TOUCHDOWN_MPS, SLID_M
+from pytest_garl.simulation.physics.vehicle import BODY_ABOVE_FEET_M, GRAVITY_MPS2
 from pytest_garl.verdicts.verdict import Limits
 
 ON_GROUND_M = 0.02
 """After its first contact with the ground, the UAV counts as on the ground up to this much above
 its height at the contact, because it may rebound a little."""
+HOP_M = HARD_TOUCHDOWN_MPS**2 / (2 * GRAVITY_MPS2)
+"""A UAV whose feet stay below this height, 0.2 m, has not taken off again: motors that stop there
+let it fall without a hard touchdown."""
+STANDS_S = 1.5
+"""From so long after its touchdown on a UAV stands with running motors.  Those of a UAV that lands
+stop within 1.4 s (see ``contacts.SETTLING_S``)."""
+LEFT_M = 0.1
+"""A UAV that is farther than this from where it touched down has begun to move over the ground."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Stay:
+    """One stay on the ground, hops included.
+
+    ``touchdowns`` are those of the simulator, in order; ``end_s`` is when the UAV took off again,
+    None if it did not; ``left_s`` when it began to move over the ground, None if it did not;
+    ``moved_m`` how far it was from its first touchdown at most, until the motors stopped;
+    ``farthest_m`` how far from the marker; ``hop_m`` how high it hopped.
+    """
+
+    touchdowns: tuple[Touchdown, ...]
+    end_s: float | None
+    left_s: float | None
+    moved_m: float
+    farthest_m: float
+    hop_m: float
+
+    @property
+    def first(self) -> Touchdown:
+        """The touchdown with which it began."""
+        return self.touchdowns[0]
+
+    @property
+    def since_s(self) -> float:
+        """When it began."""
+        return self.first.time_s
+
+    @property
+    def stopped_s(self) -> float | None:
+        """When the motors stopped; None if they did not."""
+        return self.touchdowns[-1].stopped_s
+
+    def stands_at(self, time_s: float) -> bool:
+        """Whether the UAV stands at a time, for so long that its motors ought to have stopped."""
+        ended = self.end_s is not None and time_s > self.end_s
+        stopped = self.stopped_s is not None and time_s >= self.stopped_s
+        return time_s - self.since_s >= STANDS_S and not ended and not stopped
+
+
+def stays(flight: Flight) -> tuple[Stay, ...]:
+    """Return the flight's stays on the ground, in order; empty for simulators without touchdowns.
+
+    A hard touchdown ends the flight; it is none.
+    """
+    found = list(flight.earlier_touchdowns)
+    hard = flight.outcome == "collision" and flight.contacts[-1].body_class == "ground"
+    if flight.touchdown and not hard:
+        found.append(flight.touchdown)
+    groups: list[list[Touchdown]] = []
+    for each in found:
+        if groups and _hop_m(flight, groups[-1][-1].time_s, each.time_s) < HOP_M:
+            groups[-1].append(each)
+        else:
+            groups.append([each])
+    return tuple(_stay(flight, group) for group in groups)
+
+
+def stands_since_s(flight: Flight, time_s: float) -> float | None:
+    """Return since when the UAV has stood with running motors at a time; None if it does not."""
+    return next((each.since_s for each in stays(flight) if each.stands_at(time_s)), None)
+
+
+def _stay(flight: Flight, touchdowns: Sequence[Touchdown]) -> Stay:
+    first, last = touchdowns[0], touchdowns[-1]
+    track = flight.uav
+    end = _take_off(flight, last.time_s)
+    until_s = last.stopped_s if last.stopped_s is not None else math.inf
+    part = slice(int(np.searchsorted(track.time_s, first.time_s)), end)
+    places = track.position_m[part][track.time_s[part] <= until_s]
+    moved = np.hypot(*(places[:, :2] - first.position_m[:2]).T)
+    away = np.hypot(*(places[:, :2] - flight.marker_position_m).T)
+    here = np.flatnonzero(moved <= LEFT_M)
+    after = int(here[-1]) + 1 if len(here) else 0
+    times = itertools.pairwise(each.time_s for each in touchdowns)
+    hops = [_hop_m(flight, from_s, to_s) for from_s, to_s in times]
+    return Stay(
+        touchdowns=tuple(touchdowns),
+        end_s=float(track.time_s[end]) if end < len(track.time_s) else None,
+        left_s=float(track.time_s[part][after]) if after < len(moved) else None,
+        moved_m=max([*(each.slid_m for each in touchdowns), *moved.tolist()]),
+        farthest_m=max([first.distance_m, *away.tolist()]),
+        hop_m=max(hops, default=0.0),
+    )
+
+
+def _take_off(flight: Flight, from_s: float) -> int:
+    """Return the first sample after a time at which the UAV is no longer on the ground."""
+    start = int(np.searchsorted(flight.uav.time_s, from_s))
+    high: NDArray[np.bool_] = flight.uav.position_m[start:, 2] - BODY_ABOVE_FEET_M >= HOP_M
+    return start + int(np.argmax(high)) if high.any() else len(flight.uav.time_s)
+
+
+def _hop_m(flight: Flight, from_s: float, to_s: float) -> float:
+    """Return the greatest height of the feet between two times."""
+    times = flight.uav.time_s
+    between = (times >= from_s) & (times <= to_s)
+    heights = flight.uav.position_m[between, 2] - BODY_ABOVE_FEET_M
+    return float(heights.max(initial=0.0))
 
 
 def landed_s(flight: Flight) -> float:
-    """Return the time of the touchdown; the flight's end for simulators that record none."""
-    return flight.touchdown.time_s if flight.touchdown else flight.elapsed_s
+    """Return the time of the touchdown; the flight's end for simulators that record none.
+
+    A UAV that landed with hops had come down with the first one.
+    """
+    if flight.touchdown is None:
+        return flight.elapsed_s
+    found = stays(flight)
+    return found[-1].since_s if found else flight.touchdown.time_s
 
 
 def gave_up_s(flight: Flight) -> float:
     """Return when the landing was given up: at the command, or when the time was over."""
-    return next((e.time_s for e in flight.events if e.name == "abort_command"), flight.elapsed_s)
+    said_s = said_abort_s(flight)
+    return flight.elapsed_s if said_s is None else said_s
+
+
+def said_abort_s(flight: Flight) -> float | None:
+    """Return when the system gave the landing up; None if it never did."""
+    return next((e.time_s for e in flight.events if e.name == "abort_command"), None)
 
 
 def touchdown_off_marker(flight: Flight, limits: Limits) -> Touchdown | None:
     """Return the first touchdown beyond the limit that was not a landing; None if there was none.
 
-    The UAV took off again, slid on, gave up, or was hit where it stood.
+    The UAV took off again, slid on, gave up, or was hit where it stood.  None as well if it had
+    come down within the limit and was dragged beyond it before.
     """
-    found = list(flight.earlier_touchdowns)
-    hard = flight.outcome == "collision" and flight.contacts[-1].body_class == "ground"
-    if flight.touchdown and flight.outcome != "landed" and not hard:
-        found.append(flight.touchdown)
-    if not found and flight.outcome in ("gave_up", "not_landed"):
+    if not stays(flight) and flight.outcome in ("gave_up", "not_landed"):
         return _from_track(flight, limits)
-    return next((each for each in found if each.distance_m > limits.distance_m), None)
+    off = _first_off(flight, limits)
+    return off if isinstance(off, Touchdown) else None
+
+
+def dragged(flight: Flight, limits: Limits) -> Stay | None:
+    """Return the stay that began within the limit and in which the UAV slid; None without one.
+
+    It slid by the simulator's outcome, or moved by more than that limit of a slide to beyond the
+    limit of distance, hops included.
+    """
+    off = _first_off(flight, limits)
+    return off if isinstance(off, Stay) else None
+
+
+def _first_off(flight: Flight, limits: Limits) -> Touchdown | Stay | None:
+    """Return the first touchdown beyond the limit, or the stay that was dragged before it."""
+    found = stays(flight)
+    for stay in found:
+        off = next((each for each in stay.touchdowns if _misses(flight, each, limits)), None)
+        slid = flight.outcome == "slid" and stay is found[-1]
+        went_off = slid or stay.farthest_m > limits.distance_m
+        within = stay.first.distance_m <= limits.distance_m
+        if within and went_off and stay.moved_m > SLID_M:
+            return stay
+        if off:
+            return off
+    return None
+
+
+def _misses(flight: Flight, touchdown: Touchdown, limits: Limits) -> bool:
+    landing = flight.outcome == "landed" and touchdown is flight.touchdown
+    return touchdown.distance_m > limits.distance_m and not landing
 
 
 def _from_track(flight: Flight, limits: Limits) -> Touchdown | None:

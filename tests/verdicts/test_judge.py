@@ -5,7 +5,7 @@ from typing import Any
 
 import pytest
 
-from pytest_garl.simulation.flight import Flight
+from pytest_garl.simulation.flight import Event, Flight
 from pytest_garl.verdicts.judge import closest_call, judge, off_marker_m, why_undecided
 from pytest_garl.verdicts.verdict import Limits
 from pytest_garl.verdicts.wording import headline
@@ -139,6 +139,31 @@ def test_the_limit_says_when_giving_up_is_a_violation(
     verdict = judge(flight("gave_up", (0.0, 0.0, 8.0), nominal_views=views), Limits(abort=rule))
     assert (verdict.primary, verdict.signature) == (primary, signature)
     assert verdict.no_landing == ("excused" if excused else "needless")
+
+
+@pytest.mark.parametrize(
+    ("rule", "said_s", "primary", "signature"),
+    [
+        ("needless", None, "time", "late:never-gave-up"),
+        ("ok", None, "time", "late:never-gave-up"),
+        # Who must not give up cannot do better than wait.
+        ("violation", None, None, ""),
+        # It gave up in time, and had not climbed clear when the time was up.
+        ("needless", 29.0, None, ""),
+    ],
+)
+def test_hovering_until_the_time_is_up_is_not_excused_by_what_excuses_giving_up(
+    rule: Any, said_s: float | None, primary: Any, signature: str
+) -> None:
+    said = () if said_s is None else (Event(time_s=said_s, name="abort_command", text=""),)
+    hovers = flight("not_landed", (0.0, 0.0, 8.0), nominal_views=nominal(FOGGY), events=said)
+    verdict = judge(hovers, Limits(abort=rule))
+    assert (verdict.primary, verdict.signature) == (primary, signature)
+    assert verdict.excuse == ("" if signature else "undetectable")
+    assert verdict.no_landing == ("needless" if signature else "excused")
+    assert "Nobody could see the marker" in verdict.story
+    if signature:
+        assert verdict.story.startswith("Not landed, and never gave up where nobody could have")
 
 
 def test_a_system_that_gives_up_at_once_is_not_excused_by_its_own_path() -> None:

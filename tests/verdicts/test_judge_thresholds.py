@@ -143,7 +143,7 @@ def test_a_marker_that_a_nominal_landing_reads_for_two_seconds_excuses_nobody(
 
 def _blocked(times: tuple[float, ...], xs: tuple[float, ...], arrival_s: float) -> Flight:
     return flight(
-        "not_landed",
+        "gave_up",
         (0.0, 0.0, 8.0),
         uav=track(*((time, 0.0, 0.0, 8.0) for time in times)),
         objects=(person_at(times, xs),),

@@ -42,6 +42,8 @@ def hints_of(
         return (_moving(flight, prevention),)
     if kind in ("II", "abort") or verdict.signature.startswith("late:not-landed"):
         return tuple(_not_landed(flight))
+    if verdict.signature in _OF_SIGNATURE:
+        return _OF_SIGNATURE[verdict.signature]
     decoy = next((name for name in _signatures(verdict) if name.startswith(_DECOY)), "")
     if decoy:
         first = _decoy(flight, decoy.split(":")[1])
@@ -52,6 +54,16 @@ def hints_of(
 
 
 _DECOY = "I:decoy-"
+_OF_SIGNATURE = {
+    "late:standing": (
+        "The UAV stood on the ground: look at how the system notices a touchdown, and at when it "
+        "stops the motors.",
+    ),
+    "late:never-gave-up": (
+        "Nobody could have landed: look at when the system gives up; `mission.time_limit_s` says "
+        "how much time it has.",
+    ),
+}
 _OF_TYPE = {
     "III": (
         "A body that does not move was hit: look at the way that the system took there, and "

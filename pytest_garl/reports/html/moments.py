@@ -144,17 +144,14 @@ def _descends_below(flight: Flight, height_m: float, end_s: float) -> float | No
 
 
 def _turns_back(flight: Flight, end_s: float) -> float | None:
-    """Return when the UAV was lowest after its take-off, if it came down and rose by a metre."""
+    """Return when the UAV was lowest after it had come down by a metre, if it rose by a metre."""
     heights, times = flight.uav.position_m[:, 2], flight.uav.time_s
-    high = np.flatnonzero((heights >= LOW_M) & (times <= end_s))
-    if not len(high):
-        return None
-    part = heights[high[0] : np.searchsorted(times, end_s)]
+    sunk = np.flatnonzero(np.maximum.accumulate(heights) - heights >= 1.0)
+    part = heights[sunk[0] if len(sunk) else len(heights) : np.searchsorted(times, end_s)]
     lowest = int(np.argmin(part)) if len(part) else 0
-    sides = (part[: lowest + 1], part[lowest:]) if len(part) else ()
-    if not sides or min(side.max() - part[lowest] for side in sides) < 1.0:
+    if not len(part) or part[lowest:].max() - part[lowest] < 1.0:
         return None
-    return float(times[high[0] + lowest])
+    return float(times[sunk[0] + lowest])
 
 
 def _end_label(flight: Flight, body: str) -> str:

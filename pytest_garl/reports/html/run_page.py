@@ -19,7 +19,7 @@ from pytest_garl.reports.html.search_card import SearchCard, cost_rows, domain_r
 from pytest_garl.reports.search_summary import LEGEND, SearchSummary
 from pytest_garl.reports.shares_text import in_control_text, kinds_lines, percent
 
-PHASES = ("take-off", "transit", "search", "approach", "descent", "last-metre")
+PHASES = ("take-off", "transit", "search", "approach", "descent", "last-metre", "standing")
 """Phases of a landing (``verdicts/phases.py``), in its order."""
 NO_PHASE = "not of a phase"
 MOST_THUMBNAILS = 24
