@@ -24,6 +24,7 @@ COMMANDS = {
     "experiment": "experiment",
     "export": "export",
     "film": "film",
+    "init": "init",
     "report": "report",
     "train": "train",
 }

@@ -1,0 +1,155 @@
+"""``garl init``: write what a project needs before its first search."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+from pathlib import Path
+
+import click
+
+from pytest_garl.cli import skeleton
+from pytest_garl.cli.check import imported_system
+from pytest_garl.cli.pytest_settings import PYTHONPATH, SETTINGS, find_settings
+from pytest_garl.errors import GarlError
+from pytest_garl.messages import command
+
+SKELETON = "my_landing:MyLandingSystem"
+IGNORED = ".garl/"
+"""Ledgers, records and films of runs: large, and made again by each run."""
+TEST = """\
+import pytest
+from {module} import {name}
+
+pytestmark = pytest.mark.garl(system={system}, maps=["court", "lawn"])
+
+
+def test_lands_on_the_marker(landing):
+    assert landing.distance_to_landing_m <= landing.limits.distance_m
+
+
+def test_lands_in_time(landing):
+    assert landing.time_to_landing_s <= landing.limits.time_s
+
+
+def test_collides_with_nothing(landing):
+    assert not landing.collisions
+
+
+def test_completes_the_mission(landing):
+    assert landing.completed or landing.excused  # it may give up only where nobody could land
+"""
+_KNOWN_IGNORES = {".garl", ".garl/", "/.garl", "/.garl/", "**/.garl", "**/.garl/", ".garl/*"}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Step:
+    """What was done to a file, for the user."""
+
+    file: Path
+    done: str
+
+
+@click.command()
+@click.argument("system", metavar="[MODULE:CLASS]", default="")
+def init(system: str) -> None:
+    """Write a test file, pytest's settings and a .gitignore entry.
+
+    MODULE:CLASS is your landing system, such as my_landing:MyLandingSystem. Without it the command
+    writes one to begin with, my_landing.py, which lands in clear air. Run it in the folder in which
+    you will run pytest. It changes no line that is there; if all is there it changes nothing.
+    """
+    here = Path.cwd()
+    settings = find_settings(here)
+    steps = []
+    if not system:
+        system = SKELETON
+        steps.append(_write_skeleton(here / f"{SKELETON.partition(':')[0]}.py"))
+    # The import says what is wrong with the name before anything is written with it.
+    imported_system(system)
+    folder = next((here / path for path in settings.test_paths if (here / path).is_dir()), here)
+    test = folder / _test_file(system)
+    wanted = SETTINGS | (PYTHONPATH if _needs_path(system, folder, here) else {})
+    steps += [
+        _Step(file=settings.file, done=settings.add(wanted)),
+        _write(test, _test_of(system)),
+        _ignore(here / ".gitignore"),
+    ]
+    for step in steps:
+        click.echo(f"{step.done:<10} {step.file.relative_to(here)}")
+    click.echo("\nThen run:")
+    shown = test.relative_to(here)
+    click.echo(f"    {command('garl', 'check', shown)}")
+    click.echo("        flies it in clear air and names its faults")
+    click.echo(f"    {command('pytest', '--garl-budget=40', shown)}")
+    click.echo("        searches: 40 flights on each map, saved cases in scenarios/regressions")
+
+
+def _test_file(system: str) -> str:
+    """Return the name of the test file of a landing system."""
+    module = system.partition(":")[0].rpartition(".")[2]
+    name = re.sub(r"\W", "_", module)
+    return f"test_{name}.py"
+
+
+def _needs_path(system: str, folder: Path, here: Path) -> bool:
+    """Return whether pytest finds the landing system's module only with a path of its own.
+
+    It finds what lies beside a test file, or beside the packages that the file is in.
+    """
+    top = system.partition(":")[0].partition(".")[0]
+    is_here = (here / f"{top}.py").is_file() or (here / top).is_dir()
+    return is_here and folder != here and not (folder / "__init__.py").is_file()
+
+
+def _test_of(system: str) -> str:
+    """Return the tests of a landing system, named as MODULE:CLASS."""
+    module, _, qualified = system.partition(":")
+    return TEST.format(module=module, name=qualified.partition(".")[0], system=qualified)
+
+
+def _write_skeleton(file: Path) -> _Step:
+    """Write the landing system to begin with; raise GarlError if another file has its name."""
+    text = Path(skeleton.__file__).read_text(encoding="utf-8")
+    name = SKELETON.partition(":")[2]
+    if file.exists() and f"class {name}" not in _text_of(file):
+        raise GarlError(
+            f"{file.name}: is here and has no class {name}; name the class that is your landing "
+            f"system: garl init {file.stem}:CLASS"
+        )
+    return _write(file, text)
+
+
+def _write(file: Path, text: str) -> _Step:
+    """Write a file that is not there."""
+    try:
+        with file.open("x", encoding="utf-8") as opened:
+            opened.write(text)
+    except FileExistsError:
+        return _Step(file=file, done="unchanged")
+    except OSError as error:
+        raise GarlError(f"{file}: cannot be written ({error})") from error
+    return _Step(file=file, done="wrote")
+
+
+def _ignore(file: Path) -> _Step:
+    """Let git ignore the folder of runs."""
+    if not file.exists():
+        return _write(file, f"{IGNORED}\n")
+    text = _text_of(file)
+    if _KNOWN_IGNORES & {line.strip() for line in text.splitlines()}:
+        return _Step(file=file, done="unchanged")
+    end = "" if not text or text.endswith("\n") else "\n"
+    try:
+        with file.open("a", encoding="utf-8") as opened:
+            opened.write(f"{end}{IGNORED}\n")
+    except OSError as error:
+        raise GarlError(f"{file}: cannot be written ({error})") from error
+    return _Step(file=file, done="added to")
+
+
+def _text_of(file: Path) -> str:
+    try:
+        return file.read_text(encoding="utf-8")
+    except (OSError, UnicodeDecodeError) as error:
+        raise GarlError(f"{file}: cannot be read ({error})") from error
