@@ -16,6 +16,7 @@ import sys
 import sysconfig
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from importlib.machinery import PathFinder
 from pathlib import Path
 from typing import Any
 
@@ -159,6 +160,22 @@ def _parents(name: str) -> Iterator[str]:
     while "." in name:
         name = name.rpartition(".")[0]
         yield name
+
+
+def module_file(name: str, folder: Path) -> Path | None:
+    """Return the file of a module that Python, or ``folder``, has; None if there is none.
+
+    Nothing is imported.
+    """
+    found = _find(name)
+    if found is not None:
+        return found.file
+    places: Sequence[str] | None = [str(folder)]
+    spec = None
+    for part in (*reversed([*_parents(name)]), name):
+        spec = PathFinder.find_spec(part, places) if places else None
+        places = spec.submodule_search_locations if spec else None
+    return Path(spec.origin) if spec and spec.origin and Path(spec.origin).is_file() else None
 
 
 def _find(name: str) -> _Module | None:

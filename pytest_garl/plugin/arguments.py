@@ -149,6 +149,9 @@ OPTIONS = (
     ),
 )
 
+DEFAULT_CASES = "scenarios/regressions"
+"""The folder of the saved cases if the ini key names none."""
+
 
 def add_options(parser: pytest.Parser) -> None:
     """Register all options and ini keys."""
@@ -171,7 +174,7 @@ def add_options(parser: pytest.Parser) -> None:
     parser.addini(
         "garl_dir", help="Folder of the ledger and the records of flights.", default=".garl"
     )
-    parser.addini("garl_cases", help="Folder of the saved cases.", default="scenarios/regressions")
+    parser.addini("garl_cases", help=f"Folder of the saved cases (default: {DEFAULT_CASES}).")
     parser.addini(
         "garl_xfail_strict",
         help="Whether an open saved case that passes fails the run.",

@@ -11,11 +11,14 @@ import pytest
 from pytest_garl.errors import GarlError
 from pytest_garl.execution.flight_id import slots
 from pytest_garl.messages import command
+from pytest_garl.plugin.keys import COLLECTED
 from pytest_garl.plugin.marker import MarkerArguments, read_marker
 from pytest_garl.plugin.options import Options
 from pytest_garl.plugin.target import Target
 
-NOTHING_TO_FLY = "no --garl-budget given and no saved cases; to search: pytest --garl-budget=40"
+NOTHING_TO_FLY = (
+    "no --garl-budget given and no saved case of this test; to search: pytest --garl-budget=40"
+)
 
 
 def parametrize(metafunc: pytest.Metafunc, marker: pytest.Mark, options: Options) -> None:
@@ -23,7 +26,9 @@ def parametrize(metafunc: pytest.Metafunc, marker: pytest.Mark, options: Options
 
     Raises GarlError if the marker is invalid.
     """
-    targets = targets_for(marker, options, metafunc.definition.originalname)
+    arguments = read_marker(marker, options)
+    _note(metafunc, arguments)
+    targets = targets_for(arguments, options, metafunc.definition.originalname)
     if targets:
         ids = [target.name for target in targets]
         return metafunc.parametrize("garl_slot", targets, ids=ids, indirect=True)
@@ -34,12 +39,23 @@ def parametrize(metafunc: pytest.Metafunc, marker: pytest.Mark, options: Options
     return metafunc.parametrize("garl_slot", [reason], ids=["nothing"], indirect=True)
 
 
-def targets_for(marker: pytest.Mark, options: Options, test: str) -> list[Target]:
-    """Return the saved cases and the slots of a marked test called ``test``.
+def _note(metafunc: pytest.Metafunc, arguments: MarkerArguments) -> None:
+    """Note a test for the census of the saved cases."""
+    from pytest_garl.regressions.collected_tests import CollectedTest
 
-    Raises GarlError if the marker is invalid.
-    """
-    arguments = read_marker(marker, options)
+    metafunc.config.stash[COLLECTED].tests.append(
+        CollectedTest(
+            nodeid=metafunc.definition.nodeid,
+            name=metafunc.definition.originalname,
+            system=arguments.target.system_name,
+            maps=arguments.all_maps,
+            files=arguments.target.files,
+        )
+    )
+
+
+def targets_for(arguments: MarkerArguments, options: Options, test: str) -> list[Target]:
+    """Return the saved cases and the slots of a marked test called ``test``."""
     if options.repeat:
         return [
             each for map in arguments.maps for each in _repeated_targets(arguments, map, options)

@@ -15,6 +15,7 @@ from pytest_garl.plugin.arguments import add_options, computes, is_enabled
 from pytest_garl.plugin.fixtures import garl_slot, landing, npcs, scenario
 from pytest_garl.plugin.keys import (
     BODY_RUNS,
+    COLLECTED,
     FINDING_TEST,
     GATE_PLUGIN,
     LANDING,
@@ -26,6 +27,7 @@ from pytest_garl.plugin.keys import (
     name_slots,
     target_of,
 )
+from pytest_garl.plugin.lost_cases import Collected
 from pytest_garl.plugin.tally import Tally
 
 __all__ = ["garl_slot", "landing", "npcs", "scenario"]
@@ -65,6 +67,8 @@ def pytest_configure(config: pytest.Config) -> None:
     if not is_xdist_worker(config):
         config.stash[TALLY] = Tally()
         config.pluginmanager.register(config.stash[TALLY], "garl_tally")
+    config.stash[COLLECTED] = Collected()
+    config.pluginmanager.register(config.stash[COLLECTED], "garl_collected")
     if not is_enabled(config):
         return
     from pytest_garl.plugin.option_checks import check_usage
@@ -99,6 +103,22 @@ def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
         parametrize(metafunc, marker, options_of(metafunc.config))
     except GarlError as error:
         raise pytest.Collector.CollectError(f"{metafunc.definition.nodeid}: {error}") from error
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_collection_modifyitems(
+    session: pytest.Session, config: pytest.Config, items: list[pytest.Item]
+) -> None:
+    """Put an item before the others for each saved case that nothing can fly any more."""
+    collected = config.stash[COLLECTED]
+    if collected.tests:
+        from pytest_garl.plugin.lost_cases import lost_case_items
+        from pytest_garl.plugin.options import options_of
+
+        try:
+            items[:0] = lost_case_items(session, options_of(config), collected)
+        except GarlError as error:
+            raise pytest.UsageError(str(error)) from error
 
 
 @pytest.hookimpl(tryfirst=True)

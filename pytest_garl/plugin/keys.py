@@ -17,6 +17,8 @@ RUN = pytest.StashKey[Any]()
 """Where a session keeps its run; none if nothing is to be flown."""
 TALLY = pytest.StashKey[Any]()
 """Where a session that is no xdist worker keeps what its reports say."""
+COLLECTED = pytest.StashKey[Any]()
+"""Where a session keeps which files and landing tests it collected."""
 LANDING = pytest.StashKey[Any]()
 """Where an item keeps the landing that it asked for."""
 BODY_RUNS = pytest.StashKey[bool]()
@@ -67,6 +69,8 @@ FINDING_TEST = "garl.found"
 """A worker's item failed for a violation that a search found: the search and the signature."""
 OUTSIDE = "garl.outside"
 """A saved case whose values lie outside the test's domain, and which of them."""
+LOST = "garl.lost"
+"""A file of the corpus that nothing can fly any more, and why."""
 FATAL = "garl.fatal"
 """Why the run cannot go on."""
 

@@ -30,6 +30,7 @@ class MarkerArguments:
 
     maps: tuple[str, ...]
     """Those of the marker's maps that ``--garl-map`` selects."""
+    all_maps: tuple[str, ...]
     target: Target
     """A target without map, for items that have none."""
     marker: MarkerSpec | None = None
@@ -100,6 +101,7 @@ def read_marker(marker: pytest.Mark, options: Options) -> MarkerArguments:
         within(target.domain, target.navigation)  # Raises if they contradict each other.
     return MarkerArguments(
         maps=tuple(map for map in maps if not options.maps or map in options.maps),
+        all_maps=maps,
         target=target,
         marker=spec,
         start=_start(marker),

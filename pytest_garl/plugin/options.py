@@ -15,7 +15,7 @@ from pytest_garl.adversary.catalogue import policy_names
 from pytest_garl.adversary.domain_policy import domain_with_policy, policy_in
 from pytest_garl.errors import GarlError
 from pytest_garl.execution.flight_id import Slot
-from pytest_garl.plugin.arguments import OPTIONS, Option
+from pytest_garl.plugin.arguments import DEFAULT_CASES, OPTIONS, Option
 from pytest_garl.plugin.keys import is_xdist_worker
 from pytest_garl.plugin.option_values import among, filmed, integer, number, wrong
 from pytest_garl.plugin.report_options import report_folder, report_url
@@ -79,6 +79,8 @@ class Options:
     """Whether all kinds of a search together have no more flights than the search."""
     xfail_strict: bool
     cases: Path
+    cases_named: bool
+    """Whether the ini file or the command line names the folder of the cases."""
     folder: Path
     root: Path
     controller: str
@@ -174,7 +176,8 @@ def read_options(config: pytest.Config) -> Options:
         shrink=_shrink(text["shrink"]),
         shrink_capped=not text["shrink"],
         xfail_strict=bool(config.getini("garl_xfail_strict")),
-        cases=config.rootpath / str(config.getini("garl_cases")),
+        cases=config.rootpath / str(config.getini("garl_cases") or DEFAULT_CASES),
+        cases_named=bool(config.getini("garl_cases")),
         folder=folder,
         root=config.rootpath,
         controller=controller_of(config),

@@ -35,6 +35,7 @@ class CaseHeader:
     live: bool
     reason: NoGateReason
     map: str
+    test: str
     asserting_test: str
 
 
@@ -90,6 +91,7 @@ def read_header(top: Table) -> CaseHeader:
         live=live,
         reason=reason,
         map=top.string("map"),
+        test=top.string("test", ""),
         asserting_test=asserting_test(top.string("test", ""), top.string("assertion", "")),
     )
 

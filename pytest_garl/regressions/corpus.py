@@ -71,9 +71,17 @@ class Corpus:
         self._listed: dict[Path, tuple[CorpusEntry, ...]] = {}
 
     def entries(self, system: str) -> tuple[CorpusEntry, ...]:
-        """Return the files of a system in the order of their names, broken ones among them."""
+        """Return the files of a system in the order of their names.
+
+        Files whose header cannot be read are among them.  Cases of another class of the module lie
+        in the same folder.
+        """
         self._check_link()
-        return tuple(_of_system(entry, system) for entry in self._in(self._folder_of(system)))
+        return tuple(
+            entry
+            for entry in self._in(self._folder_of(system))
+            if entry.header is None or entry.header.system == system
+        )
 
     def all_entries(self) -> tuple[CorpusEntry, ...]:
         """Return all files of the corpus, system by system."""
@@ -165,7 +173,7 @@ class Corpus:
         return self._listed[folder]
 
     def _list(self, folder: Path) -> Iterator[CorpusEntry]:
-        for path in sorted(folder.glob("*.toml")):
+        for path in sorted(folder.glob("[!.]*.toml")):
             try:
                 changed_ns = path.stat().st_mtime_ns
             except OSError as error:
@@ -234,16 +242,6 @@ def _lost(path: Path, reason: str) -> CorpusEntry:
     )
 
 
-def _of_system(entry: CorpusEntry, system: str) -> CorpusEntry:
-    if entry.header is None or entry.header.system == system:
-        return entry
-    problem = (
-        f"{entry.path}: key 'system': found {entry.header.system!r}, expected {system!r}, the only "
-        "system with tests whose cases lie in this folder"
-    )
-    return dataclasses.replace(entry, header=None, header_problem=problem)
-
-
 def _failure(case: Case) -> tuple[str, ...]:
     """Return the facts that two cases of the same failure share."""
     return (
@@ -281,3 +279,22 @@ def read_acceptance(cases: Path) -> Acceptance:
         problem = done.stderr.strip().partition("\n")[0]
         return Acceptance(cases=cases, committed=frozenset(), problem=problem)
     return Acceptance(cases=cases, committed=frozenset(done.stdout.split("\0")[:-1]))
+
+
+def committed_cases(cases: Path) -> list[str]:
+    """Return the paths of the cases of a folder that git's index has, also if the folder is gone.
+
+    The paths are those below the folder.
+    """
+    at = next((each for each in cases.absolute().parents if each.is_dir()), None)
+    if at is None:
+        return []
+    command = ["git", "-C", str(at), "ls-files", "-z", "--", str(cases.absolute())]
+    try:
+        done = subprocess.run(command, capture_output=True, text=True, check=False)
+    except OSError:
+        # Without git nothing is known of a folder that is gone.
+        return []
+    below = cases.absolute().relative_to(at).as_posix()
+    names = [name.removeprefix(f"{below}/") for name in done.stdout.split("\0")[:-1]]
+    return [name for name in names if name.endswith(".toml") and name.count("/") == 1]
