@@ -41,6 +41,9 @@ REACTION_S = 0.3
 default rate, in which a system notices, decides and its latency passes; engineering estimate."""
 OBSERVED_WITHIN_S = LONGEST_ESCAPE_S + REACTION_S
 """What the camera showed earlier does not count: no escape begins so early."""
+Escape = Literal["flight", "motors off"]
+"""How a collision could have been escaped: by flying on, or, by a UAV that stands on the ground, by
+stopping the motors."""
 MoveList = tuple[tuple[float, float], ...]
 Moves = tuple[tuple[str, MoveList], ...]
 ChangeList = tuple[tuple[int, str, float], ...]
@@ -88,11 +91,14 @@ class Prevention:
     ``inevitable_s`` is the time to inevitable collision: the longest time before the contact from
     which no escape exists.  ``observed_s`` is how long before the contact the camera had shown the
     body well enough for the first time within ``OBSERVED_WITHIN_S``; None if it had not.
+    ``escape`` is how a preventable collision could have been escaped: to stop the motors on the
+    ground needs no camera.
     """
 
     answer: Preventable = "not asked"
     inevitable_s: float | None = None
     observed_s: float | None = None
+    escape: Escape = "flight"
 
     @property
     def text(self) -> str:
@@ -109,6 +115,11 @@ class Prevention:
             )
         else:
             escape = f"an escape exists {ESCAPE_STEP_S:.1f} s before the contact"
+        if self.escape == "motors off":
+            return (
+                f"{self.answer}: the UAV stood on the ground, where stopping the motors is an "
+                f"escape that needs no camera; {escape}"
+            )
         seen = (
             f"the camera did not show the body well enough within the last {OBSERVED_WITHIN_S:g} s"
             if self.observed_s is None

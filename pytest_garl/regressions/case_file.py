@@ -23,6 +23,7 @@ from pytest_garl.regressions.behaviour_toml import (
 from pytest_garl.regressions.case import (
     NOT_ASKED,
     Case,
+    Escape,
     Evidence,
     NoGateReason,
     Preventable,
@@ -164,6 +165,8 @@ def _prevention_lines(prevention: Prevention) -> list[list[str]]:
         f'answer = "{prevention.answer}"',
         *(f"{key} = {value!r}  # {text}" for key, value, text in seconds if value is not None),
     ]
+    if prevention.escape != "flight":
+        lines.append(f'escape = "{prevention.escape}"  # of a UAV that stands on the ground')
     return [lines]
 
 
@@ -171,7 +174,7 @@ def _read_prevention(top: Table) -> Prevention:
     if "preventable" not in top.values:
         return NOT_ASKED
     table = top.table("preventable")
-    table.refuse_unknown({"answer", "inevitable_s", "observed_s"})
+    table.refuse_unknown({"answer", "inevitable_s", "observed_s", "escape"})
     seconds = {
         key: table.number(key, low=0.0, high=LONGEST_S)
         for key in ("inevitable_s", "observed_s")
@@ -180,7 +183,10 @@ def _read_prevention(top: Table) -> Prevention:
     answer = cast(Preventable, table.string("answer", allowed=get_args(Preventable)[1:]))
     if "inevitable_s" not in seconds:
         raise table.error("inevitable_s", "found nothing, expected a number of seconds")
-    return Prevention(answer=answer, **seconds)
+    escape: Escape = "flight"
+    if "escape" in table.values:
+        escape = cast(Escape, table.string("escape", allowed=get_args(Escape)))
+    return Prevention(answer=answer, escape=escape, **seconds)
 
 
 def _violation_lines(violation: Violation) -> list[str]:

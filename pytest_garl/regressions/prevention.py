@@ -2,7 +2,8 @@
 
 A model plans an escape from the flight's own state, later and later before the contact; a real
 flight confirms the plan: the landing system flies until then, the escape after it.  NPCs repeat
-their moves until then; after it a policy that reads the UAV goes on live.
+their moves until then; after it a policy that reads the UAV goes on live.  A UAV that stands on the
+ground escapes by stopping its motors as well: then a body that runs into it is no violation.
 """
 
 from __future__ import annotations
@@ -12,7 +13,6 @@ import math
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
-from typing import Literal
 
 import numpy as np
 
@@ -39,11 +39,16 @@ from pytest_garl.scenarios.placement import map_in
 from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.simulation.flight import Contact, Flight
 from pytest_garl.simulation.flight_file import load
+from pytest_garl.simulation.land_detector import DETECTED_AFTER_S
 from pytest_garl.simulation.navigation import error_m_at
 from pytest_garl.simulation.npc_policy import PolicySpec
 from pytest_garl.simulation.physics.world import PHYSICS_RATE_HZ, World
-from pytest_garl.simulation.system_under_test.takeover import Leg, Takeover
+from pytest_garl.simulation.system_under_test.takeover import Leg, Pilot, Takeover
+from pytest_garl.verdicts.touchdowns import stays
 
+STEADY_S = 1.0
+"""From so long after its touchdown on a UAV that is still on the ground may stop its motors: the
+land detector waits for the same second."""
 EXTRA_S = 0.5
 """The flight of an escape goes on so long after it is judged."""
 
@@ -83,7 +88,7 @@ class Collision:
 
     def job_of(
         self,
-        pilot: Literal["escape", "hold", "blind"],
+        pilot: Pilot,
         from_s: float,
         legs: tuple[Leg, ...] = (),
     ) -> FlightJob:
@@ -128,12 +133,24 @@ class Collision:
         since_s = self.contact.time_s - LONGEST_ESCAPE_S - REACTION_S
         return first_observation_s(self.flight, self.contact.body, since_s)
 
+    def stood_since_s(self) -> float | None:
+        """Return since when the UAV had stood on the ground at the contact; None in the air."""
+        found = stays(self.flight)
+        return found[-1].since_s if found and found[-1].end_s is None else None
+
     def survives(self, completed: CompletedFlight, from_s: float, world: World) -> bool:
         """Return whether a flight with a takeover is the same until then, and escapes."""
         if not completed.record.exists():
             return False
         flight = load(completed.record)
         return self.same_until(flight, from_s) and escaped(flight, world, from_s, self.until_s)
+
+    def stops(self, completed: CompletedFlight, from_s: float) -> bool:
+        """Return whether a flight with a takeover is the same until then, and lands in time."""
+        if not completed.record.exists():
+            return False
+        flight = load(completed.record)
+        return self.same_until(flight, from_s) and flight.outcome == "landed"
 
     def same_until(self, flight: Flight, time_s: float) -> bool:
         """Return whether another flight has the same trajectory up to a time."""
@@ -200,11 +217,22 @@ class _Question:
         observed_s = None if seen_s is None else round(contact_s - seen_s, 3)
         tried = [ESCAPE_STEP_S * (1 + n) for n in range(round(LONGEST_ESCAPE_S / ESCAPE_STEP_S))]
         tried = [before_s for before_s in tried if before_s < contact_s]
-        latest_s = next((before_s for before_s in tried if self._escapes(before_s)), None)
+        stop_s = next((before_s for before_s in tried if self._stops(before_s)), None)
+        latest_s = next(
+            (before_s for before_s in tried if before_s == stop_s or self._escapes(before_s)), None
+        )
         if latest_s is None:
             if self._unconfirmed or not tried:
                 return NOT_ASKED
             return Prevention(answer="unpreventable", inevitable_s=tried[-1], observed_s=observed_s)
+        if stop_s is not None:
+            # It stands there and need not have seen anything.
+            return Prevention(
+                answer="preventable",
+                inevitable_s=latest_s - ESCAPE_STEP_S,
+                observed_s=observed_s,
+                escape="motors off",
+            )
         ready_s = 0.0 if seen_s is None else contact_s - seen_s - REACTION_S
         # Whoever has an escape later can also wait for it.
         in_time = ready_s >= latest_s or (ready_s > 0 and self._escapes(ready_s))
@@ -224,11 +252,26 @@ class _Question:
         legs = find_escape(model, collision.contact.body, collision.contact.time_s)
         if legs is None:
             return False
-        if not self._left:
-            self._unconfirmed = True
-            return False
-        self._left -= 1
-        completed = self._fly(collision.job_of("escape", from_s, legs))
-        confirmed = collision.survives(completed, from_s, self._world)
+        completed = self._flown(collision.job_of("escape", from_s, legs))
+        confirmed = completed is not None and collision.survives(completed, from_s, self._world)
         self._unconfirmed |= not confirmed
         return confirmed
+
+    def _stops(self, before_s: float) -> bool:
+        """Return whether a UAV that stands on the ground can stop its motors before the contact."""
+        collision = self._collision
+        from_s, since_s = collision.takeover_s(before_s), collision.stood_since_s()
+        if since_s is None or from_s < since_s + STEADY_S:
+            return False
+        # One flight is left for an escape by flying.
+        if self._left <= 1 or from_s + DETECTED_AFTER_S >= collision.contact.time_s:
+            return False
+        completed = self._flown(collision.job_of("stop", from_s))
+        return completed is not None and collision.stops(completed, from_s)
+
+    def _flown(self, job: FlightJob) -> CompletedFlight | None:
+        """Fly a job; return None if no flight is left for it."""
+        if not self._left:
+            return None
+        self._left -= 1
+        return self._fly(job)

@@ -75,6 +75,11 @@ def test_case_of_an_own_assertion_belongs_to_its_test_in_any_file() -> None:
             "2.4 s before it",
         ),
         (
+            Prevention(answer="preventable", inevitable_s=1.0, escape="motors off"),
+            "preventable: the UAV stood on the ground, where stopping the motors is an escape that "
+            "needs no camera; an escape exists 1.5 s before the contact, none 1.0 s before it",
+        ),
+        (
             Prevention(answer="sensor-limited", inevitable_s=1.5),
             "sensor-limited: an escape exists 2.0 s before the contact, none 1.5 s before it, the "
             "camera did not show the body well enough within the last 5.3 s",

@@ -15,6 +15,7 @@ from pytest_garl.messages import printable
 from pytest_garl.regressions.case import (
     NOT_ASKED,
     Case,
+    Escape,
     NoGateReason,
     Preventable,
     Prevention,
@@ -85,11 +86,13 @@ def test_allowed_abort_of_the_first_schema_is_read_as_the_default_of_today() -> 
 @pytest.mark.parametrize("observed_s", [None, 2.4])
 def test_file_keeps_what_was_preventable(answer: Preventable, observed_s: float | None) -> None:
     reason = cast(NoGateReason, "" if answer == "preventable" else answer)
-    found = Prevention(answer=answer, inevitable_s=0.5, observed_s=observed_s)
+    escape: Escape = "motors off" if answer == "preventable" and observed_s is None else "flight"
+    found = Prevention(answer=answer, inevitable_s=0.5, observed_s=observed_s, escape=escape)
     judged = dataclasses.replace(case(), prevention=found, reason=reason)
     text = dump_case(judged)
     assert parse_case(text, load_map) == judged
     assert ("gates = false" in text) is bool(reason)
+    assert ('escape = "motors off"' in text) is (escape == "motors off")
 
 
 @settings(deadline=None)

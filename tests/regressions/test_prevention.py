@@ -6,18 +6,30 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from pytest_garl.adversary.catalogue import policy_spec
 from pytest_garl.execution.flight import fly_job
 from pytest_garl.execution.flight_id import CompletedFlight, FlightId
 from pytest_garl.execution.job import FlightJob
+from pytest_garl.execution.reference import reference_to
+from pytest_garl.landing_system import Command, Observation, VelocitySetpoint
 from pytest_garl.regressions import prevention
 from pytest_garl.regressions.case import NOT_ASKED
 from pytest_garl.regressions.case_flights import recorded_behaviour
 from pytest_garl.regressions.clearance import KEPT_M, Clearance, escaped
 from pytest_garl.regressions.escape_plan import find_escape
 from pytest_garl.regressions.prevention import Collision, collision_of, prevention_of
+from pytest_garl.scenarios.files import loads
 from pytest_garl.simulation.flight import Step
 from pytest_garl.simulation.flight_file import load
-from tests.support.blind_lander import LAWN, blind_flight, completed, job_of, scenario_with
+from pytest_garl.simulation.fly import fly
+from tests.support.blind_lander import (
+    LAWN,
+    BlindLander,
+    blind_flight,
+    completed,
+    job_of,
+    scenario_with,
+)
 
 pytestmark = pytest.mark.sim
 DOG = "dog-1"
@@ -125,6 +137,75 @@ def test_escape_that_no_flight_confirms_leaves_the_question_open(tmp_path: Path)
 
     assert prevention_of(chased, fly, 2) == NOT_ASKED
     assert len(flown) == 2
+
+
+class StandsThere(BlindLander):
+    """Comes down, and holds its place on the ground with running motors."""
+
+    def step(self, observation: Observation) -> Command:
+        height_m = float(observation.position_m[2])
+        if not self.climbed or height_m > 0.3:
+            return super().step(observation)
+        return VelocitySetpoint(velocity_mps=(0.0, 0.0, -0.3 if height_m > 0.26 else 0.0))
+
+
+PASSER_BY = """
+schema = 2
+map = "lawn"
+seed = 1
+[scenario.marker]
+x_m = 2.0
+y_m = 1.0
+[scenario.told]
+surveyed = 1.0
+[scenario.person-1]
+start_x_m = 4.0
+start_y_m = 1.0
+speed_mps = 1.4
+grade = "careless"
+phase = "touchdown"
+crosses_x_m = 0.0
+crosses_y_m = 0.0
+"""
+
+
+def passer_by(folder: Path, delay_s: float) -> tuple[Collision, Flights]:
+    """Return the collision of a person with a UAV that stands on its marker."""
+    scenario = loads(f"{PASSER_BY}delay_s = {delay_s}\n", LAWN)
+    done = completed(
+        fly(scenario, StandsThere, policy_spec("graded"), map=LAWN, time_limit_s=60.0), folder
+    )
+    job = FlightJob.for_system(
+        reference_to(StandsThere), LAWN, policy_spec("graded"), flights=folder
+    )
+    behaviour = recorded_behaviour(done, scenario, LAWN)
+    found = collision_of(job, scenario, behaviour, done, LAWN)
+    assert found is not None
+    return found, Flights(found)
+
+
+def test_a_uav_that_stands_on_the_ground_escapes_by_stopping_its_motors(tmp_path: Path) -> None:
+    stands, fly = passer_by(tmp_path, 3.0)
+    found = prevention_of(stands, fly, 3)
+    assert (found.answer, found.escape) == ("preventable", "motors off")
+    assert found.inevitable_s is not None
+    assert found.inevitable_s <= 1.0
+    assert found.observed_s is None
+    assert "stopping the motors is an escape that needs no camera" in found.text
+    takeover = fly.jobs[0].takeover
+    assert takeover is not None
+    assert takeover.pilot == "stop"
+
+
+def test_a_uav_cannot_stop_its_motors_in_the_first_second_after_its_touchdown(
+    tmp_path: Path,
+) -> None:
+    stands, fly = passer_by(tmp_path, 0.0)
+    since_s = stands.stood_since_s()
+    assert since_s is not None
+    assert stands.contact.time_s - since_s < 2.0
+    assert prevention_of(stands, fly, 3).escape == "flight"
+    assert {job.takeover.pilot for job in fly.jobs if job.takeover} <= {"escape"}
 
 
 def test_flight_that_is_another_before_the_takeover_confirms_nothing(tmp_path: Path) -> None:

@@ -101,6 +101,11 @@ def _decoy(flight: Flight | None, kind: str) -> str:
 
 def _moving(flight: Flight | None, prevention: Prevention) -> str:
     answer = prevention.answer
+    if prevention.escape == "motors off":
+        return (
+            "The UAV stood on the ground with running motors: look at how the system notices a "
+            "touchdown, and at when it stops the motors."
+        )
     if answer == "preventable":
         return (
             "An escape existed after the camera could show the body: look at what the system does "

@@ -7,6 +7,8 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from pytest_garl.messages import shortened
+from pytest_garl.regressions.case import OBSERVED_WITHIN_S
+from pytest_garl.regressions.observation import OBSERVABLE_PX, pixels_of
 from pytest_garl.reports.html.flight_view import gap_m, phases
 from pytest_garl.reports.html.moments import decisive_s
 from pytest_garl.simulation.flight import Flight, Step
@@ -78,6 +80,14 @@ def _body(flight: Flight, steps: Sequence[Step], end_s: float) -> Iterator[str]:
         f"The camera showed {body} in {frames}, first at {seen[0]:.1f} s, which is "
         f"{end_s - seen[0]:.1f} s before the contact: the UAV was {up:.1f} m up, and the nearest "
         f"NPC {float(gap_m(flight)[index]):.1f} m away."
+    )
+    recent = [s for s in steps if s.time_s >= contact.time_s - OBSERVED_WITHIN_S]
+    shown = [pixels_of(step, body) for step in recent if body in step.objects_visible]
+    large = sum(px >= OBSERVABLE_PX for px in shown)
+    counted = f"{len(shown)} of these frames, {large} of them with {OBSERVABLE_PX} pixels or more"
+    yield (
+        f"For an escape only the last {OBSERVED_WITHIN_S:g} s before the contact count: they have "
+        f"{counted if shown else 'none of these frames'}."
     )
 
 

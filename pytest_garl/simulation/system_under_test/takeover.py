@@ -21,7 +21,7 @@ from pytest_garl.landing_system import (
     airframe_of,
 )
 from pytest_garl.simulation.physics.flight_control import FlightControl
-from pytest_garl.simulation.physics.vehicle import Motion, Vector, vehicle_model
+from pytest_garl.simulation.physics.vehicle import Motion, Quaternion, Vector, vehicle_model
 from pytest_garl.simulation.system_under_test.descent import descend
 
 CRUISE_M = 10.0
@@ -34,6 +34,7 @@ DESCENT_MPS = 1.0
 """Speeds of the blind pilot: those of the reference pilot's descent, and twice that across."""
 CLIMBING_MPS = 0.3
 """A UAV that climbs faster than this is taking off."""
+Pilot = Literal["escape", "stop", "hold", "blind"]
 _ROUNDING_S = 1e-6
 
 
@@ -49,13 +50,14 @@ class Leg:
 class Takeover:
     """Who flies in place of the landing system from ``from_s`` on.
 
-    "escape" flies the legs and hovers after them; "hold" repeats the landing system's last command;
-    "blind" goes on to the marker and down, and knows of nothing else.  The first command is the one
+    "escape" flies the legs and hovers after them; "stop" switches the motors off; "hold" repeats
+    the landing system's last command; "blind" goes on to the marker and down, and knows of nothing
+    else.  The first command is the one
     that takes effect at ``from_s`` or just after it.  From ``until_s`` on the pilot gives up, which
     ends the flight.
     """
 
-    pilot: Literal["escape", "hold", "blind"]
+    pilot: Pilot
     from_s: float
     until_s: float
     legs: tuple[Leg, ...] = ()
@@ -119,7 +121,8 @@ class TakenOver:
             return command
         x, y, z = (float(value) for value in observation.position_m)
         vx, vy, vz = (float(value) for value in observation.velocity_mps)
-        return self._command(effect_s, (x, y, z), (vx, vy, vz))
+        attitude = _quaternion(observation.attitude)
+        return self._command(effect_s, (x, y, z), (vx, vy, vz), attitude)
 
     def control(self, state: VehicleState) -> MotorThrusts:
         """Return the thrusts of who flies; the other pilot uses the simulated flight control."""
@@ -128,18 +131,23 @@ class TakenOver:
             thrusts: MotorThrusts = self._inner.control(state)
             return thrusts
         position, velocity = _vector(state.position_m), _vector(state.velocity_mps)
-        command = self._command(state.time_s, position, velocity)
+        attitude = _quaternion(state.attitude)
+        command = self._command(state.time_s, position, velocity, attitude)
         self._control.remember_yaw(command)
-        qx, qy, qz, qw = (float(value) for value in state.attitude)
-        motion = Motion(position, velocity, (qx, qy, qz, qw), _vector(state.angular_velocity_radps))
+        motion = Motion(position, velocity, attitude, _vector(state.angular_velocity_radps))
         return MotorThrusts(newtons=self._control.thrusts(motion, command, self._control_dt_s))
 
-    def _command(self, time_s: float, position: Vector, velocity: Vector) -> Command:
+    def _command(
+        self, time_s: float, position: Vector, velocity: Vector, attitude: Quaternion
+    ) -> Command:
         takeover = self._takeover
         if time_s >= takeover.until_s - _ROUNDING_S:
             return Abort()
         if takeover.pilot == "hold":
             return self._last
+        if takeover.pilot == "stop":
+            # Towards the present attitude, so that no motor runs to turn the UAV.
+            return AttitudeSetpoint(attitude=attitude, thrust=0.0)
         if takeover.pilot == "blind":
             return self._blind(position, velocity)
         return VelocitySetpoint(
@@ -181,3 +189,8 @@ def velocity_of(legs: tuple[Leg, ...], elapsed_s: float) -> Vector:
 def _vector(values: Any) -> Vector:
     x, y, z = (float(value) for value in values)
     return x, y, z
+
+
+def _quaternion(values: Any) -> Quaternion:
+    x, y, z, w = (float(value) for value in values)
+    return x, y, z, w

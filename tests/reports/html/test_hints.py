@@ -109,6 +109,10 @@ def test_a_collision_says_what_could_have_prevented_it(answer: Any, words: str) 
 def test_the_sentences_say_when_the_body_was_first_in_view() -> None:
     told = " ".join(sighting_sentences(collided(range(60, 80))))
     assert "showed dog-1 in 20 frames, first at 6.0 s, which is 2.0 s before the contact" in told
+    assert "the last 5.3 s before the contact count: they have 20 of these frames, 0 of" in told
+    early = " ".join(sighting_sentences(collided(range(20))))
+    assert "showed dog-1 in 20 frames" in early
+    assert "count: they have none of these frames." in early
     unseen = " ".join(sighting_sentences(collided(range(0))))
     assert "never showed dog-1 before the contact at 8.0 s" in unseen
 
