@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import dataclasses
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import click
+from click.core import ParameterSource
 
 from pytest_garl.cli.case_tables import (
     case_table,
@@ -18,8 +20,11 @@ from pytest_garl.messages import command, printable
 from pytest_garl.regressions.case import NO_GATE_TEXTS, Case, NoGateReason
 from pytest_garl.regressions.case_file import load_case
 from pytest_garl.regressions.corpus import Corpus, replace_file
-from pytest_garl.regressions.replay import Replay, replay, system_of
+from pytest_garl.regressions.replay import Replay, replay
 from pytest_garl.regressions.story_text import grade_in_words
+
+if TYPE_CHECKING:
+    from pytest_garl.plugin.project_collection import ProjectTests
 
 DEFAULT_FOLDER = Path("scenarios/regressions")
 NO_PROOF = 3
@@ -33,6 +38,8 @@ MINIMUM_RESHRINK_FLIGHTS = 9
 class _Project:
     root: Path
     corpus: Corpus
+    named: bool
+    """Whether the command line names the folder."""
 
     @property
     def maps(self) -> tuple[Path, ...]:
@@ -40,6 +47,16 @@ class _Project:
 
     def case(self, file: Path) -> Case:
         return load_case(file, self.maps)
+
+    def collected(self) -> tuple[ProjectTests, Corpus]:
+        """Return the landing tests, and the corpus that pytest flies, or that of ``--folder``."""
+        from pytest_garl.plugin.project_collection import collect_project
+
+        tests = collect_project(self.root, self.corpus.folder if self.named else None)
+        folder = tests.cases
+        if folder.is_relative_to(self.root):
+            folder = folder.relative_to(self.root)
+        return tests, Corpus(folder, self.maps)
 
 
 FOLDER = click.option(
@@ -60,7 +77,11 @@ def cases(context: click.Context, folder: Path) -> None:
     A case is a file under scenarios/regressions/<system>/. Run these commands where you run pytest.
     """
     root = Path.cwd()
-    context.obj = _Project(root=root, corpus=Corpus(folder, (root / "scenarios" / "maps",)))
+    named = context.get_parameter_source("folder") is ParameterSource.COMMANDLINE
+    if named and not (folder.is_dir() or folder.is_symlink()):
+        raise click.BadParameter(f"there is no folder {printable(str(folder))}", param=None)
+    corpus = Corpus(folder, (root / "scenarios" / "maps",))
+    context.obj = _Project(root=root, corpus=corpus, named=named)
 
 
 def say(text: str, *, err: bool = False) -> None:
@@ -304,12 +325,21 @@ def prune(project: _Project, yes: bool) -> None:
 @cases.command()
 @click.pass_obj
 def check(project: _Project) -> None:
-    """Check all files without flying: readable, named after their content, system importable."""
-    problems = []
-    found = project.corpus.all_entries()
+    """Check all files without flying: readable, named after their content, flown by a test.
+
+    pytest collects the test files of the project that have the marker, and those that cases name. A
+    case that none of them flies is lost.
+    """
+    from pytest_garl.regressions.census import census
+
+    tests, corpus = project.collected()
+    problems = [f"{file}: cannot be collected: {reason}" for file, reason in tests.broken]
+    lost = {each.path: each.reason for each in census(corpus, tests.collection)}
+    found = corpus.all_entries() if corpus.folder.is_dir() or corpus.folder.is_symlink() else ()
     for entry in found:
         case = entry.case
         if case is None:
+            lost.pop(entry.path, None)
             problems.append(entry.problem)
             continue
         if entry.name != case.id:
@@ -320,10 +350,7 @@ def check(project: _Project) -> None:
         test = project.root / case.test.partition("::")[0]
         if "::" in case.test and not test.is_file():
             problems.append(f"{entry.path}: key 'test': there is no file {test}")
-        try:
-            system_of(case, project.root)
-        except GarlError as error:
-            problems.append(f"{entry.path}: {error}")
+    problems += [f"{path}: {reason}" for path, reason in lost.items()]
     for problem in problems:
         say(problem, err=True)
     say(f"{len(found)} cases, {len(problems)} problems")

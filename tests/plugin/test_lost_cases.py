@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import shutil
 import subprocess
+import sys
 from collections.abc import Callable
 from pathlib import Path
 
@@ -314,3 +315,50 @@ def test_a_committed_case_alone_may_be_deleted(pytester: pytest.Pytester, file: 
     assert len(lost(run(pytester))) == 1
     subprocess.run(["git", "rm", "-rq", "--cached", CASES], cwd=pytester.path, check=True)
     assert run(pytester).ret == pytest.ExitCode.OK
+
+
+def checked(project: Path, *args: str) -> tuple[int, str]:
+    """Return exit status and output of ``garl cases check``."""
+    start = "from pytest_garl.cli import main; main()"
+    command = [sys.executable, "-c", start, "cases", *args, "check"]
+    done = subprocess.run(command, cwd=project, capture_output=True, text=True, check=False)
+    return done.returncode, done.stdout + done.stderr
+
+
+@pytest.mark.parametrize(
+    "lose", [drop_map, move_one_folder_up, fly_another_system], ids=lambda lose: lose.__name__
+)
+def test_check_names_what_a_session_names(
+    pytester: pytest.Pytester, file: Path, lose: Callable[[Path, Path], None]
+) -> None:
+    assert checked(pytester.path) == (0, "1 cases, 0 problems\n")
+    lose(pytester.path, file)
+    status, output = checked(pytester.path)
+    assert status == 1
+    assert LOSSES[lose] in output
+    assert "1 problems" in output
+
+
+def test_check_collects_files_that_pytest_cannot_collect_together(
+    pytester: pytest.Pytester, file: Path
+) -> None:
+    in_two_folders(pytester.path)
+    for name in ("a", "b"):
+        (pytester.path / name / f"test_{name}.py").rename(pytester.path / name / "test_same.py")
+        for case in (pytester.path / CASES / f"system_{name}").glob("*.toml"):
+            replace_text(case, f"test_{name}.py", "test_same.py")
+    assert checked(pytester.path) == (0, "2 cases, 0 problems\n")
+    (pytester.path / "b" / "test_same.py").write_text("import not_there")
+    status, output = checked(pytester.path)
+    assert status == 1
+    assert "b/test_same.py: cannot be collected: ModuleNotFoundError" in output
+
+
+def test_check_takes_the_folder_of_the_ini_key(pytester: pytest.Pytester, file: Path) -> None:
+    (pytester.path / "pytest.ini").write_text("[pytest]\ngarl_cases = kept\n")
+    status, output = checked(pytester.path)
+    assert status == 1
+    assert "garl_cases: there is no folder" in output
+    (pytester.path / CASES).rename(pytester.path / "kept")
+    assert checked(pytester.path) == (0, "1 cases, 0 problems\n")
+    assert "there is no folder typo" in checked(pytester.path, "--folder", "typo")[1]

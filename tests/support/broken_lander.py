@@ -31,6 +31,14 @@ class Lander:
         x, y, _ = self.home
         return Abort()
 """
+TESTS = """
+import pytest
+from stack_of_test import Lander
+
+@pytest.mark.garl(system=Lander, maps=["lawn"])
+def test_lands(landing):
+    assert landing.distance_to_landing_m <= landing.limits.distance_m
+"""
 LAWN = load_map("lawn")
 
 
@@ -74,6 +82,7 @@ def broken_project(folder: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Pa
     monkeypatch.chdir(folder)
     monkeypatch.setattr(sys, "path", [*sys.path])
     (folder / "stack_of_test.py").write_text(SYSTEM)
+    (folder / "test_lander.py").write_text(TESTS)
     (folder / "broken").touch()
     path = Corpus(folder / "scenarios" / "regressions").save(case_of_broken_lander())
     assert path is not None
