@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Literal
 
+from pytest_garl.airframe import Rangefinder
 from pytest_garl.landing_system import Diagnostics
 
 if TYPE_CHECKING:
@@ -165,7 +166,8 @@ class Step:
     read, None without a camera or outside the frame.  ``objects_visible`` names the dynamic objects
     of which at least one pixel is in the frame, and ``objects_px`` counts their pixels, in the same
     order.  ``estimation_error_m`` is the difference between the position in the observation and the
-    true one at the time of the picture.
+    true one at the time of the picture; ``rangefinder_m`` the reading in the observation, None
+    without one.
     """
 
     time_s: float
@@ -177,6 +179,7 @@ class Step:
     marker: MarkerView | None = None
     objects_px: tuple[int, ...] = ()
     estimation_error_m: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    rangefinder_m: float | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -210,7 +213,7 @@ class Flight:
     ``nominal_views`` show how a nominal landing would have seen the marker; they are empty for
     flights that landed, hit something or crashed, and for simulators that do not record them.
     ``nominal_arrival_s`` and ``nominal_landing_s`` are when a nominal flight is above the marker
-    and on it.
+    and on it.  ``rangefinder`` is the airframe's, None without one.
     """
 
     outcome: Outcome
@@ -230,6 +233,7 @@ class Flight:
     nominal_views: tuple[NominalView, ...] = ()
     nominal_arrival_s: float | None = None
     nominal_landing_s: float | None = None
+    rangefinder: Rangefinder | None = None
     sha256: str = ""
     cpu: str = ""
     versions: tuple[tuple[str, str], ...] = ()

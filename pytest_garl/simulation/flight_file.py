@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from pytest_garl.airframe import Rangefinder
 from pytest_garl.errors import GarlError, NotFiniteError
 from pytest_garl.files.arrays import unpack
 from pytest_garl.files.json_values import dataclass_from, parse_json
@@ -105,6 +106,7 @@ def save(flight: Flight, path: Path) -> None:
         "nominal_views": [dataclasses.asdict(item) for item in flight.nominal_views],
         "nominal_arrival_s": flight.nominal_arrival_s,
         "nominal_landing_s": flight.nominal_landing_s,
+        "rangefinder": dataclasses.asdict(flight.rangefinder) if flight.rangefinder else None,
         "sha256": flight.sha256,
         "cpu": flight.cpu,
         "versions": flight.versions,
@@ -226,6 +228,7 @@ class _Header:
     nominal_views: tuple[NominalView, ...]
     nominal_arrival_s: float | None
     nominal_landing_s: float | None
+    rangefinder: Rangefinder | None
     sha256: str
     cpu: str
     versions: tuple[tuple[str, str], ...]

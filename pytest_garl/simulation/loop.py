@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import math
 from collections.abc import Callable, Sequence
 from functools import partial
@@ -105,7 +106,8 @@ class Loop:
         finally:
             self.close()
         outcome, crash = _after_closing(self._system, self.recorder, outcome, crash)
-        return self.recorder.flight(outcome, crash, self._contacts.touchdowns)
+        flight = self.recorder.flight(outcome, crash, self._contacts.touchdowns)
+        return dataclasses.replace(flight, rangefinder=self._system.airframe.rangefinder)
 
     def begin(self) -> None:
         """Reset the NPCs' policies and the landing system."""
@@ -237,7 +239,8 @@ class Loop:
             self._system.observe_truth(_truth(self, self._navigation.error_m))
         command = self._system.step(delivery.observation)
         error_m = estimation_error_m(delivery.observation, delivery.place_m)
-        self.recorder.step(command, delivery.sight, error_m)
+        range_m = delivery.observation.rangefinder_m
+        self.recorder.step(command, delivery.sight, error_m, range_m)
         latency_s = self._system.airframe.latency_s
         self._pending.append((tick + round(latency_s * PHYSICS_RATE_HZ), command))
 

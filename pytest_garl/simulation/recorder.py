@@ -134,10 +134,17 @@ class Recorder:
             objects_px=tuple(int(frame.pixels[ids[name]]) for name in names),
         )
 
-    def step(self, command: Command, sight: Sight, error_m: Vector = (0.0, 0.0, 0.0)) -> None:
+    def step(
+        self,
+        command: Command,
+        sight: Sight,
+        error_m: Vector = (0.0, 0.0, 0.0),
+        range_m: float | None = None,
+    ) -> None:
         """Record one command of the landing system, with what its frame shows.
 
-        ``error_m`` is the error of the position that the system was told.
+        ``error_m`` is the error of the position that the system was told, ``range_m`` the reading
+        of its rangefinder.
         """
         diagnostics = command.diagnostics
         if diagnostics and diagnostics.phase != self._phase:
@@ -154,6 +161,7 @@ class Recorder:
                 marker=sight.marker,
                 objects_px=sight.objects_px,
                 estimation_error_m=error_m,
+                rangefinder_m=range_m,
             )
         )
 

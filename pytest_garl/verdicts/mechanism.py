@@ -12,7 +12,7 @@ from pytest_garl.simulation.flight import Contact, Crash, Flight, Separation, To
 from pytest_garl.simulation.system_under_test.texts import cut
 from pytest_garl.verdicts.excuses import expected_readable_s
 from pytest_garl.verdicts.findings import descent_elsewhere
-from pytest_garl.verdicts.phases import landing_phase
+from pytest_garl.verdicts.phases import flying_from, landing_phase
 from pytest_garl.verdicts.sightings import (
     AT_MARKER_M,
     last_report_s,
@@ -46,6 +46,8 @@ RECENT_S = 0.5
 """A marker that was in view so long ago is in view."""
 RESERVE_SHARE = 0.15
 """A landing that is given up in this last share of the time limit is given up for want of time."""
+UNRANGED_S = 1.0
+"""A rangefinder that had no reading for less than this is not described."""
 MESSAGE_CHARS = 300
 """Length of an exception's message in a description; the flight's record has 1,000 characters."""
 TILTED_RAD = math.radians(20)
@@ -221,10 +223,12 @@ def _no_landing_cause(flight: Flight, limits: Limits, end: str) -> tuple[Violati
         off_m = stays(flight)[-1].first.distance_m
         when = f" at {at_s:.1f} s" if flight.outcome == "gave_up" else ""
         text = f"{end}{when}, although it stood {off_m:.1f} m off the marker."
-        return "late", "late:standing", text
+        return "late", "late:standing", f"{text}{_unranged_text(flight, at_s)}"
     phase = landing_phase(flight, at_s)
     readable = [step.time_s for step in readable_steps(flight, at_s)]
-    report = f"{_report_text(flight, at_s)}{_opportunity_text(flight)}"
+    report = (
+        f"{_report_text(flight, at_s)}{_unranged_text(flight, at_s)}{_opportunity_text(flight)}"
+    )
     when = f" at {at_s:.1f} s" if flight.outcome == "gave_up" else ""
     if not readable:
         # A detector may read a frame that a good one reads with less than one half.
@@ -263,6 +267,23 @@ def _report_text(flight: Flight, until_s: float) -> str:
         for step in flight.steps
     )
     return " The system reported other places, never the marker's." if reports else ""
+
+
+def _unranged_text(flight: Flight, until_s: float) -> str:
+    """Return for how long after the take-off the rangefinder had no reading; empty if briefly."""
+    start = flying_from(flight)
+    if flight.rangefinder is None or start == len(flight.uav.time_s):
+        return ""
+    flown = [s for s in flight.steps if flight.uav.time_s[start] <= s.time_s <= until_s]
+    without = [step.time_s for step in flown if step.rangefinder_m is None]
+    lasted_s = len(without) * _frame_s(flight)
+    if lasted_s < UNRANGED_S:
+        return ""
+    reach = f"{flight.rangefinder.least_m:g} to {flight.rangefinder.most_m:g} m"
+    return (
+        f" After the take-off the rangefinder, which reaches {reach}, had no reading for "
+        f"{lasted_s:.1f} s, last at {without[-1]:.1f} s."
+    )
 
 
 def _opportunity_text(flight: Flight) -> str:

@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 
 from pytest_garl.adversary.catalogue import policy_spec
+from pytest_garl.airframe import Rangefinder
 from pytest_garl.errors import GarlError
 from pytest_garl.landing_system import Detection, Diagnostics
 from pytest_garl.scenarios.genes import genome_for
@@ -103,8 +104,10 @@ def flight() -> Flight:
                 marker_px=20.0,
                 objects_visible=("dog-1",),
                 diagnostics=diagnostics,
+                rangefinder_m=4.25,
             ),
         ),
+        rangefinder=Rangefinder(least_m=0.3, most_m=6.0),
         decoys=(("marker-3", 1.0, 2.0),),
         crash=Crash(kind="raised", error="E", message="m", where="w", traceback="t"),
         sha256="ab",
@@ -146,7 +149,7 @@ def test_a_flight_survives_its_file_to_the_byte(file: Path, tmp_path: Path) -> N
     found = flight_file.load(file)
     assert flight_file.hash_of(found) == flight_file.hash_of(flight())
     names = ("contacts", "separations", "events", "steps", "decoys", "crash", "versions")
-    for name in (*names, "touchdown", "earlier_touchdowns"):
+    for name in (*names, "touchdown", "earlier_touchdowns", "rangefinder"):
         assert getattr(found, name) == getattr(flight(), name)
     assert found.objects[0].changes == flight().objects[0].changes
     flight_file.save(found, tmp_path / "two.npz")

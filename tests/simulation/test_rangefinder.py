@@ -101,6 +101,10 @@ def test_only_an_airframe_with_a_rangefinder_has_readings_and_flies_the_same() -
     heights = [float(each.position_m[2]) for each in Measures.seen[15:]]
     assert readings == pytest.approx(np.array(heights) - 0.05, abs=0.25)
     assert flights[0].sha256 == flights[1].sha256
+    # The record holds what the landing system got.
+    assert {step.rangefinder_m for step in flights[0].steps} == {None}
+    assert [s.rangefinder_m for s in flights[1].steps] == [o.rangefinder_m for o in Measures.seen]
+    assert [each.rangefinder for each in flights] == [None, Rangefinder()]
 
 
 def test_readings_show_the_true_height_when_the_estimated_one_errs() -> None:

@@ -5,6 +5,7 @@ from typing import Any
 
 import pytest
 
+from pytest_garl.airframe import Rangefinder
 from pytest_garl.simulation.flight import Event, Flight
 from pytest_garl.verdicts.judge import closest_call, judge, off_marker_m, why_undecided
 from pytest_garl.verdicts.verdict import Limits
@@ -192,6 +193,31 @@ def test_the_target_is_compared_without_the_error_of_the_position() -> None:
     assert wrong.signature == right.signature == "I:nothing:unseen"
     assert "its target was 5.0 m off the marker" in wrong.story
     assert "its target was right" in right.story
+
+
+@pytest.mark.parametrize(("most_m", "without_s"), [(6.0, 12.0), (20.0, 0.0)])
+def test_a_flight_that_did_not_land_says_for_how_long_its_rangefinder_had_no_reading(
+    most_m: float, without_s: float
+) -> None:
+    path = track((0.0, 0.0, 0.0, 0.2), (5.0, 0.0, 0.0, 7.0), (30.0, 0.0, 0.0, 10.0))
+    times = [index / 10 for index in range(301)]
+    steps = tuple(
+        dataclasses.replace(
+            step(time_s, marker=CLEAR),
+            # On the ground it is too near.
+            rangefinder_m=None if time_s < 5.0 or 10.0 <= time_s < 10.0 + without_s else 5.0,
+        )
+        for time_s in times
+    )
+    subject = flight(
+        "gave_up", (0.0, 0.0, 10.0), uav=path, steps=steps, rangefinder=Rangefinder(most_m=most_m)
+    )
+    story = judge(subject, Limits()).story
+    told = "the rangefinder, which reaches 0.2 to 6 m, had no reading for 12.0 s, last at 21.9 s."
+    assert (told in story) == bool(without_s)
+    assert ("rangefinder" in story) == bool(without_s)
+    blind = dataclasses.replace(subject, rangefinder=None)
+    assert "rangefinder" not in judge(blind, Limits()).story
 
 
 def test_a_late_landing_off_the_marker_violates_the_distance_alone() -> None:

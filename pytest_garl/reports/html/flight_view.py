@@ -129,7 +129,18 @@ def _metres(flight: Flight, picked: NDArray[np.intp]) -> list[dict[str, Any]]:
     errors = [(s.time_s, math.hypot(*s.estimation_error_m)) for s in flight.steps]
     if max((error for _, error in errors), default=0.0) >= 0.1:
         lines.append(_line("error of the estimated position", "error", _held(errors, times)))
+    if flight.rangefinder:
+        lines.append(_line("rangefinder's reading", "laser", _readings(flight, times)))
     return lines
+
+
+def _readings(flight: Flight, times: Array) -> list[float | None]:
+    """Return the rangefinder's reading at each time, None where it had none."""
+    gaps = [
+        (s.time_s, math.nan if s.rangefinder_m is None else s.rangefinder_m) for s in flight.steps
+    ]
+    held = _held(gaps, times)
+    return [None if value is None or math.isnan(value) else value for value in held]
 
 
 def _line(name: str, kind: str, values: Iterable[float | None]) -> dict[str, Any]:

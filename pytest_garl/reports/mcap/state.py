@@ -68,6 +68,7 @@ def sights(flight: Flight) -> Iterator[Logged]:
             "reported_markers": float(len(found)),
             "target_off_m": _target_off_m(flight, step),
             "position_error_m": math.hypot(*step.estimation_error_m),
+            "rangefinder_m": math.nan if step.rangefinder_m is None else step.rangefinder_m,
         }
         yield _numbers(ns(step.time_s), SIGHT, "Sight", sight)
 

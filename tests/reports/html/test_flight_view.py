@@ -5,6 +5,7 @@ import json
 
 import numpy as np
 
+from pytest_garl.airframe import Rangefinder
 from pytest_garl.landing_system import Diagnostics
 from pytest_garl.reports.html.flight_view import (
     MOST_PHASES,
@@ -42,6 +43,20 @@ def test_data_are_json_and_of_one_length() -> None:
     lines = [*data["metres"], *data["percent"]]
     assert {len(line["values"]) for line in lines} == {count}
     assert {len(data["uav"][axis]) for axis in "xyz"} == {count}
+
+
+def test_the_readings_of_a_rangefinder_are_a_line_with_gaps() -> None:
+    without = recorded(steps=seen(range(20, 60)))
+    assert "laser" not in {line["kind"] for line in flight_data(without, ())["metres"]}
+    steps = tuple(
+        dataclasses.replace(step, rangefinder_m=5.5 if step.time_s < 4.0 else None)
+        for step in without.steps
+    )
+    flight = dataclasses.replace(without, steps=steps, rangefinder=Rangefinder(most_m=6.0))
+    data = flight_data(flight, ())
+    (line,) = (line for line in data["metres"] if line["kind"] == "laser")
+    shown = dict(zip(data["t"], line["values"], strict=True))
+    assert (shown[2.0], shown[5.0]) == (5.5, None)
 
 
 def test_a_long_flight_is_thinned_and_keeps_its_end() -> None:

@@ -51,3 +51,4 @@ def test_sights_are_those_of_the_steps(exported: Exported) -> None:
         assert sight.marker_visible == step.marker_visible
         assert sight.reported_markers == len(found)
         assert math.isnan(sight.target_off_m) == (not found)
+        assert math.isnan(sight.rangefinder_m) == (step.rangefinder_m is None)
