@@ -6,16 +6,18 @@ from collections.abc import Iterator
 
 import pytest
 
-WITHOUT_HYPOTHESIS = "-p no:hypothesispytest"
+FOREIGN = ("randomly", "rerunfailures", "pytest-retry", "flaky", "timeout", "pytest_cov")
+"""Plugins of other projects' habits, which the tests of these habits load by name."""
+WITHOUT_OTHERS = " ".join(f"-p no:{name}" for name in ("hypothesispytest", *FOREIGN))
 """Hypothesis's plugin imports all of Hypothesis at the end of each run, which takes longer than
 flying; nothing in the projects of these tests uses it.  The tutorial runs with it."""
 
 
 @pytest.fixture(scope="session", autouse=True)
 def faster_runs() -> Iterator[None]:
-    """Let runs of pytest in other processes start without Hypothesis's plugin."""
+    """Let runs of pytest in other processes start without other plugins."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setenv("PYTEST_ADDOPTS", WITHOUT_HYPOTHESIS)
+        patch.setenv("PYTEST_ADDOPTS", WITHOUT_OTHERS)
         yield
 
 
@@ -25,4 +27,4 @@ def faster_runs_of_pytester(request: pytest.FixtureRequest) -> None:
     if "pytester" in request.fixturenames:
         patch: pytest.MonkeyPatch = request.getfixturevalue("monkeypatch")
         request.getfixturevalue("pytester")
-        patch.setenv("PYTEST_ADDOPTS", WITHOUT_HYPOTHESIS)
+        patch.setenv("PYTEST_ADDOPTS", WITHOUT_OTHERS)

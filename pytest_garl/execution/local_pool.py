@@ -9,6 +9,7 @@ from pathlib import Path
 
 from pytest_garl import cpu_dispatch
 from pytest_garl.execution.checkout import Checkout
+from pytest_garl.execution.exit_guard import watched_flight
 from pytest_garl.execution.flight import fly_job
 from pytest_garl.execution.job import parse_job
 from pytest_garl.execution.ledger_queue import Claim, WorkQueue
@@ -68,8 +69,15 @@ class InProcessPool:
             self._queue.release_dead()
             time.sleep(TURN_S)
             return
-        scenario = parse_scenario(claim.scenario)
-        self._queue.record(claim, *fly_job(parse_job(claim.job), scenario, claim.flight, None))
+        job, scenario = parse_job(claim.job), parse_scenario(claim.scenario)
+        with watched_flight() as watch:
+            flown = fly_job(job, scenario, claim.flight, None)
+        if watch.status is None:
+            self._queue.record(claim, *flown)
+        else:
+            # As if a worker had ended: the same finding, and no record.
+            job.record(claim.flight).unlink(missing_ok=True)
+            retry_or_record(self._queue, claim, WorkerExit(status=watch.status, stderr=watch.stack))
 
     def close(self) -> None:
         """Do nothing: no flight is under way between two turns."""

@@ -181,6 +181,12 @@ def add_options(parser: pytest.Parser) -> None:
         type="bool",
         default=False,
     )
+    parser.addini(
+        "garl_unasserted",
+        help="What a violation is that no selected test asserts: 'fail' fails the run, 'note' is a "
+        "line of the summary (default: fail where the environment variable CI is set, else note).",
+        default="",
+    )
 
 
 def is_enabled(config: pytest.Config) -> bool:
@@ -201,3 +207,9 @@ def computes(config: pytest.Config) -> bool:
         or any(config.getini(f"garl_{name}") for name in ("budget", "repeat", "baseline"))
         or config.getini("garl_workers") == "0"
     )
+
+
+def flies_itself(config: pytest.Config) -> bool:
+    """Whether this process flies, and not workers; may be asked before a conftest.py is read."""
+    given = getattr(config.known_args_namespace, "garl_workers", None)
+    return str(config.getini("garl_workers") if given is None else given) == "0"

@@ -19,7 +19,7 @@ from pytest_garl.baselines.pairs import PairResult
 from pytest_garl.errors import GarlError
 from pytest_garl.messages import command
 from pytest_garl.plugin.abort import abort_session
-from pytest_garl.plugin.keys import GATE_PLUGIN, GATE_REPORT, RUN, is_xdist_worker
+from pytest_garl.plugin.keys import GATE_PLUGIN, GATE_REPORT, RUN, is_xdist_worker, marker_of
 from pytest_garl.plugin.marker import read_marker
 from pytest_garl.plugin.options import Options
 from pytest_garl.plugin.run import Run
@@ -121,8 +121,10 @@ class BaselineGatePlugin:
         made = yield
         if not isinstance(made, list):
             return made
-        marker = next((mark for item in made if (mark := item.get_closest_marker("garl"))), None)
-        return made if marker is None else [*self._gates(collector, marker), *made]
+        # Parameters may have marks of their own; all slots of one share it.
+        marks = {id(mark): mark for item in made if (mark := marker_of(item)) is not None}
+        gates = [gate for mark in marks.values() for gate in self._gates(collector, mark)]
+        return [*gates, *made]
 
     def _gates(
         self, collector: pytest.Module | pytest.Class, marker: pytest.Mark

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
@@ -11,14 +12,69 @@ import pytest
 from pytest_garl.errors import GarlError
 from pytest_garl.execution.flight_id import slots
 from pytest_garl.messages import command
-from pytest_garl.plugin.keys import COLLECTED
+from pytest_garl.plugin.keys import COLLECTED, marker_among
 from pytest_garl.plugin.marker import MarkerArguments, read_marker
-from pytest_garl.plugin.options import Options
+from pytest_garl.plugin.options import Options, options_of
 from pytest_garl.plugin.target import Target
 
 NOTHING_TO_FLY = (
     "no --garl-budget given and no saved case of this test; to search: pytest --garl-budget=40"
 )
+
+
+@contextlib.contextmanager
+def make_items(metafunc: pytest.Metafunc, marker: pytest.Mark | None) -> Iterator[None]:
+    """Make the items of a test that takes a landing; inside pytest makes those of its parameters.
+
+    A mark of a parameter, ``pytest.param(System, marks=pytest.mark.garl(...))``, comes before that
+    of the test.  Raises CollectError if an item has no mark, or an invalid one.
+    """
+    name, options = metafunc.definition.nodeid, options_of(metafunc.config)
+    try:
+        if marker is not None and not _has_marked_parameters(metafunc.definition):
+            parametrize(metafunc, marker, options)
+            yield
+        else:
+            yield
+            _parametrize_each(metafunc, marker, options)
+    except GarlError as error:
+        raise pytest.Collector.CollectError(f"{name}: {error}") from error
+
+
+def _parametrize_each(
+    metafunc: pytest.Metafunc, marker: pytest.Mark | None, options: Options
+) -> None:
+    """Give each combination of parameters the slots of its own mark.
+
+    ``Metafunc.parametrize`` alone cannot: it combines its values with all that came before.
+    """
+    calls, made = metafunc._calls, []
+    if not calls:
+        raise pytest.Collector.CollectError(_without_mark(metafunc.definition.nodeid))
+    for call in calls:
+        own = marker_among(call.marks) or marker
+        if own is None:
+            name = f"{metafunc.definition.nodeid}[{call.id}]"
+            raise pytest.Collector.CollectError(_without_mark(name))
+        metafunc._calls = [call]
+        parametrize(metafunc, own, options)
+        made += metafunc._calls
+    metafunc._calls = made
+
+
+def _without_mark(name: str) -> str:
+    return f"{name} uses a landing fixture without @pytest.mark.garl(system=..., maps=[...])"
+
+
+def _has_marked_parameters(definition: pytest.Item) -> bool:
+    """Whether a parameter of a test has a mark ``garl``; a list or a tuple can be looked into."""
+    for mark in definition.iter_markers("parametrize"):
+        values = mark.args[1] if len(mark.args) > 1 else mark.kwargs.get("argvalues")
+        if not isinstance(values, list | tuple):
+            continue
+        if any(marker_among(getattr(each, "marks", ())) for each in values):
+            return True
+    return False
 
 
 def parametrize(metafunc: pytest.Metafunc, marker: pytest.Mark, options: Options) -> None:

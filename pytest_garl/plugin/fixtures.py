@@ -11,6 +11,7 @@ from pytest_garl.plugin.abort import abort_session
 from pytest_garl.plugin.keys import (
     BODY_RUNS,
     LANDING,
+    NO_PARAMETERS,
     OUTCOME,
     OUTSIDE,
     RUN,
@@ -29,7 +30,9 @@ if TYPE_CHECKING:
 @pytest.fixture
 def garl_slot(request: pytest.FixtureRequest) -> Target:
     """Return the slot of the item."""
-    target: Target | str = request.param
+    target: Target | str | None = getattr(request, "param", None)
+    if target is None:
+        pytest.fail(f"{request.node.nodeid}: {NO_PARAMETERS}", pytrace=False)
     if isinstance(target, str):
         pytest.skip(target)
     if target.broken:

@@ -11,7 +11,7 @@ import pytest
 from pytest_garl.errors import GarlError
 from pytest_garl.plugin import hookspecs
 from pytest_garl.plugin.abort import abort_if_reported, drop_entries_without_line, fail_report
-from pytest_garl.plugin.arguments import add_options, computes, is_enabled
+from pytest_garl.plugin.arguments import add_options, computes, flies_itself, is_enabled
 from pytest_garl.plugin.fixtures import garl_slot, landing, npcs, scenario
 from pytest_garl.plugin.keys import (
     BODY_RUNS,
@@ -22,10 +22,14 @@ from pytest_garl.plugin.keys import (
     RUN,
     TALLY,
     WORKER_ASSERTION,
+    has_slot,
     is_landing_item,
     is_xdist_worker,
+    marker_among,
+    marker_of,
     name_slots,
     target_of,
+    without_landing,
 )
 from pytest_garl.plugin.lost_cases import Collected
 from pytest_garl.plugin.tally import Tally
@@ -49,6 +53,10 @@ def pytest_load_initial_conftests(early_config: pytest.Config) -> None:
         from pytest_garl import cpu_dispatch
 
         cpu_dispatch.pin()
+    if flies_itself(early_config):
+        from pytest_garl.execution import exit_guard
+
+        exit_guard.install()
 
 
 def pytest_configure(config: pytest.Config) -> None:
@@ -86,23 +94,37 @@ def pytest_configure(config: pytest.Config) -> None:
         begin_run(config, options)
 
 
-def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
+@pytest.hookimpl(wrapper=True)
+def pytest_generate_tests(metafunc: pytest.Metafunc) -> Generator[None, object, object]:
     """Make the items of a marked test."""
-    if "garl_slot" not in metafunc.fixturenames:
-        return
+    takes_landing = "garl_slot" in metafunc.fixturenames
     marker = metafunc.definition.get_closest_marker("garl")
-    if marker is None:
-        raise pytest.Collector.CollectError(
-            f"{metafunc.definition.nodeid} uses a landing fixture without "
-            "@pytest.mark.garl(system=..., maps=[...])"
-        )
-    from pytest_garl.plugin.collection import parametrize
-    from pytest_garl.plugin.options import options_of
+    if not takes_landing:
+        if marker is not None:
+            raise pytest.Collector.CollectError(without_landing(metafunc.definition))
+        result = yield
+        if any(marker_among(call.marks) for call in metafunc._calls):
+            raise pytest.Collector.CollectError(without_landing(metafunc.definition))
+        return result
+    from pytest_garl.plugin.collection import make_items
 
-    try:
-        parametrize(metafunc, marker, options_of(metafunc.config))
-    except GarlError as error:
-        raise pytest.Collector.CollectError(f"{metafunc.definition.nodeid}: {error}") from error
+    with make_items(metafunc, marker):
+        return (yield)
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_make_collect_report(
+    collector: pytest.Collector,
+) -> Generator[None, pytest.CollectReport, pytest.CollectReport]:
+    """Refuse marked methods of a unittest.TestCase: pytest gives them no parameters."""
+    report = yield
+    if isinstance(collector, pytest.Class):
+        for item in report.result or ():
+            if isinstance(item, pytest.Item) and marker_of(item) and not has_slot(item):
+                report.outcome, report.longrepr = "failed", without_landing(item)
+                report.result = []
+                break
+    return report
 
 
 @pytest.hookimpl(tryfirst=True)
@@ -252,31 +274,11 @@ def pytest_report_collectionfinish(config: pytest.Config) -> list[str]:
 def pytest_terminal_summary(terminalreporter: Any, config: pytest.Config) -> None:
     """Write the findings of each landing system on each map."""
     tally = config.stash[TALLY]
-    if RUN not in config.stash and tally.items and config.pluginmanager.hasplugin("dsession"):
-        from pytest_garl.plugin.options import options_of
-        from pytest_garl.plugin.startup import join_workers
+    if not (RUN in config.stash or tally.items or tally.problems):
+        return
+    from pytest_garl.plugin.terminal_summary import write_summary
 
-        join_workers(config, options_of(config))
-    run = config.stash.get(RUN, None)
-    if run is not None:
-        from pytest_garl.plugin.github_summary import write_step_summary
-        from pytest_garl.plugin.pages import write_pages
-        from pytest_garl.plugin.summary import write_run
-
-        try:
-            if run.options.film:
-                from pytest_garl.plugin.films import draw_failures
-
-                run.films = draw_failures(terminalreporter, run, tally)
-            searches = write_run(terminalreporter, run, tally)
-            report = write_pages(terminalreporter, run)
-            write_step_summary(terminalreporter, run, searches, report)
-        except GarlError as error:
-            terminalreporter.write_line(f"garl: {error}", red=True)
-    if tally.items:
-        from pytest_garl.plugin.summary import write_status
-
-        write_status(terminalreporter, tally)
+    write_summary(terminalreporter, config, tally)
 
 
 def pytest_sessionfinish(session: pytest.Session) -> None:
@@ -287,7 +289,7 @@ def pytest_sessionfinish(session: pytest.Session) -> None:
     nothing_compared = gate is not None and gate.note_missing_gate(session)
     if run is not None:
         _save_cases(run, session, nothing_compared=nothing_compared)
-    if run is not None or gate is not None or (tally is not None and tally.items):
+    if run is not None or gate is not None or is_enabled(session.config) or (tally and tally.items):
         from pytest_garl.plugin.options import options_of
         from pytest_garl.plugin.session_status import set_exit_status
 
@@ -301,9 +303,11 @@ def _save_cases(run: Any, session: pytest.Session, *, nothing_compared: bool) ->
 
         if may_save(run, session) and not nothing_compared:
             save_cases(run, session)
-    except GarlError as error:
-        # Without its ledger a session saves nothing; the summary says why.
-        run.save_problem = run.save_problem or str(error)
+    except Exception as error:  # noqa: BLE001 (the summary, which follows, says what it was)
+        from pytest_garl.plugin.session_status import problem_text
+
+        # Without its ledger, for example, a session saves nothing.
+        run.save_problem = run.save_problem or problem_text("what is saved", error)
     finally:
         run.end_flights()
 
@@ -313,6 +317,10 @@ def pytest_unconfigure(config: pytest.Config) -> None:
     run = config.stash.get(RUN, None)
     if run is not None:
         run.close()
+    if flies_itself(config):
+        from pytest_garl.execution import exit_guard
+
+        exit_guard.uninstall()
 
 
 @pytest.hookimpl(optionalhook=True)

@@ -71,6 +71,12 @@ OUTSIDE = "garl.outside"
 """A saved case whose values lie outside the test's domain, and which of them."""
 LOST = "garl.lost"
 """A file of the corpus that nothing can fly any more, and why."""
+NO_PARAMETERS = (
+    "the fixture 'landing' needs an item for each flight, and pytest makes them only of a "
+    "function, or of a method of a plain class (no unittest.TestCase), that takes landing as an "
+    "argument"
+)
+"""Why a test cannot have a landing although it asked for one."""
 FATAL = "garl.fatal"
 """Why the run cannot go on."""
 
@@ -85,12 +91,42 @@ def is_landing_item(item: pytest.Item) -> bool:
     return target_of(item) is not None or hasattr(item, "garl_gate")
 
 
+def marker_of(item: pytest.Item) -> pytest.Mark | None:
+    """Return an item's mark ``garl``; that of a parameter comes before that of the test."""
+    callspec: Any = getattr(item, "callspec", None)
+    return marker_among(callspec.marks if callspec else ()) or item.get_closest_marker("garl")
+
+
+def marker_among(marks: Iterable[Any]) -> pytest.Mark | None:
+    """Return the mark ``garl`` of a parameter, given its marks and decorators."""
+    found = [mark for mark in marks if mark.name == "garl"]
+    return getattr(found[-1], "mark", found[-1]) if found else None
+
+
 def target_of(item: pytest.Item) -> Target | None:
     """Return the target of an item, or None if it is no landing test."""
     callspec = getattr(item, "callspec", None)
     target = callspec.params.get("garl_slot") if callspec else None
     # If there is nothing to fly, the parameter is the reason, a string.
     return None if isinstance(target, str) else target
+
+
+def has_slot(item: pytest.Item) -> bool:
+    """Whether an item is one of a landing test, be there something to fly or not."""
+    callspec = getattr(item, "callspec", None)
+    return callspec is not None and "garl_slot" in callspec.params
+
+
+def without_landing(item: pytest.Item) -> str:
+    """Return why a marked test that does not take ``landing`` is an error."""
+    if "landing" in getattr(item, "fixturenames", ()):
+        # Plain functions and methods that name the fixture have their slots by then.
+        return f"{item.nodeid}: {NO_PARAMETERS}"
+    return (
+        f"{item.nodeid}: carries @pytest.mark.garl and does not take the fixture 'landing', so "
+        "it flies nothing; give it the argument landing, or take the mark off it (the mark of "
+        "a module or a class is on all its tests)"
+    )
 
 
 def name_slots(items: Iterable[pytest.Item]) -> None:

@@ -78,6 +78,8 @@ class Options:
     shrink_capped: bool
     """Whether all kinds of a search together have no more flights than the search."""
     xfail_strict: bool
+    unasserted: Literal["fail", "note"]
+    """What a violation is that no selected test asserts."""
     cases: Path
     cases_named: bool
     """Whether the ini file or the command line names the folder of the cases."""
@@ -176,6 +178,7 @@ def read_options(config: pytest.Config) -> Options:
         shrink=_shrink(text["shrink"]),
         shrink_capped=not text["shrink"],
         xfail_strict=bool(config.getini("garl_xfail_strict")),
+        unasserted=_unasserted(config),
         cases=config.rootpath / str(config.getini("garl_cases") or DEFAULT_CASES),
         cases_named=bool(config.getini("garl_cases")),
         folder=folder,
@@ -219,6 +222,15 @@ def _shrink(text: str) -> int:
     if 0 < number < MINIMUM_SHRINK:
         raise wrong("shrink", text, f"0, or at least {MINIMUM_SHRINK} flights per new kind")
     return number
+
+
+def _unasserted(config: pytest.Config) -> Literal["fail", "note"]:
+    """Return what the ini key says; by default nobody reads the notes of a build server."""
+    text = str(config.getini("garl_unasserted"))
+    text = text or ("fail" if os.environ.get("CI") else "note")
+    if text not in ("fail", "note"):
+        raise pytest.UsageError(f"garl_unasserted: found {text!r}, expected fail or note")
+    return cast(Literal["fail", "note"], text)
 
 
 def _baseline(config: pytest.Config) -> Path | None:

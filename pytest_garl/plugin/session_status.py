@@ -5,12 +5,15 @@ No other module sets ``session.exitstatus``; a session that cannot go on ends by
 
 from __future__ import annotations
 
+import traceback
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import pytest
 
 from pytest_garl.errors import GarlError
+from pytest_garl.messages import shortened
 from pytest_garl.plugin.options import Options
 from pytest_garl.plugin.run import Run
 from pytest_garl.plugin.tally import Tally
@@ -19,6 +22,10 @@ from pytest_garl.reports.search_summary import SearchSummary
 
 FLIGHTS_PER_EXCEPTION = 20
 """One in so many flights of a search may be inconclusive, and one may fail without repeating it."""
+_ASK_FOR_FLIGHTS = ("budget", "map", "repeat")
+"""Options of the command line that ask a session for flights, whatever its tests are."""
+MESSAGE_CHARS = 300
+"""Characters of an unexpected error's message that a line shows."""
 MOST_NAMED = 5
 """A sentence names so many flights and counts the rest."""
 
@@ -61,13 +68,12 @@ def set_exit_status(
 ) -> None:
     """Note the problems of a session in its tally, and set its exit status."""
     broken = run is not None and bool(run.save_problem)
-    if tally is not None and tally.items:
+    if tally is not None:
         try:
             tally.problems = list(problems(tally, run, options))
-        except GarlError as error:
+        except Exception as error:  # noqa: BLE001 (the summary, which follows, says what it was)
             broken = True
-            if run is not None:
-                run.save_problem = run.save_problem or str(error)
+            tally.problems = [problem_text("this list", error)]
     facts = SessionFacts(
         nothing_compared=nothing_compared,
         interrupted=run is not None and run.interrupted,
@@ -75,6 +81,24 @@ def set_exit_status(
         problems=tally is not None and bool(tally.problems),
     )
     session.exitstatus = exit_status(session.exitstatus, facts)
+
+
+def fail_broken_session(config: pytest.Config) -> None:
+    """Let a session fail whose summary, the last that pytest does, could not be written."""
+    session: Any = config.pluginmanager.get_plugin("session")
+    session.exitstatus = exit_status(session.exitstatus, SessionFacts(broken=True))
+
+
+def problem_text(part: str, error: Exception) -> str:
+    """Return one line about an error that a part of a session's end met."""
+    if isinstance(error, GarlError):
+        return str(error)
+    last = traceback.extract_tb(error.__traceback__)[-1]
+    message = shortened(str(error), MESSAGE_CHARS)
+    return (
+        f"{part} is not complete because of an error in pytest-garl, please report it: "
+        f"{type(error).__name__}: {message} ({last.filename}:{last.lineno})"
+    )
 
 
 def problems(tally: Tally, run: Run | None, options: Options) -> Iterator[str]:
@@ -91,8 +115,10 @@ def problems(tally: Tally, run: Run | None, options: Options) -> Iterator[str]:
         yield from _unrepeated(tally, searches)
         if not run.options.repeat:
             yield from _without_landing(searches)
-    if (options.searches_or_repeats or "map" in options.given) and tally.items and not tally.flown:
+    if _flights_were_asked_for(tally, options) and not tally.flown:
         yield f"nothing was flown, although flights were asked for: {_why_nothing_flew(tally)}"
+    if options.unasserted == "fail" and tally.unasserted:
+        yield f"{_unasserted(tally)} (garl_unasserted = note makes this a note)"
 
 
 def notes(tally: Tally) -> Iterator[str]:
@@ -100,8 +126,7 @@ def notes(tally: Tally) -> Iterator[str]:
     if tally.items and not tally.flown and not tally.gated:
         yield f"nothing was flown: {_why_nothing_flew(tally)}"
     if tally.unasserted:
-        kinds = [f"{name} ({counted(n, 'flight')})" for name, n in tally.unasserted.most_common()]
-        yield f"no selected test fails for these violations: {', '.join(kinds)}"
+        yield _unasserted(tally)
     for search in tally.without_landing:
         flights = counted(len(search.flights), "flight")
         yield f"{search.name} on {search.map}: landed in none of {flights}"
@@ -110,7 +135,21 @@ def notes(tally: Tally) -> Iterator[str]:
         yield f"{_search(system, map)}: {violations} did not repeat: {_names(slots)}"
 
 
+def _flights_were_asked_for(tally: Tally, options: Options) -> bool:
+    """Whether this session was to fly; an ini key's budget asks only sessions of landing tests."""
+    if tally.items:
+        return options.searches_or_repeats or "map" in options.given
+    return tally.tests_ran and not options.given.isdisjoint(_ASK_FOR_FLIGHTS)
+
+
+def _unasserted(tally: Tally) -> str:
+    kinds = [f"{name} ({counted(n, 'flight')})" for name, n in tally.unasserted.most_common()]
+    return f"no selected test fails for these violations: {', '.join(kinds)}"
+
+
 def _why_nothing_flew(tally: Tally) -> str:
+    if not tally.items:
+        return "no test that ran takes the fixture 'landing'"
     reasons = [reason for reason, _ in tally.no_flight.most_common()]
     return "; ".join(reasons) or "all landing tests were skipped before they asked for a landing"
 

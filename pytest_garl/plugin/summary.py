@@ -96,7 +96,11 @@ def _property_values(reporter: Any, outcomes: tuple[str, ...], key: str) -> set[
     """Return the values of a user property in the reports with some outcomes."""
     reports = [report for outcome in outcomes for report in reporter.getreports(outcome)]
     return {
-        str(value) for report in reports for name, value in report.user_properties if name == key
+        str(value)
+        for report in reports
+        # Among the skipped ones are modules skipped at collection, whose reports have none.
+        for name, value in getattr(report, "user_properties", ())
+        if name == key
     }
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections import Counter
+from collections.abc import Generator
 from typing import TYPE_CHECKING
 
 import pytest
@@ -38,6 +39,8 @@ class Tally:
         """Whether a baseline's gate has flown."""
         self.not_repeated: set[tuple[str, ...]] = set()
         self.problems: list[str] = []
+        self.tests_ran = False
+        """Whether pytest ran all selected tests, and did not only collect them."""
         self.interrupted = False
         """Whether somebody ended the session with Ctrl-C or SIGTERM."""
         self._signatures: dict[tuple[str, str], str] = {}
@@ -68,7 +71,9 @@ class Tally:
         flight = (report.nodeid.partition("::")[0], str(properties[SLOT]))
         if properties.get(SIGNATURE):
             self._signatures[flight] = str(properties[SIGNATURE])
-        if report.failed or hasattr(report, "wasxfail"):
+        # An item that pytest-garl excuses shows its violation; a mark xfail of the test's hides it.
+        excused = SHOWN_VIOLATION in properties and hasattr(report, "wasxfail")
+        if report.failed or excused:
             self._failing_flights.add(flight)
         if REPORTED_FAILURE in properties and report.failed:
             self._failures[report.nodeid] = str(properties[REPORTED_FAILURE])
@@ -82,6 +87,13 @@ class Tally:
             self._user_failures.setdefault(report.nodeid, []).append(str(properties[USER_FAILURE]))
         if NOT_REPEATED in properties:
             self.not_repeated.add(tuple(json.loads(str(properties[NOT_REPEATED]))))
+
+    @pytest.hookimpl(wrapper=True)
+    def pytest_runtestloop(self, session: pytest.Session) -> Generator[None, object, object]:
+        """Note that the selected tests ran to the end."""
+        result = yield
+        self.tests_ran = not session.config.option.collectonly
+        return result
 
     def pytest_keyboard_interrupt(self, excinfo: pytest.ExceptionInfo[BaseException]) -> None:
         """Note that somebody wants the session to end."""

@@ -114,6 +114,50 @@ def test_summary_notes_a_violation_that_no_test_asserts(pytester: pytest.Pyteste
     result.stdout.fnmatch_lines(["garl: no selected test fails for *: I:nothing:unseen (1 flight)"])
 
 
+@pytest.mark.parametrize(
+    ("ci", "key", "status"),
+    [
+        ("true", (), RED),
+        ("", (), GREEN),
+        ("true", ("-o", "garl_unasserted=note"), GREEN),
+        ("", ("-o", "garl_unasserted=fail"), RED),
+        ("", ("-o", "garl_unasserted=maybe"), USAGE),
+    ],
+)
+def test_ini_key_says_what_a_violation_is_that_no_test_asserts(
+    pytester: pytest.Pytester,
+    monkeypatch: pytest.MonkeyPatch,
+    ci: str,
+    key: tuple[str, ...],
+    status: int,
+) -> None:
+    write_tests(pytester, "Good", COLLISIONS)
+    monkeypatch.setenv("CI", ci)
+    result = run(pytester, "--garl-budget=1", "--garl-workers=0", *key)
+    assert result.ret == status
+    output = result.stdout.str() + result.stderr.str()
+    expected = "garl_unasserted: found 'maybe'" if status == USAGE else "no selected test fails for"
+    assert expected in output
+
+
+def test_summary_notes_a_violation_whose_tests_are_all_expected_to_fail(
+    pytester: pytest.Pytester,
+) -> None:
+    write_tests(pytester, "Good", f"pytestmark = [pytestmark, pytest.mark.xfail]\n{DISTANCE}")
+    result = run(pytester, "--garl-budget=1", "--garl-workers=0")
+    result.assert_outcomes(xfailed=1)
+    result.stdout.fnmatch_lines(["garl: no selected test fails for *: I:nothing:unseen (1 flight)"])
+
+
+def test_budget_of_an_ini_key_asks_nothing_of_a_session_without_landing_tests(
+    pytester: pytest.Pytester,
+) -> None:
+    pytester.makepyfile(test_plain="def test_plain(): pass")
+    result = run(pytester, "-o", "garl_budget=4")
+    assert result.ret == GREEN
+    result.stdout.no_fnmatch_line("*nothing was flown*")
+
+
 def test_session_without_landing_tests_reports_nothing(pytester: pytest.Pytester) -> None:
     pytester.makepyfile(test_plain="def test_plain(): pass")
     result = run(pytester)

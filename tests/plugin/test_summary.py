@@ -159,6 +159,33 @@ def test_summary_says_that_the_folder_of_cases_cannot_be_written(
     result.stdout.fnmatch_lines(["*garl: cases*", "nothing more was saved: *ini key garl_cases"])
 
 
+@pytest.mark.parametrize(
+    ("module", "function", "part"),
+    [
+        ("summary", "write_run", "the summary"),
+        ("github_summary", "write_step_summary", "the step summary"),
+        ("session_status", "problems", "this list"),
+    ],
+)
+def test_an_error_in_the_summary_is_one_red_line(
+    pytester: pytest.Pytester, module: str, function: str, part: str
+) -> None:
+    project(pytester)
+    with (pytester.path / "conftest.py").open("a") as conftest:
+        conftest.write(
+            f"from pytest_garl.plugin import {module}\n"
+            f"def broken(*args): raise RuntimeError('it broke')\n"
+            f"{module}.{function} = broken\n"
+        )
+    result = run(pytester, "--garl-budget=2", "--garl-workers=0")
+    assert result.ret == pytest.ExitCode.INTERNAL_ERROR
+    output = " ".join(result.stdout.str().split())
+    assert f"{part} is not complete because of an error in pytest-garl" in output
+    assert output.count("RuntimeError: it broke") == 1
+    result.stdout.no_fnmatch_line("Traceback*")
+    result.stdout.fnmatch_lines(["=* short test summary info =*", "=*failed*"])
+
+
 def test_landing_is_exported_for_annotations() -> None:
     import pytest_garl
     from pytest_garl.plugin.landing import Landing
