@@ -133,7 +133,7 @@ def test_ini_key_says_what_a_violation_is_that_no_test_asserts(
 ) -> None:
     write_tests(pytester, "Good", COLLISIONS)
     monkeypatch.setenv("CI", ci)
-    result = run(pytester, "--garl-budget=1", "--garl-workers=0", *key)
+    result = run(pytester, "--garl-budget=2", "--garl-workers=0", *key)
     assert result.ret == status
     output = result.stdout.str() + result.stderr.str()
     expected = "garl_unasserted: found 'maybe'" if status == USAGE else "no selected test fails for"
@@ -144,7 +144,7 @@ def test_summary_notes_a_violation_whose_tests_are_all_expected_to_fail(
     pytester: pytest.Pytester,
 ) -> None:
     write_tests(pytester, "Good", f"pytestmark = [pytestmark, pytest.mark.xfail]\n{DISTANCE}")
-    result = run(pytester, "--garl-budget=1", "--garl-workers=0")
+    result = run(pytester, "--garl-budget=2", "--garl-workers=0")
     result.assert_outcomes(xfailed=1)
     result.stdout.fnmatch_lines(["garl: no selected test fails for *: I:nothing:unseen (1 flight)"])
 
