@@ -117,6 +117,11 @@ class LedgerQueries:
             generation,
         )
 
+    def first_of(self, search: str, signature: str) -> LedgerFlight:
+        """Return the first flight, in slot order, of those that show a signature so far."""
+        condition = "search.id = ? AND json_extract(result, '$.verdict.signature') = ?"
+        return self._flights(condition, search, signature)[0]
+
     def flight_with_hash(self, sha256: str) -> LedgerFlight | None:
         """Return a flight whose trajectory has a hash: of a search, or flown on demand."""
         found = self._flights("slot.sha256 = ?", sha256, kinds="'search', 'case', 'on_demand'")

@@ -4,17 +4,25 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+import pytest
+
 from pytest_garl import cpu_dispatch
+from pytest_garl.messages import command
 from pytest_garl.plugin.run import Run
+from pytest_garl.plugin.suggested_commands import shown_path
 from pytest_garl.plugin.terminal_text import counted, duration
 from pytest_garl.regressions.forecast import flight_times_with_shrinking, seconds_per_new_signature
 from pytest_garl.reports.shares_text import limits_text
 from pytest_garl.verdicts.verdict import DEFAULT_LIMITS
 
+_DEFAULT_LEDGER = ".garl/ledger.sqlite"
 
-def header(run: Run) -> str:
+
+def header(run: Run, config: pytest.Config) -> str:
     """Return the header: what is searched, how long it takes, and a warning, if any."""
-    return "\n".join([_search_line(run), *cpu_dispatch_warning(run)])
+    return "\n".join(
+        [_search_line(run), *_findings_so_far(run, config), *cpu_dispatch_warning(run)]
+    )
 
 
 def forecast(run: Run) -> list[str]:
@@ -95,6 +103,15 @@ def _search_line(run: Run) -> str:
         f"seed {options.seed}, NPCs {options.policy_in(options.domain)}, "
         f"domain {options.domain.name}, {_workers(run)}"
     )
+
+
+def _findings_so_far(run: Run, config: pytest.Config) -> list[str]:
+    """Return how to see what a search has found before it is over."""
+    if run.options.repeat or not run.options.budget:
+        return []
+    ledger = shown_path(run.ledger.path, config)
+    report = command("garl", "report", *([] if ledger == _DEFAULT_LEDGER else [ledger]))
+    return [f"garl: `{report}` in a second terminal shows what was found so far"]
 
 
 def _workers(run: Run) -> str:

@@ -253,7 +253,7 @@ def pytest_report_header(config: pytest.Config) -> str | None:
         return None
     from pytest_garl.plugin.header import header
 
-    return header(run)
+    return header(run, config)
 
 
 def pytest_report_collectionfinish(config: pytest.Config) -> list[str]:
@@ -301,6 +301,8 @@ def _save_cases(run: Any, session: pytest.Session, *, nothing_compared: bool) ->
     try:
         from pytest_garl.plugin.save_cases import may_save, save_cases
 
+        if run.news is not None:
+            run.news.write(run.ledger, at_once=True)
         if may_save(run, session) and not nothing_compared:
             save_cases(run, session)
     except Exception as error:  # noqa: BLE001 (the summary, which follows, says what it was)

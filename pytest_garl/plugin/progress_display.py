@@ -17,6 +17,7 @@ import pytest
 from pytest_garl.errors import LedgerError
 from pytest_garl.execution.ledger import Ledger
 from pytest_garl.plugin.keys import is_xdist_worker
+from pytest_garl.plugin.kind_news import KindNews
 from pytest_garl.plugin.progress_text import ProgressReader, RunProgress, progress_line
 from pytest_garl.plugin.run import Run
 from pytest_garl.plugin.terminal_text import begin_line, width_of
@@ -38,19 +39,45 @@ def show_progress(run: Run, config: pytest.Config) -> Iterator[None]:
     if is_xdist_worker(config):
         with _call_on_wait(run, ControllerWatch().look, lambda: None):
             yield
-    elif not _is_terminal():
+        return
+    news = run.news = run.news or KindNews(run, config)
+    with _progress_and(news, run, config):
+        yield
+
+
+@contextmanager
+def _progress_and(news: KindNews, run: Run, config: pytest.Config) -> Iterator[None]:
+    """Show progress, and news above it, in the process that writes."""
+    if not _is_terminal():
         log = ProgressLog(run, config)
-        with _call_on_wait(run, log.refresh, lambda: None), _call_on_reports(run, config):
+        refresh = _both(news.write, log.refresh)
+        with _call_on_wait(run, refresh, lambda: None), _call_on_reports(run, config):
             yield
     elif config.pluginmanager.hasplugin("dsession"):
-        with closing(TerminalLine(run)) as line, LineThread(line).drawing(run.ledger.path, config):
+        line = TerminalLine(run)
+        thread = LineThread(line)
+        drawing = thread.drawing(run.ledger.path, config)
+        above = _call_on_wait(run, partial(thread.write_above, news), lambda: None)
+        with closing(line), drawing, above, _call_on_reports(run, config):
             yield
     elif run.options.workers == 0:
         # The system flies in this process, where it may print or stop in a debugger.
-        yield
-    else:
-        with closing(TerminalLine(run)) as line, _call_on_wait(run, line.refresh, line.clear):
+        with _call_on_wait(run, news.write, lambda: None):
             yield
+    else:
+        line = TerminalLine(run, news)
+        with closing(line), _call_on_wait(run, line.refresh, line.clear):
+            yield
+
+
+def _both(
+    first: Callable[[Ledger], None], second: Callable[[Ledger], None]
+) -> Callable[[Ledger], None]:
+    def refresh(ledger: Ledger) -> None:
+        first(ledger)
+        second(ledger)
+
+    return refresh
 
 
 @contextmanager
@@ -113,14 +140,18 @@ class ProgressLog:
 class TerminalLine:
     """One line below the cursor, on a copy of standard output that pytest does not capture."""
 
-    def __init__(self, run: Run) -> None:
+    def __init__(self, run: Run, news: KindNews | None = None) -> None:
+        self._news = news
         self._terminal = os.dup(sys.stdout.fileno())
         self._reader = ProgressReader(run, REFRESH_S)
         self._progress: RunProgress | None = None
         self._visible = False
 
     def refresh(self, ledger: Ledger) -> None:
-        """Draw the line if it is not visible or out of date."""
+        """Draw the line if it is not visible or out of date; write news above it."""
+        if self._news and (lines := self._news.lines(ledger)):
+            self.clear()
+            self._news.show(lines)
         if self.read(ledger) or not self._visible:
             self.draw()
 
@@ -163,6 +194,12 @@ class LineThread:
         self._lock = threading.RLock()
         self._stop = threading.Event()
         self._given_up = False
+        self._hidden = 0
+
+    def write_above(self, news: KindNews, ledger: Ledger) -> None:
+        """Write the news that are due while the line is not visible."""
+        with self._without_line():
+            news.write(ledger)
 
     @contextmanager
     def drawing(self, ledger: Path, config: pytest.Config) -> Iterator[None]:
@@ -189,11 +226,18 @@ class LineThread:
 
     @pytest.hookimpl(wrapper=True, tryfirst=True)
     def _hide_while_pytest_writes(self) -> Generator[None, Any, Any]:
+        with self._without_line():
+            return (yield)
+
+    @contextmanager
+    def _without_line(self) -> Iterator[None]:
         with self._lock:
             self._line.clear()
+            self._hidden += 1
             try:
-                return (yield)
+                yield
             finally:
+                self._hidden -= 1
                 self._redraw()
 
     pytest_runtest_logstart = _hide_while_pytest_writes
@@ -217,5 +261,5 @@ class LineThread:
             self._line.clear()
 
     def _redraw(self) -> None:
-        if not self._given_up:
+        if not self._given_up and not self._hidden:
             self._line.draw()

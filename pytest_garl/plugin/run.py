@@ -32,6 +32,7 @@ from pytest_garl.simulation.npc_policy import PolicySpec
 
 if TYPE_CHECKING:
     from pytest_garl.plugin.films import Films
+    from pytest_garl.plugin.kind_news import KindNews
     from pytest_garl.plugin.user_assertions import ItemAssertion
     from pytest_garl.regressions.follow_up import InvestigatedSignature
     from pytest_garl.regressions.forecast import RemainingWork
@@ -152,6 +153,8 @@ class Run:
     """The films of what failed, if an option asks for them."""
     remaining: RemainingWork | None = None
     """The work that follows the search, once it is known."""
+    news: KindNews | None = None
+    """Which new kinds were told while the run goes on."""
     save_problem: str = ""
     """Why not everything was saved, empty if it was."""
     user_assertions: dict[tuple[str, str], ItemAssertion] = field(default_factory=dict)

@@ -55,6 +55,8 @@ def save_cases(run: Run, session: pytest.Session) -> None:
             run.investigated = follow_up(
                 investigations, requests, run.finding_tests, _saver(run), run.on_wait
             )
+        if run.news is not None:
+            run.news.write(run.ledger, at_once=True)
     except KeyboardInterrupt:
         run.interrupted = True
         begin_line(reporter)

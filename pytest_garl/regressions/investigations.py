@@ -111,6 +111,14 @@ class Investigations:
         return len(self._started) - self.running
 
     @property
+    def results(self) -> list[tuple[CaseRequest, CaseResult]]:
+        """The requests whose investigation has ended without an error, with their results."""
+        ended = [each for each in self._started.values() if each.result.done()]
+        return [
+            (each.request, each.result.result()) for each in ended if not each.result.exception()
+        ]
+
+    @property
     def flown(self) -> int:
         """How many flights they had, also those that were stopped."""
         return self._flights.flown

@@ -1,0 +1,103 @@
+"""While a search runs: a sentence when a new kind of violation is found or shrunk."""
+
+from __future__ import annotations
+
+import re
+import time
+from collections.abc import Iterator
+from contextlib import nullcontext
+from typing import Any
+
+import pytest
+
+from pytest_garl.execution.job import parse_job
+from pytest_garl.execution.ledger import Ledger
+from pytest_garl.plugin.run import Run
+from pytest_garl.plugin.terminal_text import begin_line, width_of, wrapped
+from pytest_garl.regressions.case_request import CaseRequest, CaseResult
+from pytest_garl.verdicts.wording import headline
+
+PERIOD_S = 1.0
+"""The ledger is read so often: a flight takes longer."""
+
+
+class KindNews:
+    """Writes what was found and shrunk since it wrote last, each kind once.
+
+    A kind that a saved case knows is not new.
+    """
+
+    def __init__(self, run: Run, config: pytest.Config) -> None:
+        self._run, self._config = run, config
+        self._looked = 0.0
+        self._found: set[tuple[str, str]] = set()
+        self._shrunk: set[str] = set()
+        self._known: dict[str, frozenset[str]] = {}
+        options = run.options
+        quiet = config.get_verbosity() < 0
+        self._is_wanted = bool(options.budget) and not options.repeat and not quiet
+
+    def lines(self, ledger: Ledger, *, at_once: bool = False) -> list[str]:
+        """Return the sentences that are due; ``at_once`` although it has just looked."""
+        now = time.monotonic()
+        if not self._is_wanted or (now - self._looked < PERIOD_S and not at_once):
+            return []
+        self._looked = now
+        return [*self._new_kinds(ledger), *self._shrunk_kinds()]
+
+    def write(self, ledger: Ledger, *, at_once: bool = False) -> None:
+        """Write the sentences that are due on lines of their own."""
+        if lines := self.lines(ledger, at_once=at_once):
+            self.show(lines)
+
+    def show(self, lines: list[str]) -> None:
+        """Write lines, also while pytest captures what a test prints."""
+        reporter: Any = self._config.pluginmanager.get_plugin("terminalreporter")
+        capture: Any = self._config.pluginmanager.get_plugin("capturemanager")
+        if reporter is None:
+            return
+        with capture.global_and_fixture_disabled() if capture else nullcontext():
+            begin_line(reporter)
+            # Captured, standard output is no terminal and has no width.
+            width = width_of(self._config)
+            for line in lines:
+                reporter.write_line(wrapped(line, width, others="  "))
+
+    def _new_kinds(self, ledger: Ledger) -> Iterator[str]:
+        for search, signature in ledger.queries.seconds_by_signature():
+            if (search, signature) in self._found:
+                continue
+            self._found.add((search, signature))
+            if signature in self._known_in(ledger, search):
+                continue
+            flight = ledger.queries.first_of(search, signature)
+            where = f"{flight.system.split(':')[-1]} on {flight.id.map}"
+            told = headline(flight.result.verdict.story)
+            yield f"garl: found {signature}: {told} ({where}, {flight.id.slot_id})"
+
+    def _shrunk_kinds(self) -> Iterator[str]:
+        investigations = self._run.investigations
+        for request, result in investigations.results if investigations else ():
+            if request.name not in self._shrunk:
+                self._shrunk.add(request.name)
+                yield _shrunk(request, result)
+
+    def _known_in(self, ledger: Ledger, search: str) -> frozenset[str]:
+        """Return the kinds that saved cases of a search's system and map expect."""
+        if search not in self._known:
+            text = ledger.job(search)
+            assert text is not None, "a flight's search has a job"
+            job = parse_job(text)
+            corpus = self._run.options.corpus
+            self._known[search] = frozenset(corpus.expected_signatures(job.system.name, job.map))
+        return self._known[search]
+
+
+def _shrunk(request: CaseRequest, result: CaseResult) -> str:
+    """Return what is left of a kind when it is confirmed and shrunk."""
+    name = f"{result.signature} ({request.job.system.name.split(':')[-1]} on {request.job.map})"
+    if result.case is None:
+        return f"garl: not confirmed {name}: {result.reason}"
+    # The first sentence says what it takes and what happens; the summary shows them all.
+    what = re.split(r"\.\s+(?=[A-Z])", result.case.violation.description, maxsplit=1)[0]
+    return f"garl: shrunk {name}: {what}"
