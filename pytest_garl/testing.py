@@ -17,8 +17,10 @@ from pytest_garl.adversary.catalogue import policy_spec
 from pytest_garl.adversary.domain_policy import domain_with_policy
 from pytest_garl.errors import LandingSystemError
 from pytest_garl.execution.flight import time_limit_s
+from pytest_garl.execution.judge_process import JudgeProcess
 from pytest_garl.execution.metering import CallMeter, OutOfTimeError
 from pytest_garl.execution.reference import check_system
+from pytest_garl.execution.result import FlightResult
 from pytest_garl.execution.separate_process import call_in_separate_process
 from pytest_garl.fiducial import MarkerSpec
 from pytest_garl.files.json_values import dataclass_from
@@ -44,7 +46,6 @@ from pytest_garl.simulation.fly import fly
 from pytest_garl.simulation.physics.vehicle import up_m
 from pytest_garl.simulation.system_under_test.reading import finite
 from pytest_garl.simulation.system_under_test.texts import shown
-from pytest_garl.verdicts.judge import judge
 from pytest_garl.verdicts.phases import landing_phase
 from pytest_garl.verdicts.sightings import reports_detections, reports_targets
 from pytest_garl.verdicts.verdict import Limits, default_distance_m
@@ -236,15 +237,19 @@ class _Checker:
         """Fly the scenarios and compare the flights."""
         flights: list[str] = []
         cpu_s = self._limit_s
-        with _warning_of_leftovers(self._warnings.append):
+        # Another process judges: a landing system may replace in this one what judges.
+        with JudgeProcess() as judge, _warning_of_leftovers(self._warnings.append):
             try:
                 first = self._fly(self._system, self._calm, self._seconds)
-                flights.append(f"{self._map.name}: {self._ending(first.flight)}")
+                result = judge.judge_flight(first.flight, self._plan.limits)
+                flights.append(f"{self._map.name}: {_ending(first.flight, result)}")
                 cpu_s = first.cpu_s
-                self._judge(first)
+                self._note_result(first, result)
                 other = self._compare(first)
-                flights.append(f"{self._map.name}, another scenario: {self._ending(other.flight)}")
-                if {first.flight.outcome, other.flight.outcome} == {"gave_up"}:
+                drawn = judge.judge_flight(other.flight, self._plan.limits)
+                ending = _ending(other.flight, drawn)
+                flights.append(f"{self._map.name}, another scenario: {ending}")
+                if {result.outcome, drawn.outcome} == {"gave_up"}:
                     self._warnings.append("gave up in both scenarios; a search would learn nothing")
             except OutOfTimeError:
                 self._warnings.append(
@@ -306,10 +311,9 @@ class _Checker:
         if text not in self._warnings:
             self._warnings.append(text)
 
-    def _judge(self, first: _TimedFlight) -> None:
+    def _note_result(self, first: _TimedFlight, result: FlightResult) -> None:
         """Note whether it lands in clear air, and warn of problems that a search would have."""
-        flight, warn = first.flight, self._warnings.append
-        verdict = judge(flight, self._plan.limits)
+        flight, warn, verdict = first.flight, self._warnings.append, result.verdict
         if self._whole and (verdict.violation or not verdict.completed):
             self._faults.append(
                 "your system does not land in clear air, on "
@@ -317,7 +321,7 @@ class _Checker:
                 "again"
             )
         touchdown = flight.touchdown
-        if touchdown and touchdown.stopped_s is None and flight.outcome == "not_landed":
+        if touchdown and touchdown.stopped_s is None and result.outcome == "not_landed":
             warn(
                 "touched the ground, but its motors did not stop; that takes Land(), or a thrust "
                 "below 30 % of that of a hover for 1 s"
@@ -339,12 +343,6 @@ class _Checker:
                 f"slow: {first.cpu_s:.0f} s of computing for {flight.elapsed_s:.0f} s of flight, "
                 f"{self._meter.mean_s * 1e3:.0f} ms in each call"
             )
-
-    def _ending(self, flight: Flight) -> str:
-        touchdown, verdict = flight.touchdown, judge(flight, self._plan.limits)
-        if flight.outcome == "landed" and touchdown and not verdict.violation:
-            return f"landed {touchdown.distance_m:.2f} m off after {touchdown.time_s:.0f} s"
-        return verdict.story
 
     def _fly(self, system: Any, scenario: Scenario, seconds: float) -> _TimedFlight:
         began = time.process_time()
@@ -370,6 +368,13 @@ _REMEMBERS = (
     "a later flight of one instance differs from the first of a fresh one; reset(mission) must "
     "forget the flight before"
 )
+
+
+def _ending(flight: Flight, result: FlightResult) -> str:
+    touchdown = flight.touchdown
+    if result.outcome == "landed" and touchdown and not result.verdict.violation:
+        return f"landed {touchdown.distance_m:.2f} m off after {touchdown.time_s:.0f} s"
+    return result.verdict.story
 
 
 def _scenarios(plan: CheckPlan) -> tuple[Scenario, Scenario]:

@@ -1,9 +1,14 @@
-"""Fly one scenario as a job says: simulate the flight, judge it, save its record."""
+"""Fly one scenario as a job says, and judge its record: two steps, for two processes.
+
+The flight runs the landing system's code, which may replace any function of its process.  So the
+record is all that leaves that process, and another one, which never runs that code, judges it.
+"""
 
 from __future__ import annotations
 
 import dataclasses
 import sys
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from pytest_garl.execution.flight_id import FlightId
@@ -18,16 +23,20 @@ if TYPE_CHECKING:
     from pytest_garl.verdicts.verdict import Limits
 
 
-def fly_job(
-    job: FlightJob, scenario: Scenario, flight: FlightId, guard: Any
-) -> tuple[FlightResult, str, float]:
-    """Fly, judge and save a flight; return its result, its trajectory's hash, its wall time.
+@dataclass(frozen=True, slots=True, kw_only=True)
+class FlownJob:
+    """What a flight left: its record, or the reason why there is none.
 
-    The record of an earlier attempt is removed first.  If the flight holds a number that is not
-    finite, that is a finding, and no record is left.
+    ``refusal`` is that reason: the flight held a number that is not finite.
     """
+
+    wall_s: float
+    refusal: str = ""
+
+
+def fly_and_save(job: FlightJob, scenario: Scenario, flight: FlightId, guard: Any) -> FlownJob:
+    """Fly, and save the record; that of an earlier attempt is removed first."""
     from pytest_garl.errors import NotFiniteError
-    from pytest_garl.execution.severity_of_flight import severity_of
     from pytest_garl.simulation.flight_file import save
     from pytest_garl.simulation.system_under_test.takeover import with_takeover
 
@@ -51,11 +60,35 @@ def fly_job(
     try:
         save(flown, record)
     except NotFiniteError as error:
-        crash = Crash(kind="nonsense", error="NotFinite", message=str(error))
+        return FlownJob(wall_s=flown.wall_s, refusal=str(error))
+    return FlownJob(wall_s=flown.wall_s)
+
+
+def judge_record(
+    job: FlightJob, scenario: Scenario, flight: FlightId, flown: FlownJob
+) -> tuple[FlightResult, str, float]:
+    """Return the result of a flight, its trajectory's hash and its wall time, from its record.
+
+    A flight that was refused is a finding.  Raises GarlError if the record cannot be read.
+    """
+    from pytest_garl.execution.severity_of_flight import severity_of
+    from pytest_garl.simulation.flight_file import load
+
+    map = job.load_map()
+    if flown.refusal:
+        crash = Crash(kind="nonsense", error="NotFinite", message=flown.refusal)
         return broken_result(crash, map.diagonal_m), "", flown.wall_s
-    result = judged(flown, job.limits)
-    severity = severity_of(flown, result.verdict, scenario, map, job.npcs)
-    return dataclasses.replace(result, severity=severity), flown.sha256, flown.wall_s
+    record = load(job.record(flight))
+    result = judged(record, job.limits)
+    severity = severity_of(record, result.verdict, scenario, map, job.npcs)
+    return dataclasses.replace(result, severity=severity), record.sha256, record.wall_s
+
+
+def fly_job(
+    job: FlightJob, scenario: Scenario, flight: FlightId, guard: Any
+) -> tuple[FlightResult, str, float]:
+    """Fly and judge in this process: for a landing system that is known to replace nothing."""
+    return judge_record(job, scenario, flight, fly_and_save(job, scenario, flight, guard))
 
 
 def time_limit_s(limits: Limits) -> float:

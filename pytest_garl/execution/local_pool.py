@@ -10,8 +10,9 @@ from pathlib import Path
 from pytest_garl import cpu_dispatch
 from pytest_garl.execution.checkout import Checkout
 from pytest_garl.execution.exit_guard import watched_flight
-from pytest_garl.execution.flight import fly_job
+from pytest_garl.execution.flight import fly_and_save
 from pytest_garl.execution.job import parse_job
+from pytest_garl.execution.judge_process import JudgeProcess
 from pytest_garl.execution.ledger_queue import Claim, WorkQueue
 from pytest_garl.execution.pool import Pool
 from pytest_garl.execution.process_pool import TURN_S, ProcessPool
@@ -55,12 +56,13 @@ class FlightWorkers:
 
 
 class InProcessPool:
-    """Flies one slot after the other in this process, for a debugger."""
+    """Flies one slot after the other in this process, for a debugger; another one judges."""
 
     in_process = True
 
     def __init__(self, queue: WorkQueue) -> None:
         self._queue = queue
+        self._judge = JudgeProcess()
 
     def turn(self) -> None:
         """Fly one slot."""
@@ -70,14 +72,16 @@ class InProcessPool:
             time.sleep(TURN_S)
             return
         job, scenario = parse_job(claim.job), parse_scenario(claim.scenario)
+        self._judge.start()
         with watched_flight() as watch:
-            flown = fly_job(job, scenario, claim.flight, None)
+            flown = fly_and_save(job, scenario, claim.flight, None)
         if watch.status is None:
-            self._queue.record(claim, *flown)
+            self._queue.record(claim, *self._judge.judge(job, scenario, claim.flight, flown))
         else:
             # As if a worker had ended: the same finding, and no record.
             job.record(claim.flight).unlink(missing_ok=True)
             retry_or_record(self._queue, claim, WorkerExit(status=watch.status, stderr=watch.stack))
 
     def close(self) -> None:
-        """Do nothing: no flight is under way between two turns."""
+        """End the process that judges; no flight is under way between two turns."""
+        self._judge.close()

@@ -49,6 +49,27 @@ def children_of(parent: int) -> Iterator[int]:
             yield int(folder.name)
 
 
+def descendants_of(ancestor: int) -> set[int]:
+    """Return the ids of all processes below one, zombies included."""
+    found: set[int] = set()
+    new = {ancestor}
+    while new:
+        children = {child for parent in new for child in _children_by_thread(parent)}
+        new = children - found
+        found |= new
+    return found
+
+
+def _children_by_thread(parent: int) -> set[int]:
+    """Return a process's children from the lists of its threads, which need no look at others."""
+    found: set[int] = set()
+    for file in Path(f"/proc/{parent}/task").glob("*/children"):
+        # A process or a thread may end meanwhile.
+        with contextlib.suppress(OSError):
+            found.update(int(pid) for pid in file.read_text().split())
+    return found
+
+
 def _stat(pid: int) -> list[str]:
     """Return the fields of /proc/PID/stat after the name: state, parent, and so on."""
     try:

@@ -3,7 +3,8 @@
 A worker is two processes.  The flying process runs the landing system's code, which may hold the
 interpreter for ever, close files, replace ``time.time`` or be killed.  The supervisor never runs a
 line of that code: it forks the flying process, shares one page of memory with it, ends it if it
-hangs, and ends all processes that the landing system leaves behind.
+hangs, has each flight judged from its record, and ends all processes that the landing system
+leaves behind.
 """
 
 from __future__ import annotations
@@ -27,7 +28,9 @@ from typing import Any, NoReturn
 from pytest_garl.execution.processes import (
     Parent,
     adopt_orphans,
+    alive,
     children_of,
+    descendants_of,
     end_with_parent,
     failure_text,
     ignore_ctrl_c,
@@ -48,11 +51,19 @@ DUMP_S = 2.0
 """How long a process that hangs may take to dump its stacks."""
 ENDING_S = 5.0
 """How long the supervisor tries to end the processes below it."""
+ANSWER_EVERY_S = 0.001
+"""How often a flying process looks whether its flight is judged; that takes 20 ms."""
 _DUMP = signal.SIGRTMAX
 _STDERR = 2
-_BEGAN, _LIMIT, _MOVED, _ENDING, _LENGTH = range(5)
+_BEGAN, _LIMIT, _MOVED, _ENDING, _LENGTH, _ASKED = range(6)
 _TEXT = 64
 _MEMORY_BYTES = 2**16
+_WAITS, _GOES_ON, _ENDS = 1.0, 0.0, 2.0
+"""What is known of a request: it waits for an answer, or the flying process goes on or ends."""
+
+JudgeFunction = Callable[[dict[str, Any]], dict[str, Any]]
+"""Takes a request of the flying process, and judges; returns the facts with which that process
+must end, or none if it may go on."""
 
 
 class FlightMonitor:
@@ -91,6 +102,26 @@ class FlightMonitor:
         while self._numbers[_ENDING]:
             sleep(1)
 
+    def request(self, **facts: Any) -> bool:
+        """Have the supervisor judge a flight; return whether this process may fly another one."""
+        self.report(**facts)
+        self._numbers[_ASKED] = _WAITS
+        # The supervisor waits for output; if there is no stderr any more, it looks a bit later.
+        with contextlib.suppress(OSError):
+            os.write(_STDERR, self.mark)
+        while self._numbers[_ASKED] == _WAITS or self._numbers[_ENDING]:
+            sleep(ANSWER_EVERY_S)
+        return bool(self._numbers[_ASKED] == _GOES_ON)
+
+    def requested(self) -> dict[str, Any] | None:
+        """Return the request that waits for an answer, or None."""
+        return self.reported() if self._numbers[_ASKED] == _WAITS else None
+
+    def answer(self, *, goes_on: bool) -> None:
+        """Let the flying process go on, or end."""
+        self._numbers[_LENGTH] = 0.0
+        self._numbers[_ASKED] = _GOES_ON if goes_on else _ENDS
+
     def overdue(self) -> str:
         """Return what takes too long as the beginning of a sentence; empty if nothing does."""
         began, limit_s, moved = self._numbers[: _MOVED + 1]
@@ -124,10 +155,16 @@ class FlightMonitor:
         return facts
 
 
-def supervise(parent: Parent, fly: Callable[[FlightMonitor], None], component: str) -> NoReturn:
+def supervise(
+    parent: Parent,
+    fly: Callable[[FlightMonitor], None],
+    judge: JudgeFunction,
+    component: str,
+) -> NoReturn:
     """Run ``fly`` in a process of its own; report to the parent how it ended, and end the rest.
 
-    ``component`` names what failed if ``fly`` raises an error that is not one of pytest-garl's own.
+    ``judge`` judges in this process the flights of the other one.  ``component`` names what failed
+    if ``fly`` raises an error that is not one of pytest-garl's own.
     """
     monitor = FlightMonitor()
     reading, writing = os.pipe()
@@ -141,7 +178,7 @@ def supervise(parent: Parent, fly: Callable[[FlightMonitor], None], component: s
         os.close(writing)
         _fly(me, monitor, fly, component)
     os.close(writing)
-    _Supervisor(parent, monitor, flying, reading).run()
+    _Supervisor(parent, monitor, flying, reading, judge).run()
 
 
 def _fly(
@@ -181,9 +218,17 @@ class _EndRequestedError(BaseException):
 
 
 class _Supervisor:
-    def __init__(self, parent: Parent, monitor: FlightMonitor, flying: int, stderr: int) -> None:
+    def __init__(
+        self,
+        parent: Parent,
+        monitor: FlightMonitor,
+        flying: int,
+        stderr: int,
+        judge: JudgeFunction,
+    ) -> None:
         self._parent, self._monitor, self._flying = parent, monitor, flying
-        self._stderr = stderr
+        self._stderr, self._judge = stderr, judge
+        self._judged: dict[str, Any] = {}
         self._poll = select.poll()
         self._poll.register(stderr, select.POLLIN)
         self._is_open = True
@@ -204,7 +249,7 @@ class _Supervisor:
                 hung=self._hung,
                 stacks=self._stacks.decode(errors="replace"),
                 stderr=self._text.decode(errors="replace"),
-                **self._monitor.reported(),
+                **(self._judged or self._monitor.reported()),
             )
         except _EndRequestedError:
             signal.signal(signal.SIGTERM, signal.SIG_IGN)
@@ -220,10 +265,36 @@ class _Supervisor:
                 return os.waitstatus_to_exitcode(status)
             if not self._parent.lives():
                 raise _EndRequestedError
+            if (request := self._monitor.requested()) is not None:
+                self._answer(request)
             self._hung = self._hung or self._monitor.overdue()
             if self._hung:
                 self._kill()
             self._read_stderr(STDERR_WAIT_MS)
+
+    def _answer(self, request: dict[str, Any]) -> None:
+        """Judge a flight, once nothing that it has left runs any more.
+
+        Such a process might hold the ledger's lock.
+        """
+        left = self._end_what_is_left()
+        self._judged = self._judge(request)
+        if self._judged:
+            self._monitor.note_ending()
+            os.kill(self._flying, signal.SIGKILL)
+        else:
+            self._monitor.answer(goes_on=not left)
+
+    def _end_what_is_left(self) -> bool:
+        """End the processes that a flight has left; return whether there were any."""
+        left = descendants_of(getpid()) - {self._flying}
+        for pid in left:
+            with contextlib.suppress(OSError):
+                os.kill(pid, signal.SIGKILL)
+        until = monotonic() + ENDING_S
+        while monotonic() < until and any(alive(pid) for pid in left):
+            sleep(0.002)
+        return bool(left)
 
     def _kill(self) -> None:
         """Have a process that hangs dump its stacks, then kill it."""

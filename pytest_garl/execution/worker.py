@@ -1,9 +1,8 @@
-"""A worker: claims a slot, flies it and records the result, until its parent process ends."""
+"""A worker: claims a slot, flies it and has it judged, until its parent process ends."""
 
 from __future__ import annotations
 
 import dataclasses
-import traceback
 from contextlib import closing
 from os import _exit, getpid, getppid
 from pathlib import Path
@@ -12,16 +11,11 @@ from time import monotonic, sleep
 from pytest_garl import cpu_dispatch
 from pytest_garl.errors import GarlError, LandingSystemError, LedgerError, SimulatorError
 from pytest_garl.execution.checkout import isolate_imports
+from pytest_garl.execution.flight import FlownJob
+from pytest_garl.execution.judging import SIMULATOR, SlotJudge, failure_of, import_what_judges
 from pytest_garl.execution.ledger_queue import Claim, WorkQueue
 from pytest_garl.execution.processes import Parent, failure_text, run_worker
-from pytest_garl.execution.result import FlightResult
 from pytest_garl.execution.supervisor import FlightMonitor, supervise
-from pytest_garl.simulation.system_under_test.texts import (
-    MESSAGE_CHARS,
-    TRACEBACK_CHARS,
-    class_name,
-    text_from,
-)
 
 CLAIM_EVERY_S = 0.02
 """Time between two attempts to claim a slot."""
@@ -31,8 +25,6 @@ _TRUSTED = "pytest_garl."
 """Landing systems of this package leave their process as it was."""
 RESTART_S = 1.0
 """How long a used worker waits for a fresh one to take a slot, before it ends to make room."""
-SIMULATOR = "the simulator"
-"""The failed component, in the message of an error that ends the run."""
 
 
 def main(parent: Parent, path: str, *checkouts: str) -> None:
@@ -44,12 +36,15 @@ def main(parent: Parent, path: str, *checkouts: str) -> None:
             isolate_imports(checkouts)
         Worker(Path(path), owner, monitor).run()
 
-    supervise(parent, fly, SIMULATOR)
+    # Before the fork: the flying process would import them too.
+    import_what_judges()
+    supervise(parent, fly, SlotJudge(Path(path), owner).judge, SIMULATOR)
 
 
 class Worker:
-    """Claims, flies and records slot after slot, with the process id of its supervisor ``owner``.
+    """Claims and flies slot after slot, and has its supervisor judge them.
 
+    Slots are claimed for ``owner``, the process id of the supervisor.
     It ends if a fresh process must continue: after a flight that changed the process, and before
     another landing system flies.  If a landing system replaces ``numpy.zeros`` or leaves a thread
     behind, no other system's flights may change.
@@ -63,7 +58,7 @@ class Worker:
 
     def run(self) -> None:
         """Fly until the supervisor ends, or until a fresh process must continue."""
-        # The supervisor needs none of these modules, and is forked before they are imported.
+        # The supervisor needs none of these modules: it has forked this process before.
         import cv2
 
         from pytest_garl.execution.process_state import ProcessState
@@ -73,16 +68,14 @@ class Worker:
         state = ProcessState()
         while (claim := self._wait_for_slot()) is not None:
             try:
-                result, sha256, wall_s = self._fly(claim)
-                with closing(WorkQueue.open(self._path, self._owner)) as queue:
-                    queue.record(claim, result, sha256, wall_s)
-                    queue.count("idle_s", self._idle_s)
+                flown = self._fly(claim)
             except Exception as error:
                 if _is_permanent(error) and not state.limited():
                     raise
-                self._monitor.report(failure=_failure(error))
+                self._monitor.report(failure=failure_of(error))
                 break
-            if state.changed():
+            goes_on = self._monitor.request(**dataclasses.asdict(flown), idle_s=self._idle_s)
+            if not goes_on or state.changed():
                 break
 
     def _wait_for_slot(self) -> Claim | None:
@@ -114,8 +107,8 @@ class Worker:
             sleep(CLAIM_EVERY_S)
         return None
 
-    def _fly(self, claim: Claim) -> tuple[FlightResult, str, float]:
-        from pytest_garl.execution.flight import fly_job
+    def _fly(self, claim: Claim) -> FlownJob:
+        from pytest_garl.execution.flight import fly_and_save
         from pytest_garl.execution.job import parse_job
         from pytest_garl.scenarios.files import parse_scenario
 
@@ -127,7 +120,7 @@ class Worker:
             self._prove_simulator(claim)
         try:
             self._monitor.flight_begins(limit_s)
-            return fly_job(job, scenario, claim.flight, self._monitor)
+            return fly_and_save(job, scenario, claim.flight, self._monitor)
         except OSError as error:
             # Errors of the landing system are part of its flight; this one is of the record.
             raise LedgerError(f"{job.flights}: {error.strerror or error}") from error
@@ -139,7 +132,7 @@ class Worker:
 
     def _prove_simulator(self, claim: Claim) -> None:
         """Fly the scenario with the reference pilot; raise GarlError if that fails too."""
-        from pytest_garl.execution.flight import fly_job
+        from pytest_garl.execution.flight import fly_and_save
         from pytest_garl.execution.job import parse_job
         from pytest_garl.execution.reference import reference_to
         from pytest_garl.scenarios.files import parse_scenario
@@ -149,29 +142,17 @@ class Worker:
             parse_job(claim.job), system=reference_to(ReferencePilot), takeover=None
         )
         try:
-            fly_job(job, parse_scenario(claim.scenario), claim.flight, None)
+            flown = fly_and_save(job, parse_scenario(claim.scenario), claim.flight, None)
         except GarlError:
             raise
         except Exception as error:
             raise SimulatorError(failure_text(error, SIMULATOR)) from error
+        self._monitor.request(**dataclasses.asdict(flown), proves=True)
 
 
 def _is_permanent(error: Exception) -> bool:
     """Whether an error occurs in any process: one of pytest-garl, not of the landing system."""
     return isinstance(error, GarlError) and not isinstance(error, LandingSystemError)
-
-
-def _failure(error: Exception) -> dict[str, str]:
-    kind = class_name(type(error))
-    return {
-        "error": kind,
-        "message": text_from(lambda: str(error), MESSAGE_CHARS, f"{kind}, whose str()"),
-        "traceback": text_from(lambda: _text(error), TRACEBACK_CHARS, f"{kind}, whose traceback"),
-    }
-
-
-def _text(error: Exception) -> str:
-    return "".join(traceback.format_exception(error))
 
 
 if __name__ == "__main__":

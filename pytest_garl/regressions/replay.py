@@ -12,6 +12,7 @@ from pytest_garl import cpu_dispatch
 from pytest_garl.adversary.catalogue import policy_spec
 from pytest_garl.errors import GarlError, LandingSystemError
 from pytest_garl.execution.flight import time_limit_s
+from pytest_garl.execution.judge_process import JudgeProcess
 from pytest_garl.execution.reference import (
     BUILT_IN,
     simulator_sha256,
@@ -23,7 +24,6 @@ from pytest_garl.regressions.case_test_run import CaseTestResult, run_case_tests
 from pytest_garl.scenarios.maps.map import Map, load_map
 from pytest_garl.simulation.flight import Flight
 from pytest_garl.simulation.flight_file import load
-from pytest_garl.verdicts.judge import judge
 
 ReplayResult = Literal["FIXED", "FAILED", "STALE", "UNDECIDED"]
 BUILT_IN_VERDICT = "the built-in verdict"
@@ -74,7 +74,8 @@ def replay(
     """
     map = load_map(case.scenario.map, map_folders)
     if not case.test:
-        return _by_verdict(case, folder, map, f"{BUILT_IN_VERDICT}: the case names no test", live)
+        judged_by = f"{BUILT_IN_VERDICT}: the case names no test"
+        return _by_verdict(case, folder, map, judged_by, live)
     with run_case_tests(case, folder, live=live) as (results, flights):
         finder = next((each for each in results if each.is_result_of(case.test)), None)
         if finder is not None:
@@ -137,11 +138,13 @@ def _recorded_flight(folder: Path, sha256: str) -> Flight | None:
 def _by_verdict(case: Case, folder: Path, map: Map, judged_by: str, live: bool) -> Replay:
     from pytest_garl.simulation.fly import fly
 
-    system = system_of(case, folder)
-    cpu_dispatch.check()
-    npcs = policy_spec(case.policy) if live else case.behaviour.policy
-    flight = fly(case.scenario, system, npcs, map=map, time_limit_s=time_limit_s(case.limits))
-    verdict = judge(flight, case.limits)
+    with JudgeProcess() as judge:
+        system = system_of(case, folder)
+        cpu_dispatch.check()
+        npcs = policy_spec(case.policy) if live else case.behaviour.policy
+        flight = fly(case.scenario, system, npcs, map=map, time_limit_s=time_limit_s(case.limits))
+        judged = judge.judge_flight(flight, case.limits)
+    verdict = judged.verdict
     sources = SourceHashes(
         system_sha256=sources_sha256(system),
         simulator_sha256=simulator_sha256(BUILT_IN),
@@ -157,7 +160,7 @@ def _by_verdict(case: Case, folder: Path, map: Map, judged_by: str, live: bool) 
         result = "STALE"
     return Replay(
         result=result,
-        outcome=flight.outcome,
+        outcome=judged.outcome,
         signature=verdict.signature,
         description=verdict.story,
         judged_by=judged_by,

@@ -2,7 +2,7 @@ from __future__ import annotations
 
 import dataclasses
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
@@ -12,6 +12,7 @@ from pytest_garl.execution.job import FlightJob
 from pytest_garl.execution.ledger import Ledger
 from pytest_garl.execution.local_pool import local_pool
 from pytest_garl.execution.on_demand import FlyFunction, OnDemandFlights
+from pytest_garl.execution.pool import Pool
 from pytest_garl.execution.reference import reference_to
 from pytest_garl.simulation.system_under_test.reference_pilot import ReferencePilot
 from tests.execution.flying import Good, job_of, scenario
@@ -27,8 +28,19 @@ def ledger(tmp_path: Path) -> Ledger:
     return Ledger.create(tmp_path / "ledger.sqlite", {})
 
 
+POOLS: list[Pool] = []
+
+
+@pytest.fixture(autouse=True)
+def _end_of_pools() -> Iterator[None]:
+    yield
+    while POOLS:
+        POOLS.pop().close()
+
+
 def on_demand(ledger: Ledger, on_wait: Callable[[], None] = lambda: None) -> OnDemandFlights:
-    return OnDemandFlights(ledger, local_pool(ledger.queue, workers=0), on_wait)
+    POOLS.append(local_pool(ledger.queue, workers=0))
+    return OnDemandFlights(ledger, POOLS[-1], on_wait)
 
 
 def foggier(job: FlightJob) -> Callable[[FlyFunction], tuple[float, str]]:
