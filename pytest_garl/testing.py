@@ -44,6 +44,7 @@ from pytest_garl.simulation.flight import Flight
 from pytest_garl.simulation.flight_file import divergence_time_s
 from pytest_garl.simulation.fly import fly
 from pytest_garl.simulation.physics.vehicle import up_m
+from pytest_garl.simulation.system_under_test.ground_truth import PilotWrapper, is_own
 from pytest_garl.simulation.system_under_test.reading import finite
 from pytest_garl.simulation.system_under_test.texts import shown
 from pytest_garl.verdicts.phases import landing_phase
@@ -192,6 +193,12 @@ def check_contract(system: type) -> None:
     """Raise LandingSystemError if a class has not the methods and the airframe of the contract."""
     check_system(system)
     _check_airframe(system)
+    if hasattr(system, "observe_truth") and not is_own(system):
+        raise LandingSystemError(
+            f"{system.__name__}: has an attribute observe_truth, the name by which pilots of "
+            "pytest-garl are told where the marker is; a landing system is not told, so give it "
+            "another name"
+        )
     _check_signature(system, "reset", 1)
     _check_signature(system, "step", 1)
 
@@ -460,22 +467,22 @@ def _reusing_one_instance(system: type, yaws: list[tuple[float, float]]) -> Any:
     """
     instances: list[Any] = []
 
-    class Reused:
+    class Reused(PilotWrapper):
         airframe = airframe_of(system)
 
         def __init__(self) -> None:
             if not instances:
                 instances.append(system())
-            self._instance = instances[0]
+            self.wrapped = instances[0]
 
         def __getattr__(self, name: str) -> Any:
-            return getattr(self._instance, name)
+            return getattr(self.wrapped, name)
 
         def reset(self, mission: Mission) -> None:
-            self._instance.reset(mission)
+            self.wrapped.reset(mission)
 
         def step(self, observation: Observation) -> Any:
-            answer = self._instance.step(observation)
+            answer = self.wrapped.step(observation)
             if isinstance(answer, PositionSetpoint | VelocitySetpoint):
                 yaw = finite(answer.yaw_rad)
                 if yaw is not None and abs(yaw) > LARGEST_YAW_RAD:

@@ -93,14 +93,25 @@ class Silent(Climbs):
         return None
 
 
-class RemembersTheMarker(ReferencePilot):
-    """Lands well once; then it flies to where the marker was in the flight before."""
+class RemembersTheMarker(Climbs):
+    """Lands at the told coordinate once; then it flies to that of the flight before."""
 
-    known: Truth | None = None
+    known: tuple[float, float] | None = None
 
+    def reset(self, mission: Mission) -> None:
+        super().reset(mission)
+        self.known = self.known or mission.gps_position_m
+
+    def step(self, observation: Observation) -> Command:
+        assert self.known
+        if observation.time_s < 20:
+            return PositionSetpoint(position_m=(*self.known, 5.0))
+        return Land()
+
+
+class AsksForTheTruth(Climbs):
     def observe_truth(self, truth: Truth) -> None:
-        self.known = self.known or truth
-        super().observe_truth(self.known)
+        raise AssertionError("told")
 
 
 class GivesUp(Climbs):
@@ -243,6 +254,11 @@ def test_check_flies_until_landed_and_reports_the_distance() -> None:
     assert all(f"{name}=" in warning for name in ("target_m", "detections", "phase"))
     assert "ReferencePilot: a flight takes" in str(check)
     assert "a search of 40 flights takes" in str(check)
+
+
+def test_check_refuses_a_class_that_asks_for_the_truth() -> None:
+    with pytest.raises(LandingSystemError, match="has an attribute observe_truth, the name by"):
+        check_landing_system(AsksForTheTruth)
 
 
 def test_check_finds_a_flight_that_depends_on_the_one_before() -> None:

@@ -235,8 +235,8 @@ class Loop:
                 self._step(tick, delivery)
 
     def _step(self, tick: int, delivery: Delivery) -> None:
-        if self._system.observes_truth:
-            self._system.observe_truth(_truth(self, self._navigation.error_m))
+        if self._system.told:
+            self._system.told.observe_truth(_truth(self, self._navigation.error_m))
         command = self._system.step(delivery.observation)
         error_m = estimation_error_m(delivery.observation, delivery.place_m)
         range_m = delivery.observation.rangefinder_m

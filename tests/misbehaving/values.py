@@ -308,12 +308,15 @@ class NobodyKnowsWhetherItSees(Lander):
 
 
 class NobodyKnowsWhetherItIsTold(Lander):
+    comes_to = "harmless"
+
     @property
     def observe_truth(self) -> Any:
         raise RuntimeError("no answer")
 
 
 class TruthIsNoMethod(Lander):
+    comes_to = "harmless"
     observe_truth = "please"
 
 

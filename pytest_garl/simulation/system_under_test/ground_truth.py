@@ -1,8 +1,13 @@
-"""Ground truth for a reference pilot: the positions of the marker and of all objects."""
+"""Ground truth for a reference pilot: the positions of the marker and of all objects.
+
+Only pilots of this package are told: a landing system must find the marker itself.  A method of
+the same name in another class gets nothing.
+"""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 from pytest_garl.scenarios.maps.map import Map
 from pytest_garl.scenarios.object_types import ObjectType
@@ -24,8 +29,39 @@ class TruthObject:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Truth:
-    """The world at one camera frame; passed to systems that have ``observe_truth(truth)``."""
+    """The world at one camera frame."""
 
     marker_m: tuple[float, float]
     objects: tuple[TruthObject, ...]
     map: Map
+
+
+class ToldPilot:
+    """Base of the pilots of this package that are told the truth before each step."""
+
+    def observe_truth(self, truth: Truth) -> None:
+        """Take the truth of this moment."""
+        raise NotImplementedError
+
+
+class PilotWrapper:
+    """Base of the classes of this package that pass calls on to another system, ``wrapped``."""
+
+    wrapped: Any
+
+
+def told_pilot(system: Any) -> ToldPilot | None:
+    """Return the pilot that is told the truth, of a system or of what it wraps; None if none is."""
+    # By the type: a landing system may have a property ``__class__``.
+    kind = type(system)
+    if not issubclass(kind, ToldPilot | PilotWrapper) or not is_own(kind):
+        return None
+    told: ToldPilot | None = (
+        told_pilot(system.wrapped) if issubclass(kind, PilotWrapper) else system
+    )
+    return told
+
+
+def is_own(system: type) -> bool:
+    """Whether this package defines a class."""
+    return system.__module__.partition(".")[0] == __name__.partition(".")[0]

@@ -21,7 +21,7 @@ from pytest_garl.simulation.system_under_test.calls import (
     read_airframe,
 )
 from pytest_garl.simulation.system_under_test.diagnostics import DiagnosticsQuota
-from pytest_garl.simulation.system_under_test.ground_truth import Truth
+from pytest_garl.simulation.system_under_test.ground_truth import ToldPilot, told_pilot
 from pytest_garl.simulation.system_under_test.validation import read_command, read_thrusts
 
 
@@ -29,8 +29,9 @@ class SystemUnderTest:
     """The landing system of one flight.
 
     Every call may raise SystemFailedError, which ends the flight.
-    ``needs_camera`` and ``observes_truth`` are known after ``start``.  ``has_stepped`` is whether
-    ``step`` has returned a command, ``gave_up`` whether the last one was ``Abort()``.
+    ``needs_camera`` and ``told``, a pilot of this package that is told the truth, are known after
+    ``start``.  ``has_stepped`` is whether ``step`` has returned a command, ``gave_up`` whether the
+    last one was ``Abort()``.
     """
 
     def __init__(self, make_system: Callable[[], Any], guard: StepGuard | None) -> None:
@@ -38,7 +39,8 @@ class SystemUnderTest:
         self._calls = SystemCalls(make_system, guard)
         self._quota = DiagnosticsQuota()
         self.airframe, self._airframe_error = self._read_airframe()
-        self.needs_camera, self.observes_truth = True, False
+        self.needs_camera = True
+        self.told: ToldPilot | None = None
         self.has_stepped = self.gave_up = False
         self._system: Any = None
 
@@ -58,13 +60,7 @@ class SystemUnderTest:
         self.needs_camera = self._calls.run(
             "needs_camera", lambda: bool(getattr(self._system, "needs_camera", True))
         )
-        self.observes_truth = self._calls.run(
-            "observe_truth", lambda: getattr(self._system, "observe_truth", None) is not None
-        )
-
-    def observe_truth(self, truth: Truth) -> None:
-        """Pass the truth to a system that has ``observe_truth``: a reference pilot."""
-        self._calls.run("observe_truth", lambda: self._system.observe_truth(truth))
+        self.told = told_pilot(self._system)
 
     def step(self, observation: Observation) -> Command:
         """Return the checked command for one camera frame."""

@@ -23,6 +23,7 @@ from pytest_garl.landing_system import (
 from pytest_garl.simulation.physics.flight_control import FlightControl
 from pytest_garl.simulation.physics.vehicle import Motion, Quaternion, Vector, vehicle_model
 from pytest_garl.simulation.system_under_test.descent import descend
+from pytest_garl.simulation.system_under_test.ground_truth import PilotWrapper
 
 CRUISE_M = 10.0
 """Height to which the blind pilot continues a climb."""
@@ -86,7 +87,7 @@ class _Maker:
         return TakenOver(self._system(), self._takeover, self.airframe)
 
 
-class TakenOver:
+class TakenOver(PilotWrapper):
     """A landing system until a time; from then on another pilot flies.
 
     Until then every call reaches the landing system as it would alone, so that the flight is the
@@ -94,7 +95,7 @@ class TakenOver:
     """
 
     def __init__(self, inner: Any, takeover: Takeover, airframe: Airframe) -> None:
-        self._inner, self._takeover = inner, takeover
+        self.wrapped, self._takeover = inner, takeover
         self._latency_s = airframe.latency_s
         self._control_dt_s = 1.0 / airframe.control_rate_hz if airframe.control_rate_hz else 0.0
         self._control = FlightControl(vehicle_model(airframe))
@@ -104,19 +105,19 @@ class TakenOver:
 
     def __getattr__(self, name: str) -> Any:
         """Return an attribute of the landing system, such as ``needs_camera``."""
-        if name == "_inner":
+        if name == "wrapped":
             raise AttributeError(name)
-        return getattr(self._inner, name)
+        return getattr(self.wrapped, name)
 
     def reset(self, mission: Mission) -> None:
         """Reset the landing system."""
-        self._inner.reset(mission)
+        self.wrapped.reset(mission)
 
     def step(self, observation: Observation) -> Command:
         """Return the command of who flies when it takes effect."""
         effect_s = observation.time_s + self._latency_s
         if effect_s < self._takeover.from_s - _ROUNDING_S:
-            command: Command = self._inner.step(observation)
+            command: Command = self.wrapped.step(observation)
             self._remember(command)
             return command
         x, y, z = (float(value) for value in observation.position_m)
@@ -128,7 +129,7 @@ class TakenOver:
         """Return the thrusts of who flies; the other pilot uses the simulated flight control."""
         held = self._takeover.pilot == "hold" and state.time_s < self._takeover.until_s
         if held or state.time_s < self._takeover.from_s - _ROUNDING_S:
-            thrusts: MotorThrusts = self._inner.control(state)
+            thrusts: MotorThrusts = self.wrapped.control(state)
             return thrusts
         position, velocity = _vector(state.position_m), _vector(state.velocity_mps)
         attitude = _quaternion(state.attitude)

@@ -23,10 +23,11 @@ from pytest_garl.adversary.catalogue import policy_spec
 from pytest_garl.scenarios.chromosome import decode
 from pytest_garl.scenarios.genes import genome_for
 from pytest_garl.scenarios.maps.map import load_map
+from pytest_garl.scenarios.placement import marker_position_m
 from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.scenarios.validity import repair
+from pytest_garl.simulation.flight import Flight
 from pytest_garl.simulation.fly import fly
-from pytest_garl.simulation.system_under_test.ground_truth import Truth
 from tests.support.bare_flight import Trace, fly_bare
 
 pytestmark = pytest.mark.sim
@@ -38,23 +39,19 @@ STANDING_M = 0.2
 
 
 class Lands:
-    """Takes off, flies over the given GPS position and lands; it knows where the marker is.
+    """Takes off, flies over the given GPS position and lands; ``marker`` is where the marker is.
 
     Orders take effect ``latency_s`` after the image, as commands do.
     """
 
     airframe = AIRFRAME
     needs_camera = False
-    sees = True
+    marker: tuple[float, float] | None = None
 
     def reset(self, mission: Mission) -> None:
         self.control_loop = ArduPilotControl(self.airframe, PARAMETERS)
         self.goal = (*mission.gps_position_m, 7.0)
-        self.marker: tuple[float, float] | None = None
         self.orders: list[tuple[float, Callable[[], None]]] = []
-
-    def observe_truth(self, truth: Truth) -> None:
-        self.marker = truth.marker_m[0], truth.marker_m[1]
 
     def step(self, observation: Observation) -> Command:
         loop, now = self.control_loop, observation.time_s
@@ -66,7 +63,7 @@ class Lands:
             self.later(now, lambda: loop.guide(position=self.goal, speed=5.0))
         elif loop.mode == "guided" and math.dist((x, y, z), self.goal) < 0.3 and speed < 0.3:
             self.later(now, loop.land)
-        if self.sees and self.marker is not None:
+        if self.marker is not None:
             marker = (*self.marker, 0.0)
             self.later(now, lambda: loop.landing_target(marker, now))
         if loop.mode == "land" or (loop.landed and now > 10):
@@ -82,42 +79,41 @@ class Lands:
         return self.control_loop.control(state)
 
 
-class LandsBlind(Lands):
-    sees = False
-
-
 def scenario(**genes: float) -> Scenario:
     genome = genome_for(EMPTY)
     nominal = decode(genome.nominal, genome, map="lawn", seed=5)
     return repair(nominal.replace({k.replace("__", "."): v for k, v in genes.items()}), EMPTY)
 
 
+def flown(where: Scenario, *, sees: bool = True, time_limit_s: float = 80) -> Flight:
+    system = type("Sees", (Lands,), {"marker": marker_position_m(where, EMPTY)}) if sees else Lands
+    policy = policy_spec("stationary")
+    return fly(where, system, policy, map=EMPTY, time_limit_s=time_limit_s)
+
+
 def test_it_lands_precisely_on_a_marker_that_it_sees() -> None:
     where = scenario(marker__x=0.2, marker__y=-0.15)
-    flight = fly(where, Lands, policy_spec("stationary"), map=EMPTY, time_limit_s=80)
+    flight = flown(where)
     assert flight.outcome == "landed"
     assert flight.final_distance_m < 0.05
     assert all(contact.speed_mps < 0.6 for contact in flight.contacts)
 
 
 def test_it_holds_and_lands_below_itself_where_it_sees_none() -> None:
-    flight = fly(scenario(), LandsBlind, policy_spec("stationary"), map=EMPTY, time_limit_s=80)
+    flight = flown(scenario(), sees=False)
     assert flight.outcome == "landed"
     assert math.dist(flight.uav.position_m[-1, :2], EMPTY.gps_position_m) < 0.3
 
 
 def test_it_lands_precisely_in_wind() -> None:
     where = scenario(marker__x=0.2, wind__mean_mps=5.0)
-    flight = fly(where, Lands, policy_spec("stationary"), map=EMPTY, time_limit_s=80)
+    flight = flown(where)
     assert flight.outcome == "landed"
     assert flight.final_distance_m < 0.1
 
 
 def test_the_same_flight_flies_the_same_bytes() -> None:
-    first, again = (
-        fly(scenario(), Lands, policy_spec("stationary"), map=EMPTY, time_limit_s=12)
-        for _ in range(2)
-    )
+    first, again = (flown(scenario(), time_limit_s=12) for _ in range(2))
     assert first.sha256 == again.sha256
 
 

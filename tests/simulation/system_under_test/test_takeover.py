@@ -18,6 +18,7 @@ from pytest_garl.landing_system import (
 )
 from pytest_garl.simulation.flight import Flight
 from pytest_garl.simulation.fly import fly
+from pytest_garl.simulation.system_under_test.ground_truth import told_pilot
 from pytest_garl.simulation.system_under_test.reference_pilot import ReferencePilot
 from pytest_garl.simulation.system_under_test.takeover import (
     Leg,
@@ -129,6 +130,6 @@ def test_pilot_takes_over_a_system_with_its_own_flight_control() -> None:
 def test_attributes_of_the_landing_system_are_seen_through() -> None:
     system = with_takeover(ReferencePilot, takeover("hold"))()
     assert system.needs_camera is False
-    assert callable(system.observe_truth)
+    assert isinstance(told_pilot(system), ReferencePilot)
     assert with_takeover(ReferencePilot, takeover("hold")).needs_camera is False  # type: ignore[attr-defined]
-    assert getattr(with_takeover(BlindLander, takeover("hold"))(), "observe_truth", None) is None
+    assert told_pilot(with_takeover(BlindLander, takeover("hold"))()) is None
