@@ -10,13 +10,14 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Literal, get_args
 
-from pytest_garl.errors import LandingSystemError
+from pytest_garl.errors import LandingSystemError, of_a_user
 from pytest_garl.messages import listed
 
 if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
+__tracebackhide__ = of_a_user
 MAX_RATE_HZ = 240.0
 """The rate of the physics: nothing can be asked more often."""
 
@@ -32,7 +33,6 @@ def _check(
     kind: str, name: str, value: object, low: float, high: float, unit: str, *, whole: bool = False
 ) -> None:
     """Raise LandingSystemError unless a value is a number in a range; NaN is in none."""
-    __tracebackhide__ = True  # pytest shows the line of the user's module that made it
     try:
         fits = low <= value <= high and not (whole and value != int(value))  # type: ignore[operator, call-overload]
     except (TypeError, ValueError, OverflowError):
@@ -67,7 +67,6 @@ class Camera:
     distortion: tuple[float, ...] = ()
 
     def __post_init__(self) -> None:
-        __tracebackhide__ = True
         for name in ("width_px", "height_px"):
             _check("Camera", name, getattr(self, name), 16, _MOST_PIXELS // 16, "px", whole=True)
         if self.width_px * self.height_px > _MOST_PIXELS:
@@ -82,7 +81,6 @@ class Camera:
             self._check_lens()
 
     def _check_lens(self) -> None:
-        __tracebackhide__ = True
         import numpy as np
 
         from pytest_garl.distortion import undistorted
@@ -129,7 +127,6 @@ class Camera:
 
 def _coefficients(found: object) -> tuple[float, ...]:
     """Return the coefficients of a lens as plain floats; raise LandingSystemError for others."""
-    __tracebackhide__ = True
     try:
         values = tuple(float(each) for each in found) if isinstance(found, Sequence) else None
     except (TypeError, ValueError, OverflowError):
@@ -157,7 +154,6 @@ class Rangefinder:
     most_m: float = 120.0
 
     def __post_init__(self) -> None:
-        __tracebackhide__ = True
         for name in ("least_m", "most_m"):
             _check("Rangefinder", name, getattr(self, name), 0.0, 200.0, "m")
         if self.least_m >= self.most_m:
@@ -193,7 +189,6 @@ class Airframe:
     rangefinder: Rangefinder | None = None
 
     def __post_init__(self) -> None:
-        __tracebackhide__ = True
         camera: object = self.camera
         if not isinstance(camera, Camera):
             found = type(camera).__name__

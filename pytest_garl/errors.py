@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 from pytest_garl.messages import printable
 
 
@@ -15,6 +17,15 @@ class GarlError(Exception):
 
     def __init__(self, message: str) -> None:
         super().__init__(printable(message))
+
+
+def of_a_user(excinfo: Any) -> bool:
+    """Whether an error is one that its message explains, given pytest's ``ExceptionInfo``.
+
+    A module whose ``__tracebackhide__`` this is has no frames in such an error's traceback: pytest
+    shows the line of the user's module that made the value.
+    """
+    return excinfo is not None and isinstance(excinfo.value, GarlError)
 
 
 class ScenarioError(GarlError):

@@ -6,8 +6,10 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from pytest_garl.errors import ScenarioError
+from pytest_garl.errors import ScenarioError, of_a_user
 from pytest_garl.messages import listed, shown
+
+__tracebackhide__ = of_a_user
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -70,7 +72,6 @@ class MarkerSpec:
     nested: tuple[NestedMarker, ...] = ()
 
     def __post_init__(self) -> None:
-        __tracebackhide__ = True  # pytest shows the line of the user's module that made it
         if self.dictionary not in DICTIONARIES:
             raise ScenarioError(
                 f"marker: found dictionary = {shown(self.dictionary)}, expected one of "
@@ -121,7 +122,6 @@ class MarkerSpec:
 
 
 def _check(name: str, marker: NestedMarker, size: int, dictionary: str) -> None:
-    __tracebackhide__ = True
     if type(marker.id) is not int or not 0 <= marker.id < size:
         raise ScenarioError(
             f"{name}: found id = {shown(marker.id)}, expected a whole number from 0 to {size - 1} "

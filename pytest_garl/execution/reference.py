@@ -145,6 +145,13 @@ def system_named(name: str) -> Any:
 
 def check_system(system: Any) -> None:
     """Raise LandingSystemError if a class cannot be a landing system."""
+    if isinstance(system, str) and SYSTEM_NAME.fullmatch(system):
+        module, _, name = system.partition(":")
+        first = name.partition(".")[0]
+        raise LandingSystemError(
+            f"system={system!r}: expected a class, found its name; import it: "
+            f"from {module} import {first}, and give system={name}"
+        )
     if not inspect.isclass(system):
         raise LandingSystemError(
             f"system={system!r}: expected a class, found {type(system).__name__}"

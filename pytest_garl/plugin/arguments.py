@@ -189,6 +189,28 @@ def add_options(parser: pytest.Parser) -> None:
     )
 
 
+def check_keys(config: pytest.Config) -> None:
+    """Raise UsageError for an unknown ini key ``garl_…`` of the configuration file or of ``-o``.
+
+    pytest itself warns at most, and the key that was meant keeps its default.
+    """
+    # pytest has no public list of the keys that are given.
+    for key in config._inicfg:
+        if key.startswith("garl_"):
+            try:
+                config.getini(key)
+            except ValueError as error:
+                raise pytest.UsageError(_unknown_key(key)) from error
+
+
+def _unknown_key(key: str) -> str:
+    import difflib
+
+    near = difflib.get_close_matches(key, [f"garl_{option.name}" for option in OPTIONS], n=1)
+    meant = f"did you mean {near[0]}? " if near else ""
+    return f"{key}: unknown ini key; {meant}`pytest --help` lists those that begin with garl_"
+
+
 def is_enabled(config: pytest.Config) -> bool:
     """Whether the command line or the configuration asks for flights."""
     names = [option.name for option in OPTIONS]

@@ -11,7 +11,13 @@ import pytest
 from pytest_garl.errors import GarlError
 from pytest_garl.plugin import hookspecs
 from pytest_garl.plugin.abort import abort_if_reported, drop_entries_without_line, fail_report
-from pytest_garl.plugin.arguments import add_options, computes, flies_itself, is_enabled
+from pytest_garl.plugin.arguments import (
+    add_options,
+    check_keys,
+    computes,
+    flies_itself,
+    is_enabled,
+)
 from pytest_garl.plugin.fixtures import garl_slot, landing, npcs, scenario
 from pytest_garl.plugin.keys import (
     BODY_RUNS,
@@ -63,15 +69,18 @@ def pytest_configure(config: pytest.Config) -> None:
     """Register the marker; read the options and begin the run if the session searches."""
     config.addinivalue_line(
         "markers",
-        "garl(system, maps, domain, limits, deterministic, files): search for violations of a "
-        "landing system. system is its class; maps are names (default: court and lawn); domain "
-        "is the name or the TOML file of the conditions in which it is to land; limits is "
+        "garl(system, maps, domain, marker, start, limits, deterministic, files): search for "
+        "violations of a landing system. system is its class; maps are names (default: court and "
+        "lawn); domain is the name or the TOML file of the conditions in which it is to land; "
+        "marker is what lies there, MarkerSpec(dictionary='DICT_5X5_50', id=0, side_m=1.5) "
+        "(default: the map's); start is 'ground' (default), 'hover' or Start(...); limits is "
         "limits(distance_m=0.75, time_s=120, abort='needless'): how far from the marker and how "
         "late it may land, and when giving up is a violation: if somebody could have landed "
         "('needless'), never ('ok'), always ('violation'); deterministic is False if equal "
         "flights may differ (default: True); files are its data files, which --garl-resume "
         "compares.",
     )
+    check_keys(config)
     if not is_xdist_worker(config):
         config.stash[TALLY] = Tally()
         config.pluginmanager.register(config.stash[TALLY], "garl_tally")

@@ -95,11 +95,12 @@ class Options:
     def domain_of(self, named: str | None) -> Domain:
         """Return the domain of a test whose marker names one; the command line wins.
 
-        Raises ScenarioError for a domain that cannot be read.
+        Raises ScenarioError for a domain that cannot be read, be it flown or not.
         """
-        if named is None or self.given & {"domain", "weather"}:
+        if named is None:
             return self.domain
-        return domain_with_policy(named, self.root)
+        own = domain_with_policy(named, self.root)
+        return self.domain if self.given & {"domain", "weather"} else own
 
     def policy_in(self, domain: Domain) -> str:
         """Return the name of the policy that moves the NPCs of a search in a domain."""

@@ -5,11 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import Literal, get_args
 
-from pytest_garl.errors import ScenarioError
+from pytest_garl.errors import ScenarioError, of_a_user
 from pytest_garl.fiducial import MarkerSpec, NestedMarker
 from pytest_garl.files.toml import Table, finite, quoted
 from pytest_garl.messages import shown
 
+__tracebackhide__ = of_a_user
 StartMode = Literal["ground", "hover"]
 START_HEIGHT_M = (2.0, 100.0)
 """Lowest and highest start in the air: above a take-off, below what the camera draws."""
@@ -29,7 +30,6 @@ class Start:
     offset_m: tuple[float, float] = (0.0, 0.0)
 
     def __post_init__(self) -> None:
-        __tracebackhide__ = True  # pytest shows the line of the user's module that made it
         if self.mode not in get_args(StartMode):
             raise ScenarioError(
                 f"start: found mode = {shown(self.mode)}, expected 'ground' or 'hover'"

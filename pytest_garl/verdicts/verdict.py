@@ -7,10 +7,11 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Literal, get_args
 
-from pytest_garl.errors import OptionError
+from pytest_garl.errors import OptionError, of_a_user
 from pytest_garl.messages import shown
 from pytest_garl.scenarios.placement import MARKER_SIDE_M
 
+__tracebackhide__ = of_a_user
 LONGEST_S = 300.0
 """The largest limit of time, in seconds: more than twice the paper's two minutes, and short enough
 that a landing system that hovers does not hold up a search."""
@@ -60,6 +61,13 @@ _NO_LANDING: Mapping[Excuse, NoLanding] = {
 AbortRule = Literal["needless", "ok", "violation"]
 
 
+def _plain(value: object) -> float | None:
+    """Return a number whose comparisons are Python's own; None for what is no number."""
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        return None
+    return value if type(value) in (int, float) else float(value)
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Limits:
     """Limits beyond which a flight violates a property.
@@ -76,12 +84,13 @@ class Limits:
 
     def __post_init__(self) -> None:
         for name, high in (("distance_m", FARTHEST_M), ("time_s", LONGEST_S)):
-            value = getattr(self, name)
-            good = isinstance(value, int | float) and not isinstance(value, bool)
-            if not good or not 0 <= value <= high:
+            given = getattr(self, name)
+            value = _plain(given)
+            if value is None or not 0 <= value <= high:
                 raise OptionError(
-                    f"limits: found {name}={shown(value)}, expected a number from 0 to {high:g}"
+                    f"limits: found {name}={shown(given)}, expected a number from 0 to {high:g}"
                 )
+            object.__setattr__(self, name, value)
         if self.abort not in get_args(AbortRule):
             raise OptionError(
                 f"limits: found abort={shown(self.abort)}, expected 'needless', 'ok' or 'violation'"

@@ -54,3 +54,52 @@ def test_a_marker_refuses_an_unknown_limit_and_names_the_known_ones(
     tests.write_text(tests.read_text().replace("maps=", "limits={'distance': 1}, maps="))
     result = run(pytester, "--garl-budget=2")
     result.stdout.fnmatch_lines(["*found distance, expected distance_m, time_s or abort, such as*"])
+
+
+def test_a_marker_that_names_its_class_by_text_says_how_to_import_it(
+    pytester: pytest.Pytester,
+) -> None:
+    project(pytester, system="'systems:Good'")
+    result = run(pytester)
+    assert result.ret == pytest.ExitCode.INTERRUPTED
+    output = " ".join(result.stdout.str().split())
+    words = "import it: from systems import Good, and give system=Good"
+    assert f"expected a class, found its name; {words}" in output
+
+
+@pytest.mark.parametrize(
+    ("argument", "words"),
+    [
+        ("limits=pytest_garl.limits(distance=1)", "*found distance, expected distance_m*"),
+        ("limits=pytest_garl.limits(time_s=-1)", "*found time_s=-1, expected a number*"),
+        ("marker=pytest_garl.MarkerSpec(id=99)", "*found id = 99, expected a whole number*"),
+        ("start=pytest_garl.Start(height_m=-1)", "*found height_m = -1, expected*"),
+    ],
+)
+def test_an_invalid_value_shows_the_users_line_and_no_other(
+    pytester: pytest.Pytester, argument: str, words: str
+) -> None:
+    project(pytester)
+    tests = pytester.path / "test_it.py"
+    text = tests.read_text().replace("maps=", f"{argument}, maps=")
+    tests.write_text(f"import pytest_garl\n{text}")
+    result = run(pytester)
+    assert result.ret == pytest.ExitCode.INTERRUPTED
+    result.stdout.fnmatch_lines(["test_it.py:5: in <module>", words])
+    for place in ("*pytest_garl/*.py:*", "<string>:*"):
+        result.stdout.no_fnmatch_line(place)
+
+
+def test_a_markers_domain_is_checked_beside_that_of_the_command_line(
+    pytester: pytest.Pytester,
+) -> None:
+    project(pytester, maps="['lawn'], domain='feild'")
+    result = run(pytester, "--garl-budget=2", "--garl-domain=calm")
+    assert result.ret == pytest.ExitCode.INTERRUPTED
+    result.stdout.fnmatch_lines(["*mark.garl: domain='feild': *"])
+
+
+def test_pytest_names_all_arguments_of_the_marker(pytester: pytest.Pytester) -> None:
+    output = " ".join(run(pytester, "--markers").stdout.str().split())
+    names = "system, maps, domain, marker, start, limits, deterministic, files"
+    assert f"@pytest.mark.garl({names}): " in output

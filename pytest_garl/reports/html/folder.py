@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import os
 import shutil
+import tempfile
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -14,6 +15,8 @@ from pytest_garl.reports.html.naming import GENERATOR, INDEX, KINDS, STILLS
 
 _HEAD_BYTES = 4096
 """The generator stands in the first lines of a page."""
+_TRIAL_BYTES = 100_000
+"""The size of a small page."""
 
 
 def check_target(folder: Path) -> None:
@@ -35,8 +38,12 @@ def check_target(folder: Path) -> None:
     except OSError as error:
         raise SavingError(_unwritable(folder, error)) from error
     parent = next(each for each in where.parents if each.exists())
-    if not os.access(parent, os.W_OK | os.X_OK):
-        raise SavingError(_unwritable(folder, PermissionError(13, "Permission denied")))
+    try:
+        # Rights alone do not tell: a disk may be read-only or full.
+        with tempfile.TemporaryDirectory(prefix=f".{where.name}.", dir=parent) as trial:
+            Path(trial, INDEX).write_bytes(bytes(_TRIAL_BYTES))
+    except OSError as error:
+        raise SavingError(_unwritable(folder, error)) from error
 
 
 def _is_report(folder: Path) -> bool:

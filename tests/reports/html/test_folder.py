@@ -1,6 +1,6 @@
 from __future__ import annotations
 
-import os
+import errno
 from pathlib import Path
 
 import pytest
@@ -105,10 +105,16 @@ def test_a_place_that_cannot_be_written_is_one_message(where: str) -> None:
         write(Path(where))
 
 
-def test_a_folder_without_permission_is_found_before_the_work(
+def test_a_disk_that_cannot_be_written_is_found_before_the_work(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    def full(*_: object) -> None:
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    check_target(tmp_path / "report")
+    assert names(tmp_path) == []
     # Root may write everywhere.
-    monkeypatch.setattr(os, "access", lambda *_: False)
-    with pytest.raises(SavingError, match="cannot be written"):
-        check_target(tmp_path / "report")
+    monkeypatch.setattr(Path, "write_bytes", full)
+    with pytest.raises(SavingError, match=r"cannot be written \(No space left on device\)"):
+        check_target(tmp_path / "deep" / "report")
+    assert names(tmp_path) == []
