@@ -31,15 +31,20 @@ from pytest_garl.landing_system import (
     VelocitySetpoint,
     airframe_of,
 )
-from pytest_garl.scenarios.chromosome import decode
 from pytest_garl.scenarios.domains.domain import Domain
 from pytest_garl.scenarios.domains.genome import genome_of
 from pytest_garl.scenarios.domains.names import DEFAULT_DOMAIN
 from pytest_garl.scenarios.maps.map import Map, load_map
 from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.scenarios.task import Start, Task
-from pytest_garl.scenarios.validity import repair
 from pytest_garl.search.methods.random import random_scenarios
+from pytest_garl.search.probes import (
+    Probe,
+    clear_scenario,
+    probes_for,
+    start_beside,
+    without_objects,
+)
 from pytest_garl.simulation.flight import Flight
 from pytest_garl.simulation.flight_file import divergence_time_s
 from pytest_garl.simulation.fly import fly
@@ -50,6 +55,7 @@ from pytest_garl.simulation.system_under_test.texts import shown
 from pytest_garl.verdicts.phases import landing_phase
 from pytest_garl.verdicts.sightings import reports_detections, reports_targets
 from pytest_garl.verdicts.verdict import Limits, default_distance_m
+from pytest_garl.verdicts.wording import headline
 
 FLIGHTS = 40
 """Flights of the search whose time the check estimates: the README's first budget."""
@@ -68,6 +74,31 @@ SHORTEST_S = 2.0
 
 
 @dataclasses.dataclass(frozen=True, slots=True, kw_only=True)
+class ProbeResult:
+    """How a probe ended: a flight with one cause (``docs/probes.md``).
+
+    ``sentence`` says what was not as in clear air, ``ending`` how the flight ended, ``outside``
+    which of its values the domain does not have, so that a violation is only a note.
+    """
+
+    name: str
+    sentence: str
+    ending: str
+    violated: bool
+    outside: tuple[str, ...] = ()
+
+    @property
+    def passed(self) -> bool:
+        """Whether it violates nothing that may be asked in the domain."""
+        return not self.violated or bool(self.outside)
+
+    def __str__(self) -> str:
+        verdict = "ok" if not self.violated else "note" if self.outside else "FAILED"
+        note = f" (outside the domain: {self.outside[0]})" if verdict == "note" else ""
+        return f"probe {self.name}: {verdict}: {self.sentence}: {self.ending}{note}"
+
+
+@dataclasses.dataclass(frozen=True, slots=True, kw_only=True)
 class Check:
     """The result of a check: how the flights ended, faults, warnings, and the cost of a flight.
 
@@ -80,11 +111,12 @@ class Check:
     warnings: tuple[str, ...]
     cpu_s: float
     faults: tuple[str, ...] = ()
+    probes: tuple[ProbeResult, ...] = ()
 
     @property
     def passed(self) -> bool:
-        """Whether there is no fault."""
-        return not self.faults
+        """Whether there is no fault, and no probe violates."""
+        return not self.faults and all(probe.passed for probe in self.probes)
 
     def __str__(self) -> str:
         low, high = FLIGHTS * self.cpu_s, FLIGHTS * FLIGHTS_OF_FAILURES * self.cpu_s
@@ -94,7 +126,8 @@ class Check:
         )
         found = [f"fault: {text}" for text in self.faults]
         found += [f"warning: {text}" for text in self.warnings]
-        return "\n".join([f"{self.system}: {text}" for text in (*self.flights, cost)] + found)
+        lines = (*self.flights, cost, *self.probes)
+        return "\n".join([f"{self.system}: {text}" for text in lines] + found)
 
 
 @dataclasses.dataclass(frozen=True, slots=True, kw_only=True)
@@ -102,7 +135,7 @@ class CheckPlan:
     """What a check flies: one map with the task, the domain and the limits of a test.
 
     ``seconds`` ends each flight early; None flies until it landed, or for the limit of time.
-    ``limit_s`` is the computing time (CPU) for all flights.
+    ``limit_s`` is the computing time (CPU) for all flights, and that for all ``probes``.
     """
 
     map: Map
@@ -112,6 +145,7 @@ class CheckPlan:
     seconds: float | None = None
     deterministic: bool = True
     limit_s: float = 120.0
+    probes: bool = False
 
 
 def check_landing_system(
@@ -125,6 +159,7 @@ def check_landing_system(
     start: Start | None = None,
     domain: str = DEFAULT_DOMAIN,
     limits: Limits | None = None,
+    probes: bool = False,
 ) -> Check:
     """Fly a class in two scenarios and return the result; raise LandingSystemError for a fault.
 
@@ -139,8 +174,10 @@ def check_landing_system(
     ``seconds`` ends each flight early (simulated time; by default it flies until it landed, or
     120 s).  ``deterministic=False`` turns a difference between equal flights into a warning.
     ``limit_s`` is the computing time (CPU) for all flights; a slow system is compared over shorter
-    ones.  A call that takes 30 s counts as hanging.  If NumPy was loaded earlier and computes with
-    other instructions than a search, the check runs in a separate process.
+    ones.  With ``probes`` a landing system that lands in clear air also flies the probes: scenarios
+    with one cause each, which have as much time.  A call that takes 30 s counts as hanging.  If
+    NumPy was loaded earlier and computes with other instructions than a search, the check runs in a
+    separate process.
     """
     check_contract(system)
     if not cpu_dispatch.pin():
@@ -154,14 +191,15 @@ def check_landing_system(
             "start": start and dataclasses.asdict(start),
             "domain": domain,
             "limits": limits and dataclasses.asdict(limits),
+            "probes": probes,
         }
         values = call_in_separate_process("pytest_garl.testing:_check_as_values", system, options)
         return dataclass_from(Check, values)
     plan = plan_for(map=map, marker=marker, start=start, domain=domain, limits=limits)
-    return check_as_planned(
-        system,
-        dataclasses.replace(plan, seconds=seconds, deterministic=deterministic, limit_s=limit_s),
+    plan = dataclasses.replace(
+        plan, seconds=seconds, deterministic=deterministic, limit_s=limit_s, probes=probes
     )
+    return check_as_planned(system, plan)
 
 
 def plan_for(
@@ -243,6 +281,7 @@ class _Checker:
     def run(self) -> Check:
         """Fly the scenarios and compare the flights."""
         flights: list[str] = []
+        probed: tuple[ProbeResult, ...] = ()
         cpu_s = self._limit_s
         # Another process judges: a landing system may replace in this one what judges.
         with JudgeProcess() as judge, _warning_of_leftovers(self._warnings.append):
@@ -256,6 +295,7 @@ class _Checker:
                 drawn = judge.judge_flight(other.flight, self._plan.limits)
                 ending = _ending(other.flight, drawn)
                 flights.append(f"{self._map.name}, another scenario: {ending}")
+                probed = self._probe(judge, first.flight)
                 if {result.outcome, drawn.outcome} == {"gave_up"}:
                     self._warnings.append("gave up in both scenarios; a search would learn nothing")
             except OutOfTimeError:
@@ -272,8 +312,41 @@ class _Checker:
             flights=tuple(flights),
             warnings=tuple(self._warnings),
             faults=tuple(self._faults),
+            probes=probed,
             cpu_s=cpu_s,
         )
+
+    def _probe(self, judge: JudgeProcess, twin: Flight) -> tuple[ProbeResult, ...]:
+        """Fly the probes of a system that lands in clear air, with fresh instances."""
+        plan = self._plan
+        if not plan.probes or not self._whole or self._faults:
+            return ()
+        self._meter.allow(plan.limit_s)
+        beside = start_beside(self._calm, plan.map, plan.domain)
+        base, scenario = twin, self._calm
+        found, flight = self._probed(judge, beside)
+        if flight.outcome == "landed" and not found.violated:
+            base, scenario = flight, beside.scenario
+        camera = airframe_of(self._system).camera
+        others = probes_for(base, scenario, plan.map, plan.domain, plan.limits, camera)
+        # Some are the flight in clear air, or the one beside the marker.
+        flown = (self._calm, beside.scenario)
+        return (
+            found,
+            *(self._probed(judge, each)[0] for each in others if each.scenario not in flown),
+        )
+
+    def _probed(self, judge: JudgeProcess, probe: Probe) -> tuple[ProbeResult, Flight]:
+        flight = self._fly(self._system, probe.scenario, self._seconds, raises=False).flight
+        judged = judge.judge_flight(flight, self._plan.limits)
+        result = ProbeResult(
+            name=probe.name,
+            sentence=probe.sentence,
+            ending=headline(_ending(flight, judged)),
+            violated=probe.is_violated(judged.verdict),
+            outside=probe.outside,
+        )
+        return result, flight
 
     def _compare(self, first: _TimedFlight) -> _TimedFlight:
         """Fly both scenarios with fresh instances and with one that flies them all."""
@@ -351,7 +424,9 @@ class _Checker:
                 f"{self._meter.mean_s * 1e3:.0f} ms in each call"
             )
 
-    def _fly(self, system: Any, scenario: Scenario, seconds: float) -> _TimedFlight:
+    def _fly(
+        self, system: Any, scenario: Scenario, seconds: float, *, raises: bool = True
+    ) -> _TimedFlight:
         began = time.process_time()
         with self._meter.timed():
             flight = fly(
@@ -362,7 +437,7 @@ class _Checker:
                 time_limit_s=seconds,
                 guard=self._meter,
             )
-        if flight.crash is not None:
+        if flight.crash is not None and raises:
             crash, hint = flight.crash, ""
             if "read-only" in crash.message:
                 hint = "; observations are read-only, copy the array before changing it"
@@ -386,15 +461,10 @@ def _ending(flight: Flight, result: FlightResult) -> str:
 
 def _scenarios(plan: CheckPlan) -> tuple[Scenario, Scenario]:
     """Return the domain's mildest scenario and one that a search might draw; no NPC is there."""
+    clear = clear_scenario(plan.map, plan.task, plan.domain)
     genome = genome_of(plan.domain, plan.map, plan.task)
-    calm = repair(decode(genome.nominal, genome, map=plan.map.name, seed=1), plan.map)
     drawn = random_scenarios(plan.map, genome, 1, 0, 1)[0]
-    return _without_objects(calm, plan.map), _without_objects(drawn, plan.map)
-
-
-def _without_objects(scenario: Scenario, map: Map) -> Scenario:
-    names = {name for name, _ in map.all_objects} - {*scenario.removed_objects}
-    return scenario.without(*sorted(names))
+    return clear, without_objects(drawn, plan.map)
 
 
 def _last_place(flight: Flight) -> str:

@@ -29,9 +29,13 @@ from pytest_garl import (
 )
 from pytest_garl.errors import LandingSystemError
 from pytest_garl.execution import metering
+from pytest_garl.execution.flight import judged
+from pytest_garl.execution.judge_process import JudgeProcess
+from pytest_garl.search import probes
 from pytest_garl.simulation.system_under_test.ground_truth import Truth
 from pytest_garl.simulation.system_under_test.reference_pilot import ReferencePilot
 from pytest_garl.testing import check_landing_system
+from tests.support.probed_landers import ZeroByDefault
 
 COUNTER = itertools.count()
 
@@ -384,3 +388,42 @@ def test_check_warns_of_threads_and_processes_left_behind() -> None:
             process.wait()
     assert "leaves 5 threads running (my-thread)" in warnings
     assert any("leaves 5 processes running" in warning for warning in warnings)
+
+
+def test_check_flies_probes_of_a_system_that_lands(monkeypatch: pytest.MonkeyPatch) -> None:
+    plan = testing.plan_for(map="lawn", start=Start(mode="hover", height_m=6.0))
+    checker = testing._Checker(ZeroByDefault, dataclasses.replace(plan, probes=True))
+    made = probes.probes_for
+
+    def two(*args: Any) -> Any:
+        return [each for each in made(*args) if each.name in ("no-marker", "start-over")]
+
+    monkeypatch.setattr(testing, "probes_for", two)
+    calm = checker._fly(ZeroByDefault, checker._calm, 120.0)
+    with JudgeProcess() as judge:
+        beside, without = checker._probe(judge, calm.flight)
+    assert (beside.name, beside.passed) == ("start-beside", True)
+    assert str(without) == (
+        "probe no-marker: FAILED: no marker is there for a minute: landed 4.0 m off the marker, on "
+        "open ground"
+    )
+    check = testing.Check(system="S", flights=(), warnings=(), cpu_s=1.0, probes=(beside, without))
+    assert not check.passed
+    assert "S: probe no-marker: FAILED" in str(check)
+
+
+def test_check_flies_no_probes_of_a_system_that_does_not_land() -> None:
+    plan = testing.plan_for(map="lawn")
+    checker = testing._Checker(Climbs, dataclasses.replace(plan, probes=True))
+    calm = checker._fly(Climbs, checker._calm, 120.0)
+    judge = JudgeProcess()
+    checker._note_result(calm, judged(calm.flight, plan.limits))
+    assert checker._probe(judge, calm.flight) == ()
+
+
+def test_a_violated_probe_outside_the_domain_is_a_note() -> None:
+    probe = testing.ProbeResult(
+        name="level-wind", sentence="wind", ending="slid", violated=True, outside=("wind = 5",)
+    )
+    assert probe.passed
+    assert str(probe) == "probe level-wind: note: wind: slid (outside the domain: wind = 5)"

@@ -36,12 +36,21 @@ DEFAULT_MAP = "lawn"
     help="End each flight after this simulated time.  [default: when it landed, or 120]",
 )
 @click.option(
+    "--no-probes",
+    is_flag=True,
+    help="Do not fly the probes: no marker, others beside it, a marker that goes, and so on.",
+)
+@click.option(
     "--nondeterministic",
     is_flag=True,
     help="Only warn if equal flights differ (as deterministic=False in the marker).",
 )
 def check(
-    targets: tuple[str, ...], maps: tuple[str, ...], seconds: float | None, nondeterministic: bool
+    targets: tuple[str, ...],
+    maps: tuple[str, ...],
+    seconds: float | None,
+    no_probes: bool,
+    nondeterministic: bool,
 ) -> None:
     """Fly a landing system without moving objects and name its faults.
 
@@ -49,27 +58,47 @@ def check(
     marker, start, domain, limits and maps. A class, such as my_landing:MyLandingSystem, is flown
     from the ground to the marker of the map.
 
-    It flies two scenarios, and the first one again. Run it where you run pytest. The exit status is
-    1 if there is a fault that a search would meet in every flight, as if it does not land in clear
-    air. Warnings name other problems of a search.
+    It flies two scenarios, and the first one again. If it lands in clear air, it flies the probes
+    on one map: scenarios with one cause each, such as no marker at all. Run it where you run
+    pytest. The exit status is 1 if there is a fault that a search would meet in every flight, as if
+    it does not land in clear air, or if a probe violates. Warnings name other problems of a search.
     """
     from pytest_garl.testing import check_as_planned
 
     planned = [each for target in targets for each in _planned(target, maps)]
+    probed = [] if no_probes else _probed(planned)
     passed = True
     # Nothing else interrupts a call that hangs in C code and holds the interpreter.
     faulthandler.dump_traceback_later(LIMIT_S, exit=True, file=sys.__stderr__ or 2)
     try:
         for system, plan in planned:
             deterministic = plan.deterministic and not nondeterministic
-            plan = replace(plan, seconds=seconds, deterministic=deterministic)
-            result = check_as_planned(system, plan)
+            wanted = (system, plan) in probed
+            flown = replace(plan, seconds=seconds, deterministic=deterministic, probes=wanted)
+            result = check_as_planned(system, flown)
             click.echo(result)
             passed &= result.passed
     finally:
         faulthandler.cancel_dump_traceback_later()
     if not passed:
         raise SystemExit(1)
+
+
+def _probed(planned: list[tuple[type, CheckPlan]]) -> list[tuple[type, CheckPlan]]:
+    """Return what flies the probes: each landing system with each task, on one of its maps."""
+    from pytest_garl.search.probes import probed_map
+
+    found = []
+    for system, plan in planned:
+        alike = [
+            other
+            for each, other in planned
+            if each is system and replace(other, map=plan.map) == plan
+        ]
+        first = probed_map([each.map for each in alike])
+        if plan.map == first:
+            found.append((system, plan))
+    return found
 
 
 def _planned(target: str, maps: tuple[str, ...]) -> Iterator[tuple[type, CheckPlan]]:

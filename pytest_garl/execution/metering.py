@@ -31,6 +31,10 @@ class CallMeter:
         self._interrupts = False
         self.slowest_s = 0.0
 
+    def allow(self, limit_s: float) -> None:
+        """Limit the sum anew, from now on."""
+        self._ends_at_s = process_time() + limit_s
+
     @property
     def mean_s(self) -> float:
         """Mean CPU time of a call."""

@@ -7,9 +7,10 @@ from pathlib import Path
 import pytest
 from click.testing import CliRunner, Result
 
-from pytest_garl import Start
+from pytest_garl import Start, testing
 from pytest_garl.cli import main
 from pytest_garl.cli.check import _planned
+from pytest_garl.testing import Check, CheckPlan, ProbeResult
 
 SYSTEM = """
 from pytest_garl import PositionSetpoint
@@ -143,6 +144,27 @@ def test_check_says_why_a_file_has_nothing_to_fly(target: str, words: str) -> No
     assert done.exit_code == 1
     assert words in done.output
     assert "INTERNALERROR" not in done.output
+
+
+def test_check_flies_the_probes_of_a_landing_system_on_one_map(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    flown: list[tuple[str, str, bool]] = []
+
+    def record(system: type, plan: CheckPlan) -> Check:
+        flown.append((system.__name__, plan.map.name, plan.probes))
+        failed = ProbeResult(name="no-marker", sentence="none", ending="landed", violated=True)
+        probes = (failed,) if plan.probes else ()
+        return Check(system="S", flights=(), warnings=(), cpu_s=0.0, probes=probes)
+
+    monkeypatch.setattr(testing, "check_as_planned", record)
+    assert garl("test_checked.py").exit_code == 1
+    # The court has a marker of its own on the ground.
+    wanted = [("Climbs", "court", False), ("Climbs", "lawn", True), ("Other", "lawn", True)]
+    assert flown == wanted
+    flown.clear()
+    assert garl("test_checked.py", "--no-probes").exit_code == 0
+    assert not any(probes for _, _, probes in flown)
 
 
 def test_check_flies_on_no_map_that_the_tests_do_not_name() -> None:
