@@ -29,6 +29,17 @@ class SearchProgress:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class FlightSeconds:
+    """Mean wall times of flights; 0 without such flights."""
+
+    of_search: float
+    violating: float
+    """Of the search's flights that violated a property."""
+    beside: float
+    """Of the flights beside the search, which repeat, confirm and shrink violations."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class LedgerFlight:
     """A flight of a search; ``scenario`` is text, ``sha256`` the hash of the trajectory."""
 
@@ -200,6 +211,18 @@ class LedgerQueries:
             "SELECT avg(wall_s) FROM slot WHERE state = 'flown'"
         ).fetchone()
         return None if row[0] is None else float(row[0])
+
+    def flight_seconds(self) -> FlightSeconds:
+        """Return the mean wall times of the flights so far."""
+        row = self._database.execute(
+            "SELECT avg(wall_s) FILTER (WHERE kind = 'search'), "
+            "avg(wall_s) FILTER (WHERE kind = 'search' "
+            "AND json_extract(result, '$.verdict.primary') IS NOT NULL), "
+            "avg(wall_s) FILTER (WHERE kind = 'on_demand') "
+            "FROM slot JOIN search ON search.id = slot.search WHERE state = 'flown'"
+        ).fetchone()
+        of_search, violating, beside = (float(mean or 0.0) for mean in row)
+        return FlightSeconds(of_search=of_search, violating=violating, beside=beside)
 
     def flying_s(self, search: str) -> float:
         """Return the sum of the wall times of a search's flights."""

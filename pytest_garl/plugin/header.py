@@ -11,6 +11,7 @@ from pytest_garl.messages import command
 from pytest_garl.plugin.run import Run
 from pytest_garl.plugin.suggested_commands import shown_path
 from pytest_garl.plugin.terminal_text import counted, duration
+from pytest_garl.plugin.time_left import FIRST_FLIGHTS
 from pytest_garl.regressions.forecast import flight_times_with_shrinking, seconds_per_new_signature
 from pytest_garl.reports.shares_text import limits_text
 from pytest_garl.verdicts.verdict import DEFAULT_LIMITS
@@ -26,12 +27,12 @@ def header(run: Run, config: pytest.Config) -> str:
 
 
 def forecast(run: Run) -> list[str]:
-    """Return how long all searches take together, if there are several."""
+    """Return how long all searches take together, if there are several and an earlier run tells."""
     options = run.options
     sizes = run.search_sizes
-    if not options.budget or options.workers is None or len(sizes) < 2:
+    if not options.budget or options.workers is None or len(sizes) < 2 or run.flight_s is None:
         return []
-    time = f"{_duration_of(run, sizes)}{_shrinking(run)}"
+    time = f"{_duration_of(run, run.flight_s, sizes)}{_shrinking(run, run.flight_s)}"
     return [f"garl: {len(sizes)} searches, {time}"]
 
 
@@ -122,34 +123,29 @@ def _workers(run: Run) -> str:
     if options.workers is None:
         return f"all workers{pool}"
     workers = counted(options.workers, "worker") if options.workers else "flown inside pytest"
-    time = f"{_duration_of(run, [options.budget])} per system and map{_shrinking(run)}"
-    return f"{workers}{pool}; {time}"
+    if run.flight_s is None:
+        told = f"the time is told after {FIRST_FLIGHTS} flights"
+        return f"{workers}{pool}" + (f"; {told}" if options.budget > FIRST_FLIGHTS else "")
+    time = _duration_of(run, run.flight_s, [options.budget])
+    return f"{workers}{pool}; {time} per system and map{_shrinking(run, run.flight_s)}"
 
 
-def _duration_of(run: Run, searches: Sequence[int]) -> str:
+def _duration_of(run: Run, flight_s: float, searches: Sequence[int]) -> str:
     """Return how long searches of so many flights take, with all that the default cap allows."""
     options = run.options
     each = options.shrink if options.shrink_capped else 0
     workers = max(1, options.workers or 1)
     times = sum(flight_times_with_shrinking(search, each, workers) for search in searches)
-    return _about(times * run.flight_s.fastest, times * run.flight_s.slowest)
+    return f"about {duration(times * flight_s)}"
 
 
-def _shrinking(run: Run) -> str:
+def _shrinking(run: Run, flight_s: float) -> str:
     """Return what the duration says about shrinking."""
     options = run.options
     if not options.shrink:
         return ""
     if options.shrink_capped:
         return ", shrinking included"
-    fastest_s, slowest_s = (
-        seconds_per_new_signature(options.shrink, flight_s) for flight_s in run.flight_s
-    )
+    kind_s = seconds_per_new_signature(options.shrink, flight_s)
     beside = ", on one worker" if (options.workers or 1) > 1 else ""
-    return f", and {_about(fastest_s, slowest_s)} per new kind of violation{beside}"
-
-
-def _about(fastest_s: float, slowest_s: float) -> str:
-    """Return a duration as a range, if it has one."""
-    fastest, slowest = duration(fastest_s), duration(slowest_s)
-    return f"about {fastest}" if fastest == slowest else f"{fastest} to {slowest}"
+    return f", and about {duration(kind_s)} per new kind of violation{beside}"

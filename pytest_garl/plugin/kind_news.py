@@ -10,10 +10,10 @@ from typing import Any
 
 import pytest
 
-from pytest_garl.execution.job import parse_job
 from pytest_garl.execution.ledger import Ledger
 from pytest_garl.plugin.run import Run
-from pytest_garl.plugin.terminal_text import begin_line, width_of, wrapped
+from pytest_garl.plugin.terminal_text import begin_line, duration, width_of, wrapped
+from pytest_garl.plugin.time_left import NewKinds, TimeLeft
 from pytest_garl.regressions.case_request import CaseRequest, CaseResult
 from pytest_garl.verdicts.wording import headline
 
@@ -32,7 +32,8 @@ class KindNews:
         self._looked = 0.0
         self._found: set[tuple[str, str]] = set()
         self._shrunk: set[str] = set()
-        self._known: dict[str, frozenset[str]] = {}
+        self._kinds, self._time_left = NewKinds(run), TimeLeft(run)
+        self._tells_time = run.flight_s is None
         options = run.options
         quiet = config.get_verbosity() < 0
         self._is_wanted = bool(options.budget) and not options.repeat and not quiet
@@ -43,7 +44,8 @@ class KindNews:
         if not self._is_wanted or (now - self._looked < PERIOD_S and not at_once):
             return []
         self._looked = now
-        return [*self._new_kinds(ledger), *self._shrunk_kinds()]
+        time_left = [] if at_once else self._time(ledger, now)
+        return [*self._new_kinds(ledger), *self._shrunk_kinds(), *time_left]
 
     def write(self, ledger: Ledger, *, at_once: bool = False) -> None:
         """Write the sentences that are due on lines of their own."""
@@ -62,18 +64,28 @@ class KindNews:
             width = width_of(self._config)
             for line in lines:
                 reporter.write_line(wrapped(line, width, others="  "))
+            # A pipe, such as the log of a build server, would get it with the next test's dot.
+            reporter.flush()
 
     def _new_kinds(self, ledger: Ledger) -> Iterator[str]:
-        for search, signature in ledger.queries.seconds_by_signature():
+        for search, signature in self._kinds.found(ledger):
             if (search, signature) in self._found:
                 continue
             self._found.add((search, signature))
-            if signature in self._known_in(ledger, search):
-                continue
             flight = ledger.queries.first_of(search, signature)
             where = f"{flight.system.split(':')[-1]} on {flight.id.map}"
             told = headline(flight.result.verdict.story)
             yield f"garl: found {signature}: {told} ({where}, {flight.id.slot_id})"
+
+    def _time(self, ledger: Ledger, now: float) -> Iterator[str]:
+        """Yield the time left once, in a run whose header could not tell it."""
+        if not self._tells_time:
+            return
+        forecast = self._time_left.forecast(ledger, now)
+        if forecast.left_s is not None:
+            self._tells_time = False
+            shrinking = ", shrinking included" if self._run.options.shrink else ""
+            yield f"garl: about {duration(forecast.left_s)} left{shrinking}"
 
     def _shrunk_kinds(self) -> Iterator[str]:
         investigations = self._run.investigations
@@ -81,16 +93,6 @@ class KindNews:
             if request.name not in self._shrunk:
                 self._shrunk.add(request.name)
                 yield _shrunk(request, result)
-
-    def _known_in(self, ledger: Ledger, search: str) -> frozenset[str]:
-        """Return the kinds that saved cases of a search's system and map expect."""
-        if search not in self._known:
-            text = ledger.job(search)
-            assert text is not None, "a flight's search has a job"
-            job = parse_job(text)
-            corpus = self._run.options.corpus
-            self._known[search] = frozenset(corpus.expected_signatures(job.system.name, job.map))
-        return self._known[search]
 
 
 def _shrunk(request: CaseRequest, result: CaseResult) -> str:

@@ -135,6 +135,7 @@ class ProgressLog:
         with capture.global_and_fixture_disabled() if capture else nullcontext():
             begin_line(reporter)
             reporter.write_line(progress_line(progress, width_of(self._config)))
+            reporter.flush()
 
 
 class TerminalLine:

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+import dataclasses
 import time
-from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
@@ -11,7 +11,7 @@ from pytest_garl.execution.ledger import Ledger
 from pytest_garl.execution.ledger_queries import SearchProgress
 from pytest_garl.plugin.run import SELECTED, Run
 from pytest_garl.plugin.terminal_text import counted, duration
-from pytest_garl.regressions.forecast import RemainingWork, flights_after_search
+from pytest_garl.plugin.time_left import TimeLeft
 
 _MARGINS = ("collision", "distance", "time")
 """Properties whose nearest approach to a violation the line shows."""
@@ -35,7 +35,11 @@ class RunProgress:
     expected_after: float = 0
     """Flights expected beside the searches, those flown included."""
     left_s: float | None = None
-    """A forecast of the time left, if there is a better one than the mean."""
+    """A forecast of the time left; None before enough was flown."""
+    after_search: bool = False
+    """Whether the searches are over, so that what is left follows them."""
+    least_share: float = 0.0
+    """The share of the work that the bar has shown already."""
     shrinks: bool = True
     """Whether kinds are confirmed and shrunk; if not, their violations are flown again only."""
     investigated: int = 0
@@ -50,6 +54,11 @@ class RunProgress:
     def total(self) -> float:
         """How many flights of searches and beside them are expected."""
         return self._wanted + self._after
+
+    @property
+    def share(self) -> float:
+        """The share of the expected flights that has been flown, never less than was shown."""
+        return max(self.least_share, self.flown / self.total if self.total else 0.0)
 
     @property
     def _searched(self) -> int:
@@ -70,11 +79,8 @@ class RunProgress:
         purpose = "to shrink" if self.shrinks else "to repeat"
         after = f", {self.flown_after:.0f}/{self._after:.0f} {purpose}" if self._after else ""
         phrases = [f"{self._searched}/{self._wanted} flights{after}"]
-        left_s = self.left_s
-        if left_s is None and self.seconds > 0 and 0 < self.flown < self.total:
-            left_s = (self.total - self.flown) * self.seconds / self.flown
-        if left_s is not None:
-            phrases.append(f"{duration(left_s)} left")
+        if self.left_s is not None:
+            phrases.append(f"{duration(self.left_s)} left")
         if self.kinds:
             phrases.append(" ".join(f"{kind}:{count}" for kind, count in self.kinds.items()))
         flying = next((each for each in self.searches if each.flown < each.total), None)
@@ -83,7 +89,7 @@ class RunProgress:
             phrases.append(f"{where} g{flying.generation:02d} {flying.flown}/{flying.total}")
             if self.investigated:
                 phrases.append(f"shrinking {counted(self.investigated, 'kind')} beside it")
-        elif self.left_s is not None:
+        elif self.after_search:
             phrases.append("confirming and shrinking" if self.shrinks else "repeating")
         if self.flown and self.seconds > 0:
             phrases.append(f"{self.flown / self.seconds:.2f} flights/s")
@@ -100,7 +106,7 @@ class RunProgress:
 def progress_line(progress: RunProgress, width: int) -> str:
     """Return a bar, then as many whole phrases as there is room for."""
     cells = 20 if width >= 100 else 10
-    full = int(cells * progress.flown / progress.total) if progress.total else 0
+    full = int(cells * progress.share)
     line = f"garl [{'#' * full}{'-' * (cells - full)}]"
     for phrase in progress.phrases:
         if len(line) + 2 + len(phrase) > width:
@@ -115,9 +121,8 @@ class ProgressReader:
 
     def __init__(self, run: Run, every_s: float) -> None:
         self._run, self._every_s = run, every_s
-        self._last_read = self._began = self._remaining_since = 0.0
-        self._expected_after = 0.0
-        self._remaining: RemainingWork | None = None
+        self._last_read = self._began = 0.0
+        self._time_left, self._share = TimeLeft(run), 0.0
 
     def start_clock(self) -> None:
         """Read nothing for ``every_s`` seconds; the forecast counts the flights of that time."""
@@ -134,34 +139,21 @@ class ProgressReader:
         if not searches:
             return None
         self._began = self._began or now
-        flown_after = queries.meters().get("on_demand", 0)
-        left_s = self._forecast(ledger, flown_after, now)
+        forecast = self._time_left.forecast(ledger, now)
         investigations = self._run.investigations
-        return RunProgress(
+        progress = RunProgress(
             searches=searches,
             kinds=queries.violation_counts(),
             nearest=queries.nearest(),
             seconds=now - self._began,
             selected=selected,
-            flown_after=flown_after,
-            expected_after=self._expected_after,
-            left_s=left_s,
+            flown_after=queries.meters().get("on_demand", 0),
+            expected_after=forecast.flights_after,
+            left_s=forecast.left_s,
+            after_search=self._run.remaining is not None,
             shrinks=self._run.options.shrink > 0,
             investigated=investigations.running if investigations else 0,
         )
-
-    def _forecast(self, ledger: Ledger, flown_after: float, now: float) -> float | None:
-        """Update how many flights follow the searches; return the time left if it is known."""
-        remaining = self._run.remaining
-        if remaining is None:
-            options = self._run.options
-            cap = options.budget if options.shrink_capped else None
-            new_kinds = Counter(search for search, _ in ledger.queries.seconds_by_signature())
-            self._expected_after = sum(
-                flights_after_search(kinds, options.shrink, cap) for kinds in new_kinds.values()
-            )
-            return None
-        if self._remaining is None:
-            self._remaining, self._remaining_since = remaining, now
-            self._expected_after = flown_after + remaining.flights
-        return max(0.0, self._remaining.seconds - (now - self._remaining_since))
+        # What is expected grows with each new kind; the bar does not go back.
+        self._share = max(self._share, progress.share)
+        return dataclasses.replace(progress, least_share=self._share)

@@ -19,7 +19,6 @@ from pytest_garl.execution.pool import Pool, wait_for
 from pytest_garl.execution.reference import Reference, simulator_sha256
 from pytest_garl.execution.sources import combined_sha256
 from pytest_garl.plugin.early_reflights import EarlyReflights
-from pytest_garl.plugin.flight_time import FIRST_RUN, FlightTime
 from pytest_garl.plugin.keys import target_of
 from pytest_garl.plugin.options import Options
 from pytest_garl.plugin.search_setup import Searches
@@ -138,7 +137,8 @@ class Run:
     search_sizes: list[int] = field(default_factory=list)
     """How many flights the selected items want of each search; saved cases are none."""
     results: dict[FlightId, CompletedFlight] = field(default_factory=dict)
-    flight_s: FlightTime = FIRST_RUN
+    flight_s: float | None = None
+    """Wall time of a flight in the run before in this folder; None if there was none."""
     on_wait: Callable[[], None] = field(default=lambda: None)
     """Called while a flight is waited for."""
     on_wait_end: Callable[[], None] = field(default=lambda: None)

@@ -102,7 +102,7 @@ def _saver(run: Run) -> Callable[[Case], Path | None]:
 def _flight_s(run: Run, requests: Sequence[CaseRequest]) -> dict[str, float]:
     """Return how long a flight of each signature took in the search."""
     measured = run.ledger.queries.seconds_by_signature()
-    average_s = run.ledger.queries.seconds_per_flight() or run.flight_s.typical
+    average_s = run.ledger.queries.seconds_per_flight() or 0.0
     return {
         each.name: measured.get((each.search, each.signature)) or average_s for each in requests
     }

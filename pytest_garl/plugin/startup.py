@@ -20,7 +20,6 @@ from pytest_garl.execution.processes import alive
 from pytest_garl.execution.ray.pool import check_ray, ray_pool
 from pytest_garl.execution.reference import BUILT_IN, package_sha256, reference_to
 from pytest_garl.execution.stored_ledger import check_stored, stored_flight_s
-from pytest_garl.plugin.flight_time import FIRST_RUN, FlightTime
 from pytest_garl.plugin.keys import RUN, is_xdist_worker
 from pytest_garl.plugin.options import Options
 from pytest_garl.plugin.run import Run
@@ -188,8 +187,6 @@ def _lock(ledger: Path) -> TextIO:
     return file
 
 
-def _flight_s(ledger: Ledger) -> FlightTime:
+def _flight_s(ledger: Ledger) -> float | None:
     known = ledger.fact(EARLIER_FLIGHT_S)
-    if not isinstance(known, int | float):
-        return FIRST_RUN
-    return FlightTime(float(known), float(known))
+    return float(known) if isinstance(known, int | float) else None

@@ -18,6 +18,12 @@ REPEATED_SHARE = 0.1
 """Kinds of violation per flight of a search: four to eight in forty flights of OpenCV-MLS."""
 
 
+RARER = 0.6
+"""Kinds per flight later in a search by those so far: 11 in 80 flights after 7 in 30, or so."""
+PRIOR_SHARE, PRIOR_FLIGHTS = 0.1, 12
+"""What the first flights must outweigh: between no kind and eight in forty flights."""
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RemainingWork:
     """The flights that follow a search, and the time that they take."""
@@ -27,7 +33,17 @@ class RemainingWork:
     seconds: float
 
 
-def flights_after_search(kinds: int, each: int, cap: int | None) -> float:
+def expected_kinds(found: int, flown: int, wanted: int) -> float:
+    """Return how many new kinds a search will have found, after some of its flights.
+
+    It is the share so far, as if ``PRIOR_FLIGHTS`` had been flown before with ``PRIOR_SHARE`` of
+    new kinds.  New kinds get rarer: the flights that are left find ``RARER`` as many.
+    """
+    share = (found + PRIOR_SHARE * PRIOR_FLIGHTS) / (flown + PRIOR_FLIGHTS)
+    return found + RARER * share * max(0, wanted - flown)
+
+
+def flights_after_search(kinds: float, each: int, cap: int | None) -> float:
     """Return the flights that the new kinds of a search take, with those that confirm them."""
     if not kinds or not each:
         return 0.0

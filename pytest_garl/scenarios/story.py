@@ -22,7 +22,7 @@ CHASE_S = 5.0
 """Longest chase, as the design of the grades says."""
 APPROACH_S = 10.0
 """An NPC that has come and perceives no UAV for so long leaves: engineering estimate."""
-WALKERS_AND_BIRDS = ("person", "dog", "bird")
+WALKERS_AND_BIRDS = ("person", "child", "dog", "bird")
 LONGEST_PAUSE_S = 60.0
 """So that a pad exists that is blocked for longer than a landing system can wait."""
 
@@ -142,7 +142,7 @@ STORY: Mapping[str, StoryParameter] = {
             meaning="how long it stands where it crosses",
             source="engineering estimate: a telephone call",
             grades=("careless",),
-            types=("person", "dog"),
+            types=("person", "child", "dog"),
         ),
         StoryParameter(
             name="stoop_m",

@@ -7,6 +7,7 @@ import pytest
 from pytest_garl.regressions.case_request import CaseRequest
 from pytest_garl.regressions.forecast import (
     SPENT_SHARE,
+    expected_kinds,
     flight_times_with_shrinking,
     flights_after_search,
     remaining_work,
@@ -85,3 +86,11 @@ def test_forecast_before_a_search_is_right_within_a_factor_of_one_and_a_half(
 
 def test_forecast_knows_that_flights_of_one_kind_follow_each_other() -> None:
     assert flight_times_with_shrinking(16, 16, 16) == pytest.approx((1 + SPENT_SHARE * 16) ** 0.5)
+
+
+def test_expected_kinds_begin_with_a_guess_and_end_with_what_was_found() -> None:
+    assert expected_kinds(0, 0, 40) == pytest.approx(2.4)
+    assert expected_kinds(7, 40, 40) == 7
+    assert expected_kinds(0, 39, 40) < 0.1
+    later = [expected_kinds(5, flown, 40) for flown in (8, 16, 24, 32, 40)]
+    assert later == sorted(later, reverse=True)

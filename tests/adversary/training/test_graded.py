@@ -12,8 +12,15 @@ pytest.importorskip("gymnasium")
 from gymnasium.utils.env_checker import check_env
 
 from pytest_garl.adversary.minds import Intercepting
-from pytest_garl.adversary.training.graded import GradedEnv, env_of
+from pytest_garl.adversary.training.episode import draw_episode
+from pytest_garl.adversary.training.graded import (
+    LATEST_COMING_S,
+    GradedEnv,
+    _with_story,
+    env_of,
+)
 from pytest_garl.adversary.training.presets import PRESETS
+from pytest_garl.scenarios.story import LIMITS_S, story_of
 from tests.adversary.training.surrogates import COURT, OURS
 
 CURIOUS, CHASING = (
@@ -72,3 +79,15 @@ def test_a_step_after_the_end_changes_nothing() -> None:
 def test_a_surrogate_with_grades_has_their_environment() -> None:
     assert isinstance(env_of(CHASING), GradedEnv)
     assert not isinstance(env_of(OURS), GradedEnv)
+
+
+@pytest.mark.parametrize("kind", ["person", "child", "dog", "bird"])
+def test_each_npc_of_the_surrogate_has_the_drawn_story(kind: str) -> None:
+    scenario, place = draw_episode(COURT[0], [kind], np.random.default_rng(0))
+    told = _with_story(scenario, place, "chasing", 8.0, np.random.default_rng(1))
+    story = story_of(told, f"{kind}-1")
+    assert story is not None
+    assert story.grade == "chasing"
+    assert 0 < story.delay_s <= LATEST_COMING_S
+    assert 0 < story.lasts_s <= LIMITS_S["chasing"]
+    assert not story.is_child, "its body is that of its type"
