@@ -107,7 +107,14 @@ def judged(flight: Flight, limits: Limits) -> FlightResult:
         outcome=flight.outcome,
         final_distance_m=flight.final_distance_m,
         elapsed_s=flight.elapsed_s,
-        collisions=tuple(contact.body for contact in flight.contacts) if collided else (),
+        # A soft touchdown before is no collision.
+        collisions=tuple(
+            contact.body
+            for contact in flight.contacts
+            if contact.body_class != "ground" or contact is flight.contacts[-1]
+        )
+        if collided
+        else (),
         undecided=why_undecided(flight),
         off_marker_m=off_marker_m(flight, limits),
         closest_call=call,

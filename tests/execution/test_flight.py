@@ -19,6 +19,7 @@ from pytest_garl.simulation.flight_file import load
 from pytest_garl.verdicts.verdict import Limits
 from tests.execution.flying import Good, job_of, scenario
 from tests.support import tiny_simulator
+from tests.verdicts.flights import flight, hit
 
 NAN = math.nan
 
@@ -85,3 +86,12 @@ def test_flight_removes_the_record_of_an_earlier_attempt(tmp_path: Path) -> None
     broken = dataclasses.replace(job, simulator=reference_to(with_nan_distance))
     fly_job(broken, scenario(), flight, None)
     assert not job.record(flight).exists()
+
+
+def test_a_soft_touchdown_before_a_collision_is_none() -> None:
+    (ground,), (dog,) = hit("ground", "ground", "ground"), hit("dog-1", "dog", "dynamic")
+    met = judged(flight("collision", (0.0, 0.0, 0.2), contacts=(ground, dog)), Limits())
+    assert met.collisions == ("dog-1",)
+    first = dataclasses.replace(ground, time_s=20.0)
+    hard = judged(flight("collision", (0.0, 0.0, 0.2), contacts=(first, ground)), Limits())
+    assert hard.collisions == ("ground",)

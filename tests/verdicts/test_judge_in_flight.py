@@ -2,17 +2,30 @@
 
 from __future__ import annotations
 
+import dataclasses
 import math
+from typing import Any
 
 import pytest
 
 from pytest_garl.adversary.catalogue import policy_spec
 from pytest_garl.baselines.record import BaselineSpec
-from pytest_garl.landing_system import Abort, Command, Land, Mission, Observation, PositionSetpoint
+from pytest_garl.landing_system import (
+    Abort,
+    Command,
+    Land,
+    Mission,
+    Observation,
+    PositionSetpoint,
+    VelocitySetpoint,
+)
 from pytest_garl.scenarios.maps.map import load_map
+from pytest_garl.scenarios.task import Start, Task
 from pytest_garl.simulation.fly import fly
 from pytest_garl.verdicts.judge import judge, off_marker_m
+from pytest_garl.verdicts.phases import landing_phase
 from pytest_garl.verdicts.verdict import Limits
+from tests.support.flights import EMPTY, STAND, Scripted, nominal
 
 ASIDE_M = 6.0
 
@@ -47,3 +60,65 @@ def test_a_system_that_touches_the_ground_far_off_and_gives_up_violates_the_dist
     assert f"Touched the ground {off:.1f} m off the marker before it gave up" in verdict.story
     wide = judge(flight, Limits(distance_m=off + 0.5))
     assert (wide.primary, wide.violation_type) == ("time", "II")
+
+
+def hovering(height_m: float, offset_m: tuple[float, float] = (0.0, 0.0), **genes: float) -> Any:
+    start = Start(mode="hover", height_m=height_m, offset_m=offset_m)
+    return dataclasses.replace(nominal(**genes), task=Task(start=start))
+
+
+class TurnsBack(Scripted):
+    """Comes down at 1 m/s to 1.2 m beside the marker, and flies up and away."""
+
+    def reset(self, mission: Mission) -> None:
+        super().reset(mission)
+        self.low = False
+
+    def step(self, observation: Observation) -> Command:
+        self.low |= float(observation.position_m[2]) < 1.3
+        up_mps = 0.5 if self.low else -1.0
+        return VelocitySetpoint(velocity_mps=(1.0 if self.low else 0.0, 0.0, up_mps))
+
+
+@pytest.mark.sim
+def test_a_flight_that_starts_low_in_the_air_has_the_margins_of_one_that_starts_high() -> None:
+    def margins(height_m: float) -> dict[str, float]:
+        scenario = hovering(height_m, offset_m=(1.0, 0.0))
+        flight = fly(scenario, TurnsBack, STAND, map=EMPTY, time_limit_s=height_m + 4.0)
+        assert [landing_phase(flight, at_s) for at_s in (0.2, height_m - 2.5)] == [
+            "approach",
+            "descent",
+        ]
+        return {each.property: each.value for each in judge(flight, Limits()).margins}
+
+    low, high = margins(5.0), margins(8.0)
+    assert low["distance"] == pytest.approx(-0.25, abs=0.1)
+    assert low["touchdown_speed"] == pytest.approx(1.0, abs=0.15)
+    for name in ("distance", "touchdown_speed", "touchdown_tilt", "decoy", "slide"):
+        assert low[name] == pytest.approx(high[name], abs=0.1), name
+
+
+class HoldsItsPlace(Scripted):
+    """Comes down on the marker and holds its place there; its motors never stop."""
+
+    def reset(self, mission: Mission) -> None:
+        super().reset(mission)
+        self.goal, self.down = mission.gps_position_m, False
+
+    def step(self, observation: Observation) -> Command:
+        self.down |= float(observation.position_m[2]) < 0.26
+        if not self.down:
+            return VelocitySetpoint(velocity_mps=(0.0, 0.0, -0.5))
+        return PositionSetpoint(position_m=(*self.goal, 0.22), speed_mps=2.0)
+
+
+@pytest.mark.sim
+def test_a_uav_that_holds_its_place_on_the_ground_is_dragged_when_its_position_jumps() -> None:
+    jump = {"jump__from_s": 8.0, "jump__distance_m": 3.0}
+    flight = fly(hovering(3.0, **jump), HoldsItsPlace, STAND, map=EMPTY, time_limit_s=20.0)
+    assert len(flight.earlier_touchdowns) > 0
+    verdict = judge(flight, Limits())
+    assert verdict.signature == "slid:motors-on"
+    assert "stood there with running motors until 8." in verdict.story
+    stands = fly(hovering(3.0), HoldsItsPlace, STAND, map=EMPTY, time_limit_s=12.0)
+    assert judge(stands, Limits(time_s=12.0)).signature == "late:standing"
