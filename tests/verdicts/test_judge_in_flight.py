@@ -114,8 +114,8 @@ class HoldsItsPlace(Scripted):
 
 @pytest.mark.sim
 def test_a_uav_that_holds_its_place_on_the_ground_is_dragged_when_its_position_jumps() -> None:
-    jump = {"jump__from_s": 8.0, "jump__distance_m": 3.0}
-    flight = fly(hovering(3.0, **jump), HoldsItsPlace, STAND, map=EMPTY, time_limit_s=20.0)
+    jumps = hovering(3.0, jump__from_s=8.0, jump__distance_m=3.0)
+    flight = fly(jumps, HoldsItsPlace, STAND, map=EMPTY, time_limit_s=20.0)
     assert len(flight.earlier_touchdowns) > 0
     verdict = judge(flight, Limits())
     assert verdict.signature == "slid:motors-on"
