@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from rich.console import Console
 from rich.table import Table
@@ -14,6 +15,9 @@ from pytest_garl.messages import printable
 from pytest_garl.regressions.case import Case
 from pytest_garl.regressions.corpus import CorpusEntry
 from pytest_garl.regressions.description import describe_scenario
+
+if TYPE_CHECKING:
+    from pytest_garl.regressions.renewal import Renewal
 
 _ENDLESS = 100_000
 """Width of a table outside a terminal, so that no name is cut."""
@@ -43,6 +47,23 @@ def case_table(found: Iterable[CorpusEntry]) -> Table:
         if not case.gates:
             status.append(f" ({case.reason})")
         table.add_row(where, status, signature, robust, objects)
+    return table
+
+
+def renamed_table(renewals: Sequence[Renewal]) -> Table:
+    """Return a table of the cases with new signatures or names: what they were, and what they are.
+
+    Each renewal has been written.
+    """
+    table = Table(box=None, header_style="bold")
+    for name in ("case", "is", "signature", "is"):
+        table.add_column(name, overflow="fold")
+    for each in renewals:
+        assert each.case is not None
+        assert each.written is not None
+        names = (f"{each.path.parent.name}/{each.path.stem}", each.written.stem)
+        signatures = (each.before.violation.signature, each.case.violation.signature)
+        table.add_row(*(Text(printable(text, keep="")) for text in (*names, *signatures)))
     return table
 
 

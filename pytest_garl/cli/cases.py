@@ -3,28 +3,35 @@
 from __future__ import annotations
 
 import dataclasses
+import os
+from collections import Counter
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, get_args
 
 import click
 from click.core import ParameterSource
+from rich.console import Console
+from rich.progress import Progress
 
 from pytest_garl.cli.case_tables import (
     case_table,
     environment_changes,
     print_table,
+    renamed_table,
     scenario_table,
 )
-from pytest_garl.errors import GarlError
+from pytest_garl.errors import CorpusError, GarlError
 from pytest_garl.messages import command, printable
 from pytest_garl.regressions.case import NO_GATE_TEXTS, Case, NoGateReason
 from pytest_garl.regressions.case_file import load_case
-from pytest_garl.regressions.corpus import Corpus, replace_file
+from pytest_garl.regressions.corpus import Corpus, replace_file, rewrite_file
+from pytest_garl.regressions.reference_proofs import Proofs
 from pytest_garl.regressions.replay import Replay, replay
 from pytest_garl.regressions.story_text import grade_in_words
 
 if TYPE_CHECKING:
     from pytest_garl.plugin.project_collection import ProjectTests
+    from pytest_garl.regressions.renewal import Renewal
 
 DEFAULT_FOLDER = Path("scenarios/regressions")
 NO_PROOF = 3
@@ -47,6 +54,10 @@ class _Project:
 
     def case(self, file: Path) -> Case:
         return load_case(file, self.maps)
+
+    def proved(self, case: Case) -> Case:
+        """Return a case with the reference that the latest run here proved."""
+        return Proofs(self.root / ".garl").renewed(case)
 
     def collected(self) -> tuple[ProjectTests, Corpus]:
         """Return the landing tests, and the corpus that pytest flies, or that of ``--folder``."""
@@ -72,7 +83,7 @@ FOLDER = click.option(
 @FOLDER
 @click.pass_context
 def cases(context: click.Context, folder: Path) -> None:
-    """Manage saved violations: list, show, replay, accept, promote, shrink, prune, check.
+    """Manage saved violations: list, show, replay, accept, promote, shrink, renew, prune, check.
 
     A case is a file under scenarios/regressions/<system>/. Run these commands where you run pytest.
     """
@@ -177,7 +188,7 @@ def replay_(context: click.Context, file: Path, live: bool, video: Path | None) 
 
         # Checked before the flight, which takes longer.
         check_film_file(video, makes_folder=True)
-    replayed = replay(case, project.root, project.maps, live=live)
+    replayed = replay(project.proved(case), project.root, project.maps, live=live)
     _show_replay(replayed)
     if video is not None:
         from pytest_garl.cli.film import draw
@@ -244,7 +255,7 @@ def _flown_as_fixed(project: _Project, file: Path, case: Case) -> list[str]:
     """Fly a case that is said to be fixed; return remarks, or raise GarlError if it is not."""
     remarks = []
     for live in (False, True) if case.live else (False,):
-        replayed = replay(case, project.root, project.maps, live=live)
+        replayed = replay(project.proved(case), project.root, project.maps, live=live)
         how = "a live policy" if live else "its recorded moves"
         if replayed.result != "FIXED":
             raise GarlError(f"{file}: {_refusal(replayed, how)}; it stays {case.status}")
@@ -300,6 +311,78 @@ def shrink(project: _Project, file: Path, flights: int, workers: int) -> None:
 
 
 @cases.command()
+@click.argument(
+    "files",
+    metavar="[FILE]...",
+    nargs=-1,
+    type=click.Path(path_type=Path, exists=True, dir_okay=False),
+)
+@click.option(
+    "--workers",
+    type=click.IntRange(min=0),
+    default=lambda: os.cpu_count() or 1,
+    show_default="one per CPU core",
+    help="Number of worker processes.",
+)
+@click.pass_obj
+def renew(project: _Project, files: tuple[Path, ...], workers: int) -> None:
+    """Renew the hashes of cases that fail again to the byte with today's sources: all, or FILEs.
+
+    Do that after an upgrade, before you repair your landing system: only then does a later pass
+    count as a repair. If the flight is the recorded one, but today's version calls the violation
+    something else, the file gets the new signature and name. A case whose flight differs stays as
+    it is, and the exit status is 1.
+    """
+    from pytest_garl.regressions.renewal import RenewalResult, renew
+
+    tests, corpus = project.collected()
+    if files:
+        chosen = {file: project.case(file) for file in files}
+    else:
+        entries = corpus.all_entries()
+        chosen = {entry.path: entry.case for entry in entries if entry.case is not None}
+        for entry in entries:
+            if entry.case is None:
+                say(entry.problem, err=True)
+    console = Console(stderr=True)
+    with Progress(console=console, disable=not console.is_terminal, transient=True) as progress:
+        bar = progress.add_task("flights")
+        done = renew(
+            chosen,
+            tests.collection,
+            tests.simulator,
+            project.maps,
+            workers,
+            lambda flown, total: progress.update(bar, completed=flown, total=total),
+        )
+    done = [_written(each, project.maps) for each in done]
+    renamed = [each for each in done if each.result == "renamed"]
+    if renamed:
+        print_table(renamed_table(renamed))
+    refused = [each for each in done if each.result == "not renewed"]
+    for each in refused:
+        say(f"{each.path}: {each.reason}", err=True)
+    counts = Counter(each.result for each in done)
+    names = [name for name in get_args(RenewalResult) if counts[name]]
+    say(f"{len(done)} cases: {', '.join(f'{counts[name]} {name}' for name in names) or 'none'}")
+    if renamed:
+        say(f"git sees the new names after: {command('git', 'add', '-A', corpus.folder)}")
+    if refused:
+        raise SystemExit(1)
+
+
+def _written(renewal: Renewal, map_folders: tuple[Path, ...]) -> Renewal:
+    """Write a renewed case; return what became of it."""
+    if renewal.case is None:
+        return renewal
+    try:
+        path = rewrite_file(renewal.path, renewal.before, renewal.case, map_folders)
+    except CorpusError as error:
+        return dataclasses.replace(renewal, result="not renewed", reason=str(error), case=None)
+    return dataclasses.replace(renewal, written=path)
+
+
+@cases.command()
 @click.option("--yes", is_flag=True, help="Delete without asking.")
 @click.pass_obj
 def prune(project: _Project, yes: bool) -> None:
@@ -312,7 +395,7 @@ def prune(project: _Project, yes: bool) -> None:
     for entry in project.corpus.all_entries():
         if entry.case is None or entry.case.status == "fixed":
             continue
-        replayed = replay(entry.case, project.root, project.maps)
+        replayed = replay(project.proved(entry.case), project.root, project.maps)
         if replayed.result != "STALE":
             kept += 1
             continue

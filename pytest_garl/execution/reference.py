@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import Any
 
 from pytest_garl.errors import LandingSystemError
+from pytest_garl.execution.flight_code import code_sha256, flight_code_sha256
 from pytest_garl.messages import shown
 
 SYSTEM_NAME = re.compile(r"\w[\w-]*(\.\w[\w-]*)*:[^\W\d]\w*(\.[^\W\d]\w*)*")
@@ -122,9 +123,12 @@ def package_sha256() -> str:
 
 
 def simulator_sha256(simulator: Reference) -> str:
-    """Return the hash of a flight's code except the landing system: package and simulator."""
-    own = Path(simulator.file).read_bytes() if simulator.file else b""
-    return hashlib.sha256(package_sha256().encode() + own).hexdigest()
+    """Return the hash of the code that flies and judges a case, except the landing system.
+
+    A simulator of the project's own is part of it.
+    """
+    own = code_sha256(Path(simulator.file)) if simulator.file else ""
+    return hashlib.sha256(f"{flight_code_sha256()}{own}".encode()).hexdigest()
 
 
 def system_named(name: str) -> Any:

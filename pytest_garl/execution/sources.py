@@ -133,14 +133,18 @@ def _defining(definition: Any) -> _Module | None:
 
 @functools.lru_cache(maxsize=1024)
 def _imports(source: bytes, package: str) -> frozenset[str]:
-    """Return the names that source code imports, at its top level or in a function.
+    """Return the names that source code imports; none if it cannot be parsed."""
+    try:
+        return imported_names(ast.parse(source), package)
+    except (SyntaxError, ValueError):
+        return frozenset()
+
+
+def imported_names(tree: ast.Module, package: str) -> frozenset[str]:
+    """Return the names that a module imports, at its top level or in a function.
 
     ``package`` is the package that relative imports start from.
     """
-    try:
-        tree = ast.parse(source)
-    except (SyntaxError, ValueError):
-        return frozenset()
     found: set[str] = set()
     for node in ast.walk(tree):
         if isinstance(node, ast.Import):

@@ -14,6 +14,7 @@ from pytest_garl.plugin.keys import (
     NO_PARAMETERS,
     OUTCOME,
     OUTSIDE,
+    RENEWABLE,
     RUN,
     SIGNATURE,
     TRAJECTORY,
@@ -84,6 +85,8 @@ def landing(request: pytest.FixtureRequest, garl_slot: Target, npcs: PolicySpec 
         item.user_properties.append((OUTSIDE, outside))
     if reasons := run.unproven(garl_slot):
         request.node.user_properties.append((UNPROVEN, "; ".join(reasons)))
+    if garl_slot.entry is not None and run.prove_reference(garl_slot):
+        item.user_properties.append((RENEWABLE, garl_slot.entry.path.name))
     item.stash[LANDING] = landing
     if item.stash.get(BODY_RUNS, False):
         # Asked for by the test's body, which must not go on.

@@ -9,9 +9,10 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
-from pytest_garl.plugin.keys import SEVERITY, SIGNATURE, SLOT
+from pytest_garl.plugin.keys import LOST, SEVERITY, SIGNATURE, SLOT
 from pytest_garl.plugin.run import Run
 from pytest_garl.plugin.suggested_commands import repeat_kind_command
+from pytest_garl.plugin.summary import renewal_lines
 from pytest_garl.reports.html.index_markdown import index_parts, page_link
 from pytest_garl.reports.markdown import code, escaped, table
 from pytest_garl.reports.search_summary import WHY_NO_LANDING, SearchSummary, ViolationKind
@@ -46,8 +47,7 @@ def write_step_summary(
 
     ``report`` is the folder of pages of the run, if one was written.
     """
-    path = os.environ.get(VARIABLE)
-    if not path:
+    if not os.environ.get(VARIABLE):
         return
     url = run.options.report_url
     pages = {(kind.where, kind.signature): kind for kind in report.page.kinds} if report else {}
@@ -72,7 +72,22 @@ def write_step_summary(
         escaped(f"{_where(search)}: {line}") for search in searches for line in kinds_lines(search)
     ]
     parts.append(_kinds_table(rows) if rows else none)
+    parts += [*_lost_cases(reporter), *renewal_lines(reporter)]
     parts += index_parts(report.page, report.index.parent, url) if report else ()
+    _append(reporter, parts)
+
+
+def write_lost_cases(reporter: Any) -> None:
+    """Append the lost cases of a session that flew nothing, if GitHub names a file."""
+    lines = _lost_cases(reporter)
+    if lines:
+        _append(reporter, lines)
+
+
+def _append(reporter: Any, parts: Sequence[str]) -> None:
+    path = os.environ.get(VARIABLE)
+    if not path:
+        return
     text = "\n\n".join(parts)
     try:
         with Path(path).open("a", encoding="utf-8") as file:
@@ -115,6 +130,16 @@ def _shares(search: SearchSummary) -> tuple[str, ...]:
         search.count("inconclusive"),
     ]
     return escaped(_where(search)), str(total), *(percent(count, total) for count in counts)
+
+
+def _lost_cases(reporter: Any) -> list[str]:
+    """Return a line for each file of the corpus that nothing can fly any more."""
+    return [
+        f"Lost: {escaped(str(value))}"
+        for report in reporter.getreports("failed")
+        for key, value in report.user_properties
+        if key == LOST and report.when == "call"
+    ]
 
 
 def _failed_cases(reporter: Any) -> list[Row]:

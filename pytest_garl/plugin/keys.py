@@ -69,6 +69,8 @@ FINDING_TEST = "garl.found"
 """A worker's item failed for a violation that a search found: the search and the signature."""
 OUTSIDE = "garl.outside"
 """A saved case whose values lie outside the test's domain, and which of them."""
+RENEWABLE = "garl.renewable"
+"""A case that fails to the byte with other sources than its own."""
 LOST = "garl.lost"
 """A file of the corpus that nothing can fly any more, and why."""
 NO_PARAMETERS = (

@@ -23,6 +23,7 @@ from pytest_garl.plugin.keys import target_of
 from pytest_garl.plugin.options import Options
 from pytest_garl.plugin.search_setup import Searches
 from pytest_garl.plugin.target import Target
+from pytest_garl.regressions.reference_proofs import Proofs, proves_reference
 from pytest_garl.regressions.replay import SourceHashes, stale_reasons
 from pytest_garl.scenarios.files import parse_scenario
 from pytest_garl.scenarios.maps.map import load_map
@@ -248,15 +249,32 @@ class Run:
         """Return why a passing case proves nothing; empty if only the landing system changed."""
         if target.case is None:
             return ()
-        sources = SourceHashes(
+        flight = self.flight(target)
+        excuse = flight.result.verdict.excuse
+        excused = (f"nobody could have landed ({excuse})",) if excuse else ()
+        case = self._proofs.renewed(target.case)
+        return *excused, *stale_reasons(case, self._sources(target), flight.sha256)
+
+    def prove_reference(self, target: Target) -> bool:
+        """Note it if a case fails to the byte with other sources than its own; return whether."""
+        if target.case is None or target.live:
+            return False
+        sources = self._sources(target)
+        proved = proves_reference(target.case, sources, self.flight(target).sha256)
+        if proved:
+            self._proofs.note(target.case, sources)
+        return proved
+
+    def _sources(self, target: Target) -> SourceHashes:
+        return SourceHashes(
             system_sha256=combined_sha256(self.searches.sources(target)),
             simulator_sha256=simulator_sha256(self.simulator),
             map_sha256=load_map(target.map, self.options.map_folders).sha256,
         )
-        flight = self.flight(target)
-        excuse = flight.result.verdict.excuse
-        excused = (f"nobody could have landed ({excuse})",) if excuse else ()
-        return *excused, *stale_reasons(target.case, sources, flight.sha256)
+
+    @functools.cached_property
+    def _proofs(self) -> Proofs:
+        return Proofs(self.options.folder)
 
     def scenario(self, target: Target) -> Scenario:
         """Return the scenario of a slot."""

@@ -13,7 +13,7 @@ import pytest
 from pytest_garl.messages import command
 from pytest_garl.plugin.films import film_lines
 from pytest_garl.plugin.header import cpu_dispatch_warning
-from pytest_garl.plugin.keys import CASE, MAYBE_FIXED, OUTSIDE, STALE
+from pytest_garl.plugin.keys import CASE, MAYBE_FIXED, OUTSIDE, RENEWABLE, STALE
 from pytest_garl.plugin.landing import NOT_JUDGED
 from pytest_garl.plugin.run import Run
 from pytest_garl.plugin.save_cases import saved_lines
@@ -21,6 +21,7 @@ from pytest_garl.plugin.session_status import notes
 from pytest_garl.plugin.suggested_commands import repeat_kind_command, shown_path
 from pytest_garl.plugin.tally import Tally
 from pytest_garl.plugin.terminal_text import width_of, wrapped
+from pytest_garl.regressions.reference_proofs import renewal_line
 from pytest_garl.reports.run_report import ENDED, USER_FAILURES, utc_now
 from pytest_garl.reports.search_summary import SearchSummary, ViolationKind, legend
 from pytest_garl.reports.shares_text import (
@@ -46,6 +47,7 @@ def write_run(reporter: Any, run: Run, tally: Tally) -> list[SearchSummary]:
         *saved_lines(run.investigated, reporter.config),
         *([f"nothing more was saved: {run.save_problem}"] if run.save_problem else []),
         *_passing_cases(reporter),
+        *renewal_lines(reporter),
         *_cases_outside(reporter),
         *(wrapped(line, width_of(reporter.config)) for line in cpu_dispatch_warning(run)),
     ]
@@ -83,6 +85,13 @@ def _passing_cases(reporter: Any) -> list[str]:
         ),
         *(f"stale: {text}" for text in sorted(stale)),
     ]
+
+
+def renewal_lines(reporter: Any) -> list[str]:
+    """Return the line that tells of cases with another version's hash that fly as recorded."""
+    outcomes = ("passed", "failed", "xfailed", "skipped", "error")
+    line = renewal_line(len(_property_values(reporter, outcomes, RENEWABLE)))
+    return [line] if line else []
 
 
 def _cases_outside(reporter: Any) -> list[str]:

@@ -24,6 +24,11 @@ def write_summary(reporter: Any, config: pytest.Config, tally: Tally) -> None:
     run = config.stash.get(RUN, None)
     if run is not None:
         _write_run(reporter, run, tally)
+    else:
+        with _one_line_if_broken(reporter, "the step summary"):
+            from pytest_garl.plugin.github_summary import write_lost_cases
+
+            write_lost_cases(reporter)
     if tally.items or tally.problems:
         with _one_line_if_broken(reporter, "the summary"):
             from pytest_garl.plugin.summary import write_status

@@ -204,6 +204,22 @@ def replace_file(path: Path, case: Case, map_folders: tuple[Path, ...] = ()) -> 
         return written
 
 
+def rewrite_file(path: Path, before: Case, case: Case, map_folders: tuple[Path, ...] = ()) -> Path:
+    """Write a case in place of ``before`` in ``path``; the file keeps its name if the id stays.
+
+    Raises CorpusError if another file has the new name.
+    """
+    if before.id == case.id:
+        with locked(path.parent):
+            return write_text_atomically(
+                path, dump_case(case, lambda name: load_map(name, map_folders))
+            )
+    taken = path.with_name(f"{case.id}.toml")
+    if taken != path and taken.exists():
+        raise CorpusError(f"{path}: its new name is that of another case, {taken.name}")
+    return replace_file(path, case, map_folders)
+
+
 def folder_of(cases: Path, system: str) -> Path:
     """Return where the cases of a system ("module:class") lie: under its module's own name."""
     return cases / system.partition(":")[0].rpartition(".")[2]

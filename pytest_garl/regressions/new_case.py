@@ -70,7 +70,9 @@ def new_case(
         live=prevention.answer == "preventable" and npcs.reads_uav,
         prevention=prevention,
         scenario=failing.scenario,
-        violation=_violation(completed.result.verdict, flight, failure, severity),
+        violation=_own_violation(failure, completed.result.verdict)
+        if failure is not None
+        else violation_in(completed.result.verdict, flight, severity),
         policy=npcs.name,
         policy_sha256=npcs.sha256,
         moves=failing.behaviour.moves,
@@ -112,19 +114,20 @@ def _reason(failing: FailingScenario, prevention: Prevention) -> NoGateReason:
     return answer if answer in ("sensor-limited", "unpreventable") else ""
 
 
-def _violation(
-    verdict: Verdict, flight: Flight | None, failure: UserFailure | None, severity: Severity
-) -> Violation:
-    """Return the violation: of the verdict, or of the test's own assertion."""
-    if failure is not None:
-        return Violation(
-            signature=failure.signature,
-            type="own",
-            property="own",
-            margin=0.0,
-            unit="1",
-            description=f"{failure.test}: {failure.message}. {verdict.story}",
-        )
+def _own_violation(failure: UserFailure, verdict: Verdict) -> Violation:
+    """Return the violation of a test's own assertion."""
+    return Violation(
+        signature=failure.signature,
+        type="own",
+        property="own",
+        margin=0.0,
+        unit="1",
+        description=f"{failure.test}: {failure.message}. {verdict.story}",
+    )
+
+
+def violation_in(verdict: Verdict, flight: Flight | None, severity: Severity) -> Violation:
+    """Return the violation that a verdict found."""
     assert verdict.primary is not None
     assert verdict.violation_type is not None
     margin = next((each for each in verdict.margins if each.property == verdict.primary), None)

@@ -49,6 +49,17 @@ def file(pytester: pytest.Pytester, monkeypatch: pytest.MonkeyPatch) -> Path:
     return save(pytester.path, a_case())
 
 
+def test_the_step_summary_names_a_lost_case(
+    pytester: pytest.Pytester, file: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    drop_map(pytester.path, file)
+    monkeypatch.setenv("GITHUB_STEP_SUMMARY", str(pytester.path / "summary.md"))
+    run(pytester)
+    (line,) = (pytester.path / "summary.md").read_text().splitlines()[2:3]
+    assert line.startswith("Lost: scenarios/regressions/systems/lawn-V-ZeroDivisionError-")
+    assert "flies on lawn any more, only on court" in line
+
+
 def run(pytester: pytest.Pytester, *args: str) -> pytest.RunResult:
     return pytester.runpytest_subprocess("-p", "no:cacheprovider", "--garl-workers=0", *args)
 
