@@ -12,11 +12,9 @@ from typing import Any
 
 from pytest_garl.errors import GarlError
 
-SETTINGS = {
-    "garl_domain": ("field", "where the system is to land: garl domain show field"),
-    "garl_cases": ("scenarios/regressions", "saved failures: commit this folder"),
-}
-"""Each ini key with its value, its default, and what it means."""
+SETTINGS = {"garl_domain": ("field", "where the system is to land: garl domain show field")}
+"""Each ini key with its value, the default, and what it means.  `garl_cases` is none of them: a
+folder that it names must exist, and there is none before the first case."""
 PYTHONPATH = {"pythonpath": (".", "so that the tests find your modules")}
 _INI_SECTIONS = {
     "pytest.ini": "pytest",

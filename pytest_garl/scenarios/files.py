@@ -130,11 +130,8 @@ def _read_section(table: Table, head: str, map: Map) -> dict[str, float]:
     ranges = ranges_of(head, map)
     optional = {name for name in ranges if name.startswith("destination_")}
     table.refuse_unknown({*ranges})
-    required = (
-        {*ranges} - optional - {HEIGHT, *STORY}
-        if head not in ("weather", *GROUPS) or head == "light"
-        else ()
-    )
+    is_complete = head not in ("weather", *GROUPS)
+    required = {*ranges} - optional - {HEIGHT, *STORY} if is_complete else ()
     for name in required:
         table.get(name)
     if bool(optional & {*table.values}) and not optional <= {*table.values}:

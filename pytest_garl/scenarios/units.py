@@ -19,6 +19,7 @@ from pytest_garl.scenarios.light import (
     NOON_DEG,
     TWILIGHT_DEG,
     position_of,
+    position_of_elevation,
     sun_azimuth_deg,
     sun_elevation_deg,
 )
@@ -204,7 +205,9 @@ def from_sections(
     light = sections.get("light", {})
     conditions: dict[str, float] = {}
     if light:
-        values[SUN], turn = position_of(*(light[name] for name in LIGHT))
+        elevation = light.get(LIGHT[0], NOON_DEG)
+        morning = sun_azimuth_deg(position_of_elevation(elevation))
+        values[SUN], turn = position_of(elevation, light.get(LIGHT[1], morning))
         conditions[TURN] = round(turn, ANGLE_DIGITS)
     marker = sections["marker"]
     values |= marker_genes((marker["x_m"], marker["y_m"]), map)

@@ -87,7 +87,6 @@ def test_existing_project_keeps_all_that_it_has(folder: Path) -> None:
     assert settings == {
         "testpaths": ["tests"],
         "garl_domain": "calm",
-        "garl_cases": "scenarios/regressions",
         "pythonpath": ".",
     }
     assert (folder / ".gitignore").read_text() == "*.pyc\n.garl/\n"

@@ -15,6 +15,7 @@ from pytest_garl.scenarios.genes import genome_for
 from pytest_garl.scenarios.genome_like import with_destinations
 from pytest_garl.scenarios.maps.map import load_map
 from pytest_garl.scenarios.scenario import Scenario
+from pytest_garl.scenarios.units import sections_of
 from pytest_garl.scenarios.validity import problems, repair
 
 COURT = load_map("court")
@@ -27,6 +28,26 @@ def test_conditions_survive_the_file_which_names_only_those_that_are_not_nominal
     assert "[scenario.wind]\nmean_mps = 4.5\n" in dumps(scenario, COURT)
     assert loads(dumps(scenario, COURT), COURT) == scenario
     assert dumps(plain.replace({"wind.mean_mps": 0.0}), COURT) == dumps(plain, COURT)
+
+
+def test_elevation_or_azimuth_of_the_sun_alone_is_enough() -> None:
+    genome = genome_for(COURT)
+    plain = repair(decode(genome.nominal, genome, map="court", seed=3), COURT)
+
+    def light(*lines: str) -> dict[str, float]:
+        text = "\n".join([dumps(plain, COURT), "[scenario.light]", *lines, ""])
+        return sections_of(loads(text, COURT), COURT)["light"]
+
+    # On the sun's way of the day, in the morning.
+    low = light("sun_elevation_deg = 12.0")
+    assert low["sun_elevation_deg"] == 12.0
+    assert 90 < low["sun_azimuth_deg"] < 180
+    assert light(*(f"{name} = {value}" for name, value in low.items())) == low
+    # As high as at noon.
+    assert light("sun_azimuth_deg = 90.0") == {
+        "sun_elevation_deg": 60.0,
+        "sun_azimuth_deg": 90.0,
+    }
 
 
 def test_a_condition_that_cannot_be_flown_is_refused() -> None:

@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 
 from pytest_garl.adversary.catalogue import DEFAULT_POLICY, policy_names
+from pytest_garl.adversary.domain_policy import GRADED, domain_with_policy, policy_in
 from pytest_garl.errors import GarlError
 from pytest_garl.search.catalogue import (
     DEFAULT_METHOD,
@@ -48,6 +49,15 @@ def test_a_users_method_is_named_by_its_module() -> None:
     assert bred(users, 2) == bred(make_method("garl-paper", plan()), 2)
     with pytest.raises(GarlError, match=r"'nowhere:method'.*cannot be loaded.*one of .*garl, "):
         make_method("nowhere:method", plan())
+
+
+@pytest.mark.parametrize("name", ["field", "calm"])
+def test_every_method_flies_with_graded_npcs_in_a_domain_that_names_a_grade(name: str) -> None:
+    domain = domain_with_policy(name)
+    policies = {policy_in(domain, default_policy(method)) for method in method_names()}
+    assert policies == {GRADED}
+    page = (Path(__file__).parents[2] / "docs" / "methods.md").read_text()
+    assert f"`{name}`" in page.partition("(policy `graded`)")[0]
 
 
 def test_the_page_on_methods_has_a_row_for_each_with_its_policy() -> None:
