@@ -26,6 +26,10 @@ TRY = "cp -r docs/tutorial /tmp/my-stack && cd /tmp/my-stack && rm -r scenarios"
 RUN_BY = {
     "python3.11 -m venv .venv && . .venv/bin/activate": ("Makefile", "$(FLIES)"),
     "pip install -c constraints.txt .": ("Makefile", "-c constraints.txt -e ."),
+    'pip install -c constraints.txt "pytest-garl @ git+https://HOST/PATH.git@COMMIT"': (
+        "tests/test_workflow.py",
+        "Requirement",
+    ),
     "garl init my_landing:MyLandingSystem": ("tests/cli/test_init.py", "init"),
     "garl check test_my_landing.py": ("tests/cli/test_check.py", "check"),
     "pytest --garl-budget=40 test_my_landing.py": ("tests/test_pages.py", "--garl-budget"),
