@@ -26,6 +26,7 @@ from pytest_garl.regressions.case import NO_GATE_TEXTS, Case, NoGateReason
 from pytest_garl.regressions.case_file import load_case
 from pytest_garl.regressions.corpus import Corpus, replace_file, rewrite_file
 from pytest_garl.regressions.reference_proofs import Proofs
+from pytest_garl.regressions.description import unusual_in_flight
 from pytest_garl.regressions.replay import Replay, replay
 from pytest_garl.regressions.story_text import grade_in_words
 
@@ -144,9 +145,12 @@ def show(project: _Project, file: Path) -> None:
     evidence = case.evidence
     say(f"{case.id}  {case.status}  {case.system}")
     say(f"{case.violation.signature}: {case.violation.description}")
-    if case.severity.text:
+    if case.severity.about:
         means = grade_in_words(case.severity.grade)
-        say(f"It takes {case.severity.text}{f' ({means})' if means else ''}.")
+        if case.is_shrunk:
+            say(f"It takes {case.severity.text}{f' ({means})' if means else ''}.")
+        else:
+            say(f"Not shrunk: nobody knows what it takes. {unusual_in_flight(case.severity)}")
     say("")
     print_table(scenario_table(case, project.maps))
     for key, by in environment_changes(case):

@@ -122,11 +122,15 @@ def _text(found: dict[str, Any]) -> str:
         if control:
             lines.append(f"  {control['text']}")
         for kind in search["signatures"]:
-            took = (kind["severity"] or {}).get("text", "")
+            severity = kind["severity"] or {}
+            told = severity.get("text", "")
+            least = "at the least" if severity.get("took") else "unusual in the least of them"
             seen = in_control_text(
                 kind["in_control"], control["random"]["flights"] if control else 0
             )
-            lines.append(f"  {kind['count']:4d}  {kind['signature']}: {kind['headline']}")
-            lines += [f"        at the least: {took}"] if took else []
+            title, *ending = filter(None, (kind["title"], kind["headline"]))
+            lines.append(f"  {kind['count']:4d}  {kind['signature']}: {title}")
+            lines += [f"        {text}" for text in ending]
+            lines += [f"        {least}: {told}"] if told else []
             lines += [f"        {text}" for text in (seen, kind["repeat"]) if text]
     return "\n".join([*lines, ""]) if lines else "no flights yet\n"

@@ -68,7 +68,7 @@ class FlightResult:
         if isinstance(values, Mapping):
             values = {**_DEFAULTS} | {key: value for key, value in values.items() if key in _FIELDS}
             if isinstance(values["severity"], Mapping):
-                values["severity"] = {"values": [], **values["severity"]}
+                values["severity"] = {**_SEVERITY_DEFAULTS, **values["severity"]}
         return dataclass_from(cls, values)
 
     def dumps(self) -> str:
@@ -77,6 +77,7 @@ class FlightResult:
 
 
 _DEFAULTS: Mapping[str, Any] = {"off_marker_m": None, "landed_s": None, "severity": None}
+_SEVERITY_DEFAULTS: Mapping[str, Any] = {"values": [], "unread": [], "untried": []}
 _FIELDS = frozenset(field.name for field in dataclasses.fields(FlightResult))
 
 

@@ -1,5 +1,8 @@
 """How severe a violation is: how strong an adversary, or how harsh a world, it takes.
 
+What a violation *takes* is known of a shrunk case only.  Of a flight that a search found, it is
+known what was *unusual* in it.
+
 The weaker the adversary, the more severe: a landing system that hits people who know nothing of it
 needs no enemy.
 """
@@ -33,7 +36,11 @@ class Severity:
     Of conditions: ``conditions`` are active, objects that are there included; ``values`` say for
     each which of its values are not nominal, or how many, and are empty in files of earlier
     versions; ``largest_share`` (0..1) is how far the strongest lies from nominal, as a share of all
-    that can be flown; ``largest`` says it in words.
+    that can be flown; ``largest`` says it in words.  ``unread`` are those of the conditions that
+    change only data which the landing system never read: no text names them.
+
+    ``untried`` names conditions and objects of a saved case of which shrinking did not try whether
+    the violation needs them.
     """
 
     about: Literal["", "body", "conditions"] = ""
@@ -47,6 +54,8 @@ class Severity:
     values: tuple[str, ...] = ()
     largest: str = ""
     largest_share: float = 0.0
+    unread: tuple[str, ...] = ()
+    untried: tuple[str, ...] = ()
 
     @property
     def key(self) -> tuple[float, ...]:
@@ -69,10 +78,52 @@ class Severity:
 
     @property
     def text(self) -> str:
-        """It in words: ``a chasing dog at 6.1 m/s for 3.5 s, 2 others there``; may be empty."""
+        """What it took, for a violation that was shrunk: ``fog alone, visibility 11 m``.
+
+        It may be empty.  What shrinking did not try is named.
+        """
+        told = {"": "", "body": self._body_text(), "conditions": self._conditions_text()}[
+            self.about
+        ]
+        return f"{told}{self._untried_text()}" if told else ""
+
+    @property
+    def unusual(self) -> str:
+        """What was unusual in a flight of which nobody knows what it took; empty for nothing.
+
+        ``rain (45 mm/h, wetness 93 %), person-2``, or ``a chasing dog at 6.1 m/s for 3.5 s``.
+        """
         if self.about == "body":
             return self._body_text()
-        return self._conditions_text() if self.about else ""
+        acting = self.acting
+        if len(acting) == 1:
+            acting = [(acting[0][0], self._value_of_one(acting[0][1]))]
+        named = [_named(*each) for each in acting]
+        if len(named) > MOST_LISTED:
+            named = [*named[:MOST_LISTED], f"{len(named) - MOST_LISTED} more"]
+        return ", ".join(named)
+
+    @property
+    def acting(self) -> list[tuple[str, str]]:
+        """Return (name, value) of the conditions that may have acted."""
+        values = self.values or ("",) * len(self.conditions)
+        pairs = zip(self.conditions, values, strict=True)
+        return [(name, value) for name, value in pairs if name not in self.unread]
+
+    def _value_of_one(self, value: str) -> str:
+        """Return the value of a condition that is the only one, with the largest if it has many."""
+        if value.endswith(COUNTED):
+            return f"{value}, most of all {self.largest}"
+        return value or self.largest
+
+    def _untried_text(self) -> str:
+        names = [each for each in self.untried if each not in self.unread]
+        if not names:
+            return ""
+        if len(names) > MOST_LISTED:
+            names = [*names[: MOST_LISTED - 1], f"{len(names) - MOST_LISTED + 1} more"]
+        told = ", ".join(names[:-1]) + " and " + names[-1] if len(names) > 1 else names[0]
+        return f"; {told} {'were' if len(names) > 1 else 'was'} not tried"
 
     def _body_text(self) -> str:
         words = " ".join(word for word in (self.grade, self.type) if word)
@@ -86,26 +137,23 @@ class Severity:
         return f"{text}, {others} other{'s' if others > 1 else ''} there"
 
     def _conditions_text(self) -> str:
-        names, count = self.conditions, len(self.conditions)
+        acting = self.acting
+        names, count = [name for name, _ in acting], len(acting)
         if not count:
             return "nothing unusual"
-        values = self.values or ("",) * count
         if count == 1:
-            told = values[0] or self.largest
-            if values[0].endswith(COUNTED):
-                told = f"{values[0]}, most of all {self.largest}"
+            told = self._value_of_one(acting[0][1])
             return f"{names[0]} alone{f', {told}' if told else ''}"
         if count > MOST_LISTED:
             more = f"{count - MOST_LISTED} more"
             return f"{count} conditions: {', '.join([*names[:MOST_LISTED], more])}"
-        named = (
-            f"{name} ({value})" if value else name
-            for name, value in zip(names, values, strict=True)
-        )
-        return f"{count} conditions: {', '.join(named)}"
+        return f"{count} conditions: {', '.join(_named(*each) for each in acting)}"
 
-    def to_json(self) -> dict[str, Any]:
-        """Return plain values for a report: its text, and the facts of a body or of conditions."""
+    def to_json(self, *, took: bool) -> dict[str, Any]:
+        """Return plain values for a report: its text, and the facts of a body or of conditions.
+
+        ``took`` says that it is of a shrunk case, so that its text is what the violation takes.
+        """
         body = {
             "grade": self.grade,
             "type": self.type,
@@ -119,9 +167,17 @@ class Severity:
             "values": list(self.values),
             "largest": self.largest,
             "largest_share": self.largest_share,
+            "unread": list(self.unread),
         }
         facts = {"": {}, "body": body, "conditions": conditions}[self.about]
-        return {"about": self.about, "text": self.text, **facts}
+        if self.about:
+            facts["untried"] = list(self.untried)
+        text = self.text if took else self.unusual
+        return {"about": self.about, "took": took, "text": text, **facts}
+
+
+def _named(name: str, value: str) -> str:
+    return f"{name} ({value})" if value else name
 
 
 NO_SEVERITY = Severity()

@@ -6,7 +6,7 @@ import numpy as np
 
 from pytest_garl.adversary.grades import GRADE_LIMITS
 from pytest_garl.execution.severity import NO_SEVERITY, Severity
-from pytest_garl.scenarios.conditions import active_conditions
+from pytest_garl.scenarios.conditions import active_conditions, unread_groups
 from pytest_garl.scenarios.maps.map import Map
 from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.scenarios.story import LIMITS_S, Story, story_of
@@ -38,13 +38,17 @@ def severity_of(
     if verdict.violation_type == "IV" and flight.contacts:
         return _of_body(flight, flight.contacts[-1], scenario, len(present), npcs)
     conditions = active_conditions(scenario)
-    strongest = max(conditions, key=lambda each: each.share, default=None)
+    unread = unread_groups(scenario, flight.data_read)
+    acting = [each for each in conditions if each.cause not in unread]
+    strongest = max(acting, key=lambda each: each.share, default=None)
     return Severity(
         about="conditions",
         conditions=(*(each.cause for each in conditions), *present),
         values=(*(each.named for each in conditions), *("" for _ in present)),
         largest=strongest.words if strongest else "",
-        largest_share=strongest.share if strongest else 0.0,
+        # Of all conditions, so that what a system reads does not change which scenarios are bred.
+        largest_share=max((each.share for each in conditions), default=0.0),
+        unread=unread,
     )
 
 

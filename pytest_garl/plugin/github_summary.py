@@ -24,7 +24,15 @@ if TYPE_CHECKING:
 
 VARIABLE = "GITHUB_STEP_SUMMARY"
 """GitHub names in this variable the file whose text it shows on the page of the step."""
-COLUMNS = ("where", "what", "flights", "what happened", "at the least", "see it", "page")
+COLUMNS = (
+    "where",
+    "what",
+    "flights",
+    "what happened",
+    "took at least",
+    "see it",
+    "page",
+)
 SHARES = (
     "where",
     "flown",
@@ -56,8 +64,8 @@ def write_step_summary(
             escaped(_where(search)),
             escaped(kind.signature),
             escaped(_flights(search, kind)),
-            escaped(kind.headline),
-            escaped(kind.severity_text),
+            escaped("; ".join(filter(None, (kind.title, kind.headline)))),
+            escaped(kind.least),
             code(repeat_kind_command(search, kind, reporter.config)),
             _link(pages.get((_where(search), kind.signature)), report, url),
         )

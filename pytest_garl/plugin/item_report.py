@@ -168,7 +168,8 @@ class _Writer:
         file = self._case_file
         self._note(CASE, file)
         if self.result.severity is not None and not failure.user_property:
-            self._note(SEVERITY, self.result.severity.text)
+            severity = self.result.severity
+            self._note(SEVERITY, severity.text if case.is_shrunk else severity.unusual)
         if decision.outcome == "xfailed":
             return self._expect(report_text.expected_failure(decision, facts, file))
         flown = (failure.signature, self.result.verdict.story)

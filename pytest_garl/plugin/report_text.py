@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import pytest
 
 from pytest_garl.execution.result import FlightResult
+from pytest_garl.execution.severity import Severity
 from pytest_garl.messages import command
 from pytest_garl.plugin.item_facts import ItemFailure, divergence_s
 from pytest_garl.plugin.outcomes import CaseState, Decision, FailedItem, Reason, Reflights
@@ -99,14 +100,23 @@ def violation_text(
         lines.append("It is not saved: its test takes other fixtures than landing and scenario.")
     elif own and verdict.primary is not None:
         lines.append("It is saved only if it also fails in a flight that violates nothing else.")
-    severity = result.severity.text if result.severity else ""
-    took = [f"It took {severity}."] if severity and not own else []
-    remarks = [*took, *_scenario(item.config, run, target), *_doubts(run, target, reflights)]
+    told = "" if own or result.severity is None else _unusual(result.severity)
+    remarks = [
+        *([told] if told else []),
+        *_scenario(item.config, run, target),
+        *_doubts(run, target, reflights),
+    ]
     repeat = repeat_line(item, target)
     lines += [*_wrapped(remarks if own else [story, *remarks], item.config), repeat]
     return FailureText(
         lines=tuple(lines), headline=own.message if own else headline(story), command=repeat
     )
+
+
+def _unusual(severity: Severity) -> str:
+    from pytest_garl.regressions.description import unusual_in_flight
+
+    return unusual_in_flight(severity)
 
 
 def case_text(

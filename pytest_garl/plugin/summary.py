@@ -114,7 +114,7 @@ def _property_values(reporter: Any, outcomes: tuple[str, ...], key: str) -> set[
 
 
 def _write_searches(reporter: Any, run: Run, tally: Tally) -> list[SearchSummary]:
-    searches = tally.search_summaries(run.ledger)
+    searches = _with_cases(run, tally.search_summaries(run.ledger))
     if run.options.searches_or_repeats:
         failures = [dataclasses.asdict(each) for each in tally.user_failures]
         run.ledger.note_fact(USER_FAILURES, failures)
@@ -124,6 +124,16 @@ def _write_searches(reporter: Any, run: Run, tally: Tally) -> list[SearchSummary
         for line in _lines_about(searches, run, tally, reporter):
             reporter.write_line(line)
     return searches
+
+
+def _with_cases(run: Run, searches: list[SearchSummary]) -> list[SearchSummary]:
+    """Return the summaries with the causes that the cases of this run and the saved ones tell."""
+    systems = dict.fromkeys(each.system for each in searches)
+    cases = [
+        *(each.result.case for each in run.investigated),
+        *(entry.case for system in systems for entry in run.options.corpus.entries(system)),
+    ]
+    return [each.with_cases([case for case in cases if case]) for each in searches]
 
 
 def _lines_about(searches: list[SearchSummary], run: Run, tally: Tally, reporter: Any) -> list[str]:
@@ -239,10 +249,10 @@ def _kind_lines(
         command = repeat_kind_command(search, kind, config)
         fits = len(signature) + 2 + len(command) <= width
         lines += [f"{signature}  {command}"] if fits else [signature.rstrip(), f"{'':8}{command}"]
-        lines.append(wrapped(kind.headline, width, first=" " * 8, others=" " * 8))
-        least = f"at the least: {kind.severity_text}" if kind.severity_text else ""
+        for text in filter(None, (kind.title, kind.headline)):
+            lines.append(wrapped(text, width, first=" " * 8, others=" " * 8))
         seen = in_control_text(kind.in_control, search.random_flights)
-        facts = "; ".join(fact for fact in (least, seen) if fact)
+        facts = "; ".join(fact for fact in (kind.least, seen) if fact)
         if facts:
             lines.append(wrapped(facts, width, first=" " * 8, others=" " * 10))
         if kind.signature in films:

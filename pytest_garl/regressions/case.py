@@ -212,6 +212,11 @@ class Case:
         return f"{evidence.neighbours_failed} of {evidence.neighbours} neighbours fail too"
 
     @property
+    def is_shrunk(self) -> bool:
+        """Whether flights showed what the violation takes; else the case is as it was found."""
+        return bool(self.evidence.neighbours) or self.severity.window_s is not None
+
+    @property
     def asserting_test(self) -> str:
         """The name of the test whose own assertion failed; empty for the built-in verdict."""
         return asserting_test(self.test, self.assertion)

@@ -83,7 +83,7 @@ def dump_case(case: Case, load_map: Callable[[str], Map] = load_map) -> str:
     sections = [
         header_lines(case, map),
         _violation_lines(case.violation),
-        *severity_lines(case.severity),
+        *severity_lines(case.severity, is_shrunk=case.is_shrunk),
         *_prevention_lines(case.prevention),
         _limits_lines(case.limits),
         [

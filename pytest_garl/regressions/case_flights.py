@@ -12,8 +12,11 @@ from pytest_garl.regressions.case_request import CaseRequest, CaseResult, Failin
 from pytest_garl.regressions.move_reduction import short_moves
 from pytest_garl.regressions.prevention import collision_of, prevention_of
 from pytest_garl.regressions.robustness import NEIGHBOURS, neighbours
+from pytest_garl.regressions.simplification import removals, simplified
+from pytest_garl.scenarios.conditions import unread_groups, without_groups
 from pytest_garl.scenarios.maps.map import Map
 from pytest_garl.scenarios.scenario import Scenario
+from pytest_garl.scenarios.validity import repair
 from pytest_garl.simulation.flight_file import load
 from pytest_garl.simulation.npc_policy import PolicySpec
 
@@ -34,7 +37,10 @@ class CaseFlights:
         self.asked_prevention = False
         self._fly = fly
         self._live: dict[Scenario, CompletedFlight] = dict(request.violations)
-        self._of_search = frozenset(self._live)
+        self._of_search = {*self._live}
+        self._origins: dict[Scenario, Scenario] = {}
+        self._flown: set[Scenario] = set()
+        self._failed: list[Scenario] = []
 
     @property
     def map(self) -> Map:
@@ -55,6 +61,42 @@ class CaseFlights:
         """Return what the objects did in the live flight of a scenario."""
         return recorded_behaviour(self._live[scenario], scenario, self.map)
 
+    def without_unread(self, scenario: Scenario) -> Scenario:
+        """Return a violation of the search without the conditions whose data was never read.
+
+        Its flight is the same, so nothing is flown.
+        """
+        flight = self._live[scenario]
+        found = without_unread(self.request, scenario, flight)
+        if found != scenario:
+            self._live[found] = flight
+            self._of_search.add(found)
+            self._origins[found] = scenario
+        return found
+
+    def as_found(self, failing: FailingScenario) -> FailingScenario:
+        """Return a failure with the scenario of the search, all its conditions included."""
+        origin = self._origins.get(failing.origin, failing.origin)
+        return dataclasses.replace(failing, origin=origin)
+
+    def untried(self, failing: FailingScenario) -> tuple[str, ...]:
+        """Return the conditions and objects of which no flight showed whether they are needed.
+
+        A flight shows that if it lacks nothing but them of a scenario that failed.
+        """
+        scenario, map = failing.scenario, self.map
+        hit = find_colliding_object(failing.flight)
+        known = dict.fromkeys((scenario, *self._failed))
+        names = []
+        for name, steps in removals(scenario, map, hit).items():
+            ways = [[step] for step in steps] + ([steps] if len(steps) > 1 else [])
+            known = dict.fromkeys((scenario, *self._failed))
+            if not any(
+                repair(simplified(e, way), map) in self._flown for e in known for way in ways
+            ):
+                names.append(name)
+        return tuple(names)
+
     def fly_live(self, scenario: Scenario) -> CompletedFlight:
         """Fly a scenario with the search's policy."""
         flight = self._live[scenario] = self._go(self.request.job, scenario)
@@ -70,11 +112,11 @@ class CaseFlights:
 
     def fails_live(self, scenario: Scenario) -> bool:
         """Fly a scenario with the search's policy; return whether it fails in the same way."""
-        return self.request.fails(scenario, self.fly_live(scenario))
+        return self._fails(scenario, self.fly_live(scenario))
 
     def fails_recorded(self, scenario: Scenario, behaviour: RecordedBehaviour) -> bool:
         """Fly a scenario with recorded moves; return whether it fails in the same way."""
-        return self.request.fails(scenario, self.fly_recorded(scenario, behaviour))
+        return self._fails(scenario, self.fly_recorded(scenario, behaviour))
 
     def confirm(
         self,
@@ -89,7 +131,7 @@ class CaseFlights:
         Returns None if the scenario does not fail, or if fewer than ``at_least`` neighbours fail.
         """
         flight = self._known_flight(scenario, behaviour) or self.fly_recorded(scenario, behaviour)
-        if not self.request.fails(scenario, flight):
+        if not self._fails(scenario, flight):
             return None
         failing = self.count_neighbours(origin, scenario, behaviour, flight, at_least=at_least)
         return failing if failing.neighbours_failed >= at_least else None
@@ -160,9 +202,28 @@ class CaseFlights:
             reason=reason,
         )
 
+    def _fails(self, scenario: Scenario, flight: CompletedFlight) -> bool:
+        if not self.request.fails(scenario, flight):
+            return False
+        self._failed.append(scenario)
+        return True
+
     def _go(self, job: FlightJob, scenario: Scenario) -> CompletedFlight:
         self.flown += 1
+        self._flown.add(scenario)
         return self._fly(job, scenario)
+
+
+def without_unread(request: CaseRequest, scenario: Scenario, flight: CompletedFlight) -> Scenario:
+    """Return a scenario without the conditions that change only data which was never read.
+
+    ``flight`` is its flight.  What a system never reads cannot change what it does, so the other
+    scenario has the same flight; the assertion of a test may judge it in another way.
+    """
+    if not flight.record.exists():
+        return scenario
+    found = without_groups(scenario, unread_groups(scenario, load(flight.record).data_read))
+    return found if request.fails(found, flight) else scenario
 
 
 def recorded_behaviour(flight: CompletedFlight, scenario: Scenario, map: Map) -> RecordedBehaviour:

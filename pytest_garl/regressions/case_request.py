@@ -141,6 +141,11 @@ class FailingScenario:
     window_s: float | None = None
 
     @property
+    def is_shrunk(self) -> bool:
+        """Whether flights showed what it takes; else it is as the search found it."""
+        return bool(self.neighbours_flown) or self.window_s is not None
+
+    @property
     def is_robust(self) -> bool:
         """Whether the case gates: the entry has a window, or all neighbours fail."""
         if self.window_s is not None:

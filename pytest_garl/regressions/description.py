@@ -29,18 +29,35 @@ NEAR_M = 3.0
 own stride."""
 
 
-def describe(flight: Flight, verdict: Verdict, severity: Severity = NO_SEVERITY) -> str:
-    """Return the verdict's sentence behind what it took.
+def describe(
+    flight: Flight,
+    verdict: Verdict,
+    severity: Severity = NO_SEVERITY,
+    *,
+    is_shrunk: bool = False,
+) -> str:
+    """Return the verdict's sentence behind what it took, or what was unusual if it is not shrunk.
 
     After a collision that is how the moving object came near, else the conditions.
     """
     if severity.about == "conditions" and severity.conditions:
-        return f"{_sentence(severity.text)}: {verdict.story}"
+        if is_shrunk:
+            return f"{_sentence(severity.text)}: {verdict.story}"
+        return f"{unusual_in_flight(severity)} {verdict.story}"
     contact = flight.contacts[-1] if flight.contacts else None
     if verdict.violation_type != "IV" or contact is None:
         return verdict.story
     hit = next((item for item in flight.objects if item.name == contact.body), None)
     return f"{_approach(flight, hit, severity)} {verdict.story}" if hit else verdict.story
+
+
+def unusual_in_flight(severity: Severity) -> str:
+    """Return a sentence about a flight of which nobody knows what it took; it may be empty."""
+    if not severity.about:
+        return ""
+    if not severity.unusual:
+        return "Nothing was unusual in this flight."
+    return f"Unusual in this flight: {severity.unusual}."
 
 
 def _sentence(text: str) -> str:
@@ -65,7 +82,7 @@ def _approach(flight: Flight, hit: ObjectRecord, severity: Severity) -> str:
     point = compass_point(float(side[0]), float(side[1]))
     told = f"{kind} at {speed:.1f} m/s"
     if severity.about == "body":
-        told = _sentence(severity.text) + ("," if severity.objects > 1 else "")
+        told = _sentence(severity.unusual) + ("," if severity.objects > 1 else "")
     return (
         f"{told} enters from the {point} while the UAV is {up:.1f} m above "
         f"{_ground_below(flight, uav[entered])}."

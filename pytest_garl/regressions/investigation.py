@@ -52,6 +52,9 @@ class CaseBuilder:
         scenarios = request.scenarios
         if not scenarios:
             return flights.result(None, NOT_REPRODUCED)
+        # What the landing system never read is no cause, and to drop it takes no flight.
+        first = [flights.without_unread(each) for each in scenarios[:CANDIDATES]]
+        scenarios = [*first, *scenarios[CANDIDATES:]]
         if request.is_exception:
             return self._exception(scenarios[0])
         if not find_colliding_object(flights.live_flight(scenarios[0])):
@@ -89,7 +92,13 @@ class CaseBuilder:
     def _result(self, failing: FailingScenario) -> CaseResult:
         """Return the case of a failure, with the answer whether it could have been prevented."""
         flights = self._flights
-        return flights.result(new_case(self._request, failing, flights.prevention(failing)))
+        case = new_case(
+            self._request,
+            flights.as_found(failing),
+            flights.prevention(failing),
+            flights.untried(failing),
+        )
+        return flights.result(case)
 
     def _exception(self, first: Scenario) -> CaseResult:
         """Return the case of an exception or a hang: with an empty scenario if that fails too."""

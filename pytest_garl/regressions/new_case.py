@@ -15,7 +15,7 @@ from pytest_garl.regressions.case import (
     Prevention,
     Violation,
 )
-from pytest_garl.regressions.case_flights import recorded_behaviour
+from pytest_garl.regressions.case_flights import recorded_behaviour, without_unread
 from pytest_garl.regressions.case_request import CaseRequest, CaseResult, FailingScenario
 from pytest_garl.regressions.description import describe
 from pytest_garl.regressions.removed import Removed
@@ -39,10 +39,11 @@ def case_without_flights(request: CaseRequest) -> CaseResult:
             reason="not flown again without people, dogs and birds: no flights are left",
             finding=request.finding,
         )
-    scenario = request.simplest
-    flight = dict(request.violations)[scenario]
+    origin = request.simplest
+    flight = dict(request.violations)[origin]
+    scenario = without_unread(request, origin, flight)
     failing = FailingScenario(
-        origin=scenario,
+        origin=origin,
         scenario=scenario,
         behaviour=recorded_behaviour(flight, scenario, request.map),
         flight=flight,
@@ -55,14 +56,18 @@ def new_case(
     request: CaseRequest,
     failing: FailingScenario,
     prevention: Prevention = NOT_ASKED,
+    untried: tuple[str, ...] = (),
 ) -> Case:
-    """Return the case of a failing scenario."""
+    """Return the case of a failing scenario.
+
+    ``untried`` names what shrinking did not try to remove.
+    """
     completed, job = failing.flight, request.job
     flight = load(completed.record) if completed.record.exists() else None
     ask = request.user_assertion
     failure = ask(completed, failing.scenario) if ask else None
     npcs = failing.npcs or job.npcs
-    severity = _severity(request, failing, flight, npcs)
+    severity = dataclasses.replace(_severity(request, failing, flight, npcs), untried=untried)
     return Case(
         system=job.system.name,
         status="open",
@@ -72,7 +77,9 @@ def new_case(
         scenario=failing.scenario,
         violation=_own_violation(failure, completed.result.verdict)
         if failure is not None
-        else violation_in(completed.result.verdict, flight, severity),
+        else violation_in(
+            completed.result.verdict, flight, severity, is_shrunk=failing.is_shrunk
+        ),
         policy=npcs.name,
         policy_sha256=npcs.sha256,
         moves=failing.behaviour.moves,
@@ -126,7 +133,9 @@ def _own_violation(failure: UserFailure, verdict: Verdict) -> Violation:
     )
 
 
-def violation_in(verdict: Verdict, flight: Flight | None, severity: Severity) -> Violation:
+def violation_in(
+    verdict: Verdict, flight: Flight | None, severity: Severity, *, is_shrunk: bool
+) -> Violation:
     """Return the violation that a verdict found."""
     assert verdict.primary is not None
     assert verdict.violation_type is not None
@@ -137,5 +146,7 @@ def violation_in(verdict: Verdict, flight: Flight | None, severity: Severity) ->
         property=verdict.primary,
         margin=margin.value if margin else 0.0,
         unit=margin.unit if margin else "1",
-        description=describe(flight, verdict, severity) if flight else verdict.story,
+        description=describe(flight, verdict, severity, is_shrunk=is_shrunk)
+        if flight
+        else verdict.story,
     )

@@ -21,7 +21,12 @@ from pytest_garl.execution.reference import (
 from pytest_garl.execution.sources import sources_sha256
 from pytest_garl.regressions.case import NOT_ASKED, Case, Prevention, RecordedBehaviour
 from pytest_garl.regressions.case_file import record_lines, size_of
-from pytest_garl.regressions.case_flights import ESCAPE_FLIGHTS, CaseFlights, find_colliding_object
+from pytest_garl.regressions.case_flights import (
+    ESCAPE_FLIGHTS,
+    CaseFlights,
+    find_colliding_object,
+    without_unread,
+)
 from pytest_garl.regressions.case_request import CaseRequest, CaseResult, FailingScenario
 from pytest_garl.regressions.investigation import simplest_robust, with_shorter_record
 from pytest_garl.regressions.new_case import new_case
@@ -109,13 +114,14 @@ class CaseReshrinker:
         saved = self._reproduce()
         if saved is None:
             return flights.result(None, NOT_REPRODUCED)
+        simpler = self._without_unread(saved)
         # A crossing is alone, careless and as slow as usual; its entry would lose its window.
         is_crossing = case.severity.window_s is not None
         better = None
         if not is_crossing:
-            better = self._improved_case(saved, self._shrink_by_record(saved))
+            better = self._improved_case(saved, self._shrink_by_record(simpler))
         if better is None and not is_crossing:
-            better = self._improved_case(saved, self._shrink_by_policy(saved))
+            better = self._improved_case(saved, self._shrink_by_policy(simpler))
         if better is None and self._is_outdated():
             better = self._replacement(saved, case.prevention)
         return flights.result(better, "" if better else NOTHING_SIMPLER)
@@ -139,6 +145,11 @@ class CaseReshrinker:
             neighbours_flown=evidence.neighbours,
             window_s=case.severity.window_s,
         )
+
+    def _without_unread(self, saved: FailingScenario) -> FailingScenario:
+        """Return the failure without the conditions whose data was never read: the same flight."""
+        found = without_unread(self._request, saved.scenario, saved.flight)
+        return dataclasses.replace(saved, scenario=found) if found != saved.scenario else saved
 
     def _is_outdated(self) -> bool:
         """Return whether the case's evidence comes from other sources than today's."""
@@ -214,7 +225,11 @@ class CaseReshrinker:
 
     def _replacement(self, failing: FailingScenario, prevention: Prevention) -> Case:
         """Return a failure as the case that replaces the saved one."""
-        case, found = self._case, new_case(self._request, failing, prevention)
+        case, untried = self._case, self._flights.untried(failing)
+        if case.is_shrunk:
+            # What was tried when it was saved need not be tried again.
+            untried = tuple(name for name in untried if name in case.severity.untried)
+        found = new_case(self._request, failing, prevention, untried)
         removed = all_removed(case.evidence.removed, found.evidence.removed)
         return dataclasses.replace(
             found,

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
-from pytest_garl.scenarios.conditions import has_harsher_end
+from pytest_garl.scenarios.conditions import active_conditions, cause_of_key, has_harsher_end
 from pytest_garl.scenarios.genes import Genome, NuclearGene, Property
 from pytest_garl.scenarios.genome_like import genome_like
 from pytest_garl.scenarios.groups.catalogue import GROUPS
@@ -54,6 +54,27 @@ def simplifications(scenario: Scenario, genome: Genome, colliding_object: str) -
         conditions.append((_strength(scenario, gene), _reset(nominal)))
     conditions.sort(key=lambda each: each[0])
     return Simplifications(objects=objects, conditions=[step for _, step in conditions])
+
+
+def removals(
+    scenario: Scenario, map: Map, colliding_object: str
+) -> dict[str, list[Simplification]]:
+    """Return how to remove each object, and how to make each condition nominal, by name.
+
+    A condition may have several genes.  The marker's place and whoever was hit are not named.
+    """
+    found: dict[str, list[Simplification]] = {}
+    for key, _ in scenario.genes:
+        name = key.partition(".")[0]
+        if key.endswith(".velocity") and name != colliding_object:
+            found[name] = [_removal(name)]
+    active = {each.cause for each in active_conditions(scenario)}
+    for gene in genome_of(scenario, map).genes:
+        nominal = {item.key: item.nominal for item in gene.properties}
+        cause = cause_of_key(gene.properties[0].key)
+        if cause in active and any(scenario[key] != value for key, value in nominal.items()):
+            found.setdefault(cause, []).append(_reset(nominal))
+    return found
 
 
 def value_simplifications(scenario: Scenario, genome: Genome) -> list[list[Simplification]]:

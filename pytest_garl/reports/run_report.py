@@ -19,6 +19,7 @@ from pytest_garl.execution.ledger import Ledger
 from pytest_garl.execution.ledger_queries import LedgerFlight
 from pytest_garl.messages import command
 from pytest_garl.regressions.corpus import Corpus
+from pytest_garl.reports.causes import cause_of
 from pytest_garl.reports.search_summary import (
     SearchSummary,
     SlotUserFailure,
@@ -57,15 +58,19 @@ def run_report_as_json(path: Path, corpus: Corpus) -> dict[str, Any]:
         return run_report_of(ledger, path, corpus)
 
 
-def summaries_of(ledger: Ledger) -> list[SearchSummary]:
-    """Return the summary of each search, with the failed assertions about users' own properties."""
+def summaries_of(ledger: Ledger, corpus: Corpus) -> list[SearchSummary]:
+    """Return the summary of each search, with the causes that saved cases tell.
+
+    Failed assertions about users' own properties are among the kinds.
+    """
     failures = [SlotUserFailure(**each) for each in ledger.fact(USER_FAILURES) or ()]
-    return search_summaries(ledger, failures)
+    cases = [entry.case for entry in corpus.all_entries() if entry.case is not None]
+    return [each.with_cases(cases) for each in search_summaries(ledger, failures)]
 
 
 def run_report_of(ledger: Ledger, path: Path, corpus: Corpus) -> dict[str, Any]:
     """Return the report of the run in an open ledger, which lies at ``path``."""
-    summaries = summaries_of(ledger)
+    summaries = summaries_of(ledger, corpus)
     progress = ledger.queries.progress()
     slots: Counter[tuple[str, str]] = Counter()
     for each in progress:
@@ -130,12 +135,15 @@ def _search(
             "distance": count_decided(verdicts, "distance"),
             "time": count_decided(verdicts, "time"),
         },
+        "causes": len({cause_of(kind.case.severity) for kind in summary.kinds if kind.case}),
         "effective_kinds": round(summary.effective_kinds, 4),
         "control": _control(summary),
         "signatures": [
             {
                 **_kind(summary, kind, path),
-                "severity": kind.severity.to_json() if kind.severity else None,
+                "title": kind.title,
+                "cause": list(cause_of(kind.case.severity)) if kind.case else None,
+                "severity": _severity(kind),
                 "in_control": kind.in_control,
                 "cases": [
                     case["file"]
@@ -160,6 +168,13 @@ def _kind(summary: SearchSummary, kind: ViolationKind, path: Path) -> dict[str, 
         "headline": kind.headline,
         "repeat": _repeat_command(summary, kind.first, path),
     }
+
+
+def _severity(kind: ViolationKind) -> dict[str, Any] | None:
+    """Return what the shrunk case of a kind takes, or what was unusual in its least flight."""
+    if kind.case is not None:
+        return kind.case.severity.to_json(took=True)
+    return kind.severity.to_json(took=False) if kind.severity else None
 
 
 def _control(summary: SearchSummary) -> dict[str, Any] | None:
@@ -218,7 +233,9 @@ def _cases(corpus: Corpus, systems: set[str]) -> list[dict[str, Any]]:
                 "reason": case.reason,
                 "known": corpus.is_accepted(entry),
                 "story": case.violation.description,
-                "severity": case.severity.to_json() if case.severity.about else None,
+                "severity": case.severity.to_json(took=case.is_shrunk)
+                if case.severity.about
+                else None,
             }
         )
     return found

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import statistics
 from collections.abc import Iterable, Mapping, Sequence, Set
 from dataclasses import dataclass
@@ -12,6 +13,8 @@ from pytest_garl.execution.job import FlightJob, parse_job
 from pytest_garl.execution.ledger import Ledger
 from pytest_garl.execution.ledger_queries import LedgerFlight
 from pytest_garl.execution.severity import Severity
+from pytest_garl.regressions.case import Case
+from pytest_garl.reports.causes import cause_of, counted_causes, telling_case, title_of
 from pytest_garl.reports.control_arm import ControlArm, control_arm, is_control
 from pytest_garl.verdicts.kinds import hill_number
 from pytest_garl.verdicts.verdict import Limits, NoLanding, Verdict
@@ -51,7 +54,7 @@ class ViolationKind:
     in it, and ``headline`` the story in short.  ``severity`` is the lowest of these flights, None
     if none is known, and ``severest`` the first slot with it.  ``in_control`` is the number of
     random flights that show it, None without a control arm to compare with.  ``slots`` are those of
-    the flights.
+    the flights.  ``case`` is the shrunk case that tells its cause, None if nobody knows the cause.
     """
 
     signature: str
@@ -63,11 +66,24 @@ class ViolationKind:
     severest: str = ""
     in_control: int | None = None
     slots: tuple[str, ...] = ()
+    case: Case | None = None
 
     @property
-    def severity_text(self) -> str:
-        """The lowest severity in words; empty if there is nothing to say."""
-        return self.severity.text if self.severity else ""
+    def title(self) -> str:
+        """The cause and the ending in a few words; empty if nobody knows the cause."""
+        return title_of(self.case) if self.case else ""
+
+    @property
+    def least(self) -> str:
+        """What it takes at the least, of a shrunk case; else what was unusual in its flights.
+
+        It may be empty.
+        """
+        if self.case is not None:
+            return f"at the least: {self.case.severity.text}"
+        if self.severity is None or not self.severity.about:
+            return ""
+        return f"unusual in {self.severest}: {self.severity.unusual or 'nothing'}"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -112,6 +128,21 @@ class SearchSummary:
     def random_flights(self) -> int:
         """The number of flights of the control arm, 0 without one."""
         return self.control.random.flights if self.control else 0
+
+    @property
+    def causes(self) -> str:
+        """How many causes its kinds have, in words; empty if none is known."""
+        return counted_causes([kind.case for kind in self.kinds])
+
+    def with_cases(self, cases: Sequence[Case]) -> Self:
+        """Return it with the causes that cases tell; kinds of one cause stand together."""
+        told = [
+            dataclasses.replace(
+                kind, case=telling_case(cases, self.system, self.map, kind.signature)
+            )
+            for kind in self.kinds
+        ]
+        return dataclasses.replace(self, kinds=tuple(by_cause(told)))
 
     @property
     def effective_kinds(self) -> float:
@@ -241,6 +272,19 @@ def _summary(
         npcs=tuple(dict.fromkeys(job.npcs.name for job in jobs)),
         control=control,
     )
+
+
+def by_cause(kinds: Sequence[ViolationKind]) -> list[ViolationKind]:
+    """Return kinds with those of one cause together, the most frequent cause first.
+
+    A kind of which nobody knows the cause stands for itself.  The order within a cause is kept.
+    """
+    groups: dict[tuple[str, ...], list[ViolationKind]] = {}
+    for kind in kinds:
+        key = cause_of(kind.case.severity) if kind.case else ("", kind.signature)
+        groups.setdefault(key, []).append(kind)
+    ordered = sorted(groups.values(), key=lambda group: -sum(kind.count for kind in group))
+    return [kind for group in ordered for kind in group]
 
 
 def _lowest_severities(flights: Sequence[LedgerFlight]) -> dict[str, tuple[Severity, str]]:

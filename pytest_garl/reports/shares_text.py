@@ -43,7 +43,10 @@ def share_lines(search: SearchSummary) -> list[str]:
 def kinds_lines(search: SearchSummary) -> list[str]:
     """Return how diverse the violations are, and what random flights found beside the search."""
     number, effective = len(search.kinds), search.effective_kinds
-    diverse = f"{number} kinds of violation, as diverse as {effective:.1f} equally frequent ones"
+    causes = f", {search.causes}" if search.causes else ""
+    diverse = (
+        f"{number} kinds of violation{causes}, as diverse as {effective:.1f} equally frequent ones"
+    )
     return [text for text in (diverse if number > 1 else "", control_text(search)) if text]
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from dataclasses import dataclass
 
 from pytest_garl.scenarios.domains.genome import WEATHER_CAUSES
@@ -58,6 +58,39 @@ def active_conditions(scenario: Scenario) -> tuple[ActiveCondition, ...]:
         if name != LIGHT_GROUP and not is_exact:
             found += _condition(name, list(_values(scenario, group)))
     return tuple(found)
+
+
+_CAUSE_OF_WEATHER = {
+    f"environment.{name}": cause for cause, names in WEATHER_CAUSES.items() for name in names
+}
+
+
+def cause_of_key(key: str) -> str:
+    """Return the cause to which the gene of a scenario belongs: ``fog``, ``light``, ``wind``."""
+    if key in (SUN, TURN):
+        return LIGHT_GROUP
+    return _CAUSE_OF_WEATHER.get(key, key.partition(".")[0])
+
+
+def unread_groups(scenario: Scenario, data_read: Collection[str] | None) -> tuple[str, ...]:
+    """Return the groups that are not nominal and change only data that was never read.
+
+    ``data_read`` are the fields of an observation that the landing system read in the flight of the
+    scenario; if nobody knows (None), no group is named.
+    """
+    if data_read is None:
+        return ()
+    return tuple(
+        name
+        for name, group in GROUPS.items()
+        if group.feeds and group.feeds not in data_read and any(_values(scenario, group))
+    )
+
+
+def without_groups(scenario: Scenario, names: Collection[str]) -> Scenario:
+    """Return a scenario in which these groups are nominal."""
+    nominal = {key: value for name in names for key, value in GROUPS[name].nominal.items()}
+    return scenario.replace(nominal) if nominal else scenario
 
 
 def _condition(cause: str, values: list[tuple[float, str]]) -> list[ActiveCondition]:

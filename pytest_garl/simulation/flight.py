@@ -17,6 +17,8 @@ BodyClass = Literal["static", "dynamic", "ground"]
 
 TRACK_RATE_HZ = 24.0
 """Rate of the recorded tracks: every tenth physics step."""
+OBSERVED = ("image", "depth_m", "rangefinder_m")
+"""The fields of an observation of which a flight records whether they were read."""
 PACKAGES = ("pytest-garl", "numpy", "opencv-python-headless", "pybullet")
 """Packages whose versions determine the bytes of a flight."""
 
@@ -213,7 +215,9 @@ class Flight:
     ``nominal_views`` show how a nominal landing would have seen the marker; they are empty for
     flights that landed, hit something or crashed, and for simulators that do not record them.
     ``nominal_arrival_s`` and ``nominal_landing_s`` are when a nominal flight is above the marker
-    and on it.  ``rangefinder`` is the airframe's, None without one.
+    and on it.  ``rangefinder`` is the airframe's, None without one.  ``data_read`` names those of
+    ``OBSERVED`` that the landing system read in any frame; None for simulators that do not record
+    it.  It is in no hash.
     """
 
     outcome: Outcome
@@ -234,6 +238,7 @@ class Flight:
     nominal_arrival_s: float | None = None
     nominal_landing_s: float | None = None
     rangefinder: Rangefinder | None = None
+    data_read: tuple[str, ...] | None = None
     sha256: str = ""
     cpu: str = ""
     versions: tuple[tuple[str, str], ...] = ()

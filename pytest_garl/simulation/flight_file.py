@@ -107,6 +107,7 @@ def save(flight: Flight, path: Path) -> None:
         "nominal_arrival_s": flight.nominal_arrival_s,
         "nominal_landing_s": flight.nominal_landing_s,
         "rangefinder": dataclasses.asdict(flight.rangefinder) if flight.rangefinder else None,
+        "data_read": flight.data_read,
         "sha256": flight.sha256,
         "cpu": flight.cpu,
         "versions": flight.versions,
@@ -229,6 +230,7 @@ class _Header:
     nominal_arrival_s: float | None
     nominal_landing_s: float | None
     rangefinder: Rangefinder | None
+    data_read: tuple[str, ...] | None
     sha256: str
     cpu: str
     versions: tuple[tuple[str, str], ...]

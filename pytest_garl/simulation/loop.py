@@ -239,8 +239,7 @@ class Loop:
             self._system.told.observe_truth(_truth(self, self._navigation.error_m))
         command = self._system.step(delivery.observation)
         error_m = estimation_error_m(delivery.observation, delivery.place_m)
-        range_m = delivery.observation.rangefinder_m
-        self.recorder.step(command, delivery.sight, error_m, range_m)
+        self.recorder.step(command, delivery.sight, error_m, delivery.range_m)
         latency_s = self._system.airframe.latency_s
         self._pending.append((tick + round(latency_s * PHYSICS_RATE_HZ), command))
 

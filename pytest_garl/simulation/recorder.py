@@ -15,6 +15,7 @@ from pytest_garl.scenarios.placement import Pad
 from pytest_garl.simulation.camera.frame import Frame
 from pytest_garl.simulation.camera.renderer import Renderer
 from pytest_garl.simulation.flight import (
+    OBSERVED,
     BodyClass,
     Contact,
     Crash,
@@ -66,6 +67,8 @@ class Recorder:
         self._events: list[Event] = []
         self._steps: list[Step] = []
         self._phase = ""
+        self.data_read: set[str] = set()
+        """Names of the data that the landing system read."""
 
     def begin(self, position: Vector, attitude: Quaternion, velocity: Vector) -> None:
         """Record the pose at time zero, so a flight that fails at its start has a track too."""
@@ -204,6 +207,7 @@ class Recorder:
             crash=crash,
             touchdown=touchdowns[-1] if touchdowns else None,
             earlier_touchdowns=tuple(touchdowns[:-1]),
+            data_read=tuple(name for name in OBSERVED if name in self.data_read),
         )
 
 

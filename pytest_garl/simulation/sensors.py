@@ -32,12 +32,14 @@ from pytest_garl.simulation.timing import Timing
 class Delivery:
     """An observation as it reaches the landing system.
 
-    ``sight`` is what its picture shows, ``place_m`` where the UAV was when it was taken.
+    ``sight`` is what its picture shows, ``place_m`` where the UAV was when it was taken,
+    ``range_m`` the reading of the rangefinder: whoever asks the observation for it has read it.
     """
 
     observation: Observation
     sight: Sight
     place_m: Vector
+    range_m: float | None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -154,6 +156,12 @@ class Sensors:
             attitude=pose.attitude,
             rangefinder_m=picture.range_m,
             rng=self._rng,
+            noted=self._recorder.data_read,
         )
-        delivery = Delivery(observation=observation, sight=picture.sight, place_m=picture.place_m)
+        delivery = Delivery(
+            observation=observation,
+            sight=picture.sight,
+            place_m=picture.place_m,
+            range_m=picture.range_m,
+        )
         self._under_way.append((self._timing.arrival(tick, picture.jitter_ms), delivery))

@@ -198,7 +198,7 @@ def test_a_report_is_written_to_a_file_or_printed_as_text(searched: Path) -> Non
     assert "Good on lawn: 8 of 8 flown, 6 landed, 8 violate (3 by the paper's definition" in words
     assert "gave up: needless 0, excused 0, blocked 0" in words
     assert "IV:dog:last-metre:unseen: collided with dog-1" in words
-    assert "\n        at the least: a hostile dog at 0.0 m/s for 14.2 s" in words
+    assert "\n        unusual in the least of them: a hostile dog at 0.0 m/s for 14.2 s" in words
 
 
 def test_a_report_changes_no_result(pytester: pytest.Pytester, searched: Path) -> None:

@@ -106,7 +106,59 @@ def test_severity_of_an_earlier_version_has_no_values() -> None:
 
 
 def test_report_holds_only_facts_that_count() -> None:
-    assert NO_SEVERITY.to_json() == {"about": "", "text": ""}
-    assert PERSON.to_json()["grade"] == "careless"
-    assert "conditions" not in PERSON.to_json()
-    assert FOG.to_json()["conditions"] == ["fog"]
+    assert NO_SEVERITY.to_json(took=False) == {"about": "", "took": False, "text": ""}
+    assert PERSON.to_json(took=True)["grade"] == "careless"
+    assert "conditions" not in PERSON.to_json(took=True)
+    assert FOG.to_json(took=True)["conditions"] == ["fog"]
+
+
+def test_only_a_shrunk_case_says_what_it_took() -> None:
+    assert FOG.to_json(took=True)["text"] == "fog alone, visibility 11 m"
+    assert FOG.to_json(took=False)["text"] == "fog (visibility 11 m)"
+
+
+@pytest.mark.parametrize(
+    ("severity", "unusual"),
+    [
+        (FOG, "fog (visibility 11 m)"),
+        (CAMERA, "camera, person-1"),
+        (
+            dataclasses.replace(CAMERA, conditions=("camera",), values=("5 values",)),
+            "camera (5 values, most of all dirt 15 %)",
+        ),
+        (dataclasses.replace(FOG, conditions=tuple("abcdef")), "a, b, c, d, 2 more"),
+        (PERSON, "a careless person at 1.4 m/s"),
+        (Severity(about="conditions"), ""),
+        (NO_SEVERITY, ""),
+    ],
+)
+def test_what_was_unusual_is_said_without_a_cause(severity: Severity, unusual: str) -> None:
+    assert severity.unusual == unusual
+
+
+LIGHT_AND_DEPTH = Severity(
+    about="conditions",
+    conditions=("light", "depth"),
+    values=("sun 23 degrees high", "range 7.8 m"),
+    largest="sun 23 degrees high",
+    largest_share=0.7,
+)
+
+
+def test_data_that_was_never_read_is_no_condition() -> None:
+    blind = dataclasses.replace(LIGHT_AND_DEPTH, unread=("depth",))
+    assert blind.text == "light alone, sun 23 degrees high"
+    assert blind.unusual == "light (sun 23 degrees high)"
+    # What a system reads does not change which flights a search prefers.
+    assert blind.key == LIGHT_AND_DEPTH.key
+
+
+def test_what_shrinking_did_not_try_is_named() -> None:
+    one = dataclasses.replace(LIGHT_AND_DEPTH, untried=("depth",))
+    assert one.text == (
+        "2 conditions: light (sun 23 degrees high), depth (range 7.8 m); depth was not tried"
+    )
+    both = dataclasses.replace(LIGHT_AND_DEPTH, untried=("depth", "light"))
+    assert both.text.endswith("; depth and light were not tried")
+    body = dataclasses.replace(PERSON, objects=2, untried=("fog", "dog-1"))
+    assert body.text.endswith("1 other there; fog and dog-1 were not tried")

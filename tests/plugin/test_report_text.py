@@ -43,10 +43,14 @@ def test_headline_stands_where_people_look(
 def test_failure_and_summary_say_how_severe_the_violation_is(pytester: pytest.Pytester) -> None:
     project(pytester)
     output = run(pytester, *SEARCH, "--garl-shrink=0").stdout.str()
-    assert "\nIt took a hostile dog at 0.0 m/s for " in output
-    assert "\n        at the least: a hostile dog at 0.0 m/s for " in output
+    assert "\nUnusual in this flight: a hostile dog at 0.0 m/s for " in output
+    assert "It took" not in output
+    assert "at the least" not in output
+    assert re.search(
+        r"\n        unusual in lawn-g\d\d-s\d\d: a hostile dog at 0.0 m/s for ", output
+    )
     harmless = run(pytester, *SEARCH, "--garl-shrink=0", "--garl-npcs=waypoint").stdout.str()
-    assert "\nIt took a careless dog at 0.0 m/s" in harmless
+    assert "\nUnusual in this flight: a careless dog at 0.0 m/s" in harmless
 
 
 def test_printed_command_repeats_the_failure(pytester: pytest.Pytester) -> None:

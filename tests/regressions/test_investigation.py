@@ -1,7 +1,9 @@
 from __future__ import annotations
 
+import dataclasses
 import random
 from collections.abc import Callable
+from pathlib import Path
 
 import pytest
 
@@ -18,6 +20,8 @@ from pytest_garl.regressions.investigation import (
 from pytest_garl.regressions.robustness import NEIGHBOURS, neighbours
 from pytest_garl.scenarios.conditions import active_conditions
 from pytest_garl.scenarios.scenario import Scenario
+from pytest_garl.scenarios.validity import repair
+from pytest_garl.simulation.flight_file import save
 from tests.regressions.samples import (
     LAWN,
     OBJECT_NAMES,
@@ -26,6 +30,7 @@ from tests.regressions.samples import (
     make_case_request,
     violating_scenario,
 )
+from tests.support.recorded_flights import recorded, seen
 
 
 @pytest.mark.parametrize("seed", range(40))
@@ -151,3 +156,55 @@ def test_simplest_robust_keeps_the_simplest_if_all_sit_on_an_edge() -> None:
 def test_flight_without_a_record_has_no_shorter_one() -> None:
     flights = CaseFlights(make_case_request(60, VIOLATING_SCENARIO), FakeFlights(lambda *_: True))
     assert with_shorter_record(flights, best(flights)) == (best(flights),)
+
+
+def test_what_was_never_read_is_dropped_without_a_flight(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    """Depth that the system never read is no condition of a case, whatever the budget."""
+    record = tmp_path / "flight.npz"
+    save(dataclasses.replace(recorded(steps=seen(())), data_read=("image",)), record)
+    scenario = VIOLATING_SCENARIO.replace({"depth.range_m": 7.8, "depth.holes_percent": 22.0})
+    request = make_case_request(NEIGHBOURS + 2, scenario, signature=LATE)
+    ((found, flight),) = request.violations
+    request = dataclasses.replace(
+        request, violations=((found, dataclasses.replace(flight, record=record)),)
+    )
+    flown: list[Scenario] = []
+
+    def fails(each: Scenario, _: str) -> bool:
+        flown.append(each)
+        return True
+
+    result = CaseBuilder(request, FakeFlights(fails, signature=LATE)).build()
+    assert result.case is not None
+    assert all(each["depth.range_m"] == 100.0 for each in (*flown, result.case.scenario))
+    assert "condition" in result.case.evidence.removed
+    read = dataclasses.replace(recorded(steps=seen(())), data_read=("image", "depth_m"))
+    save(read, record)
+    assert CaseFlights(request, FakeFlights(fails)).without_unread(found) == found
+
+
+def test_conditions_that_no_flight_tried_to_remove_are_named() -> None:
+    request = make_case_request(40, VIOLATING_SCENARIO, signature=LATE)
+    flights = CaseFlights(request, FakeFlights(lambda *_: False, signature=LATE))
+    failing = FailingScenario(
+        origin=VIOLATING_SCENARIO,
+        scenario=VIOLATING_SCENARIO,
+        behaviour=RecordedBehaviour(moves=()),
+        flight=flights.live_flight(VIOLATING_SCENARIO),
+    )
+    everything = {each.cause for each in active_conditions(VIOLATING_SCENARIO)} | {*OBJECT_NAMES}
+    assert {*flights.untried(failing)} == everything
+    # Without fog it does not fail, and without one object neither: both were tried.
+    assert not flights.fails_live(
+        repair(VIOLATING_SCENARIO.replace({"environment.fog": 0.0}), LAWN)
+    )
+    assert not flights.fails_live(repair(VIOLATING_SCENARIO.without(OBJECT_NAMES[1]), LAWN))
+    assert {*flights.untried(failing)} == everything - {"fog", OBJECT_NAMES[1]}
+
+
+def test_a_case_that_was_shrunk_to_its_end_names_nothing() -> None:
+    result = late_case(lambda each: each["environment.fog"] >= 0.04, budget=60)
+    assert result.case is not None
+    assert result.case.severity.untried == ()

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pytest_garl.messages import shortened
-from pytest_garl.reports.html.moments import Moment, decisive_s
+from pytest_garl.reports.html.moments import Moment, decisive_s, telling_moment
 from pytest_garl.scenarios.object_types import OBJECT_TYPES
 from pytest_garl.simulation.flight import Flight, ObjectRecord, Step, Track
 from pytest_garl.simulation.physics.vehicle import BODY_ABOVE_FEET_M, up_m
@@ -53,10 +53,11 @@ class Strip:
 def flight_data(flight: Flight, moments: Sequence[Moment]) -> dict[str, Any]:
     """Return the values that path, timeline and cursor of a page draw, for JSON."""
     picked = _picked(flight.uav.time_s)
+    opens = telling_moment(flight, moments)
     times = flight.uav.time_s[picked]
     return {
         "end_s": round(float(flight.elapsed_s), 2),
-        "decisive_s": round(decisive_s(flight), 2),
+        "opens_s": round(opens.time_s if opens else decisive_s(flight), 2),
         "marker": [round(each, 2) for each in flight.marker_position_m],
         "t": _rounded(times),
         "uav": _path(flight.uav, picked, lift_m=-BODY_ABOVE_FEET_M),

@@ -48,7 +48,7 @@ def index_parts(page: RunPage, folder: Path, url: str) -> list[str]:
 
 
 def _pictures(page: RunPage, url: str) -> list[str]:
-    """Return the last picture of each kind that shows the surroundings, frequent kinds first."""
+    """Return the picture of each kind that shows its cause, in the order of the index."""
     shown = [kind for kind in page.kinds if kind.still]
     parts = [
         f'<a href="{url}/{kind.address}"><img src="{url}/{kind.still}" width="{PICTURE_WIDTH}" '

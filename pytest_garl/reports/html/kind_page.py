@@ -52,12 +52,15 @@ class KindPlan:
 class KindPage:
     """What a page of a kind says.
 
-    ``facts`` are (label, text); ``commands`` repeat the flight; ``other`` is the page with the
-    flight as found, or that of the case: (text, address).
+    ``title`` is the cause of the kind and ``ending`` how the flight ended; without a known cause
+    the ending is the title, and ``ending`` is empty.  ``facts`` are (label, text); ``commands``
+    repeat the flight; ``other`` is the page with the flight as found, or that of the case: (text,
+    address).
     """
 
     name: str
     title: str
+    ending: str
     signature: str
     meaning: str
     where: str
@@ -89,7 +92,7 @@ def plan_kinds(
         for j, (kind, row) in enumerate(zip(search.kinds, told["signatures"], strict=True)):
             first = search.flight(kind.first)
             as_found = task_of(ledger, first, first.scenario, camera)
-            entry = cases.get(kind.signature)
+            entry = _telling(cases.get(kind.signature, ()), kind)
             case = _case_task(ledger, entry, as_found) if entry else None
             task = dataclasses.replace(case or as_found, with_film=(i, j) in filmed)
             plans.append(
@@ -106,14 +109,20 @@ def plan_kinds(
     return plans
 
 
-def _cases(corpus: Corpus, search: SearchSummary) -> dict[str, CorpusEntry]:
-    """Return the first saved case of each signature of a search."""
-    found: dict[str, CorpusEntry] = {}
+def _cases(corpus: Corpus, search: SearchSummary) -> dict[str, list[CorpusEntry]]:
+    """Return the saved cases of each signature of a search."""
+    found: dict[str, list[CorpusEntry]] = {}
     for entry in corpus.entries(search.system):
         case = entry.case
         if case is not None and case.scenario.map == search.map:
-            found.setdefault(case.violation.signature, entry)
+            found.setdefault(case.violation.signature, []).append(entry)
     return found
+
+
+def _telling(entries: Sequence[CorpusEntry], kind: ViolationKind) -> CorpusEntry | None:
+    """Return the saved case that tells the cause of a kind; else the first, None without one."""
+    first = entries[0] if entries else None
+    return next((each for each in entries if each.case == kind.case), first)
 
 
 def _case_task(ledger: Ledger, entry: CorpusEntry, as_found: FlightTask) -> FlightTask | None:
@@ -145,9 +154,10 @@ def kind_page(plan: KindPlan, flight: ShownFlight, known: bool) -> KindPage:
         name=plan.name,
         story=story,
         description=description,
-        subject="the saved case, shrunk" if is_case else f"{plan.kind.first}, the first flight",
+        subject=_subject(plan),
         facts=_facts(plan, flight, known),
         other=other if plan.found else None,
+        title=plan.kind.title,
     )
 
 
@@ -161,7 +171,7 @@ def found_page(plan: KindPlan, flight: ShownFlight) -> KindPage:
         story=plan.found.result.verdict.story,
         description=flight.description,
         subject=f"{plan.kind.first}, as the search found it",
-        facts=(("It took", _took(flight, plan.found)),),
+        facts=(_unusual(plan.found),),
         other=("the saved case, shrunk", f"{plan.name}.html"),
     )
 
@@ -181,12 +191,14 @@ def _page(
     subject: str,
     facts: tuple[Fact, ...],
     other: Fact | None,
+    title: str = "",
 ) -> KindPage:
     kind, search = plan.kind, plan.search
-    title = shortened(headline(story), MOST_TITLE)
+    ending = _capitalised(shortened(headline(story), MOST_TITLE))
     return KindPage(
         name=name,
-        title=title[:1].upper() + title[1:],
+        title=_capitalised(title) or ending,
+        ending=ending if title else "",
         signature=kind.signature,
         meaning=LEGEND.get(kind.signature.partition(":")[0], ""),
         where=f"{search.name} on {search.map}",
@@ -206,22 +218,39 @@ def _shows_case(plan: KindPlan) -> bool:
     return plan.entry is not None and plan.task.name == plan.entry.name
 
 
-def _took(flight: ShownFlight, task: FlightTask | None) -> str:
-    severity = task.result.severity if task else None
-    return severity.text if severity else ""
+def _subject(plan: KindPlan) -> str:
+    """Return which flight the page of a kind shows."""
+    if plan.case is None or not _shows_case(plan):
+        return f"{plan.kind.first}, the first flight"
+    return f"the saved case, {'shrunk' if plan.case.is_shrunk else 'not shrunk'}"
+
+
+def _capitalised(text: str) -> str:
+    return text[:1].upper() + text[1:]
+
+
+def _unusual(task: FlightTask) -> Fact:
+    """Return what was unusual in a flight of which nobody knows what it took."""
+    severity = task.result.severity
+    told = severity.unusual or "nothing" if severity and severity.about else ""
+    return "Unusual in this flight", told
 
 
 def _facts(plan: KindPlan, flight: ShownFlight, known: bool) -> tuple[Fact, ...]:
     kind, search, case = plan.kind, plan.search, plan.case
+    shows_shrunk = case is not None and case.is_shrunk and _shows_case(plan)
     severity = case.severity if case and _shows_case(plan) else plan.task.result.severity
-    took = severity.text if severity else ""
+    label, told = ("It took", severity.text if severity else "")
+    if not shows_shrunk:
+        label, told = _unusual(plan.task)
     means = grade_in_words(severity.grade) if severity and severity.grade else ""
-    least = kind.severity_text
+    least, _, least_text = kind.least.partition(": ")
+    is_told = shows_shrunk or kind.severest == plan.task.name
     seen = in_control_text(kind.in_control, search.random_flights)
     flights = f"{kind.count} of {len(search.flights)} flights"
     return (
-        ("It took", f"{took} ({means})" if took and means else took),
-        (f"At the least, in {kind.severest}", least if least != took else ""),
+        (label, f"{told} ({means})" if told and means else told),
+        (_capitalised(least), "" if is_told else least_text),
         ("Found in", f"{flights}; {seen}" if seen else flights),
         ("Robustness", case.robustness if case else ""),
         ("Preventable?", case.prevention.text if case else ""),

@@ -8,8 +8,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pytest_garl.simulation.flight import Flight
+from pytest_garl.simulation.flight import Flight, Step
 from pytest_garl.simulation.physics.vehicle import up_m
+from pytest_garl.verdicts.detectability import readable_probability
 from pytest_garl.verdicts.margins import COMMIT_M
 from pytest_garl.verdicts.mechanism import NO_LANDING
 from pytest_garl.verdicts.phases import LOW_M
@@ -42,7 +43,7 @@ class Moment:
 def moments_of(flight: Flight) -> tuple[Moment, ...]:
     """Return the moments in the order of time; those at almost the same time are one.
 
-    Of too many the last ones stay, and the first one.
+    Of too many the last ones stay, the first one, and the one that shows the cause best.
     """
     end_s = decisive_s(flight)
     merged: list[Moment] = []
@@ -55,7 +56,9 @@ def moments_of(flight: Flight) -> tuple[Moment, ...]:
         else:
             merged.append(each)
     if len(merged) > MOST:
-        merged = [merged[0], *merged[1 - MOST :]]
+        shows = telling_moment(flight, merged)
+        latest = [each for each in merged[1:] if each is not shows][2 - MOST :]
+        merged = [each for each in merged if each is merged[0] or each is shows or each in latest]
     return tuple(Moment(time_s=m.time_s, label=m.label[:1].upper() + m.label[1:]) for m in merged)
 
 
@@ -67,6 +70,45 @@ def decisive_s(flight: Flight) -> float:
         return flight.touchdown.time_s
     given_up = (each.time_s for each in flight.events if each.name == "abort_command")
     return next(given_up, flight.elapsed_s)
+
+
+def telling_moment(flight: Flight, moments: Sequence[Moment]) -> Moment | None:
+    """Return the moment that shows best why a flight ended as it did.
+
+    Of a collision that is when the camera shows the body for the last time, of a touchdown when the
+    UAV passes ``COMMIT_M``, and of a flight without a landing when the marker is best to read.
+    """
+    time_s = _telling_s(flight, decisive_s(flight))
+    if time_s is None:
+        return last_far(flight, moments)
+    return min(moments, key=lambda each: abs(each.time_s - time_s), default=None)
+
+
+def _telling_s(flight: Flight, end_s: float) -> float | None:
+    """Return when a flight shows best why it ended so; None if nothing was to be seen."""
+    if flight.outcome == "collision" and flight.contacts:
+        body = flight.contacts[-1].body
+        return max(
+            (s.time_s for s in flight.steps if body in s.objects_visible and s.time_s <= end_s),
+            default=end_s,
+        )
+    if flight.outcome in ("landed", "slid"):
+        low = _descends_below(flight, COMMIT_M, end_s)
+        return end_s if low is None else low
+    if flight.outcome in NO_LANDING:
+        best = _best_to_read(flight, end_s)
+        return best.time_s if best else None
+    return end_s
+
+
+def _best_to_read(flight: Flight, end_s: float) -> Step | None:
+    """Return the frame in which the marker is best to read; None if it is in no frame."""
+    shown = [s for s in flight.steps if s.time_s <= end_s and s.marker_visible > 0]
+    return max(
+        shown,
+        key=lambda s: (round(readable_probability(s.marker), 2), s.marker_visible * s.marker_px),
+        default=None,
+    )
 
 
 def last_far(flight: Flight, moments: Sequence[Moment]) -> Moment | None:
@@ -101,6 +143,8 @@ def _all(flight: Flight, end_s: float) -> Iterator[Moment]:
     low = _descends_below(flight, COMMIT_M, end_s)
     if low is not None:
         yield Moment(time_s=low, label=f"the UAV passes {COMMIT_M:g} m")
+    if flight.outcome in NO_LANDING and (best := _best_to_read(flight, end_s)):
+        yield Moment(time_s=best.time_s, label="the marker is best to read")
     if flight.outcome in NO_LANDING and (lowest := _turns_back(flight, end_s)) is not None:
         yield Moment(time_s=lowest, label="the UAV turns back up")
     body = flight.contacts[-1].body if flight.outcome == "collision" and flight.contacts else ""
@@ -119,6 +163,8 @@ def _sightings(flight: Flight, body: str, end_s: float) -> Iterator[Moment]:
     if not times:
         return
     yield Moment(time_s=times[0], label=f"{body} is in view for the first time")
+    if end_s - times[-1] >= SAME_S:
+        yield Moment(time_s=times[-1], label=f"{body} is in view for the last time")
     starts = [after for before, after in itertools.pairwise(times) if after - before > 1]
     if starts:
         yield Moment(time_s=starts[-1], label=f"{body} comes into view again")

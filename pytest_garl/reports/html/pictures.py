@@ -12,7 +12,7 @@ import cv2
 import numpy as np
 
 from pytest_garl.landing_system import Camera
-from pytest_garl.reports.html.moments import Moment, last_far
+from pytest_garl.reports.html.moments import Moment, telling_moment
 from pytest_garl.reports.html.scene import jpeg_uri
 from pytest_garl.scenarios.maps.map import Map
 from pytest_garl.scenarios.scenario import Scenario
@@ -44,20 +44,20 @@ class Still:
     label: str
     picture: str
     facts: tuple[str, ...]
-    far: bool = False
-    """Whether it is the last of its flight that shows the surroundings."""
+    shows_cause: bool = False
+    """Whether it shows best why its flight ended so: it stands for its kind."""
 
 
 def stills_of(
     flight: Flight, scenario: Scenario, renderer: Renderer, moments: Sequence[Moment]
 ) -> tuple[tuple[Still, ...], str]:
-    """Return the pictures at the moments, and a small one of the last that shows the surroundings.
+    """Return the pictures at the moments, and a small one of the moment that shows the cause.
 
     A picture is that of the last frame up to its moment.  The marker is outlined.
     """
     pane, shown = CameraPane(renderer), scenario
     found, small = [], ""
-    far = last_far(flight, moments)
+    shows = telling_moment(flight, moments)
     for moment in moments:
         step = _step_at(flight.steps, moment.time_s)
         time_s = step.time_s if step else moment.time_s
@@ -73,10 +73,10 @@ def stills_of(
                 label=moment.label,
                 picture=uri,
                 facts=tuple(_facts(step)),
-                far=moment is far,
+                shows_cause=moment is shows,
             )
         )
-        if moment is far:
+        if moment is shows:
             least = cv2.resize(drawn, THUMBNAIL_PX, interpolation=cv2.INTER_AREA)
             small = jpeg_uri(np.asarray(least, np.uint8), THUMBNAIL_QUALITY)
     return tuple(found), small

@@ -61,7 +61,7 @@ def write_html_report(
         )
     no_encoder = _no_encoder() if films else ""
     with checked_ledger(ledger) as opened:
-        searches = summaries_of(opened)
+        searches = summaries_of(opened, corpus)
         found = run_report_of(opened, ledger, corpus)
         plans = plan_kinds(opened, searches, found, corpus, 0 if no_encoder else films)
     tasks = [task for plan in plans for task in (plan.task, plan.found) if task is not None]
@@ -76,7 +76,7 @@ def write_html_report(
             page = kind_page(plan, flight, known)
             pages.append((plan, page))
             _write(folder / page_address(page.name), render_kind(page))
-            for still in (each for each in flight.stills if each.far):
+            for still in (each for each in flight.stills if each.shows_cause):
                 (folder / still_address(page.name)).write_bytes(picture_bytes(still.picture))
             if as_found is not None:
                 other = found_page(plan, as_found)

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from pytest_garl.reports.causes import cause_of, counted_causes
 from pytest_garl.reports.html.charts import (
     Plot,
     kinds_over_flights,
@@ -37,6 +38,7 @@ class KindRow:
     address: str
     still: str
     title: str
+    ending: str
     signature: str
     where: str
     count: int
@@ -88,10 +90,10 @@ def run_page(
     missing: Sequence[str],
 ) -> RunPage:
     """Return the index of a run: ``found`` is its report as data, ``shown`` its pages in order."""
+    shown = _by_cause(shown)
     kinds = [_kind(plan, page, index) for index, (plan, page) in enumerate(shown)]
     flights = found["flights"]
     violating = sum(each.violating for each in searches)
-    kinds.sort(key=lambda row: (-row.count, row.signature, row.where))
     not_by_chance = {page.name for plan, page in shown if plan.kind.in_control == 0}
     return RunPage(
         title=_title(searches, len(kinds), violating),
@@ -142,7 +144,28 @@ def _title(searches: Sequence[SearchSummary], kinds: int, violating: int) -> str
     if not violating:
         return f"{who}: no violation in {flown} flights"
     ways = "one way" if kinds == 1 else f"{kinds} ways"
-    return f"{who}: {violating} of {flown} flights violate something, in {ways}"
+    causes = counted_causes([kind.case for each in searches for kind in each.kinds])
+    with_causes = f", with {causes}" if causes else ""
+    return f"{who}: {violating} of {flown} flights violate something, in {ways}{with_causes}"
+
+
+def _by_cause(
+    shown: Sequence[tuple[KindPlan, KindPage]],
+) -> list[tuple[KindPlan, KindPage]]:
+    """Return the pages with those of one cause together, over all searches, frequent ones first."""
+    groups: dict[tuple[str, ...], list[tuple[KindPlan, KindPage]]] = {}
+    for plan, page in sorted(shown, key=_order):
+        case = plan.kind.case
+        key = cause_of(case.severity) if case else ("", page.name)
+        groups.setdefault(key, []).append((plan, page))
+    # Sorting is stable: groups of the same size stay in the order of their first pages.
+    ordered = sorted(groups.values(), key=lambda group: -sum(p.kind.count for p, _ in group))
+    return [each for group in ordered for each in group]
+
+
+def _order(shown: tuple[KindPlan, KindPage]) -> tuple[int, str, str]:
+    plan, page = shown
+    return -plan.kind.count, plan.kind.signature, page.where
 
 
 def _subtitle(found: Mapping[str, Any]) -> str:
@@ -197,7 +220,7 @@ def _kind(plan: KindPlan, page: KindPage, index: int) -> KindRow:
     kind, search = plan.kind, plan.search
     case = plan.case
     facts = [
-        f"at the least: {kind.severity_text}" if kind.severity_text else "",
+        kind.least,
         in_control_text(kind.in_control, search.random_flights),
         case.robustness if case else "",
         case.prevention.text.partition(":")[0] if case else "",
@@ -209,6 +232,7 @@ def _kind(plan: KindPlan, page: KindPage, index: int) -> KindRow:
         address=page_address(plan.name),
         still=still_address(plan.name) if page.flight.stills else "",
         title=page.title,
+        ending=page.ending,
         signature=kind.signature,
         where=page.where,
         count=kind.count,

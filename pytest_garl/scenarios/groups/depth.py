@@ -8,6 +8,7 @@ NO_LIMIT_M = 100.0
 GROUP = Group(
     name="depth",
     meaning="a depth camera with a limited reach, and with holes",
+    feeds="depth_m",
     parameters=(
         Parameter(
             name="range_m",

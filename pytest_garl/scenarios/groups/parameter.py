@@ -44,11 +44,16 @@ class Parameter:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Group:
-    """Parameters that one cause switches on together: wind has a speed, a direction, gusts."""
+    """Parameters that one cause switches on together: wind has a speed, a direction, gusts.
+
+    ``feeds`` is the field of an observation if the group changes nothing but that: a landing system
+    that never reads it flies the same flight without the group.  It is empty for all others.
+    """
 
     name: str
     meaning: str
     parameters: tuple[Parameter, ...]
+    feeds: str = ""
 
     @property
     def keys(self) -> tuple[str, ...]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import functools
 from collections.abc import Callable
 from typing import Any, TypeVar
 
@@ -21,14 +22,18 @@ _NOT_PAINTED = np.zeros((0, 0, 3), np.uint8)
 
 
 class LazyObservation(Observation):
-    """An observation whose image is painted only for a system that looks at it.
+    """An observation that notes which of its data is read, and paints its image only then.
 
-    To paint takes longer than all the rest of a frame, and not every system looks at each.
+    To paint takes longer than all the rest of a frame, and not every system looks at each.  Data
+    that a system never reads cannot be a cause of what it does.
     """
 
-    __slots__ = ("_paint",)
+    __slots__ = ("_depth_m", "_noted", "_paint", "_rangefinder_m")
     __qualname__ = "Observation"  # It shows itself under the name that users know.
     _paint: Callable[[], NDArray[np.uint8]]
+    _depth_m: NDArray[np.float32]
+    _rangefinder_m: float | None
+    _noted: set[str]
 
     def __getattr__(self, name: str) -> Any:
         """Say which field was meant; Python calls this for names that are not there."""
@@ -39,14 +44,42 @@ class LazyObservation(Observation):
         hint = f"did you mean {near[0]}?" if near else f"it has {', '.join(fields)}"
         raise AttributeError(f"Observation has no {name!r}; {hint}")
 
+    def __reduce__(self) -> tuple[Callable[[], Observation], tuple[()]]:
+        """Give whoever copies or pickles it a plain observation."""
+        values = {each.name: getattr(self, each.name) for each in dataclasses.fields(Observation)}
+        return functools.partial(Observation, **values), ()
+
     @property
     def image(self) -> NDArray[np.uint8]:
         """The RGB image, read-only."""
+        self._noted.add("image")
         return self._paint()
 
     @image.setter
     def image(self, image: NDArray[np.uint8]) -> None:
         object.__setattr__(self, "_paint", lambda: image)
+
+    @property
+    def depth_m(self) -> NDArray[np.float32]:
+        """The planar depth, read-only."""
+        self._noted.add("depth_m")
+        return self._depth_m
+
+    @depth_m.setter
+    def depth_m(self, depth_m: NDArray[np.float32]) -> None:
+        object.__setattr__(self, "_depth_m", depth_m)
+
+    @property
+    def rangefinder_m(self) -> float | None:
+        """The reading of the rangefinder."""
+        self._noted.add("rangefinder_m")
+        return self._rangefinder_m
+
+    @rangefinder_m.setter
+    def rangefinder_m(self, rangefinder_m: float | None) -> None:
+        object.__setattr__(self, "_rangefinder_m", rangefinder_m)
+        # The constructor sets this field last; whoever copies an observation has read it all.
+        object.__setattr__(self, "_noted", set())
 
 
 def observe(
@@ -58,8 +91,12 @@ def observe(
     attitude: Quaternion,
     rangefinder_m: float | None,
     rng: np.random.Generator,
+    noted: set[str],
 ) -> Observation:
-    """Return what a frame shows, the pose with noise drawn from ``rng``; arrays are read-only."""
+    """Return what a frame shows, the pose with noise drawn from ``rng``; arrays are read-only.
+
+    ``noted`` takes the names of the data that the landing system reads: those in ``OBSERVED``.
+    """
     noise = rng.standard_normal(6)
     observation = LazyObservation(
         time_s=time_s,
@@ -71,6 +108,7 @@ def observe(
         rangefinder_m=rangefinder_m,
     )
     object.__setattr__(observation, "_paint", lambda: _frozen(frame.image))
+    object.__setattr__(observation, "_noted", noted)
     return observation
 
 

@@ -3,6 +3,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from pytest_garl.execution.ledger import Ledger
+from pytest_garl.regressions.corpus import Corpus
 from pytest_garl.reports.html.charts import (
     kinds_over_flights,
     outcome_bar,
@@ -29,7 +30,7 @@ def summary(folder: Path) -> SearchSummary:
     path = write_ledger(folder, [Flown(result=each) for each in RESULTS])
     ledger = Ledger(path)
     try:
-        (found,) = summaries_of(ledger)
+        (found,) = summaries_of(ledger, Corpus(folder))
     finally:
         ledger.close()
     return found

@@ -94,6 +94,20 @@ def test_one_cursor_moves_film_path_and_timeline(report: Path, chromium: Browser
     assert chromium.problems == []
 
 
+def test_a_page_opens_at_the_moment_that_film_and_charts_both_show(
+    report: Path, chromium: Browser
+) -> None:
+    chromium.open(page(report, "II-lost"))
+    opens_s = chromium.evaluate("garl.flight.opens_s")
+    assert opens_s > 0
+    chromium.wait_for("document.getElementById('film').readyState >= 2")
+    chromium.wait_for("!document.getElementById('film').seeking")
+    views = chromium.evaluate(VIEWS)
+    start_s = chromium.evaluate("garl.flight.film_start_s")
+    assert views["film"] == pytest.approx(opens_s - start_s, abs=0.06)
+    assert views["timeline"] == views["path"] == pytest.approx(opens_s, abs=0.06)
+
+
 def test_the_film_plays_and_takes_the_cursor_along(report: Path, chromium: Browser) -> None:
     chromium.open(page(report, "II-lost"))
     chromium.wait_for("document.getElementById('film').readyState >= 2")

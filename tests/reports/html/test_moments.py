@@ -12,9 +12,10 @@ from pytest_garl.reports.html.moments import (
     decisive_s,
     last_far,
     moments_of,
+    telling_moment,
 )
 from pytest_garl.simulation.flight import Flight
-from tests.support.recorded_flights import hit_by_dog, recorded, seen
+from tests.support.recorded_flights import READABLE, hit_by_dog, recorded, seen
 
 
 def labels(flight: Flight) -> list[str]:
@@ -90,3 +91,52 @@ def test_the_last_moment_says_how_the_flight_ended(outcome: str, label: str) -> 
 def test_a_flight_of_one_sample_has_a_moment() -> None:
     flight = recorded(steps=(), places=np.zeros((1, 3)), end_s=0.0)
     assert len(moments_of(flight)) == 1
+
+
+def test_a_flight_without_a_landing_is_shown_where_the_marker_is_best_to_read() -> None:
+    dim = dataclasses.replace(READABLE, contrast=6.0)
+    steps = tuple(
+        dataclasses.replace(each, marker=dim) if each.marker and not 35 <= i < 38 else each
+        for i, each in enumerate(seen(range(20, 60)))
+    )
+    flight = recorded(steps=steps, given_up_s=9.0)
+    shows = telling_moment(flight, moments_of(flight))
+    assert shows is not None
+    assert 3.5 <= shows.time_s < 3.8
+    assert "The marker is best to read" in shows.label
+
+
+def test_a_marker_that_was_never_in_the_picture_leaves_the_last_view_from_above() -> None:
+    flight = recorded(steps=seen(()), given_up_s=9.0)
+    found = moments_of(flight)
+    assert telling_moment(flight, found) == last_far(flight, found)
+
+
+def test_a_collision_is_shown_when_the_body_is_last_in_view() -> None:
+    steps = tuple(
+        dataclasses.replace(each, objects_visible=("dog-1",) if 60 <= i < 75 else ())
+        for i, each in enumerate(seen(range(20, 60)))
+    )
+    flight = recorded(steps=steps, outcome="collision", contacts=(hit_by_dog(8.0),), end_s=8.0)
+    shows = telling_moment(flight, moments_of(flight))
+    assert shows is not None
+    assert shows.time_s == 7.4
+
+
+def test_a_touchdown_is_shown_from_three_metres() -> None:
+    sinks = np.array([[0.0, 0.0, max(0.2, 9.0 - index / 20)] for index in range(241)])
+    flight = recorded(steps=seen(range(20, 60)), outcome="landed", places=sinks, end_s=12.0)
+    shows = telling_moment(flight, moments_of(flight))
+    assert shows is not None
+    assert "passes" in shows.label
+
+
+def test_the_moment_that_shows_the_cause_stays_among_many() -> None:
+    steps = tuple(
+        dataclasses.replace(each, marker_px=90.0 if i == 25 else each.marker_px)
+        for i, each in enumerate(seen([*range(20, 30), *range(50, 55), *range(90, 99)]))
+    )
+    flight = recorded(steps=steps, given_up_s=9.9)
+    found = moments_of(flight)
+    assert len(found) <= MOST
+    assert any("best to read" in each.label for each in found)

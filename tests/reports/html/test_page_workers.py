@@ -27,7 +27,7 @@ def tasks(tmp_path: Path, video: Video) -> list[FlightTask]:
     path = write_ledger(tmp_path, flown)
     corpus = Corpus(tmp_path / "cases")
     with checked_ledger(path) as ledger:
-        searches = summaries_of(ledger)
+        searches = summaries_of(ledger, corpus)
         found = run_report_of(ledger, path, corpus)
         return [plan.task for plan in plan_kinds(ledger, searches, found, corpus, 0)]
 

@@ -50,6 +50,7 @@ def page(text: str = "plain", data: dict[str, Any] | None = None) -> KindPage:
     return KindPage(
         name="page",
         title=text,
+        ending=text,
         signature=text,
         meaning=text,
         where=text,

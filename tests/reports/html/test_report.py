@@ -17,7 +17,7 @@ from pytest_garl.errors import LedgerError
 from pytest_garl.execution.reference import Reference
 from pytest_garl.regressions.corpus import Corpus
 from pytest_garl.reports.html.index_markdown import index_parts
-from pytest_garl.reports.html.moments import last_far, moments_of
+from pytest_garl.reports.html.moments import moments_of, telling_moment
 from pytest_garl.reports.html.report import WrittenReport, write_html_report
 from pytest_garl.simulation.flight import Crash
 from tests.reports.html.test_rendering import HOSTILE, Elements
@@ -257,7 +257,7 @@ def broken_ledgers(run: Path) -> Iterator[tuple[Path, str]]:
     yield damaged, "is damaged or no ledger of this version"
 
 
-def test_the_picture_of_a_build_is_the_last_that_shows_the_surroundings(
+def test_the_picture_of_a_build_is_the_one_that_shows_the_cause(
     tmp_path: Path, video: Video
 ) -> None:
     uav = video.flight.uav
@@ -267,12 +267,12 @@ def test_the_picture_of_a_build_is_the_last_that_shows_the_surroundings(
     write_ledger(tmp_path, [Flown(result=lost(), flight=flight)])
     (kind,) = write(tmp_path).page.kinds
     moments = moments_of(flight)
-    far = last_far(flight, moments)
-    assert far is not None
-    assert far != moments[-1]
+    shows = telling_moment(flight, moments)
+    assert shows is not None
+    assert shows != moments[-1]
     page = kind_page(tmp_path)
     shown = re.findall(r'class="moment".*?src="data:image/jpeg;base64,([^"]+)"', page, re.DOTALL)
-    expected = base64.b64decode(shown[moments.index(far)])
+    expected = base64.b64decode(shown[moments.index(shows)])
     assert (tmp_path / "report" / kind.still).read_bytes() == expected
 
 

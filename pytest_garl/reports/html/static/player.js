@@ -67,6 +67,8 @@
   }
 
   if (film) {
+    // A film that is not loaded yet forgets where it was sent.
+    film.addEventListener("loadeddata", () => seek(garl.time), { once: true });
     const follow = () => {
       if (film.paused || film.ended) return;
       garl.setTime(film.currentTime + flight.film_start_s, "film");
@@ -110,6 +112,6 @@
   }
   document.getElementById("controls").hidden = false;
   garl.onTime(show);
-  // The decisive moment is what a reader looks for.
-  garl.setTime(flight.decisive_s, "player");
+  // The moment that shows the cause is what a reader looks for.
+  garl.setTime(flight.opens_s, "player");
 })();

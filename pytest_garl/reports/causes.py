@@ -1,0 +1,137 @@
+"""The cause of a kind of violation, from its shrunk case: the title of a kind, and its group.
+
+A flight that a search found has many unusual conditions, and nobody knows which of them the
+violation takes.  Shrinking finds out, so only a kind with a shrunk case has a cause.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Sequence
+
+from pytest_garl.execution.severity import Severity
+from pytest_garl.messages import shortened
+from pytest_garl.regressions.case import Case
+
+MOST_NAMED = 3
+"""Of more conditions than these a title counts the rest."""
+MOST_CHARACTERS = 140
+NOTHING = "nothing unusual"
+"""The cause of a violation that needs no condition at all."""
+_NUMBERED = re.compile(r"-\d+$")
+_OF = {"fog": "visibility ", "dust": "visibility ", "wind": "mean ", "jump": "distance "}
+"""Conditions of one quantity, and how its value begins: "fog of 10 m" for "visibility 10 m"."""
+_SPEAKS_FOR_ITSELF = ("light", "camera", "leaves")
+"""Conditions whose single value says what it is: "sun 23 degrees high", "dirt 20 %"."""
+_ENDINGS = {
+    "II:never-seen": "the marker is never readable",
+    "II:lost": "the marker is lost from view",
+    "II:gave-up-in-sight": "gives up with the marker in view",
+    "late:not-landed": "does not land in time",
+    "late:never-gave-up": "neither lands nor gives up",
+    "late:no-time": "gives up for want of time",
+    "late:landed": "lands late",
+    "off:seen": "comes down beside the marker",
+    "off:unseen": "comes down beside the marker",
+    "hard:fast": "touches down too fast",
+    "hard:tilted": "touches down tilted",
+}
+_ENDINGS_OF_TYPE = {
+    "slid": "slides after the touchdown",
+    "abort": "gives up",
+}
+_PHASES = {
+    "take-off": "during the take-off",
+    "transit": "on the way to the marker",
+    "search": "in the search",
+    "approach": "on the approach",
+    "descent": "in the descent",
+    "last-metre": "in the last metre",
+}
+
+
+def telling_case(cases: Iterable[Case], system: str, map: str, signature: str) -> Case | None:
+    """Return the first case that tells the cause of a kind: it is open, and shrunk."""
+    for case in cases:
+        is_its = (case.system, case.scenario.map) == (system, map)
+        if is_its and case.violation.signature == signature and tells_cause(case):
+            return case
+    return None
+
+
+def tells_cause(case: Case) -> bool:
+    """Return whether a case says what its kind takes."""
+    return case.status == "open" and case.is_shrunk and bool(cause_of(case.severity))
+
+
+def cause_of(severity: Severity) -> tuple[str, ...]:
+    """Return the cause of a shrunk violation: names of conditions, or the type of a body.
+
+    Two kinds with the same cause stand together; how strong it is does not matter.
+    """
+    if severity.about == "body":
+        return (severity.type,)
+    if severity.about != "conditions":
+        return ()
+    names = {_NUMBERED.sub("", name) for name, _ in severity.acting}
+    return tuple(sorted(names)) or (NOTHING,)
+
+
+def title_of(case: Case) -> str:
+    """Return the cause and the ending: ``fog of 10 m: the marker is never readable``.
+
+    Empty if the ending has no words of its own, as that of a test's own assertion.
+    """
+    ending = _ending(case.violation.signature)
+    if not ending:
+        return ""
+    return shortened(f"{cause_in_words(case.severity)}: {ending}", MOST_CHARACTERS)
+
+
+def cause_in_words(severity: Severity) -> str:
+    """Return the cause with its strength: ``fog of 10 m``, ``a careless dog at 4.0 m/s``."""
+    if severity.about == "body":
+        return severity.unusual
+    named = [_condition(*each) for each in severity.acting] or [NOTHING]
+    if len(named) > MOST_NAMED:
+        named = [*named[: MOST_NAMED - 1], f"{len(named) - MOST_NAMED + 1} more conditions"]
+    return " and ".join(filter(None, (", ".join(named[:-1]), named[-1])))
+
+
+def _condition(name: str, value: str) -> str:
+    beginning = _OF.get(name)
+    if beginning and value.startswith(beginning) and "," not in value:
+        return f"{name} of {value.removeprefix(beginning)}"
+    if name in _SPEAKS_FOR_ITSELF and value and not value.endswith(" values"):
+        return value
+    return f"{name} ({value})" if value else name
+
+
+def _ending(signature: str) -> str:
+    """Return what happens, in words; empty for signatures without words of their own."""
+    kind, _, rest = signature.partition(":")
+    parts = rest.split(":")
+    if kind == "I":
+        if parts[0] == "nothing":
+            return "comes down on open ground, off the marker"
+        return f"comes down on a {parts[0].removeprefix('decoy-')}"
+    if kind in ("III", "IV"):
+        ending = f"hits a {parts[0]}"
+    else:
+        ending = _ENDINGS.get(f"{kind}:{parts[0]}", _ENDINGS_OF_TYPE.get(kind, ""))
+    phase = next((_PHASES[part] for part in parts[1:] if part in _PHASES), "")
+    return f"{ending} {phase}".strip() if ending else ""
+
+
+def counted_causes(cases: Sequence[Case | None]) -> str:
+    """Return how many causes kinds have: ``4 causes``, ``3 causes of the 5 that are shrunk``.
+
+    ``cases`` are those of the kinds, None for a kind whose cause nobody knows; empty if there is
+    none.
+    """
+    known = [case for case in cases if case is not None]
+    if not known:
+        return ""
+    number = len({cause_of(case.severity) for case in known})
+    causes = f"{number} cause{'' if number == 1 else 's'}"
+    return causes if len(known) == len(cases) else f"{causes} of the {len(known)} that are shrunk"
