@@ -25,8 +25,8 @@ from pytest_garl.messages import command, printable
 from pytest_garl.regressions.case import NO_GATE_TEXTS, Case, NoGateReason
 from pytest_garl.regressions.case_file import load_case
 from pytest_garl.regressions.corpus import Corpus, replace_file, rewrite_file
-from pytest_garl.regressions.reference_proofs import Proofs
 from pytest_garl.regressions.description import unusual_in_flight
+from pytest_garl.regressions.reference_proofs import Proofs
 from pytest_garl.regressions.replay import Replay, replay
 from pytest_garl.regressions.story_text import grade_in_words
 

@@ -77,9 +77,7 @@ def new_case(
         scenario=failing.scenario,
         violation=_own_violation(failure, completed.result.verdict)
         if failure is not None
-        else violation_in(
-            completed.result.verdict, flight, severity, is_shrunk=failing.is_shrunk
-        ),
+        else violation_in(completed.result.verdict, flight, severity, is_shrunk=failing.is_shrunk),
         policy=npcs.name,
         policy_sha256=npcs.sha256,
         moves=failing.behaviour.moves,

@@ -162,9 +162,7 @@ def renewal_by(path: Path, case: Case, sources: SourceHashes, flight: CompletedF
                 "its flight is the recorded one to the byte, but today's verdict finds no "
                 f"violation in it: delete it, if `garl cases replay {path}` agrees",
             )
-        violation = violation_in(
-            result.verdict, record, case.severity, is_shrunk=case.is_shrunk
-        )
+        violation = violation_in(result.verdict, record, case.severity, is_shrunk=case.is_shrunk)
         renewed = dataclasses.replace(renewed, violation=violation)
     renamed = renewed.id != case.id or renewed.violation.signature != case.violation.signature
     return Renewal(path=path, result="renamed" if renamed else "renewed", before=case, case=renewed)

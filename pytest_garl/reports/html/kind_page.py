@@ -222,7 +222,10 @@ def _subject(plan: KindPlan) -> str:
     """Return which flight the page of a kind shows."""
     if plan.case is None or not _shows_case(plan):
         return f"{plan.kind.first}, the first flight"
-    return f"the saved case, {'shrunk' if plan.case.is_shrunk else 'not shrunk'}"
+    if plan.case.is_shrunk:
+        return "the saved case, shrunk"
+    # A crash of the landing system is flown again with as little as possible, and has no severity.
+    return "the saved case, not shrunk" if plan.case.severity.about else "the saved case"
 
 
 def _capitalised(text: str) -> str:
