@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import contextlib
 import sqlite3
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
+from time import monotonic
 from typing import Any, Literal
 
 from pytest_garl.errors import LedgerError
@@ -42,6 +43,11 @@ flight of a violation.  Figures and the result hash cover the searches alone."""
 BEHIND_SEARCHES, BEFORE_SEARCHES = -1, 1
 """Priorities of flights that are flown when no flight of a search waits, or before those of
 searches, whose priority is 0."""
+LOCKED_S = 300.0
+"""How long a statement waits for another process that holds the ledger's lock.  Ours hold it for
+milliseconds; one that a landing system has left holds it until its flight ends."""
+_BUSY_S = 1.0
+"""How long SQLite itself waits, during which no signal is handled."""
 _LONGEST = 64_000_000
 """Most bytes of one value: a damaged file may declare a value that fills the memory."""
 
@@ -66,12 +72,15 @@ class Rows:
 
 
 class Database:
-    """A connection to a ledger's file; its errors are LedgerErrors."""
+    """A connection to a ledger's file; its errors are LedgerErrors.
 
-    def __init__(self, path: Path) -> None:
-        self.path = path
+    ``on_locked`` is called once a second while another process holds the lock.
+    """
+
+    def __init__(self, path: Path, on_locked: Callable[[], None] = lambda: None) -> None:
+        self.path, self.on_locked = path, on_locked
         with self._explained():
-            self._connection = sqlite3.connect(path, timeout=30, isolation_level=None)
+            self._connection = sqlite3.connect(path, timeout=_BUSY_S, isolation_level=None)
             self._connection.setlimit(sqlite3.SQLITE_LIMIT_LENGTH, _LONGEST)
         self.execute("PRAGMA journal_mode=WAL")
         self.execute("PRAGMA synchronous=NORMAL")
@@ -83,9 +92,17 @@ class Database:
 
     def execute(self, sql: str, values: Sequence[Any] = ()) -> Rows:
         """Run one statement and fetch its rows at once, since only then a damaged page shows."""
+        until = monotonic() + LOCKED_S
         with self._explained():
-            cursor = self._connection.execute(sql, values)
-            return Rows(rows=cursor.fetchall(), rowcount=cursor.rowcount)
+            while True:
+                try:
+                    cursor = self._connection.execute(sql, values)
+                    return Rows(rows=cursor.fetchall(), rowcount=cursor.rowcount)
+                except sqlite3.OperationalError as error:
+                    is_busy = error.sqlite_errorcode & 0xFF == sqlite3.SQLITE_BUSY
+                    if not is_busy or monotonic() > until:
+                        raise
+                self.on_locked()
 
     def executemany(self, sql: str, rows: Sequence[Sequence[Any]]) -> None:
         """Run one statement for each row."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import importlib
 import traceback
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -47,9 +48,11 @@ class SlotJudge:
         self._ledger, self._worker = ledger, worker
         self._queue: WorkQueue | None = None
 
-    def judge(self, request: dict[str, Any]) -> dict[str, Any]:
+    def judge(self, request: dict[str, Any], end_flying: Callable[[], None]) -> dict[str, Any]:
         """Judge a flight; return the facts with which the worker must end, or none.
 
+        ``end_flying`` ends the flying process: called if the ledger is locked, since a thread that
+        the flight has left may hold the lock.
         A record that cannot be judged is a failure of the flight, as an error of the simulator is.
         ``request`` holds the fields of a FlownJob.  With ``proves`` the flight is one of the
         reference pilot, of which only counts that it can be judged.
@@ -57,7 +60,7 @@ class SlotJudge:
         proves, idle_s = request.pop("proves", False), request.pop("idle_s", 0.0)
         try:
             if self._queue is None:
-                self._queue = WorkQueue.open(self._ledger, self._worker)
+                self._queue = WorkQueue.open(self._ledger, self._worker, end_flying)
             claim = self._queue.claim_of(self._worker)
             if claim is None:
                 # The slot was given back: whoever claims it now flies it again.

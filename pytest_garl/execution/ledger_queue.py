@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from time import monotonic
@@ -53,13 +54,27 @@ class WorkQueue:
         self._pid = os.getpid() if pid is None else pid
 
     @classmethod
-    def open(cls, path: Path, pid: int | None = None) -> WorkQueue:
-        """Open the queue of the ledger at ``path`` alone, as a worker does."""
-        return cls(Database(path), pid)
+    def open(
+        cls, path: Path, pid: int | None = None, on_locked: Callable[[], None] = lambda: None
+    ) -> WorkQueue:
+        """Open the queue of the ledger at ``path`` alone, as a worker does.
+
+        ``on_locked`` is called once a second while another process holds the ledger's lock.
+        """
+        return cls(Database(path, on_locked), pid)
 
     def close(self) -> None:
         """Close the file."""
         self._database.close()
+
+    @contextmanager
+    def when_locked(self, do: Callable[[], None]) -> Iterator[None]:
+        """Call ``do`` once a second while another process holds the ledger's lock."""
+        before, self._database.on_locked = self._database.on_locked, do
+        try:
+            yield
+        finally:
+            self._database.on_locked = before
 
     def claim(self, lease_s: float | None = LEASE_S, *, flown: str = "") -> Claim | None:
         """Claim the next slot; a slot that ended a worker is claimed only while no other flies.

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import contextlib
+import os
+import signal
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -11,13 +14,17 @@ from pytest_garl import cpu_dispatch
 from pytest_garl.execution.checkout import Checkout
 from pytest_garl.execution.exit_guard import watched_flight
 from pytest_garl.execution.flight import fly_and_save
-from pytest_garl.execution.job import parse_job
+from pytest_garl.execution.job import TIMEOUT_S, parse_job
 from pytest_garl.execution.judge_process import JudgeProcess
 from pytest_garl.execution.ledger_queue import Claim, WorkQueue
 from pytest_garl.execution.pool import Pool
 from pytest_garl.execution.process_pool import TURN_S, ProcessPool
-from pytest_garl.execution.worker_failure import WorkerExit, retry_or_record
+from pytest_garl.execution.processes import descendants_of
+from pytest_garl.execution.worker_failure import WorkerExit, call_limit_s, retry_or_record
 from pytest_garl.scenarios.files import parse_scenario
+
+SILENT_LIMITS = 3
+"""For so many limits of a call a worker's supervisor may show no sign of life."""
 
 
 def local_pool(queue: WorkQueue, workers: int, checkout: Checkout | None = None) -> Pool:
@@ -46,6 +53,13 @@ class FlightWorkers:
         """Return the module that a worker runs, and its arguments."""
         return ["pytest_garl.execution.worker", str(ledger), *self.folders]
 
+    def silence_s(self, queue: WorkQueue, pid: int) -> float:
+        """Return for how long a worker may show no sign of life: three limits of a call."""
+        claim = queue.claim_of(pid)
+        if claim is None:
+            return SILENT_LIMITS * TIMEOUT_S
+        return SILENT_LIMITS * call_limit_s(parse_job(claim.job), claim)
+
     def handle_exit(self, queue: WorkQueue, pid: int, ended: WorkerExit) -> bool:
         """Decide on the slot that a worker had claimed; return whether it had claimed one."""
         claim = queue.claim_of(pid)
@@ -73,11 +87,13 @@ class InProcessPool:
             return
         job, scenario = parse_job(claim.job), parse_scenario(claim.scenario)
         self._judge.start()
+        before = descendants_of(os.getpid())
         with watched_flight() as watch:
             flown = fly_and_save(job, scenario, claim.flight, None)
-        if watch.status is None:
-            self._queue.record(claim, *self._judge.judge(job, scenario, claim.flight, flown))
-        else:
+        with self._queue.when_locked(lambda: _end_those_since(before)):
+            if watch.status is None:
+                self._queue.record(claim, *self._judge.judge(job, scenario, claim.flight, flown))
+                return
             # As if a worker had ended: the same finding, and no record.
             job.record(claim.flight).unlink(missing_ok=True)
             retry_or_record(self._queue, claim, WorkerExit(status=watch.status, stderr=watch.stack))
@@ -85,3 +101,10 @@ class InProcessPool:
     def close(self) -> None:
         """End the process that judges; no flight is under way between two turns."""
         self._judge.close()
+
+
+def _end_those_since(before: set[int]) -> None:
+    """End the processes that a flight has left below this one: one of them holds the lock."""
+    for pid in descendants_of(os.getpid()) - before:
+        with contextlib.suppress(OSError):
+            os.kill(pid, signal.SIGKILL)

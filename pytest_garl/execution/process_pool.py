@@ -17,13 +17,21 @@ from typing import IO, Any, Protocol
 from pytest_garl import cpu_dispatch
 from pytest_garl.errors import LedgerError, PoolError
 from pytest_garl.execution.ledger_queue import WorkQueue
-from pytest_garl.execution.processes import create_report_file, read_report
+from pytest_garl.execution.processes import (
+    Heartbeat,
+    create_report_file,
+    descendants_of,
+    read_report,
+)
 from pytest_garl.execution.worker_failure import WorkerExit
 
 TURN_S = 0.02
 """How long one turn of a pool waits for its workers."""
 MAX_IDLE_EXITS = 3
 """If more workers than this end one after the other and nothing is flown, the pool gives up."""
+LEAST_SILENCE_S = 10.0
+"""A worker that shows no sign of life for less time than this is never taken for one that stands
+still; it shows one four times a second, and a machine may be busy."""
 STDERR_BYTES = 2**16
 """How much of a worker's stderr is read; its end says why the worker died."""
 
@@ -42,6 +50,9 @@ class WorkerKind(Protocol):
     def command(self, ledger: Path) -> Sequence[str]:
         """Return the module that a worker runs, and its arguments."""
 
+    def silence_s(self, queue: WorkQueue, pid: int) -> float:
+        """Return for how long a worker may show no sign of life."""
+
     def handle_exit(self, queue: WorkQueue, pid: int, ended: WorkerExit) -> bool:
         """Decide on the slot that a worker had claimed; return whether it had claimed one."""
 
@@ -52,6 +63,7 @@ class _Worker:
     stderr: IO[bytes]
     """A file: a pipe that nobody reads would block a worker that writes much."""
     report_file: int
+    heartbeat: Heartbeat
 
     def has_ended(self) -> bool:
         """Return whether the process has ended; if so, end the rest of its session."""
@@ -73,8 +85,16 @@ class _Worker:
         while time.monotonic() < until and not self.has_ended():
             time.sleep(TURN_S / 4)
         if self.process.returncode is None:
-            self._end_session()
-            self.process.wait()
+            self.end_at_once()
+
+    def end_at_once(self) -> None:
+        """Kill the process and all below it: stopped, it cannot end them itself."""
+        below = descendants_of(self.process.pid)
+        self._end_session()
+        for pid in below:
+            with contextlib.suppress(OSError):
+                os.kill(pid, signal.SIGKILL)
+        self.process.wait()
 
     def _end_session(self) -> None:
         with contextlib.suppress(ProcessLookupError):
@@ -113,6 +133,10 @@ class ProcessPool:
             if worker.has_ended():
                 del self._workers[pid]
                 self._handle_exit(pid, worker)
+            elif stands_still := self._stands_still(pid, worker):
+                del self._workers[pid]
+                worker.end_at_once()
+                self._handle_exit(pid, worker, stands_still)
         self._queue.release_dead()
         most = self._kind.max_workers
         while len(self._workers) < most and self._queue.register_worker(most, self._start):
@@ -132,6 +156,19 @@ class ProcessPool:
                 self._queue.unregister_worker(pid)
         self._workers.clear()
 
+    def _stands_still(self, pid: int, worker: _Worker) -> str:
+        """Return what took too long if a worker shows no sign of life any more; empty if it does.
+
+        Its supervisor watches the flight, but a landing system may stop its supervisor by a signal.
+        """
+        silent_s = worker.heartbeat.silent_s()
+        if silent_s < LEAST_SILENCE_S:
+            return ""
+        limit_s = max(LEAST_SILENCE_S, self._kind.silence_s(self._queue, pid))
+        if silent_s < limit_s:
+            return ""
+        return f"the process that watches it stood still for {limit_s:g} s of wall time"
+
     def _start(self) -> int:
         stderr = tempfile.TemporaryFile("a+b")  # noqa: SIM115 (closed when the worker has ended)
         report_file = create_report_file()
@@ -146,12 +183,17 @@ class ProcessPool:
             pass_fds=[report_file],
             start_new_session=True,
         )
-        worker = _Worker(process=process, stderr=stderr, report_file=report_file)
+        worker = _Worker(
+            process=process,
+            stderr=stderr,
+            report_file=report_file,
+            heartbeat=Heartbeat(report_file),
+        )
         self._workers[process.pid] = worker
         return process.pid
 
-    def _handle_exit(self, pid: int, worker: _Worker) -> None:
-        """Decide what follows from the end of a worker."""
+    def _handle_exit(self, pid: int, worker: _Worker, stands_still: str = "") -> None:
+        """Decide what follows from the end of a worker, which may have been ended as it hung."""
         try:
             facts, status = worker.report(), worker.process.wait()
             if "cannot_go_on" in facts:
@@ -162,7 +204,7 @@ class ProcessPool:
                 status=facts.get("status", status),
                 stacks=facts.get("stacks", ""),
                 stderr=facts.get("stderr") or worker.last_stderr(),
-                hung=facts.get("hung", ""),
+                hung=stands_still or facts.get("hung", ""),
                 failure=(failure["error"], failure["message"], failure["traceback"])
                 if failure
                 else None,

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import builtins
+import ctypes
 import importlib
 import locale
 import os
+import platform
 import resource
 import signal
 import sys
@@ -45,6 +47,13 @@ _LIMITED = (
     resource.RLIMIT_AS,
     resource.RLIMIT_DATA,
 )
+_ENVIRONMENT_BYTES = 64
+"""More than ``fenv_t`` has of any C library."""
+_X87, _MXCSR = slice(0, 2), slice(28, 32)
+"""Where ``fenv_t`` of x86-64 holds the control words of the x87 and of SSE, which all code that
+was compiled for speed uses."""
+_MXCSR_FLAGS = 0x3F
+"""Bits that say what has occurred, such as an inexact result; they set nothing."""
 _GONE = object()
 
 
@@ -132,7 +141,22 @@ def _settings() -> dict[str, Any]:
         "alarm": signal.getitimer(signal.ITIMER_REAL) != (0.0, 0.0),
         # Libraries that were compiled for speed switch these off when they are loaded.
         "subnormal numbers": float(np.float64(sys.float_info.min) * 0.5) > 0,
+        "rounding": _rounding(),
     }
+
+
+def _rounding() -> tuple[int, ...]:
+    """Return how this thread rounds and which floating-point errors it raises.
+
+    ``fegetround`` alone would not do: on x86-64 it reads the x87, with which nobody computes.
+    """
+    library = ctypes.CDLL(None)
+    if platform.machine() != "x86_64":
+        return (int(library.fegetround()),)
+    environment = ctypes.create_string_buffer(_ENVIRONMENT_BYTES)
+    library.fegetenv(environment)
+    x87, mxcsr = (int.from_bytes(environment.raw[part], "little") for part in (_X87, _MXCSR))
+    return x87, mxcsr & ~_MXCSR_FLAGS
 
 
 def _folder() -> str:

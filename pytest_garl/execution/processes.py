@@ -12,10 +12,13 @@ import traceback
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
+from time import monotonic
 from typing import Any
 
 from pytest_garl.errors import GarlError
 
+LONGEST_LOOK_S = 1.0
+"""So much of the time between two looks at a heartbeat counts."""
 _PR_SET_PDEATHSIG = 1
 _PR_SET_CHILD_SUBREAPER = 36
 
@@ -99,6 +102,10 @@ class Parent:
         """Return whether the parent still exists."""
         return os.getppid() == self.pid
 
+    def beat(self) -> None:
+        """Show the parent that this process goes on: the file's time of change is later."""
+        os.utime(self.file)
+
     def report(self, **facts: Any) -> None:
         """Write a report; it replaces an earlier one."""
         os.ftruncate(self.file, 0)
@@ -115,6 +122,31 @@ def read_report(file: int) -> dict[str, Any]:
     text = os.pread(file, os.fstat(file).st_size, 0)
     facts: dict[str, Any] = json.loads(text) if text else {}
     return facts
+
+
+class Heartbeat:
+    """Whether a child process goes on: it beats by changing the time of its report's file."""
+
+    def __init__(self, file: int) -> None:
+        self._file = file
+        self._last_ns = os.fstat(file).st_mtime_ns
+        self._beats = False
+        self._looked_s = monotonic()
+        self._silent_s = 0.0
+
+    def silent_s(self) -> float:
+        """Return for how long a child that has beaten before has not, in this process's time.
+
+        Only time counts in which this process looked: if all processes of a machine stood still,
+        the child may wake later than this one.
+        """
+        now, last_ns = monotonic(), os.fstat(self._file).st_mtime_ns
+        if last_ns != self._last_ns:
+            self._beats, self._last_ns, self._silent_s = True, last_ns, 0.0
+        elif self._beats:
+            self._silent_s += min(now - self._looked_s, LONGEST_LOOK_S)
+        self._looked_s = now
+        return self._silent_s
 
 
 def end_with_parent(parent: int, number: int = signal.SIGTERM) -> None:

@@ -18,6 +18,7 @@ import secrets
 import select
 import signal
 import sys
+import threading
 import traceback
 from collections.abc import Callable
 from os import _exit, getpid
@@ -51,6 +52,8 @@ DUMP_S = 2.0
 """How long a process that hangs may take to dump its stacks."""
 ENDING_S = 5.0
 """How long the supervisor tries to end the processes below it."""
+BEAT_EVERY_S = 0.25
+"""How often the supervisor shows that it goes on: a landing system may stop it by a signal."""
 ANSWER_EVERY_S = 0.001
 """How often a flying process looks whether its flight is judged; that takes 20 ms."""
 _DUMP = signal.SIGRTMAX
@@ -61,9 +64,9 @@ _MEMORY_BYTES = 2**16
 _WAITS, _GOES_ON, _ENDS = 1.0, 0.0, 2.0
 """What is known of a request: it waits for an answer, or the flying process goes on or ends."""
 
-JudgeFunction = Callable[[dict[str, Any]], dict[str, Any]]
-"""Takes a request of the flying process, and judges; returns the facts with which that process
-must end, or none if it may go on."""
+JudgeFunction = Callable[[dict[str, Any], Callable[[], None]], dict[str, Any]]
+"""Takes a request of the flying process, and what ends that process, and judges; returns the facts
+with which that process must end, or none if it may go on."""
 
 
 class FlightMonitor:
@@ -240,6 +243,8 @@ class _Supervisor:
         """Supervise until the flying process has ended or the parent asks for the end."""
         try:
             signal.signal(signal.SIGTERM, _request_end)
+            # A thread: to judge a long record takes longer than the time between two beats.
+            threading.Thread(target=self._beat, daemon=True).start()
             status = self._wait()
             signal.signal(signal.SIGTERM, signal.SIG_IGN)
             self._read_stderr(0)
@@ -256,6 +261,11 @@ class _Supervisor:
             end_descendants()
         finally:
             _exit(0)
+
+    def _beat(self) -> None:
+        while True:
+            self._parent.beat()
+            sleep(BEAT_EVERY_S)
 
     def _wait(self) -> int:
         """Wait for the flying process to end; return its exit status, a signal's as negative."""
@@ -278,12 +288,15 @@ class _Supervisor:
         Such a process might hold the ledger's lock.
         """
         left = self._end_what_is_left()
-        self._judged = self._judge(request)
+        self._judged = self._judge(request, self._end_flying)
         if self._judged:
-            self._monitor.note_ending()
-            os.kill(self._flying, signal.SIGKILL)
+            self._end_flying()
         else:
             self._monitor.answer(goes_on=not left)
+
+    def _end_flying(self) -> None:
+        self._monitor.note_ending()
+        os.kill(self._flying, signal.SIGKILL)
 
     def _end_what_is_left(self) -> bool:
         """End the processes that a flight has left; return whether there were any."""

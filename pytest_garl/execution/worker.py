@@ -16,11 +16,10 @@ from pytest_garl.execution.judging import SIMULATOR, SlotJudge, failure_of, impo
 from pytest_garl.execution.ledger_queue import Claim, WorkQueue
 from pytest_garl.execution.processes import Parent, failure_text, run_worker
 from pytest_garl.execution.supervisor import FlightMonitor, supervise
+from pytest_garl.execution.worker_failure import call_limit_s
 
 CLAIM_EVERY_S = 0.02
 """Time between two attempts to claim a slot."""
-RETRY_LIMIT_FACTOR = 3.0
-"""A flight that is repeated alone gets so many times the limit of a call."""
 _TRUSTED = "pytest_garl."
 """Landing systems of this package leave their process as it was."""
 RESTART_S = 1.0
@@ -115,7 +114,7 @@ class Worker:
         job, scenario = parse_job(claim.job), parse_scenario(claim.scenario)
         if not job.system.module.startswith(_TRUSTED):
             self._system = job.system.name
-        limit_s = job.timeout_s * (RETRY_LIMIT_FACTOR if claim.earlier_exits else 1.0)
+        limit_s = call_limit_s(job, claim)
         if "failed" in claim.earlier_exits:
             self._prove_simulator(claim)
         try:

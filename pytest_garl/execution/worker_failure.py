@@ -11,11 +11,13 @@ from __future__ import annotations
 import signal
 from dataclasses import dataclass, replace
 
-from pytest_garl.execution.job import parse_job
+from pytest_garl.execution.job import FlightJob, parse_job
 from pytest_garl.execution.ledger_queue import Claim, WorkQueue
 from pytest_garl.execution.result import FlightResult, broken_result
 from pytest_garl.simulation.flight import Crash
 
+RETRY_LIMIT_FACTOR = 3.0
+"""A flight that is repeated alone gets so many times the limit of a call."""
 ATTEMPTS = 3
 """If a slot hangs, is killed and makes the simulator fail, once each, it stays inconclusive."""
 
@@ -45,6 +47,11 @@ class WorkerExit:
         if self.failure:
             return "failed"
         return "killed" if self.status == -signal.SIGKILL or not self.watched else "died"
+
+
+def call_limit_s(job: FlightJob, claim: Claim) -> float:
+    """Return how long one call of the landing system may take in this attempt, in seconds."""
+    return job.timeout_s * (RETRY_LIMIT_FACTOR if claim.earlier_exits else 1.0)
 
 
 def retry_or_record(queue: WorkQueue, claim: Claim, ended: WorkerExit) -> None:

@@ -7,16 +7,19 @@ import faulthandler
 import os
 import resource
 import signal
+import sqlite3
 import subprocess
 import sys
 import time
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from pytest_garl.landing_system import Land, Observation
 from tests.execution.flying import Good
 
+kept: list[Any] = []
 MARKED = "PYTEST_GARL_TEST_LEFT"
 """In the environment of the processes that are left: who looks for them finds his own only."""
 
@@ -77,6 +80,48 @@ class LeavesProcesses(Good):
         return Land()
 
 
+class StopsItsSupervisor(Good):
+    """Stops the process that watches it."""
+
+    def step(self, observation: Observation) -> Land:
+        os.kill(os.getppid(), signal.SIGSTOP)
+        return Land()
+
+
+HOLDS = """
+import sqlite3, sys, time
+connection = sqlite3.connect(sys.argv[1], isolation_level=None)
+connection.execute("BEGIN IMMEDIATE")
+print("held", flush=True)
+time.sleep(600)
+"""
+
+
+class LeavesTheLedgerLocked(Good):
+    """Leaves a process in a session of its own that may write in the ledger, alone."""
+
+    def step(self, observation: Observation) -> Land:
+        process = subprocess.Popen(
+            [sys.executable, "-c", HOLDS, "ledger.sqlite"],
+            start_new_session=True,
+            stdout=subprocess.PIPE,
+        )
+        assert process.stdout
+        process.stdout.readline()
+        kept.append(process)
+        return Land()
+
+
+class KeepsTheLedgerLocked(Good):
+    """Keeps the lock itself, in the flying process."""
+
+    def step(self, observation: Observation) -> Land:
+        connection = sqlite3.connect("ledger.sqlite", isolation_level=None)
+        connection.execute("BEGIN IMMEDIATE")
+        kept.append(connection)
+        return Land()
+
+
 class Forks(Good):
     """Comes back from its call in two processes."""
 
@@ -115,6 +160,14 @@ class PretendsToZeros(Good):
 
     def step(self, observation: Observation) -> Land:
         setattr(np, "zeros", np.ones)  # noqa: B010
+        return Land()
+
+
+class SavesNothing(Good):
+    """Takes away what writes the record."""
+
+    def step(self, observation: Observation) -> Land:
+        vars(np)["savez_compressed"] = lambda *_, **more: None
         return Land()
 
 

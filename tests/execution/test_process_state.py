@@ -1,5 +1,7 @@
 from __future__ import annotations
 
+import ctypes
+import platform
 import random
 import signal
 import subprocess
@@ -97,6 +99,36 @@ def test_changed_settings_of_libraries_are_noticed(state: ProcessState) -> None:
     cv2.setUseOptimized(not optimized)
     assert state.changed()
     cv2.setUseOptimized(optimized)
+    assert not state.changed()
+
+
+def set_mxcsr(bits: int) -> None:
+    """Set the control word of SSE alone, as the intrinsics of a C compiler do."""
+    library = ctypes.CDLL(None)
+    environment = ctypes.create_string_buffer(64)
+    library.fegetenv(environment)
+    ctypes.memmove(ctypes.addressof(environment) + 28, bits.to_bytes(4, "little"), 4)
+    library.fesetenv(environment)
+
+
+@pytest.mark.skipif(platform.machine() != "x86_64", reason="constants of x86-64")
+def test_rounding_mode_is_noticed(state: ProcessState) -> None:
+    library = ctypes.CDLL(None)
+    upward, nearest = 0x800, 0
+    try:
+        assert library.fesetround(upward) == 0
+        assert state.changed()
+        library.fesetround(nearest)
+        assert not state.changed()
+        default, all_downward = 0x1F80, 0x1F80 | 0x2000
+        set_mxcsr(all_downward)
+        assert library.fegetround() == nearest
+        assert state.changed()
+        set_mxcsr(default)
+    finally:
+        library.fesetround(nearest)
+    # What has occurred is no setting.
+    assert 1.0 / 3.0 > 0
     assert not state.changed()
 
 

@@ -30,14 +30,18 @@ from tests.execution.misbehaving import (
     Floods,
     Forks,
     HoldsTheLock,
+    KeepsTheLedgerLocked,
     KilledOnce,
     LeavesLock,
     LeavesProcesses,
+    LeavesTheLedgerLocked,
     OpensNothing,
     Pretends,
     PretendsToZeros,
     ReplacesZeros,
+    SavesNothing,
     StopsClocks,
+    StopsItsSupervisor,
     WillNotEnd,
     left,
 )
@@ -140,6 +144,22 @@ def works_between_calls(*args: Any, guard: Any, **more: Any) -> Any:
     return tiny_simulator.fly(*args, guard=guard, **more)
 
 
+def records_no_samples(*args: Any, **more: Any) -> Any:
+    """Return a flight that can be saved and not be read."""
+    flight = tiny_simulator.fly(*args, **more)
+    track = flight.uav
+    empty = dataclasses.replace(track, **{name: getattr(track, name)[:0] for name in TRACK})
+    return dataclasses.replace(flight, uav=empty)
+
+
+TRACK = ("time_s", "position_m", "attitude", "velocity_mps")
+
+
+def test_simulator_whose_records_cannot_be_judged_ends_the_run(field: Field) -> None:
+    with pytest.raises(PoolError, match=r"0\.time_s: found no times, expected at least one"):
+        field.fly(Good, simulator=records_no_samples)
+
+
 def test_limit_of_a_call_ignores_the_simulators_time(field: Field) -> None:
     flown = field.fly(Good, timeout_s=2.0, simulator=works_between_calls)
     assert flown.result.outcome == "landed"
@@ -193,6 +213,26 @@ def test_processes_started_in_a_flight_end_with_it(field: Field, undisturbed: st
     assert left("misbehaving.py") == set()
 
 
+def test_stopped_supervisor_is_a_finding(
+    field: Field, undisturbed: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("pytest_garl.execution.process_pool.LEAST_SILENCE_S", 1.5)
+    flown = field.fly(StopsItsSupervisor, timeout_s=0.2)
+    assert flown.signature == "V:hung:Timeout"
+    stood_still = "the process that watches it stood still for 1.8 s of wall time, twice"
+    assert crash_of(flown).message == stood_still
+    assert flown.neighbour == undisturbed
+
+
+@pytest.mark.parametrize("system", [LeavesTheLedgerLocked, KeepsTheLedgerLocked])
+def test_lock_that_a_flight_leaves_ends_no_run(
+    field: Field, undisturbed: str, system: type
+) -> None:
+    flown = field.fly(system)
+    assert flown.signature == ""
+    assert flown.neighbour == undisturbed
+
+
 def test_system_that_forks_is_flown_once(field: Field, undisturbed: str) -> None:
     flown = field.fly(Forks)
     assert flown.signature == ""
@@ -207,6 +247,7 @@ def test_system_that_forks_is_flown_once(field: Field, undisturbed: str) -> None
         (OpensNothing, "V:broke:LedgerError"),
         (ReplacesZeros, "V:broke:TypeError"),
         (PretendsToZeros, ""),
+        (SavesNothing, "V:broke:GarlError"),
         (Floods, ""),
         (WillNotEnd, ""),
     ],

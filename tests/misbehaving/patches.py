@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import builtins
 import contextlib
+import ctypes
 import decimal
 import gc
 import json
@@ -192,6 +193,13 @@ class TurnsWarningsIntoErrors(Patches):
     def misbehave(self, observation: Observation) -> Any:
         warnings.simplefilter("error")
         np.seterr(all="raise")
+
+
+class RoundsUpward(Patches):
+    """As libraries for intervals do."""
+
+    def misbehave(self, observation: Observation) -> Any:
+        ctypes.CDLL(None).fesetround(0x800)
 
 
 class SeedsEverything(Harmless):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib.util
+import math
 import re
 import socket
 from collections.abc import Sequence
@@ -75,6 +76,10 @@ class RayDriver:
             str(self.root),
             str(self.workers or 0),
         ]
+
+    def silence_s(self, queue: WorkQueue, pid: int) -> float:
+        """Return no limit: the driver runs no landing system, and does not beat."""
+        return math.inf
 
     def handle_exit(self, queue: WorkQueue, pid: int, ended: WorkerExit) -> bool:
         """Release all slots: no landing system runs in the driver, so none caused its exit."""
