@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import asdict, dataclass, field, fields, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar, cast
 
@@ -56,7 +56,7 @@ def read_marker(marker: pytest.Mark, options: Options) -> MarkerArguments:
     """Return the arguments of a marker; raise GarlError if one is invalid."""
     from pytest_garl.scenarios.domains.navigation import within
     from pytest_garl.scenarios.maps.map import load_map, map_names
-    from pytest_garl.verdicts.verdict import Limits, limits
+    from pytest_garl.verdicts.verdict import Limits, LimitsOfMarker, limits
 
     known = {"system", "maps", "domain", "marker", "start", "limits"}
     known |= {"deterministic", "files"}
@@ -78,8 +78,7 @@ def read_marker(marker: pytest.Mark, options: Options) -> MarkerArguments:
     spec = _of_type(marker, "marker", MarkerSpec)
     for map in maps:
         _check_ids(spec, load_map(map, options.map_folders))
-    given = marker.kwargs.get("limits", Limits())
-    has_distance = not isinstance(given, dict) or "distance_m" in given
+    given = marker.kwargs.get("limits", {})
     if isinstance(given, dict):
         given = limits(**{str(name): value for name, value in given.items()})
     if not isinstance(given, Limits):
@@ -92,7 +91,7 @@ def read_marker(marker: pytest.Mark, options: Options) -> MarkerArguments:
         raise GarlError(f"mark.garl: deterministic={deterministic!r}: expected True or False")
     target = Target(
         system=system,
-        limits=given,
+        limits=Limits(**asdict(given)),
         deterministic=deterministic,
         domain=_domain(marker.kwargs.get("domain"), options),
         files=_files(marker.kwargs.get("files", ()), options),
@@ -105,7 +104,7 @@ def read_marker(marker: pytest.Mark, options: Options) -> MarkerArguments:
         target=target,
         marker=spec,
         start=_start(marker),
-        has_distance=has_distance and "limits" in marker.kwargs,
+        has_distance=not isinstance(given, LimitsOfMarker),
         map_folders=options.map_folders,
     )
 

@@ -97,8 +97,14 @@ class Limits:
             )
 
 
+class LimitsOfMarker(Limits):
+    """Limits that state no distance: it follows from the size of the marker that lies there."""
+
+    __slots__ = ()
+
+
 def limits(**given: Any) -> Limits:
-    """Return the limits of a marker; raise OptionError for an unknown name."""
+    """Return the limits of a mark ``garl``; raise OptionError for an unknown name."""
     known = [field.name for field in dataclasses.fields(Limits)]
     unknown = [name for name in given if name not in known]
     if unknown:
@@ -106,7 +112,7 @@ def limits(**given: Any) -> Limits:
             f"limits: found {', '.join(unknown)}, expected {', '.join(known[:-1])} or {known[-1]}, "
             "such as limits(distance_m=1.0)"
         )
-    return Limits(**given)
+    return Limits(**given) if "distance_m" in given else LimitsOfMarker(**given)
 
 
 DEFAULT_LIMITS = Limits()

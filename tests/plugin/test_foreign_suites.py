@@ -72,17 +72,15 @@ class Habit:
     files: Mapping[str, str] = field(default_factory=dict)
     conftest: str = ""
     args: tuple[str, ...] = ()
-    needs: str = "pytest"
-    """The module of the plugin."""
+    needs: tuple[str, ...] = ()
+    """The modules of its plugins."""
 
 
 HABITS = {
-    "importorskip": Habit(files={"test_other.py": "import pytest\npytest.importorskip('no_such')"}),
-    "module-level skip": Habit(
-        files={"test_other.py": "import pytest\npytest.skip('later', allow_module_level=True)"}
-    ),
-    "conftest skips": Habit(
+    "skips": Habit(
         files={
+            "test_absent.py": "import pytest\npytest.importorskip('no_such')\n",
+            "test_later.py": "import pytest\npytest.skip('later', allow_module_level=True)\n",
             "test_other.py": "import pytest\n@pytest.mark.slow\ndef test_a(): assert 0\n",
             "test_ignored.py": "raise RuntimeError('not for this machine')",
             "pytest.ini": "[pytest]\ngarl_domain = paper\nmarkers = slow: slow\n",
@@ -93,24 +91,29 @@ HABITS = {
     "classes and fixtures": Habit(files={"test_it.py": CLASSES}),
     "marked parameters": Habit(files={"test_it.py": PARAMETERS}),
     "rerunfailures": Habit(
-        args=("-p", "rerunfailures", "--reruns=1"), needs="pytest_rerunfailures"
+        args=("-p", "rerunfailures", "--reruns=1"), needs=("pytest_rerunfailures",)
     ),
-    "retry": Habit(args=("-p", "pytest-retry", "--retries=1"), needs="pytest_retry"),
-    "flaky": Habit(args=("-p", "flaky", "--force-flaky"), needs="flaky"),
-    "randomly": Habit(args=("-p", "randomly", "--randomly-seed=1"), needs="pytest_randomly"),
-    "timeout": Habit(args=("-p", "timeout", "--timeout=60"), needs="pytest_timeout"),
+    "retry": Habit(args=("-p", "pytest-retry", "--retries=1"), needs=("pytest_retry",)),
+    "flaky": Habit(args=("-p", "flaky", "--force-flaky"), needs=("flaky",)),
+    "randomly, timeout and cov": Habit(
+        args=(
+            *("-p", "randomly", "--randomly-seed=1"),
+            *("-p", "timeout", "--timeout=60"),
+            *("-p", "pytest_cov", "--cov=systems"),
+        ),
+        needs=("pytest_randomly", "pytest_timeout", "pytest_cov"),
+    ),
     "xdist": Habit(
-        files={"test_other.py": "import pytest\npytest.importorskip('no_such')"},
+        files={"test_absent.py": "import pytest\npytest.importorskip('no_such')\n"},
         args=("-n2", "--garl-workers=1"),
-        needs="xdist",
     ),
-    "cov": Habit(args=("-p", "pytest_cov", "--cov=systems"), needs="pytest_cov"),
 }
 
 
 def _session(pytester: pytest.Pytester, habit: Habit, simulator: str) -> pytest.RunResult:
-    if importlib.util.find_spec(habit.needs) is None:
-        pytest.skip(f"{habit.needs} is not installed")
+    missing = [name for name in habit.needs if importlib.util.find_spec(name) is None]
+    if missing:
+        pytest.skip(f"not installed: {', '.join(missing)}")
     project(pytester)
     for file, text in habit.files.items():
         (pytester.path / file).write_text(text)
@@ -128,11 +131,18 @@ def test_a_clean_search_is_green_in_a_suite_with_habits(
 
 
 @pytest.mark.parametrize("name", HABITS)
-def test_a_violation_is_red_in_a_suite_with_habits(pytester: pytest.Pytester, name: str) -> None:
+def test_a_violation_is_red_in_a_suite_with_habits(
+    pytester: pytest.Pytester, monkeypatch: pytest.MonkeyPatch, name: str
+) -> None:
+    monkeypatch.setenv("CI", "true")
     result = _session(pytester, HABITS[name], CONFTEST)
     assert result.ret == pytest.ExitCode.TESTS_FAILED
     result.stdout.fnmatch_lines(["*on lawn: 4 flown, landed 75.0 %*", "ledger: *"])
-    assert "INTERNALERROR" not in result.stdout.str() + result.stderr.str()
+    output = result.stdout.str() + result.stderr.str()
+    assert "INTERNALERROR" not in output
+    # Its tests assert it, whatever runs them.
+    assert "no selected test fails" not in output
+    assert "this run is not green" not in output
 
 
 def test_marked_parameters_fly_their_own_systems(pytester: pytest.Pytester) -> None:

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import pytest
 
+from pytest_garl.execution.job import parse_job
 from pytest_garl.execution.ledger import Ledger
 from pytest_garl.fiducial import MarkerSpec
 from pytest_garl.scenarios.files import parse_scenario
 from pytest_garl.scenarios.task import Start, Task
+from pytest_garl.verdicts.verdict import Limits
 from tests.support.landing_project import project, run
 
 
@@ -60,6 +62,20 @@ def test_a_saved_case_keeps_the_marker(pytester: pytest.Pytester) -> None:
     assert "distance_m = 1.0\n" in case.read_text()
     run(pytester, "-k", "case")
     assert tasks_flown(pytester) == {Task(marker=MarkerSpec(id=9, side_m=2.0))}
+
+
+@pytest.mark.parametrize(
+    ("given", "distance_m"), [("time_s=100", 0.3), ("time_s=100, distance_m=0.75", 0.75)]
+)
+def test_limits_that_state_no_distance_follow_the_size_of_the_marker(
+    pytester: pytest.Pytester, given: str, distance_m: float
+) -> None:
+    with_arguments(pytester, f"marker={{'side_m': 0.5}}, limits=pytest_garl.limits({given})")
+    run(pytester, "--garl-budget=1", "--garl-workers=0")
+    ledger = Ledger(pytester.path / ".garl" / "ledger.sqlite")
+    [(_, job)] = ledger.searches()
+    ledger.close()
+    assert parse_job(job).limits == Limits(distance_m=distance_m, time_s=100)
 
 
 @pytest.mark.parametrize(
