@@ -10,13 +10,15 @@ The modules, in the order in which a session needs them:
 3. ``collection`` makes the items of each marked test: ``marker`` reads the marker, and a ``target``
    says what one item tests.  ``baseline_gate`` adds items that compare rates with a baseline.
 4. ``search_setup`` puts the searches of the selected items into the ledger when the first of them
-   asks for its ``landing``.  ``header`` forecasts the flights; ``progress_display`` shows how far
-   they are, in the words of ``progress_text``.
+   asks for its ``landing``.  ``progress_display`` shows how far they are, in the words of
+   ``progress_text``; ``kind_news`` tells each new kind of violation, and ``time_left`` forecasts
+   the rest from what was flown.
 5. ``outcomes`` decides whether an item passes, fails, xfails or skips.  ``item_facts`` gathers the
    facts (with ``failed_statement`` and ``user_assertions``), and ``item_report`` writes the
    decision into the report (``report_text``).
 6. ``tally`` counts what reports say, ``save_cases`` saves new violations, ``session_status`` sets
-   the exit status, and ``summary`` and ``github_summary`` show all of it.
+   the exit status, and ``summary`` and ``github_summary`` show all of it.  ``termination`` lets
+   SIGTERM end a session as Ctrl-C does.
 
 ``hookspecs`` has the hook that users may implement, ``case_tests`` finds the tests of a saved case
 for ``garl cases``, and ``suggested_commands`` and ``terminal_text`` serve all texts.
