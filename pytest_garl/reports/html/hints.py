@@ -42,8 +42,8 @@ def hints_of(
         return (_moving(flight, prevention),)
     if kind in ("II", "abort") or verdict.signature.startswith("late:not-landed"):
         return tuple(_not_landed(flight))
-    if verdict.signature in _OF_SIGNATURE:
-        return _OF_SIGNATURE[verdict.signature]
+    if verdict.cause in _OF_CAUSE:
+        return _OF_CAUSE[verdict.cause]
     decoy = next((name for name in _signatures(verdict) if name.startswith(_DECOY)), "")
     if decoy:
         first = _decoy(flight, decoy.split(":")[1])
@@ -54,7 +54,7 @@ def hints_of(
 
 
 _DECOY = "I:decoy-"
-_OF_SIGNATURE = {
+_OF_CAUSE = {
     "late:standing": (
         "The UAV stood on the ground: look at how the system notices a touchdown, and at when it "
         "stops the motors.",

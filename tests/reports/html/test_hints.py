@@ -93,6 +93,23 @@ def test_a_marker_that_could_never_be_read_points_to_the_search() -> None:
 
 
 @pytest.mark.parametrize(
+    ("signature", "words"),
+    [
+        ("late:standing", "how the system notices a touchdown"),
+        ("late:never-gave-up", "look at when the system gives up"),
+        ("late:landed:descent", "which phase took the time"),
+    ],
+)
+def test_a_late_flight_is_told_by_what_took_its_time(signature: str, words: str) -> None:
+    assert words in hints_of(recorded(steps=seen(())), verdict("late", signature))[0]
+
+
+def test_a_uav_that_stood_on_the_ground_is_told_to_stop_its_motors() -> None:
+    stood = Prevention(answer="preventable", inevitable_s=0.5, escape="motors off")
+    assert "when it stops the motors" in hints_of(collided(range(0)), verdict("IV"), stood)[0]
+
+
+@pytest.mark.parametrize(
     ("answer", "words"),
     [
         ("preventable", "An escape existed after the camera could show the body"),
