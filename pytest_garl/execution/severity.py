@@ -110,6 +110,16 @@ class Severity:
         pairs = zip(self.conditions, values, strict=True)
         return [(name, value) for name, value in pairs if name not in self.unread]
 
+    @property
+    def tried(self) -> list[tuple[str, str]]:
+        """(name, value) of the conditions that may have acted, but for those in ``untried``."""
+        return [each for each in self.acting if each[0] not in self.untried]
+
+    @property
+    def is_guess(self) -> bool:
+        """Whether no condition was tried: nobody knows which of them the violation takes."""
+        return self.about == "conditions" and bool(self.acting) and not self.tried
+
     def _value_of_one(self, value: str) -> str:
         """Return the value of a condition that is the only one, with the largest if it has many."""
         if value.endswith(COUNTED):

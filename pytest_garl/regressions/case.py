@@ -214,7 +214,8 @@ class Case:
     @property
     def is_shrunk(self) -> bool:
         """Whether flights showed what the violation takes; else the case is as it was found."""
-        return bool(self.evidence.neighbours) or self.severity.window_s is not None
+        was_flown = bool(self.evidence.neighbours) or self.severity.window_s is not None
+        return was_flown and not self.severity.is_guess
 
     @property
     def asserting_test(self) -> str:

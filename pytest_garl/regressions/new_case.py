@@ -68,6 +68,7 @@ def new_case(
     failure = ask(completed, failing.scenario) if ask else None
     npcs = failing.npcs or job.npcs
     severity = dataclasses.replace(_severity(request, failing, flight, npcs), untried=untried)
+    is_shrunk = failing.is_shrunk and not severity.is_guess
     return Case(
         system=job.system.name,
         status="open",
@@ -77,7 +78,7 @@ def new_case(
         scenario=failing.scenario,
         violation=_own_violation(failure, completed.result.verdict)
         if failure is not None
-        else violation_in(completed.result.verdict, flight, severity, is_shrunk=failing.is_shrunk),
+        else violation_in(completed.result.verdict, flight, severity, is_shrunk=is_shrunk),
         policy=npcs.name,
         policy_sha256=npcs.sha256,
         moves=failing.behaviour.moves,

@@ -67,13 +67,14 @@ def tells_cause(case: Case) -> bool:
 def cause_of(severity: Severity) -> tuple[str, ...]:
     """Return the cause of a shrunk violation: names of conditions, or the type of a body.
 
-    Two kinds with the same cause stand together; how strong it is does not matter.
+    Two kinds with the same cause stand together; how strong it is does not matter, and what was not
+    tried is no cause.
     """
     if severity.about == "body":
         return (severity.type,)
     if severity.about != "conditions":
         return ()
-    names = {_NUMBERED.sub("", name) for name, _ in severity.acting}
+    names = {_NUMBERED.sub("", name) for name, _ in severity.tried}
     return tuple(sorted(names)) or (NOTHING,)
 
 
@@ -92,10 +93,12 @@ def cause_in_words(severity: Severity) -> str:
     """Return the cause with its strength: ``fog of 10 m``, ``a careless dog at 4.0 m/s``."""
     if severity.about == "body":
         return severity.unusual
-    named = [_condition(*each) for each in severity.acting] or [NOTHING]
+    named = [_condition(*each) for each in severity.tried] or [NOTHING]
     if len(named) > MOST_NAMED:
         named = [*named[: MOST_NAMED - 1], f"{len(named) - MOST_NAMED + 1} more conditions"]
-    return " and ".join(filter(None, (", ".join(named[:-1]), named[-1])))
+    cause = " and ".join(filter(None, (", ".join(named[:-1]), named[-1])))
+    perhaps = [name for name, _ in severity.acting if name in severity.untried]
+    return f"{cause}, perhaps {' and '.join(perhaps)}" if perhaps else cause
 
 
 def _condition(name: str, value: str) -> str:
@@ -115,7 +118,9 @@ def _ending(signature: str) -> str:
         if parts[0] == "nothing":
             return "comes down on open ground, off the marker"
         return f"comes down on a {parts[0].removeprefix('decoy-')}"
-    if kind in ("III", "IV"):
+    if kind == "IV":
+        ending = "collision"
+    elif kind == "III":
         ending = f"hits a {parts[0]}"
     else:
         ending = _ENDINGS.get(f"{kind}:{parts[0]}", _ENDINGS_OF_TYPE.get(kind, ""))
@@ -124,7 +129,7 @@ def _ending(signature: str) -> str:
 
 
 def counted_causes(cases: Sequence[Case | None]) -> str:
-    """Return how many causes kinds have: ``4 causes``, ``3 causes of the 5 that are shrunk``.
+    """Return how many causes kinds have: ``4 causes``, ``5 of them shrunk, with 3 causes``.
 
     ``cases`` are those of the kinds, None for a kind whose cause nobody knows; empty if there is
     none.
@@ -134,4 +139,4 @@ def counted_causes(cases: Sequence[Case | None]) -> str:
         return ""
     number = len({cause_of(case.severity) for case in known})
     causes = f"{number} cause{'' if number == 1 else 's'}"
-    return causes if len(known) == len(cases) else f"{causes} of the {len(known)} that are shrunk"
+    return causes if len(known) == len(cases) else f"{len(known)} of them shrunk, with {causes}"

@@ -48,7 +48,7 @@ def shrunk(signature: str, severity: Severity, **fields: Any) -> Case:
         (
             "IV:dog:last-metre:unseen",
             DOG,
-            "a careless dog at 4.0 m/s: hits a dog in the last metre",
+            "a careless dog at 4.0 m/s: collision in the last metre",
         ),
         (
             "I:decoy-helipad-h:seen",
@@ -72,6 +72,17 @@ def test_a_title_is_the_cause_and_the_ending(
     signature: str, severity: Severity, title: str
 ) -> None:
     assert title_of(shrunk(signature, severity)) == title
+
+
+def test_what_was_not_tried_is_no_cause() -> None:
+    both = conditions(fog="visibility 10 m", decoy_2="qr-code")
+    perhaps = dataclasses.replace(both, untried=("decoy-2",))
+    assert cause_of(perhaps) == ("fog",)
+    words = "fog of 10 m, perhaps decoy-2: the marker is never readable"
+    assert title_of(shrunk("II:never-seen", perhaps)) == words
+    guess = shrunk("II:never-seen", dataclasses.replace(both, untried=("fog", "decoy-2")))
+    assert not guess.is_shrunk
+    assert telling_case([guess], SYSTEM, "lawn", "II:never-seen") is None
 
 
 def test_the_strength_and_the_number_of_an_object_are_no_part_of_a_cause() -> None:
@@ -130,7 +141,7 @@ def test_kinds_of_one_cause_stand_together_and_are_counted() -> None:
         "IV:dog:descent:seen",
         "V:ValueError@x",
     ]
-    assert told.causes == "2 causes of the 3 that are shrunk"
+    assert told.causes == "3 of them shrunk, with 2 causes"
     assert counted_causes([each.case for each in told.kinds[:3]]) == "2 causes"
 
 

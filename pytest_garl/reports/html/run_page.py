@@ -145,7 +145,7 @@ def _title(searches: Sequence[SearchSummary], kinds: int, violating: int) -> str
         return f"{who}: no violation in {flown} flights"
     ways = "one way" if kinds == 1 else f"{kinds} ways"
     causes = counted_causes([kind.case for each in searches for kind in each.kinds])
-    with_causes = f", with {causes}" if causes else ""
+    with_causes = f", {causes}" if causes else ""
     return f"{who}: {violating} of {flown} flights violate something, in {ways}{with_causes}"
 
 
