@@ -120,10 +120,12 @@ class Prevention:
                 f"{self.answer}: the UAV stood on the ground, where stopping the motors is an "
                 f"escape that needs no camera; {escape}"
             )
+        # What it showed before the time that counts is not asked.
+        at_least = "at least " if (self.observed_s or 0.0) >= LONGEST_ESCAPE_S else ""
         seen = (
             f"the camera did not show the body well enough within the last {OBSERVED_WITHIN_S:g} s"
             if self.observed_s is None
-            else f"the camera showed the body {self.observed_s:.1f} s before it"
+            else f"the camera showed the body {at_least}{self.observed_s:.1f} s before it"
         )
         return f"{self.answer}: {escape}, {seen}"
 

@@ -39,6 +39,7 @@ from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.simulation.camera.cover_event import renderer_of
 from pytest_garl.simulation.flight import Flight
 from pytest_garl.simulation.flight_file import load
+from pytest_garl.verdicts.sightings import reports_detections
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -80,6 +81,7 @@ class ShownFlight:
     notes: tuple[str, ...] = ()
     missing: str = ""
     sightings: tuple[str, ...] = ()
+    reports_detections: bool = False
     hints: tuple[str, ...] = ()
     conditions: tuple[ConditionRow, ...] = ()
     events: tuple[tuple[float, str], ...] = ()
@@ -141,6 +143,7 @@ def shown_flight(task: FlightTask) -> ShownFlight:
         film=drawn.film,
         notes=(*notes, *drawn.notes),
         sightings=sighting_sentences(flight),
+        reports_detections=reports_detections(flight),
         hints=hints_of(flight, verdict, task.prevention),
         conditions=conditions,
         events=event_rows(flight),

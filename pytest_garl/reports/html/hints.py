@@ -233,8 +233,8 @@ def _path_at_marker(flight: Flight) -> str:
     lowest = above[int(np.argmin(heights[above]))]
     return (
         f"The UAV was within {AT_MARKER_M:g} m of the marker, seen from above, for "
-        f"{float(steps[above].sum()):.1f} s, first at {track.time_s[above[0]]:.1f} s, and came "
-        f"down to {heights[lowest]:.1f} m there, at {track.time_s[lowest]:.1f} s."
+        f"{float(steps[above].sum()):.1f} s, first at {track.time_s[above[0]]:.1f} s; there it was "
+        f"{heights[lowest]:.1f} m up at the lowest, at {track.time_s[lowest]:.1f} s."
     )
 
 

@@ -172,7 +172,7 @@ def found_page(plan: KindPlan, flight: ShownFlight) -> KindPage:
         description=flight.description,
         subject=f"{plan.kind.first}, as the search found it",
         facts=(_unusual(plan.found),),
-        other=("the saved case, shrunk", f"{plan.name}.html"),
+        other=(_subject(plan), f"{plan.name}.html"),
     )
 
 
@@ -258,7 +258,7 @@ def _facts(plan: KindPlan, flight: ShownFlight, known: bool) -> tuple[Fact, ...]
         ("Robustness", case.robustness if case else ""),
         ("Preventable?", case.prevention.text if case else ""),
         ("Why it gates nothing", NO_GATE_TEXTS[case.reason] if case and case.reason else ""),
-        ("Shrinking removed", case.evidence.removed if case else ""),
+        ("Shrinking removed", case.evidence.removed if case and case.is_shrunk else ""),
         ("Saved case", _status(case, known) if case else "none in this project"),
     )
 
