@@ -25,7 +25,7 @@ _NAMES = ("_exit", "execv", "execve")
 class ProcessEnd(SystemExit):
     """What a landing system gets in place of the end of the process.
 
-    A SystemExit of this package passes through the simulator, and is silent in a thread.
+    A SystemExit of this package passes through the simulator, which takes others for findings.
     """
 
 
