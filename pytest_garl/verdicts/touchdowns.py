@@ -78,7 +78,8 @@ def stays(flight: Flight) -> tuple[Stay, ...]:
     A hard touchdown ends the flight; it is none.
     """
     found = list(flight.earlier_touchdowns)
-    hard = flight.outcome == "collision" and flight.contacts[-1].body_class == "ground"
+    last = flight.contacts[-1] if flight.contacts else None
+    hard = flight.outcome == "collision" and last is not None and last.body_class == "ground"
     if flight.touchdown and not hard:
         found.append(flight.touchdown)
     groups: list[list[Touchdown]] = []

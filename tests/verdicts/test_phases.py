@@ -71,6 +71,10 @@ def test_a_uav_that_starts_in_the_air_never_takes_off(height: float) -> None:
     assert phases((0.0, height), (5.0, 10.0), (9.0, 6.9))[1:] == ["approach", "descent"]
 
 
+def test_a_collision_without_a_recorded_contact_has_a_phase() -> None:
+    assert landing_phase(flight("collision", (0.0, 0.0, 1.0)), 30.0) == "last-metre"
+
+
 def test_a_descent_begins_half_a_metre_below_a_low_search() -> None:
     found = phases((0.0, 4.0), (5.0, 3.501), (6.0, 3.499), (9.0, 3.9))
     assert found == ["approach", "approach", "descent", "approach"]
