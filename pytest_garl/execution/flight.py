@@ -7,15 +7,17 @@ record is all that leaves that process, and another one, which never runs that c
 from __future__ import annotations
 
 import dataclasses
+import math
 import sys
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from pytest_garl.execution.flight_id import FlightId
 from pytest_garl.execution.job import FlightJob
+from pytest_garl.execution.reference import BUILT_IN
 from pytest_garl.execution.result import FlightResult, broken_result
 from pytest_garl.scenarios.scenario import Scenario
-from pytest_garl.simulation.flight import Crash
+from pytest_garl.simulation.flight import Crash, Touchdown
 from pytest_garl.verdicts.verdict import PAPER_LIMITS
 
 if TYPE_CHECKING:
@@ -79,9 +81,31 @@ def judge_record(
         crash = Crash(kind="nonsense", error="NotFinite", message=flown.refusal)
         return broken_result(crash, map.diagonal_m), "", flown.wall_s
     record = load(job.record(flight))
+    if job.simulator == BUILT_IN:
+        record = measured(record)
     result = judged(record, job.limits)
     severity = severity_of(record, result.verdict, scenario, map, job.npcs)
     return dataclasses.replace(result, severity=severity), record.sha256, record.wall_s
+
+
+def measured(flight: Flight) -> Flight:
+    """Return a record of the built-in simulator with distances that this process has measured.
+
+    They are the same to the byte unless the landing system replaced ``math.dist`` in its process.
+    """
+    marker = flight.marker_position_m
+    x, y = (float(value) for value in flight.uav.position_m[-1, :2])
+
+    def again(touchdown: Touchdown) -> Touchdown:
+        distance_m = math.dist(touchdown.position_m[:2], marker)
+        return dataclasses.replace(touchdown, distance_m=distance_m)
+
+    return dataclasses.replace(
+        flight,
+        final_distance_m=math.dist((x, y), marker),
+        touchdown=again(flight.touchdown) if flight.touchdown else None,
+        earlier_touchdowns=tuple(again(each) for each in flight.earlier_touchdowns),
+    )
 
 
 def fly_job(

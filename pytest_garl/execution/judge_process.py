@@ -19,7 +19,7 @@ from typing import IO, Any, Self
 
 from pytest_garl import cpu_dispatch
 from pytest_garl.errors import GarlError, PoolError
-from pytest_garl.execution.flight import FlownJob, judge_record, judged
+from pytest_garl.execution.flight import FlownJob, judge_record, judged, measured
 from pytest_garl.execution.flight_id import FlightId
 from pytest_garl.execution.job import FlightJob, parse_job
 from pytest_garl.execution.processes import end_with_parent, ignore_ctrl_c
@@ -93,6 +93,7 @@ class JudgeProcess:
     def judge_flight(self, flight: Flight, limits: Limits) -> FlightResult:
         """Return the result of a flight of which nobody keeps the record, without its severity.
 
+        The built-in simulator has flown it.
         Raises NotFiniteError if the flight holds a NaN or an infinity.
         """
         with tempfile.TemporaryDirectory(prefix="garl-") as folder:
@@ -146,7 +147,8 @@ def _answer(question: dict[str, Any]) -> dict[str, Any]:
     try:
         if "record" in question:
             limits = dataclass_from(Limits, question["limits"])
-            return {"result": judged(load(Path(question["record"])), limits).to_json()}
+            flight = measured(load(Path(question["record"])))
+            return {"result": judged(flight, limits).to_json()}
         result, sha256, wall_s = judge_record(
             parse_job(question["job"]),
             parse_scenario(question["scenario"]),

@@ -10,15 +10,18 @@ from typing import Any
 
 import pytest
 
-from pytest_garl.execution.flight import fly_job, judged, time_limit_s
+from pytest_garl.adversary.catalogue import policy_spec
+from pytest_garl.execution.flight import fly_job, judged, measured, time_limit_s
 from pytest_garl.execution.flight_id import FlightId
 from pytest_garl.execution.reference import reference_to
-from pytest_garl.landing_system import Diagnostics
+from pytest_garl.landing_system import Command, Diagnostics, Land, Observation, PositionSetpoint
 from pytest_garl.simulation.flight import Flight, Step
 from pytest_garl.simulation.flight_file import load
+from pytest_garl.simulation.fly import fly
 from pytest_garl.verdicts.verdict import Limits
-from tests.execution.flying import Good, job_of, scenario
+from tests.execution.flying import LAWN, Good, job_of, scenario
 from tests.support import tiny_simulator
+from tests.support.bent_judges import LandsAtHome
 from tests.verdicts.flights import flight, hit
 
 NAN = math.nan
@@ -95,3 +98,24 @@ def test_a_soft_touchdown_before_a_collision_is_none() -> None:
     first = dataclasses.replace(ground, time_s=20.0)
     hard = judged(flight("collision", (0.0, 0.0, 0.2), contacts=(first, ground)), Limits())
     assert hard.collisions == ("ground",)
+
+
+@pytest.mark.sim
+@pytest.mark.parametrize("lands_s", [3.0, 10.0])
+def test_distances_are_measured_to_the_byte(lands_s: float) -> None:
+    class Lands(LandsAtHome):
+        needs_camera = False
+
+        def step(self, observation: Observation) -> Command:
+            # The second one takes off again in between.
+            up = observation.time_s < 3.0 or 5.9 < observation.time_s < lands_s
+            home = (self.home[0] + 0.1, self.home[1], 2.5)
+            return PositionSetpoint(position_m=home) if up else Land(speed_mps=1.0)
+
+    flown = fly(scenario(), Lands, policy_spec("stationary"), map=LAWN, time_limit_s=20.0)
+    again = measured(flown)
+    assert flown.touchdown is not None
+    assert bool(flown.earlier_touchdowns) == (lands_s == 10.0)
+    assert again.final_distance_m == flown.final_distance_m > 1.0
+    assert again.touchdown == flown.touchdown
+    assert again.earlier_touchdowns == flown.earlier_touchdowns

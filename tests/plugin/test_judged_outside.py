@@ -87,11 +87,11 @@ def test_replaced_judge_bends_no_check(tmp_path: Path) -> None:
     assert "All is well" not in done.stdout
 
 
-def test_replaced_judge_bends_no_replay(tmp_path: Path) -> None:
+@pytest.mark.parametrize("system", ["SeesNothing", "MeasuresNothing"])
+def test_replaced_judge_bends_no_replay(tmp_path: Path, system: str) -> None:
     case = case_of_broken_lander()
-    system = "bent_judges:SeesNothing"
     path = Corpus(tmp_path / "scenarios" / "regressions").save(
-        dataclasses.replace(case, system=system, limits=DEFAULT_LIMITS)
+        dataclasses.replace(case, system=f"bent_judges:{system}", limits=DEFAULT_LIMITS)
     )
     assert path is not None
     done = garl(tmp_path, "cases", "replay", str(path))

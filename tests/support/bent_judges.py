@@ -84,6 +84,15 @@ class SeesNothing(ReplacesTheJudge):
     needs_camera: Any = False
 
 
+class MeasuresNothing(LandsAtHome):
+    """Has a broken function in place of one with which the simulator records distances."""
+
+    needs_camera: Any = False
+
+    def replace(self) -> None:
+        vars(math)["dist"] = lambda first, second: 0.0
+
+
 class BendsArithmetic(LandsAtHome):
     """As a library does that has faster functions of the same names, with a bug."""
 
