@@ -29,7 +29,7 @@ COLUMNS = (
     "what",
     "flights",
     "what happened",
-    "took at least",
+    "conditions",
     "see it",
     "page",
 )
