@@ -36,9 +36,14 @@ PLACE = "At 32.7 s the UAV was 1.4 m up, over the marker."
             "1.2 m/s, 1.6 m up",
         ),
         (
-            f"Gave up at 108.0 s for want of time; the marker was last in view at 22.3 s. {PLACE}",
-            "gave up at 108.0 s for want of time, 1.4 m up, over the marker; the marker was last "
+            f"Gave up at 32.7 s for want of time; the marker was last in view at 22.3 s. {PLACE}",
+            "gave up at 32.7 s for want of time, 1.4 m up, over the marker; the marker was last "
             "in view at 22.3 s",
+        ),
+        (
+            # It climbed away after that: the place is not where it gave up.
+            f"Gave up at 31.7 s with the marker in view, last 0.9 s before. {PLACE}",
+            "gave up at 31.7 s with the marker in view, last 0.9 s before",
         ),
         (
             "Not landed; the marker was never detected. "

@@ -131,9 +131,9 @@ def _moving(flight: Flight | None, prevention: Prevention) -> str:
             "procedure, before the code."
         )
     return (
-        f"{contact.body} was in view {contact.time_s - times[0]:.1f} s before the contact: look at "
-        "what the system does with something that comes into view. Whether an escape existed was "
-        "not asked for this flight."
+        f"{contact.body} was first in view {contact.time_s - times[0]:.1f} s before the contact: "
+        "look at what the system does with something that comes into view. Whether an escape "
+        "existed was not asked for this flight."
     )
 
 
