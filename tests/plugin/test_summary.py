@@ -99,7 +99,7 @@ def test_step_summary_holds_a_table_of_violations(
     ]
     assert (
         f"| Good on lawn | IV:dog:last-metre:unseen | 2 | {HIT} | "
-        "a hostile dog at 0.0 m/s for 14.2 s, 3 others there | "
+        "unusual in lawn-g00-s02: a hostile dog at 0.0 m/s for 14.2 s, 3 others there | "
         "`pytest test_it.py --garl-repeat=lawn-g00-s02 -o garl_dir=elsewhere` |"
     ) in lines
     folded = [line for line in result.outlines if line.startswith("SKIPPED")]
