@@ -36,6 +36,8 @@ class LostCaseItem(pytest.Item):
     """An item that fails with the reason why nothing flies a file of the corpus."""
 
     reason: str
+    fixturenames: tuple[str, ...] = ()
+    """Hooks of projects ask every item for it."""
 
     def runtest(self) -> None:
         """Fail."""

@@ -12,6 +12,7 @@ import ast
 import fnmatch
 import functools
 import os
+import re
 import sys
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -25,7 +26,7 @@ from pytest_garl.regressions.corpus import Corpus, CorpusEntry, committed_cases,
 
 _SIGNS_OF_A_CASE = (b"\ntrajectory_sha256 =", b"\n[violation]")
 """What each case file holds, under whatever name."""
-_MARKER = b"garl"
+_MARKER = re.compile(rb"\bmark\s*\.\s*garl\b")
 _FIXTURE = b"landing"
 
 
@@ -293,7 +294,7 @@ def marked_test_files(root: Path, patterns: Sequence[str], skipped: Sequence[str
 def has_marker(path: Path) -> bool:
     """Return whether a source file holds ``mark.garl``, outside of texts."""
     source = _read(path)
-    if _MARKER not in source:
+    if not _MARKER.search(source):
         return False
     try:
         tree = ast.parse(source)

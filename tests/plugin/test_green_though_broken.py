@@ -1,7 +1,8 @@
 """Ways in which a session could be green although the landing system is broken: all are red in CI.
 
 Each row of ``TRICKS`` is a small project and a command.  The landing system comes down three metres
-off in fog, and a fast dog hits it; in most flights it lands well.
+off in fog, and a fast dog hits it; in most flights it lands well.  The rows of lost corpora are in
+``test_lost_cases.py``.
 """
 
 from __future__ import annotations
