@@ -77,6 +77,8 @@ def _command(run: ExperimentRun, folder: Path, workers: int) -> list[str]:
         "-o",
         # Saved cases do not belong to the experiment.
         f"garl_cases={folder.resolve() / 'no-cases'}",
+        "-o",
+        "garl_probes=never",
         run.tests,
     ]
     if run.npcs:

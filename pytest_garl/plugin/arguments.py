@@ -187,6 +187,12 @@ def add_options(parser: pytest.Parser) -> None:
         "line of the summary (default: fail where the environment variable CI is set, else note).",
         default="",
     )
+    parser.addini(
+        "garl_probes",
+        help="When a search flies the probes of a landing system before: 'first', until they have "
+        "passed and again when the system has changed; 'always'; or 'never'.",
+        default="first",
+    )
 
 
 def check_keys(config: pytest.Config) -> None:

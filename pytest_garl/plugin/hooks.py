@@ -97,6 +97,10 @@ def pytest_configure(config: pytest.Config) -> None:
         from pytest_garl.plugin.baseline_gate import register
 
         register(config, options)
+    if options.budget and not options.repeat and options.probes != "never":
+        from pytest_garl.plugin.probe_items import ProbesPlugin
+
+        config.pluginmanager.register(ProbesPlugin(options), "garl_probes")
     if options.searches_or_repeats and not config.option.collectonly:
         from pytest_garl.plugin.startup import begin_run
 

@@ -80,6 +80,8 @@ class Options:
     xfail_strict: bool
     unasserted: Literal["fail", "note"]
     """What a violation is that no selected test asserts."""
+    probes: Literal["first", "always", "never"]
+    """When a search flies the probes of a landing system before."""
     cases: Path
     cases_named: bool
     """Whether the ini file or the command line names the folder of the cases."""
@@ -180,6 +182,7 @@ def read_options(config: pytest.Config) -> Options:
         shrink_capped=not text["shrink"],
         xfail_strict=bool(config.getini("garl_xfail_strict")),
         unasserted=_unasserted(config),
+        probes=_probes(config),
         cases=config.rootpath / str(config.getini("garl_cases") or DEFAULT_CASES),
         cases_named=bool(config.getini("garl_cases")),
         folder=folder,
@@ -232,6 +235,13 @@ def _unasserted(config: pytest.Config) -> Literal["fail", "note"]:
     if text not in ("fail", "note"):
         raise pytest.UsageError(f"garl_unasserted: found {text!r}, expected fail or note")
     return cast(Literal["fail", "note"], text)
+
+
+def _probes(config: pytest.Config) -> Literal["first", "always", "never"]:
+    text = str(config.getini("garl_probes"))
+    if text not in ("first", "always", "never"):
+        raise pytest.UsageError(f"garl_probes: found {text!r}, expected first, always or never")
+    return cast(Literal["first", "always", "never"], text)
 
 
 def _baseline(config: pytest.Config) -> Path | None:

@@ -14,6 +14,7 @@ from pytest_garl.errors import GarlError
 from pytest_garl.messages import command
 from pytest_garl.plugin.keys import is_xdist_worker
 from pytest_garl.plugin.options import SHRINK
+from pytest_garl.plugin.probe_items import probe_requests
 from pytest_garl.plugin.progress_display import show_progress
 from pytest_garl.plugin.run import Run
 from pytest_garl.plugin.suggested_commands import shown_path
@@ -48,6 +49,7 @@ def save_cases(run: Run, session: pytest.Session) -> None:
     try:
         _collect_reported_failures(run, session)
         requests = investigations.requests(run.user_assertions)
+        requests = (*requests, *probe_requests(run.ledger, run.options.shrink))
         if requests:
             begin_line(reporter)
             reporter.write_line(_announcement(run, investigations, requests))

@@ -1,0 +1,281 @@
+"""Probes before a search: one item per landing system flies them, before the first slot.
+
+Their flights are no flights of the search: its budget, its counts and its hash do not hold them.  A
+probe that violates is followed up after the session as a violation of the search is.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+from typing import Any
+
+import pytest
+
+from pytest_garl.adversary.catalogue import policy_spec
+from pytest_garl.adversary.domain_policy import NOBODY
+from pytest_garl.errors import GarlError
+from pytest_garl.execution.flight_id import FIRST_SLOT, CompletedFlight, search_key
+from pytest_garl.execution.job import parse_job
+from pytest_garl.execution.ledger import Ledger
+from pytest_garl.execution.reference import package_sha256
+from pytest_garl.execution.sources import combined_sha256, data_files, source_hashes
+from pytest_garl.files.atomic import write_text_atomically
+from pytest_garl.landing_system import Airframe
+from pytest_garl.messages import command
+from pytest_garl.plugin.abort import abort_session
+from pytest_garl.plugin.keys import RUN, target_of
+from pytest_garl.plugin.options import Options
+from pytest_garl.plugin.run import Run
+from pytest_garl.plugin.suggested_commands import shown_path
+from pytest_garl.plugin.target import Target
+from pytest_garl.plugin.terminal_text import counted
+from pytest_garl.regressions.case_request import CaseRequest
+from pytest_garl.regressions.new_signatures import request_of
+from pytest_garl.scenarios.conditions import active_conditions
+from pytest_garl.scenarios.domains.domain import Domain
+from pytest_garl.scenarios.domains.navigation import within
+from pytest_garl.scenarios.files import dump_scenario
+from pytest_garl.scenarios.maps.map import load_map
+from pytest_garl.scenarios.scenario import Scenario
+from pytest_garl.search.probes import Probe, clear_scenario, probed_map, probes_for, start_beside
+from pytest_garl.simulation.flight_file import load
+from pytest_garl.verdicts.verdict import Verdict
+from pytest_garl.verdicts.wording import headline
+
+PASSED = "probes.json"
+"""The file beside the ledger that names the landing systems whose probes have passed."""
+VIOLATED = "violated probes of "
+"""Prefix of the ledger's facts: by search, signature and hash of each flight that violated."""
+
+
+class ProbesPlugin:
+    """The hook of a session that searches: puts the probes before the selected tests."""
+
+    def __init__(self, options: Options) -> None:
+        self._options = options
+
+    @pytest.hookimpl(trylast=True)
+    def pytest_collection_modifyitems(
+        self, config: pytest.Config, items: list[pytest.Item]
+    ) -> None:
+        """Add the items when ``-k`` and the like have selected those that search.
+
+        A simulator of the user's own need not know the conditions of probes.
+        """
+        if not config.hook.pytest_garl_fly(config=config):
+            items[:0] = list(probe_items(self._options, items))
+
+
+def probe_items(options: Options, items: Sequence[pytest.Item]) -> Iterator[pytest.Item]:
+    """Yield an item for each landing system that the selected items search for violations.
+
+    With ``garl_probes = first`` none for a system whose probes passed with its present sources.
+    """
+    passed = _passed(options)
+    names: set[str] = set()
+    for target, module in _searched(options, items):
+        name = f"probes[{target.system.__name__}]"
+        while name in names:
+            name += "+"
+        names.add(name)
+        if options.probes == "always" or _key(options, target) not in passed:
+            yield ProbesItem.from_parent(module, name=name, target=target)
+
+
+class ProbesItem(pytest.Item):
+    """Flies the probes of a landing system, and fails if one violates."""
+
+    def __init__(self, *, target: Target, **rest: Any) -> None:
+        super().__init__(**rest)
+        self._target = target
+
+    def runtest(self) -> None:
+        """Fly the system in clear air, and then its probes."""
+        run: Run = self.config.stash[RUN]
+        try:
+            flown = _Flown(run, self._target)
+            violated = flown.violated()
+            flown.note()
+        except GarlError as error:
+            abort_session(self, error)
+        if flown.problem:
+            pytest.skip(flown.problem)
+        self.add_report_section("call", "stdout", "\n".join(flown.lines))
+        if not violated:
+            _note_passed(run.options, self._target)
+            return
+        number = f"{len(violated)} of {counted(len(flown.results), 'probe')}"
+        lines = [f"{self._target.system.__name__} violates {number} on {self._target.map}:"]
+        lines += flown.lines
+        for probe in violated:
+            file = write_text_atomically(
+                run.options.folder / "probes" / f"{self._target.map}-{probe.name}.toml",
+                dump_scenario(probe.scenario),
+            )
+            repeat = f"--garl-repeat={shown_path(file, self.config)}"
+            lines.append(f"fly it: {command('pytest', shown_path(self.path, self.config), repeat)}")
+        pytest.fail("\n".join(lines), pytrace=False)
+
+    def reportinfo(self) -> tuple[os.PathLike[str] | str, int | None, str]:
+        """Return the item's file and name."""
+        return self.path, None, self.name
+
+
+class _Flown:
+    """The flown probes of a landing system; ``problem`` is why there are none."""
+
+    def __init__(self, run: Run, target: Target) -> None:
+        self._run, self._target = run, target
+        self.results: list[tuple[Probe, CompletedFlight]] = []
+        self.problem = ""
+        map = load_map(target.map, run.options.map_folders)
+        domain = within(_domain(run.options, target), target.navigation)
+        clear = self._twin = clear_scenario(map, target.task, domain)
+        beside = start_beside(clear, map, domain)
+        first, second = self._fly([clear, beside.scenario])
+        if not _has_landed(first):
+            story = headline(first.result.verdict.story)
+            self.problem = f"no probes: it does not land in clear air: {story}"
+            return
+        self.results.append((beside, second))
+        base, scenario = (second, beside.scenario) if _has_landed(second) else (first, clear)
+        self._twin = scenario
+        camera = (target.airframe or Airframe()).camera
+        others = [
+            probe
+            for probe in probes_for(load(base.record), scenario, map, domain, target.limits, camera)
+            if probe.scenario not in (clear, beside.scenario)
+        ]
+        flights = self._fly([probe.scenario for probe in others])
+        self.results += zip(others, flights, strict=True)
+
+    @property
+    def lines(self) -> list[str]:
+        """One line for each probe."""
+        return [self._line(probe, flight.result.verdict) for probe, flight in self.results]
+
+    def violated(self) -> list[Probe]:
+        """Return the probes that violate what may be asked, and that no known case excuses."""
+        return [
+            probe
+            for probe, flight in self.results
+            if not probe.outside
+            and probe.is_violated(flight.result.verdict)
+            and not self._known(probe, flight.result.verdict)
+        ]
+
+    def note(self) -> None:
+        """Note in the ledger which flights violate, for the process that saves cases."""
+        violated = self.violated()
+        found = [
+            [flight.signature, flight.sha256]
+            for probe, flight in self.results
+            if probe in violated and flight.sha256
+        ]
+        if found:
+            self._run.ledger.note_fact(f"{VIOLATED}{self._target.search}", found)
+
+    def _line(self, probe: Probe, verdict: Verdict) -> str:
+        """Return how a probe ended."""
+        said = "ok"
+        if probe.is_violated(verdict):
+            known = self._known(probe, verdict)
+            said = f"known, {known}" if known else "FAILED"
+            said = "outside the domain" if probe.outside else said
+        return f"{probe.name}: {said}: {probe.sentence}: {headline(verdict.story)}"
+
+    def _known(self, probe: Probe, verdict: Verdict) -> str:
+        """Return the file of a known case with the signature and the causes of a probe."""
+        corpus = self._run.options.corpus
+        for entry in corpus.entries(self._target.system_name):
+            case = entry.case
+            if (
+                case is not None
+                and case.status == "open"
+                and case.violation.signature == verdict.signature
+                and corpus.is_accepted(entry)
+                and has_cause_of(case.scenario, probe.scenario, self._twin)
+            ):
+                return entry.path.name
+        return ""
+
+    def _fly(self, scenarios: Sequence[Scenario]) -> Sequence[CompletedFlight]:
+        return self._run.fly_all(self._target, policy_spec(NOBODY), scenarios)
+
+
+def probe_requests(ledger: Ledger, budget: int) -> tuple[CaseRequest, ...]:
+    """Return the requests for cases of the probes that violated, by signature.
+
+    A search may have found the same signature; its cause is another one as a rule.
+    """
+    requests: dict[str, CaseRequest] = {}
+    for search, _ in ledger.searches():
+        for signature, sha256 in ledger.fact(f"{VIOLATED}{search}") or ():
+            flight = ledger.queries.flight_with_hash(sha256)
+            job = ledger.job(flight.id.search) if flight is not None else None
+            if flight is None or job is None:
+                continue
+            request = request_of(search, signature, [flight], parse_job(job), budget)
+            name = f"{request.name} in probes"
+            requests.setdefault(name, replace(request, name=name))
+    return tuple(requests.values())
+
+
+def _searched(
+    options: Options, items: Sequence[pytest.Item]
+) -> Iterator[tuple[Target, pytest.Module]]:
+    """Yield each landing system with each of its tasks, on one map, and the module of its tests."""
+    found: dict[Target, tuple[list[str], pytest.Module]] = {}
+    for item in items:
+        target, module = target_of(item), item.getparent(pytest.Module)
+        if target is not None and target.is_searched and module is not None:
+            key = replace(target, slot=FIRST_SLOT, map="")
+            maps, _ = found.setdefault(key, ([], module))
+            if target.map not in maps:
+                maps.append(target.map)
+    for target, (maps, module) in found.items():
+        map = probed_map([load_map(name, options.map_folders) for name in maps])
+        yield replace(target, map=map.name), module
+
+
+def _has_landed(flight: CompletedFlight) -> bool:
+    verdict = flight.result.verdict
+    return flight.result.outcome == "landed" and not verdict.violation
+
+
+def _domain(options: Options, target: Target) -> Domain:
+    return target.domain or options.domain
+
+
+def has_cause_of(case: Scenario, probe: Scenario, twin: Scenario) -> bool:
+    """Whether a case has the cause of a probe, which its twin has not, and no other one."""
+    own = _causes(probe) - _causes(twin)
+    causes = _causes(case)
+    return causes <= _causes(probe) and (own <= causes or not own)
+
+
+def _causes(scenario: Scenario) -> set[str]:
+    """Return what is not nominal in a scenario; all decoys are one cause."""
+    return {each.cause.partition("-")[0] for each in active_conditions(scenario)}
+
+
+def _key(options: Options, target: Target) -> str:
+    """Return what stands for a landing system, its task and its present sources."""
+    sources = source_hashes(target.system, data_files(target.files, options.root))
+    return search_key(json.dumps([target.search, combined_sha256(sources), package_sha256()]))
+
+
+def _passed(options: Options) -> list[str]:
+    try:
+        known = json.loads((options.folder / PASSED).read_text(encoding="utf-8"))
+    except (OSError, ValueError):
+        return []
+    return [str(each) for each in known] if isinstance(known, list) else []
+
+
+def _note_passed(options: Options, target: Target) -> None:
+    keys = [*_passed(options), _key(options, target)]
+    write_text_atomically(options.folder / PASSED, json.dumps(sorted({*keys})))

@@ -1,0 +1,153 @@
+"""A search flies the probes of its landing system before the first slot."""
+
+from __future__ import annotations
+
+import shutil
+from pathlib import Path
+
+import pytest
+
+from pytest_garl.plugin.probe_items import PASSED, has_cause_of
+from pytest_garl.scenarios.maps.map import load_map
+from pytest_garl.scenarios.task import Task
+from pytest_garl.search.probes import clear_scenario
+from tests.search.test_probes import FIELD
+from tests.support import probed_landers
+from tests.support.landing_project import project, result_hash
+
+TESTS = """
+import pytest
+from pytest_garl import Start
+from landers import {system}
+HOVER = Start(mode="hover", height_m=6.0)
+pytestmark = pytest.mark.garl(system={system}, maps=["lawn"], start=HOVER, domain="gone.toml")
+
+def test_distance(landing):
+    assert landing.distance_to_landing_m <= 10
+
+def test_time(landing):
+    assert landing.time_to_landing_s <= 120
+"""
+DOMAIN = """
+npc_behaviour = "absent"
+[told]
+surveyed = [1, 1]
+error_m = [0, 4]
+towards_deg = [265, 275]
+[cover]
+from_s = [0, 1]
+lasts_s = [0, 0.1]
+share_percent = [0, 100]
+"""
+"""Both landers land in all of it."""
+ONE_PROBE = """
+from pytest_garl.plugin import probe_items
+made = probe_items.probes_for
+
+def no_marker(*args):
+    return [each for each in made(*args) if each.name == "no-marker"]
+
+probe_items.probes_for = no_marker
+"""
+SEARCH = ("--garl-budget=1", "--garl-method=random", "--garl-workers=2")
+ITEM = "test_it.py::probes[{}]"
+
+
+def write(pytester: pytest.Pytester, system: str) -> None:
+    """Write a project whose landing system flies two probes: beside the marker, and without."""
+    shutil.copy(Path(probed_landers.__file__), pytester.path / "landers.py")
+    (pytester.path / "conftest.py").write_text(ONE_PROBE)
+    (pytester.path / "gone.toml").write_text(DOMAIN)
+    (pytester.path / "test_it.py").write_text(TESTS.format(system=system))
+
+
+def run(pytester: pytest.Pytester, probes: str, *more: str) -> pytest.RunResult:
+    given = ("-p", "no:cacheprovider", "-o", f"garl_probes={probes}", *SEARCH, *more)
+    return pytester.runpytest_subprocess(*given)
+
+
+def collected(pytester: pytest.Pytester, probes: str) -> list[str]:
+    done = run(pytester, probes, "--collect-only", "-q")
+    return [line for line in done.outlines if "::" in line]
+
+
+@pytest.mark.sim
+def test_a_violated_probe_is_red_again(pytester: pytest.Pytester) -> None:
+    write(pytester, "ZeroByDefault")
+    done = run(pytester, "first", "--garl-shrink=0")
+    done.assert_outcomes(failed=1, passed=2)
+    assert done.ret == pytest.ExitCode.TESTS_FAILED
+    done.stdout.fnmatch_lines(
+        [
+            "ZeroByDefault violates 1 of 2 probes on lawn:",
+            "start-beside: ok: the marker lies 4 m * of the start: landed after *",
+            "no-marker: FAILED: no marker is there for a minute: landed 4.0 m off *",
+            "fly it: pytest test_it.py --garl-repeat=.garl/probes/lawn-no-marker.toml",
+        ]
+    )
+    assert (pytester.path / ".garl" / "probes" / "lawn-no-marker.toml").is_file()
+    assert collected(pytester, "first")[0] == ITEM.format("ZeroByDefault")
+
+
+@pytest.mark.sim
+@pytest.mark.long
+def test_a_violated_probe_is_shrunk_and_saved_and_its_known_case_excuses_it(
+    pytester: pytest.Pytester, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.delenv("CI", raising=False)
+    write(pytester, "ZeroByDefault")
+    done = run(pytester, "first")
+    done.stdout.fnmatch_lines(["saved scenarios/regressions/landers/lawn-I-*.toml"])
+    (case,) = (pytester.path / "scenarios").rglob("lawn-I-*.toml")
+    assert "cover (lasts 60 s, share 100 %)" in case.read_text()
+    pytester.run("garl", "cases", "accept", str(case))
+    again = run(pytester, "first", "--garl-shrink=0", "-v")
+    again.stdout.fnmatch_lines([f"{ITEM.format('ZeroByDefault').replace('[', '[[]')} PASSED*"])
+    assert again.ret == pytest.ExitCode.OK
+
+
+@pytest.mark.sim
+def test_probes_that_passed_are_flown_again_only_if_the_system_changes(
+    pytester: pytest.Pytester,
+) -> None:
+    write(pytester, "Lander")
+    run(pytester, "first", "--garl-shrink=0").assert_outcomes(passed=3)
+    with_probes = result_hash(pytester)
+    assert (pytester.path / ".garl" / PASSED).is_file()
+    item = ITEM.format("Lander")
+    assert item not in collected(pytester, "first")
+    assert collected(pytester, "always")[0] == item
+    assert item not in collected(pytester, "never")
+    with (pytester.path / "landers.py").open("a") as file:
+        file.write("CHANGED = True\n")
+    assert collected(pytester, "first")[0] == item
+    # Neither budget nor hash of the search knows of the probes.
+    run(pytester, "never", "--garl-shrink=0").assert_outcomes(passed=2)
+    assert result_hash(pytester) == with_probes
+
+
+def test_an_unknown_value_is_a_usage_error(pytester: pytest.Pytester) -> None:
+    write(pytester, "Lander")
+    done = run(pytester, "sometimes")
+    assert done.ret == pytest.ExitCode.USAGE_ERROR
+    done.stderr.fnmatch_lines(["*garl_probes: found 'sometimes', expected first, always or never"])
+
+
+def test_a_simulator_of_the_users_own_flies_no_probes(pytester: pytest.Pytester) -> None:
+    project(pytester)
+    assert collected(pytester, "always") == [
+        f"test_it.py::test_{name}[lawn-g00-s00]" for name in ("distance", "time", "collisions")
+    ]
+
+
+def test_a_known_case_excuses_only_the_probe_with_its_cause() -> None:
+    lawn = load_map("lawn")
+    clear = clear_scenario(lawn, Task(), FIELD)
+    twin = clear.replace({"told.error_m": 4.0})
+    cover = {"cover.lasts_s": 60.0, "cover.share_percent": 100.0}
+    probe = twin.replace(cover)
+    assert has_cause_of(clear.replace(cover), probe, twin)
+    assert has_cause_of(probe, probe, twin)
+    assert not has_cause_of(twin, probe, twin)
+    assert not has_cause_of(probe.replace({"wind.mean_mps": 5.0}), probe, twin)
+    assert has_cause_of(twin, twin, twin)
