@@ -11,13 +11,16 @@ FOREIGN = ("randomly", "rerunfailures", "pytest-retry", "flaky", "timeout", "pyt
 WITHOUT_OTHERS = " ".join(f"-p no:{name}" for name in ("hypothesispytest", *FOREIGN))
 """Hypothesis's plugin imports all of Hypothesis at the end of each run, which takes longer than
 flying; nothing in the projects of these tests uses it.  The tutorial runs with it."""
+WITHOUT_PROBES = "-o garl_probes=never"
+"""Probes take seconds; ``test_probe_items.py`` asks for them."""
+FASTER = f"{WITHOUT_OTHERS} {WITHOUT_PROBES}"
 
 
 @pytest.fixture(scope="session", autouse=True)
 def faster_runs() -> Iterator[None]:
     """Let runs of pytest in other processes start without other plugins."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setenv("PYTEST_ADDOPTS", WITHOUT_OTHERS)
+        patch.setenv("PYTEST_ADDOPTS", FASTER)
         yield
 
 
@@ -27,4 +30,4 @@ def faster_runs_of_pytester(request: pytest.FixtureRequest) -> None:
     if "pytester" in request.fixturenames:
         patch: pytest.MonkeyPatch = request.getfixturevalue("monkeypatch")
         request.getfixturevalue("pytester")
-        patch.setenv("PYTEST_ADDOPTS", WITHOUT_OTHERS)
+        patch.setenv("PYTEST_ADDOPTS", FASTER)

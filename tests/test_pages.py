@@ -198,7 +198,11 @@ def test_code_of_the_readme_flies(pytester: pytest.Pytester) -> None:
     result.assert_outcomes(passed=12 * 2)
 
 
-def test_options_page_lists_every_option_with_its_default(pytester: pytest.Pytester) -> None:
+def test_options_page_lists_every_option_with_its_default(
+    pytester: pytest.Pytester, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    # It says that the tests of this project fly no probes.
+    monkeypatch.delenv("PYTEST_ADDOPTS")
     lines = (DOCS / "options.md").read_text().splitlines()
     rows = [re.split(r"(?<!\\)\|", line) for line in lines if line.startswith("| ")]
     options = {found[0]: row for row in rows if (found := re.findall(r"--garl-(\w+)", row[1]))}
