@@ -202,9 +202,25 @@ CONDITIONS = Severity(
 NAMED = dataclasses.replace(CONDITIONS, values=("visibility 11 m", "mean 3 m/s"))
 
 
+def test_a_file_says_whether_its_severity_is_what_it_takes() -> None:
+    severe = dataclasses.replace(case(), severity=NAMED)
+    assert "# The conditions that it takes" in dump_case(severe)
+    raw = dataclasses.replace(
+        severe, evidence=dataclasses.replace(severe.evidence, neighbours=0, neighbours_failed=0)
+    )
+    assert "# Unusual in the flight that was found; the case is not shrunk." in dump_case(raw)
+
+
 @pytest.mark.parametrize(
     "severity",
-    [BODY, dataclasses.replace(BODY, grade="", window_s=None), CONDITIONS, NAMED, NO_SEVERITY],
+    [
+        BODY,
+        dataclasses.replace(BODY, grade="", window_s=None, untried=("dog-1", "fog")),
+        CONDITIONS,
+        NAMED,
+        dataclasses.replace(NAMED, untried=("wind",), unread=("fog",)),
+        NO_SEVERITY,
+    ],
 )
 def test_file_keeps_what_the_violation_takes(severity: Severity) -> None:
     severe = dataclasses.replace(case(), severity=severity)
