@@ -18,8 +18,9 @@ MOST_NAMED = 3
 MOST_CHARACTERS = 140
 NOTHING = "nothing unusual"
 """The cause of a violation that needs no condition at all."""
+_DECOY = "decoy-"
 _NUMBERED = re.compile(r"-\d+$")
-_OF = {"fog": "visibility ", "dust": "visibility ", "wind": "mean ", "jump": "distance "}
+_OF = {"fog": "visibility ", "wind": "mean ", "jump": "distance "}
 """Conditions of one quantity, and how its value begins: "fog of 10 m" for "visibility 10 m"."""
 _SPEAKS_FOR_ITSELF = ("light", "camera", "leaves")
 """Conditions whose single value says what it is: "sun 23 degrees high", "dirt 20 %"."""
@@ -117,7 +118,8 @@ def _ending(signature: str) -> str:
     if kind == "I":
         if parts[0] == "nothing":
             return "comes down on open ground, off the marker"
-        return f"comes down on a {parts[0].removeprefix('decoy-')}"
+        is_decoy = parts[0].startswith(_DECOY)
+        return "comes down on the decoy" if is_decoy else f"comes down on a {parts[0]}"
     if kind == "IV":
         ending = "collision"
     elif kind == "III":

@@ -53,7 +53,7 @@ def shrunk(signature: str, severity: Severity, **fields: Any) -> Case:
         (
             "I:decoy-helipad-h:seen",
             conditions(decoy_1="helipad-h", person_2=""),
-            "decoy-1 (helipad-h) and person-2: comes down on a helipad-h",
+            "decoy-1 (helipad-h) and person-2: comes down on the decoy",
         ),
         (
             "I:nothing:seen",
