@@ -6,14 +6,7 @@ from collections.abc import Iterator
 
 import pytest
 
-FOREIGN = ("randomly", "rerunfailures", "pytest-retry", "flaky", "timeout", "pytest_cov")
-"""Plugins of other projects' habits, which the tests of these habits load by name."""
-WITHOUT_OTHERS = " ".join(f"-p no:{name}" for name in ("hypothesispytest", *FOREIGN))
-"""Hypothesis's plugin imports all of Hypothesis at the end of each run, which takes longer than
-flying; nothing in the projects of these tests uses it.  The tutorial runs with it."""
-WITHOUT_PROBES = "-o garl_probes=never"
-"""Probes take seconds; ``test_probe_items.py`` asks for them."""
-FASTER = f"{WITHOUT_OTHERS} {WITHOUT_PROBES}"
+from tests.support.other_plugins import FASTER
 
 
 @pytest.fixture(scope="session", autouse=True)

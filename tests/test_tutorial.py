@@ -11,6 +11,7 @@ import pytest
 
 from pytest_garl.cpu_dispatch import cpu_class_of_flights
 from pytest_garl.regressions.case_file import load_case
+from tests.support.other_plugins import WITHOUT_FOREIGN
 
 DOCS = Path(__file__).parents[1] / "docs"
 SEARCH = "--garl-budget"
@@ -50,7 +51,7 @@ def test_every_command_of_the_tutorial_prints_what_it_says(
         monkeypatch.setenv(f"GIT_{name}_EMAIL", "anna@example.org")
     monkeypatch.setenv("COLUMNS", "100")
     monkeypatch.setenv("PATH", f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}")
-    monkeypatch.delenv("PYTEST_ADDOPTS", raising=False)
+    monkeypatch.setenv("PYTEST_ADDOPTS", WITHOUT_FOREIGN)
     for command in ("git init -q", "git add *.py *.patch", "git commit -qm stack"):
         subprocess.run(command, shell=True, cwd=stack, check=True)
     commands = transcript()
