@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import shutil
+import sys
 from pathlib import Path
 
 import pytest
@@ -100,7 +101,7 @@ def test_a_violated_probe_is_shrunk_and_saved_and_its_known_case_excuses_it(
     done.stdout.fnmatch_lines(["saved scenarios/regressions/landers/lawn-I-*.toml"])
     (case,) = (pytester.path / "scenarios").rglob("lawn-I-*.toml")
     assert "cover (lasts 60 s, share 100 %)" in case.read_text()
-    pytester.run("garl", "cases", "accept", str(case))
+    pytester.run(str(Path(sys.executable).with_name("garl")), "cases", "accept", str(case))
     again = run(pytester, "first", "--garl-shrink=0", "-v")
     again.stdout.fnmatch_lines([f"{ITEM.format('ZeroByDefault').replace('[', '[[]')} PASSED*"])
     assert again.ret == pytest.ExitCode.OK
