@@ -117,7 +117,7 @@ def row_of(key: Key) -> dict[str, Any]:
         "outcome": flight.outcome,
         "no_landing": verdict.no_landing,
         "kind": verdict.cause,
-        "signature": verdict.signature,
+        "signature": verdict.ending,
     }
 
 

@@ -87,7 +87,7 @@ def row_of(task: Task) -> dict[str, object]:
         "flight": number,
         "outcome": flight.outcome,
         "no_landing": verdict.no_landing,
-        "signature": verdict.signature,
+        "signature": verdict.ending,
         "kind": verdict.cause,
         "paper": int(verdict.paper_violation),
         "findings": " ".join(each.signature for each in verdict.findings),

@@ -44,6 +44,14 @@ def flight_code_sha256() -> str:
 
 def code_sha256(file: Path) -> str:
     """Return the hash of the parsed code in a file; of its bytes if Python cannot parse it."""
+    stat = file.stat()
+    return _code_sha256(file, stat.st_mtime_ns, stat.st_size)
+
+
+@functools.cache
+def _code_sha256(file: Path, changed_ns: int, size: int) -> str:
+    """Parse a state of a file once: CPython 3.11 cannot parse in two threads at a time."""
+    del changed_ns, size
     source = file.read_bytes()
     try:
         return hashlib.sha256(_meaning(ast.parse(source)).encode()).hexdigest()

@@ -81,5 +81,5 @@ class CompletedFlight:
 
     @property
     def signature(self) -> str:
-        """The violation's signature, empty for a flight without violation."""
+        """How it ended, as in the result; empty for a flight without violation."""
         return self.result.signature

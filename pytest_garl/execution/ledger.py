@@ -113,6 +113,13 @@ class Ledger:
         except ValueError as error:
             raise LedgerError(f"{self.path}: the fact {key!r} is damaged: {error}") from error
 
+    def count_facts(self, prefix: str) -> int:
+        """Return how many facts have keys that begin with a prefix."""
+        row = self.database.execute(
+            "SELECT count(*) FROM run WHERE substr(key, 1, ?) = ?", (len(prefix), prefix)
+        ).fetchone()
+        return int(row[0])
+
     def first_fact(self, key: str, value: Any) -> Any:
         """Set a fact unless it is set already; return its value."""
         self.database.execute("INSERT OR IGNORE INTO run VALUES (?, ?)", (key, json.dumps(value)))

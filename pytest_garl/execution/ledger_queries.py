@@ -13,6 +13,7 @@ from typing import Any
 from pytest_garl.execution.database import Database
 from pytest_garl.execution.flight_id import CompletedFlight, FlightId, Slot
 from pytest_garl.execution.result import FlightResult, parse_result
+from pytest_garl.verdicts.ending import ending_of
 
 _ADDRESS = re.compile(r"0x[0-9a-f]+")
 
@@ -51,7 +52,7 @@ class LedgerFlight:
 
     @property
     def signature(self) -> str:
-        """The violation's signature, empty for a flight without violation."""
+        """How it ended, as in the result; empty for a flight without violation."""
         return self.result.signature
 
     def completed(self, folder: Path) -> CompletedFlight:
@@ -129,9 +130,8 @@ class LedgerQueries:
         )
 
     def first_of(self, search: str, signature: str) -> LedgerFlight:
-        """Return the first flight, in slot order, of those that show a signature so far."""
-        condition = "search.id = ? AND json_extract(result, '$.verdict.signature') = ?"
-        return self._flights(condition, search, signature)[0]
+        """Return the first flight, in slot order, of those that end with a signature so far."""
+        return next(each for each in self.violating(search) if each.signature == signature)
 
     def flight_with_hash(self, sha256: str) -> LedgerFlight | None:
         """Return a flight whose trajectory has a hash: of a search, or flown on demand."""
@@ -189,15 +189,20 @@ class LedgerQueries:
         return dict(rows.fetchall())
 
     def seconds_by_signature(self) -> dict[tuple[str, str], float]:
-        """Return the mean wall time of violations by search and signature."""
+        """Return the mean wall time of violations by search and how they ended."""
         rows = self._database.execute(
             "SELECT search.id, json_extract(result, '$.verdict.signature') AS signature, "
-            "avg(coalesce(wall_s, 0)) FROM slot JOIN search ON search.id = slot.search "
+            "sum(coalesce(wall_s, 0)), count(*) FROM slot JOIN search ON search.id = slot.search "
             "WHERE kind = 'search' AND state = 'flown' "
             "AND json_extract(result, '$.verdict.primary') IS NOT NULL "
             "GROUP BY search.id, signature"
         )
-        return {(search, signature): float(wall_s) for search, signature, wall_s in rows}
+        sums: dict[tuple[str, str], tuple[float, int]] = {}
+        for search, signature, wall_s, count in rows:
+            key = search, ending_of(signature)
+            before_s, before = sums.get(key, (0.0, 0))
+            sums[key] = before_s + wall_s, before + count
+        return {key: wall_s / count for key, (wall_s, count) in sums.items()}
 
     def meters(self) -> dict[str, float]:
         """Return what the run has spent, by the name of the meter."""

@@ -47,8 +47,11 @@ class FlightResult:
 
     @property
     def signature(self) -> str:
-        """The violation's signature, empty for a flight without violation."""
-        return self.verdict.signature
+        """How it ended: the violation's signature without its cause; empty without a violation.
+
+        Flights are compared by it.
+        """
+        return self.verdict.ending
 
     @property
     def inconclusive(self) -> bool:

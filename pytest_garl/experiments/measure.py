@@ -108,7 +108,7 @@ def _violations(search: FinishedSearch) -> dict[str, Any]:
     """Return the columns that count outcomes and violations."""
     verdicts = search.verdicts
     types = Counter[str](each.violation_type or "" for each in verdicts if each.violation)
-    kinds = Counter(each.signature for each in verdicts if each.violation)
+    kinds = Counter(each.ending for each in verdicts if each.violation)
     without_landing = Counter[str](each.no_landing for each in verdicts)
     return {
         "violations": types.total(),

@@ -37,12 +37,14 @@ def failed_item(
     if failure is None or result.inconclusive:
         return FailedItem(signature="", inconclusive=result.inconclusive)
     options = run.options
+    by_signature = target.entry is not None or failure.user_property
+    expected = run.expected_signatures(target).get(failure.signature, "") if by_signature else None
     return FailedItem(
         signature=failure.signature,
         user_property=failure.user_property,
         crashed=result.verdict.violation_type == "V",
         case=case_state(run, target),
-        expected_by=run.expected_signatures(target).get(failure.signature, ""),
+        expected_by=expected,
         repeating=bool(options.repeat),
         duplicates=options.duplicates,
     )
@@ -54,7 +56,7 @@ def case_state(run: Run, target: Target) -> CaseState | None:
     if entry is None or entry.case is None:
         return None
     return CaseState(
-        signature=entry.case.violation.signature,
+        signature=entry.case.ending,
         status=entry.case.status,
         reason=entry.case.reason,
         accepted=run.options.corpus.is_accepted(entry),
@@ -82,6 +84,8 @@ def failure_facts(
     def gather(need: Need, facts: FailedItem) -> FailedItem:
         assert failure is not None
         match need:
+            case Need.KNOWN:
+                return _with_excuse(run, target, failure, facts)
             case Need.EARLIER:
                 earlier = first_with_same_signature(run, target, failure, nodeid)
                 return dataclasses.replace(facts, earlier=earlier)
@@ -92,6 +96,20 @@ def failure_facts(
                 return dataclasses.replace(facts, claimed=True, earlier=faster)
 
     return gather
+
+
+def _with_excuse(run: Run, target: Target, failure: ItemFailure, facts: FailedItem) -> FailedItem:
+    """Add the known case that excuses a violation of a search, or why none does."""
+    excuse = run.known.excuse(target, failure.signature)
+    unexcused = ""
+    if excuse.reason:
+        files = run.known.files(target, failure.signature)
+        unexcused = f"A known case ends alike and does not excuse it ({files}): {excuse.reason}."
+    return dataclasses.replace(
+        facts,
+        expected_by=excuse.known.name if excuse.known else "",
+        unexcused=unexcused,
+    )
 
 
 def slot_claim(run: Run, target: Target, nodeid: str) -> Callable[[Need, F], F]:
@@ -190,6 +208,8 @@ def first_with_same_signature(run: Run, target: Target, failure: ItemFailure, no
             and not run.claims.has_run(item.nodeid)
         ]
         shows = waiting and failure.shows_in(run, other, run.flight(other))
+        if shows and not failure.user_property and run.known.excuse(other, failure.signature).known:
+            continue
         if shows and refly(run, other, failure).confirm:
             return other.name
     return ""

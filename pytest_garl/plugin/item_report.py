@@ -22,6 +22,7 @@ from pytest_garl.plugin.item_facts import (
 from pytest_garl.plugin.keys import (
     CASE,
     DUPLICATE_OF,
+    EXCUSED,
     FINDING_TEST,
     LANDING,
     LEFT_TO_ANOTHER,
@@ -51,6 +52,7 @@ from pytest_garl.plugin.run import Run
 from pytest_garl.plugin.suggested_commands import shown_path
 from pytest_garl.plugin.target import Target
 from pytest_garl.regressions.case import Case
+from pytest_garl.regressions.corpus import folder_of
 from pytest_garl.reports.html.naming import page_address, page_name
 
 
@@ -183,6 +185,8 @@ class _Writer:
             self._note(NOT_REPEATED, json.dumps(slot))
         elif decision.reason is Reason.DUPLICATE:
             self._note(DUPLICATE_OF, key)
+        elif decision.reason is Reason.EXPECTED:
+            self._note_excuse(failure.signature, str(facts.expected_by))
         if self.run.options.report is not None:
             self._note_page(self.run.options.report, failure.signature)
         if decision.outcome == "xfailed":
@@ -190,10 +194,15 @@ class _Writer:
         self._note(REPORTED_FAILURE, key)
         self._note_finding_test(failure)
         return self._fail(
-            report_text.violation_text(
-                self.item, self.run, target, failure, self.result, facts.reflights
-            )
+            report_text.violation_text(self.item, self.run, target, failure, self.result, facts)
         )
+
+    def _note_excuse(self, signature: str, name: str) -> None:
+        """Note the file of the known case that excuses a violation, for the summary."""
+        target = self.target
+        file = folder_of(self.run.options.corpus.folder, target.system_name) / name
+        slot = [target.system_name, target.map, target.name]
+        self._note(EXCUSED, json.dumps([*slot, signature, shown_path(file, self.item.config)]))
 
     def _note_page(self, folder: Path, signature: str) -> None:
         """Note where the page of a violation will be, for JUnit XML.

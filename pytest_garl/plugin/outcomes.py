@@ -31,7 +31,7 @@ class Reason(Enum):
     CRASH = "no assertion can judge the flight: the system crashed or gave up"
     REPORTED_ELSEWHERE = "another test of the slot reports the flight"
     VIOLATION = "the search found a violation"
-    EXPECTED = "a known case has the same signature"
+    EXPECTED = "a known case excuses it"
     DUPLICATE = "an item of an earlier slot reports the same violation"
     NOT_REPEATED = "the violation did not show again"
     EDGE = "not all neighbours of the case fail, so it gates nothing"
@@ -48,6 +48,7 @@ class Reason(Enum):
 class Need(Enum):
     """A fact that a decision needs next."""
 
+    KNOWN = "the known case that excuses the failure"
     EARLIER = "the slot of another item that reports the same failure"
     REFLIGHTS = "more flights of the same slot"
     CLAIM = "whether this item is the first to report this"
@@ -101,8 +102,10 @@ class FailedItem:
     """Whether the landing system raised, died, hung or broke the simulator."""
     inconclusive: bool = False
     case: CaseState | None = None
-    expected_by: str = ""
-    """File of a known case with the same signature."""
+    expected_by: str | None = ""
+    """File of the known case that excuses it; empty if there is none."""
+    unexcused: str = ""
+    """Known cases that end alike and do not excuse it, and why not."""
     repeating: bool = False
     """Whether the session repeats one scenario."""
     duplicates: str = "xfail"
@@ -189,6 +192,8 @@ def _unjudged_flight(facts: UnjudgedFlight) -> Decision | Need:
 
 def _failed_search(facts: FailedItem) -> Decision | Need:
     """Report each violation of a search once, if it repeats and no known case has it."""
+    if facts.expected_by is None:
+        return Need.KNOWN
     if facts.expected_by:
         return _xfail(Reason.EXPECTED)
     if facts.repeating:

@@ -89,7 +89,7 @@ def violation_text(
     target: Target,
     failure: ItemFailure,
     result: FlightResult,
-    reflights: Reflights | None,
+    facts: FailedItem,
 ) -> FailureText:
     """Return the text of a violation that a search found."""
     verdict = result.verdict
@@ -104,7 +104,8 @@ def violation_text(
     remarks = [
         *([told] if told else []),
         *_scenario(item.config, run, target),
-        *_doubts(run, target, reflights),
+        *_doubts(run, target, facts.reflights),
+        *([facts.unexcused] if facts.unexcused else []),
     ]
     repeat = repeat_line(item, target)
     lines += [*_wrapped(remarks if own else [story, *remarks], item.config), repeat]

@@ -20,6 +20,7 @@ from pytest_garl.execution.reference import Reference, simulator_sha256
 from pytest_garl.execution.sources import combined_sha256
 from pytest_garl.plugin.early_reflights import EarlyReflights
 from pytest_garl.plugin.keys import target_of
+from pytest_garl.plugin.known_violations import KnownViolations
 from pytest_garl.plugin.options import Options
 from pytest_garl.plugin.search_setup import Searches
 from pytest_garl.plugin.target import Target
@@ -243,7 +244,7 @@ class Run:
 
     def flight(self, target: Target) -> CompletedFlight:
         """Return the flight of a slot whose search is registered; wait for it."""
-        return self._wait(target.flight)
+        return self.wait(target.flight)
 
     def unproven(self, target: Target) -> tuple[str, ...]:
         """Return why a passing case proves nothing; empty if only the landing system changed."""
@@ -294,9 +295,14 @@ class Run:
         expected = options.corpus.expected_signatures(system, target.map, accepted=True)
         return {signature: entry.path.name for signature, entry in expected.items()}
 
+    @functools.cached_property
+    def known(self) -> KnownViolations:
+        """Which violations of searches the known cases excuse."""
+        return KnownViolations(self)
+
     def refly(self, target: Target, count: int) -> list[CompletedFlight]:
         """Fly a flown slot ``count`` times more."""
-        return [self._wait(flight) for flight in self.request_reflights(target, count)]
+        return [self.wait(flight) for flight in self.request_reflights(target, count)]
 
     def request_reflights(self, target: Target, count: int) -> list[FlightId]:
         """Request that a flown slot is flown ``count`` times more, unless it was already."""
@@ -319,13 +325,18 @@ class Run:
         finally:
             self.on_wait_end()
 
-    def _wait(self, flight: FlightId) -> CompletedFlight:
+    def wait(self, flight: FlightId) -> CompletedFlight:
         """Return a flight; it never changes, so the ledger is read once."""
         known = self.results.get(flight)
         if known is None:
             known = wait_for(self.ledger, self.pool, flight, self.options.flights, self._advance)
             self.results[flight] = known
         return known
+
+    def turn(self) -> None:
+        """Let the pool fly for a moment, and go on with everything."""
+        self.pool.turn()
+        self._advance()
 
     def _advance(self) -> None:
         self.searches.advance()

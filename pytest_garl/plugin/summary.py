@@ -20,7 +20,8 @@ from pytest_garl.plugin.save_cases import saved_lines
 from pytest_garl.plugin.session_status import notes
 from pytest_garl.plugin.suggested_commands import repeat_kind_command, shown_path
 from pytest_garl.plugin.tally import Tally
-from pytest_garl.plugin.terminal_text import width_of, wrapped
+from pytest_garl.plugin.terminal_text import counted, width_of, wrapped
+from pytest_garl.regressions.known_kinds import TWIN
 from pytest_garl.regressions.reference_proofs import renewal_line
 from pytest_garl.reports.run_report import ENDED, USER_FAILURES, utc_now
 from pytest_garl.reports.search_summary import SearchSummary, ViolationKind, legend
@@ -44,6 +45,7 @@ def write_run(reporter: Any, run: Run, tally: Tally) -> list[SearchSummary]:
     fold_skips(reporter)
     searches = _write_searches(reporter, run, tally)
     lines = [
+        *_excused_lines(tally, width_of(reporter.config)),
         *saved_lines(run.investigated, reporter.config),
         *([f"nothing more was saved: {run.save_problem}"] if run.save_problem else []),
         *_passing_cases(reporter),
@@ -70,6 +72,22 @@ def write_status(reporter: Any, tally: Tally) -> None:
     if not tally.problems:
         for note in notes(tally):
             reporter.write_line(wrapped(f"garl: {note}", width, others="  "), yellow=True)
+
+
+def _excused_lines(tally: Tally, width: int) -> list[str]:
+    """Return a line for each kind that a known case excuses, with the file of the case."""
+    slots: dict[tuple[str, str, str, str], set[str]] = {}
+    for system, map, slot, ending, file in tally.excused:
+        slots.setdefault((system, map, ending, file), set()).add(slot)
+    return [
+        wrapped(
+            f"known: {system.split(':')[-1]} on {map}: {ending} in "
+            f"{counted(len(found), 'flight')}, excused by {file}",
+            width,
+            others="    ",
+        )
+        for (system, map, ending, file), found in sorted(slots.items())
+    ]
 
 
 def _passing_cases(reporter: Any) -> list[str]:
@@ -191,10 +209,12 @@ def _costs(run: Run) -> str:
     meters = run.ledger.queries.meters()
     flying, idle = meters.get("flying_s", 0.0), meters.get("idle_s", 0.0)
     confirming = run.investigations.flown if run.investigations else 0
-    repeating = meters.get("on_demand", 0) - confirming
+    twins = run.ledger.count_facts(TWIN)
+    repeating = meters.get("on_demand", 0) - confirming - twins
     counts = {
         "flown again after a time-out or a kill": meters.get("retried", 0),
         "to see whether violations repeat": max(0, repeating),
+        "to tell known causes from others": twins,
         "to confirm and shrink": confirming,
     }
     words = [f"flights: {meters.get('flights', 0):.0f}"]

@@ -11,6 +11,7 @@ import pytest
 
 from pytest_garl.plugin.keys import (
     DUPLICATE_OF,
+    EXCUSED,
     GATE_REPORT,
     LEFT_TO_ANOTHER,
     NO_FLIGHT,
@@ -38,6 +39,8 @@ class Tally:
         self.gated = False
         """Whether a baseline's gate has flown."""
         self.not_repeated: set[tuple[str, ...]] = set()
+        self.excused: set[tuple[str, ...]] = set()
+        """System, map, slot, ending and file of each violation that a known case excuses."""
         self.problems: list[str] = []
         self.tests_ran = False
         """Whether pytest ran all selected tests, and did not only collect them."""
@@ -85,6 +88,8 @@ class Tally:
             self._excused.setdefault(str(properties[DUPLICATE_OF]), set()).add(report.nodeid)
         if USER_FAILURE in properties:
             self._user_failures.setdefault(report.nodeid, []).append(str(properties[USER_FAILURE]))
+        if EXCUSED in properties:
+            self.excused.add(tuple(json.loads(str(properties[EXCUSED]))))
         if NOT_REPEATED in properties:
             self.not_repeated.add(tuple(json.loads(str(properties[NOT_REPEATED]))))
 

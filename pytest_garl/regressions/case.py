@@ -13,6 +13,7 @@ from pytest_garl.adversary.recorded import recorded_spec
 from pytest_garl.execution.severity import NO_SEVERITY, Severity
 from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.simulation.npc_policy import PolicySpec
+from pytest_garl.verdicts.ending import ending_of
 from pytest_garl.verdicts.verdict import Limits, PropertyName, ViolationType
 
 Status = Literal["open", "fixed"]
@@ -60,6 +61,18 @@ class Violation:
     margin: float
     unit: str
     description: str
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Worst:
+    """The worst violation of a kind in the search that saved its case: the bound of its excuse.
+
+    ``margin`` is that of the violated property, ``grade`` the weakest adversary; each may be of
+    another flight.  A grade is empty for violations without a moving body, and if nobody knows it.
+    """
+
+    margin: float
+    grade: str = ""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -177,7 +190,8 @@ class Case:
     case gates nothing.  ``live`` is whether a repair must also hold against objects that a live
     policy moves: an escape from them exists.  ``limits`` are those of the tests when it was found;
     pytest flies it with those of today.  ``accepted`` marks a case as known in projects without
-    git.  ``severity`` is what the violation takes; empty in files of earlier versions.
+    git.  ``severity`` is what the violation takes; empty in files of earlier versions.  ``worst``
+    bounds the violations that it excuses; None in files of earlier versions, which set no bound.
     """
 
     system: str
@@ -197,6 +211,7 @@ class Case:
     live: bool = False
     prevention: Prevention = NOT_ASKED
     severity: Severity = NO_SEVERITY
+    worst: Worst | None = None
 
     @property
     def behaviour(self) -> RecordedBehaviour:
@@ -244,8 +259,16 @@ class Case:
         return self.status == "open" and self.gates
 
     @property
+    def ending(self) -> str:
+        """Its signature without the condition that acted: what flights are compared by."""
+        return ending_of(self.violation.signature)
+
+    @property
     def id(self) -> str:
-        """A name such as ``court-IV-dog-3f9a12``, the same for the same scenario."""
+        """A name such as ``court-IV-dog-3f9a12``, the same for the same scenario and bound.
+
+        A system that has become worse may fail worse in the same scenario.
+        """
         scenario = self.scenario
         # The ids of committed cases depend on these letters.
         facts = (
@@ -255,7 +278,9 @@ class Case:
         )
         # Empty without changes, so that cases from before they were recorded keep their names.
         changes = repr(self.changes) if self.changes else ""
-        digest = hashlib.sha256(f"{facts}{changes}".encode()).hexdigest()
+        worst = self.worst
+        bound = f"({worst.margin!r}, {worst.grade!r}, {self.reason!r})" if worst else ""
+        digest = hashlib.sha256(f"{facts}{changes}{bound}".encode()).hexdigest()
         words = self.violation.signature.split(":")[:2] or [self.violation.type]
         subject = "-".join(_SAFE.sub("_", word.partition("@")[0]).strip("_") for word in words)
         # A file's name has 255 bytes at most; a test's name may be longer.

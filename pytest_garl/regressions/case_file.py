@@ -29,6 +29,7 @@ from pytest_garl.regressions.case import (
     Preventable,
     Prevention,
     Violation,
+    Worst,
 )
 from pytest_garl.regressions.case_header import (
     FIRST_SCHEMA,
@@ -40,6 +41,7 @@ from pytest_garl.regressions.case_header import (
 from pytest_garl.regressions.severity_toml import read_severity, severity_lines
 from pytest_garl.scenarios.files import SCENARIO_KEYS, is_in_units, read_scenario, scenario_lines
 from pytest_garl.scenarios.maps.map import Map, load_map
+from pytest_garl.scenarios.story import GRADES
 from pytest_garl.scenarios.task import task_lines
 from pytest_garl.verdicts.verdict import (
     DEFAULT_LIMITS,
@@ -64,6 +66,10 @@ _SECTIONS = {
     "changes",
     "evidence",
 }
+_VIOLATION_KEYS = {
+    *("signature", "type", "property", "margin", "unit", "story"),
+    *("worst_margin", "weakest_grade"),
+}
 
 
 def load_case(path: Path, map_folders: tuple[Path, ...] = ()) -> Case:
@@ -82,7 +88,7 @@ def dump_case(case: Case, load_map: Callable[[str], Map] = load_map) -> str:
     map = load_map(case.scenario.map)
     sections = [
         header_lines(case, map),
-        _violation_lines(case.violation),
+        _violation_lines(case.violation, case.worst),
         *severity_lines(case.severity, is_shrunk=case.is_shrunk),
         *_prevention_lines(case.prevention),
         _limits_lines(case.limits),
@@ -118,6 +124,7 @@ def parse_case(text: str, load_map: Callable[[str], Map], *, source: str = "case
         status=header.status,
         scenario=scenario,
         violation=_read_violation(top.table("violation")),
+        worst=_read_worst(top.table("violation")),
         policy=policy.string("name"),
         policy_sha256=policy.string("sha256"),
         moves=read_moves(top.table("moves"), names),
@@ -189,7 +196,7 @@ def _read_prevention(top: Table) -> Prevention:
     return Prevention(answer=answer, escape=escape, **seconds)
 
 
-def _violation_lines(violation: Violation) -> list[str]:
+def _violation_lines(violation: Violation, worst: Worst | None) -> list[str]:
     # A comment ends at a line's end, so that no text may bring one.
     unit = printable(violation.unit, keep="")
     return [
@@ -199,12 +206,32 @@ def _violation_lines(violation: Violation) -> list[str]:
         f'property = "{violation.property}"',
         f"margin = {violation.margin!r}  # {unit}; what is not above 0 is violated",
         f"unit = {quoted(violation.unit)}",
+        *_worst_lines(worst),
         f"story = {quoted(violation.description)}",
     ]
 
 
+def _worst_lines(worst: Worst | None) -> list[str]:
+    if worst is None:
+        return []
+    lines = [f"worst_margin = {worst.margin!r}  # of the search; a worse one is not excused"]
+    return [*lines, *([f"weakest_grade = {quoted(worst.grade)}"] if worst.grade else [])]
+
+
+def _read_worst(table: Table) -> Worst | None:
+    if "worst_margin" not in table.values:
+        if "weakest_grade" in table.values:
+            raise table.error("weakest_grade", "found a grade, expected one beside worst_margin")
+        return None
+    known = "weakest_grade" in table.values
+    return Worst(
+        margin=table.number("worst_margin"),
+        grade=table.string("weakest_grade", allowed=GRADES) if known else "",
+    )
+
+
 def _read_violation(table: Table) -> Violation:
-    table.refuse_unknown({"signature", "type", "property", "margin", "unit", "story"})
+    table.refuse_unknown(_VIOLATION_KEYS)
     return Violation(
         signature=table.string("signature"),
         type=cast(ViolationType, table.string("type", allowed=get_args(ViolationType))),

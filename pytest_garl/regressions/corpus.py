@@ -16,6 +16,8 @@ from pytest_garl.messages import printable
 from pytest_garl.regressions.case import Case
 from pytest_garl.regressions.case_file import dump_case, load_case, load_header
 from pytest_garl.regressions.case_header import CaseHeader
+from pytest_garl.regressions.cause import cause_of_case
+from pytest_garl.regressions.worst import worst_in
 from pytest_garl.scenarios.maps.map import load_map
 
 
@@ -102,22 +104,29 @@ class Corpus:
         """Return whether a case is committed, or marked as accepted."""
         return entry.case is not None and self.acceptance.accepts(entry.path, entry.case)
 
-    def expected_signatures(
+    def expected_cases(
         self, system: str, map: str, *, accepted: bool = False
-    ) -> dict[str, CorpusEntry]:
-        """Return the signatures that open cases expect of a system on a map, with their files.
+    ) -> list[tuple[CorpusEntry, Case]]:
+        """Return the open cases that may excuse violations of a system on a map, with their files.
 
         A case that gates nothing says nothing about other violations with its signature.
         ``accepted`` leaves out cases that are not accepted.
         """
-        return {
-            entry.case.violation.signature: entry
+        return [
+            (entry, entry.case)
             for entry in self.entries(system)
             if entry.case is not None
             and entry.case.scenario.map == map
             and entry.case.expects_signature
             and (not accepted or self.is_accepted(entry))
-        }
+        ]
+
+    def expected_signatures(
+        self, system: str, map: str, *, accepted: bool = False
+    ) -> dict[str, CorpusEntry]:
+        """Return how violations of a system on a map are expected to end, with a case's file."""
+        expected = self.expected_cases(system, map, accepted=accepted)
+        return {case.ending: entry for entry, case in expected}
 
     def save(self, case: Case) -> Path | None:
         """Write a new case; return its file, or None if the same failure is saved already."""
@@ -147,16 +156,24 @@ class Corpus:
         return folder_of(self.folder, system)
 
     def _find(self, case: Case) -> CorpusEntry | None:
-        """Return the file that expects the same failure: system, map, signature and test.
+        """Return the file that expects the same failure: system, map, ending, cause and test.
 
         A case that gates nothing expects no failure but its own, so that a robust one of its
-        signature is saved beside it.  A second case on an edge would say nothing more.
+        signature is saved beside it.  A second case on an edge would say nothing more.  A case of
+        a worse search is saved, because a known one does not excuse what is worse.
         """
         for entry in self.entries(case.system):
             if entry.case is None or _failure(entry.case) != _failure(case):
                 continue
-            both_on_edge = case.edge and entry.case.edge and entry.case.status == "open"
-            if entry.case.expects_signature or both_on_edge or entry.name == case.id:
+            if entry.case.expects_signature:
+                same = not _is_worse(case, entry.case)
+            else:
+                both_on_edge = case.edge and entry.case.edge and entry.case.status == "open"
+                same = both_on_edge or (
+                    _without_bound(entry.case).id == _without_bound(case).id
+                    and entry.case.reason == case.reason
+                )
+            if same:
                 return entry
         return None
 
@@ -258,15 +275,27 @@ def _lost(path: Path, reason: str) -> CorpusEntry:
     )
 
 
-def _failure(case: Case) -> tuple[str, ...]:
+def _failure(case: Case) -> tuple[object, ...]:
     """Return the facts that two cases of the same failure share."""
     return (
         case.system,
         case.scenario.map,
-        case.violation.signature,
+        case.ending,
+        cause_of_case(case),
         case.asserting_test,
         case.assertion,
     )
+
+
+def _without_bound(case: Case) -> Case:
+    return dataclasses.replace(case, worst=None)
+
+
+def _is_worse(case: Case, known: Case) -> bool:
+    """Return whether a case was saved by a search with a worse violation of its kind."""
+    if case.worst is None or known.worst is None:
+        return False
+    return worst_in([case.worst, known.worst]) != known.worst
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -7,10 +7,14 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from pytest_garl.regressions.case import Case
+from pytest_garl.execution.ledger_queries import LedgerFlight
+from pytest_garl.regressions.case import Case, Worst
 from pytest_garl.regressions.case_request import CaseRequest, CaseResult
 from pytest_garl.regressions.case_requests import SearchSignature
+from pytest_garl.regressions.cause import cause_of_case
 from pytest_garl.regressions.investigations import Investigations
+from pytest_garl.regressions.worst import worst_in, worst_of
+from pytest_garl.scenarios.files import parse_scenario
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -37,8 +41,13 @@ def follow_up(
     """End the investigations of all requests, and save the cases in the requests' order.
 
     ``tests`` are the node ids of the tests that failed; they are known when all tests have run.
+    Behind the requests stand those for other causes of their kinds.
     """
     results = investigations.finish(requests, on_wait)
+    further = requests
+    while further := investigations.further(further, results, on_wait):
+        results |= investigations.finish(further, on_wait)
+        requests = (*requests, *further)
     saved: set[SearchSignature] = set()
     investigated = []
     for each in requests:
@@ -46,7 +55,8 @@ def follow_up(
         # Two findings may be one violation.
         if not result.finding or (each.search, result.signature) not in saved:
             test = tests.get((each.search, each.signature), "")
-            investigated.append(_save(each, _named_after(result, test), save))
+            bounded = _with_worst(result, investigations.violations(each.search))
+            investigated.append(_save(each, _named_after(bounded, test), save))
             saved.add((each.search, result.signature))
     return tuple(investigated)
 
@@ -56,6 +66,25 @@ def _named_after(result: CaseResult, test: str) -> CaseResult:
     if result.case is None or not test:
         return result
     return dataclasses.replace(result, case=dataclasses.replace(result.case, test=test))
+
+
+def _with_worst(result: CaseResult, violations: Sequence[LedgerFlight]) -> CaseResult:
+    """Return a result whose case holds the worst violation of its kind in the search.
+
+    These are the violations that the case would excuse but for this figure, and its own flight.
+    """
+    case = result.case
+    if case is None or case.violation.type == "own":
+        return result
+    cause = cause_of_case(case)
+    found = [
+        worst_of(each.result)
+        for each in violations
+        if each.signature == case.ending and cause.acts_in(parse_scenario(each.scenario))
+    ]
+    own = Worst(margin=case.violation.margin, grade=case.severity.grade)
+    bounded = dataclasses.replace(case, worst=worst_in([own, *found]))
+    return dataclasses.replace(result, case=bounded)
 
 
 def _save(

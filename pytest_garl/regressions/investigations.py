@@ -7,17 +7,24 @@ import functools
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Future
 from dataclasses import dataclass, field
+from pathlib import Path
 
 from pytest_garl.execution.database import BEFORE_SEARCHES, BEHIND_SEARCHES
+from pytest_garl.execution.flight_id import CompletedFlight
+from pytest_garl.execution.job import FlightJob
 from pytest_garl.execution.ledger import Ledger
+from pytest_garl.execution.ledger_queries import LedgerFlight
 from pytest_garl.execution.on_demand import OnDemandFlights
-from pytest_garl.execution.pool import Pool
+from pytest_garl.execution.pool import Pool, wait_for
+from pytest_garl.execution.reference import simulator_sha256
 from pytest_garl.regressions.allowance import Allowance, ShrinkBudget
 from pytest_garl.regressions.case_request import CaseRequest, CaseResult
 from pytest_garl.regressions.case_requests import SearchSignature, case_requests
 from pytest_garl.regressions.corpus import Corpus
 from pytest_garl.regressions.forecast import RemainingWork, remaining_work
+from pytest_garl.regressions.further_causes import FurtherCauses
 from pytest_garl.regressions.investigation import build_case
+from pytest_garl.regressions.known_kinds import Twin
 from pytest_garl.regressions.new_case import case_without_flights
 from pytest_garl.regressions.new_signatures import NewSignatures
 from pytest_garl.regressions.second_reading import case_of_finding
@@ -79,6 +86,7 @@ class Investigations:
       the cap lasts.
     - When the search is over, signatures without flights get what others have left over.  The
       others are asked in the order in which they were started, not in that in which they ended.
+    - Then other causes of the same kinds are looked for, with what is left over.
 
     If the pool flies in this process, everything is done after the search.
     """
@@ -91,11 +99,12 @@ class Investigations:
         shrinking: ShrinkBudget,
         workers: int,
     ) -> None:
-        self._ledger, self._corpus, self._shrinking = ledger, corpus, shrinking
+        self._ledger, self._pool, self._corpus, self._shrinking = ledger, pool, corpus, shrinking
         self._workers = workers
         self._beside = not pool.in_process
         self._new = NewSignatures(ledger, corpus, shrinking.each)
         self._flights = OnDemandFlights(ledger, pool, priority=self._priority)
+        self._further = FurtherCauses(ledger, self._new, shrinking.each)
         self._requests: list[CaseRequest] = []
         self._searches: dict[str, _OfSearch] = {}
         self._started: dict[str, _Investigation] = {}
@@ -136,6 +145,10 @@ class Investigations:
             self._ledger, self._corpus, self._shrinking.each, self._requests, assertions
         )
 
+    def violations(self, search: str) -> Sequence[LedgerFlight]:
+        """Return the flights of a search that violated a property, in slot order."""
+        return self._ledger.queries.violating(search)
+
     def remaining(self, requests: Requests, flight_s: Mapping[str, float]) -> RemainingWork:
         """Return the work that all requests leave; ``flight_s`` is the time of a flight by name."""
         running = [
@@ -164,6 +177,20 @@ class Investigations:
         waiting = [each for each in requests if each.name not in results]
         return results | {each.name: case_without_flights(each) for each in waiting}
 
+    def further(
+        self,
+        requests: Requests,
+        results: Mapping[str, CaseResult],
+        on_wait: Callable[[], None],
+    ) -> Requests:
+        """Return requests for other causes of the kinds that these requests have made cases of."""
+
+        def fly(job: FlightJob, twin: Twin) -> CompletedFlight:
+            return wait_for(self._ledger, self._pool, twin.flight, Path(job.flights), on_wait)
+
+        self._further.note(requests, results)
+        return self._further.requests(fly)
+
     def close(self) -> None:
         """End what still runs; its flights are in the ledger for a resumed run."""
         self._flights.close()
@@ -191,6 +218,8 @@ class Investigations:
         if not budget:
             return
         request = dataclasses.replace(request, budget=budget)
+        # The case's hash parses sources, once; two threads at a time cannot (CPython issue 106905).
+        simulator_sha256(request.job.simulator)
         investigate = case_of_finding if request.finding else build_case
         result = self._flights.start(request.name, functools.partial(investigate, request))
         investigation = _Investigation(request=request, result=result)

@@ -169,7 +169,7 @@ def renewal_by(path: Path, case: Case, sources: SourceHashes, flight: CompletedF
 
 
 def _difference(path: Path, case: Case, flight: CompletedFlight) -> str:
-    signature = case.violation.signature
+    signature = case.ending
     if flight.signature == signature:
         return f"it fails in the same way, in another flight than the recorded one; {_shrink(path)}"
     if flight.signature:

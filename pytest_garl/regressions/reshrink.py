@@ -86,7 +86,7 @@ def shrink_case(
         )
         request = CaseRequest(
             name=case.id,
-            signature=case.violation.signature,
+            signature=case.ending,
             violations=(),
             job=job,
             map=map,
@@ -236,6 +236,7 @@ class CaseReshrinker:
             status=case.status,
             live=case.live if prevention == NOT_ASKED else found.live,
             accepted=case.accepted,
+            worst=case.worst,
             policy=case.policy,
             policy_sha256=case.policy_sha256,
             evidence=dataclasses.replace(found.evidence, removed=removed),

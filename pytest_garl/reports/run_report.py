@@ -29,6 +29,7 @@ from pytest_garl.reports.search_summary import (
 )
 from pytest_garl.reports.shares_text import control_text
 from pytest_garl.scenarios.files import parse_scenario
+from pytest_garl.verdicts.ending import ending_of
 from pytest_garl.verdicts.paper_metrics import top_k
 from pytest_garl.verdicts.statistics import share_interval
 from pytest_garl.verdicts.verdict import count_decided
@@ -148,7 +149,7 @@ def _search(
                 "cases": [
                     case["file"]
                     for case in cases
-                    if (case["system"], case["map"], case["signature"])
+                    if (case["system"], case["map"], ending_of(case["signature"]))
                     == (summary.system, summary.map, kind.signature)
                 ],
             }

@@ -246,7 +246,7 @@ def _summary(
         verdict = flight.result.verdict
         if verdict.violation:
             violation = flight.id.slot_id, verdict.story
-            violations.setdefault(verdict.signature, []).append(violation)
+            violations.setdefault(verdict.ending, []).append(violation)
     for each in sorted(user_failures, key=lambda each: each.slot):
         violations.setdefault(each.signature, []).append((each.slot, each.message))
     findings: dict[str, list[tuple[str, str]]] = {}

@@ -217,7 +217,8 @@ class Flight:
     ``nominal_arrival_s`` and ``nominal_landing_s`` are when a nominal flight is above the marker
     and on it.  ``rangefinder`` is the airframe's, None without one.  ``data_read`` names those of
     ``OBSERVED`` that the landing system read in any frame; None for simulators that do not record
-    it.  It is in no hash.
+    it.  ``conditions`` names what was not nominal in the scenario, such as ``fog`` or
+    ``navigation``; empty for simulators that do not record it.  Both are in no hash.
     """
 
     outcome: Outcome
@@ -239,6 +240,7 @@ class Flight:
     nominal_landing_s: float | None = None
     rangefinder: Rangefinder | None = None
     data_read: tuple[str, ...] | None = None
+    conditions: tuple[str, ...] = ()
     sha256: str = ""
     cpu: str = ""
     versions: tuple[tuple[str, str], ...] = ()

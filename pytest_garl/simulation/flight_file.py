@@ -108,6 +108,7 @@ def save(flight: Flight, path: Path) -> None:
         "nominal_landing_s": flight.nominal_landing_s,
         "rangefinder": dataclasses.asdict(flight.rangefinder) if flight.rangefinder else None,
         "data_read": flight.data_read,
+        "conditions": flight.conditions,
         "sha256": flight.sha256,
         "cpu": flight.cpu,
         "versions": flight.versions,
@@ -231,6 +232,7 @@ class _Header:
     nominal_landing_s: float | None
     rangefinder: Rangefinder | None
     data_read: tuple[str, ...] | None
+    conditions: tuple[str, ...]
     sha256: str
     cpu: str
     versions: tuple[tuple[str, str], ...]

@@ -9,6 +9,7 @@ from importlib.metadata import version
 from typing import Any
 
 from pytest_garl.cpu_dispatch import dispatched
+from pytest_garl.scenarios.conditions import active_conditions
 from pytest_garl.scenarios.maps.map import Map, load_map
 from pytest_garl.scenarios.placement import map_in
 from pytest_garl.scenarios.scenario import Scenario
@@ -40,6 +41,7 @@ def fly(
     loop = Loop(scenario, system, npcs.make, place, time_limit_s, guard)
     flight = dataclasses.replace(
         with_nominal_landing(loop.run(), scenario, place, loop.camera),
+        conditions=tuple(each.cause for each in active_conditions(scenario)),
         cpu=dispatched(),
         versions=tuple((name, version(name)) for name in PACKAGES),
         wall_s=time.perf_counter() - began,

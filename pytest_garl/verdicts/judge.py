@@ -12,6 +12,7 @@ import numpy as np
 
 from pytest_garl.simulation.flight import Flight
 from pytest_garl.simulation.physics.vehicle import up_m
+from pytest_garl.verdicts.ending import with_cause
 from pytest_garl.verdicts.excuses import excuse
 from pytest_garl.verdicts.findings import findings
 from pytest_garl.verdicts.margins import margins
@@ -64,7 +65,7 @@ def judge(flight: Flight, limits: Limits) -> Verdict:
         outcome=flight.outcome,
         primary=mechanism.primary,
         violation_type=mechanism.violation_type,
-        signature=mechanism.signature,
+        signature=with_cause(mechanism.signature, flight.conditions, flight.objects),
         paper_violation=far if came_down else True,
         margins=margins(flight, limits, violates_time=mechanism.primary in ("time", "abort")),
         story=" ".join(filter(None, (mechanism.sentence, _standing(flight), _where(flight)))),

@@ -10,6 +10,7 @@ from typing import Any, Literal, get_args
 from pytest_garl.errors import OptionError, of_a_user
 from pytest_garl.messages import shown
 from pytest_garl.scenarios.placement import MARKER_SIDE_M
+from pytest_garl.verdicts.ending import ending_of
 
 __tracebackhide__ = of_a_user
 LONGEST_S = 300.0
@@ -158,7 +159,8 @@ class Verdict:
 
     ``primary`` is the property that the flight violates first, and ``None`` if it violates none.
     ``signature`` names the mechanism and the phase of the landing, such as
-    ``IV:dog:last-metre:unseen``.  ``paper_violation`` is the paper's definition: a collision, a
+    ``IV:dog:last-metre:unseen``, and the condition that acted if it was one alone, such as
+    ``II:lost:descent:fog``.  ``paper_violation`` is the paper's definition: a collision, a
     landing more than 1.5 m from the marker, or no landing.  ``story`` says in sentences what
     happened, where and when.  ``completed`` says whether the mission was: landed within the limit
     of distance.  ``excuse`` says why nobody could have landed in a flight without landing, and
@@ -181,6 +183,11 @@ class Verdict:
     def violation(self) -> bool:
         """Whether the flight violated a safety property."""
         return self.primary is not None
+
+    @property
+    def ending(self) -> str:
+        """The signature without the condition that acted: what flights are compared by."""
+        return ending_of(self.signature)
 
     @property
     def cause(self) -> str:

@@ -7,12 +7,16 @@ off in fog, and a fast dog hits it; in most flights it lands well.  The rows of 
 
 from __future__ import annotations
 
+import dataclasses
 import fnmatch
+import shutil
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 import pytest
 
+from pytest_garl.regressions.case_file import dump_case, load_case
+from tests.support.case_project import cases, replace_text
 from tests.support.landing_project import CONFTEST, SYSTEMS, TESTS, project, run
 
 RED = pytest.ExitCode.TESTS_FAILED
@@ -223,3 +227,43 @@ def test_deselecting_all_tests_is_no_success(pytester: pytest.Pytester) -> None:
     project(pytester)
     result = run(pytester, *SEARCH, "-k", "nothing_at_all")
     assert result.ret == pytest.ExitCode.NO_TESTS_COLLECTED
+
+
+OFF = "off = 3.0 if scenario"
+FARTHER_OFF = "off = 9.0 if scenario"
+WORSE = "its margin is -8.25, the worst known is -2.25"
+OTHERWISE = "the search's first violation of the kind fails without fog too"
+
+
+@pytest.mark.parametrize(
+    ("known", "broken", "words"),
+    [
+        ("edge", (), "FAILED test_it.py::test_distance[[]lawn-g00-s00] - landed 3.0 m off"),
+        ("git add", ((OFF, FARTHER_OFF),), WORSE),
+        ("accepted", ((OFF, FARTHER_OFF),), WORSE),
+        ("git add", (('scenario["environment.fog"]', 'scenario["environment.rain"]'),), OTHERWISE),
+        ("accepted", (('scenario["environment.fog"]', 'scenario["environment.rain"]'),), OTHERWISE),
+    ],
+)
+def test_a_saved_case_does_not_make_a_broken_system_green(
+    searched: pytest.Pytester,
+    monkeypatch: pytest.MonkeyPatch,
+    known: str,
+    broken: tuple[tuple[str, str], ...],
+    words: str,
+) -> None:
+    (path,) = [each for each in cases(searched) if each.name.startswith("lawn-I-nothing")]
+    case = load_case(path)
+    if known == "edge":
+        path.write_text(dump_case(dataclasses.replace(case, reason="edge")))
+    if known == "accepted":
+        shutil.rmtree(searched.path / ".git")
+        for each in cases(searched):
+            each.write_text(dump_case(dataclasses.replace(load_case(each), accepted=True)))
+    for old, new in broken:
+        replace_text(searched.path / "tiny_simulator.py", old, new)
+    monkeypatch.setenv("CI", "true")
+    result = run(searched, "--garl-budget=8", "--garl-workers=0")
+    assert result.ret == RED
+    output = " ".join((result.stdout.str() + result.stderr.str()).split())
+    assert fnmatch.fnmatchcase(output, f"*{words}*")

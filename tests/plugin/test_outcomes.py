@@ -180,6 +180,8 @@ def test_resolve_gathers_facts_until_they_decide() -> None:
     def gather(need: Need, facts: FailedItem) -> FailedItem:
         needs.append(need)
         match need:
+            case Need.KNOWN:
+                return dataclasses.replace(facts, expected_by="")
             case Need.EARLIER:
                 return dataclasses.replace(facts, earlier="")
             case Need.REFLIGHTS:
@@ -187,9 +189,9 @@ def test_resolve_gathers_facts_until_they_decide() -> None:
             case Need.CLAIM:
                 return dataclasses.replace(facts, claimed=True)
 
-    decision, facts = resolve(found(), gather)
+    decision, facts = resolve(found(expected_by=None), gather)
     assert decision == Decision(outcome="failed", reason=Reason.VIOLATION)
-    assert needs == [Need.EARLIER, Need.REFLIGHTS, Need.CLAIM]
+    assert needs == [Need.KNOWN, Need.EARLIER, Need.REFLIGHTS, Need.CLAIM]
     assert facts.reflights is FLAKY
 
 

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import dataclasses
 import random
 from collections.abc import Callable, Sequence
+from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
@@ -11,18 +13,30 @@ from pytest_garl.execution.flight_id import FlightId, Slot
 from pytest_garl.execution.ledger import Ledger
 from pytest_garl.execution.ledger_queue import Claim
 from pytest_garl.execution.result import FlightResult
+from pytest_garl.regressions.simplification import empty_scenario
 from pytest_garl.scenarios.files import dump_scenario, parse_scenario
 from pytest_garl.scenarios.scenario import Scenario
-from tests.regressions.samples import JOB, violating_scenario
+from tests.regressions.samples import JOB, LAWN, case, violating_scenario
 from tests.support.results import flight_result
 
+NOTHING_UNUSUAL = empty_scenario(violating_scenario(), LAWN)
 LIMITS = {"fog": 0.05, "rain": 0.07, "snow": 0.03, "road_wetness": 0.06}
 """Values of the environment above which a flight fails; the first of them names the signature."""
 
 
-def corpus_of(*signatures: str) -> Any:
-    """Return what stands for the saved cases: they expect these signatures."""
-    return SimpleNamespace(expected_signatures=lambda system, map: dict.fromkeys(signatures))
+def corpus_of(*signatures: str, scenario: Scenario | None = None) -> Any:
+    """Return what stands for the saved cases of these signatures.
+
+    They have no cause, or that of a scenario.
+    """
+    found = [
+        (
+            SimpleNamespace(path=Path(f"{signature}.toml")),
+            dataclasses.replace(case(signature), scenario=scenario or NOTHING_UNUSUAL),
+        )
+        for signature in signatures
+    ]
+    return SimpleNamespace(expected_cases=lambda system, map: found)
 
 
 def scenario_of(seed: int, cause: str) -> Scenario:
@@ -35,7 +49,7 @@ def result_of(scenario: Scenario) -> FlightResult:
     """Return the result of a flight."""
     for name, limit in LIMITS.items():
         if scenario[f"environment.{name}"] > limit:
-            signature = f"off:{name}"
+            signature = f"off:of-{name}"
             return flight_result(
                 signature, outcome="landed", primary="distance", violation_type="off"
             )

@@ -117,8 +117,8 @@ def test_cap_gives_all_flights_in_the_order_of_discovery(
     results, _ = undisturbed[True]
     flown = {name: each.flights for name, each in results.items()}
     assert sum(flown.values()) <= WANTED
-    assert flown["search off:fog"]
-    assert flown["search off:rain"]
+    assert flown["search off:of-fog"]
+    assert flown["search off:of-rain"]
     everything, _ = undisturbed[False]
     assert all(each.flights and each.case for each in everything.values())
     assert len(everything) == 4

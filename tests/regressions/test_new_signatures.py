@@ -6,9 +6,9 @@ import pytest
 
 from pytest_garl.execution.ledger import Ledger
 from pytest_garl.regressions.new_signatures import NewSignatures
-from tests.regressions.running_search import RunningSearch, corpus_of
+from tests.regressions.running_search import NOTHING_UNUSUAL, RunningSearch, corpus_of
 
-FOG, RAIN, SNOW = "off:fog", "off:rain", "off:snow"
+FOG, RAIN, SNOW = "off:of-fog", "off:of-rain", "off:of-snow"
 
 
 @pytest.fixture
@@ -59,3 +59,19 @@ def test_saved_case_is_asked_once_so_that_a_resumed_run_finds_the_same(
     assert names(search, NewSignatures(search.ledger, corpus_of(FOG), 12)) == [(RAIN, 1)]
     resumed = NewSignatures(search.ledger, corpus_of(FOG, RAIN), 12)
     assert names(search, resumed) == [(RAIN, 1)]
+
+
+def test_violation_in_which_the_known_cause_is_nominal_is_new(search: RunningSearch) -> None:
+    foggy = NOTHING_UNUSUAL.replace({"environment.fog": 0.1})
+    rainy = NOTHING_UNUSUAL.replace({"environment.rain": 0.1})
+    search.add_generation(0, ["rain"])
+    search.fly((0, 0))
+    known = NewSignatures(search.ledger, corpus_of(RAIN, scenario=rainy), 12)
+    assert names(search, known) == []
+    (search.ledger.path.parent / "other").mkdir()
+    other = RunningSearch(Ledger.create(search.ledger.path.parent / "other" / "ledger.sqlite", {}))
+    other.add_generation(0, ["rain"])
+    other.fly((0, 0))
+    assert names(other, NewSignatures(other.ledger, corpus_of(RAIN, scenario=foggy), 12)) == [
+        (RAIN, 1)
+    ]

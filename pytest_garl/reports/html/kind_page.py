@@ -110,12 +110,12 @@ def plan_kinds(
 
 
 def _cases(corpus: Corpus, search: SearchSummary) -> dict[str, list[CorpusEntry]]:
-    """Return the saved cases of each signature of a search."""
+    """Return the saved cases of each ending of a search."""
     found: dict[str, list[CorpusEntry]] = {}
     for entry in corpus.entries(search.system):
         case = entry.case
         if case is not None and case.scenario.map == search.map:
-            found.setdefault(case.violation.signature, []).append(entry)
+            found.setdefault(case.ending, []).append(entry)
     return found
 
 
