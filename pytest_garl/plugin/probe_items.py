@@ -195,7 +195,7 @@ class _Flown:
             if (
                 case is not None
                 and case.status == "open"
-                and case.violation.signature == verdict.signature
+                and case.ending == verdict.ending
                 and corpus.is_accepted(entry)
                 and has_cause_of(case.scenario, probe.scenario, self._twin)
             ):

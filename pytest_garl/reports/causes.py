@@ -12,6 +12,7 @@ from collections.abc import Iterable, Sequence
 from pytest_garl.execution.severity import Severity
 from pytest_garl.messages import shortened
 from pytest_garl.regressions.case import Case
+from pytest_garl.verdicts.ending import ending_of
 
 MOST_NAMED = 3
 """Of more conditions than these a title counts the rest."""
@@ -55,7 +56,7 @@ def telling_case(cases: Iterable[Case], system: str, map: str, signature: str) -
     """Return the first case that tells the cause of a kind: it is open, and shrunk."""
     for case in cases:
         is_its = (case.system, case.scenario.map) == (system, map)
-        if is_its and case.violation.signature == signature and tells_cause(case):
+        if is_its and case.ending == ending_of(signature) and tells_cause(case):
             return case
     return None
 
@@ -84,7 +85,7 @@ def title_of(case: Case) -> str:
 
     Empty if the ending has no words of its own, as that of a test's own assertion.
     """
-    ending = _ending(case.violation.signature)
+    ending = _ending(case.ending)
     if not ending:
         return ""
     return shortened(f"{cause_in_words(case.severity)}: {ending}", MOST_CHARACTERS)
