@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from pytest_garl.execution.job import parse_job
-from pytest_garl.regressions.known_kinds import Excuse, KnownCase, KnownKinds, fails_alike
+from pytest_garl.regressions.known_kinds import Excuse, KnownCase, KnownKinds
 
 if TYPE_CHECKING:
     from pytest_garl.plugin.run import Run
@@ -40,7 +40,7 @@ class KnownViolations:
         twin = kinds.twin(ending)
         if twin is None:
             return excuse
-        if fails_alike(self._run.wait(twin.flight).result.verdict, ending):
+        if kinds.is_refuted(ending, twin, self._run.wait(twin.flight).result):
             reason = f"the search's first violation of the kind fails without {twin.cause.text} too"
             return Excuse(known=None, reason=reason)
         return excuse

@@ -28,7 +28,7 @@ from pytest_garl.execution.ledger_queries import LedgerFlight
 from pytest_garl.regressions.case import Case
 from pytest_garl.regressions.case_request import CaseRequest, CaseResult
 from pytest_garl.regressions.cause import cause_of_case
-from pytest_garl.regressions.known_kinds import Twin, are_alike, fails_alike, request_twin
+from pytest_garl.regressions.known_kinds import Twin, are_alike, request_twin
 from pytest_garl.regressions.new_signatures import NewSignatures, named, request_of
 from pytest_garl.scenarios.files import parse_scenario
 from pytest_garl.scenarios.scenario import Scenario
@@ -108,7 +108,11 @@ class FurtherCauses:
             return []
         completed = fly(job, twin)
         kind = search, completed.signature
-        if not fails_alike(completed.result.verdict, ending) or twin.scenario in self._asked[kind]:
+        if twin.scenario in self._asked[kind] or not known.is_refuted(
+            ending, twin, completed.result
+        ):
+            return []
+        if any(each.ending == completed.signature and not cause_of_case(each) for each in made):
             return []
         request = self._request(search, completed.signature, (), job)
         return [dataclasses.replace(request, violations=((twin.scenario, completed),))]

@@ -8,8 +8,9 @@ A case excuses a violation that ends as the case does, if it has the case's caus
    search that saved the case.  A file without that figure sets no bound.
 3. The twin does not end alike.  The twin is the same scenario with the causes of all known cases of
    the kind made nominal.  If it fails all the same, the kind has another cause as well, and nothing
-   of the kind is excused.  A raw flight has more conditions than a shrunk case, so their number
-   tells nothing; what is left without the known cause does.
+   of the kind is excused; unless a known case fails with nothing unusual and ends as the twin.  A
+   raw flight has more conditions than a shrunk case, so their number tells nothing; what is left
+   without the known cause does.
 
 One twin is flown for each kind: that of the first violation, by generation and slot, that passes
 1 and 2.  An empty cause and one that the ending names have no twin: there is nothing to take away.
@@ -113,6 +114,8 @@ class KnownKinds:
         if not acting:
             causes = "; ".join(cause_of_case(each.case).text for each in known)
             return Excuse(known=None, reason=f"its cause ({causes}) is nominal here")
+        # The file that names a cause says more than one that takes nothing.
+        acting.sort(key=lambda each: not cause_of_case(each.case))
         reasons = [why_worse(result, each.case.worst) for each in acting]
         for each, reason in zip(acting, reasons, strict=True):
             if not reason:
@@ -122,6 +125,12 @@ class KnownKinds:
     def twin(self, ending: str) -> Twin | None:
         """Return the twin of a kind; None if it has none, or no violation that needs one yet."""
         return self._twins.get(ending)
+
+    def is_refuted(self, ending: str, twin: Twin, flown: FlightResult) -> bool:
+        """Return whether the twin of a kind fails alike, for a cause that no case knows."""
+        if not fails_alike(flown.verdict, ending):
+            return False
+        return self.without_twin(flown, twin.scenario).known is None
 
     def alike(self, ending: str) -> list[Case]:
         """Return the known cases whose endings differ from this one in phase and sight at most."""
