@@ -12,7 +12,7 @@ from pytest_garl.scenarios.groups.catalogue import GROUPS
 from pytest_garl.scenarios.maps.map import Map
 from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.scenarios.validity import repair
-from pytest_garl.verdicts.ending import DECOY, names_its_cause
+from pytest_garl.verdicts.ending import DECOY, NAMED_BY_THEMSELVES
 
 _BODIES = ("III", "IV")
 """Types of violations whose signature names the body that was hit."""
@@ -77,7 +77,7 @@ def cause_of_case(case: Case) -> Cause:
     if ending.partition(":")[0] in _BODIES:
         # As the search found it, a collision has conditions that the body does not need.
         return Cause(conditions=conditions if case.is_shrunk else frozenset())
-    if names_its_cause(ending):
+    if ending.partition(":")[0] in NAMED_BY_THEMSELVES:
         return Cause()
     return Cause(conditions=conditions, objects=_kinds_in(case.scenario))
 

@@ -10,29 +10,38 @@ shrunk to one keeps its ending.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Collection, Sequence
 
 from pytest_garl.scenarios.domains.genome import WEATHER_CAUSES
 from pytest_garl.scenarios.groups.catalogue import GROUPS
 
-CAUSES = frozenset({*WEATHER_CAUSES, *GROUPS})
+
+def _cause(condition: str) -> str:
+    """Return what a signature calls a condition: the number of a decoy is a scenario's own."""
+    return re.sub(r"-\d+$", "", condition)
+
+
+CAUSES = frozenset(_cause(each) for each in (*WEATHER_CAUSES, *GROUPS))
 """Names of conditions; no phase of a landing and nothing else that ends a signature has one."""
 NAMED_BY_THEMSELVES = ("III", "IV", "V", "abort", "own")
 """Types whose signature names the cause: a body, an exception, an excuse, a test."""
 DECOY = "I:decoy"
 """Begins the signature of a landing on a decoy, which is the cause."""
+MISTAKES = (DECOY, "slid:", "late:standing", "late:never-gave-up")
+"""Begin the signatures that say what the system mistook, or failed to do."""
 
 
 def names_its_cause(ending: str) -> bool:
     """Return whether an ending says what caused it."""
-    return ending.partition(":")[0] in NAMED_BY_THEMSELVES or ending.startswith(DECOY)
+    return ending.partition(":")[0] in NAMED_BY_THEMSELVES or ending.startswith(MISTAKES)
 
 
 def with_cause(ending: str, conditions: Sequence[str], objects: Collection[object]) -> str:
     """Return the signature of a flight in which these conditions acted among these objects."""
     if not ending or names_its_cause(ending) or len(conditions) != 1 or objects:
         return ending
-    return f"{ending}:{conditions[0]}"
+    return f"{ending}:{_cause(conditions[0])}"
 
 
 def ending_of(signature: str) -> str:

@@ -149,7 +149,7 @@ def test_what_cannot_be_done_is_said_and_keeps_the_files(
 @pytest.mark.sim
 def test_landing_system_to_begin_with_lands(folder: Path) -> None:
     assert init().exit_code == 0
-    done = CliRunner().invoke(main, ["check", "test_my_landing.py", "--map=lawn"])
+    done = CliRunner().invoke(main, ["check", "test_my_landing.py", "--map=lawn", "--no-probes"])
     assert done.exit_code == 0, done.output
     assert done.output.count("landed 0.0") == 2
     assert (folder / "my_landing.py").read_text() == Path(skeleton.__file__).read_text()
