@@ -70,13 +70,19 @@ def _key(case: Case) -> str:
 
 
 def proves_reference(case: Case, sources: SourceHashes, trajectory_sha256: str) -> bool:
-    """Return whether a flight shows that sources other than the case's fly it to the byte."""
+    """Return whether a flight shows that another simulator or map flies the case to the byte.
+
+    A landing system that alone has changed needs no proof: a pass is its own doing.
+    """
     recorded = case.evidence.trajectory_sha256
+    reference = dataclasses.replace(
+        SourceHashes.of(case.evidence), system_sha256=sources.system_sha256
+    )
     return (
         case.status == "open"
         and bool(recorded)
         and trajectory_sha256 == recorded
-        and sources != SourceHashes.of(case.evidence)
+        and sources != reference
     )
 
 

@@ -34,6 +34,11 @@ def test_the_same_flight_with_other_sources_is_a_proof() -> None:
     assert not proves_reference(unrecorded, UPGRADED, "")
 
 
+def test_a_change_of_the_landing_system_alone_needs_no_proof() -> None:
+    changed = dataclasses.replace(SourceHashes.of(CASE.evidence), system_sha256="cc" * 32)
+    assert not proves_reference(CASE, changed, FLOWN)
+
+
 def test_a_proof_makes_a_later_pass_a_repair(tmp_path: Path) -> None:
     assert stale_reasons(CASE, REPAIRED, "ee" * 32) == ("the simulator has changed",)
     Proofs(tmp_path).note(CASE, UPGRADED)
