@@ -10,7 +10,7 @@ import json
 import os
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import pytest
 
@@ -40,10 +40,12 @@ from pytest_garl.scenarios.domains.navigation import within
 from pytest_garl.scenarios.files import dump_scenario
 from pytest_garl.scenarios.maps.map import load_map
 from pytest_garl.scenarios.scenario import Scenario
-from pytest_garl.search.probes import Probe, clear_scenario, probed_map, probes_for, start_beside
 from pytest_garl.simulation.flight_file import load
 from pytest_garl.verdicts.verdict import Verdict
 from pytest_garl.verdicts.wording import headline
+
+if TYPE_CHECKING:
+    from pytest_garl.search.probes import Probe
 
 PASSED = "probes.json"
 """The file beside the ledger that names the landing systems whose probes have passed."""
@@ -133,6 +135,8 @@ class _Flown:
         self.problem = ""
         map = load_map(target.map, run.options.map_folders)
         domain = within(_domain(run.options, target), target.navigation)
+        from pytest_garl.search.probes import clear_scenario, probes_for, start_beside
+
         clear = self._twin = clear_scenario(map, target.task, domain)
         beside = start_beside(clear, map, domain)
         first, second = self._fly([clear, beside.scenario])
@@ -237,6 +241,9 @@ def _searched(
             if target.map not in maps:
                 maps.append(target.map)
     for target, (maps, module) in found.items():
+        # Probes need the camera, which a run without them does not import.
+        from pytest_garl.search.probes import probed_map
+
         map = probed_map([load_map(name, options.map_folders) for name in maps])
         yield replace(target, map=map.name), module
 

@@ -202,7 +202,6 @@ def test_repeat_shows_the_failure_of_an_expected_case(searched: pytest.Pytester)
             "'scenario.weather.fog_visibility_m': found 1.5",
         ),
         ('map = "lawn"', 'map = "moon"', "key 'map': unknown map 'moon'"),
-        ('"systems:Good"', '"systems:Other"', "key 'system': found 'systems:Other', expected"),
         ("dog-1 = []", "dog-1 = [[1, 2.0, 0.0]]", "'moves.dog-1': found [[]1, 2.0, 0.0]"),
         ("dog-1 = []", "cat-1 = []", "'moves.cat-1': unknown key"),
     ],
