@@ -24,6 +24,11 @@ def printable(text: str, *, keep: str = "\n\t") -> str:
     """
     if "::" in text or "##" in text:
         text = _LOG_COMMAND.sub(lambda found: _defused(found[0]), text)
+    return visible(text, keep=keep)
+
+
+def visible(text: str, *, keep: str = "\n\t") -> str:
+    """Write out what a terminal would obey, as ``printable`` does, and leave all else as it is."""
     if text.isprintable():
         return text
     return "".join(char if char in keep or _is_seen(char) else _written_out(char) for char in text)

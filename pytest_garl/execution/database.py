@@ -99,7 +99,10 @@ class Database:
                     cursor = self._connection.execute(sql, values)
                     return Rows(rows=cursor.fetchall(), rowcount=cursor.rowcount)
                 except sqlite3.OperationalError as error:
-                    is_busy = error.sqlite_errorcode & 0xFF == sqlite3.SQLITE_BUSY
+                    code = getattr(
+                        error, "sqlite_errorcode", 0
+                    )  # none if the text cannot be decoded
+                    is_busy = code & 0xFF == sqlite3.SQLITE_BUSY
                     if not is_busy or monotonic() > until:
                         raise
                 self.on_locked()

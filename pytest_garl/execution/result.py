@@ -12,7 +12,7 @@ from pytest_garl.errors import LedgerError
 from pytest_garl.execution.database import REMEDY
 from pytest_garl.execution.severity import NO_SEVERITY, Severity
 from pytest_garl.files.json_values import dataclass_from, parse_json
-from pytest_garl.messages import printable
+from pytest_garl.messages import visible
 from pytest_garl.simulation.flight import Crash
 from pytest_garl.verdicts.verdict import PAPER_LIMITS, Verdict
 
@@ -102,7 +102,7 @@ def _printable(value: Any) -> Any:
         return {key: _printable(item) for key, item in value.items()}
     if isinstance(value, list):
         return [_printable(item) for item in value]
-    return printable(value) if isinstance(value, str) else value
+    return visible(value) if isinstance(value, str) else value
 
 
 def broken_result(crash: Crash, diagonal_m: float, *, inconclusive: bool = False) -> FlightResult:

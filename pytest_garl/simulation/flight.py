@@ -12,7 +12,8 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
-Outcome = Literal["landed", "collision", "slid", "gave_up", "not_landed", "crashed"]
+Outcome = Literal["landed", "collision", "slid", "gave_up", "not_landed", "crashed", "inconclusive"]
+"""How a flight ended; a simulator of a user's own may say that it came to no end."""
 BodyClass = Literal["static", "dynamic", "ground"]
 
 TRACK_RATE_HZ = 24.0

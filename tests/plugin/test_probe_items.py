@@ -42,13 +42,13 @@ share_percent = [0, 100]
 """
 """Both landers land in all of it."""
 ONE_PROBE = """
-from pytest_garl.plugin import probe_items
-made = probe_items.probes_for
+from pytest_garl.search import probes
+made = probes.probes_for
 
 def no_marker(*args):
     return [each for each in made(*args) if each.name == "no-marker"]
 
-probe_items.probes_for = no_marker
+probes.probes_for = no_marker
 """
 SEARCH = ("--garl-budget=1", "--garl-method=random", "--garl-workers=2")
 ITEM = "test_it.py::probes[{}]"
