@@ -18,7 +18,7 @@ from pytest_garl.regressions.case import Case, Evidence, Violation
 from pytest_garl.regressions.case_file import dump_case
 from pytest_garl.scenarios.chromosome import decode
 from pytest_garl.scenarios.genes import genome_for
-from pytest_garl.scenarios.maps.map import load_map
+from pytest_garl.scenarios.maps.loading import load_map
 from pytest_garl.verdicts.verdict import Limits
 
 SYSTEM = """

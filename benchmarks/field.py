@@ -24,7 +24,7 @@ from pytest_garl.landing_system import Camera
 from pytest_garl.scenarios.chromosome import decode
 from pytest_garl.scenarios.domains.genome import genome_of
 from pytest_garl.scenarios.domains.reader import domain_named
-from pytest_garl.scenarios.maps.map import load_map
+from pytest_garl.scenarios.maps.loading import load_map
 from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.scenarios.validity import repair
 from pytest_garl.simulation.camera import renderer as renderer_module

@@ -28,7 +28,7 @@ from landing_systems.tphyolo_mls import TphYoloLandingSystem
 from pytest_garl.adversary.catalogue import policy_spec
 from pytest_garl.landing_system import Camera
 from pytest_garl.scenarios.genes import genome_for
-from pytest_garl.scenarios.maps.map import load_map
+from pytest_garl.scenarios.maps.loading import load_map
 from pytest_garl.search.methods.random import random_scenarios
 from pytest_garl.simulation.camera.renderer import Renderer
 from pytest_garl.simulation.fly import fly

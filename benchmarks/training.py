@@ -11,7 +11,7 @@ import time
 
 from pytest_garl.adversary.training.presets import PRESETS
 from pytest_garl.adversary.training.train import train
-from pytest_garl.scenarios.maps.map import load_map
+from pytest_garl.scenarios.maps.loading import load_map
 
 
 def main() -> None:

@@ -31,7 +31,7 @@ _HOMES = {
     ),
     "pytest_garl.plugin.landing": ("Landing",),
     "pytest_garl.scenarios.task": ("Start",),
-    "pytest_garl.simulation.flight": ("Flight",),
+    "pytest_garl.flight.flight": ("Flight",),
     "pytest_garl.simulation.npc_policy": ("Move", "PolicySpec", "Situation"),
     "pytest_garl.verdicts.verdict": ("Limits", "limits"),
     "pytest_garl.video": ("save_video",),

@@ -1,4 +1,5 @@
 from pytest_garl.fiducial import MarkerSpec, NestedMarker
+from pytest_garl.flight.flight import Flight
 from pytest_garl.landing_system import (
     Abort,
     Airframe,
@@ -19,7 +20,6 @@ from pytest_garl.landing_system import (
 )
 from pytest_garl.plugin.landing import Landing
 from pytest_garl.scenarios.task import Start
-from pytest_garl.simulation.flight import Flight
 from pytest_garl.simulation.npc_policy import Move, PolicySpec, Situation
 from pytest_garl.verdicts.verdict import Limits
 from pytest_garl.video import save_video

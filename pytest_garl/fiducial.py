@@ -121,6 +121,11 @@ class MarkerSpec:
         )
 
 
+PAPER_MARKER = MarkerSpec()
+MARKER_SIDE_M = PAPER_MARKER.side_m
+"""Paper, section 4.2: marker of 1.5 m, id 0."""
+
+
 def _check(name: str, marker: NestedMarker, size: int, dictionary: str) -> None:
     if type(marker.id) is not int or not 0 <= marker.id < size:
         raise ScenarioError(

@@ -24,6 +24,10 @@ from pytest_garl.execution.result import FlightResult
 from pytest_garl.execution.separate_process import call_in_separate_process
 from pytest_garl.fiducial import MarkerSpec
 from pytest_garl.files.json_values import dataclass_from
+from pytest_garl.flight.flight import Flight
+from pytest_garl.flight.flight_file import divergence_time_s
+from pytest_garl.flight.thresholds import up_m
+from pytest_garl.foreign_text import shown
 from pytest_garl.landing_system import (
     Mission,
     Observation,
@@ -34,7 +38,8 @@ from pytest_garl.landing_system import (
 from pytest_garl.scenarios.domains.domain import Domain
 from pytest_garl.scenarios.domains.genome import genome_of
 from pytest_garl.scenarios.domains.names import DEFAULT_DOMAIN
-from pytest_garl.scenarios.maps.map import Map, load_map
+from pytest_garl.scenarios.maps.loading import load_map
+from pytest_garl.scenarios.maps.map import Map
 from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.scenarios.task import Start, Task
 from pytest_garl.search.methods.random import random_scenarios
@@ -45,13 +50,9 @@ from pytest_garl.search.probes import (
     start_beside,
     without_objects,
 )
-from pytest_garl.simulation.flight import Flight
-from pytest_garl.simulation.flight_file import divergence_time_s
 from pytest_garl.simulation.fly import fly
-from pytest_garl.simulation.physics.vehicle import up_m
 from pytest_garl.simulation.system_under_test.ground_truth import PilotWrapper, is_own
 from pytest_garl.simulation.system_under_test.reading import finite
-from pytest_garl.simulation.system_under_test.texts import shown
 from pytest_garl.verdicts.phases import landing_phase
 from pytest_garl.verdicts.sightings import reports_detections, reports_targets
 from pytest_garl.verdicts.verdict import Limits, default_distance_m

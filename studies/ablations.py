@@ -23,7 +23,8 @@ from scipy.stats import t
 
 from pytest_garl.scenarios.domains.genome import genome_of
 from pytest_garl.scenarios.domains.reader import domain_named
-from pytest_garl.scenarios.maps.map import Map, load_map
+from pytest_garl.scenarios.maps.loading import load_map
+from pytest_garl.scenarios.maps.map import Map
 from pytest_garl.search.catalogue import find_method
 from pytest_garl.search.columns import Columns, OptionalGene
 from pytest_garl.search.exploration import Exploration

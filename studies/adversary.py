@@ -19,7 +19,7 @@ from typing import Any
 from pytest_garl.adversary.catalogue import policy_spec
 from pytest_garl.experiments.measure import limits_text
 from pytest_garl.scenarios.genes import WEATHER, genome_for
-from pytest_garl.scenarios.maps.map import load_map
+from pytest_garl.scenarios.maps.loading import load_map
 from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.search.methods.random import random_scenarios
 from pytest_garl.simulation.npc_policy import PolicySpec

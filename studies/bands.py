@@ -28,7 +28,8 @@ from pytest_garl.scenarios.domains.domain import ELEVATION
 from pytest_garl.scenarios.domains.reader import domain_named
 from pytest_garl.scenarios.genes import SUN, genome_for
 from pytest_garl.scenarios.light import position_of_elevation
-from pytest_garl.scenarios.maps.map import Map, load_map
+from pytest_garl.scenarios.maps.loading import load_map
+from pytest_garl.scenarios.maps.map import Map
 from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.scenarios.units import WEATHER_GENES, WEATHER_UNITS
 from pytest_garl.scenarios.validity import repair

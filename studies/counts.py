@@ -21,7 +21,7 @@ from pytest_garl.experiments.measure import HASH_DIGITS
 from pytest_garl.experiments.results import SEPARATOR, read_rows
 from pytest_garl.scenarios.files import parse_scenario
 from pytest_garl.scenarios.genes import genome_for
-from pytest_garl.scenarios.maps.map import load_map
+from pytest_garl.scenarios.maps.loading import load_map
 from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.simulation.camera.weather import conditions_of
 from studies.table import read_csv

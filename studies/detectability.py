@@ -22,7 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pytest_garl import cpu_dispatch
-from pytest_garl.simulation.flight import MarkerView
+from pytest_garl.flight.flight import MarkerView
 from pytest_garl.verdicts.detectability import COEFFICIENTS, Network, features
 from studies.detectability_conditions import CONDITIONS
 from studies.detectability_fit import fit

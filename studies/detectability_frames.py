@@ -14,18 +14,20 @@ from numpy.typing import NDArray
 
 from landing_systems.modules.detection_opencv import LOOKS, OpenCvDetector
 from landing_systems.modules.detection_tphyolo.detector import TphYoloDetector, ground_place
+from pytest_garl.fiducial import MARKER_SIDE_M
+from pytest_garl.flight.flight import MarkerView
 from pytest_garl.landing_system import Camera, Detection, Mission, Observation
 from pytest_garl.scenarios.chromosome import decode
 from pytest_garl.scenarios.genes import SUN, WEATHER, genome_for
-from pytest_garl.scenarios.maps.map import Map, load_map
+from pytest_garl.scenarios.maps.loading import load_map
+from pytest_garl.scenarios.maps.map import Map
 from pytest_garl.scenarios.object_types import OBJECT_TYPES
-from pytest_garl.scenarios.placement import MARKER_DICTIONARY, MARKER_SIDE_M, TARGET_MARKER_ID
+from pytest_garl.scenarios.placement import MARKER_DICTIONARY, TARGET_MARKER_ID
 from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.scenarios.validity import repair
 from pytest_garl.simulation.camera.cover_event import renderer_of
 from pytest_garl.simulation.camera.projection import View, eye_under
 from pytest_garl.simulation.camera.solids import BodyPose
-from pytest_garl.simulation.flight import MarkerView
 from studies.detectability_conditions import CONDITIONS, random_conditions, random_movement
 
 SEED = 260_000

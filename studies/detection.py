@@ -31,7 +31,7 @@ from landing_systems.training.tphyolo.scoring import (
     mission,
     observation_of,
 )
-from pytest_garl.scenarios.maps.map import load_map
+from pytest_garl.scenarios.maps.loading import load_map
 from studies.detection_evaluation import SEED, Detect, aruco_every_look, aruco_once, evaluate
 from studies.detection_tables import summary, table
 

@@ -22,7 +22,7 @@ from landing_systems.training.tphyolo.scoring import (
     score,
 )
 from pytest_garl import Detection, Observation
-from pytest_garl.scenarios.maps.map import load_map
+from pytest_garl.scenarios.maps.loading import load_map
 
 CONFIRM = 0.8
 """Confidence above which the decision module confirms a detection."""

@@ -28,7 +28,7 @@ from pytest_garl.regressions.case import Case
 from pytest_garl.regressions.case_file import dump_case, load_case
 from pytest_garl.regressions.replay import replay
 from pytest_garl.regressions.robustness import neighbours
-from pytest_garl.scenarios.maps.map import load_map
+from pytest_garl.scenarios.maps.loading import load_map
 
 CASES = Path("scenarios/regressions")
 COUNT = 30

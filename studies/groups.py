@@ -27,10 +27,9 @@ from pytest_garl.scenarios.chromosome import decode
 from pytest_garl.scenarios.domains.domain import ABSENT
 from pytest_garl.scenarios.domains.genome import genome_of
 from pytest_garl.scenarios.domains.reader import domain_named
-from pytest_garl.scenarios.genes import Genome, Property
-from pytest_garl.scenarios.maps.map import load_map
+from pytest_garl.scenarios.genes import OFF, ON, Genome, Property
+from pytest_garl.scenarios.maps.loading import load_map
 from pytest_garl.scenarios.scenario import Scenario
-from pytest_garl.scenarios.sparse import OFF, ON
 from pytest_garl.scenarios.validity import repair
 from pytest_garl.simulation.fly import fly
 from pytest_garl.verdicts.judge import judge

@@ -31,7 +31,7 @@ from pytest_garl.execution.result import FlightResult
 from pytest_garl.scenarios.chromosome import encode
 from pytest_garl.scenarios.domains.genome import genome_of
 from pytest_garl.scenarios.domains.reader import domain_named
-from pytest_garl.scenarios.maps.map import load_map
+from pytest_garl.scenarios.maps.loading import load_map
 from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.search.catalogue import find_method
 from pytest_garl.search.columns import STRATA, Columns

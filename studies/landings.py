@@ -21,9 +21,11 @@ from pytest_garl.adversary.catalogue import policy_spec
 from pytest_garl.scenarios.bodies import Body, Part
 from pytest_garl.scenarios.chromosome import decode
 from pytest_garl.scenarios.genes import genome_for
-from pytest_garl.scenarios.maps.map import Map, load_map
+from pytest_garl.scenarios.maps.loading import load_map
+from pytest_garl.scenarios.maps.map import Map
 from pytest_garl.scenarios.scenario import Scenario
-from pytest_garl.scenarios.validity import UAV_CLEARANCE_M, repair
+from pytest_garl.scenarios.start import UAV_CLEARANCE_M
+from pytest_garl.scenarios.validity import repair
 from pytest_garl.search.methods.random import random_scenarios
 from pytest_garl.simulation.fly import fly
 

@@ -21,7 +21,7 @@ from rich.progress import Progress
 from pytest_garl.adversary.training.dqn import EpisodeRecord
 from pytest_garl.adversary.training.presets import PRESETS
 from pytest_garl.adversary.training.train import train
-from pytest_garl.scenarios.maps.map import load_map
+from pytest_garl.scenarios.maps.loading import load_map
 
 PICTURE = Path("docs/pictures/learning-space.png")
 

@@ -52,7 +52,7 @@ def collisions(job: tuple[str, str, Uav, range]) -> int:
     """Return how many episodes end in a collision."""
     from pytest_garl.adversary.training.graded import GradedEnv
     from pytest_garl.adversary.training.presets import PRESETS
-    from pytest_garl.scenarios.maps.map import load_map
+    from pytest_garl.scenarios.maps.loading import load_map
 
     grade, name, uav, seeds = job
     maps = tuple(load_map(each) for each in ("court", "lawn"))

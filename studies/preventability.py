@@ -31,6 +31,7 @@ from pytest_garl.execution.on_demand import FlyFunction, OnDemandFlights
 from pytest_garl.execution.reference import reference_to
 from pytest_garl.experiments.pytest_run import run_pytest
 from pytest_garl.experiments.spec import ExperimentRun
+from pytest_garl.flight.flight_file import load
 from pytest_garl.regressions.case import REACTION_S
 from pytest_garl.regressions.case_flights import ESCAPE_FLIGHTS, recorded_behaviour
 from pytest_garl.regressions.clearance import touched_nothing
@@ -40,8 +41,7 @@ from pytest_garl.regressions.prevention import (
     prevention_of,
 )
 from pytest_garl.scenarios.files import parse_scenario
-from pytest_garl.scenarios.maps.map import load_map
-from pytest_garl.simulation.flight_file import load
+from pytest_garl.scenarios.maps.loading import load_map
 from pytest_garl.simulation.system_under_test.reference_pilot import ReferencePilot
 from studies.table import ResultTable, Row, run_study, share
 

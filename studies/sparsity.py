@@ -32,10 +32,9 @@ from pytest_garl.scenarios.chromosome import encode
 from pytest_garl.scenarios.domains.genome import genome_of
 from pytest_garl.scenarios.domains.reader import domain_named
 from pytest_garl.scenarios.files import dump_scenario
-from pytest_garl.scenarios.genes import Genome
-from pytest_garl.scenarios.maps.map import load_map
+from pytest_garl.scenarios.genes import ON_ABOVE, Genome
+from pytest_garl.scenarios.maps.loading import load_map
 from pytest_garl.scenarios.scenario import Scenario
-from pytest_garl.scenarios.sparse import ON_ABOVE
 from pytest_garl.search.catalogue import make_method
 from pytest_garl.search.method import FlownScenario, SearchPlan
 from pytest_garl.simulation.fly import fly

@@ -22,8 +22,8 @@ from landing_systems.modules.control_ardupilot import (
     vehicle_of,
 )
 from pytest_garl import Airframe
+from pytest_garl.flight.thresholds import BODY_ABOVE_FEET_M
 from pytest_garl.simulation.physics.vehicle import (
-    BODY_ABOVE_FEET_M,
     MOTOR_LAG_S,
     YAW_TORQUE_PER_THRUST_M,
     vehicle_model,

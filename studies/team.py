@@ -23,7 +23,7 @@ import numpy as np
 import torch
 from rich.progress import Progress
 
-from pytest_garl.adversary.catalogue import WEIGHTS, policy_spec
+from pytest_garl.adversary.catalogue import policy_spec
 from pytest_garl.adversary.learned import Network, save
 from pytest_garl.adversary.observations import (
     LIMIT,
@@ -43,8 +43,10 @@ from pytest_garl.adversary.training.uav_models import (
     AvoidingPilot,
     FlightStyle,
 )
+from pytest_garl.adversary.weights import WEIGHTS
 from pytest_garl.scenarios.genes import WEATHER, genome_for
-from pytest_garl.scenarios.maps.map import Map, load_map
+from pytest_garl.scenarios.maps.loading import load_map
+from pytest_garl.scenarios.maps.map import Map
 from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.search.methods.random import random_scenarios
 from pytest_garl.simulation.npc_policy import Move, PolicySpec, Situation

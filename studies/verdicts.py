@@ -20,11 +20,11 @@ from typing import Any
 
 from pytest_garl import cpu_dispatch
 from pytest_garl.adversary.catalogue import policy_spec
+from pytest_garl.flight.flight_file import load, save
 from pytest_garl.scenarios.genes import genome_for
-from pytest_garl.scenarios.maps.map import load_map
+from pytest_garl.scenarios.maps.loading import load_map
 from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.search.methods.random import random_scenarios
-from pytest_garl.simulation.flight_file import load, save
 from pytest_garl.simulation.fly import fly
 from pytest_garl.verdicts.judge import judge
 from pytest_garl.verdicts.touchdowns import landed_s

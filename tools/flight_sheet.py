@@ -15,13 +15,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pytest_garl.execution.ledger import Ledger
+from pytest_garl.flight.flight import Flight
+from pytest_garl.flight.flight_file import load
 from pytest_garl.landing_system import Camera
 from pytest_garl.scenarios.files import parse_scenario
-from pytest_garl.scenarios.maps.map import load_map
+from pytest_garl.scenarios.maps.loading import load_map
 from pytest_garl.simulation.camera.projection import View
 from pytest_garl.simulation.camera.renderer import Renderer
-from pytest_garl.simulation.flight import Flight
-from pytest_garl.simulation.flight_file import load
 from pytest_garl.simulation.randomness import generator
 from pytest_garl.verdicts.judge import judge
 from pytest_garl.verdicts.verdict import Limits

@@ -10,7 +10,7 @@ import numpy as np
 from pytest_garl.landing_system import Camera
 from pytest_garl.scenarios.chromosome import decode
 from pytest_garl.scenarios.genes import genome_for
-from pytest_garl.scenarios.maps.map import load_map
+from pytest_garl.scenarios.maps.loading import load_map
 from pytest_garl.scenarios.validity import repair
 from pytest_garl.simulation.camera.renderer import Renderer
 

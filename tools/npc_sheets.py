@@ -16,13 +16,14 @@ import numpy as np
 
 from landing_systems.opencv_mls import OpenCvLandingSystem
 from pytest_garl.adversary.catalogue import policy_spec
+from pytest_garl.flight.flight import Flight
 from pytest_garl.landing_system import Camera
 from pytest_garl.scenarios.genes import WEATHER, genome_for
-from pytest_garl.scenarios.maps.map import Map, load_map
+from pytest_garl.scenarios.maps.loading import load_map
+from pytest_garl.scenarios.maps.map import Map
 from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.search.methods.random import random_scenarios
 from pytest_garl.simulation.camera.renderer import Renderer
-from pytest_garl.simulation.flight import Flight
 from pytest_garl.simulation.fly import fly
 from pytest_garl.simulation.randomness import generator
 from pytest_garl.verdicts.judge import judge

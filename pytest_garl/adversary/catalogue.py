@@ -13,13 +13,13 @@ import functools
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from pytest_garl.adversary.weights import WEIGHTS
 from pytest_garl.errors import PolicyError
 
 if TYPE_CHECKING:
     from pytest_garl.simulation.npc_policy import PolicySpec
 
 DEFAULT_POLICY = "dqn"
-WEIGHTS = Path(__file__).with_name("weights")
 
 
 @functools.cache

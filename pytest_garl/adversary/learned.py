@@ -14,10 +14,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pytest_garl.adversary.catalogue import WEIGHTS
 from pytest_garl.adversary.grades import GRADE_LIMITS
 from pytest_garl.adversary.interference import Belief, Interfering
 from pytest_garl.adversary.observations import ENCODINGS, on_turn
+from pytest_garl.adversary.weights import WEIGHTS
 from pytest_garl.errors import PolicyError
 from pytest_garl.files.arrays import unpack
 from pytest_garl.files.json_values import parse_json

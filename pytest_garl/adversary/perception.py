@@ -7,8 +7,8 @@ from collections import deque
 from typing import NamedTuple
 
 from pytest_garl.adversary.grades import GradeLimits
+from pytest_garl.scenarios.bodies import Disc, discs_of
 from pytest_garl.scenarios.maps.map import Map
-from pytest_garl.scenarios.validity import Disc, discs_of
 from pytest_garl.simulation.npc_policy import DECISION_STEP_S, Situation
 
 Vector = tuple[float, float, float]

@@ -177,7 +177,7 @@ def parse_baseline(
 
 def load_baseline(path: Path, search_path: tuple[Path, ...] = ()) -> Baseline:
     """Return the baseline in a file."""
-    from pytest_garl.scenarios.maps.map import load_map
+    from pytest_garl.scenarios.maps.loading import load_map
 
     hint = "; expected a file that `garl baseline save` wrote"
     text = read_text(path, LARGEST_BYTES, hint=hint)

@@ -25,7 +25,8 @@ from pytest_garl.scenarios.domains.genome import genome_of
 from pytest_garl.scenarios.domains.names import DEFAULT_DOMAIN
 from pytest_garl.scenarios.domains.reader import domain_named
 from pytest_garl.scenarios.files import parse_scenario
-from pytest_garl.scenarios.maps.map import Map, load_map
+from pytest_garl.scenarios.maps.loading import load_map
+from pytest_garl.scenarios.maps.map import Map
 from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.search.methods.random import random_scenarios
 from pytest_garl.simulation.npc_policy import PolicySpec
@@ -172,7 +173,7 @@ def _baseline_set(
 
 def _baseline(sets: Sequence[BaselineSet]) -> Baseline:
     from pytest_garl.cpu_dispatch import cpu_class_of_flights
-    from pytest_garl.simulation.flight import PACKAGES
+    from pytest_garl.flight.flight import PACKAGES
 
     return Baseline(
         cpu=cpu_class_of_flights(),

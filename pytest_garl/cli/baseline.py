@@ -176,7 +176,7 @@ def scenario(file: Path, name: str) -> None:
     """Print one scenario of a baseline, such as court-17, as a file for pytest --garl-repeat."""
     from pytest_garl.baselines.file import load_baseline
     from pytest_garl.scenarios.files import dumps
-    from pytest_garl.scenarios.maps.map import load_map
+    from pytest_garl.scenarios.maps.loading import load_map
 
     for each in load_baseline(file, (_maps_folder(),)).sets:
         for index, flight in enumerate(each.flights):
@@ -217,7 +217,7 @@ def diff(
     from pytest_garl.baselines.gate import compare_sets
     from pytest_garl.baselines.record import fly_baseline, neighbour_flyer
     from pytest_garl.execution.checkout import Checkout
-    from pytest_garl.scenarios.maps.map import load_map
+    from pytest_garl.scenarios.maps.loading import load_map
 
     if not systems:
         raise OptionError(

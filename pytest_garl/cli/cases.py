@@ -20,6 +20,7 @@ from pytest_garl.cli.case_tables import (
     renamed_table,
     scenario_table,
 )
+from pytest_garl.cli.shared import FOLDER, say
 from pytest_garl.errors import CorpusError, GarlError
 from pytest_garl.messages import command, printable
 from pytest_garl.regressions.case import NO_GATE_TEXTS, Case, NoGateReason
@@ -34,7 +35,6 @@ if TYPE_CHECKING:
     from pytest_garl.plugin.project_collection import ProjectTests
     from pytest_garl.regressions.renewal import Renewal
 
-DEFAULT_FOLDER = Path("scenarios/regressions")
 NO_PROOF = 3
 """Exit status of a replay that proves nothing."""
 EXIT_STATUS = {"FIXED": 0, "FAILED": 1, "STALE": NO_PROOF, "UNDECIDED": NO_PROOF}
@@ -71,15 +71,6 @@ class _Project:
         return tests, Corpus(folder, self.maps)
 
 
-FOLDER = click.option(
-    "--folder",
-    type=click.Path(path_type=Path, file_okay=False),
-    default=DEFAULT_FOLDER,
-    show_default=True,
-    help="Folder of the cases (the ini key garl_cases).",
-)
-
-
 @click.group()
 @FOLDER
 @click.pass_context
@@ -94,11 +85,6 @@ def cases(context: click.Context, folder: Path) -> None:
         raise click.BadParameter(f"there is no folder {printable(str(folder))}", param=None)
     corpus = Corpus(folder, (root / "scenarios" / "maps",))
     context.obj = _Project(root=root, corpus=corpus, named=named)
-
-
-def say(text: str, *, err: bool = False) -> None:
-    """Print a text that may hold names and content of files, without control characters."""
-    click.echo(printable(text), err=err)
 
 
 FILE = click.argument("file", type=click.Path(path_type=Path, exists=True, dir_okay=False))

@@ -8,9 +8,9 @@ from typing import Any
 
 import click
 
-from pytest_garl.cli.cases import say
 from pytest_garl.cli.flight_options import names_flight
 from pytest_garl.cli.named_flight import FlightName, NamedFlight
+from pytest_garl.cli.shared import say
 from pytest_garl.errors import OptionError
 from pytest_garl.files.atomic import check_writable
 from pytest_garl.reports.mcap.sdk import check_sdk

@@ -7,9 +7,8 @@ from typing import Any
 
 import click
 
-from pytest_garl.cli.cases import FOLDER
+from pytest_garl.cli.shared import FOLDER, LEDGER
 
-LEDGER = Path(".garl/ledger.sqlite")
 _OPTIONS = (
     click.argument("flight", metavar="SLOT|CASE|FILE"),
     click.option(

@@ -6,14 +6,15 @@ import re
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from pytest_garl.cli.cases import say
 from pytest_garl.cli.check import imported_system
-from pytest_garl.cli.flight_options import LEDGER
+from pytest_garl.cli.shared import LEDGER, say
 from pytest_garl.errors import GarlError, LedgerError
 from pytest_garl.execution.flight_id import FIRST_SLOT
 from pytest_garl.execution.stored_ledger import checked_ledger, flown_slots
 from pytest_garl.files.reading import read_text
 from pytest_garl.files.toml import parse
+from pytest_garl.flight.flight import Flight
+from pytest_garl.flight.flight_file import load
 from pytest_garl.landing_system import airframe_of
 from pytest_garl.messages import command, shortened
 from pytest_garl.regressions.case import Case
@@ -25,10 +26,8 @@ from pytest_garl.reports.html.flight_task import FlightTask, record_of
 from pytest_garl.reports.mcap.source import Export, Place
 from pytest_garl.scenarios.files import load as load_scenario
 from pytest_garl.scenarios.files import parse_scenario
-from pytest_garl.scenarios.maps.map import load_map
+from pytest_garl.scenarios.maps.loading import load_map
 from pytest_garl.scenarios.placement import map_in
-from pytest_garl.simulation.flight import Flight
-from pytest_garl.simulation.flight_file import load
 from pytest_garl.verdicts.judge import judge
 from pytest_garl.verdicts.verdict import DEFAULT_LIMITS
 

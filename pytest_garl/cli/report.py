@@ -8,7 +8,7 @@ from typing import Any
 
 import click
 
-from pytest_garl.cli.cases import FOLDER
+from pytest_garl.cli.shared import FOLDER
 from pytest_garl.files.atomic import write_text_atomically
 from pytest_garl.messages import printable
 from pytest_garl.regressions.corpus import Corpus

@@ -140,7 +140,7 @@ def train(**options: Any) -> None:
 
 def _plan(options: dict[str, Any]) -> TrainingPlan:
     from pytest_garl.adversary.training.selection import TrainingPlan
-    from pytest_garl.scenarios.maps.map import load_map
+    from pytest_garl.scenarios.maps.loading import load_map
 
     name, preset = _preset(options["policy"], options["grades"])
     if preset.surrogate.grades and (options["state"] or options["reward"]):

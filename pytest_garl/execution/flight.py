@@ -16,12 +16,12 @@ from pytest_garl.execution.flight_id import FlightId
 from pytest_garl.execution.job import FlightJob
 from pytest_garl.execution.reference import BUILT_IN
 from pytest_garl.execution.result import FlightResult, broken_result
+from pytest_garl.flight.flight import Crash, Touchdown
 from pytest_garl.scenarios.scenario import Scenario
-from pytest_garl.simulation.flight import Crash, Touchdown
 from pytest_garl.verdicts.verdict import PAPER_LIMITS
 
 if TYPE_CHECKING:
-    from pytest_garl.simulation.flight import Flight
+    from pytest_garl.flight.flight import Flight
     from pytest_garl.verdicts.verdict import Limits
 
 
@@ -39,7 +39,7 @@ class FlownJob:
 def fly_and_save(job: FlightJob, scenario: Scenario, flight: FlightId, guard: Any) -> FlownJob:
     """Fly, and save the record; that of an earlier attempt is removed first."""
     from pytest_garl.errors import NotFiniteError
-    from pytest_garl.simulation.flight_file import save
+    from pytest_garl.flight.flight_file import save
     from pytest_garl.simulation.system_under_test.takeover import with_takeover
 
     record = job.record(flight)
@@ -74,7 +74,7 @@ def judge_record(
     A flight that was refused is a finding.  Raises GarlError if the record cannot be read.
     """
     from pytest_garl.execution.severity_of_flight import severity_of
-    from pytest_garl.simulation.flight_file import load
+    from pytest_garl.flight.flight_file import load
 
     map = job.load_map()
     if flown.refusal:

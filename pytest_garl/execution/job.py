@@ -14,7 +14,8 @@ from pytest_garl.execution.database import REMEDY
 from pytest_garl.execution.flight_id import FlightId
 from pytest_garl.execution.reference import BUILT_IN, Reference
 from pytest_garl.files.json_values import dataclass_from, parse_json
-from pytest_garl.scenarios.maps.map import Map, load_map
+from pytest_garl.scenarios.maps.loading import load_map
+from pytest_garl.scenarios.maps.map import Map
 from pytest_garl.simulation.npc_policy import PolicySpec
 from pytest_garl.simulation.system_under_test.takeover import Takeover
 from pytest_garl.verdicts.verdict import DEFAULT_LIMITS, Limits

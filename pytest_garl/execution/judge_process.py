@@ -25,10 +25,10 @@ from pytest_garl.execution.job import FlightJob, parse_job
 from pytest_garl.execution.processes import end_with_parent, ignore_ctrl_c
 from pytest_garl.execution.result import FlightResult
 from pytest_garl.files.json_values import dataclass_from
+from pytest_garl.flight.flight import Flight
+from pytest_garl.flight.flight_file import load, save
 from pytest_garl.scenarios.files import dump_scenario, parse_scenario
 from pytest_garl.scenarios.scenario import Scenario
-from pytest_garl.simulation.flight import Flight
-from pytest_garl.simulation.flight_file import load, save
 from pytest_garl.verdicts.verdict import Limits
 
 

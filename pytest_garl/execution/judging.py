@@ -13,13 +13,13 @@ from pytest_garl.execution.flight import FlownJob, judge_record
 from pytest_garl.execution.job import parse_job
 from pytest_garl.execution.ledger_queue import WorkQueue
 from pytest_garl.execution.processes import failure_text
-from pytest_garl.scenarios.files import parse_scenario
-from pytest_garl.simulation.system_under_test.texts import (
+from pytest_garl.foreign_text import (
     MESSAGE_CHARS,
     TRACEBACK_CHARS,
     class_name,
     text_from,
 )
+from pytest_garl.scenarios.files import parse_scenario
 
 SIMULATOR = "the simulator"
 """The failed component, in the message of an error that ends the run."""

@@ -30,6 +30,8 @@ HASHED = (
     "execution",
     "fiducial.py",
     "files",
+    "flight",
+    "foreign_text.py",
     "landing_system.py",
     "scenarios",
     "search",

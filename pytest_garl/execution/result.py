@@ -12,8 +12,8 @@ from pytest_garl.errors import LedgerError
 from pytest_garl.execution.database import REMEDY
 from pytest_garl.execution.severity import NO_SEVERITY, Severity
 from pytest_garl.files.json_values import dataclass_from, parse_json
+from pytest_garl.flight.flight import Crash
 from pytest_garl.messages import visible
-from pytest_garl.simulation.flight import Crash
 from pytest_garl.verdicts.verdict import PAPER_LIMITS, Verdict
 
 

@@ -6,14 +6,14 @@ import numpy as np
 
 from pytest_garl.adversary.grades import GRADE_LIMITS
 from pytest_garl.execution.severity import NO_SEVERITY, Severity
+from pytest_garl.flight.flight import Contact, Flight, ObjectRecord
+from pytest_garl.flight.landing_phases import LandingPhases
+from pytest_garl.flight.thresholds import up_m
 from pytest_garl.scenarios.conditions import active_conditions, unread_groups
 from pytest_garl.scenarios.maps.map import Map
 from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.scenarios.story import LIMITS_S, Story, story_of
-from pytest_garl.simulation.flight import Contact, Flight, ObjectRecord
-from pytest_garl.simulation.landing_phases import LandingPhases
 from pytest_garl.simulation.npc_policy import PolicySpec
-from pytest_garl.simulation.physics.vehicle import up_m
 from pytest_garl.verdicts.verdict import Verdict
 
 RECENT_S = 3.0

@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 from pytest_garl.execution.job import FlightJob, parse_job
 from pytest_garl.execution.ledger_queue import Claim, WorkQueue
 from pytest_garl.execution.result import FlightResult, broken_result
-from pytest_garl.simulation.flight import Crash
+from pytest_garl.flight.flight import Crash
 
 RETRY_LIMIT_FACTOR = 3.0
 """A flight that is repeated alone gets so many times the limit of a call."""

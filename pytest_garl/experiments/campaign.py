@@ -20,7 +20,7 @@ from pytest_garl.experiments.pytest_run import run_pytest
 from pytest_garl.experiments.results import ResultRow, append_rows, read_rows
 from pytest_garl.experiments.spec import Experiment, ExperimentRun
 from pytest_garl.files.atomic import locked
-from pytest_garl.scenarios.maps.map import load_map
+from pytest_garl.scenarios.maps.loading import load_map
 from pytest_garl.search.catalogue import find_method
 
 

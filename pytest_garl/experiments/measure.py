@@ -17,11 +17,11 @@ from pytest_garl.execution.ledger import Ledger
 from pytest_garl.execution.ledger_queries import LedgerFlight
 from pytest_garl.experiments.results import ResultRow
 from pytest_garl.experiments.spec import PAPER_TYPES, ExperimentRun
+from pytest_garl.flight.flight_file import load
 from pytest_garl.scenarios.files import parse_scenario
 from pytest_garl.scenarios.genes import WEATHER, genome_for
 from pytest_garl.scenarios.maps.map import Map
 from pytest_garl.scenarios.scenario import Scenario
-from pytest_garl.simulation.flight_file import load
 from pytest_garl.verdicts.paper_metrics import empty_cells, mark_visited, mean_distance, top_k
 from pytest_garl.verdicts.verdict import Limits, Verdict
 

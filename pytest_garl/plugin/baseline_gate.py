@@ -48,7 +48,7 @@ class BaselineGateItem(pytest.Item):
 
     def runtest(self) -> None:
         """Fly and compare."""
-        from pytest_garl.scenarios.maps.map import load_map
+        from pytest_garl.scenarios.maps.loading import load_map
 
         run: Run = self.config.stash[RUN]
         base = self.garl_gate

@@ -127,7 +127,7 @@ def targets_for(arguments: MarkerArguments, options: Options, test: str) -> list
 def _saved_targets(arguments: MarkerArguments, options: Options, test: str) -> Iterator[Target]:
     if not options.cases.is_dir() and not options.cases.is_symlink():
         return
-    from pytest_garl.scenarios.maps.map import map_names
+    from pytest_garl.scenarios.maps.loading import map_names
 
     known_maps = map_names(options.map_folders)
     for entry in options.corpus.entries(arguments.target.system_name):

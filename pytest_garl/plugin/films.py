@@ -3,20 +3,19 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
-from pathlib import Path
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from pytest_garl.errors import GarlError
 from pytest_garl.messages import printable
 from pytest_garl.plugin.keys import SLOT, TRAJECTORY
+from pytest_garl.plugin.run import FilmKey, Films, Run
 from pytest_garl.plugin.suggested_commands import shown_path
 from pytest_garl.plugin.terminal_text import begin_line, counted, duration, width_of, wrapped
 
 if TYPE_CHECKING:
     from pytest_garl.execution.ledger_queries import LedgerFlight
-    from pytest_garl.plugin.run import Run
     from pytest_garl.plugin.tally import Tally
     from pytest_garl.reports.films import FilmTask
 
@@ -24,32 +23,13 @@ FILM_S = 6.0
 """Computing time of a film, as docs/html-report.md says."""
 MOST_NAMED = 5
 """A line names so many flights and counts the rest."""
-Key = tuple[str, ...]
-"""What a film shows: (system, map, signature) of a kind, or (name,) of a saved case."""
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Films:
-    """The films of a run, and what the summary says of them."""
-
-    files: Mapping[Key, Path] = field(default_factory=dict)
-    notes: tuple[str, ...] = ()
-
-    def of_search(self, system: str, map: str) -> dict[str, Path]:
-        """Return the films of a search by signature."""
-        return {key[2]: path for key, path in self.files.items() if key[:2] == (system, map)}
-
-    @property
-    def of_cases(self) -> dict[str, Path]:
-        """The films of saved cases by name."""
-        return {key[0]: path for key, path in self.files.items() if len(key) == 1}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _Failure:
     """What failed, and the flight that shows it; ``name`` is that of its item."""
 
-    key: Key
+    key: FilmKey
     name: str
     flight: LedgerFlight
 

@@ -11,7 +11,6 @@ import pytest
 
 from pytest_garl.execution.flight_id import CompletedFlight
 from pytest_garl.execution.result import FlightResult
-from pytest_garl.plugin.early_reflights import REFLIGHTS
 from pytest_garl.plugin.failed_statement import failure_of
 from pytest_garl.plugin.keys import LANDING
 from pytest_garl.plugin.outcomes import (
@@ -22,7 +21,7 @@ from pytest_garl.plugin.outcomes import (
     Reflights,
     UnjudgedFlight,
 )
-from pytest_garl.plugin.run import Run, test_of
+from pytest_garl.plugin.run import REFLIGHTS, Run, test_of
 from pytest_garl.plugin.target import Target
 from pytest_garl.plugin.user_assertions import ItemAssertion
 from pytest_garl.regressions.user_failure import UserFailure
@@ -254,7 +253,7 @@ def refly(run: Run, target: Target, failure: ItemFailure) -> Reflights:
 
 def divergence_s(run: Run, target: Target) -> float | None:
     """Return when a slot's flight and its first reflight part; None if one was not recorded."""
-    from pytest_garl.simulation.flight_file import divergence_time_s, load
+    from pytest_garl.flight.flight_file import divergence_time_s, load
 
     files = [run.flight(target).record, target.reflight(0).record(run.options.flights)]
     if not all(file.exists() for file in files):

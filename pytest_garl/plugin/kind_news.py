@@ -19,6 +19,8 @@ from pytest_garl.verdicts.wording import headline
 
 PERIOD_S = 1.0
 """The ledger is read so often: a flight takes longer."""
+_NEWS = pytest.StashKey["KindNews"]()
+"""Where a session keeps which new kinds were told."""
 
 
 class KindNews:
@@ -93,6 +95,17 @@ class KindNews:
             if request.name not in self._shrunk:
                 self._shrunk.add(request.name)
                 yield _shrunk(request, result)
+
+
+def news_of(run: Run, config: pytest.Config) -> KindNews:
+    """Return the news of a run, which tell each kind once."""
+    return config.stash.setdefault(_NEWS, KindNews(run, config))
+
+
+def write_last_news(run: Run, config: pytest.Config) -> None:
+    """Write the sentences that are still due, in a session that has told any."""
+    if _NEWS in config.stash:
+        config.stash[_NEWS].write(run.ledger, at_once=True)
 
 
 def _shrunk(request: CaseRequest, result: CaseResult) -> str:

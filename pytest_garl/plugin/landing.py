@@ -16,8 +16,8 @@ from pytest_garl.plugin.failed_statement import AttributeRead, code_of
 if TYPE_CHECKING:
     from pytest_garl.execution.flight_id import CompletedFlight
     from pytest_garl.execution.result import FlightResult
+    from pytest_garl.flight.flight import Flight
     from pytest_garl.plugin.target import Target
-    from pytest_garl.simulation.flight import Flight
     from pytest_garl.verdicts.verdict import Limits, Verdict
 
 NOT_JUDGED = "not judged"
@@ -194,7 +194,7 @@ class Landing:
     @functools.cached_property
     def flight(self) -> Flight:
         """The flight's whole record, loaded from its file."""
-        from pytest_garl.simulation.flight_file import load
+        from pytest_garl.flight.flight_file import load
 
         return load(self._record)
 

@@ -42,7 +42,7 @@ class MarkerArguments:
 
     def on(self, map: str) -> Target:
         """Return the target on a map."""
-        from pytest_garl.scenarios.maps.map import load_map
+        from pytest_garl.scenarios.maps.loading import load_map
         from pytest_garl.verdicts.verdict import default_distance_m
 
         spec, limits = self.marker or load_map(map, self.map_folders).marker, self.target.limits
@@ -55,7 +55,7 @@ class MarkerArguments:
 def read_marker(marker: pytest.Mark, options: Options) -> MarkerArguments:
     """Return the arguments of a marker; raise GarlError if one is invalid."""
     from pytest_garl.scenarios.domains.navigation import within
-    from pytest_garl.scenarios.maps.map import load_map, map_names
+    from pytest_garl.scenarios.maps.loading import load_map, map_names
     from pytest_garl.verdicts.verdict import Limits, LimitsOfMarker, limits
 
     known = {"system", "maps", "domain", "marker", "start", "limits"}

@@ -77,7 +77,7 @@ def _without_effect(options: Options) -> Iterator[str]:
 
 
 def _unknown_maps(options: Options) -> Iterator[str]:
-    from pytest_garl.scenarios.maps.map import map_names
+    from pytest_garl.scenarios.maps.loading import map_names
 
     known_maps = map_names(options.map_folders)
     unknown = [map for map in options.maps if map not in known_maps]

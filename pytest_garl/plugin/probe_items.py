@@ -23,6 +23,7 @@ from pytest_garl.execution.ledger import Ledger
 from pytest_garl.execution.reference import package_sha256
 from pytest_garl.execution.sources import combined_sha256, data_files, source_hashes
 from pytest_garl.files.atomic import write_text_atomically
+from pytest_garl.flight.flight_file import load
 from pytest_garl.landing_system import Airframe
 from pytest_garl.messages import command
 from pytest_garl.plugin.abort import abort_session
@@ -38,9 +39,8 @@ from pytest_garl.scenarios.conditions import active_conditions
 from pytest_garl.scenarios.domains.domain import Domain
 from pytest_garl.scenarios.domains.navigation import within
 from pytest_garl.scenarios.files import dump_scenario
-from pytest_garl.scenarios.maps.map import load_map
+from pytest_garl.scenarios.maps.loading import load_map
 from pytest_garl.scenarios.scenario import Scenario
-from pytest_garl.simulation.flight_file import load
 from pytest_garl.verdicts.verdict import Verdict
 from pytest_garl.verdicts.wording import headline
 

@@ -17,7 +17,7 @@ import pytest
 from pytest_garl.errors import LedgerError
 from pytest_garl.execution.ledger import Ledger
 from pytest_garl.plugin.keys import is_xdist_worker
-from pytest_garl.plugin.kind_news import KindNews
+from pytest_garl.plugin.kind_news import KindNews, news_of
 from pytest_garl.plugin.progress_text import ProgressReader, RunProgress, progress_line
 from pytest_garl.plugin.run import Run
 from pytest_garl.plugin.terminal_text import begin_line, width_of
@@ -40,8 +40,7 @@ def show_progress(run: Run, config: pytest.Config) -> Iterator[None]:
         with _call_on_wait(run, ControllerWatch().look, lambda: None):
             yield
         return
-    news = run.news = run.news or KindNews(run, config)
-    with _progress_and(news, run, config):
+    with _progress_and(news_of(run, config), run, config):
         yield
 
 

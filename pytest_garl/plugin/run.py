@@ -5,45 +5,48 @@ from __future__ import annotations
 import dataclasses
 import functools
 import os
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import TYPE_CHECKING, TextIO
 
 import pytest
 
 from pytest_garl.errors import LedgerError
 from pytest_garl.execution.batch import fly_all
+from pytest_garl.execution.first_violations import FirstViolations
 from pytest_garl.execution.flight_id import CompletedFlight, FlightId, Slot
-from pytest_garl.execution.ledger import Ledger
+from pytest_garl.execution.job import parse_job
+from pytest_garl.execution.ledger import SESSION_FACT, Ledger
 from pytest_garl.execution.pool import Pool, wait_for
 from pytest_garl.execution.reference import Reference, simulator_sha256
 from pytest_garl.execution.sources import combined_sha256
-from pytest_garl.plugin.early_reflights import EarlyReflights
 from pytest_garl.plugin.keys import target_of
-from pytest_garl.plugin.known_violations import KnownViolations
 from pytest_garl.plugin.options import Options
 from pytest_garl.plugin.search_setup import Searches
 from pytest_garl.plugin.target import Target
+from pytest_garl.regressions.known_kinds import Excuse, KnownCase, KnownKinds
 from pytest_garl.regressions.reference_proofs import Proofs, proves_reference
 from pytest_garl.regressions.replay import SourceHashes, stale_reasons
+from pytest_garl.reports.search_summary import CAMERA, DOMAINS
 from pytest_garl.scenarios.files import parse_scenario
-from pytest_garl.scenarios.maps.map import load_map
+from pytest_garl.scenarios.maps.loading import load_map
 from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.simulation.npc_policy import PolicySpec
 
 if TYPE_CHECKING:
-    from pytest_garl.plugin.films import Films
-    from pytest_garl.plugin.kind_news import KindNews
     from pytest_garl.plugin.user_assertions import ItemAssertion
     from pytest_garl.regressions.follow_up import InvestigatedSignature
     from pytest_garl.regressions.forecast import RemainingWork
     from pytest_garl.regressions.investigations import Investigations
 
-from pytest_garl.execution.ledger import SESSION_FACT
-from pytest_garl.reports.search_summary import CAMERA, DOMAINS
-
 SELECTED = "selected flights"
 """The ledger's fact: how many flights of searches the selected tests want."""
+REFLIGHTS = 4
+"""A violation of a system that need not be deterministic is flown so many times more."""
+NOTHING_KNOWN = Excuse(known=None)
+FilmKey = tuple[str, ...]
+"""What a film shows: (system, map, signature) of a kind, or (name,) of a saved case."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -121,6 +124,23 @@ def _failure_fact(key: str) -> str:
     return f"{SESSION_FACT}failure {key}"
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Films:
+    """The films of a run, and what the summary says of them."""
+
+    files: Mapping[FilmKey, Path] = field(default_factory=dict)
+    notes: tuple[str, ...] = ()
+
+    def of_search(self, system: str, map: str) -> dict[str, Path]:
+        """Return the films of a search by signature."""
+        return {key[2]: path for key, path in self.files.items() if key[:2] == (system, map)}
+
+    @property
+    def of_cases(self) -> dict[str, Path]:
+        """The films of saved cases by name."""
+        return {key[0]: path for key, path in self.files.items() if len(key) == 1}
+
+
 @dataclass(kw_only=True)
 class Run:
     """State of a run in one process; xdist's workers have one each and share the ledger."""
@@ -155,8 +175,6 @@ class Run:
     """The films of what failed, if an option asks for them."""
     remaining: RemainingWork | None = None
     """The work that follows the search, once it is known."""
-    news: KindNews | None = None
-    """Which new kinds were told while the run goes on."""
     save_problem: str = ""
     """Why not everything was saved, empty if it was."""
     user_assertions: dict[tuple[str, str], ItemAssertion] = field(default_factory=dict)
@@ -344,6 +362,94 @@ class Run:
         if self.investigations is not None:
             self.investigations.advance()
         self.on_wait()
+
+
+class EarlyReflights:
+    """Requests the flights that will confirm the first violation of each signature.
+
+    The test that fails for it reports when all lower slots have reported, which may be minutes
+    later.  Nothing is decided here: a test that asks for the same flights finds them in the ledger.
+    """
+
+    def __init__(self, run: Run) -> None:
+        self._run = run
+        self._violations = FirstViolations(run.ledger.queries)
+
+    def advance(self) -> None:
+        """Request the flights for the generations that were flown since this was called last."""
+        searches = self._run.searches
+        for search in searches.breeders:
+            wanted = searches.targets[search]
+            # Saved cases may be many, and nothing in them is new.
+            if not next(iter(wanted.values())).is_searched:
+                continue
+            for signature, (first, *_) in self._violations.advance(search).items():
+                target = wanted.get(first.id.slot)
+                if target is not None and self._is_reported(target, signature):
+                    count = 1 if target.deterministic else REFLIGHTS
+                    self._run.request_reflights(target, count)
+
+    def _is_reported(self, target: Target, signature: str) -> bool:
+        """Whether a test can fail for a violation that no saved case expects."""
+        run = self._run
+        shown = any(item.shows for item in run.items.get(target.flight, ()))
+        return shown and signature not in run.expected_signatures(target)
+
+
+class KnownViolations:
+    """Asks the committed and accepted cases; each process of a session comes to the same answer."""
+
+    def __init__(self, run: Run) -> None:
+        self._run = run
+        self._kinds: dict[str, KnownKinds] = {}
+
+    def excuse(self, target: Target, ending: str) -> Excuse:
+        """Return the case that excuses a violation in a flown slot of a search, or why none does.
+
+        Waits for the slot's generation, and for the twin of the kind.  A repeated scenario is
+        excused by none, because the user wants to see it fail.
+        """
+        if self._run.options.repeat:
+            return NOTHING_KNOWN
+        kinds = self._of(target)
+        if ending not in kinds:
+            return NOTHING_KNOWN
+        self._wait_for_generation(kinds, target.slot.generation)
+        result = self._run.flight(target).result
+        excuse = kinds.without_twin(result, self._run.scenario(target))
+        if excuse.known is None:
+            return excuse
+        twin = kinds.twin(ending)
+        if twin is None:
+            return excuse
+        if kinds.is_refuted(ending, twin, self._run.wait(twin.flight).result):
+            reason = f"the search's first violation of the kind fails without {twin.cause.text} too"
+            return Excuse(known=None, reason=reason)
+        return excuse
+
+    def files(self, target: Target, ending: str) -> str:
+        """Return the files of the known cases of an ending, for a text."""
+        return ", ".join(self._of(target).files(ending))
+
+    def _of(self, target: Target) -> KnownKinds:
+        if target.search not in self._kinds:
+            run = self._run
+            text = run.ledger.job(target.search)
+            assert text is not None
+            expected = run.options.corpus.expected_cases(
+                target.system_name, target.map, accepted=True
+            )
+            known = [KnownCase(name=entry.path.name, case=case) for entry, case in expected]
+            self._kinds[target.search] = KnownKinds(
+                run.ledger, target.search, parse_job(text), known
+            )
+        return self._kinds[target.search]
+
+    def _wait_for_generation(self, kinds: KnownKinds, generation: int) -> None:
+        kinds.advance()
+        while not kinds.is_closed(generation):
+            self._run.turn()
+            kinds.advance()
 
 
 def _note_cameras(ledger: Ledger, items: Sequence[pytest.Item]) -> None:

@@ -13,6 +13,7 @@ import pytest
 from pytest_garl.errors import GarlError
 from pytest_garl.messages import command
 from pytest_garl.plugin.keys import is_xdist_worker
+from pytest_garl.plugin.kind_news import write_last_news
 from pytest_garl.plugin.options import SHRINK
 from pytest_garl.plugin.probe_items import probe_requests
 from pytest_garl.plugin.progress_display import show_progress
@@ -57,8 +58,7 @@ def save_cases(run: Run, session: pytest.Session) -> None:
             run.investigated = follow_up(
                 investigations, requests, run.finding_tests, _saver(run), run.on_wait
             )
-        if run.news is not None:
-            run.news.write(run.ledger, at_once=True)
+        write_last_news(run, config)
     except KeyboardInterrupt:
         run.interrupted = True
         begin_line(reporter)

@@ -23,7 +23,7 @@ from pytest_garl.plugin.target import Target
 from pytest_garl.scenarios.domains.genome import genome_of
 from pytest_garl.scenarios.domains.navigation import within
 from pytest_garl.scenarios.files import load
-from pytest_garl.scenarios.maps.map import load_map
+from pytest_garl.scenarios.maps.loading import load_map
 from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.search.breeder import Breeder
 from pytest_garl.search.catalogue import make_method

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from pytest_garl.execution.flight_id import FIRST_SLOT, FlightId, Slot, search_key
 from pytest_garl.execution.reference import reference_to
-from pytest_garl.scenarios.maps.map import load_map
+from pytest_garl.scenarios.maps.loading import load_map
 from pytest_garl.scenarios.task import DEFAULT_TASK, Task
 
 if TYPE_CHECKING:

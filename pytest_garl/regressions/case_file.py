@@ -40,7 +40,8 @@ from pytest_garl.regressions.case_header import (
 )
 from pytest_garl.regressions.severity_toml import read_severity, severity_lines
 from pytest_garl.scenarios.files import SCENARIO_KEYS, is_in_units, read_scenario, scenario_lines
-from pytest_garl.scenarios.maps.map import Map, load_map
+from pytest_garl.scenarios.maps.loading import load_map
+from pytest_garl.scenarios.maps.map import Map
 from pytest_garl.scenarios.story import GRADES
 from pytest_garl.scenarios.task import task_lines
 from pytest_garl.verdicts.verdict import (

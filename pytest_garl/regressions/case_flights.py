@@ -7,6 +7,7 @@ import dataclasses
 from pytest_garl.execution.flight_id import CompletedFlight
 from pytest_garl.execution.job import FlightJob
 from pytest_garl.execution.on_demand import FlyFunction
+from pytest_garl.flight.flight_file import load
 from pytest_garl.regressions.case import NOT_ASKED, Case, Prevention, RecordedBehaviour
 from pytest_garl.regressions.case_request import CaseRequest, CaseResult, FailingScenario
 from pytest_garl.regressions.move_reduction import short_moves
@@ -17,7 +18,6 @@ from pytest_garl.scenarios.conditions import unread_groups, without_groups
 from pytest_garl.scenarios.maps.map import Map
 from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.scenarios.validity import repair
-from pytest_garl.simulation.flight_file import load
 from pytest_garl.simulation.npc_policy import PolicySpec
 
 ESCAPE_FLIGHTS = 3

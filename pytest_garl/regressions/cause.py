@@ -6,9 +6,8 @@ from dataclasses import dataclass
 
 from pytest_garl.regressions.case import Case
 from pytest_garl.scenarios.conditions import LIGHT_GROUP, NOON, active_conditions
-from pytest_garl.scenarios.domains.genome import WEATHER_CAUSES
 from pytest_garl.scenarios.genes import SUN
-from pytest_garl.scenarios.groups.catalogue import GROUPS
+from pytest_garl.scenarios.groups.catalogue import GROUPS, WEATHER_CAUSES
 from pytest_garl.scenarios.maps.map import Map
 from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.scenarios.validity import repair

@@ -8,11 +8,11 @@ from contextlib import contextmanager
 
 import numpy as np
 
+from pytest_garl.flight.flight import Flight
 from pytest_garl.landing_system import Airframe
 from pytest_garl.scenarios.bodies import Body
 from pytest_garl.scenarios.maps.map import Map
 from pytest_garl.scenarios.object_types import OBJECT_TYPES
-from pytest_garl.simulation.flight import Flight
 from pytest_garl.simulation.physics.vehicle import Quaternion, Vector, vehicle_model
 from pytest_garl.simulation.physics.world import World
 

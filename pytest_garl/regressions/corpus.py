@@ -18,7 +18,7 @@ from pytest_garl.regressions.case_file import dump_case, load_case, load_header
 from pytest_garl.regressions.case_header import CaseHeader
 from pytest_garl.regressions.cause import cause_of_case
 from pytest_garl.regressions.worst import worst_in
-from pytest_garl.scenarios.maps.map import load_map
+from pytest_garl.scenarios.maps.loading import load_map
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)

@@ -8,8 +8,11 @@ from pathlib import Path
 import numpy as np
 
 from pytest_garl.execution.severity import NO_SEVERITY, Severity
+from pytest_garl.flight.flight import Flight, ObjectRecord
+from pytest_garl.flight.thresholds import up_m
 from pytest_garl.regressions.story_text import story_in_words
-from pytest_garl.scenarios.maps.map import Map, load_map
+from pytest_garl.scenarios.maps.loading import load_map
+from pytest_garl.scenarios.maps.map import Map
 from pytest_garl.scenarios.placement import (
     map_in,
     marker_position_m,
@@ -19,8 +22,6 @@ from pytest_garl.scenarios.placement import (
 )
 from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.scenarios.units import conditions_in_words
-from pytest_garl.simulation.flight import Flight, ObjectRecord
-from pytest_garl.simulation.physics.vehicle import up_m
 from pytest_garl.verdicts.verdict import Verdict
 from pytest_garl.verdicts.wording import compass_point
 

@@ -12,14 +12,15 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from pytest_garl.flight.flight import Flight, Track
+from pytest_garl.flight.landing_phases import LandingPhases
+from pytest_garl.flight.thresholds import GRAVITY_MPS2, up_m
 from pytest_garl.landing_system import Airframe, VelocitySetpoint
 from pytest_garl.regressions.clearance import Clearance, ObjectPose
 from pytest_garl.scenarios.bodies import rotate
 from pytest_garl.scenarios.maps.map import Map
 from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.simulation.environment import environment_at
-from pytest_garl.simulation.flight import Flight, Track
-from pytest_garl.simulation.landing_phases import LandingPhases
 from pytest_garl.simulation.npc_policy import (
     DECISION_STEP_S,
     NpcState,
@@ -29,14 +30,12 @@ from pytest_garl.simulation.npc_policy import (
 from pytest_garl.simulation.physics.flight_control import FlightControl
 from pytest_garl.simulation.physics.npc import Npc
 from pytest_garl.simulation.physics.vehicle import (
-    GRAVITY_MPS2,
     Motion,
     Quaternion,
     Vector,
     VehicleModel,
     drag,
     lag,
-    up_m,
     vehicle_model,
     wrench,
 )

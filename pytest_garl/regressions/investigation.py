@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 
 from pytest_garl.execution.on_demand import FlyFunction
+from pytest_garl.flight.flight_file import load
 from pytest_garl.regressions.case import RecordedBehaviour
 from pytest_garl.regressions.case_flights import ESCAPE_FLIGHTS, CaseFlights, find_colliding_object
 from pytest_garl.regressions.case_request import CaseRequest, CaseResult, FailingScenario
@@ -20,7 +21,6 @@ from pytest_garl.regressions.simplification import (
 )
 from pytest_garl.regressions.weaker_adversary import confirm_crossing, confirm_lower_grade
 from pytest_garl.scenarios.scenario import Scenario
-from pytest_garl.simulation.flight_file import load
 
 MINIMUM_CASE_FLIGHTS = 2 + NEIGHBOURS + ESCAPE_FLIGHTS
 """The fewest flights that can confirm a violation: one of a straight crossing or of the scenario

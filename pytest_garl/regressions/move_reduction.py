@@ -5,12 +5,12 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Iterator
 
+from pytest_garl.flight.flight import Flight
 from pytest_garl.regressions.case import MoveList, Moves, RecordedBehaviour
 from pytest_garl.scenarios.maps.map import Map
 from pytest_garl.scenarios.placement import start_genes
 from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.scenarios.validity import problems
-from pytest_garl.simulation.flight import Flight
 from pytest_garl.simulation.npc_policy import DECISION_STEP_S
 
 LAST_MOVES_S = (2.0, 4.0, 8.0)

@@ -7,6 +7,8 @@ import dataclasses
 from pytest_garl.execution.reference import simulator_sha256
 from pytest_garl.execution.severity import NO_SEVERITY, Severity
 from pytest_garl.execution.severity_of_flight import severity_of
+from pytest_garl.flight.flight import Flight
+from pytest_garl.flight.flight_file import load
 from pytest_garl.regressions.case import (
     NOT_ASKED,
     Case,
@@ -20,8 +22,6 @@ from pytest_garl.regressions.case_request import CaseRequest, CaseResult, Failin
 from pytest_garl.regressions.description import describe
 from pytest_garl.regressions.removed import Removed
 from pytest_garl.regressions.user_failure import UserFailure
-from pytest_garl.simulation.flight import Flight
-from pytest_garl.simulation.flight_file import load
 from pytest_garl.simulation.npc_policy import PolicySpec
 from pytest_garl.verdicts.verdict import Verdict
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import itertools
 
-from pytest_garl.simulation.flight import Flight, Step
+from pytest_garl.flight.flight import Flight, Step
 
 OBSERVABLE_PX = 20
 """A body is observable if it has at least so many pixels in two successive frames: some four by

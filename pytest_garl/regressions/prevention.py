@@ -21,6 +21,8 @@ from pytest_garl.errors import LandingSystemError
 from pytest_garl.execution.flight import time_limit_s
 from pytest_garl.execution.flight_id import CompletedFlight
 from pytest_garl.execution.job import FlightJob
+from pytest_garl.flight.flight import Contact, Flight
+from pytest_garl.flight.flight_file import load
 from pytest_garl.landing_system import Airframe, airframe_of
 from pytest_garl.regressions.case import (
     ESCAPE_STEP_S,
@@ -37,8 +39,6 @@ from pytest_garl.regressions.observation import first_observation_s
 from pytest_garl.scenarios.maps.map import Map
 from pytest_garl.scenarios.placement import map_in
 from pytest_garl.scenarios.scenario import Scenario
-from pytest_garl.simulation.flight import Contact, Flight
-from pytest_garl.simulation.flight_file import load
 from pytest_garl.simulation.land_detector import DETECTED_AFTER_S
 from pytest_garl.simulation.navigation import error_m_at
 from pytest_garl.simulation.npc_policy import PolicySpec

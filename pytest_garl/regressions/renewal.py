@@ -19,13 +19,13 @@ from pytest_garl.execution.job import FlightJob
 from pytest_garl.execution.on_demand import FlyFunction, OnDemandFlights
 from pytest_garl.execution.reference import Reference, reference_to, simulator_sha256
 from pytest_garl.execution.sources import data_files, sources_sha256
+from pytest_garl.flight.flight_file import load
 from pytest_garl.regressions.case import Case
 from pytest_garl.regressions.collected_tests import Collection
 from pytest_garl.regressions.new_case import violation_in
 from pytest_garl.regressions.reference_proofs import with_sources
 from pytest_garl.regressions.replay import SourceHashes, system_of
-from pytest_garl.scenarios.maps.map import load_map
-from pytest_garl.simulation.flight_file import load
+from pytest_garl.scenarios.maps.loading import load_map
 
 RenewalResult = Literal["renewed", "renamed", "current", "fixed", "not renewed"]
 

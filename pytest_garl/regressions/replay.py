@@ -19,11 +19,12 @@ from pytest_garl.execution.reference import (
     system_named,
 )
 from pytest_garl.execution.sources import sources_sha256
+from pytest_garl.flight.flight import Flight
+from pytest_garl.flight.flight_file import load
 from pytest_garl.regressions.case import Case, Evidence
 from pytest_garl.regressions.case_test_run import CaseTestResult, run_case_tests
-from pytest_garl.scenarios.maps.map import Map, load_map
-from pytest_garl.simulation.flight import Flight
-from pytest_garl.simulation.flight_file import load
+from pytest_garl.scenarios.maps.loading import load_map
+from pytest_garl.scenarios.maps.map import Map
 
 ReplayResult = Literal["FIXED", "FAILED", "STALE", "UNDECIDED"]
 BUILT_IN_VERDICT = "the built-in verdict"

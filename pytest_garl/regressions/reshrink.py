@@ -36,7 +36,8 @@ from pytest_garl.regressions.robustness import NEIGHBOURS
 from pytest_garl.regressions.shrink import shrink
 from pytest_garl.regressions.simplification import complexity, genome_of
 from pytest_garl.regressions.user_failure import UserAssertion
-from pytest_garl.scenarios.maps.map import Map, load_map
+from pytest_garl.scenarios.maps.loading import load_map
+from pytest_garl.scenarios.maps.map import Map
 from pytest_garl.scenarios.scenario import Scenario
 
 MINIMUM_RESHRINK_FLIGHTS = 1 + 1 + 1 + NEIGHBOURS + ESCAPE_FLIGHTS

@@ -13,15 +13,16 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from pytest_garl.flight.flight import Flight, ObjectRecord
 from pytest_garl.regressions.simplification import MARKER_PLACE
+from pytest_garl.scenarios.bodies import Disc, discs_of
 from pytest_garl.scenarios.maps.map import Map
 from pytest_garl.scenarios.object_types import HEIGHTS_M, OBJECT_TYPES, ObjectType
 from pytest_garl.scenarios.placement import marker_position_m, object_altitude_m, start_genes
 from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.scenarios.story import GRADES, STORY, with_all_values
 from pytest_garl.scenarios.units import HEIGHT, PLACE_DIGITS
-from pytest_garl.scenarios.validity import Disc, discs_of, problems, repair
-from pytest_garl.simulation.flight import Flight, ObjectRecord
+from pytest_garl.scenarios.validity import problems, repair
 from pytest_garl.simulation.npc_policy import DECISION_STEP_S
 from pytest_garl.simulation.physics.bird_path import ENTRY_M, LEAST_HEIGHT_M
 from pytest_garl.simulation.physics.locomotion import STANDING_MPS, next_course

@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 
 from pytest_garl.adversary.catalogue import policy_spec
+from pytest_garl.flight.flight_file import load
 from pytest_garl.regressions.case import RecordedBehaviour
 from pytest_garl.regressions.case_flights import (
     CaseFlights,
@@ -27,7 +28,6 @@ from pytest_garl.regressions.straight_crossing import (
 )
 from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.scenarios.story import GRADES, Story, story_of
-from pytest_garl.simulation.flight_file import load
 
 CARELESS = "careless"
 FALLBACK_FLIGHTS = 1 + NEIGHBOURS

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import functools
 import math
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Literal
 
@@ -63,3 +65,44 @@ def rotate(
         vy + w * ty + z * tx - x * tz,
         vz + w * tz + x * ty - y * tx,
     )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Disc:
+    """The bounding disc of a part seen from above, with its range of heights."""
+
+    name: str
+    x_m: float
+    y_m: float
+    radius_m: float
+    low_m: float
+    high_m: float
+
+
+@functools.lru_cache(maxsize=512)
+def discs_of(body: Body) -> tuple[Disc, ...]:
+    """Return discs that cover the body's parts; long parts are cut into several."""
+    return tuple(disc for part in body.parts for disc in _discs(body, part))
+
+
+def _discs(body: Body, part: Part) -> Iterable[Disc]:
+    axis = max(range(3), key=lambda index: part.size_m[index])
+    length = part.size_m[axis]
+    others = [part.size_m[index] for index in range(3) if index != axis]
+    thickness = math.hypot(*others) if part.shape == "box" else max(others)
+    pieces = max(1, math.ceil(length / max(thickness, 0.2)))
+    for piece in range(pieces):
+        along = [0.0, 0.0, 0.0]
+        along[axis] = length * ((piece + 0.5) / pieces - 0.5)
+        dx, dy, dz = rotate(part.rotation, (along[0], along[1], along[2]))
+        x, y, z = (part.position_m[0] + dx, part.position_m[1] + dy, part.position_m[2] + dz)
+        cos, sin = math.cos(body.yaw_rad), math.sin(body.yaw_rad)
+        half = math.hypot(length / pieces, thickness) / 2
+        yield Disc(
+            name=body.name,
+            x_m=body.position_m[0] + cos * x - sin * y,
+            y_m=body.position_m[1] + sin * x + cos * y,
+            radius_m=half,
+            low_m=z - half,
+            high_m=z + half,
+        )

@@ -12,10 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pytest_garl.errors import ScenarioError
-from pytest_garl.scenarios.genes import CLEAR, Genome, NuclearGene, Property
+from pytest_garl.scenarios.genes import CLEAR, OFF, ON, Genome, NuclearGene, Property, active_genes
 from pytest_garl.scenarios.groups.catalogue import PARAMETERS
 from pytest_garl.scenarios.scenario import Scenario
-from pytest_garl.scenarios.sparse import OFF, ON, active_genes
 from pytest_garl.scenarios.story import STORY
 
 ROUNDING_SHARE = 1e-3

@@ -6,9 +6,8 @@ import math
 from collections.abc import Collection, Iterator
 from dataclasses import dataclass
 
-from pytest_garl.scenarios.domains.genome import WEATHER_CAUSES
 from pytest_garl.scenarios.genes import SUN
-from pytest_garl.scenarios.groups.catalogue import GROUPS
+from pytest_garl.scenarios.groups.catalogue import GROUPS, WEATHER_CAUSES
 from pytest_garl.scenarios.groups.parameter import Group, Parameter
 from pytest_garl.scenarios.light import sun_elevation_deg
 from pytest_garl.scenarios.scenario import Scenario

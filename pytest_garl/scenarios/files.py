@@ -198,7 +198,7 @@ def map_name_in(text: str, *, source: str = "scenario") -> str:
 
 def load(path: Path, search_path: tuple[Path, ...] = ()) -> Scenario:
     """Return the scenario in a file."""
-    from pytest_garl.scenarios.maps.map import load_map
+    from pytest_garl.scenarios.maps.loading import load_map
 
     text = read_text(path)
     map = load_map(map_name_in(text, source=str(path)), search_path)

@@ -6,15 +6,13 @@ import dataclasses
 import math
 from dataclasses import dataclass
 
-from pytest_garl.fiducial import DICTIONARIES, MarkerSpec
+from pytest_garl.fiducial import DICTIONARIES, PAPER_MARKER, MarkerSpec
 from pytest_garl.scenarios.groups import decoys as decoy_groups
 from pytest_garl.scenarios.maps.map import Layer, Map
 from pytest_garl.scenarios.object_types import OBJECT_TYPES, ObjectType
 from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.scenarios.story import children_in
 
-PAPER_MARKER = MarkerSpec()
-MARKER_SIDE_M = PAPER_MARKER.side_m
 MARKER_RADIUS_M = 7.5
 TARGET_MARKER_ID = PAPER_MARKER.id
 """Paper, section 4.2: marker of 1.5 m, id 0, up to 7.5 m off the given GPS position."""

@@ -6,11 +6,13 @@ import math
 from collections.abc import Iterator
 
 from pytest_garl.errors import ScenarioError
+from pytest_garl.scenarios.bodies import discs_of
 from pytest_garl.scenarios.maps.map import Map
 from pytest_garl.scenarios.placement import told_position_m
 from pytest_garl.scenarios.scenario import Scenario
-from pytest_garl.scenarios.validity import UAV_CLEARANCE_M, discs_of
 
+UAV_CLEARANCE_M = 2.0
+"""Nothing is nearer to the UAV when a flight begins."""
 LOWEST_HOVER_M, HIGHEST_HOVER_M = 2.0, 100.0
 """Heights at which a flight can begin: above a take-off, below what the camera draws."""
 _RING_M, _DIRECTIONS = 0.5, 32

@@ -8,7 +8,7 @@ from pathlib import Path
 from hypothesis import strategies as st
 
 from pytest_garl.scenarios.genes import Property, WeatherRange, genome_for
-from pytest_garl.scenarios.maps.map import load_map
+from pytest_garl.scenarios.maps.loading import load_map
 from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.scenarios.validity import repair
 

@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-import functools
 import math
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass
 
 from pytest_garl.errors import ScenarioError
 from pytest_garl.fiducial import MarkerSpec
-from pytest_garl.scenarios.bodies import Body, Part, rotate
+from pytest_garl.scenarios.bodies import Disc, discs_of
 from pytest_garl.scenarios.groups.catalogue import GROUPS
 from pytest_garl.scenarios.groups.decoys import REACH_M
 from pytest_garl.scenarios.groups.pad import CLEARANCE
@@ -26,6 +24,7 @@ from pytest_garl.scenarios.placement import (
     start_genes,
 )
 from pytest_garl.scenarios.scenario import Scenario
+from pytest_garl.scenarios.start import UAV_CLEARANCE_M, start_m
 from pytest_garl.scenarios.units import PLACE_DIGITS, snapped
 
 UAV_REACH_M = 0.75
@@ -35,51 +34,9 @@ than reach and margin of a UAV of 1 m, so that such a UAV can reach it; `pad.cle
 less."""
 MARGINED = 1 + 2 / 6
 """Widest print of a marker as a share of its side: one of four bits with its white margin."""
-UAV_CLEARANCE_M = 2.0
 OBJECT_CLEARANCE_M = 0.3
 _RING_STEP_M = 0.1
 _DIRECTIONS = 32
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Disc:
-    """The bounding disc of a part seen from above, with its range of heights."""
-
-    name: str
-    x_m: float
-    y_m: float
-    radius_m: float
-    low_m: float
-    high_m: float
-
-
-@functools.lru_cache(maxsize=512)
-def discs_of(body: Body) -> tuple[Disc, ...]:
-    """Return discs that cover the body's parts; long parts are cut into several."""
-    return tuple(disc for part in body.parts for disc in _discs(body, part))
-
-
-def _discs(body: Body, part: Part) -> Iterable[Disc]:
-    axis = max(range(3), key=lambda index: part.size_m[index])
-    length = part.size_m[axis]
-    others = [part.size_m[index] for index in range(3) if index != axis]
-    thickness = math.hypot(*others) if part.shape == "box" else max(others)
-    pieces = max(1, math.ceil(length / max(thickness, 0.2)))
-    for piece in range(pieces):
-        along = [0.0, 0.0, 0.0]
-        along[axis] = length * ((piece + 0.5) / pieces - 0.5)
-        dx, dy, dz = rotate(part.rotation, (along[0], along[1], along[2]))
-        x, y, z = (part.position_m[0] + dx, part.position_m[1] + dy, part.position_m[2] + dz)
-        cos, sin = math.cos(body.yaw_rad), math.sin(body.yaw_rad)
-        half = math.hypot(length / pieces, thickness) / 2
-        yield Disc(
-            name=body.name,
-            x_m=body.position_m[0] + cos * x - sin * y,
-            y_m=body.position_m[1] + sin * x + cos * y,
-            radius_m=half,
-            low_m=z - half,
-            high_m=z + half,
-        )
 
 
 def problems(scenario: Scenario, map: Map) -> tuple[str, ...]:
@@ -227,8 +184,6 @@ def _start_problems(
     index: int,
     at: tuple[float, float],
 ) -> Iterable[str]:
-    from pytest_garl.scenarios.start import start_m
-
     name, kind_name = map.present_objects[index]
     kind = OBJECT_TYPES[kind_name]
     reach = kind.radius_m + OBJECT_CLEARANCE_M

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from pytest_garl.scenarios.sparse import OFF, ON
+from pytest_garl.scenarios.genes import OFF, ON
 from pytest_garl.search.columns import Columns, Mask
 from pytest_garl.search.exploration import Exploration
 from pytest_garl.search.operators import Matrix, local_steps

@@ -7,8 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from pytest_garl.scenarios.genes import Genome, NuclearGene
-from pytest_garl.scenarios.sparse import MOST_ACTIVE, OFF, ON, ON_ABOVE
+from pytest_garl.scenarios.genes import MOST_ACTIVE, OFF, ON, ON_ABOVE, Genome, NuclearGene
 from pytest_garl.scenarios.story import GRADES
 from pytest_garl.search.operators import Matrix
 

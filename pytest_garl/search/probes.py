@@ -14,7 +14,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from pytest_garl.flight.flight import Flight
+from pytest_garl.flight.thresholds import up_m
 from pytest_garl.landing_system import Camera
+from pytest_garl.scenarios.bodies import discs_of
 from pytest_garl.scenarios.chromosome import decode
 from pytest_garl.scenarios.domains.domain import Domain
 from pytest_garl.scenarios.domains.genome import genome_of
@@ -29,13 +32,11 @@ from pytest_garl.scenarios.placement import (
 from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.scenarios.start import hovers
 from pytest_garl.scenarios.task import Task
-from pytest_garl.scenarios.validity import discs_of, problems, repair
+from pytest_garl.scenarios.validity import problems, repair
 from pytest_garl.simulation.camera.cover_event import renderer_of
 from pytest_garl.simulation.camera.projection import eye_under
 from pytest_garl.simulation.camera.true_camera import true_camera
-from pytest_garl.simulation.flight import Flight
 from pytest_garl.simulation.nominal import LEVEL
-from pytest_garl.simulation.physics.vehicle import up_m
 from pytest_garl.verdicts.detectability import READABLE, readable_probability
 from pytest_garl.verdicts.sightings import readable_steps
 from pytest_garl.verdicts.verdict import Limits, Verdict

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
-from pytest_garl.simulation.flight import Outcome, Touchdown
+from pytest_garl.flight.flight import Outcome, Touchdown
 from pytest_garl.simulation.ground_stays import GroundStays
 from pytest_garl.simulation.physics.npc import Npc
 from pytest_garl.simulation.physics.vehicle import Quaternion, Vector

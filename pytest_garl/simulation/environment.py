@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
+from pytest_garl.flight.flight import Flight
 from pytest_garl.scenarios.scenario import Scenario
-from pytest_garl.simulation.flight import Flight
 from pytest_garl.simulation.npc_policy import DECISION_STEP_S, GeneChange
 
 

@@ -9,12 +9,13 @@ from importlib.metadata import version
 from typing import Any
 
 from pytest_garl.cpu_dispatch import dispatched
+from pytest_garl.flight.flight import PACKAGES, Flight
+from pytest_garl.flight.flight_file import hash_of
 from pytest_garl.scenarios.conditions import active_conditions
-from pytest_garl.scenarios.maps.map import Map, load_map
+from pytest_garl.scenarios.maps.loading import load_map
+from pytest_garl.scenarios.maps.map import Map
 from pytest_garl.scenarios.placement import map_in
 from pytest_garl.scenarios.scenario import Scenario
-from pytest_garl.simulation.flight import PACKAGES, Flight
-from pytest_garl.simulation.flight_file import hash_of
 from pytest_garl.simulation.loop import Loop
 from pytest_garl.simulation.nominal import with_nominal_landing
 from pytest_garl.simulation.npc_policy import PolicySpec

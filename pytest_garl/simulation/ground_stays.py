@@ -7,7 +7,8 @@ import math
 from collections.abc import Callable
 from typing import TYPE_CHECKING
 
-from pytest_garl.simulation.flight import Outcome, Touchdown
+from pytest_garl.flight.flight import Outcome, Touchdown
+from pytest_garl.flight.thresholds import HARD_TOUCHDOWN_MPS, SLID_M, UPRIGHT_RAD
 from pytest_garl.simulation.land_detector import LandDetector
 from pytest_garl.simulation.physics.vehicle import Vector, VehicleModel
 
@@ -18,14 +19,9 @@ BOUNCE_S = 0.25
 """A shorter loss of contact does not end a stay.  A UAV that rebounds at 1 m/s, half the speed of
 a hard touchdown, is in the air for 0.2 s."""
 STILL_MPS = 0.2
-UPRIGHT_RAD = math.radians(20)
 WATCHED_S = 2.0
 """The flight goes on for so long after the motors stopped, or after a slide exceeded its limit, so
 that the record shows whether the UAV still moves."""
-SLID_M = 0.5
-"""A UAV that moved farther over the ground than half its span did not stay where it landed."""
-HARD_TOUCHDOWN_MPS = 2.0
-"""Contact speed of a drop from 0.2 m: the least drop height of EASA CS 27.725."""
 
 
 class GroundStays:

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from pytest_garl.simulation.physics.vehicle import GRAVITY_MPS2, VehicleModel
+from pytest_garl.flight.thresholds import GRAVITY_MPS2
+from pytest_garl.simulation.physics.vehicle import VehicleModel
 
 DETECTED_AFTER_S = 1.0
 """PX4's three states of landing take 0.35, 0.25 and 0.3 s; ArduPilot documents 1 s for all its

@@ -8,6 +8,9 @@ from collections.abc import Callable, Sequence
 from functools import partial
 from typing import Any
 
+from pytest_garl.flight.flight import Crash, Flight, Outcome
+from pytest_garl.flight.landing_phases import LandingPhases
+from pytest_garl.flight.thresholds import up_m
 from pytest_garl.landing_system import Abort, Command, Land, VehicleState
 from pytest_garl.scenarios.bodies import rotate
 from pytest_garl.scenarios.maps.map import Map
@@ -16,9 +19,7 @@ from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.simulation.camera.projection import eye_under
 from pytest_garl.simulation.contacts import Contacts
 from pytest_garl.simulation.environment import changed
-from pytest_garl.simulation.flight import Crash, Flight, Outcome
 from pytest_garl.simulation.ground_stays import GroundStays
-from pytest_garl.simulation.landing_phases import LandingPhases
 from pytest_garl.simulation.landing_place import what_lies_under
 from pytest_garl.simulation.navigation import Navigation
 from pytest_garl.simulation.npc_policy import DECISION_STEP_S, GeneChange, NpcPolicy, Situation
@@ -33,7 +34,6 @@ from pytest_garl.simulation.physics.vehicle import (
     VehicleModel,
     drag,
     lag,
-    up_m,
     vehicle_model,
     wrench,
 )

@@ -14,6 +14,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Literal
 
+from pytest_garl.flight.flight import Flight, NominalView, ObjectRecord
 from pytest_garl.landing_system import Camera
 from pytest_garl.scenarios.maps.map import Map
 from pytest_garl.scenarios.placement import marker_position_m, told_position_m
@@ -25,7 +26,6 @@ from pytest_garl.simulation.camera.solids import BodyPose
 from pytest_garl.simulation.camera.true_camera import Mounting, true_camera
 from pytest_garl.simulation.environment import environment_at
 from pytest_garl.simulation.events import Event
-from pytest_garl.simulation.flight import Flight, NominalView, ObjectRecord
 from pytest_garl.simulation.system_under_test.descent import LAND_BELOW_M, SLOW_BELOW_M
 from pytest_garl.simulation.system_under_test.mission import SEARCH_ALTITUDE_M
 from pytest_garl.simulation.system_under_test.reference_pilot import CRUISE_MPS, DESCENT_MPS

@@ -9,12 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from pytest_garl.landing_system import Command
-from pytest_garl.scenarios.maps.map import Map
-from pytest_garl.scenarios.placement import Pad
-from pytest_garl.simulation.camera.frame import Frame
-from pytest_garl.simulation.camera.renderer import Renderer
-from pytest_garl.simulation.flight import (
+from pytest_garl.flight.flight import (
     OBSERVED,
     BodyClass,
     Contact,
@@ -29,6 +24,11 @@ from pytest_garl.simulation.flight import (
     Touchdown,
     Track,
 )
+from pytest_garl.landing_system import Command
+from pytest_garl.scenarios.maps.map import Map
+from pytest_garl.scenarios.placement import Pad
+from pytest_garl.simulation.camera.frame import Frame
+from pytest_garl.simulation.camera.renderer import Renderer
 from pytest_garl.simulation.physics.npc import Npc
 
 Vector = tuple[float, float, float]

@@ -4,17 +4,13 @@ from __future__ import annotations
 
 import math
 
+from pytest_garl.flight.thresholds import BODY_ABOVE_FEET_M, GRAVITY_MPS2
 from pytest_garl.landing_system import Command, VelocitySetpoint
 from pytest_garl.scenarios.maps.map import Map
 from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.scenarios.start import hovers, start_m, start_yaw_rad
 from pytest_garl.simulation.physics.flight_control import NO_THRUST
-from pytest_garl.simulation.physics.vehicle import (
-    BODY_ABOVE_FEET_M,
-    GRAVITY_MPS2,
-    Thrusts,
-    VehicleModel,
-)
+from pytest_garl.simulation.physics.vehicle import Thrusts, VehicleModel
 from pytest_garl.simulation.physics.world import World
 
 

@@ -11,8 +11,8 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
+from pytest_garl.flight.flight import Flight, ObjectRecord
 from pytest_garl.scenarios.object_types import OBJECT_TYPES
-from pytest_garl.simulation.flight import Flight, ObjectRecord
 from pytest_garl.verdicts.detectability import readable_probability
 from pytest_garl.verdicts.verdict import Excuse
 

@@ -6,8 +6,8 @@ import math
 
 import numpy as np
 
-from pytest_garl.simulation.flight import Flight
-from pytest_garl.simulation.physics.vehicle import up_m
+from pytest_garl.flight.flight import Flight
+from pytest_garl.flight.thresholds import up_m
 from pytest_garl.verdicts.phases import landing_phase
 from pytest_garl.verdicts.sightings import (
     AT_MARKER_M,

@@ -10,8 +10,8 @@ import math
 
 import numpy as np
 
-from pytest_garl.simulation.flight import Flight
-from pytest_garl.simulation.physics.vehicle import up_m
+from pytest_garl.flight.flight import Flight
+from pytest_garl.flight.thresholds import up_m
 from pytest_garl.verdicts.ending import with_cause
 from pytest_garl.verdicts.excuses import excuse
 from pytest_garl.verdicts.findings import findings

@@ -11,9 +11,8 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from pytest_garl.simulation.flight import Flight, Touchdown
-from pytest_garl.simulation.ground_stays import HARD_TOUCHDOWN_MPS, SLID_M, UPRIGHT_RAD
-from pytest_garl.simulation.physics.vehicle import BODY_ABOVE_FEET_M
+from pytest_garl.flight.flight import Flight, Touchdown
+from pytest_garl.flight.thresholds import BODY_ABOVE_FEET_M, HARD_TOUCHDOWN_MPS, SLID_M, UPRIGHT_RAD
 from pytest_garl.verdicts.findings import UNDETECTED_S, undetected_s
 from pytest_garl.verdicts.phases import flying_from
 from pytest_garl.verdicts.sightings import target_of

@@ -8,8 +8,8 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from pytest_garl.simulation.flight import Contact, Crash, Flight, Separation, Touchdown
-from pytest_garl.simulation.system_under_test.texts import cut
+from pytest_garl.flight.flight import Contact, Crash, Flight, Separation, Touchdown
+from pytest_garl.foreign_text import cut
 from pytest_garl.verdicts.excuses import expected_readable_s
 from pytest_garl.verdicts.findings import descent_elsewhere
 from pytest_garl.verdicts.phases import flying_from, landing_phase

@@ -11,7 +11,7 @@ import math
 
 import numpy as np
 
-from pytest_garl.simulation.flight import Flight
+from pytest_garl.flight.flight import Flight
 from pytest_garl.verdicts.touchdowns import stands_since_s
 
 LAST_METRE_M = 1.2

@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Iterator
 
-from pytest_garl.simulation.flight import Flight, Step
+from pytest_garl.flight.flight import Flight, Step
 from pytest_garl.verdicts.detectability import READABLE, readable_probability
 
 AT_MARKER_M = 1.5

@@ -15,9 +15,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from pytest_garl.simulation.flight import Flight, Touchdown
-from pytest_garl.simulation.ground_stays import HARD_TOUCHDOWN_MPS, SLID_M
-from pytest_garl.simulation.physics.vehicle import BODY_ABOVE_FEET_M, GRAVITY_MPS2
+from pytest_garl.flight.flight import Flight, Touchdown
+from pytest_garl.flight.thresholds import (
+    BODY_ABOVE_FEET_M,
+    GRAVITY_MPS2,
+    HARD_TOUCHDOWN_MPS,
+    SLID_M,
+)
 from pytest_garl.verdicts.verdict import Limits
 
 ON_GROUND_M = 0.02

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 from typing import Any, Literal, get_args
 
 from pytest_garl.errors import OptionError, of_a_user
+from pytest_garl.fiducial import MARKER_SIDE_M
 from pytest_garl.messages import shown
-from pytest_garl.scenarios.placement import MARKER_SIDE_M
 from pytest_garl.verdicts.ending import ending_of
 
 __tracebackhide__ = of_a_user

@@ -6,9 +6,9 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from pytest_garl.flight.flight import Step
 from pytest_garl.landing_system import Detection
 from pytest_garl.simulation.camera.renderer import Renderer
-from pytest_garl.simulation.flight import Step
 from pytest_garl.video import drawing
 from pytest_garl.video.pose import Poses
 

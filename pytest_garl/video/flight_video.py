@@ -9,13 +9,13 @@ from pathlib import Path
 import numpy as np
 
 from pytest_garl.errors import GarlError
+from pytest_garl.flight.flight import Flight
 from pytest_garl.landing_system import Camera
 from pytest_garl.scenarios.maps.map import Map
 from pytest_garl.scenarios.placement import map_in, marker_position_m
 from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.simulation.camera.cover_event import renderer_of
 from pytest_garl.simulation.environment import environment_at
-from pytest_garl.simulation.flight import Flight
 from pytest_garl.video.camera_pane import CameraPane
 from pytest_garl.video.drawing import Image
 from pytest_garl.video.film_file import write_film

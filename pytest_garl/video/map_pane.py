@@ -9,6 +9,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from pytest_garl.flight.flight import Flight, ObjectRecord, Step
 from pytest_garl.landing_system import Camera
 from pytest_garl.scenarios.bodies import rotate
 from pytest_garl.scenarios.maps.map import Map
@@ -20,7 +21,6 @@ from pytest_garl.simulation.camera.ground_cover import cover_shift
 from pytest_garl.simulation.camera.meshes import mesh_of, placed_hulls
 from pytest_garl.simulation.camera.projection import View
 from pytest_garl.simulation.camera.weather import conditions_of
-from pytest_garl.simulation.flight import Flight, ObjectRecord, Step
 from pytest_garl.simulation.randomness import generator
 from pytest_garl.video import drawing
 from pytest_garl.video.labels import Labels

@@ -8,9 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from pytest_garl.flight.flight import Flight, Track
 from pytest_garl.simulation.camera.projection import Quaternion, Vector, eye_under
 from pytest_garl.simulation.camera.solids import BodyPose
-from pytest_garl.simulation.flight import Flight, Track
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

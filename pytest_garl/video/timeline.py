@@ -7,8 +7,8 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from pytest_garl.simulation.flight import Flight, Step
-from pytest_garl.simulation.physics.vehicle import up_m
+from pytest_garl.flight.flight import Flight, Step
+from pytest_garl.flight.thresholds import up_m
 from pytest_garl.video import drawing
 from pytest_garl.video.pose import Poses
 

@@ -11,7 +11,7 @@ from pytest_garl.landing_system import Camera
 from pytest_garl.scenarios.chromosome import decode
 from pytest_garl.scenarios.genes import genome_for
 from pytest_garl.scenarios.groups.decoys import KINDS
-from pytest_garl.scenarios.maps.map import load_map
+from pytest_garl.scenarios.maps.loading import load_map
 from pytest_garl.simulation.camera.renderer import Renderer
 from pytest_garl.simulation.randomness import generator
 from studies.conditions._frames import draw_frames

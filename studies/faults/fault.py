@@ -10,7 +10,7 @@ from typing import Any
 from pytest_garl.execution.flight import judged
 from pytest_garl.execution.result import FlightResult
 from pytest_garl.scenarios.files import load
-from pytest_garl.scenarios.maps.map import load_map
+from pytest_garl.scenarios.maps.loading import load_map
 from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.simulation.fly import fly
 from pytest_garl.simulation.npc_policy import PolicySpec

@@ -13,13 +13,13 @@ import numpy as np
 
 from pytest_garl import cpu_dispatch
 from pytest_garl.adversary.catalogue import policy_spec
+from pytest_garl.flight.flight import Flight
 from pytest_garl.scenarios.chromosome import decode
 from pytest_garl.scenarios.domains.genome import genome_of
 from pytest_garl.scenarios.domains.reader import domain_named
-from pytest_garl.scenarios.maps.map import load_map
+from pytest_garl.scenarios.maps.loading import load_map
 from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.scenarios.validity import repair
-from pytest_garl.simulation.flight import Flight
 from pytest_garl.simulation.fly import fly
 from pytest_garl.verdicts.judge import judge
 from pytest_garl.verdicts.verdict import DEFAULT_LIMITS, Verdict, default_distance_m

@@ -12,8 +12,8 @@ from pytest_garl.adversary.grades import GRADE_LIMITS
 from pytest_garl.adversary.interference import Belief, Interfering, kept_away
 from pytest_garl.adversary.minds import Direct
 from pytest_garl.adversary.perception import Perception, Sighting
-from pytest_garl.scenarios.maps.map import load_map
-from pytest_garl.scenarios.validity import discs_of
+from pytest_garl.scenarios.bodies import discs_of
+from pytest_garl.scenarios.maps.loading import load_map
 from pytest_garl.simulation.npc_policy import STAY, Move
 from tests.support.situations import being, situation
 from tests.support.stories import TICK_S, scenario_with, walk

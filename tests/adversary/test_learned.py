@@ -11,8 +11,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from pytest_garl.adversary.catalogue import WEIGHTS
 from pytest_garl.adversary.learned import Network, learned_spec, read_manifest, save
+from pytest_garl.adversary.weights import WEIGHTS
 from pytest_garl.errors import PolicyError
 
 

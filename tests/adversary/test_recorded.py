@@ -12,7 +12,7 @@ from pytest_garl.adversary.way_out import LANDING_ZONE_M
 from pytest_garl.errors import PolicyError
 from pytest_garl.scenarios.chromosome import decode
 from pytest_garl.scenarios.genes import genome_for
-from pytest_garl.scenarios.maps.map import load_map
+from pytest_garl.scenarios.maps.loading import load_map
 from pytest_garl.scenarios.placement import start_genes
 from pytest_garl.search.methods.random import random_scenarios
 from pytest_garl.simulation.fly import fly

@@ -17,7 +17,7 @@ from pytest_garl.execution.ledger import Ledger
 from pytest_garl.execution.reference import BUILT_IN, Reference
 from pytest_garl.scenarios.domains.reader import domain_named
 from pytest_garl.scenarios.files import dump_scenario
-from pytest_garl.scenarios.maps.map import load_map
+from pytest_garl.scenarios.maps.loading import load_map
 from pytest_garl.verdicts.verdict import Limits
 from tests.support.results import flight_result
 

@@ -8,7 +8,7 @@ import pytest
 
 from pytest_garl.baselines import file as baselines
 from pytest_garl.errors import BaselineError, ScenarioError
-from pytest_garl.scenarios.maps.map import load_map
+from pytest_garl.scenarios.maps.loading import load_map
 from tests.baselines.samples import baseline
 
 BASELINE = baselines.dump_baseline(baseline())

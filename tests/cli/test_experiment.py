@@ -19,7 +19,7 @@ from pytest_garl.experiments.spec import read_experiment
 from pytest_garl.scenarios.chromosome import encode
 from pytest_garl.scenarios.files import parse_scenario
 from pytest_garl.scenarios.genes import genome_for
-from pytest_garl.scenarios.maps.map import load_map
+from pytest_garl.scenarios.maps.loading import load_map
 from pytest_garl.scenarios.placement import marker_position_m
 from tests.plugin.test_resume import FLOWN, SLOW, query
 from tests.support.landing_project import write_project

@@ -15,6 +15,8 @@ from pytest_garl.cli import named_flight as module
 from pytest_garl.cli.named_flight import FlightName, NamedFlight
 from pytest_garl.errors import GarlError, ScenarioError
 from pytest_garl.execution.reference import Reference
+from pytest_garl.flight.flight import Flight
+from pytest_garl.flight.flight_file import save
 from pytest_garl.plugin import case_tests
 from pytest_garl.regressions.case import Case
 from pytest_garl.regressions.corpus import Corpus, replace_file
@@ -23,8 +25,6 @@ from pytest_garl.regressions.reshrink import CaseSetup
 from pytest_garl.reports.mcap.source import Place
 from pytest_garl.scenarios.files import dumps
 from pytest_garl.scenarios.placement import map_in
-from pytest_garl.simulation.flight import Flight
-from pytest_garl.simulation.flight_file import save
 from tests.regressions.samples import LAWN
 from tests.regressions.samples import case as dog_case
 from tests.reports.html.test_report import lost

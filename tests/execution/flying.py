@@ -12,7 +12,7 @@ from pytest_garl.execution.reference import reference_to
 from pytest_garl.landing_system import Land, Observation
 from pytest_garl.scenarios.chromosome import decode
 from pytest_garl.scenarios.genes import genome_for
-from pytest_garl.scenarios.maps.map import load_map
+from pytest_garl.scenarios.maps.loading import load_map
 from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.scenarios.validity import repair
 from pytest_garl.simulation.npc_policy import PolicySpec

@@ -13,7 +13,7 @@ from pytest_garl.execution.job import FlightJob
 from pytest_garl.execution.ledger import Ledger
 from pytest_garl.execution.reference import Reference
 from pytest_garl.scenarios.files import dump_scenario
-from pytest_garl.scenarios.maps.map import load_map
+from pytest_garl.scenarios.maps.loading import load_map
 from pytest_garl.verdicts.verdict import Limits
 from tests.execution.flying import Good, Replaces, job_of, scenario
 from tests.support.results import flight_result

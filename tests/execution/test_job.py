@@ -12,7 +12,7 @@ from pytest_garl.execution.flight_id import FlightId
 from pytest_garl.execution.job import TIMEOUT_S, FlightJob, parse_job
 from pytest_garl.execution.reference import BUILT_IN, reference_to
 from pytest_garl.plugin.arguments import OPTIONS
-from pytest_garl.scenarios.maps.map import load_map
+from pytest_garl.scenarios.maps.loading import load_map
 from pytest_garl.simulation.npc_policy import PolicySpec
 from pytest_garl.verdicts.verdict import DEFAULT_LIMITS, Limits
 from tests.execution.flying import Good

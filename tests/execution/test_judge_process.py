@@ -17,8 +17,8 @@ from pytest_garl.execution.judge_process import JudgeProcess
 from pytest_garl.execution.ledger import Ledger
 from pytest_garl.execution.local_pool import local_pool
 from pytest_garl.execution.reference import reference_to
-from pytest_garl.simulation.flight import Flight
-from pytest_garl.simulation.flight_file import load
+from pytest_garl.flight.flight import Flight
+from pytest_garl.flight.flight_file import load
 from pytest_garl.simulation.system_under_test.calls import crash_of
 from pytest_garl.verdicts.verdict import Limits
 from tests.execution.flying import Good, job_of, scenario

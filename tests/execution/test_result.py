@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from pytest_garl.errors import LedgerError
 from pytest_garl.execution.result import FlightResult, broken_result, parse_result
-from pytest_garl.simulation.flight import Crash
+from pytest_garl.flight.flight import Crash
 from pytest_garl.verdicts.verdict import Margin, Verdict
 from tests.support.results import crash, flight_result
 

@@ -12,7 +12,7 @@ from pytest_garl.execution.severity import NO_SEVERITY, Severity
 from pytest_garl.execution.severity_of_flight import severity_of
 from pytest_garl.scenarios.chromosome import decode
 from pytest_garl.scenarios.genes import genome_for
-from pytest_garl.scenarios.maps.map import load_map
+from pytest_garl.scenarios.maps.loading import load_map
 from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.scenarios.story import GRADES, with_all_values
 from pytest_garl.verdicts.verdict import Verdict

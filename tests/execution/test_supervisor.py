@@ -20,8 +20,8 @@ from pytest_garl.execution.process_pool import MAX_IDLE_EXITS, ProcessPool
 from pytest_garl.execution.reference import reference_to
 from pytest_garl.execution.result import FlightResult
 from pytest_garl.execution.supervisor import LEAST_STANDSTILL_S, FlightMonitor
+from pytest_garl.flight.flight import Crash
 from pytest_garl.scenarios.files import dump_scenario
-from pytest_garl.simulation.flight import Crash
 from tests.execution.flying import Exits, Good, Slow, job_of, scenario
 from tests.execution.ledgers import result_of, sha256_of
 from tests.execution.misbehaving import (

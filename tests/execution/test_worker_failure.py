@@ -8,8 +8,8 @@ from pytest_garl.execution.flight_id import FlightId
 from pytest_garl.execution.ledger import Ledger
 from pytest_garl.execution.ledger_queue import Claim
 from pytest_garl.execution.worker_failure import WorkerExit, retry_or_record
+from pytest_garl.flight.flight import Crash
 from pytest_garl.scenarios.files import dump_scenario
-from pytest_garl.simulation.flight import Crash
 from tests.execution.flying import Good, job_of, scenario
 from tests.execution.ledgers import result_of
 from tests.support.results import flight_result

@@ -6,7 +6,7 @@ import pytest
 from pytest_garl.experiments.measure import chromosomes
 from pytest_garl.scenarios.genes import genome_for
 from pytest_garl.scenarios.genome_like import with_destinations
-from pytest_garl.scenarios.maps.map import load_map
+from pytest_garl.scenarios.maps.loading import load_map
 from pytest_garl.search.methods.random import random_scenarios
 
 MAP = load_map("lawn")

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from pytest_garl.adversary import learned as network
-from pytest_garl.adversary.catalogue import WEIGHTS
+from pytest_garl.adversary.weights import WEIGHTS
 from pytest_garl.baselines import file as baseline
 from pytest_garl.baselines import record
 from pytest_garl.errors import GarlError
@@ -26,6 +26,7 @@ from pytest_garl.execution.ledger import Ledger
 from pytest_garl.execution.stored_ledger import check_stored
 from pytest_garl.experiments import results as rows
 from pytest_garl.experiments import spec as plan
+from pytest_garl.flight import flight_file
 from pytest_garl.regressions import case_file as files
 from pytest_garl.regressions import corpus
 from pytest_garl.regressions.description import describe_scenario
@@ -36,7 +37,6 @@ from pytest_garl.scenarios.genes import genome_for
 from pytest_garl.scenarios.maps import map as maps
 from pytest_garl.scenarios.validity import problems
 from pytest_garl.search.objectives import violation_proximity
-from pytest_garl.simulation import flight_file
 from tests.baselines import samples as baseline_samples
 from tests.execution.flying import Good, job_of, scenario
 from tests.experiments.samples import row

@@ -8,12 +8,13 @@ import pytest
 from landing_systems.mm_mls import MultiModuleLandingSystem
 from landing_systems.tphyolo_mls import TphYoloLandingSystem
 from pytest_garl.adversary.catalogue import policy_spec
+from pytest_garl.flight.flight import Flight
 from pytest_garl.scenarios.chromosome import decode
 from pytest_garl.scenarios.genes import genome_for
-from pytest_garl.scenarios.maps.map import Map, load_map
+from pytest_garl.scenarios.maps.loading import load_map
+from pytest_garl.scenarios.maps.map import Map
 from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.scenarios.validity import repair
-from pytest_garl.simulation.flight import Flight
 from pytest_garl.simulation.fly import fly
 
 pytestmark = pytest.mark.sim

@@ -9,7 +9,7 @@ from landing_systems.opencv_mls import OpenCvLandingSystem
 from pytest_garl.adversary.catalogue import policy_spec
 from pytest_garl.scenarios.chromosome import decode
 from pytest_garl.scenarios.genes import genome_for
-from pytest_garl.scenarios.maps.map import load_map
+from pytest_garl.scenarios.maps.loading import load_map
 from pytest_garl.scenarios.validity import repair
 from pytest_garl.simulation.fly import fly
 

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from pytest_garl.scenarios.maps.map import load_map
+from pytest_garl.scenarios.maps.loading import load_map
 
 PAGE = Path(__file__).parents[2] / "docs" / "extending.md"
 BLOCK = re.compile(r"^```(?:python|toml)\n# (\S+)\n(.*?)^```$", re.DOTALL | re.MULTILINE)

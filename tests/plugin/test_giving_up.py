@@ -173,7 +173,7 @@ def test_needless_giving_up_is_red_in_the_real_simulator(
 EXCUSED = """
 import dataclasses
 import tiny_simulator
-from pytest_garl.simulation.flight import MarkerView, NominalView
+from pytest_garl.flight.flight import MarkerView, NominalView
 
 HIDDEN = MarkerView(share_in_frame=1.0, px_per_module=4.0, border_hidden=1.0, bits_hidden=1.0,
                     contrast=80.0, noise=3.0, blur_px=0.0)

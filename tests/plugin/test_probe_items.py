@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from pytest_garl.plugin.probe_items import PASSED, has_cause_of
-from pytest_garl.scenarios.maps.map import load_map
+from pytest_garl.scenarios.maps.loading import load_map
 from pytest_garl.scenarios.task import Task
 from pytest_garl.search.probes import clear_scenario
 from tests.search.test_probes import FIELD

@@ -235,8 +235,8 @@ TOUCHES_AND_GIVES_UP = """
 import dataclasses
 
 import tiny_simulator
-from pytest_garl.simulation.flight import Contact
-from pytest_garl.simulation.flight_file import hash_of
+from pytest_garl.flight.flight import Contact
+from pytest_garl.flight.flight_file import hash_of
 
 
 def fly(*args, **options):

@@ -57,7 +57,7 @@ def test_summary_counts_failures_of_users_properties_as_violations(
     )
     (pytester.path / "conftest.py").write_text(
         "import dataclasses, tiny_simulator\n"
-        "from pytest_garl.simulation.flight_file import hash_of\n"
+        "from pytest_garl.flight.flight_file import hash_of\n"
         "def calm(scenario, *args, **kwargs):\n"
         "    nominal = {'environment.fog': 0.0, 'dog-1.velocity': 0.1}\n"
         "    return tiny_simulator.fly(scenario.replace(nominal), *args, **kwargs)\n"

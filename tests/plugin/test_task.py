@@ -99,7 +99,7 @@ def test_an_invalid_marker_or_start_is_refused(
 
 
 def test_a_marker_that_the_maps_ground_has_too_is_refused(pytester: pytest.Pytester) -> None:
-    from pytest_garl.scenarios.maps.map import load_map
+    from pytest_garl.scenarios.maps.loading import load_map
 
     layers = load_map("court").ground.layers
     number = next(each.marker_id for each in layers if each.kind == "marker")

@@ -18,7 +18,7 @@ from pytest_garl.regressions.simplification import without_other_objects
 from pytest_garl.regressions.straight_crossing import Encounter, straight_crossing
 from pytest_garl.scenarios.chromosome import decode
 from pytest_garl.scenarios.genes import genome_for
-from pytest_garl.scenarios.maps.map import load_map
+from pytest_garl.scenarios.maps.loading import load_map
 from pytest_garl.scenarios.object_types import OBJECT_TYPES
 from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.scenarios.validity import repair

@@ -17,7 +17,7 @@ from pytest_garl.regressions.case import Case, Evidence, Violation
 from pytest_garl.regressions.case_request import CaseRequest
 from pytest_garl.scenarios.chromosome import decode
 from pytest_garl.scenarios.genes import genome_for
-from pytest_garl.scenarios.maps.map import load_map
+from pytest_garl.scenarios.maps.loading import load_map
 from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.scenarios.units import snapped
 from pytest_garl.scenarios.validity import repair

@@ -6,7 +6,7 @@ import pytest
 
 from pytest_garl.errors import ScenarioError
 from pytest_garl.regressions.case_file import dump_case, parse_case
-from pytest_garl.scenarios.maps.map import load_map
+from pytest_garl.scenarios.maps.loading import load_map
 from tests.regressions.samples import OBJECT_NAMES, case, case_with_changes
 
 TEXT = dump_case(case())

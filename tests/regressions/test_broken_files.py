@@ -8,7 +8,7 @@ import pytest
 
 from pytest_garl.errors import ScenarioError
 from pytest_garl.regressions.case_file import dump_case, load_case, load_header, parse_case
-from pytest_garl.scenarios.maps.map import load_map
+from pytest_garl.scenarios.maps.loading import load_map
 from tests.regressions.samples import SYSTEM, case
 
 TEXT = dump_case(case())

@@ -25,7 +25,7 @@ from pytest_garl.regressions.case_header import SCHEMA
 from pytest_garl.scenarios.chromosome import decode
 from pytest_garl.scenarios.genes import genome_for
 from pytest_garl.scenarios.genome_like import with_destinations
-from pytest_garl.scenarios.maps.map import load_map
+from pytest_garl.scenarios.maps.loading import load_map
 from pytest_garl.scenarios.units import snapped
 from pytest_garl.scenarios.validity import repair
 from pytest_garl.verdicts.verdict import Limits

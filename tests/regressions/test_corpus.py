@@ -15,7 +15,7 @@ from pytest_garl.regressions.case import NoGateReason, Status
 from pytest_garl.regressions.case_file import dump_case, load_case
 from pytest_garl.regressions.corpus import Corpus, patch_of, read_acceptance, replace_file
 from pytest_garl.scenarios.maps import map as package
-from pytest_garl.scenarios.maps.map import load_map
+from pytest_garl.scenarios.maps.loading import load_map
 from tests.regressions.samples import OBJECT_NAMES, SYSTEM, case
 
 TEXT = dump_case(case())

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 
+from pytest_garl.flight.flight_file import save
 from pytest_garl.regressions.case import RecordedBehaviour
 from pytest_garl.regressions.case_flights import CaseFlights
 from pytest_garl.regressions.case_request import CaseResult, FailingScenario
@@ -21,7 +22,6 @@ from pytest_garl.regressions.robustness import NEIGHBOURS, neighbours
 from pytest_garl.scenarios.conditions import active_conditions
 from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.scenarios.validity import repair
-from pytest_garl.simulation.flight_file import save
 from tests.regressions.samples import (
     LAWN,
     OBJECT_NAMES,

@@ -4,8 +4,8 @@ import dataclasses
 
 import pytest
 
+from pytest_garl.flight.flight import Flight, Step
 from pytest_garl.regressions.observation import OBSERVABLE_PX, first_observation_s
-from pytest_garl.simulation.flight import Flight, Step
 from tests.support.blind_lander import blind_flight
 
 

@@ -11,6 +11,8 @@ from pytest_garl.execution.flight import fly_job
 from pytest_garl.execution.flight_id import CompletedFlight, FlightId
 from pytest_garl.execution.job import FlightJob
 from pytest_garl.execution.reference import reference_to
+from pytest_garl.flight.flight import Step
+from pytest_garl.flight.flight_file import load
 from pytest_garl.landing_system import Command, Observation, VelocitySetpoint
 from pytest_garl.regressions import prevention
 from pytest_garl.regressions.case import NOT_ASKED
@@ -19,8 +21,6 @@ from pytest_garl.regressions.clearance import KEPT_M, Clearance, escaped
 from pytest_garl.regressions.escape_plan import find_escape
 from pytest_garl.regressions.prevention import Collision, collision_of, prevention_of
 from pytest_garl.scenarios.files import loads
-from pytest_garl.simulation.flight import Step
-from pytest_garl.simulation.flight_file import load
 from pytest_garl.simulation.fly import fly
 from tests.support.blind_lander import (
     LAWN,

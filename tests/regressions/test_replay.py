@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 
 from pytest_garl.execution.flight_id import CompletedFlight
+from pytest_garl.flight.flight_file import save
 from pytest_garl.regressions.case import Case
 from pytest_garl.regressions.case_flights import recorded_behaviour
 from pytest_garl.regressions.case_test_run import CaseTestResult
@@ -18,7 +19,6 @@ from pytest_garl.regressions.replay import (
     replay,
     stale_reasons,
 )
-from pytest_garl.simulation.flight_file import save
 from pytest_garl.simulation.fly import fly
 from pytest_garl.simulation.system_under_test.reference_pilot import ReferencePilot
 from tests.regressions.samples import case

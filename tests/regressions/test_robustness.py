@@ -4,7 +4,7 @@ import dataclasses
 
 from pytest_garl.regressions.robustness import neighbours
 from pytest_garl.scenarios.genes import genome_for
-from pytest_garl.scenarios.maps.map import load_map
+from pytest_garl.scenarios.maps.loading import load_map
 from pytest_garl.scenarios.story import with_all_values
 from pytest_garl.scenarios.validity import problems
 from pytest_garl.search.methods.random import random_scenarios

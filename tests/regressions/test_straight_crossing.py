@@ -8,6 +8,7 @@ import pytest
 
 from landing_systems.opencv_mls import OpenCvLandingSystem
 from pytest_garl.adversary.catalogue import policy_spec
+from pytest_garl.flight.flight import Flight
 from pytest_garl.regressions.simplification import without_other_objects
 from pytest_garl.regressions.straight_crossing import (
     FARTHEST_M,
@@ -22,7 +23,6 @@ from pytest_garl.scenarios.object_types import OBJECT_TYPES
 from pytest_garl.scenarios.placement import marker_position_m, object_speed_mps, object_start_m
 from pytest_garl.scenarios.story import story_of
 from pytest_garl.scenarios.validity import problems
-from pytest_garl.simulation.flight import Flight
 from pytest_garl.simulation.fly import fly
 from tests.regressions.crossings import LAWN, NOMINAL, crossing, encounter
 from tests.support.collisions import hits_a_person

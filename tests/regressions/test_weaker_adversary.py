@@ -12,6 +12,7 @@ from pytest_garl.adversary.catalogue import policy_spec
 from pytest_garl.execution.flight_id import CompletedFlight
 from pytest_garl.execution.job import FlightJob
 from pytest_garl.execution.on_demand import FlyFunction
+from pytest_garl.flight.flight_file import save
 from pytest_garl.regressions.case_file import dump_case, parse_case
 from pytest_garl.regressions.case_flights import CaseFlights
 from pytest_garl.regressions.case_request import CaseRequest
@@ -20,7 +21,6 @@ from pytest_garl.regressions.weaker_adversary import confirm_crossing, confirm_l
 from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.scenarios.story import GRADES, with_all_values
 from pytest_garl.scenarios.validity import repair
-from pytest_garl.simulation.flight_file import save
 from tests.regressions.crossings import LAWN, NOMINAL, RealFlights, crossing, encounter
 from tests.regressions.samples import JOB, collision_result
 from tests.support.collisions import hits_a_person

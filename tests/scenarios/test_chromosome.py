@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from pytest_garl.errors import ScenarioError
 from pytest_garl.scenarios.chromosome import decode, encode
 from pytest_garl.scenarios.genes import genome_for
-from pytest_garl.scenarios.maps.map import load_map
+from pytest_garl.scenarios.maps.loading import load_map
 
 COURT = load_map("court")
 

@@ -5,7 +5,7 @@ import pytest
 from pytest_garl.scenarios.chromosome import decode
 from pytest_garl.scenarios.conditions import active_conditions
 from pytest_garl.scenarios.genes import genome_for
-from pytest_garl.scenarios.maps.map import load_map
+from pytest_garl.scenarios.maps.loading import load_map
 
 LAWN = load_map("lawn")
 GENOME = genome_for(LAWN)

@@ -17,7 +17,7 @@ from pytest_garl.scenarios.domains.reader import domain_named
 from pytest_garl.scenarios.files import dumps, loads
 from pytest_garl.scenarios.genes import genome_for
 from pytest_garl.scenarios.groups.decoys import KINDS
-from pytest_garl.scenarios.maps.map import load_map
+from pytest_garl.scenarios.maps.loading import load_map
 from pytest_garl.scenarios.placement import decoys_of, marker_position_m
 from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.scenarios.task import Task

@@ -17,13 +17,12 @@ from pytest_garl.scenarios.domains.genome import genome_of
 from pytest_garl.scenarios.domains.names import BUILT_IN
 from pytest_garl.scenarios.domains.reader import domain_named
 from pytest_garl.scenarios.files import dumps, loads
-from pytest_garl.scenarios.genes import Genome, genome_for
+from pytest_garl.scenarios.genes import Genome, active_genes, genome_for
 from pytest_garl.scenarios.genome_like import with_destinations
 from pytest_garl.scenarios.groups.catalogue import GROUPS, PARAMETERS
-from pytest_garl.scenarios.maps.map import load_map
+from pytest_garl.scenarios.maps.loading import load_map
 from pytest_garl.scenarios.placement import marker_position_m, told_position_m
 from pytest_garl.scenarios.scenario import Scenario
-from pytest_garl.scenarios.sparse import active_genes
 from pytest_garl.scenarios.units import sections_of
 from pytest_garl.scenarios.validity import repair
 from pytest_garl.search.methods.random import random_scenarios

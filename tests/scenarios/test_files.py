@@ -13,7 +13,7 @@ from pytest_garl.scenarios.chromosome import decode
 from pytest_garl.scenarios.files import dump_scenario, dumps, load, loads, parse_scenario
 from pytest_garl.scenarios.genes import genome_for
 from pytest_garl.scenarios.genome_like import with_destinations
-from pytest_garl.scenarios.maps.map import load_map
+from pytest_garl.scenarios.maps.loading import load_map
 from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.scenarios.units import sections_of
 from pytest_garl.scenarios.validity import problems, repair

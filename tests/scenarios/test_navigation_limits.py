@@ -11,7 +11,7 @@ from pytest_garl.scenarios.domains.genome import genome_of
 from pytest_garl.scenarios.domains.names import BUILT_IN
 from pytest_garl.scenarios.domains.navigation import RTK_LIMITS, within
 from pytest_garl.scenarios.domains.reader import domain_named
-from pytest_garl.scenarios.maps.map import load_map
+from pytest_garl.scenarios.maps.loading import load_map
 from pytest_garl.search.methods.random import random_scenarios
 
 FIELD = domain_named("field")

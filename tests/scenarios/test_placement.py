@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from pytest_garl.scenarios.chromosome import decode
 from pytest_garl.scenarios.genes import genome_for
-from pytest_garl.scenarios.maps.map import load_map
+from pytest_garl.scenarios.maps.loading import load_map
 from pytest_garl.scenarios.placement import (
     disc_to_square,
     marker_position_m,

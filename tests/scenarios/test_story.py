@@ -12,7 +12,7 @@ from pytest_garl.scenarios.chromosome import decode
 from pytest_garl.scenarios.domains.genome import genome_of
 from pytest_garl.scenarios.domains.reader import domain_named
 from pytest_garl.scenarios.files import dumps, loads
-from pytest_garl.scenarios.maps.map import load_map
+from pytest_garl.scenarios.maps.loading import load_map
 from pytest_garl.scenarios.placement import map_in, object_type
 from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.scenarios.story import GRADES, LIMITS_S, STORY, story_of

@@ -13,7 +13,8 @@ from pytest_garl.scenarios.files import dumps, is_in_units, loads
 from pytest_garl.scenarios.genes import SUN, genome_for, group_gene
 from pytest_garl.scenarios.genome_like import with_destinations
 from pytest_garl.scenarios.groups.catalogue import GROUPS, PARAMETERS
-from pytest_garl.scenarios.maps.map import Map, load_map, map_names
+from pytest_garl.scenarios.maps.loading import load_map, map_names
+from pytest_garl.scenarios.maps.map import Map
 from pytest_garl.scenarios.object_types import HEIGHTS_M
 from pytest_garl.scenarios.placement import MARKER_RADIUS_M, marker_genes, marker_position_m
 from pytest_garl.scenarios.scenario import Scenario

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from pytest_garl.scenarios.chromosome import decode
 from pytest_garl.scenarios.files import dumps, loads
 from pytest_garl.scenarios.genes import genome_for
-from pytest_garl.scenarios.maps.map import load_map, map_names
+from pytest_garl.scenarios.maps.loading import load_map, map_names
 from pytest_garl.scenarios.strategies import scenarios
 from pytest_garl.scenarios.validity import problems, repair
 

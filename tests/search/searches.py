@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pytest_garl.execution.result import FlightResult
 from pytest_garl.scenarios.genes import genome_for
-from pytest_garl.scenarios.maps.map import load_map
+from pytest_garl.scenarios.maps.loading import load_map
 from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.search.method import FlownScenario, Method, SearchPlan
 from pytest_garl.verdicts.verdict import Margin

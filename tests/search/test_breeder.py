@@ -9,7 +9,7 @@ from pytest_garl.execution.ledger import Ledger
 from pytest_garl.plugin.options import population
 from pytest_garl.scenarios.files import parse_scenario
 from pytest_garl.scenarios.genes import genome_for
-from pytest_garl.scenarios.maps.map import load_map
+from pytest_garl.scenarios.maps.loading import load_map
 from pytest_garl.search.breeder import Breeder
 from pytest_garl.search.catalogue import make_method, method_names
 from pytest_garl.search.method import FlownScenario, SearchPlan

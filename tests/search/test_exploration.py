@@ -9,7 +9,7 @@ import pytest
 from pytest_garl.scenarios.chromosome import decode
 from pytest_garl.scenarios.domains.genome import genome_of
 from pytest_garl.scenarios.domains.reader import domain_named
-from pytest_garl.scenarios.maps.map import load_map
+from pytest_garl.scenarios.maps.loading import load_map
 from pytest_garl.scenarios.placement import told_position_m
 from pytest_garl.search.columns import STRATA, Columns
 from pytest_garl.search.exploration import Exploration

@@ -11,10 +11,11 @@ import pytest
 
 from pytest_garl import Camera, Start
 from pytest_garl.adversary.catalogue import policy_spec
+from pytest_garl.flight.flight import Flight, Track
 from pytest_garl.scenarios.conditions import active_conditions
 from pytest_garl.scenarios.domains.domain import Domain
 from pytest_garl.scenarios.domains.reader import domain_named
-from pytest_garl.scenarios.maps.map import load_map
+from pytest_garl.scenarios.maps.loading import load_map
 from pytest_garl.scenarios.placement import decoys_of, marker_position_m, told_position_m
 from pytest_garl.scenarios.start import start_m
 from pytest_garl.scenarios.task import Task
@@ -27,7 +28,6 @@ from pytest_garl.search.probes import (
     probes_for,
     start_beside,
 )
-from pytest_garl.simulation.flight import Flight, Track
 from pytest_garl.simulation.fly import fly
 from pytest_garl.verdicts.judge import judge
 from pytest_garl.verdicts.verdict import DEFAULT_LIMITS, Verdict

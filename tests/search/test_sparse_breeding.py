@@ -12,7 +12,7 @@ from pytest_garl.scenarios.chromosome import encode
 from pytest_garl.scenarios.domains.genome import genome_of
 from pytest_garl.scenarios.domains.reader import domain_named
 from pytest_garl.scenarios.genome_like import with_destinations
-from pytest_garl.scenarios.maps.map import load_map
+from pytest_garl.scenarios.maps.loading import load_map
 from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.search.catalogue import make_method
 from pytest_garl.search.method import FlownScenario, SearchPlan

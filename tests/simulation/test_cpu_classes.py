@@ -21,7 +21,7 @@ from pytest_garl.execution.reference import Reference
 from pytest_garl.regressions.case import Case
 from pytest_garl.regressions.case_file import dump_case
 from pytest_garl.regressions.corpus import Corpus
-from pytest_garl.scenarios.maps.map import load_map
+from pytest_garl.scenarios.maps.loading import load_map
 
 Found = tuple[Path, Case]
 ROOT = Path(__file__).parents[2]

@@ -11,17 +11,17 @@ from pytest_garl import Command, Mission, Observation, PositionSetpoint
 from pytest_garl.adversary.catalogue import policy_spec
 from pytest_garl.adversary.recorded import recorded_spec
 from pytest_garl.execution.flight_id import CompletedFlight
+from pytest_garl.flight.flight import Flight
+from pytest_garl.flight.flight_file import load, save
 from pytest_garl.landing_system import Airframe, Camera
 from pytest_garl.regressions.case import RecordedBehaviour
 from pytest_garl.regressions.case_flights import recorded_behaviour
 from pytest_garl.scenarios.genes import ENVIRONMENT, genome_for
-from pytest_garl.scenarios.maps.map import load_map
+from pytest_garl.scenarios.maps.loading import load_map
 from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.search.methods.random import random_scenarios
 from pytest_garl.simulation.camera.renderer import Renderer
 from pytest_garl.simulation.environment import changed, environment_at
-from pytest_garl.simulation.flight import Flight
-from pytest_garl.simulation.flight_file import load, save
 from pytest_garl.simulation.fly import fly
 from pytest_garl.simulation.npc_policy import Move, PolicySpec, Situation
 from pytest_garl.simulation.randomness import generator

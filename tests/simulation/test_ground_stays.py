@@ -21,11 +21,12 @@ from pytest_garl import (
     VelocitySetpoint,
 )
 from pytest_garl.fiducial import MarkerSpec
+from pytest_garl.flight.flight import Flight, Outcome, Touchdown
+from pytest_garl.flight.thresholds import GRAVITY_MPS2
 from pytest_garl.scenarios.placement import Pad
-from pytest_garl.simulation.flight import Flight, Outcome, Touchdown
 from pytest_garl.simulation.fly import fly
 from pytest_garl.simulation.ground_stays import GroundStays
-from pytest_garl.simulation.physics.vehicle import GRAVITY_MPS2, REFERENCE_MASS_KG, vehicle_model
+from pytest_garl.simulation.physics.vehicle import REFERENCE_MASS_KG, vehicle_model
 from pytest_garl.simulation.recorder import Recorder
 from tests.support.flights import EMPTY, STAND, Scripted, nominal
 

@@ -5,8 +5,9 @@ from __future__ import annotations
 import pytest
 
 from pytest_garl import Airframe
+from pytest_garl.flight.thresholds import GRAVITY_MPS2
 from pytest_garl.simulation.land_detector import LandDetector
-from pytest_garl.simulation.physics.vehicle import GRAVITY_MPS2, REFERENCE_MASS_KG, vehicle_model
+from pytest_garl.simulation.physics.vehicle import REFERENCE_MASS_KG, vehicle_model
 
 WEIGHT_N = REFERENCE_MASS_KG * GRAVITY_MPS2
 

@@ -11,11 +11,11 @@ import numpy as np
 import pytest
 
 from pytest_garl import Abort, Command, Observation
+from pytest_garl.flight.flight import Flight, NominalView, ObjectRecord, Track
 from pytest_garl.landing_system import Camera
 from pytest_garl.scenarios.maps.map import Map
 from pytest_garl.scenarios.object_types import OBJECT_TYPES
 from pytest_garl.scenarios.placement import marker_position_m
-from pytest_garl.simulation.flight import Flight, NominalView, ObjectRecord, Track
 from pytest_garl.simulation.fly import fly
 from pytest_garl.simulation.nominal import (
     SIGHT_HEIGHTS_M,

@@ -10,10 +10,11 @@ import numpy as np
 import pytest
 
 from pytest_garl import Airframe, Command, Observation, PositionSetpoint, Rangefinder
+from pytest_garl.flight.thresholds import BODY_ABOVE_FEET_M
 from pytest_garl.scenarios.bodies import Body, Part
 from pytest_garl.simulation.fly import fly
 from pytest_garl.simulation.physics.flight_control import MAX_TILT_RAD
-from pytest_garl.simulation.physics.vehicle import BODY_ABOVE_FEET_M, Motion, vehicle_model
+from pytest_garl.simulation.physics.vehicle import Motion, vehicle_model
 from pytest_garl.simulation.physics.world import World
 from pytest_garl.simulation.rangefinder import NOISE_M, Ranging
 from tests.support.flights import EMPTY, STAND, Scripted, nominal

@@ -10,10 +10,10 @@ import pytest
 
 from pytest_garl import Command, Land, Observation, VelocitySetpoint
 from pytest_garl.errors import ScenarioError
+from pytest_garl.scenarios.bodies import discs_of
 from pytest_garl.scenarios.scenario import Scenario
-from pytest_garl.scenarios.start import start_m
+from pytest_garl.scenarios.start import UAV_CLEARANCE_M, start_m
 from pytest_garl.scenarios.task import Start, Task
-from pytest_garl.scenarios.validity import UAV_CLEARANCE_M, discs_of
 from pytest_garl.simulation.fly import fly
 from pytest_garl.simulation.nominal import nominal_arrival_s
 from pytest_garl.simulation.system_under_test.reference_pilot import ReferencePilot

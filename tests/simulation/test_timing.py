@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from pytest_garl import Airframe, Command, Mission, MotorThrusts, Observation, VehicleState
-from pytest_garl.simulation.flight import Flight
+from pytest_garl.flight.flight import Flight
 from pytest_garl.simulation.fly import fly
 from tests.support.flights import EMPTY, STAND, Hovers, Scripted, nominal
 

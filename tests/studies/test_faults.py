@@ -10,10 +10,10 @@ import pytest
 from pytest_garl.scenarios.chromosome import decode, encode
 from pytest_garl.scenarios.domains.genome import genome_of
 from pytest_garl.scenarios.files import dumps
-from pytest_garl.scenarios.genes import Genome
-from pytest_garl.scenarios.maps.map import Map, load_map
+from pytest_garl.scenarios.genes import MOST_ACTIVE, ON_ABOVE, Genome
+from pytest_garl.scenarios.maps.loading import load_map
+from pytest_garl.scenarios.maps.map import Map
 from pytest_garl.scenarios.scenario import Scenario
-from pytest_garl.scenarios.sparse import MOST_ACTIVE, ON_ABOVE
 from pytest_garl.scenarios.validity import problems, repair
 from pytest_garl.search.columns import Columns
 from studies.faults import search

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from pytest_garl.scenarios.domains.domain import CONDITIONS
-from pytest_garl.scenarios.maps.map import load_map
+from pytest_garl.scenarios.maps.loading import load_map
 from pytest_garl.scenarios.units import sections_of
 from studies import groups
 

@@ -11,6 +11,8 @@ from pytest_garl.execution.flight import judged
 from pytest_garl.execution.flight_id import CompletedFlight
 from pytest_garl.execution.job import FlightJob
 from pytest_garl.execution.reference import reference_to
+from pytest_garl.flight.flight import Flight
+from pytest_garl.flight.flight_file import save
 from pytest_garl.landing_system import (
     Airframe,
     Camera,
@@ -21,11 +23,9 @@ from pytest_garl.landing_system import (
 )
 from pytest_garl.scenarios.chromosome import decode
 from pytest_garl.scenarios.genes import genome_for
-from pytest_garl.scenarios.maps.map import load_map
+from pytest_garl.scenarios.maps.loading import load_map
 from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.scenarios.validity import repair
-from pytest_garl.simulation.flight import Flight
-from pytest_garl.simulation.flight_file import save
 from pytest_garl.simulation.fly import fly
 from pytest_garl.simulation.system_under_test.descent import descend
 from pytest_garl.verdicts.verdict import DEFAULT_LIMITS

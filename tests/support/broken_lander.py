@@ -13,7 +13,7 @@ from pytest_garl.regressions.case import Case, Evidence, Violation
 from pytest_garl.regressions.corpus import Corpus
 from pytest_garl.scenarios.chromosome import decode
 from pytest_garl.scenarios.genes import genome_for
-from pytest_garl.scenarios.maps.map import load_map
+from pytest_garl.scenarios.maps.loading import load_map
 from pytest_garl.scenarios.validity import repair
 from pytest_garl.verdicts.verdict import Limits
 

@@ -6,7 +6,7 @@ import dataclasses
 
 import numpy as np
 
-from pytest_garl.simulation.flight import Flight, ObjectRecord, Track
+from pytest_garl.flight.flight import Flight, ObjectRecord, Track
 from tests.verdicts.flights import flight, hit
 
 CONTACT_S = 30.0

@@ -16,7 +16,7 @@ from pytest_garl.adversary.catalogue import policy_spec
 from pytest_garl.landing_system import Airframe
 from pytest_garl.scenarios.chromosome import decode
 from pytest_garl.scenarios.genes import genome_for
-from pytest_garl.scenarios.maps.map import load_map
+from pytest_garl.scenarios.maps.loading import load_map
 from pytest_garl.scenarios.validity import repair
 
 LAWN = load_map("lawn")

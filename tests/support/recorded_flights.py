@@ -8,8 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pytest_garl.landing_system import Detection, Diagnostics
-from pytest_garl.simulation.flight import (
+from pytest_garl.flight.flight import (
     TRACK_RATE_HZ,
     Contact,
     Event,
@@ -18,6 +17,7 @@ from pytest_garl.simulation.flight import (
     Step,
     Track,
 )
+from pytest_garl.landing_system import Detection, Diagnostics
 
 END_S = 10.0
 READABLE = MarkerView(

@@ -14,14 +14,14 @@ from pytest_garl.execution.job import FlightJob
 from pytest_garl.execution.ledger import Ledger
 from pytest_garl.execution.reference import BUILT_IN, Reference
 from pytest_garl.execution.result import FlightResult
+from pytest_garl.flight.flight import Flight
+from pytest_garl.flight.flight_file import save
 from pytest_garl.landing_system import Camera
 from pytest_garl.reports.run_report import BEGAN, ENDED
 from pytest_garl.reports.search_summary import CAMERA
 from pytest_garl.scenarios.files import dump_scenario
-from pytest_garl.scenarios.maps.map import load_map
+from pytest_garl.scenarios.maps.loading import load_map
 from pytest_garl.scenarios.scenario import Scenario
-from pytest_garl.simulation.flight import Flight
-from pytest_garl.simulation.flight_file import save
 from tests.support.videos import SCENARIO, Hovers
 
 SYSTEM = "my_stack:Hovers"

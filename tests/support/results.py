@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from pytest_garl.execution.result import FlightResult
-from pytest_garl.simulation.flight import Crash
+from pytest_garl.flight.flight import Crash
 from pytest_garl.verdicts.verdict import (
     Excuse,
     Finding,

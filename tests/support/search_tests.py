@@ -32,7 +32,7 @@ def outcomes_of(result: pytest.RunResult, word: str) -> set[str]:
 SIMULATOR = """
 import dataclasses
 import tiny_simulator
-from pytest_garl.simulation.flight import Contact
+from pytest_garl.flight.flight import Contact
 
 def fly(scenario, *args, **kwargs):
     flight = tiny_simulator.fly(scenario, *args, **kwargs)

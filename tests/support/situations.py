@@ -5,7 +5,7 @@ import numpy as np
 from pytest_garl.adversary.catalogue import policy_spec
 from pytest_garl.scenarios.chromosome import decode
 from pytest_garl.scenarios.genes import genome_for
-from pytest_garl.scenarios.maps.map import load_map
+from pytest_garl.scenarios.maps.loading import load_map
 from pytest_garl.scenarios.object_types import OBJECT_TYPES
 from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.simulation.npc_policy import DECISION_STEP_S, NpcState, Situation

@@ -10,7 +10,8 @@ import numpy as np
 from pytest_garl.adversary.catalogue import policy_spec
 from pytest_garl.scenarios.chromosome import decode
 from pytest_garl.scenarios.genes import genome_for
-from pytest_garl.scenarios.maps.map import Map, load_map
+from pytest_garl.scenarios.maps.loading import load_map
+from pytest_garl.scenarios.maps.map import Map
 from pytest_garl.scenarios.placement import map_in, object_type, start_genes
 from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.scenarios.story import with_all_values

@@ -8,6 +8,8 @@ from typing import Any
 
 import numpy as np
 
+from pytest_garl.flight.flight import Contact, Flight, Touchdown, Track
+from pytest_garl.flight.flight_file import hash_of
 from pytest_garl.landing_system import (
     Abort,
     Camera,
@@ -19,8 +21,6 @@ from pytest_garl.landing_system import (
 )
 from pytest_garl.scenarios.placement import marker_position_m
 from pytest_garl.scenarios.scenario import Scenario
-from pytest_garl.simulation.flight import Contact, Flight, Touchdown, Track
-from pytest_garl.simulation.flight_file import hash_of
 from pytest_garl.simulation.system_under_test.calls import crash_of
 
 STEP_S = 0.5

@@ -7,6 +7,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 from pytest_garl.adversary.catalogue import policy_spec
+from pytest_garl.flight.flight import Flight
 from pytest_garl.landing_system import (
     Abort,
     Airframe,
@@ -21,10 +22,10 @@ from pytest_garl.landing_system import (
 )
 from pytest_garl.scenarios.chromosome import decode
 from pytest_garl.scenarios.genes import genome_for
-from pytest_garl.scenarios.maps.map import Map, load_map
+from pytest_garl.scenarios.maps.loading import load_map
+from pytest_garl.scenarios.maps.map import Map
 from pytest_garl.scenarios.placement import marker_position_m, start_genes
 from pytest_garl.scenarios.scenario import Scenario
-from pytest_garl.simulation.flight import Flight
 from pytest_garl.simulation.fly import fly
 
 SEARCH_M = 10.0

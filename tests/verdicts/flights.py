@@ -7,8 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from pytest_garl.landing_system import Detection, Diagnostics
-from pytest_garl.simulation.flight import (
+from pytest_garl.flight.flight import (
     Contact,
     Crash,
     Flight,
@@ -20,6 +19,7 @@ from pytest_garl.simulation.flight import (
     Touchdown,
     Track,
 )
+from pytest_garl.landing_system import Detection, Diagnostics
 
 CLEAR = MarkerView(
     share_in_frame=1.0,

@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from pytest_garl.simulation.flight import MarkerView
+from pytest_garl.flight.flight import MarkerView
 from pytest_garl.verdicts.detectability import (
     FEATURES,
     READABLE,

@@ -6,7 +6,7 @@ from typing import Any
 import pytest
 
 from pytest_garl.airframe import Rangefinder
-from pytest_garl.simulation.flight import Event, Flight
+from pytest_garl.flight.flight import Event, Flight
 from pytest_garl.verdicts.judge import closest_call, judge, off_marker_m, why_undecided
 from pytest_garl.verdicts.verdict import Limits
 from pytest_garl.verdicts.wording import headline

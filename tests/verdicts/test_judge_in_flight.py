@@ -19,7 +19,7 @@ from pytest_garl.landing_system import (
     PositionSetpoint,
     VelocitySetpoint,
 )
-from pytest_garl.scenarios.maps.map import load_map
+from pytest_garl.scenarios.maps.loading import load_map
 from pytest_garl.scenarios.task import Start, Task
 from pytest_garl.simulation.fly import fly
 from pytest_garl.verdicts.judge import judge, off_marker_m

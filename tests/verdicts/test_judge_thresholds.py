@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from pytest_garl.simulation.flight import Flight
+from pytest_garl.flight.flight import Flight
 from pytest_garl.verdicts.judge import judge
 from pytest_garl.verdicts.verdict import Limits
 from tests.verdicts.flights import (

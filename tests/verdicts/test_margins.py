@@ -11,7 +11,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from pytest_garl.simulation.flight import Flight, Outcome
+from pytest_garl.flight.flight import Flight, Outcome
 from pytest_garl.verdicts.judge import judge
 from pytest_garl.verdicts.verdict import Limits, MarginName
 from tests.verdicts.flights import CLEAR, CRASH, flight, gap, hit, step, touchdown

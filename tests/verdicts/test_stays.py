@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from pytest_garl.simulation.flight import Event, Flight, Touchdown, Track
+from pytest_garl.flight.flight import Event, Flight, Touchdown, Track
 from pytest_garl.verdicts.judge import judge, off_marker_m
 from pytest_garl.verdicts.phases import landing_phase
 from pytest_garl.verdicts.touchdowns import HOP_M, landed_s, stands_since_s, stays

@@ -10,9 +10,9 @@ import pytest
 from pytest_garl import Observation
 from pytest_garl.adversary.catalogue import policy_spec
 from pytest_garl.commands import Command
+from pytest_garl.flight.flight_file import load, save
 from pytest_garl.scenarios.files import loads
-from pytest_garl.scenarios.maps.map import load_map
-from pytest_garl.simulation.flight_file import load, save
+from pytest_garl.scenarios.maps.loading import load_map
 from pytest_garl.simulation.fly import fly
 from pytest_garl.verdicts.judge import judge
 from pytest_garl.verdicts.verdict import Limits

@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 import math
 
-from pytest_garl.simulation.flight import Contact
+from pytest_garl.flight.flight import Contact
 from pytest_garl.video import frames
 from pytest_garl.video.drawing import HIT, MARKER, OBJECTS, UAV
 from tests.support.videos import LAWN, MAP_PART, SCENARIO, Hovers, Video, on_the_map, painted

@@ -8,7 +8,7 @@ import math
 import numpy as np
 import pytest
 
-from pytest_garl.simulation.flight import Track
+from pytest_garl.flight.flight import Track
 from pytest_garl.video.pose import path_until, poses_at
 from tests.support.videos import Video
 

@@ -6,9 +6,9 @@ import math
 
 import numpy as np
 
+from pytest_garl.fiducial import MARKER_SIDE_M
 from pytest_garl.scenarios.bodies import Body
 from pytest_garl.scenarios.maps.map import Ground, Layer, LayerKind, Map, Texture
-from pytest_garl.scenarios.placement import MARKER_SIDE_M
 from pytest_garl.scenarios.static_bodies import STATIC_BODIES
 
 HALF_M = 8.0

@@ -12,12 +12,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pytest_garl import Camera
-from pytest_garl.fiducial import MarkerSpec
+from pytest_garl.fiducial import MARKER_SIDE_M, MarkerSpec
 from pytest_garl.scenarios.chromosome import decode
 from pytest_garl.scenarios.genes import CONFINED_WEATHER, genome_for
 from pytest_garl.scenarios.maps.map import Map
 from pytest_garl.scenarios.object_types import OBJECT_TYPES
-from pytest_garl.scenarios.placement import MARKER_SIDE_M, TARGET_MARKER_ID
+from pytest_garl.scenarios.placement import TARGET_MARKER_ID
 from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.scenarios.task import Task
 from pytest_garl.scenarios.validity import repair

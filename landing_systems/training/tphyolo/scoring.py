@@ -11,7 +11,8 @@ import numpy as np
 
 from landing_systems.training.tphyolo.scenes import CAMERA, Marker, Picture
 from pytest_garl import Detection, Mission, Observation
-from pytest_garl.scenarios.placement import MARKER_DICTIONARY, MARKER_SIDE_M
+from pytest_garl.fiducial import MARKER_SIDE_M
+from pytest_garl.scenarios.placement import MARKER_DICTIONARY
 
 Kind = Literal["right", "wrong-id", "nothing-there"]
 

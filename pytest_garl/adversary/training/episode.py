@@ -9,15 +9,17 @@ from typing import Any
 
 import numpy as np
 
+from pytest_garl.flight.flight import Outcome
 from pytest_garl.landing_system import Camera
+from pytest_garl.scenarios.bodies import discs_of
 from pytest_garl.scenarios.chromosome import decode
 from pytest_garl.scenarios.genes import genome_for
 from pytest_garl.scenarios.maps.map import Map
 from pytest_garl.scenarios.placement import start_genes
 from pytest_garl.scenarios.scenario import Scenario
-from pytest_garl.scenarios.validity import UAV_CLEARANCE_M, discs_of, repair
+from pytest_garl.scenarios.start import UAV_CLEARANCE_M
+from pytest_garl.scenarios.validity import repair
 from pytest_garl.simulation.camera.renderer import Renderer
-from pytest_garl.simulation.flight import Outcome
 from pytest_garl.simulation.loop import Loop
 from pytest_garl.simulation.npc_policy import DECISION_STEP_S, STAY, Move, Situation
 from pytest_garl.simulation.physics.world import PHYSICS_RATE_HZ

@@ -24,7 +24,7 @@ from pytest_garl.execution.reference import package_sha256
 from pytest_garl.execution.result import FlightResult, broken_result
 from pytest_garl.execution.worker_failure import WorkerExit
 from pytest_garl.files.json_values import parse_json
-from pytest_garl.simulation.flight import PACKAGES, Crash
+from pytest_garl.flight.flight import PACKAGES, Crash
 
 _PLACEHOLDER_RESULT = broken_result(Crash(kind="died", error="", message=""), diagonal_m=0.0)
 """The entry in the actor's own ledger for a flight whose worker ended; nothing reads it."""

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
+from pytest_garl.flight.flight import Flight, Step
 from pytest_garl.messages import printable, shortened
 from pytest_garl.regressions.description import describe_scenario_on
 from pytest_garl.scenarios.groups.catalogue import PARAMETERS
@@ -12,7 +13,6 @@ from pytest_garl.scenarios.light import NOON_DEG
 from pytest_garl.scenarios.maps.map import Map
 from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.scenarios.units import WEATHER_GENES, WEATHER_UNITS, unit_of
-from pytest_garl.simulation.flight import Flight, Step
 
 MOST_ROWS = 120
 """A landing system that says something else in each frame fills no page."""

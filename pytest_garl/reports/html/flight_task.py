@@ -15,6 +15,8 @@ from pytest_garl.execution.reference import BUILT_IN
 from pytest_garl.execution.result import FlightResult
 from pytest_garl.execution.severity import NO_SEVERITY
 from pytest_garl.files.json_values import dataclass_from
+from pytest_garl.flight.flight import Flight
+from pytest_garl.flight.flight_file import load
 from pytest_garl.landing_system import Camera
 from pytest_garl.regressions.case import NOT_ASKED, Prevention
 from pytest_garl.regressions.description import describe
@@ -37,8 +39,6 @@ from pytest_garl.scenarios.maps.map import Map
 from pytest_garl.scenarios.placement import map_in
 from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.simulation.camera.cover_event import renderer_of
-from pytest_garl.simulation.flight import Flight
-from pytest_garl.simulation.flight_file import load
 from pytest_garl.verdicts.sightings import reports_detections
 
 

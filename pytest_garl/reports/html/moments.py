@@ -8,8 +8,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pytest_garl.simulation.flight import Flight, Step
-from pytest_garl.simulation.physics.vehicle import up_m
+from pytest_garl.flight.flight import Flight, Step
+from pytest_garl.flight.thresholds import up_m
 from pytest_garl.verdicts.detectability import readable_probability
 from pytest_garl.verdicts.margins import COMMIT_M
 from pytest_garl.verdicts.mechanism import NO_LANDING

@@ -11,6 +11,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 
+from pytest_garl.flight.flight import Flight, Step
 from pytest_garl.landing_system import Camera
 from pytest_garl.reports.html.moments import Moment, telling_moment
 from pytest_garl.reports.html.scene import jpeg_uri
@@ -18,7 +19,6 @@ from pytest_garl.scenarios.maps.map import Map
 from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.simulation.camera.renderer import Renderer
 from pytest_garl.simulation.environment import environment_at
-from pytest_garl.simulation.flight import Flight, Step
 from pytest_garl.verdicts.detectability import readable_probability
 from pytest_garl.video import frames, rate_hz, write
 from pytest_garl.video.camera_pane import CameraPane

@@ -7,8 +7,8 @@ from collections.abc import Iterator, Sequence
 
 from foxglove.messages import PoseInFrame, PosesInFrame
 
+from pytest_garl.flight.flight import Flight, Step
 from pytest_garl.reports.mcap.values import IDENTITY, WORLD, Logged, ns, pose, stamp
-from pytest_garl.simulation.flight import Flight, Step
 
 PLAN, TARGET, PATH = "/plan", "/target", "/path"
 MOST_POSES = 1000

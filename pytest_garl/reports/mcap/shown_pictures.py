@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pytest_garl.distortion import distorted
+from pytest_garl.flight.flight import TRACK_RATE_HZ, Flight, Step
 from pytest_garl.landing_system import Camera
 from pytest_garl.reports.mcap.source import Place
 from pytest_garl.scenarios.scenario import Scenario
@@ -24,7 +25,6 @@ from pytest_garl.simulation.camera.projection import NEAR_M, Quaternion, Vector,
 from pytest_garl.simulation.camera.true_camera import Mounting, product, true_camera
 from pytest_garl.simulation.environment import environment_at
 from pytest_garl.simulation.events import Event
-from pytest_garl.simulation.flight import TRACK_RATE_HZ, Flight, Step
 from pytest_garl.simulation.physics.world import PHYSICS_RATE_HZ
 from pytest_garl.simulation.timing import Timing
 from pytest_garl.video.drawing import Image

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from pytest_garl.flight.flight import Flight
 from pytest_garl.landing_system import Camera
 from pytest_garl.scenarios.maps.map import Map
 from pytest_garl.scenarios.scenario import Scenario
-from pytest_garl.simulation.flight import Flight
 from pytest_garl.verdicts.verdict import DEFAULT_LIMITS, Limits
 
 

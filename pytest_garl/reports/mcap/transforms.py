@@ -9,6 +9,7 @@ import numpy as np
 from foxglove.messages import FrameTransform, FrameTransforms
 from numpy.typing import NDArray
 
+from pytest_garl.flight.flight import Flight, Track
 from pytest_garl.reports.mcap.values import (
     CAMERA_FRAME,
     IDENTITY,
@@ -22,7 +23,6 @@ from pytest_garl.reports.mcap.values import (
 )
 from pytest_garl.simulation.camera.projection import CAMERA_BELOW_M, Quaternion
 from pytest_garl.simulation.camera.true_camera import product
-from pytest_garl.simulation.flight import Flight, Track
 
 TOPIC = "/tf"
 OPTICAL: Quaternion = (math.sqrt(0.5), -math.sqrt(0.5), 0.0, 0.0)

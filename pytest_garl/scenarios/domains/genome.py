@@ -18,7 +18,7 @@ from pytest_garl.scenarios.genes import (
     place_gene,
 )
 from pytest_garl.scenarios.genome_like import story_property
-from pytest_garl.scenarios.groups.catalogue import GROUPS, PARAMETERS
+from pytest_garl.scenarios.groups.catalogue import GROUPS, PARAMETERS, WEATHER_CAUSES
 from pytest_garl.scenarios.light import position_of_elevation
 from pytest_garl.scenarios.maps.map import Map
 from pytest_garl.scenarios.object_types import OBJECT_TYPES
@@ -28,14 +28,6 @@ from pytest_garl.scenarios.units import WEATHER_UNITS
 
 _NO_RANGE = 1e-9
 """A range that files round to one value."""
-WEATHER_CAUSES = {
-    "dust": ("dust",),
-    "fog": ("fog",),
-    "rain": ("rain", "road_wetness"),
-    "snow": ("snow", "road_snow"),
-    "leaves": ("maple_leaf", "road_leaf"),
-}
-"""Weather genes that one cause switches on together: rain wets the ground, snow covers it."""
 
 
 def genome_of(

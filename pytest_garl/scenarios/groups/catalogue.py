@@ -36,3 +36,11 @@ PARAMETERS: dict[str, Parameter] = {
     for group in GROUPS.values()
     for key, each in zip(group.keys, group.parameters, strict=True)
 }
+WEATHER_CAUSES = {
+    "dust": ("dust",),
+    "fog": ("fog",),
+    "rain": ("rain", "road_wetness"),
+    "snow": ("snow", "road_snow"),
+    "leaves": ("maple_leaf", "road_leaf"),
+}
+"""Weather genes that one cause switches on together: rain wets the ground, snow covers it."""

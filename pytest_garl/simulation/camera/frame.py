@@ -8,7 +8,7 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
-from pytest_garl.simulation.flight import MarkerView
+from pytest_garl.flight.flight import MarkerView
 
 
 class Frame:

@@ -9,6 +9,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from pytest_garl.flight.flight import MarkerView
 from pytest_garl.landing_system import Camera
 from pytest_garl.simulation.camera.exposure import Exposure
 from pytest_garl.simulation.camera.gloss import Gloss
@@ -23,7 +24,6 @@ from pytest_garl.simulation.camera.projection import NEAR_M, View
 from pytest_garl.simulation.camera.sensor import Sensor
 from pytest_garl.simulation.camera.solids import PaintedSolid, Shadow, sun_shines
 from pytest_garl.simulation.camera.weather import Conditions
-from pytest_garl.simulation.flight import MarkerView
 
 Array = NDArray[np.float32]
 _SHIFT = 4

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pytest_garl.errors import GarlError
+from pytest_garl.flight.flight import MarkerView
 from pytest_garl.landing_system import Camera
 from pytest_garl.scenarios.maps.map import Map
 from pytest_garl.scenarios.placement import Pad, pad_of
@@ -36,7 +37,6 @@ from pytest_garl.simulation.camera.solids import (
     draw_shadows,
 )
 from pytest_garl.simulation.camera.weather import Conditions, conditions_of
-from pytest_garl.simulation.flight import MarkerView
 
 Vector = tuple[float, float, float]
 Quaternion = tuple[float, float, float, float]

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 
+from pytest_garl.flight.thresholds import GRAVITY_MPS2
 from pytest_garl.landing_system import (
     Abort,
     AttitudeSetpoint,
@@ -17,7 +18,6 @@ from pytest_garl.landing_system import (
     VelocitySetpoint,
 )
 from pytest_garl.simulation.physics.vehicle import (
-    GRAVITY_MPS2,
     Motion,
     Quaternion,
     Thrusts,

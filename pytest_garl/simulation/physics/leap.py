@@ -5,13 +5,13 @@ from __future__ import annotations
 import math
 from collections import deque
 
+from pytest_garl.flight.thresholds import GRAVITY_MPS2
 from pytest_garl.scenarios.object_types import ObjectType
 from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.scenarios.story import APPROACH_S, story_of
 
 Vector = tuple[float, float, float]
 
-GRAVITY_MPS2 = 9.81
 REACTION_S = 0.5
 """It leaps at where the UAV was so long ago: the delay with which the grade that chases sees."""
 LEAPS_FROM_M = 1.0

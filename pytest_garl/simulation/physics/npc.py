@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
-from pytest_garl.scenarios.bodies import Body
+from pytest_garl.scenarios.bodies import Body, Disc, discs_of
 from pytest_garl.scenarios.maps.map import Map
 from pytest_garl.scenarios.placement import (
     object_altitude_m,
@@ -14,7 +14,6 @@ from pytest_garl.scenarios.placement import (
     object_type,
 )
 from pytest_garl.scenarios.scenario import Scenario
-from pytest_garl.scenarios.validity import Disc, discs_of
 from pytest_garl.simulation.npc_policy import (
     DECISION_STEP_S,
     Move,

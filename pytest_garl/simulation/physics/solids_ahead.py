@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
+from pytest_garl.scenarios.bodies import Disc
 from pytest_garl.scenarios.object_types import ObjectType
-from pytest_garl.scenarios.validity import Disc
 
 _MARGIN_M = 0.3
 _TURN_STEPS = 12

@@ -14,7 +14,6 @@ from typing import NamedTuple
 from pytest_garl.landing_system import Airframe
 from pytest_garl.scenarios.maps.map import Texture
 
-GRAVITY_MPS2 = 9.81
 AIR_DENSITY_KGPM3 = 1.225
 """International Standard Atmosphere at sea level."""
 REFERENCE_MASS_KG = 2.355
@@ -30,7 +29,6 @@ DRAG_AREA_M2 = 0.05
 ROTOR_DRAG_PER_S = 0.10
 """Linear drag of the rotors per unit mass.  Engineering estimate, at the low end: Faessler,
 Franchi and Scaramuzza (2018) identify some 0.2 to 0.5 1/s on a small agile quadrotor."""
-BODY_ABOVE_FEET_M = 0.20
 FEET_FRICTION: dict[Texture, float] = {
     "concrete": 0.7,
     "asphalt": 0.65,
@@ -61,11 +59,6 @@ class VehicleModel:
     max_thrust_n: float
     drag_n_per_mps: float
     drag_n_per_mps2: float
-
-
-def up_m(body_m: float) -> float:
-    """Return how high the feet are above the ground, for a body's height; never below it."""
-    return max(0.0, body_m - BODY_ABOVE_FEET_M)
 
 
 def vehicle_model(airframe: Airframe) -> VehicleModel:

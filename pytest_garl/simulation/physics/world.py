@@ -9,14 +9,9 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+from pytest_garl.flight.thresholds import BODY_ABOVE_FEET_M, GRAVITY_MPS2
 from pytest_garl.scenarios.bodies import Body
-from pytest_garl.simulation.physics.vehicle import (
-    BODY_ABOVE_FEET_M,
-    GRAVITY_MPS2,
-    Quaternion,
-    Vector,
-    VehicleModel,
-)
+from pytest_garl.simulation.physics.vehicle import Quaternion, Vector, VehicleModel
 
 
 @contextlib.contextmanager

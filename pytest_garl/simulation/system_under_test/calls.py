@@ -8,10 +8,8 @@ from pathlib import Path
 from typing import Any, Protocol
 
 from pytest_garl.errors import LandingSystemError
-from pytest_garl.landing_system import Airframe, airframe_of
-from pytest_garl.simulation.flight import Crash
-from pytest_garl.simulation.system_under_test.reading import NonsenseError
-from pytest_garl.simulation.system_under_test.texts import (
+from pytest_garl.flight.flight import Crash
+from pytest_garl.foreign_text import (
     MESSAGE_CHARS,
     TRACEBACK_CHARS,
     class_name,
@@ -19,6 +17,8 @@ from pytest_garl.simulation.system_under_test.texts import (
     identifier_from,
     text_from,
 )
+from pytest_garl.landing_system import Airframe, airframe_of
+from pytest_garl.simulation.system_under_test.reading import NonsenseError
 
 _SIMULATION = Path(__file__).parents[1]
 _SIMULATION_FILES = {

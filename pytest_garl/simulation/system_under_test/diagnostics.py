@@ -7,6 +7,7 @@ import json
 import math
 from typing import Any
 
+from pytest_garl.foreign_text import cut, shown
 from pytest_garl.landing_system import Detection, Diagnostics
 from pytest_garl.simulation.system_under_test.reading import (
     NonsenseError,
@@ -18,7 +19,6 @@ from pytest_garl.simulation.system_under_test.reading import (
     numbers,
     vector,
 )
-from pytest_garl.simulation.system_under_test.texts import cut, shown
 
 PHASE_CHARS = 100
 NOTE_CHARS = 1_000

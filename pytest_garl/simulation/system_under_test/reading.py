@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from pytest_garl.simulation.system_under_test.texts import shown
+from pytest_garl.foreign_text import shown
 
 Vector = tuple[float, float, float]
 

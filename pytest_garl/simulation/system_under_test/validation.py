@@ -20,10 +20,10 @@ from pytest_garl.commands import (
     PositionSetpoint,
     VelocitySetpoint,
 )
+from pytest_garl.foreign_text import shown
 from pytest_garl.landing_system import MotorThrusts
 from pytest_garl.simulation.system_under_test.diagnostics import DiagnosticsQuota, read_diagnostics
 from pytest_garl.simulation.system_under_test.reading import NonsenseError, number, numbers, vector
-from pytest_garl.simulation.system_under_test.texts import shown
 
 COMMANDS = (PositionSetpoint, VelocitySetpoint, AttitudeSetpoint, Land, Abort)
 QUATERNION_SLACK = 0.1

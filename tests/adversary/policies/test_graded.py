@@ -11,12 +11,13 @@ import numpy as np
 import pytest
 
 from landing_systems.opencv_mls import OpenCvLandingSystem
-from pytest_garl.adversary.catalogue import WEIGHTS, policy_spec
+from pytest_garl.adversary.catalogue import policy_spec
 from pytest_garl.adversary.learned import learned_spec
+from pytest_garl.adversary.weights import WEIGHTS
 from pytest_garl.errors import PolicyError
 from pytest_garl.scenarios.chromosome import decode
 from pytest_garl.scenarios.genes import genome_for
-from pytest_garl.scenarios.maps.map import load_map
+from pytest_garl.scenarios.maps.loading import load_map
 from pytest_garl.scenarios.placement import start_genes
 from pytest_garl.scenarios.story import GRADES, with_all_values
 from pytest_garl.scenarios.validity import repair

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pytest_garl.adversary.training.presets import Surrogate
-from pytest_garl.scenarios.maps.map import load_map
+from pytest_garl.scenarios.maps.loading import load_map
 
 COURT = (load_map("court"),)
 OURS = Surrogate(maps=COURT)

@@ -1,8 +1,9 @@
 from __future__ import annotations
 
-from pytest_garl.adversary.catalogue import WEIGHTS, learned_policies
+from pytest_garl.adversary.catalogue import learned_policies
 from pytest_garl.adversary.learned import read_manifest
 from pytest_garl.adversary.training.presets import PRESETS
+from pytest_garl.adversary.weights import WEIGHTS
 
 
 def test_each_shipped_learned_policy_has_the_preset_of_its_training() -> None:

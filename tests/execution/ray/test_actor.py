@@ -16,8 +16,8 @@ from pytest_garl.execution.ledger_queue import Claim
 from pytest_garl.execution.ray.actor import ActorWorkspace, FlightActor, FlightOutput
 from pytest_garl.execution.reference import Reference, reference_to
 from pytest_garl.execution.worker_failure import WorkerExit
+from pytest_garl.flight.flight_file import load
 from pytest_garl.scenarios.files import dump_scenario
-from pytest_garl.simulation.flight_file import load
 from tests.execution.flying import Exits, Good, Loud, Reports, Sleeps, Slow, job_of, scenario
 from tests.support.landing_project import write_project
 

@@ -20,13 +20,13 @@ from pytest_garl import (
     VehicleState,
 )
 from pytest_garl.adversary.catalogue import policy_spec
+from pytest_garl.flight.flight import Flight
 from pytest_garl.scenarios.chromosome import decode
 from pytest_garl.scenarios.genes import genome_for
-from pytest_garl.scenarios.maps.map import load_map
+from pytest_garl.scenarios.maps.loading import load_map
 from pytest_garl.scenarios.placement import marker_position_m
 from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.scenarios.validity import repair
-from pytest_garl.simulation.flight import Flight
 from pytest_garl.simulation.fly import fly
 from tests.support.bare_flight import Trace, fly_bare
 

@@ -30,7 +30,7 @@ from pytest_garl import Observation
 from pytest_garl.fiducial import MarkerSpec
 from pytest_garl.scenarios.chromosome import decode
 from pytest_garl.scenarios.genes import genome_for
-from pytest_garl.scenarios.maps.map import load_map
+from pytest_garl.scenarios.maps.loading import load_map
 from pytest_garl.scenarios.task import Task
 from pytest_garl.simulation.camera.projection import View
 from pytest_garl.simulation.camera.renderer import Renderer

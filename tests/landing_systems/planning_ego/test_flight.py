@@ -8,12 +8,12 @@ import pytest
 from landing_systems.modules.planning_ego import LANDING, EgoPlanner
 from pytest_garl import Airframe, Command, Mission, Observation, PositionSetpoint, VelocitySetpoint
 from pytest_garl.adversary.catalogue import policy_spec
+from pytest_garl.flight.flight import Flight
 from pytest_garl.scenarios.bodies import Body
 from pytest_garl.scenarios.chromosome import decode
 from pytest_garl.scenarios.genes import genome_for
-from pytest_garl.scenarios.maps.map import load_map
+from pytest_garl.scenarios.maps.loading import load_map
 from pytest_garl.scenarios.static_bodies import box, tree
-from pytest_garl.simulation.flight import Flight
 from pytest_garl.simulation.fly import fly
 
 FOLLOWING_P = 1.0

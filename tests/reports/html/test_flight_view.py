@@ -6,6 +6,8 @@ import json
 import numpy as np
 
 from pytest_garl.airframe import Rangefinder
+from pytest_garl.flight.flight import Flight, ObjectRecord, Step, Track
+from pytest_garl.flight.thresholds import BODY_ABOVE_FEET_M
 from pytest_garl.landing_system import Diagnostics
 from pytest_garl.reports.html.flight_view import (
     MOST_PHASES,
@@ -17,8 +19,6 @@ from pytest_garl.reports.html.flight_view import (
     strips,
 )
 from pytest_garl.scenarios.object_types import OBJECT_TYPES
-from pytest_garl.simulation.flight import Flight, ObjectRecord, Step, Track
-from pytest_garl.simulation.physics.vehicle import BODY_ABOVE_FEET_M
 from tests.support.recorded_flights import recorded, seen
 from tests.support.videos import TARGET, Video
 

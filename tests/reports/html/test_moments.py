@@ -5,6 +5,7 @@ import dataclasses
 import numpy as np
 import pytest
 
+from pytest_garl.flight.flight import Flight
 from pytest_garl.reports.html.moments import (
     BEFORE_END_S,
     MOST,
@@ -14,7 +15,6 @@ from pytest_garl.reports.html.moments import (
     moments_of,
     telling_moment,
 )
-from pytest_garl.simulation.flight import Flight
 from tests.support.recorded_flights import READABLE, hit_by_dog, recorded, seen
 
 

@@ -5,8 +5,8 @@ from pathlib import Path
 
 import pytest
 
+from pytest_garl.flight.flight import Flight
 from pytest_garl.scenarios.placement import map_in
-from pytest_garl.simulation.flight import Flight
 from pytest_garl.video.drawing import Image
 from tests.support.mcap_files import Recording, needs_extra, read_mcap
 from tests.support.videos import LAWN, SCENARIO, Hovers

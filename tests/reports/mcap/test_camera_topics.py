@@ -11,10 +11,10 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from pytest_garl.flight.flight import Flight
 from pytest_garl.landing_system import Camera, Detection, Diagnostics
 from pytest_garl.reports.mcap.source import Export, Place
 from pytest_garl.scenarios.placement import map_in, pad_of
-from pytest_garl.simulation.flight import Flight
 from tests.reports.mcap.conftest import Exported
 from tests.support.flights import EMPTY, nominal
 from tests.support.mcap_files import (

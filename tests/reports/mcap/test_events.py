@@ -5,9 +5,9 @@ from pathlib import Path
 
 import pytest
 
+from pytest_garl.flight.flight import Crash, Event
 from pytest_garl.landing_system import Diagnostics
 from pytest_garl.reports.mcap.source import Export
-from pytest_garl.simulation.flight import Crash, Event
 from tests.support.mcap_files import needs_extra, read_mcap
 from tests.support.recorded_flights import recorded, seen
 

@@ -4,7 +4,7 @@ import math
 
 import pytest
 
-from pytest_garl.simulation.physics.vehicle import up_m
+from pytest_garl.flight.thresholds import up_m
 from tests.reports.mcap.conftest import Exported
 from tests.support.mcap_files import decoded, needs_extra
 

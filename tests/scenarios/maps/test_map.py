@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from pytest_garl.errors import ScenarioError
-from pytest_garl.scenarios.maps.map import load_map, map_names
+from pytest_garl.scenarios.maps.loading import load_map, map_names
 
 
 @pytest.mark.parametrize(

@@ -12,7 +12,7 @@ from pytest_garl.errors import ScenarioError
 from pytest_garl.scenarios.chromosome import decode
 from pytest_garl.scenarios.files import dumps, load
 from pytest_garl.scenarios.genes import genome_for
-from pytest_garl.scenarios.maps.map import load_map
+from pytest_garl.scenarios.maps.loading import load_map
 
 LAWN = (Path(maps.__file__).parent / "lawn.toml").read_text()
 

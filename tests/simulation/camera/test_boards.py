@@ -13,7 +13,7 @@ from pytest_garl import Camera, MarkerSpec, NestedMarker
 from pytest_garl.fiducial import DICTIONARIES
 from pytest_garl.scenarios.chromosome import decode
 from pytest_garl.scenarios.genes import genome_for
-from pytest_garl.scenarios.maps.map import load_map
+from pytest_garl.scenarios.maps.loading import load_map
 from pytest_garl.scenarios.task import Task
 from pytest_garl.scenarios.validity import repair
 from pytest_garl.simulation.camera.frame import Frame

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from pytest_garl import Camera
+from pytest_garl.flight.flight import MarkerView
 from pytest_garl.simulation.camera.cover_event import renderer_of
 from pytest_garl.simulation.camera.frame import Frame
 from pytest_garl.simulation.camera.renderer import Renderer
-from pytest_garl.simulation.flight import MarkerView
 from pytest_garl.simulation.randomness import generator
 from tests.support.flights import EMPTY, nominal
 

@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 import pytest
 
+from pytest_garl.flight.flight import MarkerView
 from pytest_garl.simulation.camera.frame import Frame
-from pytest_garl.simulation.flight import MarkerView
 from tests.support.pictures import CAMERA, LEVEL, NONE, poses, renderer
 
 FAR = [((50.0, 50.0, 0.0), 0.0)] * 3

@@ -10,12 +10,12 @@ import pytest
 from numpy.typing import NDArray
 
 from pytest_garl import Camera
+from pytest_garl.flight.flight import MarkerView
 from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.scenarios.validity import problems
 from pytest_garl.simulation.camera.frame import Frame
 from pytest_garl.simulation.camera.marker_patch import GREY, modules
 from pytest_garl.simulation.camera.renderer import Renderer
-from pytest_garl.simulation.flight import MarkerView
 from pytest_garl.simulation.randomness import generator
 from tests.support.flights import EMPTY, nominal
 

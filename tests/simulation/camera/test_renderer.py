@@ -9,7 +9,7 @@ import pytest
 from pytest_garl.fiducial import MarkerSpec
 from pytest_garl.scenarios.chromosome import decode
 from pytest_garl.scenarios.genes import WEATHER, genome_for
-from pytest_garl.scenarios.maps.map import map_names
+from pytest_garl.scenarios.maps.loading import map_names
 from pytest_garl.scenarios.placement import marker_position_m
 from pytest_garl.scenarios.task import Task
 from pytest_garl.scenarios.validity import repair

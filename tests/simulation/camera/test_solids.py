@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 from pytest_garl.landing_system import Camera
+from pytest_garl.scenarios.bodies import discs_of
 from pytest_garl.scenarios.object_types import OBJECT_TYPES
-from pytest_garl.scenarios.validity import discs_of
 from pytest_garl.simulation.camera.meshes import mesh_of, placed
 from pytest_garl.simulation.camera.projection import FAR_M, View
 from pytest_garl.simulation.camera.solids import Solids

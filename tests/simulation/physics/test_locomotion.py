@@ -12,7 +12,8 @@ from numpy.typing import NDArray
 from pytest_garl.adversary.recorded import recorded_spec
 from pytest_garl.scenarios.chromosome import decode
 from pytest_garl.scenarios.genes import genome_for
-from pytest_garl.scenarios.maps.map import Map, load_map
+from pytest_garl.scenarios.maps.loading import load_map
+from pytest_garl.scenarios.maps.map import Map
 from pytest_garl.scenarios.object_types import OBJECT_TYPES
 from pytest_garl.scenarios.placement import object_altitude_m, start_genes
 from pytest_garl.simulation.npc_policy import DECISION_STEP_S, Move, Situation

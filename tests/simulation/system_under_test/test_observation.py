@@ -16,8 +16,8 @@ from pytest_garl import (
     Command,
     Observation,
 )
-from pytest_garl.simulation.flight import Flight
-from pytest_garl.simulation.flight_file import load, save
+from pytest_garl.flight.flight import Flight
+from pytest_garl.flight.flight_file import load, save
 from pytest_garl.simulation.fly import fly
 from tests.support.answers import flight_of
 from tests.support.flights import EMPTY, STAND, Scripted, nominal

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from pytest_garl.scenarios.genes import genome_for
-from pytest_garl.scenarios.maps.map import load_map, map_names
+from pytest_garl.scenarios.maps.loading import load_map, map_names
 from pytest_garl.search.methods.random import random_scenarios
 from pytest_garl.simulation.fly import fly
 from pytest_garl.simulation.system_under_test.reference_pilot import ReferencePilot

@@ -21,7 +21,7 @@ from pytest_garl import (
     PositionSetpoint,
     VelocitySetpoint,
 )
-from pytest_garl.simulation.flight_file import load, save
+from pytest_garl.flight.flight_file import load, save
 from pytest_garl.simulation.system_under_test.diagnostics import DiagnosticsQuota
 from pytest_garl.simulation.system_under_test.validation import read_command, read_thrusts
 from tests.support.answers import (

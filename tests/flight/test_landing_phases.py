@@ -2,7 +2,7 @@ from __future__ import annotations
 
 from math import inf
 
-from pytest_garl.simulation.landing_phases import LandingPhases
+from pytest_garl.flight.landing_phases import LandingPhases
 
 
 def began(*heights_m: float) -> tuple[float, ...]:

@@ -14,11 +14,8 @@ import pytest
 from pytest_garl.adversary.catalogue import policy_spec
 from pytest_garl.airframe import Rangefinder
 from pytest_garl.errors import GarlError
-from pytest_garl.landing_system import Detection, Diagnostics
-from pytest_garl.scenarios.genes import genome_for
-from pytest_garl.search.methods.random import random_scenarios
-from pytest_garl.simulation import flight_file
-from pytest_garl.simulation.flight import (
+from pytest_garl.flight import flight_file
+from pytest_garl.flight.flight import (
     Contact,
     Crash,
     Event,
@@ -29,7 +26,10 @@ from pytest_garl.simulation.flight import (
     Touchdown,
     Track,
 )
-from pytest_garl.simulation.flight_file import load, save
+from pytest_garl.flight.flight_file import load, save
+from pytest_garl.landing_system import Detection, Diagnostics
+from pytest_garl.scenarios.genes import genome_for
+from pytest_garl.search.methods.random import random_scenarios
 from pytest_garl.simulation.fly import fly
 from pytest_garl.simulation.system_under_test.reference_pilot import ReferencePilot
 from tests.support.flights import LAWN

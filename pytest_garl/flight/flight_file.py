@@ -19,8 +19,7 @@ from pytest_garl.errors import GarlError, NotFiniteError
 from pytest_garl.files.arrays import unpack
 from pytest_garl.files.json_values import dataclass_from, parse_json
 from pytest_garl.files.reading import MEGABYTE, read_bytes
-from pytest_garl.messages import listed
-from pytest_garl.simulation.flight import (
+from pytest_garl.flight.flight import (
     Contact,
     Crash,
     Event,
@@ -33,6 +32,7 @@ from pytest_garl.simulation.flight import (
     Touchdown,
     Track,
 )
+from pytest_garl.messages import listed
 
 Array = NDArray[Any]
 LARGEST_BYTES = 32 * MEGABYTE
