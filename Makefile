@@ -42,16 +42,16 @@ test-ray: $(READY)  ## the tests that start Ray clusters: minutes, so not part o
 	$(BIN)/pytest -m ray tests
 
 bench: $(READY)  ## measure frames, flights and the plugin's overhead
-	$(BIN)/python -m benchmarks
+	$(BIN)/python -m lab.benchmarks
 
 faults: $(READY)  ## search for planted faults and print mutation scores: a day on two cores
-	$(BIN)/python -m studies.faults
-	$(BIN)/python -m studies.faults --report
+	$(BIN)/python -m lab.faults
+	$(BIN)/python -m lab.faults --report
 
 experiment-smoke: $(READY)  ## fly, measure and report an experiment at toy size
 	rm -rf $(SMOKE)
-	$(BIN)/garl experiment docs/experiments/smoke.toml --out=$(SMOKE) --folder=$(SMOKE)/runs
-	$(BIN)/garl experiment docs/experiments/smoke.toml --out=$(SMOKE) --report
+	$(BIN)/python -m lab.experiment docs/experiments/smoke.toml --out=$(SMOKE) --folder=$(SMOKE)/runs
+	$(BIN)/python -m lab.experiment docs/experiments/smoke.toml --out=$(SMOKE) --report
 
 clean:  ## remove the virtual environment and the run folder
 	rm -rf $(VENV) .garl

@@ -41,8 +41,8 @@ def test_every_command_of_the_cases_page_exists() -> None:
 
 
 def test_the_page_of_experiments_tells_every_column_and_every_key() -> None:
-    from pytest_garl.experiments.results import ResultRow
-    from pytest_garl.experiments.spec import TOP_KEYS
+    from lab.experiment.results import ResultRow
+    from lab.experiment.spec import TOP_KEYS
 
     text = (DOCS / "experiments" / "README.md").read_text()
     types = {f"type_{kind}" for kind in ("ii", "iii", "iv")}
@@ -53,7 +53,7 @@ def test_the_page_of_experiments_tells_every_column_and_every_key() -> None:
 
 
 def test_counts_in_remarks_agree_with_the_rows() -> None:
-    from pytest_garl.experiments.results import read_rows
+    from lab.experiment.results import read_rows
 
     rows = {row.result_hash: row for row in read_rows(DOCS / "experiments" / "rq.csv")}
     with (DOCS / "experiments" / "counts.csv").open(newline="") as file:

@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).parents[1]
-FOLDERS = ("pytest_garl", "landing_systems", "studies", "benchmarks", "tools")
+FOLDERS = ("pytest_garl", "landing_systems", "lab")
 MOST_LINES = 700
 MOST_LINES_OF_A_CLASS = 400
 

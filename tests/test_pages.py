@@ -84,7 +84,7 @@ def test_page_has_no_dead_link(page: Path) -> None:
 def test_page_names_no_missing_file(page: Path) -> None:
     if page.name == "CHANGELOG.md":
         return
-    rooms = "pytest_garl|landing_systems|tests|docs|studies|benchmarks|tools"
+    rooms = "pytest_garl|landing_systems|tests|docs|lab"
     named = re.findall(rf"`((?:{rooms})/[\w/.-]*)`", page.read_text())
     assert [name for name in named if not (ROOT / name).exists() and "/my_" not in name] == []
     modules = re.findall(rf"python -m ((?:{rooms})[\w.]*)", page.read_text())

@@ -21,7 +21,6 @@ COMMANDS = {
     "check": "check",
     "diff": "baseline",
     "domain": "domain",
-    "experiment": "experiment",
     "export": "export",
     "film": "film",
     "init": "init",
@@ -32,19 +31,32 @@ COMMANDS = {
 _RESTARTED = "_PYTEST_GARL_RESTARTED"
 
 
-class _Group(click.Group):
-    """Loads a subcommand only when it is used, and shows the project's errors without traceback.
+class Pinned(click.Command):
+    """A command that shows the project's errors without traceback, and flies as a worker does.
 
-    The modules of the subcommands load NumPy.  Before that, the environment must name the CPU
-    instructions that NumPy may use.
+    Its code loads NumPy.  Before that, the environment must name the CPU instructions that NumPy
+    may use.
     """
 
     def main(self, args: Any = None, *rest: Any, **more: Any) -> Any:
+        """Start again if NumPy was loaded too early, then run."""
         if args is None and not cpu_dispatch.pin() and _RESTARTED not in os.environ:
             # NumPy was loaded while the interpreter started: start again with this environment.
             os.environ[_RESTARTED] = "1"
             os.execv(sys.executable, [sys.executable, *sys.orig_argv[1:]])
         return super().main(args, *rest, **more)
+
+    def invoke(self, ctx: click.Context) -> object:
+        """Run, and show an error of the project in one line."""
+        try:
+            with _clean_exit_on_sigterm():
+                return super().invoke(ctx)
+        except GarlError as error:
+            raise click.ClickException(str(error)) from error
+
+
+class _Group(Pinned, click.Group):
+    """Loads a subcommand only when it is used."""
 
     def list_commands(self, ctx: click.Context) -> list[str]:
         return sorted(COMMANDS)
@@ -56,13 +68,6 @@ class _Group(click.Group):
         module = importlib.import_module(f"pytest_garl.cli.{COMMANDS[cmd_name]}")
         found: click.Command = getattr(module, cmd_name)
         return found
-
-    def invoke(self, ctx: click.Context) -> object:
-        try:
-            with _clean_exit_on_sigterm():
-                return super().invoke(ctx)
-        except GarlError as error:
-            raise click.ClickException(str(error)) from error
 
 
 @contextlib.contextmanager

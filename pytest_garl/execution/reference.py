@@ -44,7 +44,6 @@ NOT_HASHED = (
     "baselines",
     "cli",
     "errors.py",
-    "experiments",
     "fixtures.py",
     "messages.py",
     "plugin",

@@ -8,12 +8,12 @@ from pathlib import Path
 import pytest
 from click.testing import CliRunner, Result
 
+from lab.domain_table import PAGE, with_table
 from pytest_garl.cli import main
 from pytest_garl.cli.domain import MEANINGS, ranges_of, text_of
 from pytest_garl.scenarios.domains.domain import CONDITIONS
 from pytest_garl.scenarios.domains.names import BUILT_IN, DEFAULT_DOMAIN
 from pytest_garl.scenarios.domains.reader import domain_named
-from studies.domain_table import PAGE, with_table
 
 
 def garl(*words: str) -> Result:
@@ -96,4 +96,4 @@ def test_the_example_of_the_page_is_a_domain(tmp_path: Path) -> None:
 
 def test_page_has_the_table_of_the_built_in_domains() -> None:
     page = PAGE.read_text()
-    assert page == with_table(page), "run: python -m studies.domain_table"
+    assert page == with_table(page), "run: python -m lab.domain_table"

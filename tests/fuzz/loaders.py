@@ -14,6 +14,8 @@ from typing import Any
 
 import numpy as np
 
+from lab.experiment import results as rows
+from lab.experiment import spec as plan
 from pytest_garl.adversary import learned as network
 from pytest_garl.adversary.weights import WEIGHTS
 from pytest_garl.baselines import file as baseline
@@ -24,8 +26,6 @@ from pytest_garl.execution.flight_id import FlightId
 from pytest_garl.execution.job import parse_job
 from pytest_garl.execution.ledger import Ledger
 from pytest_garl.execution.stored_ledger import check_stored
-from pytest_garl.experiments import results as rows
-from pytest_garl.experiments import spec as plan
 from pytest_garl.flight import flight_file
 from pytest_garl.regressions import case_file as files
 from pytest_garl.regressions import corpus
@@ -39,9 +39,9 @@ from pytest_garl.scenarios.validity import problems
 from pytest_garl.search.objectives import violation_proximity
 from tests.baselines import samples as baseline_samples
 from tests.execution.flying import Good, job_of, scenario
-from tests.experiments.samples import row
-from tests.experiments.test_spec import TEXT as PLAN
 from tests.fuzz import binary_mutations, mutations
+from tests.lab.experiment.samples import row
+from tests.lab.experiment.test_spec import TEXT as PLAN
 from tests.regressions import samples as case_samples
 
 Change = Callable[[random.Random], None]

@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from lab.faults.control import ControlSystem, Vector
 from pytest_garl import Observation
 from pytest_garl.adversary.catalogue import policy_spec
 from pytest_garl.commands import Command
@@ -16,7 +17,6 @@ from pytest_garl.scenarios.maps.loading import load_map
 from pytest_garl.simulation.fly import fly
 from pytest_garl.verdicts.judge import judge
 from pytest_garl.verdicts.verdict import Limits
-from studies.faults.control import ControlSystem, Vector
 
 SCENARIO = """schema = 2
 map = "lawn"

@@ -61,7 +61,7 @@ class TphYoloDetector:
                 f"TPH-YOLO: found marker {mission.marker_id} of {mission.marker_dictionary}, "
                 f"expected one of {', '.join(map(str, CLASS_IDS))} of DICT_5X5_50, which its "
                 "network was trained on; take such a marker, train the network "
-                "(landing_systems/training/tphyolo), or use OpenCV-MLS"
+                "(lab/train_detector), or use OpenCV-MLS"
             )
         files = read_weights(weights)
         self._boxes, self._ids = load_network(files.boxes), load_network(files.ids)

@@ -97,5 +97,5 @@ def read_weights(file: Path) -> Weights:
 def _wrong(path: Path, problem: str) -> WeightsError:
     return WeightsError(
         f"marker detector: {path} {problem}; restore the files, or train it again with "
-        "`python -m landing_systems.training.tphyolo.train`"
+        "`python -m lab.train_detector.train`"
     )

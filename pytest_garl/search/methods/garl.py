@@ -47,7 +47,7 @@ ALL = "all"
 class GarlParameters:
     """All parameters of the search.
 
-    ``python -m studies.ablations`` measures what each part of the search is worth.
+    ``python -m lab.ablations`` measures what each part of the search is worth.
     """
 
     explores_first: int = 100

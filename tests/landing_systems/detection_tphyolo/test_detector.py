@@ -11,6 +11,14 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from lab.train_detector.scenes import (
+    CAMERA,
+    Print,
+    pictures,
+    random_pose,
+    truth,
+)
+from lab.train_detector.scoring import mission, observation_of, score
 from landing_systems.modules.detection_tphyolo.detector import (
     LARGEST_SIDE_PX,
     TphYoloDetector,
@@ -18,14 +26,6 @@ from landing_systems.modules.detection_tphyolo.detector import (
     ground_place,
 )
 from landing_systems.modules.detection_tphyolo.patches import PATCH_PX, REACH, normalised, patch
-from landing_systems.training.tphyolo.scenes import (
-    CAMERA,
-    Print,
-    pictures,
-    random_pose,
-    truth,
-)
-from landing_systems.training.tphyolo.scoring import mission, observation_of, score
 from pytest_garl import Observation
 from pytest_garl.fiducial import MarkerSpec
 from pytest_garl.scenarios.chromosome import decode

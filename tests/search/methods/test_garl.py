@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from lab.stand_in import stand_in
 from pytest_garl.execution.result import FlightResult
 from pytest_garl.scenarios.chromosome import encode
 from pytest_garl.scenarios.domains.genome import genome_of
@@ -18,7 +19,6 @@ from pytest_garl.search.columns import STRATA, Columns
 from pytest_garl.search.method import FlownScenario, SearchPlan
 from pytest_garl.search.methods.garl import Garl, GarlParameters
 from pytest_garl.search.methods.random import RandomSearch
-from studies.stand_in import stand_in
 
 MAP = load_map("court")
 GENOME = genome_of(domain_named("field"), MAP)

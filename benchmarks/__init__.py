@@ -1,1 +1,0 @@
-"""Benchmarks of speed; ``python -m benchmarks`` runs the quick ones."""

@@ -1,0 +1,1 @@
+"""Benchmarks of speed; ``python -m lab.benchmarks`` runs the quick ones."""

@@ -1,0 +1,12 @@
+"""Run every quick benchmark."""
+
+from __future__ import annotations
+
+from lab.benchmarks import collect, field, ledger, overhead, speed, throughput
+
+speed.main()
+overhead.main()
+collect.main()
+ledger.main()
+throughput.main()
+field.main()

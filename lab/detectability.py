@@ -1,0 +1,182 @@
+"""Calibrates the detectability oracle on painted frames that independent detectors read.
+
+``python -m lab.detectability`` draws and reads the frames (15 minutes on two cores) unless
+``--frames`` names a file that has them, fits the oracle, and writes its coefficients,
+``docs/detectability.md`` and ``docs/pictures/detectability.png``.
+"""
+
+from __future__ import annotations
+
+import argparse
+import dataclasses
+import functools
+import json
+import multiprocessing
+import time
+from collections.abc import Iterable, Sequence
+from concurrent.futures import ProcessPoolExecutor
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lab.detectability_conditions import CONDITIONS
+from lab.detectability_fit import fit
+from lab.detectability_frames import KINDS, MAPS, Detectors, Kind, ReadFrame, read_frames
+from lab.detectability_page import page
+from lab.detectability_report import WHOLE, Sample, draw
+from pytest_garl import cpu_dispatch
+from pytest_garl.flight.flight import MarkerView
+from pytest_garl.verdicts.detectability import COEFFICIENTS, Network, features
+
+Array = NDArray[np.float64]
+FIELDS = tuple(field.name for field in dataclasses.fields(MarkerView))
+COLUMNS = ("scenario", "map", *CONDITIONS, "height_m", *FIELDS, "stock", "good", "learned")
+CHUNK = 20
+DIAGRAM = Path("pictures", "detectability.png")
+
+
+def table_of(frames: Iterable[ReadFrame]) -> Array:
+    """Return one row of ``COLUMNS`` per frame."""
+    rows = [
+        (
+            each.scenario,
+            MAPS.index(each.map),
+            *each.conditions,
+            each.height_m,
+            *dataclasses.astuple(each.view),
+            *each.read,
+        )
+        for each in frames
+    ]
+    return np.array(rows, dtype=np.float64).reshape(len(rows), len(COLUMNS))
+
+
+def features_of(table: Array) -> Array:
+    """Return the oracle's features of each row."""
+    first = COLUMNS.index(FIELDS[0])
+    views = table[:, first : first + len(FIELDS)].tolist()
+    return np.array(
+        [features(MarkerView(**dict(zip(FIELDS, view, strict=True)))) for view in views]
+    )
+
+
+def reads_of(table: Array) -> Array:
+    """Return whether each detector reads each row's frame, shape (n, 3)."""
+    reads: Array = table[:, -3:]
+    return reads
+
+
+def half_of(table: Array) -> NDArray[np.intp]:
+    """Return the half, 0 or 1, to which each row's scenario belongs; both have both maps."""
+    half: NDArray[np.intp] = table[:, 0].astype(int) // len(MAPS) % 2
+    return half
+
+
+def fitted(tables: Sequence[Array], columns: slice = slice(None)) -> Network:
+    """Return the network fitted to all rows of some tables."""
+    rows = np.concatenate(tables)
+    return fit(features_of(rows)[:, columns], reads_of(rows).max(axis=1))
+
+
+def held_out(tables: Sequence[Array]) -> list[Sample]:
+    """Return each table with the predictions of networks that have not seen the row's half."""
+    predicted = [np.zeros((4, len(table))) for table in tables]
+    for half in (0, 1):
+        others = [table[half_of(table) != half] for table in tables]
+        oracle = fitted(others)
+        by_size, without_cover = fitted(others, slice(1)), fitted(others, slice(3))
+        constant = float(reads_of(np.concatenate(others)).max(axis=1).mean())
+        for table, into in zip(tables, predicted, strict=True):
+            chosen = half_of(table) == half
+            inputs = features_of(table[chosen])
+            into[0, chosen] = oracle.probabilities(inputs)
+            into[1, chosen] = by_size.probabilities(inputs[:, :1])
+            into[2, chosen] = without_cover.probabilities(inputs[:, :3])
+            into[3, chosen] = constant
+    return [sample_of(table, into) for table, into in zip(tables, predicted, strict=True)]
+
+
+def sample_of(table: Array, predicted: Array) -> Sample:
+    """Return the rows with their predictions (4, n), in the order of ``Sample``'s fields."""
+    column = {name: table[:, index] for index, name in enumerate(COLUMNS)}
+    first = COLUMNS.index(CONDITIONS[0])
+    return Sample(
+        predicted=predicted[0],
+        by_size=predicted[1],
+        without_cover=predicted[2],
+        constant=predicted[3],
+        read_by=reads_of(table),
+        map=column["map"],
+        conditions=table[:, first : first + len(CONDITIONS)],
+        height_m=column["height_m"],
+        share_in_frame=column["share_in_frame"],
+        hidden=(column["border_hidden"] + column["bits_hidden"]) / 2,
+        px_per_module=column["px_per_module"],
+    )
+
+
+@functools.cache
+def detectors() -> Detectors:
+    """Return this process's detectors."""
+    return Detectors()
+
+
+def chunk(numbers: tuple[int, ...], kind: Kind) -> Array:
+    """Return the table of some scenarios."""
+    frames = [each for n in numbers for each in read_frames(n, detectors(), kind)]
+    return table_of(frames)
+
+
+def pinned_processes(workers: int) -> ProcessPoolExecutor:
+    """Return processes that compute alike on every machine, with one thread each."""
+    cpu_dispatch.pin()
+    return ProcessPoolExecutor(workers, multiprocessing.get_context("spawn"))
+
+
+def generate(scenarios: int, kind: Kind, workers: int) -> Array:
+    """Draw, paint and read the frames of scenarios, in their order, whatever the workers."""
+    chunks = [tuple(range(at, min(scenarios, at + CHUNK))) for at in range(0, scenarios, CHUNK)]
+    began, tables = time.monotonic(), []
+    with pinned_processes(workers) as pool:
+        for done, table in enumerate(pool.map(chunk, chunks, [kind] * len(chunks)), start=1):
+            tables.append(table)
+            left_s = (time.monotonic() - began) / done * (len(chunks) - done)
+            print(f"{done}/{len(chunks)} chunks, {left_s / 60:.0f} minutes left", flush=True)
+    return np.concatenate(tables)
+
+
+def main() -> None:
+    """Draw the frames where there are none, fit, and write coefficients, page and diagram."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--scenarios", type=int, default=2000, help="default 2000")
+    parser.add_argument(
+        "--others", type=int, default=250, help="blurred, far, cut, and cluttered; default 250 each"
+    )
+    parser.add_argument("--workers", type=int, default=2)
+    parser.add_argument("--frames", type=Path, default=Path(".garl/detectability.npz"))
+    parser.add_argument("--coefficients", type=Path, default=COEFFICIENTS)
+    parser.add_argument("--docs", type=Path, default=Path("docs"))
+    arguments = parser.parse_args()
+    if not arguments.frames.exists():
+        counts = (arguments.scenarios, *[arguments.others] * (len(KINDS) - 1))
+        drawn = [generate(*each, arguments.workers) for each in zip(counts, KINDS, strict=True)]
+        arguments.frames.parent.mkdir(parents=True, exist_ok=True)
+        named: dict[str, Any] = dict(zip(KINDS, drawn, strict=True))
+        np.savez_compressed(arguments.frames, **named)
+    with np.load(arguments.frames) as file:
+        tables = [file[kind] for kind in KINDS]
+    with pinned_processes(1) as process:
+        oracle = process.submit(fitted, tables).result()
+        usual, *others = process.submit(held_out, tables).result()
+    values = json.dumps(dataclasses.asdict(oracle), indent=1)
+    arguments.coefficients.write_text(values + "\n", encoding="utf-8")
+    draw(usual.where(usual.share_in_frame >= WHOLE), arguments.docs / DIAGRAM)
+    text = page(usual, others)
+    (arguments.docs / "detectability.md").write_text(text, encoding="utf-8")
+    print(text)
+
+
+if __name__ == "__main__":
+    main()

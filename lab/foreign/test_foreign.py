@@ -1,0 +1,65 @@
+"""Search for failures of the foreign systems; pytest collects this file only if it is named.
+
+GARL_FOREIGN=FOLDER pytest lab/foreign/test_foreign.py -k blueos --garl-budget=60
+"""
+
+from __future__ import annotations
+
+import pytest
+
+from lab.foreign.catalogue import SYSTEMS
+from pytest_garl import Landing
+
+
+class _Landings:
+    """What is expected of each landing."""
+
+    def test_lands_on_the_marker(self, landing: Landing) -> None:
+        """No farther from its centre than the limit."""
+        assert landing.distance_to_landing_m <= landing.limits.distance_m
+
+    def test_lands_in_time(self, landing: Landing) -> None:
+        """Within two minutes."""
+        assert landing.time_to_landing_s <= landing.limits.time_s
+
+    def test_collides_with_nothing(self, landing: Landing) -> None:
+        """No body but the ground, and that gently."""
+        assert not landing.collisions
+
+    def test_completes_the_mission(self, landing: Landing) -> None:
+        """It may give up only where nobody could land."""
+        assert landing.completed or landing.excused
+
+
+def _marks(name: str) -> list[pytest.MarkDecorator]:
+    foreign = next(each for each in SYSTEMS if each.name == name)
+    problem, files = foreign.repository.problem, foreign.repository.files
+    task = foreign.task
+    return [
+        pytest.mark.skipif(bool(problem), reason=problem),
+        pytest.mark.garl(
+            system=foreign.system,
+            maps=["court", "lawn"],
+            marker=task.marker,
+            start=task.start,
+            files=[] if problem else [foreign.repository.folder / each for each in files],
+        ),
+    ]
+
+
+class TestHowDoDronesWork(_Landings):
+    """The precise landing of "How do drones work?"."""
+
+    pytestmark = _marks("how-do-drones-work")
+
+
+class TestBlueOs(_Landings):
+    """The BlueOS extension "Precision Landing"."""
+
+    pytestmark = _marks("blueos")
+
+
+class TestCuavLanding(_Landings):
+    """The precision landing for CUAV."""
+
+    pytestmark = _marks("cuav-landing")
