@@ -1,18 +1,34 @@
-"""The layout that files name: a mentioned module exists, and no file or class grows too large."""
+"""The layout: rooms stay within their lines and their reach, and what a file names exists."""
 
 from __future__ import annotations
 
 import ast
 import re
+import tomllib
+from collections import Counter
 from collections.abc import Iterator
 from pathlib import Path
 
+import grimp
 import pytest
 
 ROOT = Path(__file__).parents[1]
 FOLDERS = ("pytest_garl", "landing_systems", "lab")
 MOST_LINES = 700
 MOST_LINES_OF_A_CLASS = 400
+BUDGETS = tomllib.loads(Path(__file__).with_name("line_budgets.toml").read_text())
+REACH = {
+    "pytest_garl.verdicts.judge": 37,
+    "pytest_garl.scenarios.files": 32,
+    "pytest_garl.regressions.case_file": 46,
+    "pytest_garl.plugin.options": 99,
+}
+"""Modules of the package that an import pulls in at most, those included that it imports late."""
+
+
+@pytest.fixture(scope="module")
+def imports() -> grimp.ImportGraph:
+    return grimp.build_graph("pytest_garl", cache_dir=None)
 
 
 def sources(*folders: str) -> Iterator[Path]:
@@ -44,3 +60,32 @@ def test_modules_that_the_package_mentions_exist() -> None:
             if not any(each.endswith(f"/{mention}") for each in known):
                 missing.append(f"{path.relative_to(ROOT)}: {mention}")
     assert not missing
+
+
+def test_rooms_stay_within_their_lines() -> None:
+    lines: Counter[str] = Counter()
+    for folder in FOLDERS:
+        for path in sources(folder):
+            inside = path.relative_to(ROOT).parts
+            lines["/".join(inside[:2]) if len(inside) > 2 else folder] += path.read_text().count(
+                "\n"
+            )
+    assert sorted(lines) == sorted(BUDGETS)
+    over = {room: count for room, count in lines.items() if count > BUDGETS[room]}
+    assert not over, "raise tests/line_budgets.toml in the same commit, and say why in its message"
+    idle = {room: count for room, count in lines.items() if count <= BUDGETS[room] - 200}
+    assert not idle, "lower tests/line_budgets.toml: these rooms shrank"
+
+
+@pytest.mark.parametrize("module", REACH)
+def test_a_module_reaches_few_others(module: str, imports: grimp.ImportGraph) -> None:
+    assert len(imports.find_upstream_modules(module)) <= REACH[module]
+
+
+def test_no_module_imports_itself_by_others(imports: grimp.ImportGraph) -> None:
+    """Imports inside of functions and for type checkers count."""
+    left = {each: set(imports.find_modules_directly_imported_by(each)) for each in imports.modules}
+    while free := {each for each, wanted in left.items() if not wanted}:
+        left = {each: wanted - free for each, wanted in left.items() if each not in free}
+    # What is left is in a circle, or imports one.
+    assert not left
