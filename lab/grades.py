@@ -21,7 +21,7 @@ from typing import Any
 import numpy as np
 
 from lab.table import Key, ResultTable, Row, run_study, share
-from pytest_garl.adversary.catalogue import policy_spec
+from pytest_garl.npcs.catalogue import policy_spec
 from pytest_garl.scenarios.chromosome import decode
 from pytest_garl.scenarios.domains.genome import genome_of
 from pytest_garl.scenarios.domains.reader import domain_named

@@ -24,11 +24,11 @@ import numpy as np
 
 from lab.table import Key, ResultTable, Row, run_study
 from pytest_garl import cpu_dispatch
-from pytest_garl.adversary.catalogue import DEFAULT_POLICY, policy_spec
-from pytest_garl.adversary.domain_policy import policy_in
-from pytest_garl.baselines.gate_statistics import holm_adjusted
 from pytest_garl.execution.flight import judged
 from pytest_garl.execution.result import FlightResult
+from pytest_garl.gate.gate_statistics import holm_adjusted
+from pytest_garl.npcs.catalogue import DEFAULT_POLICY, policy_spec
+from pytest_garl.npcs.domain_policy import policy_in
 from pytest_garl.scenarios.chromosome import encode
 from pytest_garl.scenarios.domains.genome import genome_of
 from pytest_garl.scenarios.domains.reader import domain_named

@@ -17,10 +17,10 @@ from pathlib import Path
 from typing import Any
 
 from lab.table import Key, ResultTable, Row, run_study, share
-from pytest_garl.adversary.interference import Interfering, Mind
-from pytest_garl.adversary.learned import LearnedMind, shipped
-from pytest_garl.adversary.minds import Direct, Intercepting, ToMarker
-from pytest_garl.adversary.training.presets import Uav
+from pytest_garl.npcs.interference import Interfering, Mind
+from pytest_garl.npcs.learned import LearnedMind, shipped
+from pytest_garl.npcs.minds import Direct, Intercepting, ToMarker
+from pytest_garl.npcs.training.presets import Uav
 
 SEEDS_FROM = 3_500_000_000
 """Beyond the seeds of training, validation and report."""
@@ -50,8 +50,8 @@ def interfering(grade: str, mind: str) -> Interfering:
 
 def collisions(job: tuple[str, str, Uav, range]) -> int:
     """Return how many episodes end in a collision."""
-    from pytest_garl.adversary.training.graded import GradedEnv
-    from pytest_garl.adversary.training.presets import PRESETS
+    from pytest_garl.npcs.training.graded import GradedEnv
+    from pytest_garl.npcs.training.presets import PRESETS
     from pytest_garl.scenarios.maps.loading import load_map
 
     grade, name, uav, seeds = job

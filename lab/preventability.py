@@ -25,6 +25,14 @@ import numpy as np
 from lab.experiment.pytest_run import run_pytest
 from lab.experiment.spec import ExperimentRun
 from lab.table import ResultTable, Row, run_study, share
+from pytest_garl.cases.case import REACTION_S
+from pytest_garl.cases.case_flights import ESCAPE_FLIGHTS, recorded_behaviour
+from pytest_garl.cases.clearance import touched_nothing
+from pytest_garl.cases.prevention import (
+    Collision,
+    collision_of,
+    prevention_of,
+)
 from pytest_garl.execution.flight_id import CompletedFlight
 from pytest_garl.execution.job import FlightJob, parse_job
 from pytest_garl.execution.ledger import Ledger
@@ -33,14 +41,6 @@ from pytest_garl.execution.local_pool import local_pool
 from pytest_garl.execution.on_demand import FlyFunction, OnDemandFlights
 from pytest_garl.execution.reference import reference_to
 from pytest_garl.flight.flight_file import load
-from pytest_garl.regressions.case import REACTION_S
-from pytest_garl.regressions.case_flights import ESCAPE_FLIGHTS, recorded_behaviour
-from pytest_garl.regressions.clearance import touched_nothing
-from pytest_garl.regressions.prevention import (
-    Collision,
-    collision_of,
-    prevention_of,
-)
 from pytest_garl.scenarios.files import parse_scenario
 from pytest_garl.scenarios.maps.loading import load_map
 from pytest_garl.simulation.system_under_test.reference_pilot import ReferencePilot

@@ -34,7 +34,7 @@ _HOMES = {
     "pytest_garl.flight.flight": ("Flight",),
     "pytest_garl.simulation.npc_policy": ("Move", "PolicySpec", "Situation"),
     "pytest_garl.verdicts.verdict": ("Limits", "limits"),
-    "pytest_garl.video": ("save_video",),
+    "pytest_garl.reports.film": ("save_video",),
 }
 """Where each public name is defined."""
 _HOME_OF = {name: home for home, names in _HOMES.items() for name in names}

@@ -19,10 +19,10 @@ from pytest_garl.landing_system import (
     VelocitySetpoint,
 )
 from pytest_garl.plugin.landing import Landing
+from pytest_garl.reports.film import save_video
 from pytest_garl.scenarios.task import Start
 from pytest_garl.simulation.npc_policy import Move, PolicySpec, Situation
 from pytest_garl.verdicts.verdict import Limits
-from pytest_garl.video import save_video
 
 __version__: str
 

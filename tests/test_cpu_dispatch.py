@@ -137,7 +137,7 @@ def test_training_computes_by_the_baseline() -> None:
         "from pytest_garl.cli import main\n"
         "assert main.get_command(None, 'train')\n"
         "from pytest_garl import cpu_dispatch\n"
-        "import pytest_garl.adversary.training.train, torch\n"
+        "import pytest_garl.npcs.training.train, torch\n"
         "print(torch.backends.cpu.get_cpu_capability(), cpu_dispatch.dispatched())\n"
     )
     outside = {"ATEN_CPU_CAPABILITY": "default", "OPENBLAS_CORETYPE": "Nehalem"}

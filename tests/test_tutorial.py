@@ -9,8 +9,8 @@ from pathlib import Path
 
 import pytest
 
+from pytest_garl.cases.case_file import load_case
 from pytest_garl.cpu_dispatch import cpu_class_of_flights
-from pytest_garl.regressions.case_file import load_case
 from tests.support.other_plugins import WITHOUT_FOREIGN
 
 DOCS = Path(__file__).parents[1] / "docs"

@@ -14,8 +14,8 @@ from pathlib import Path
 
 import numpy as np
 
-from pytest_garl.regressions.case import Case, Evidence, Violation
-from pytest_garl.regressions.case_file import dump_case
+from pytest_garl.cases.case import Case, Evidence, Violation
+from pytest_garl.cases.case_file import dump_case
 from pytest_garl.scenarios.chromosome import decode
 from pytest_garl.scenarios.genes import genome_for
 from pytest_garl.scenarios.maps.loading import load_map

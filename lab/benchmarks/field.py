@@ -19,8 +19,8 @@ import cv2
 import numpy as np
 
 from landing_systems.opencv_mls import OpenCvLandingSystem
-from pytest_garl.adversary.catalogue import policy_spec
 from pytest_garl.landing_system import Camera
+from pytest_garl.npcs.catalogue import policy_spec
 from pytest_garl.scenarios.chromosome import decode
 from pytest_garl.scenarios.domains.genome import genome_of
 from pytest_garl.scenarios.domains.reader import domain_named

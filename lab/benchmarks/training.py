@@ -10,8 +10,8 @@ import argparse
 import dataclasses
 import time
 
-from pytest_garl.adversary.training.presets import PRESETS
-from pytest_garl.adversary.training.train import train
+from pytest_garl.npcs.training.presets import PRESETS
+from pytest_garl.npcs.training.train import train
 from pytest_garl.scenarios.maps.loading import load_map
 
 

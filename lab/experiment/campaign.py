@@ -15,11 +15,11 @@ from lab.experiment.measure import finished_searches, result_row
 from lab.experiment.pytest_run import run_pytest
 from lab.experiment.results import ResultRow, append_rows, read_rows
 from lab.experiment.spec import Experiment, ExperimentRun
-from pytest_garl.adversary.catalogue import policy_spec
 from pytest_garl.errors import ExperimentError, GarlError
 from pytest_garl.execution.ledger import Ledger
 from pytest_garl.execution.ledger_queries import SearchProgress
 from pytest_garl.files.atomic import locked
+from pytest_garl.npcs.catalogue import policy_spec
 from pytest_garl.scenarios.maps.loading import load_map
 from pytest_garl.search.catalogue import find_method
 

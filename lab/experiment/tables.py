@@ -20,7 +20,7 @@ from lab.experiment.metrics import (
 )
 from lab.experiment.results import ResultRow
 from lab.experiment.spec import PAPER_TYPES, Experiment, Grid
-from pytest_garl.baselines.gate_statistics import holm_adjusted
+from pytest_garl.gate.gate_statistics import holm_adjusted
 from pytest_garl.verdicts.kinds import hill_number, kinds_in_violations
 from pytest_garl.verdicts.statistics import mann_whitney, vargha_delaney
 

@@ -13,9 +13,9 @@ from lab.faults.catalogue import fault_named
 from lab.faults.fault import Fault, finds, result_of
 from lab.table import Key, ResultTable
 from pytest_garl import cpu_dispatch
-from pytest_garl.adversary.catalogue import DEFAULT_POLICY, policy_spec
-from pytest_garl.adversary.domain_policy import policy_in
 from pytest_garl.execution.result import FlightResult
+from pytest_garl.npcs.catalogue import DEFAULT_POLICY, policy_spec
+from pytest_garl.npcs.domain_policy import policy_in
 from pytest_garl.scenarios.chromosome import encode
 from pytest_garl.scenarios.domains.genome import genome_of
 from pytest_garl.scenarios.domains.reader import domain_named

@@ -16,9 +16,9 @@ import numpy as np
 
 from lab.pictures.flight_sheet import sheet
 from landing_systems.opencv_mls import OpenCvLandingSystem
-from pytest_garl.adversary.catalogue import policy_spec
 from pytest_garl.flight.flight import Flight
 from pytest_garl.landing_system import Camera
+from pytest_garl.npcs.catalogue import policy_spec
 from pytest_garl.scenarios.genes import WEATHER, genome_for
 from pytest_garl.scenarios.maps.loading import load_map
 from pytest_garl.scenarios.maps.map import Map

@@ -19,11 +19,11 @@ from pytest_garl.scenarios.domains.names import DEFAULT_DOMAIN, OLD_WEATHER
 from pytest_garl.verdicts.verdict import DEFAULT_LIMITS
 
 if TYPE_CHECKING:
-    from pytest_garl.baselines.comparison import Comparison
-    from pytest_garl.baselines.file import BaselineSet
-    from pytest_garl.baselines.record import BaselineSpec
     from pytest_garl.execution.flight_id import CompletedFlight
     from pytest_garl.execution.reference import Reference
+    from pytest_garl.gate.comparison import Comparison
+    from pytest_garl.gate.file import BaselineSet
+    from pytest_garl.gate.record import BaselineSpec
 
 IN_PAPER = "waypoint"
 """The NPC policy of a baseline in the world of the paper: nobody pursues the UAV."""
@@ -139,9 +139,9 @@ def save(
 
     Run it where you run pytest. The same options choose the same scenarios for every system.
     """
-    from pytest_garl.baselines.file import save_baseline
-    from pytest_garl.baselines.record import baseline_from_ledger, fly_baseline
     from pytest_garl.execution.checkout import Checkout
+    from pytest_garl.gate.file import save_baseline
+    from pytest_garl.gate.record import baseline_from_ledger, fly_baseline
 
     if ledger is not None:
         recorded = baseline_from_ledger(ledger)
@@ -163,7 +163,7 @@ def save(
 @click.argument("file", type=click.Path(path_type=Path, exists=True, dir_okay=False))
 def show(file: Path) -> None:
     """Print how the flights of a baseline ended: landed ones first, then what went wrong."""
-    from pytest_garl.baselines.file import load_baseline
+    from pytest_garl.gate.file import load_baseline
 
     for each in load_baseline(file, (_maps_folder(),)).sets:
         _show_set(each)
@@ -174,7 +174,7 @@ def show(file: Path) -> None:
 @click.argument("name")
 def scenario(file: Path, name: str) -> None:
     """Print one scenario of a baseline, such as court-17, as a file for pytest --garl-repeat."""
-    from pytest_garl.baselines.file import load_baseline
+    from pytest_garl.gate.file import load_baseline
     from pytest_garl.scenarios.files import dumps
     from pytest_garl.scenarios.maps.loading import load_map
 
@@ -214,9 +214,9 @@ def diff(
     less accurate or slower, or an inconclusive flight. Both
     use the simulator and the NPC policies of this installation, and the maps of this folder.
     """
-    from pytest_garl.baselines.gate import compare_sets
-    from pytest_garl.baselines.record import fly_baseline, neighbour_flyer
     from pytest_garl.execution.checkout import Checkout
+    from pytest_garl.gate.gate import compare_sets
+    from pytest_garl.gate.record import fly_baseline, neighbour_flyer
     from pytest_garl.scenarios.maps.loading import load_map
 
     if not systems:
@@ -251,8 +251,8 @@ def _spec(
     npcs: str,
     **rest: Any,
 ) -> BaselineSpec:
-    from pytest_garl.adversary.domain_policy import domain_with_policy, policy_in
-    from pytest_garl.baselines.record import BaselineSpec
+    from pytest_garl.gate.record import BaselineSpec
+    from pytest_garl.npcs.domain_policy import domain_with_policy, policy_in
     from pytest_garl.verdicts.verdict import Limits
 
     names = tuple(dict.fromkeys(part.strip() for part in maps.split(",") if part.strip()))
@@ -303,8 +303,8 @@ def _progress(
 
 
 def _show_set(each: BaselineSet) -> None:
-    from pytest_garl.baselines.comparison_text import column_lines, size_lines
-    from pytest_garl.baselines.compatibility import limits_text
+    from pytest_garl.gate.comparison_text import column_lines, size_lines
+    from pytest_garl.gate.compatibility import limits_text
 
     flights = [flight.summary for flight in each.flights]
     inconclusive = sum(not flight.decided for flight in flights)
@@ -318,8 +318,8 @@ def _show_set(each: BaselineSet) -> None:
 
 
 def _show(title: str, found: Comparison) -> None:
-    from pytest_garl.baselines.comparison_text import summary_lines
-    from pytest_garl.baselines.pairs import DIFFERENT_RESULTS
+    from pytest_garl.gate.comparison_text import summary_lines
+    from pytest_garl.gate.pairs import DIFFERENT_RESULTS
 
     table = Table(box=None, header_style="bold")
     for name in ("scenario", "", "base", "head"):

@@ -11,13 +11,13 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
+from pytest_garl.cases.case import Case
+from pytest_garl.cases.corpus import CorpusEntry
+from pytest_garl.cases.description import describe_scenario
 from pytest_garl.messages import printable
-from pytest_garl.regressions.case import Case
-from pytest_garl.regressions.corpus import CorpusEntry
-from pytest_garl.regressions.description import describe_scenario
 
 if TYPE_CHECKING:
-    from pytest_garl.regressions.renewal import Renewal
+    from pytest_garl.cases.renewal import Renewal
 
 _ENDLESS = 100_000
 """Width of a table outside a terminal, so that no name is cut."""

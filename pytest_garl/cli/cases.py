@@ -13,6 +13,13 @@ from click.core import ParameterSource
 from rich.console import Console
 from rich.progress import Progress
 
+from pytest_garl.cases.case import NO_GATE_TEXTS, Case, NoGateReason
+from pytest_garl.cases.case_file import load_case
+from pytest_garl.cases.corpus import Corpus, replace_file, rewrite_file
+from pytest_garl.cases.description import unusual_in_flight
+from pytest_garl.cases.reference_proofs import Proofs
+from pytest_garl.cases.replay import Replay, replay
+from pytest_garl.cases.story_text import grade_in_words
 from pytest_garl.cli.case_tables import (
     case_table,
     environment_changes,
@@ -23,17 +30,10 @@ from pytest_garl.cli.case_tables import (
 from pytest_garl.cli.shared import FOLDER, say
 from pytest_garl.errors import CorpusError, GarlError
 from pytest_garl.messages import command, printable
-from pytest_garl.regressions.case import NO_GATE_TEXTS, Case, NoGateReason
-from pytest_garl.regressions.case_file import load_case
-from pytest_garl.regressions.corpus import Corpus, replace_file, rewrite_file
-from pytest_garl.regressions.description import unusual_in_flight
-from pytest_garl.regressions.reference_proofs import Proofs
-from pytest_garl.regressions.replay import Replay, replay
-from pytest_garl.regressions.story_text import grade_in_words
 
 if TYPE_CHECKING:
+    from pytest_garl.cases.renewal import Renewal
     from pytest_garl.plugin.project_collection import ProjectTests
-    from pytest_garl.regressions.renewal import Renewal
 
 NO_PROOF = 3
 """Exit status of a replay that proves nothing."""
@@ -174,7 +174,7 @@ def replay_(context: click.Context, file: Path, live: bool, video: Path | None) 
     project: _Project = context.obj
     case = project.case(file)
     if video is not None:
-        from pytest_garl.video.film_file import check_film_file
+        from pytest_garl.reports.film.film_file import check_film_file
 
         # Checked before the flight, which takes longer.
         check_film_file(video, makes_folder=True)
@@ -280,8 +280,8 @@ def shrink(project: _Project, file: Path, flights: int, workers: int) -> None:
     The command replaces the file only by a case that is no worse in any respect (objects, genes,
     moves, size, neighbours that fail) and better in at least one.
     """
+    from pytest_garl.cases.reshrink import NOTHING_SIMPLER, shrink_case
     from pytest_garl.plugin.case_tests import case_setup
-    from pytest_garl.regressions.reshrink import NOTHING_SIMPLER, shrink_case
 
     case = project.case(file)
     setup = case_setup(case, project.root)
@@ -323,7 +323,7 @@ def renew(project: _Project, files: tuple[Path, ...], workers: int) -> None:
     something else, the file gets the new signature and name. A case whose flight differs stays as
     it is, and the exit status is 1.
     """
-    from pytest_garl.regressions.renewal import RenewalResult, renew
+    from pytest_garl.cases.renewal import RenewalResult, renew
 
     tests, corpus = project.collected()
     if files:
@@ -403,7 +403,7 @@ def check(project: _Project) -> None:
     pytest collects the test files of the project that have the marker, and those that cases name. A
     case that none of them flies is lost.
     """
-    from pytest_garl.regressions.census import census
+    from pytest_garl.cases.census import census
 
     tests, corpus = project.collected()
     problems = [f"{file}: cannot be collected: {reason}" for file, reason in tests.broken]

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import click
 
-from pytest_garl.adversary.domain_policy import domain_with_policy
+from pytest_garl.npcs.domain_policy import domain_with_policy
 from pytest_garl.scenarios.domains.domain import ABSENT, CONDITIONS, ELEVATION, Domain
 from pytest_garl.scenarios.domains.names import BUILT_IN, DEFAULT_DOMAIN
 from pytest_garl.scenarios.genes import CONFINED_WEATHER

@@ -11,8 +11,8 @@ from pytest_garl.cli.flight_options import names_flight
 from pytest_garl.cli.named_flight import CASE, RECORD, FlightName, NamedFlight
 from pytest_garl.cli.shared import say
 from pytest_garl.errors import GarlError
-from pytest_garl.video import save_video
-from pytest_garl.video.film_file import check_film_file
+from pytest_garl.reports.film import save_video
+from pytest_garl.reports.film.film_file import check_film_file
 
 
 @click.command()

@@ -6,6 +6,10 @@ import re
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+from pytest_garl.cases.case import Case
+from pytest_garl.cases.case_file import load_case
+from pytest_garl.cases.corpus import Corpus
+from pytest_garl.cases.replay import Replay, replay, system_of
 from pytest_garl.cli.check import imported_system
 from pytest_garl.cli.shared import LEDGER, say
 from pytest_garl.errors import GarlError, LedgerError
@@ -17,10 +21,6 @@ from pytest_garl.flight.flight import Flight
 from pytest_garl.flight.flight_file import load
 from pytest_garl.landing_system import airframe_of
 from pytest_garl.messages import command, shortened
-from pytest_garl.regressions.case import Case
-from pytest_garl.regressions.case_file import load_case
-from pytest_garl.regressions.corpus import Corpus
-from pytest_garl.regressions.replay import Replay, replay, system_of
 from pytest_garl.reports.films import NO_RECORD, camera_of, recorded_flight, why_no_camera
 from pytest_garl.reports.html.flight_task import FlightTask, record_of
 from pytest_garl.reports.mcap.source import Export, Place

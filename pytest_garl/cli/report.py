@@ -8,10 +8,10 @@ from typing import Any
 
 import click
 
+from pytest_garl.cases.corpus import Corpus
 from pytest_garl.cli.shared import FOLDER
 from pytest_garl.files.atomic import write_text_atomically
 from pytest_garl.messages import printable
-from pytest_garl.regressions.corpus import Corpus
 from pytest_garl.reports.html import MOST_FILMS
 from pytest_garl.reports.run_report import run_report_as_json
 from pytest_garl.reports.shares_text import in_control_text

@@ -13,15 +13,15 @@ from typing import TYPE_CHECKING, Any, get_args
 import click
 
 from pytest_garl import cpu_dispatch
-from pytest_garl.adversary.catalogue import DEFAULT_POLICY
-from pytest_garl.adversary.training.presets import PRESETS, Preset, Reward, Uav
 from pytest_garl.errors import GarlError
 from pytest_garl.landing_system import Airframe, airframe_of
+from pytest_garl.npcs.catalogue import DEFAULT_POLICY
+from pytest_garl.npcs.training.presets import PRESETS, Preset, Reward, Uav
 from pytest_garl.scenarios.object_types import OBJECT_TYPES
 from pytest_garl.scenarios.story import GRADES
 
 if TYPE_CHECKING:
-    from pytest_garl.adversary.training.selection import TrainingPlan
+    from pytest_garl.npcs.training.selection import TrainingPlan
 
 RECENT_EPISODES = 50
 """Number of episodes over which the progress bar averages."""
@@ -120,7 +120,7 @@ def train(**options: Any) -> None:
     if options["out"].suffix != ".npz":
         raise GarlError(f"--out: found {str(options['out'])!r}, expected a name that ends in .npz")
     try:
-        from pytest_garl.adversary.training.selection import train_best
+        from pytest_garl.npcs.training.selection import train_best
     except ImportError as error:
         raise GarlError(
             f"training needs packages that flying does not need ({error}): "
@@ -139,7 +139,7 @@ def train(**options: Any) -> None:
 
 
 def _plan(options: dict[str, Any]) -> TrainingPlan:
-    from pytest_garl.adversary.training.selection import TrainingPlan
+    from pytest_garl.npcs.training.selection import TrainingPlan
     from pytest_garl.scenarios.maps.loading import load_map
 
     name, preset = _preset(options["policy"], options["grades"])

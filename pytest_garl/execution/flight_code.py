@@ -19,7 +19,7 @@ from pytest_garl.execution.sources import imported_names
 
 ROOTS = (
     "pytest_garl.simulation.fly",
-    "pytest_garl.adversary.recorded",
+    "pytest_garl.npcs.recorded",
     "pytest_garl.verdicts.judge",
 )
 """What flies a case, what moves its objects, and what judges it."""

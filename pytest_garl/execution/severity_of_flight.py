@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from pytest_garl.adversary.grades import GRADE_LIMITS
 from pytest_garl.execution.severity import NO_SEVERITY, Severity
 from pytest_garl.flight.flight import Contact, Flight, ObjectRecord
 from pytest_garl.flight.landing_phases import LandingPhases
 from pytest_garl.flight.thresholds import up_m
+from pytest_garl.npcs.grades import GRADE_LIMITS
 from pytest_garl.scenarios.conditions import active_conditions, unread_groups
 from pytest_garl.scenarios.maps.map import Map
 from pytest_garl.scenarios.scenario import Scenario

@@ -10,7 +10,7 @@ from collections import namedtuple
 
 import pytest
 
-from pytest_garl.adversary.catalogue import DEFAULT_POLICY, policy_names
+from pytest_garl.npcs.catalogue import DEFAULT_POLICY, policy_names
 from pytest_garl.scenarios.domains.names import DEFAULT_DOMAIN
 from pytest_garl.search.catalogue import DEFAULT_METHOD, method_names
 

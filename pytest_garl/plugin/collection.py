@@ -97,7 +97,7 @@ def parametrize(metafunc: pytest.Metafunc, marker: pytest.Mark, options: Options
 
 def _note(metafunc: pytest.Metafunc, arguments: MarkerArguments) -> None:
     """Note a test for the census of the saved cases."""
-    from pytest_garl.regressions.collected_tests import CollectedTest
+    from pytest_garl.cases.collected_tests import CollectedTest
 
     metafunc.config.stash[COLLECTED].tests.append(
         CollectedTest(

@@ -15,8 +15,8 @@ from typing import Any
 
 import pytest
 
+from pytest_garl.cases.user_failure import UserFailure
 from pytest_garl.messages import printable
-from pytest_garl.regressions.user_failure import UserFailure
 
 FAILED_ASSERTION_TYPES: tuple[type[BaseException], ...] = (AssertionError, pytest.fail.Exception)
 """Exceptions by which a test says that a property does not hold; all others are errors."""

@@ -7,12 +7,12 @@ from collections.abc import Sequence
 import pytest
 
 from pytest_garl import cpu_dispatch
+from pytest_garl.cases.forecast import flight_times_with_shrinking, seconds_per_new_signature
 from pytest_garl.messages import command
 from pytest_garl.plugin.run import Run
 from pytest_garl.plugin.suggested_commands import shown_path
 from pytest_garl.plugin.terminal_text import counted, duration
 from pytest_garl.plugin.time_left import FIRST_FLIGHTS
-from pytest_garl.regressions.forecast import flight_times_with_shrinking, seconds_per_new_signature
 from pytest_garl.reports.shares_text import limits_text
 from pytest_garl.verdicts.verdict import DEFAULT_LIMITS
 

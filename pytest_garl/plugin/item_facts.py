@@ -9,6 +9,7 @@ from typing import TypeVar
 
 import pytest
 
+from pytest_garl.cases.user_failure import UserFailure
 from pytest_garl.execution.flight_id import CompletedFlight
 from pytest_garl.execution.result import FlightResult
 from pytest_garl.plugin.failed_statement import failure_of
@@ -24,7 +25,6 @@ from pytest_garl.plugin.outcomes import (
 from pytest_garl.plugin.run import REFLIGHTS, Run, test_of
 from pytest_garl.plugin.target import Target
 from pytest_garl.plugin.user_assertions import ItemAssertion
-from pytest_garl.regressions.user_failure import UserFailure
 
 F = TypeVar("F", PassedCase, UnjudgedFlight)
 

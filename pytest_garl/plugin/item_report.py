@@ -9,6 +9,8 @@ from pathlib import Path
 
 import pytest
 
+from pytest_garl.cases.case import Case
+from pytest_garl.cases.corpus import folder_of
 from pytest_garl.execution.result import FlightResult
 from pytest_garl.plugin import report_text
 from pytest_garl.plugin.item_facts import (
@@ -51,8 +53,6 @@ from pytest_garl.plugin.report_text import FailureText
 from pytest_garl.plugin.run import Run
 from pytest_garl.plugin.suggested_commands import shown_path
 from pytest_garl.plugin.target import Target
-from pytest_garl.regressions.case import Case
-from pytest_garl.regressions.corpus import folder_of
 from pytest_garl.reports.html.naming import page_address, page_name
 
 

@@ -10,11 +10,11 @@ from typing import Any
 
 import pytest
 
+from pytest_garl.cases.case_request import CaseRequest, CaseResult
 from pytest_garl.execution.ledger import Ledger
 from pytest_garl.plugin.run import Run
 from pytest_garl.plugin.terminal_text import begin_line, duration, width_of, wrapped
 from pytest_garl.plugin.time_left import NewKinds, TimeLeft
-from pytest_garl.regressions.case_request import CaseRequest, CaseResult
 from pytest_garl.verdicts.wording import headline
 
 PERIOD_S = 1.0

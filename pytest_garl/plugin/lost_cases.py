@@ -12,8 +12,8 @@ import pytest
 from pytest_garl.plugin.keys import LOST, is_xdist_worker
 
 if TYPE_CHECKING:
+    from pytest_garl.cases.collected_tests import CollectedTest, Collection
     from pytest_garl.plugin.options import Options
-    from pytest_garl.regressions.collected_tests import CollectedTest, Collection
 
 
 class Collected:
@@ -74,7 +74,7 @@ def lost_case_items(
         raise pytest.UsageError(missing)
     if missing:
         return [_item(session, options.cases, missing)]
-    from pytest_garl.regressions.census import census
+    from pytest_garl.cases.census import census
 
     lost = census(options.corpus, collection_of(config, options, collected))
     return [_item(session, each.path, each.reason) for each in lost]
@@ -97,7 +97,7 @@ def missing_folder(options: Options) -> str:
 
 def collection_of(config: pytest.Config, options: Options, collected: Collected) -> Collection:
     """Return what a session collected."""
-    from pytest_garl.regressions.collected_tests import Collection
+    from pytest_garl.cases.collected_tests import Collection
 
     return Collection(
         root=options.root,

@@ -49,7 +49,7 @@ def filmed(text: str, *, draws: bool) -> Literal["", "failures"]:
         return ""
     among("film", text, ("failures",))
     if draws:
-        from pytest_garl.video.encoder import program
+        from pytest_garl.reports.film.encoder import program
 
         try:
             program()

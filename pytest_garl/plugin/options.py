@@ -11,10 +11,10 @@ from typing import TYPE_CHECKING, Any, Literal, cast
 
 import pytest
 
-from pytest_garl.adversary.catalogue import policy_names
-from pytest_garl.adversary.domain_policy import domain_with_policy, policy_in
 from pytest_garl.errors import GarlError
 from pytest_garl.execution.flight_id import Slot
+from pytest_garl.npcs.catalogue import policy_names
+from pytest_garl.npcs.domain_policy import domain_with_policy, policy_in
 from pytest_garl.plugin.arguments import DEFAULT_CASES, OPTIONS, Option
 from pytest_garl.plugin.keys import is_xdist_worker
 from pytest_garl.plugin.option_values import among, filmed, integer, number, wrong
@@ -23,8 +23,8 @@ from pytest_garl.scenarios.domains.names import DEFAULT_DOMAIN, OLD_WEATHER
 from pytest_garl.search.catalogue import default_policy, find_method, method_names
 
 if TYPE_CHECKING:
+    from pytest_garl.cases.corpus import Corpus
     from pytest_garl.execution.stored_ledger import StoredSlot
-    from pytest_garl.regressions.corpus import Corpus
     from pytest_garl.scenarios.domains.domain import Domain
 
 SLOT_ID = re.compile(r"(?P<map>.+)-g(?P<generation>\d{2,})-s(?P<slot>\d{2,})")
@@ -116,7 +116,7 @@ class Options:
     @functools.cached_property
     def corpus(self) -> Corpus:
         """The saved cases, read once."""
-        from pytest_garl.regressions.corpus import Corpus
+        from pytest_garl.cases.corpus import Corpus
 
         return Corpus(self.cases, self.map_folders)
 

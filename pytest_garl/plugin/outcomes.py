@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from enum import Enum
 from typing import Literal, TypeVar
 
-from pytest_garl.regressions.case import NoGateReason, Status
+from pytest_garl.cases.case import NoGateReason, Status
 
 Outcome = Literal["passed", "failed", "xfailed", "skipped"]
 

@@ -14,8 +14,8 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
-from pytest_garl.adversary.catalogue import policy_spec
-from pytest_garl.adversary.domain_policy import NOBODY
+from pytest_garl.cases.case_request import CaseRequest
+from pytest_garl.cases.new_signatures import request_of
 from pytest_garl.errors import GarlError
 from pytest_garl.execution.flight_id import FIRST_SLOT, CompletedFlight, search_key
 from pytest_garl.execution.job import parse_job
@@ -26,6 +26,8 @@ from pytest_garl.files.atomic import write_text_atomically
 from pytest_garl.flight.flight_file import load
 from pytest_garl.landing_system import Airframe
 from pytest_garl.messages import command
+from pytest_garl.npcs.catalogue import policy_spec
+from pytest_garl.npcs.domain_policy import NOBODY
 from pytest_garl.plugin.abort import abort_session
 from pytest_garl.plugin.keys import RUN, target_of
 from pytest_garl.plugin.options import Options
@@ -33,8 +35,6 @@ from pytest_garl.plugin.run import Run
 from pytest_garl.plugin.suggested_commands import shown_path
 from pytest_garl.plugin.target import Target
 from pytest_garl.plugin.terminal_text import counted
-from pytest_garl.regressions.case_request import CaseRequest
-from pytest_garl.regressions.new_signatures import request_of
 from pytest_garl.scenarios.conditions import active_conditions
 from pytest_garl.scenarios.domains.domain import Domain
 from pytest_garl.scenarios.domains.navigation import within

@@ -18,13 +18,13 @@ from typing import Any
 
 import pytest
 
+from pytest_garl.cases.census import marked_test_files
+from pytest_garl.cases.collected_tests import CollectedTest, Collection
 from pytest_garl.errors import GarlError
 from pytest_garl.execution.reference import BUILT_IN, Reference, reference_to
 from pytest_garl.plugin.keys import COLLECTED
 from pytest_garl.plugin.lost_cases import collection_of
 from pytest_garl.plugin.options import options_of
-from pytest_garl.regressions.census import marked_test_files
-from pytest_garl.regressions.collected_tests import CollectedTest, Collection
 
 _OUTPUT_LINES = 20
 """Number of last lines of pytest's output in the error of a run that collected nothing."""

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import pytest
 
+from pytest_garl.cases.case import Case
 from pytest_garl.execution.result import FlightResult
 from pytest_garl.execution.severity import Severity
 from pytest_garl.messages import command
@@ -15,7 +16,6 @@ from pytest_garl.plugin.run import Run
 from pytest_garl.plugin.suggested_commands import repeat_line
 from pytest_garl.plugin.target import Target
 from pytest_garl.plugin.terminal_text import width_of, wrapped
-from pytest_garl.regressions.case import Case
 from pytest_garl.verdicts.statistics import share_interval
 from pytest_garl.verdicts.wording import headline
 
@@ -115,7 +115,7 @@ def violation_text(
 
 
 def _unusual(severity: Severity) -> str:
-    from pytest_garl.regressions.description import unusual_in_flight
+    from pytest_garl.cases.description import unusual_in_flight
 
     return unusual_in_flight(severity)
 
@@ -163,7 +163,7 @@ def _scenario(config: pytest.Config, run: Run, target: Target) -> list[str]:
     """Return the scenario in physical units if ``-v`` is given."""
     if config.get_verbosity() < 1:
         return []
-    from pytest_garl.regressions.description import scenario_in_words
+    from pytest_garl.cases.description import scenario_in_words
 
     scenario = run.scenario(target)
     policy = run.searches.policy_name(target)

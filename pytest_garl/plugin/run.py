@@ -12,6 +12,9 @@ from typing import TYPE_CHECKING, TextIO
 
 import pytest
 
+from pytest_garl.cases.known_kinds import Excuse, KnownCase, KnownKinds
+from pytest_garl.cases.reference_proofs import Proofs, proves_reference
+from pytest_garl.cases.replay import SourceHashes, stale_reasons
 from pytest_garl.errors import LedgerError
 from pytest_garl.execution.batch import fly_all
 from pytest_garl.execution.first_violations import FirstViolations
@@ -25,9 +28,6 @@ from pytest_garl.plugin.keys import target_of
 from pytest_garl.plugin.options import Options
 from pytest_garl.plugin.search_setup import Searches
 from pytest_garl.plugin.target import Target
-from pytest_garl.regressions.known_kinds import Excuse, KnownCase, KnownKinds
-from pytest_garl.regressions.reference_proofs import Proofs, proves_reference
-from pytest_garl.regressions.replay import SourceHashes, stale_reasons
 from pytest_garl.reports.search_summary import CAMERA, DOMAINS
 from pytest_garl.scenarios.files import parse_scenario
 from pytest_garl.scenarios.maps.loading import load_map
@@ -35,10 +35,10 @@ from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.simulation.npc_policy import PolicySpec
 
 if TYPE_CHECKING:
+    from pytest_garl.cases.follow_up import InvestigatedSignature
+    from pytest_garl.cases.forecast import RemainingWork
+    from pytest_garl.cases.investigations import Investigations
     from pytest_garl.plugin.user_assertions import ItemAssertion
-    from pytest_garl.regressions.follow_up import InvestigatedSignature
-    from pytest_garl.regressions.forecast import RemainingWork
-    from pytest_garl.regressions.investigations import Investigations
 
 SELECTED = "selected flights"
 """The ledger's fact: how many flights of searches the selected tests want."""

@@ -10,6 +10,10 @@ from typing import Any
 
 import pytest
 
+from pytest_garl.cases.case import Case
+from pytest_garl.cases.case_request import CaseRequest
+from pytest_garl.cases.follow_up import InvestigatedSignature, follow_up
+from pytest_garl.cases.investigations import Investigations
 from pytest_garl.errors import GarlError
 from pytest_garl.messages import command
 from pytest_garl.plugin.keys import is_xdist_worker
@@ -21,10 +25,6 @@ from pytest_garl.plugin.run import Run
 from pytest_garl.plugin.suggested_commands import shown_path
 from pytest_garl.plugin.terminal_text import begin_line, counted, duration, width_of, wrapped
 from pytest_garl.plugin.user_assertions import collect_assertion
-from pytest_garl.regressions.case import Case
-from pytest_garl.regressions.case_request import CaseRequest
-from pytest_garl.regressions.follow_up import InvestigatedSignature, follow_up
-from pytest_garl.regressions.investigations import Investigations
 
 _PATCH = ".patch"
 

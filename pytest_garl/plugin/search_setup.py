@@ -9,8 +9,6 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
-from pytest_garl.adversary.catalogue import policy_names, policy_spec
-from pytest_garl.adversary.policy_check import check_policy
 from pytest_garl.errors import LedgerError
 from pytest_garl.execution.database import SearchKind
 from pytest_garl.execution.flight_id import Slot
@@ -18,6 +16,8 @@ from pytest_garl.execution.job import FlightJob, parse_job
 from pytest_garl.execution.ledger import Ledger
 from pytest_garl.execution.reference import BUILT_IN, Reference, reference_to
 from pytest_garl.execution.sources import combined_sha256, data_files, source_hashes
+from pytest_garl.npcs.catalogue import policy_names, policy_spec
+from pytest_garl.npcs.policy_check import check_policy
 from pytest_garl.plugin.options import Options
 from pytest_garl.plugin.target import Target
 from pytest_garl.scenarios.domains.genome import genome_of

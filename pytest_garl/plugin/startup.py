@@ -11,7 +11,6 @@ from typing import TYPE_CHECKING, Any, TextIO
 
 import pytest
 
-from pytest_garl.adversary.catalogue import policy_spec
 from pytest_garl.errors import GarlError, LedgerError
 from pytest_garl.execution.ledger import Ledger
 from pytest_garl.execution.local_pool import local_pool
@@ -20,6 +19,7 @@ from pytest_garl.execution.processes import alive
 from pytest_garl.execution.ray.pool import check_ray, ray_pool
 from pytest_garl.execution.reference import BUILT_IN, package_sha256, reference_to
 from pytest_garl.execution.stored_ledger import check_stored, stored_flight_s
+from pytest_garl.npcs.catalogue import policy_spec
 from pytest_garl.plugin.keys import RUN, is_xdist_worker
 from pytest_garl.plugin.options import Options
 from pytest_garl.plugin.run import Run
@@ -27,7 +27,7 @@ from pytest_garl.plugin.termination import interrupt_on_sigterm
 from pytest_garl.reports.run_report import BEGAN, utc_now
 
 if TYPE_CHECKING:
-    from pytest_garl.regressions.investigations import Investigations
+    from pytest_garl.cases.investigations import Investigations
 
 EARLIER_FLIGHT_S = "seconds_per_flight"
 """The ledger's fact: wall time of a flight in the run before, for the forecast."""
@@ -129,8 +129,8 @@ def _investigations(
     if is_xdist_worker(config) or not options.budget or options.repeat or not options.shrink:
         return None
     # Only a search needs Hypothesis, which shrinks.
-    from pytest_garl.regressions.allowance import ShrinkBudget
-    from pytest_garl.regressions.investigations import Investigations
+    from pytest_garl.cases.allowance import ShrinkBudget
+    from pytest_garl.cases.investigations import Investigations
 
     shrinking = ShrinkBudget(each=options.shrink, capped=options.shrink_capped)
     return Investigations(ledger, pool, options.corpus, shrinking, options.workers or 1)

@@ -10,6 +10,8 @@ from typing import Any
 
 import pytest
 
+from pytest_garl.cases.known_kinds import TWIN
+from pytest_garl.cases.reference_proofs import renewal_line
 from pytest_garl.messages import command
 from pytest_garl.plugin.films import film_lines
 from pytest_garl.plugin.header import cpu_dispatch_warning
@@ -21,8 +23,6 @@ from pytest_garl.plugin.session_status import notes
 from pytest_garl.plugin.suggested_commands import repeat_kind_command, shown_path
 from pytest_garl.plugin.tally import Tally
 from pytest_garl.plugin.terminal_text import counted, width_of, wrapped
-from pytest_garl.regressions.known_kinds import TWIN
-from pytest_garl.regressions.reference_proofs import renewal_line
 from pytest_garl.reports.run_report import ENDED, USER_FAILURES, utc_now
 from pytest_garl.reports.search_summary import SearchSummary, ViolationKind, legend
 from pytest_garl.reports.shares_text import (

@@ -17,9 +17,9 @@ from pytest_garl.scenarios.task import DEFAULT_TASK, Task
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
+    from pytest_garl.cases.case import Case
+    from pytest_garl.cases.corpus import CorpusEntry
     from pytest_garl.landing_system import Airframe, NavigationKind
-    from pytest_garl.regressions.case import Case
-    from pytest_garl.regressions.corpus import CorpusEntry
     from pytest_garl.scenarios.domains.domain import Domain
     from pytest_garl.verdicts.verdict import Limits
 

@@ -9,10 +9,10 @@ from __future__ import annotations
 from collections import Counter
 from dataclasses import dataclass
 
+from pytest_garl.cases.forecast import RemainingWork, expected_kinds, flights_after_search
 from pytest_garl.execution.job import parse_job
 from pytest_garl.execution.ledger import Ledger
 from pytest_garl.plugin.run import SELECTED, Run
-from pytest_garl.regressions.forecast import RemainingWork, expected_kinds, flights_after_search
 
 FIRST_FLIGHTS = 8
 """The time left is told after so many flights: half as many hold one kind or none of those that end

@@ -9,13 +9,13 @@ from typing import Any
 
 import pytest
 
+from pytest_garl.cases.user_failure import UserFailure
 from pytest_garl.errors import GarlError
 from pytest_garl.execution.flight_id import CompletedFlight
 from pytest_garl.plugin.failed_statement import FAILED_ASSERTION_TYPES, failure_of
 from pytest_garl.plugin.keys import target_of
 from pytest_garl.plugin.landing import Landing
 from pytest_garl.plugin.target import Target
-from pytest_garl.regressions.user_failure import UserFailure
 from pytest_garl.scenarios.scenario import Scenario
 
 _AVAILABLE = {"landing", "scenario"}

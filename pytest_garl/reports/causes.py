@@ -9,9 +9,9 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Sequence
 
+from pytest_garl.cases.case import Case
 from pytest_garl.execution.severity import Severity
 from pytest_garl.messages import shortened
-from pytest_garl.regressions.case import Case
 from pytest_garl.verdicts.ending import ending_of
 
 MOST_NAMED = 3

@@ -15,11 +15,11 @@ from pytest_garl.execution.reference import BUILT_IN
 from pytest_garl.files.json_values import dataclass_from
 from pytest_garl.landing_system import Camera
 from pytest_garl.messages import shortened
+from pytest_garl.reports.film import save_video
 from pytest_garl.reports.html.flight_task import FlightTask, record_of, task_of
 from pytest_garl.reports.html.page_workers import in_processes
 from pytest_garl.reports.search_summary import CAMERA
 from pytest_garl.scenarios.files import parse_scenario
-from pytest_garl.video import save_video
 
 NO_RECORD = "its process ended before its record was written"
 

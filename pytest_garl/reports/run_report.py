@@ -14,11 +14,11 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
+from pytest_garl.cases.corpus import Corpus
 from pytest_garl.errors import LedgerError
 from pytest_garl.execution.ledger import Ledger
 from pytest_garl.execution.ledger_queries import LedgerFlight
 from pytest_garl.messages import command
-from pytest_garl.regressions.corpus import Corpus
 from pytest_garl.reports.causes import cause_of
 from pytest_garl.reports.search_summary import (
     SearchSummary,

@@ -9,11 +9,11 @@ from dataclasses import dataclass
 from types import MappingProxyType
 from typing import Self
 
+from pytest_garl.cases.case import Case
 from pytest_garl.execution.job import FlightJob, parse_job
 from pytest_garl.execution.ledger import Ledger
 from pytest_garl.execution.ledger_queries import LedgerFlight
 from pytest_garl.execution.severity import Severity
-from pytest_garl.regressions.case import Case
 from pytest_garl.reports.causes import cause_of, counted_causes, telling_case, title_of
 from pytest_garl.reports.control_arm import ControlArm, control_arm, is_control
 from pytest_garl.verdicts.kinds import hill_number

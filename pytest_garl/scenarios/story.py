@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from pytest_garl.scenarios.scenario import Scenario
 
 GRADES = ("careless", "curious", "chasing", "hostile")
-"""Grades of behaviour from the weakest to the strongest (:mod:`pytest_garl.adversary.grades`)."""
+"""Grades of behaviour from the weakest to the strongest (:mod:`pytest_garl.npcs.grades`)."""
 PHASES = ("start", "8 m", "3 m", "touchdown")
 """What a story waits for: the start of the flight, the UAV's descent through a height, its
 touchdown.  The delay counts from there."""

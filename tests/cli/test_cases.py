@@ -8,13 +8,13 @@ from pathlib import Path
 import pytest
 from click.testing import CliRunner, Result
 
+from pytest_garl.cases.case import Prevention
+from pytest_garl.cases.case_file import load_case
+from pytest_garl.cases.corpus import Corpus, replace_file
 from pytest_garl.cli import main
 from pytest_garl.execution.severity import Severity
-from pytest_garl.regressions.case import Prevention
-from pytest_garl.regressions.case_file import load_case
-from pytest_garl.regressions.corpus import Corpus, replace_file
 from pytest_garl.verdicts.verdict import Limits
-from tests.regressions.samples import case as dog_case
+from tests.cases.samples import case as dog_case
 from tests.support.broken_lander import LAWN, broken_project
 from tests.support.ffmpeg import hide_encoders
 

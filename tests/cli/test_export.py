@@ -10,14 +10,14 @@ from typing import Any
 import pytest
 from click.testing import CliRunner, Result
 
+from pytest_garl.cases.case_file import load_case
+from pytest_garl.cases.corpus import Corpus, replace_file
+from pytest_garl.cases.replay import replay
 from pytest_garl.cli import main
 from pytest_garl.execution.reference import Reference
 from pytest_garl.flight.flight import Flight
 from pytest_garl.flight.flight_file import hash_of, save
 from pytest_garl.landing_system import Camera
-from pytest_garl.regressions.case_file import load_case
-from pytest_garl.regressions.corpus import Corpus, replace_file
-from pytest_garl.regressions.replay import replay
 from pytest_garl.scenarios.files import dumps
 from tests.support.broken_lander import SYSTEM, case_of_broken_lander
 from tests.support.mcap_files import needs_extra, read_mcap

@@ -16,11 +16,11 @@ import cv2
 import pytest
 from click.testing import CliRunner, Result
 
+from pytest_garl.cases.case_file import load_case
+from pytest_garl.cases.corpus import replace_file
 from pytest_garl.cli import main
 from pytest_garl.execution.reference import Reference
 from pytest_garl.flight.flight_file import save
-from pytest_garl.regressions.case_file import load_case
-from pytest_garl.regressions.corpus import replace_file
 from pytest_garl.scenarios.files import dumps
 from tests.reports.html.test_report import lost
 from tests.support.broken_lander import broken_project

@@ -11,9 +11,9 @@ from pathlib import Path
 import pytest
 from click.testing import CliRunner, Result
 
+from pytest_garl.cases.case_file import load_case
+from pytest_garl.cases.corpus import replace_file
 from pytest_garl.cli import main
-from pytest_garl.regressions.case_file import load_case
-from pytest_garl.regressions.corpus import replace_file
 from tests.support.case_project import USER_PROPERTY_TEST, let_system_avoid_dog, replace_text
 from tests.support.landing_project import write_project
 

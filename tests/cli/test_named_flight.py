@@ -10,6 +10,10 @@ from pathlib import Path
 import pytest
 from click.testing import CliRunner
 
+from pytest_garl.cases.case import Case
+from pytest_garl.cases.corpus import Corpus, replace_file
+from pytest_garl.cases.replay import Replay
+from pytest_garl.cases.reshrink import CaseSetup
 from pytest_garl.cli import main
 from pytest_garl.cli import named_flight as module
 from pytest_garl.cli.named_flight import FlightName, NamedFlight
@@ -18,15 +22,11 @@ from pytest_garl.execution.reference import Reference
 from pytest_garl.flight.flight import Flight
 from pytest_garl.flight.flight_file import save
 from pytest_garl.plugin import case_tests
-from pytest_garl.regressions.case import Case
-from pytest_garl.regressions.corpus import Corpus, replace_file
-from pytest_garl.regressions.replay import Replay
-from pytest_garl.regressions.reshrink import CaseSetup
 from pytest_garl.reports.mcap.source import Place
 from pytest_garl.scenarios.files import dumps
 from pytest_garl.scenarios.placement import map_in
-from tests.regressions.samples import LAWN
-from tests.regressions.samples import case as dog_case
+from tests.cases.samples import LAWN
+from tests.cases.samples import case as dog_case
 from tests.reports.html.test_report import lost
 from tests.support.mcap_files import needs_extra
 from tests.support.recorded_flights import recorded, seen

@@ -11,8 +11,8 @@ from pathlib import Path
 
 import pytest
 
+from pytest_garl.cases.corpus import Corpus
 from pytest_garl.execution.processes import any_command_contains
-from pytest_garl.regressions.corpus import Corpus
 from tests.support.broken_lander import case_of_broken_lander
 
 SLOW = """

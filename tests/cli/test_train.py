@@ -7,8 +7,8 @@ import pytest
 from click.testing import CliRunner
 
 pytest.importorskip("torch")
-from pytest_garl.adversary.learned import learned_spec
 from pytest_garl.cli import main
+from pytest_garl.npcs.learned import learned_spec
 
 
 @pytest.mark.sim

@@ -5,13 +5,13 @@ from pathlib import Path
 
 import pytest
 
-from pytest_garl.adversary.catalogue import policy_spec
-from pytest_garl.baselines.record import BaselineSpec
 from pytest_garl.errors import LedgerError
 from pytest_garl.execution.batch import fly_all, temporary_pool
 from pytest_garl.execution.job import FlightJob
 from pytest_garl.execution.ledger import Ledger
 from pytest_garl.execution.reference import Reference
+from pytest_garl.gate.record import BaselineSpec
+from pytest_garl.npcs.catalogue import policy_spec
 from pytest_garl.scenarios.files import dump_scenario
 from pytest_garl.scenarios.maps.loading import load_map
 from pytest_garl.verdicts.verdict import Limits

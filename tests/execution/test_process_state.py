@@ -15,11 +15,11 @@ import cv2
 import numpy as np
 import pytest
 
-from pytest_garl.adversary.catalogue import policy_spec
 from pytest_garl.execution.flight_id import FlightId
 from pytest_garl.execution.job import FlightJob
 from pytest_garl.execution.process_state import ProcessState
 from pytest_garl.execution.reference import reference_to
+from pytest_garl.npcs.catalogue import policy_spec
 from pytest_garl.scenarios.files import dump_scenario
 from pytest_garl.simulation import contacts, loop
 from pytest_garl.simulation.system_under_test.reference_pilot import ReferencePilot

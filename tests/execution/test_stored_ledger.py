@@ -10,14 +10,14 @@ from typing import Any
 
 import pytest
 
-from pytest_garl.baselines.record import baseline_from_ledger
 from pytest_garl.errors import LedgerError
 from pytest_garl.execution.database import VERSION, Database
 from pytest_garl.execution.ledger import Ledger
 from pytest_garl.execution.stored_ledger import check_stored
+from pytest_garl.gate.record import baseline_from_ledger
 from pytest_garl.scenarios.files import dump_scenario
-from tests.baselines.samples import job, write_ledger
 from tests.execution.flying import scenario
+from tests.gate.samples import job, write_ledger
 from tests.support.results import flight_result
 
 

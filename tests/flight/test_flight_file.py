@@ -11,7 +11,6 @@ from typing import Any
 import numpy as np
 import pytest
 
-from pytest_garl.adversary.catalogue import policy_spec
 from pytest_garl.airframe import Rangefinder
 from pytest_garl.errors import GarlError
 from pytest_garl.flight import flight_file
@@ -28,6 +27,7 @@ from pytest_garl.flight.flight import (
 )
 from pytest_garl.flight.flight_file import load, save
 from pytest_garl.landing_system import Detection, Diagnostics
+from pytest_garl.npcs.catalogue import policy_spec
 from pytest_garl.scenarios.genes import genome_for
 from pytest_garl.search.methods.random import random_scenarios
 from pytest_garl.simulation.fly import fly

@@ -16,10 +16,9 @@ import numpy as np
 
 from lab.experiment import results as rows
 from lab.experiment import spec as plan
-from pytest_garl.adversary import learned as network
-from pytest_garl.adversary.weights import WEIGHTS
-from pytest_garl.baselines import file as baseline
-from pytest_garl.baselines import record
+from pytest_garl.cases import case_file as files
+from pytest_garl.cases import corpus
+from pytest_garl.cases.description import describe_scenario
 from pytest_garl.errors import GarlError
 from pytest_garl.execution.flight import fly_job
 from pytest_garl.execution.flight_id import FlightId
@@ -27,9 +26,10 @@ from pytest_garl.execution.job import parse_job
 from pytest_garl.execution.ledger import Ledger
 from pytest_garl.execution.stored_ledger import check_stored
 from pytest_garl.flight import flight_file
-from pytest_garl.regressions import case_file as files
-from pytest_garl.regressions import corpus
-from pytest_garl.regressions.description import describe_scenario
+from pytest_garl.gate import file as baseline
+from pytest_garl.gate import record
+from pytest_garl.npcs import learned as network
+from pytest_garl.npcs.weights import WEIGHTS
 from pytest_garl.scenarios import files as scenarios
 from pytest_garl.scenarios.chromosome import decode
 from pytest_garl.scenarios.files import parse_scenario
@@ -37,12 +37,12 @@ from pytest_garl.scenarios.genes import genome_for
 from pytest_garl.scenarios.maps import map as maps
 from pytest_garl.scenarios.validity import problems
 from pytest_garl.search.objectives import violation_proximity
-from tests.baselines import samples as baseline_samples
+from tests.cases import samples as case_samples
 from tests.execution.flying import Good, job_of, scenario
 from tests.fuzz import binary_mutations, mutations
+from tests.gate import samples as baseline_samples
 from tests.lab.experiment.samples import row
 from tests.lab.experiment.test_spec import TEXT as PLAN
-from tests.regressions import samples as case_samples
 
 Change = Callable[[random.Random], None]
 _COURT = maps.load_map("court")

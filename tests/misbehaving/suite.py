@@ -16,7 +16,6 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from pytest_garl.adversary.catalogue import policy_spec
 from pytest_garl.errors import GarlError
 from pytest_garl.execution.batch import fly_all, temporary_pool
 from pytest_garl.execution.flight_id import CompletedFlight
@@ -24,6 +23,7 @@ from pytest_garl.execution.ledger import Ledger
 from pytest_garl.execution.pool import Pool
 from pytest_garl.execution.processes import any_command_contains
 from pytest_garl.execution.reference import BUILT_IN
+from pytest_garl.npcs.catalogue import policy_spec
 from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.verdicts.verdict import Limits
 from tests.execution.flying import LAWN, job_of, scenario

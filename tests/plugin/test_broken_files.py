@@ -8,8 +8,8 @@ from pathlib import Path
 
 import pytest
 
-from pytest_garl.regressions.case_file import dump_case
-from tests.regressions.samples import case
+from pytest_garl.cases.case_file import dump_case
+from tests.cases.samples import case
 from tests.support.landing_project import project, run
 
 BROKEN = {

@@ -10,10 +10,10 @@ from typing import Any
 
 import pytest
 
+from pytest_garl.cases.user_failure import UserFailure
 from pytest_garl.execution.flight_id import CompletedFlight
 from pytest_garl.plugin.failed_statement import failure_of
 from pytest_garl.plugin.landing import Landing
-from pytest_garl.regressions.user_failure import UserFailure
 from tests.support.results import flight_result
 
 RESULT = flight_result(

@@ -13,11 +13,11 @@ from typing import Any
 
 import pytest
 
+from pytest_garl.cases.corpus import Corpus
 from pytest_garl.execution.flight_id import FlightId, Slot
 from pytest_garl.execution.stored_ledger import checked_ledger
 from pytest_garl.plugin import films
 from pytest_garl.plugin.tally import Tally
-from pytest_garl.regressions.corpus import Corpus
 from tests.plugin.test_resume import slow_project, start, wait_for
 from tests.reports.html.test_report import lost
 from tests.support.broken_lander import case_of_broken_lander

@@ -15,7 +15,7 @@ from dataclasses import dataclass, field
 
 import pytest
 
-from pytest_garl.regressions.case_file import dump_case, load_case
+from pytest_garl.cases.case_file import dump_case, load_case
 from tests.support.case_project import cases, replace_text
 from tests.support.landing_project import CONFTEST, SYSTEMS, TESTS, project, run
 

@@ -10,8 +10,8 @@ from pathlib import Path
 
 import pytest
 
+from pytest_garl.cases.corpus import Corpus
 from pytest_garl.execution.ledger import Ledger
-from pytest_garl.regressions.corpus import Corpus
 from pytest_garl.verdicts.verdict import DEFAULT_LIMITS
 from tests.support import bent_judges
 from tests.support.broken_lander import case_of_broken_lander

@@ -31,7 +31,7 @@ ARGS = (
 SLOW_SAVING = """
 import time
 from pytest_garl.files import atomic
-from pytest_garl.regressions import corpus
+from pytest_garl.cases import corpus
 
 write = atomic.write_text_atomically
 

@@ -7,10 +7,10 @@ from pathlib import Path
 
 import pytest
 
-from pytest_garl.regressions.case import Worst
-from pytest_garl.regressions.case_file import load_case
-from pytest_garl.regressions.cause import cause_of_case
-from pytest_garl.regressions.corpus import replace_file
+from pytest_garl.cases.case import Worst
+from pytest_garl.cases.case_file import load_case
+from pytest_garl.cases.cause import cause_of_case
+from pytest_garl.cases.corpus import replace_file
 from tests.support.case_project import SEARCH, add_cases_to_git, cases, replace_text, run, saved
 from tests.support.landing_project import project
 

@@ -11,8 +11,8 @@ from pathlib import Path
 
 import pytest
 
-from pytest_garl.regressions.case import Case
-from pytest_garl.regressions.corpus import Corpus
+from pytest_garl.cases.case import Case
+from pytest_garl.cases.corpus import Corpus
 from tests.support.broken_lander import case_of_broken_lander
 from tests.support.case_project import add_cases_to_git, replace_text
 from tests.support.landing_project import write_project

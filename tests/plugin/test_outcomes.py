@@ -7,6 +7,7 @@ from typing import Any
 
 import pytest
 
+from pytest_garl.cases.case import NoGateReason, Status
 from pytest_garl.plugin.outcomes import (
     CaseState,
     Decision,
@@ -21,7 +22,6 @@ from pytest_garl.plugin.outcomes import (
     decide,
     resolve,
 )
-from pytest_garl.regressions.case import NoGateReason, Status
 
 DOG, PERSON, OWN = "IV:dog:last-metre:unseen", "IV:person:descent:seen", "own:test_own:12345678"
 REPEATS = Reflights(failed=2, flown=2, same=True)

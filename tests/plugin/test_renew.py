@@ -11,8 +11,8 @@ from pathlib import Path
 
 import pytest
 
-from pytest_garl.regressions.case_file import load_case
-from pytest_garl.regressions.corpus import replace_file
+from pytest_garl.cases.case_file import load_case
+from pytest_garl.cases.corpus import replace_file
 from tests.support.case_project import let_system_avoid_dog, replace_text
 
 UPGRADE = "\n\ndef new_in_this_version():\n    return 1\n"

@@ -15,8 +15,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from pytest_garl.adversary.learned import Network, save
-from pytest_garl.adversary.weights import WEIGHTS
+from pytest_garl.npcs.learned import Network, save
+from pytest_garl.npcs.weights import WEIGHTS
 from tests.support.landing_project import project, result_hash, run
 
 SLOW = """

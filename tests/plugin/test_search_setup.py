@@ -4,10 +4,10 @@ import json
 from types import SimpleNamespace
 from typing import Any
 
-from pytest_garl.adversary.catalogue import policy_spec
+from pytest_garl.cases.case import Case
+from pytest_garl.npcs.catalogue import policy_spec
 from pytest_garl.plugin.search_setup import npc_policy_of
-from pytest_garl.regressions.case import Case
-from tests.regressions.samples import OBJECT_NAMES, case, case_with_changes
+from tests.cases.samples import OBJECT_NAMES, case, case_with_changes
 
 
 def test_case_flies_with_its_moves_and_changes() -> None:

@@ -5,11 +5,11 @@ from typing import Any
 
 import pytest
 
+from pytest_garl.cases.case import Case
 from pytest_garl.execution.severity import Severity
-from pytest_garl.regressions.case import Case
 from pytest_garl.reports.causes import cause_of, counted_causes, telling_case, title_of
 from pytest_garl.reports.search_summary import SearchSummary, ViolationKind
-from tests.regressions.samples import SYSTEM, case
+from tests.cases.samples import SYSTEM, case
 
 DOG = Severity(about="body", grade="careless", type="dog", objects=1, speed_mps=4.0)
 

@@ -7,9 +7,9 @@ from pathlib import Path
 
 import pytest
 
-from pytest_garl.adversary.catalogue import DEFAULT_POLICY, policy_names
-from pytest_garl.adversary.domain_policy import GRADED, domain_with_policy, policy_in
 from pytest_garl.errors import GarlError
+from pytest_garl.npcs.catalogue import DEFAULT_POLICY, policy_names
+from pytest_garl.npcs.domain_policy import GRADED, domain_with_policy, policy_in
 from pytest_garl.search.catalogue import (
     DEFAULT_METHOD,
     declaration_of,

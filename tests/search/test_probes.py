@@ -10,8 +10,8 @@ import math
 import pytest
 
 from pytest_garl import Camera, Start
-from pytest_garl.adversary.catalogue import policy_spec
 from pytest_garl.flight.flight import Flight, Track
+from pytest_garl.npcs.catalogue import policy_spec
 from pytest_garl.scenarios.conditions import active_conditions
 from pytest_garl.scenarios.domains.domain import Domain
 from pytest_garl.scenarios.domains.reader import domain_named

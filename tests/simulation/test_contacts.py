@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from pytest_garl import Command, Land, Observation
-from pytest_garl.adversary.recorded import recorded_spec
 from pytest_garl.flight.flight import Flight
+from pytest_garl.npcs.recorded import recorded_spec
 from pytest_garl.scenarios.chromosome import decode
 from pytest_garl.scenarios.genes import genome_for
 from pytest_garl.scenarios.placement import start_genes

@@ -14,13 +14,13 @@ from typing import Any
 import pytest
 
 from pytest_garl import cpu_dispatch
-from pytest_garl.adversary.recorded import recorded_spec
+from pytest_garl.cases.case import Case
+from pytest_garl.cases.case_file import dump_case
+from pytest_garl.cases.corpus import Corpus
 from pytest_garl.execution.batch import fly_all, temporary_pool
 from pytest_garl.execution.job import FlightJob
 from pytest_garl.execution.reference import Reference
-from pytest_garl.regressions.case import Case
-from pytest_garl.regressions.case_file import dump_case
-from pytest_garl.regressions.corpus import Corpus
+from pytest_garl.npcs.recorded import recorded_spec
 from pytest_garl.scenarios.maps.loading import load_map
 
 Found = tuple[Path, Case]
@@ -49,8 +49,8 @@ import json, sys
 import numpy as np
 from pathlib import Path
 from pytest_garl import cpu_dispatch
-from pytest_garl.adversary.recorded import recorded_spec
-from pytest_garl.regressions.case_file import load_case
+from pytest_garl.npcs.recorded import recorded_spec
+from pytest_garl.cases.case_file import load_case
 from pytest_garl.execution.reference import system_named
 from pytest_garl.simulation.fly import fly
 from pytest_garl.verdicts.judge import judge

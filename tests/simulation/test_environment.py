@@ -8,14 +8,14 @@ import numpy as np
 import pytest
 
 from pytest_garl import Command, Mission, Observation, PositionSetpoint
-from pytest_garl.adversary.catalogue import policy_spec
-from pytest_garl.adversary.recorded import recorded_spec
+from pytest_garl.cases.case import RecordedBehaviour
+from pytest_garl.cases.case_flights import recorded_behaviour
 from pytest_garl.execution.flight_id import CompletedFlight
 from pytest_garl.flight.flight import Flight
 from pytest_garl.flight.flight_file import load, save
 from pytest_garl.landing_system import Airframe, Camera
-from pytest_garl.regressions.case import RecordedBehaviour
-from pytest_garl.regressions.case_flights import recorded_behaviour
+from pytest_garl.npcs.catalogue import policy_spec
+from pytest_garl.npcs.recorded import recorded_spec
 from pytest_garl.scenarios.genes import ENVIRONMENT, genome_for
 from pytest_garl.scenarios.maps.loading import load_map
 from pytest_garl.scenarios.scenario import Scenario
@@ -139,7 +139,7 @@ def test_a_policy_that_changes_the_environment_is_seen_and_recorded() -> None:
     flight, seen = flown()
     still = PolicySpec(
         name="same",
-        factory="pytest_garl.adversary.recorded:Recorded",
+        factory="pytest_garl.npcs.recorded:Recorded",
         arguments=recorded_spec(_moves(flight)).arguments,
     )
     calm, unchanged = flown(still)

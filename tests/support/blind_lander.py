@@ -6,7 +6,6 @@ import functools
 import math
 from pathlib import Path
 
-from pytest_garl.adversary.catalogue import policy_spec
 from pytest_garl.execution.flight import judged
 from pytest_garl.execution.flight_id import CompletedFlight
 from pytest_garl.execution.job import FlightJob
@@ -21,6 +20,7 @@ from pytest_garl.landing_system import (
     Observation,
     PositionSetpoint,
 )
+from pytest_garl.npcs.catalogue import policy_spec
 from pytest_garl.scenarios.chromosome import decode
 from pytest_garl.scenarios.genes import genome_for
 from pytest_garl.scenarios.maps.loading import load_map

@@ -9,8 +9,8 @@ from pathlib import Path
 
 import pytest
 
-from pytest_garl.regressions.case import Case, Evidence, Violation
-from pytest_garl.regressions.corpus import Corpus
+from pytest_garl.cases.case import Case, Evidence, Violation
+from pytest_garl.cases.corpus import Corpus
 from pytest_garl.scenarios.chromosome import decode
 from pytest_garl.scenarios.genes import genome_for
 from pytest_garl.scenarios.maps.loading import load_map

@@ -8,7 +8,6 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from pytest_garl.adversary.catalogue import policy_spec
 from pytest_garl.execution.flight_id import FlightId, Slot
 from pytest_garl.execution.job import FlightJob
 from pytest_garl.execution.ledger import Ledger
@@ -17,6 +16,7 @@ from pytest_garl.execution.result import FlightResult
 from pytest_garl.flight.flight import Flight
 from pytest_garl.flight.flight_file import save
 from pytest_garl.landing_system import Camera
+from pytest_garl.npcs.catalogue import policy_spec
 from pytest_garl.reports.run_report import BEGAN, ENDED
 from pytest_garl.reports.search_summary import CAMERA
 from pytest_garl.scenarios.files import dump_scenario

@@ -10,15 +10,15 @@ import pytest
 from numpy.typing import NDArray
 
 from pytest_garl import Command, Mission, Observation, PositionSetpoint
-from pytest_garl.adversary.catalogue import policy_spec
 from pytest_garl.flight.flight import Flight
 from pytest_garl.landing_system import Airframe, Camera, Detection, Diagnostics
+from pytest_garl.npcs.catalogue import policy_spec
+from pytest_garl.reports.film import frames
+from pytest_garl.reports.film.drawing import Image
 from pytest_garl.scenarios.genes import genome_for
 from pytest_garl.scenarios.maps.loading import load_map
 from pytest_garl.search.methods.random import random_scenarios
 from pytest_garl.simulation.fly import fly
-from pytest_garl.video import frames
-from pytest_garl.video.drawing import Image
 
 LAWN = load_map("lawn")
 

@@ -6,7 +6,6 @@ import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
-from pytest_garl.adversary.catalogue import policy_spec
 from pytest_garl.flight.flight import Flight
 from pytest_garl.landing_system import (
     Abort,
@@ -20,6 +19,7 @@ from pytest_garl.landing_system import (
     PositionSetpoint,
     VelocitySetpoint,
 )
+from pytest_garl.npcs.catalogue import policy_spec
 from pytest_garl.scenarios.chromosome import decode
 from pytest_garl.scenarios.genes import genome_for
 from pytest_garl.scenarios.maps.loading import load_map

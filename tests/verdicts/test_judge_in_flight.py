@@ -8,8 +8,7 @@ from typing import Any
 
 import pytest
 
-from pytest_garl.adversary.catalogue import policy_spec
-from pytest_garl.baselines.record import BaselineSpec
+from pytest_garl.gate.record import BaselineSpec
 from pytest_garl.landing_system import (
     Abort,
     Command,
@@ -19,6 +18,7 @@ from pytest_garl.landing_system import (
     PositionSetpoint,
     VelocitySetpoint,
 )
+from pytest_garl.npcs.catalogue import policy_spec
 from pytest_garl.scenarios.maps.loading import load_map
 from pytest_garl.scenarios.task import Start, Task
 from pytest_garl.simulation.fly import fly

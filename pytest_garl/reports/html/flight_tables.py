@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
+from pytest_garl.cases.description import describe_scenario_on
 from pytest_garl.flight.flight import Flight, Step
 from pytest_garl.messages import printable, shortened
-from pytest_garl.regressions.description import describe_scenario_on
 from pytest_garl.scenarios.groups.catalogue import PARAMETERS
 from pytest_garl.scenarios.light import NOON_DEG
 from pytest_garl.scenarios.maps.map import Map

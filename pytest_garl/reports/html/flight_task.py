@@ -7,6 +7,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from pytest_garl.cases.case import NOT_ASKED, Prevention
+from pytest_garl.cases.description import describe
 from pytest_garl.errors import GarlError
 from pytest_garl.execution.job import FlightJob, parse_job
 from pytest_garl.execution.ledger import Ledger
@@ -18,8 +20,6 @@ from pytest_garl.files.json_values import dataclass_from
 from pytest_garl.flight.flight import Flight
 from pytest_garl.flight.flight_file import load
 from pytest_garl.landing_system import Camera
-from pytest_garl.regressions.case import NOT_ASKED, Prevention
-from pytest_garl.regressions.description import describe
 from pytest_garl.reports.html.flight_tables import (
     ConditionRow,
     condition_rows,

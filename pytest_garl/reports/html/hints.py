@@ -12,9 +12,9 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from pytest_garl.cases.case import NOT_ASKED, Prevention
 from pytest_garl.flight.flight import Flight
 from pytest_garl.flight.thresholds import up_m
-from pytest_garl.regressions.case import NOT_ASKED, Prevention
 from pytest_garl.reports.html.moments import decisive_s
 from pytest_garl.reports.html.sightings_text import readable_and_reported
 from pytest_garl.verdicts.sightings import (

@@ -7,11 +7,11 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from pytest_garl.cases.case import NO_GATE_TEXTS, Case
+from pytest_garl.cases.corpus import Corpus, CorpusEntry
+from pytest_garl.cases.story_text import grade_in_words
 from pytest_garl.execution.ledger import Ledger
 from pytest_garl.messages import command, shortened
-from pytest_garl.regressions.case import NO_GATE_TEXTS, Case
-from pytest_garl.regressions.corpus import Corpus, CorpusEntry
-from pytest_garl.regressions.story_text import grade_in_words
 from pytest_garl.reports.html.flight_tables import cut_text
 from pytest_garl.reports.html.flight_task import FlightTask, ShownFlight, task_of
 from pytest_garl.reports.html.naming import page_name, shown_file

@@ -13,6 +13,11 @@ import numpy as np
 
 from pytest_garl.flight.flight import Flight, Step
 from pytest_garl.landing_system import Camera
+from pytest_garl.reports.film import frames, rate_hz, write
+from pytest_garl.reports.film.camera_pane import CameraPane
+from pytest_garl.reports.film.encoder import TOP_KBPS
+from pytest_garl.reports.film.flight_video import CLOSING_S
+from pytest_garl.reports.film.pose import poses_at
 from pytest_garl.reports.html.moments import Moment, telling_moment
 from pytest_garl.reports.html.scene import jpeg_uri
 from pytest_garl.scenarios.maps.map import Map
@@ -20,11 +25,6 @@ from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.simulation.camera.renderer import Renderer
 from pytest_garl.simulation.environment import environment_at
 from pytest_garl.verdicts.detectability import readable_probability
-from pytest_garl.video import frames, rate_hz, write
-from pytest_garl.video.camera_pane import CameraPane
-from pytest_garl.video.encoder import TOP_KBPS
-from pytest_garl.video.flight_video import CLOSING_S
-from pytest_garl.video.pose import poses_at
 
 STILL_PX = (400, 300)
 STILL_QUALITY = 76

@@ -7,9 +7,10 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+from pytest_garl.cases.corpus import Corpus
 from pytest_garl.errors import GarlError, LedgerError
 from pytest_garl.execution.stored_ledger import checked_ledger
-from pytest_garl.regressions.corpus import Corpus
+from pytest_garl.reports.film.encoder import program
 from pytest_garl.reports.html import MOST_FILMS
 from pytest_garl.reports.html.flight_task import ShownFlight
 from pytest_garl.reports.html.folder import check_target, new_folder
@@ -21,7 +22,6 @@ from pytest_garl.reports.html.rendering import render_comparison, render_index, 
 from pytest_garl.reports.html.run_page import RunPage, run_page
 from pytest_garl.reports.run_comparison import RunComparison
 from pytest_garl.reports.run_report import run_report_of, summaries_of
-from pytest_garl.video.encoder import program
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

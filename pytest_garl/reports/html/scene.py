@@ -8,11 +8,11 @@ from typing import Any
 import cv2
 import numpy as np
 
+from pytest_garl.reports.film.drawing import Image
+from pytest_garl.reports.film.map_pane import ground_from_above
 from pytest_garl.scenarios.maps.map import Map
 from pytest_garl.simulation.camera.meshes import mesh_of, placed_hulls
 from pytest_garl.simulation.camera.renderer import Renderer
-from pytest_garl.video.drawing import Image
-from pytest_garl.video.map_pane import ground_from_above
 
 LONGER_SIDE_PX = 560
 """Enough for a path view of half a screen; the picture takes some 30 kB."""

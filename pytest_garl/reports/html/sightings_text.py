@@ -6,11 +6,11 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
+from pytest_garl.cases.case import OBSERVED_WITHIN_S
+from pytest_garl.cases.observation import OBSERVABLE_PX, pixels_of
 from pytest_garl.flight.flight import Flight, Step
 from pytest_garl.flight.thresholds import up_m
 from pytest_garl.messages import shortened
-from pytest_garl.regressions.case import OBSERVED_WITHIN_S
-from pytest_garl.regressions.observation import OBSERVABLE_PX, pixels_of
 from pytest_garl.reports.html.flight_view import gap_m, phases
 from pytest_garl.reports.html.moments import decisive_s
 from pytest_garl.verdicts.sightings import (

@@ -20,9 +20,9 @@ from numpy.typing import NDArray
 
 from pytest_garl.landing_system import Camera, Detection
 from pytest_garl.messages import shortened
+from pytest_garl.reports.film import drawing
 from pytest_garl.reports.mcap.shown_pictures import ShownPicture, ShownPictures
 from pytest_garl.reports.mcap.values import CAMERA_FRAME, Logged, colour, ns, pixel, stamp
-from pytest_garl.video import drawing
 
 IMAGE, CALIBRATION, ANNOTATIONS = "/camera/image", "/camera/calibration", "/camera/annotations"
 QUALITY = 85

@@ -26,6 +26,8 @@ from foxglove.messages import (
 from pytest_garl.flight.flight import Flight, ObjectRecord
 from pytest_garl.flight.thresholds import BODY_ABOVE_FEET_M
 from pytest_garl.messages import shortened
+from pytest_garl.reports.film import drawing
+from pytest_garl.reports.film.map_pane import MARGIN_M, ground_from_above
 from pytest_garl.reports.html.flight_view import UAV_RADIUS_M, UNKNOWN_SIZE_M
 from pytest_garl.reports.mcap.source import Place
 from pytest_garl.reports.mcap.values import (
@@ -49,8 +51,6 @@ from pytest_garl.simulation.camera.marker_patch import modules
 from pytest_garl.simulation.camera.true_camera import product
 from pytest_garl.simulation.camera.weather import conditions_of
 from pytest_garl.simulation.randomness import generator
-from pytest_garl.video import drawing
-from pytest_garl.video.map_pane import MARGIN_M, ground_from_above
 
 SCENE, MAP = "/scene", "/map"
 CELL_M = 0.1

@@ -17,6 +17,8 @@ from numpy.typing import NDArray
 from pytest_garl.distortion import distorted
 from pytest_garl.flight.flight import TRACK_RATE_HZ, Flight, Step
 from pytest_garl.landing_system import Camera
+from pytest_garl.reports.film.drawing import Image
+from pytest_garl.reports.film.pose import Poses, poses_at
 from pytest_garl.reports.mcap.source import Place
 from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.simulation.camera.cover_event import renderer_of
@@ -27,8 +29,6 @@ from pytest_garl.simulation.environment import environment_at
 from pytest_garl.simulation.events import Event
 from pytest_garl.simulation.physics.world import PHYSICS_RATE_HZ
 from pytest_garl.simulation.timing import Timing
-from pytest_garl.video.drawing import Image
-from pytest_garl.video.pose import Poses, poses_at
 
 LEVEL: Quaternion = (0.0, 0.0, 0.0, 1.0)
 

@@ -14,6 +14,7 @@ from foxglove import Channel, Context
 from foxglove.mcap import MCAPCompression, MCAPWriteOptions
 
 from pytest_garl.errors import SavingError
+from pytest_garl.reports.film.flight_video import check_scenario
 from pytest_garl.reports.mcap.camera_topics import IMAGE, camera_topics
 from pytest_garl.reports.mcap.events import events
 from pytest_garl.reports.mcap.path_topics import flown_path, plans
@@ -24,7 +25,6 @@ from pytest_garl.reports.mcap.state import sights, states
 from pytest_garl.reports.mcap.transforms import transforms
 from pytest_garl.reports.mcap.values import Logged
 from pytest_garl.verdicts.judge import judge
-from pytest_garl.video.flight_video import check_scenario
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -48,7 +48,7 @@ from pytest_garl.search.seeding import seed_sequence
 from pytest_garl.verdicts.verdict import PAPER_LIMITS
 
 if TYPE_CHECKING:
-    from pytest_garl.adversary.training.dqn import Learner
+    from pytest_garl.npcs.training.dqn import Learner
 
 Vector = NDArray[np.float64]
 STEP = 0.1
@@ -111,7 +111,7 @@ class OfflineRl:
 
     def tell(self, flown: Sequence[FlownScenario]) -> Sequence[tuple[float, ...]]:
         """Learn from each chain's step; return distance, time and diversity of each flight."""
-        from pytest_garl.adversary.training.dqn import one_thread
+        from pytest_garl.npcs.training.dqn import one_thread
 
         rows = self._genome.normalise(np.array([latest.row for latest in self._chains]))
         self._flown_rows = np.concatenate([self._flown_rows, rows])
@@ -200,8 +200,8 @@ def reward(
 
 
 def _learner(size: int, actions: int, seed: int) -> Learner:
-    from pytest_garl.adversary.training.dqn import Learner
-    from pytest_garl.adversary.training.presets import Training
+    from pytest_garl.npcs.training.dqn import Learner
+    from pytest_garl.npcs.training.presets import Training
 
     training = Training(
         seed=seed, batch=BATCH, warm_up=BATCH, target_every=TARGET_EVERY, double=False, steps=1

@@ -2,8 +2,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from pytest_garl.cases.corpus import Corpus
 from pytest_garl.execution.ledger import Ledger
-from pytest_garl.regressions.corpus import Corpus
 from pytest_garl.reports.html.charts import (
     kinds_over_flights,
     outcome_bar,

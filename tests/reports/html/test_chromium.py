@@ -7,8 +7,8 @@ from pathlib import Path
 
 import pytest
 
+from pytest_garl.cases.corpus import Corpus
 from pytest_garl.flight.flight import Crash
-from pytest_garl.regressions.corpus import Corpus
 from pytest_garl.reports.html.report import write_html_report
 from tests.reports.html.test_rendering import HOSTILE
 from tests.reports.html.test_report import lost

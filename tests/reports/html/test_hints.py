@@ -6,9 +6,9 @@ from typing import Any, get_args
 import numpy as np
 import pytest
 
+from pytest_garl.cases.case import Prevention
 from pytest_garl.flight.flight import Flight
 from pytest_garl.landing_system import Diagnostics
-from pytest_garl.regressions.case import Prevention
 from pytest_garl.reports.html.hints import hints_of
 from pytest_garl.reports.html.sightings_text import sighting_sentences
 from pytest_garl.verdicts.verdict import Finding, Verdict, ViolationType

@@ -6,9 +6,9 @@ from typing import Any
 
 import pytest
 
+from pytest_garl.cases.corpus import Corpus
 from pytest_garl.errors import GarlError
 from pytest_garl.execution.stored_ledger import checked_ledger
-from pytest_garl.regressions.corpus import Corpus
 from pytest_garl.reports.html import page_workers
 from pytest_garl.reports.html.flight_task import FlightTask, shown_flight
 from pytest_garl.reports.html.kind_page import plan_kinds

@@ -13,10 +13,10 @@ from typing import Any
 import cv2
 import pytest
 
+from pytest_garl.cases.corpus import Corpus
 from pytest_garl.errors import LedgerError
 from pytest_garl.execution.reference import Reference
 from pytest_garl.flight.flight import Crash
-from pytest_garl.regressions.corpus import Corpus
 from pytest_garl.reports.html.index_markdown import index_parts
 from pytest_garl.reports.html.moments import moments_of, telling_moment
 from pytest_garl.reports.html.report import WrittenReport, write_html_report

@@ -6,8 +6,8 @@ from pathlib import Path
 import pytest
 
 from pytest_garl.flight.flight import Flight
+from pytest_garl.reports.film.drawing import Image
 from pytest_garl.scenarios.placement import map_in
-from pytest_garl.video.drawing import Image
 from tests.support.mcap_files import Recording, needs_extra, read_mcap
 from tests.support.videos import LAWN, SCENARIO, Hovers
 
@@ -26,7 +26,7 @@ class Exported:
 def exported(tmp_path_factory: pytest.TempPathFactory) -> Exported:
     """Return a flight of three seconds over the lawn, exported."""
     needs_extra()
-    from pytest_garl.adversary.catalogue import policy_spec
+    from pytest_garl.npcs.catalogue import policy_spec
     from pytest_garl.reports.mcap.source import Export, Place
     from pytest_garl.reports.mcap.writer import write_mcap
     from pytest_garl.simulation.fly import fly

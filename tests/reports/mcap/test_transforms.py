@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 from pytest_garl.flight.flight import Track
+from pytest_garl.reports.film.pose import poses_at
 from pytest_garl.simulation.camera.meshes import rotation_matrix
 from pytest_garl.simulation.camera.projection import View
-from pytest_garl.video.pose import poses_at
 from tests.reports.mcap.conftest import Exported
 from tests.support.mcap_files import matrix_to_world, needs_extra
 from tests.support.videos import Hovers

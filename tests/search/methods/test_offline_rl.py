@@ -149,7 +149,7 @@ def test_the_method_leaves_the_global_generator_of_torch_alone() -> None:
 
 
 def test_without_torch_the_error_says_what_to_install(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.delitem(sys.modules, "pytest_garl.adversary.training.dqn", raising=False)
+    monkeypatch.delitem(sys.modules, "pytest_garl.npcs.training.dqn", raising=False)
     monkeypatch.setitem(sys.modules, "torch", None)
     with pytest.raises(GarlError, match=r"offline-rl .*pip install 'pytest-garl\[train\]'"):
         make_method("offline-rl", plan())

@@ -2,7 +2,7 @@ from __future__ import annotations
 
 import pytest
 
-from pytest_garl.adversary.catalogue import policy_spec
+from pytest_garl.npcs.catalogue import policy_spec
 from pytest_garl.search.catalogue import make_method
 from pytest_garl.search.methods.random import random_scenarios
 from pytest_garl.simulation.fly import fly

@@ -1,0 +1,342 @@
+"""Case files: small, sorted, commented TOML that a person can read, without any code.
+
+The sections stand in the file in the order of the functions here.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Callable
+from pathlib import Path
+from typing import cast, get_args
+
+from pytest_garl.cases.behaviour_toml import (
+    change_lines,
+    move_lines,
+    read_changes,
+    read_moves,
+)
+from pytest_garl.cases.case import (
+    NOT_ASKED,
+    Case,
+    Escape,
+    Evidence,
+    NoGateReason,
+    Preventable,
+    Prevention,
+    Violation,
+    Worst,
+)
+from pytest_garl.cases.case_header import (
+    FIRST_SCHEMA,
+    CaseHeader,
+    header_lines,
+    keys_of,
+    read_header,
+)
+from pytest_garl.cases.severity_toml import read_severity, severity_lines
+from pytest_garl.errors import ScenarioError
+from pytest_garl.files.reading import read_text
+from pytest_garl.files.toml import Table, parse, quoted
+from pytest_garl.messages import printable
+from pytest_garl.scenarios.files import SCENARIO_KEYS, is_in_units, read_scenario, scenario_lines
+from pytest_garl.scenarios.maps.loading import load_map
+from pytest_garl.scenarios.maps.map import Map
+from pytest_garl.scenarios.story import GRADES
+from pytest_garl.scenarios.task import task_lines
+from pytest_garl.verdicts.verdict import (
+    DEFAULT_LIMITS,
+    FARTHEST_M,
+    LONGEST_S,
+    AbortRule,
+    Limits,
+    PropertyName,
+    ViolationType,
+)
+
+_IN_UNITS = "# What is not nominal; each name ends with its unit, x is east and y north."
+_IN_GENES = "# Weather from 0 to 1, places from -1 to 1, velocity as a share of the top speed."
+_SECTIONS = {
+    "violation",
+    "severity",
+    "preventable",
+    "limits",
+    "task",
+    "policy",
+    "moves",
+    "changes",
+    "evidence",
+}
+_VIOLATION_KEYS = {
+    *("signature", "type", "property", "margin", "unit", "story"),
+    *("worst_margin", "weakest_grade"),
+}
+
+
+def load_case(path: Path, map_folders: tuple[Path, ...] = ()) -> Case:
+    """Return the case in a file; raise ScenarioError that names file and key."""
+    return parse_case(read_text(path), lambda name: load_map(name, map_folders), source=str(path))
+
+
+def load_header(path: Path) -> CaseHeader:
+    """Return the facts above a file's first table, in a fraction of the time of the whole case."""
+    header, _, _ = read_text(path).partition("\n[")
+    return read_header(Table(parse(header, str(path)), str(path)))
+
+
+def dump_case(case: Case, load_map: Callable[[str], Map] = load_map) -> str:
+    """Return the case as TOML: the same bytes for equal cases."""
+    map = load_map(case.scenario.map)
+    sections = [
+        header_lines(case, map),
+        _violation_lines(case.violation, case.worst),
+        *severity_lines(case.severity, is_shrunk=case.is_shrunk),
+        *_prevention_lines(case.prevention),
+        _limits_lines(case.limits),
+        [
+            _IN_UNITS if is_in_units(case.scenario, map) else _IN_GENES,
+            *scenario_lines(case.scenario, map)[1:],
+            *task_lines(case.scenario.task),
+        ],
+        _policy_lines(case),
+        *_behaviour_lines(case),
+        *_evidence_lines(case.evidence),
+    ]
+    return "\n\n".join("\n".join(lines) for lines in sections) + "\n"
+
+
+def parse_case(text: str, load_map: Callable[[str], Map], *, source: str = "case") -> Case:
+    """Return the case in ``text``; raise ScenarioError that names source and key."""
+    top = Table(parse(text, source), source)
+    header = read_header(top)
+    top.refuse_unknown(keys_of(header) | _SECTIONS | {*SCENARIO_KEYS})
+    try:
+        map = load_map(header.map)
+    except ScenarioError as error:
+        raise top.error("map", str(error)) from error
+    scenario = read_scenario(top, map)
+    removed = scenario.removed_objects
+    names = [name for name, _ in map.all_objects if name not in removed]
+    policy = top.table("policy")
+    policy.refuse_unknown({"name", "sha256"})
+    evidence = _read_evidence(top.table("evidence"))
+    return Case(
+        system=header.system,
+        status=header.status,
+        scenario=scenario,
+        violation=_read_violation(top.table("violation")),
+        worst=_read_worst(top.table("violation")),
+        policy=policy.string("name"),
+        policy_sha256=policy.string("sha256"),
+        moves=read_moves(top.table("moves"), names),
+        changes=read_changes(top.table("changes"), names) if "changes" in top.values else (),
+        evidence=evidence,
+        limits=_read_limits_of(header.schema, top.table("limits")),
+        test=top.string("test", ""),
+        assertion=top.string("assertion", ""),
+        accepted=top.boolean("accepted", default=False),
+        reason=_reason(header, evidence),
+        live=header.live,
+        prevention=_read_prevention(top),
+        severity=read_severity(top),
+    )
+
+
+def record_lines(case: Case) -> list[str]:
+    """Return the lines that hold the moves of the objects and their policies' changes."""
+    return [*move_lines(case.behaviour), *change_lines(case.behaviour)]
+
+
+def size_of(case: Case, map: Map) -> int:
+    """Return how many characters the scenario and the recorded behaviour take in the file."""
+    lines = (*scenario_lines(case.scenario, map), *record_lines(case))
+    return sum(len(line) for line in lines)
+
+
+def _reason(header: CaseHeader, evidence: Evidence) -> NoGateReason:
+    """Return why a case gates nothing; the first schema tells an edge by the evidence alone."""
+    if header.schema == FIRST_SCHEMA and evidence.neighbours_failed < evidence.neighbours:
+        return "edge"
+    return header.reason
+
+
+def _prevention_lines(prevention: Prevention) -> list[list[str]]:
+    if prevention == NOT_ASKED:
+        return []
+    seconds = (
+        ("inevitable_s", prevention.inevitable_s, "from then on no escape exists"),
+        ("observed_s", prevention.observed_s, "the camera first showed the body well enough"),
+    )
+    lines = [
+        "# Could it have been prevented? Seconds before the contact.",
+        "[preventable]",
+        f'answer = "{prevention.answer}"',
+        *(f"{key} = {value!r}  # {text}" for key, value, text in seconds if value is not None),
+    ]
+    if prevention.escape != "flight":
+        lines.append(f'escape = "{prevention.escape}"  # of a UAV that stands on the ground')
+    return [lines]
+
+
+def _read_prevention(top: Table) -> Prevention:
+    if "preventable" not in top.values:
+        return NOT_ASKED
+    table = top.table("preventable")
+    table.refuse_unknown({"answer", "inevitable_s", "observed_s", "escape"})
+    seconds = {
+        key: table.number(key, low=0.0, high=LONGEST_S)
+        for key in ("inevitable_s", "observed_s")
+        if key in table.values
+    }
+    answer = cast(Preventable, table.string("answer", allowed=get_args(Preventable)[1:]))
+    if "inevitable_s" not in seconds:
+        raise table.error("inevitable_s", "found nothing, expected a number of seconds")
+    escape: Escape = "flight"
+    if "escape" in table.values:
+        escape = cast(Escape, table.string("escape", allowed=get_args(Escape)))
+    return Prevention(answer=answer, escape=escape, **seconds)
+
+
+def _violation_lines(violation: Violation, worst: Worst | None) -> list[str]:
+    # A comment ends at a line's end, so that no text may bring one.
+    unit = printable(violation.unit, keep="")
+    return [
+        "[violation]",
+        f"signature = {quoted(violation.signature)}",
+        f'type = "{violation.type}"',
+        f'property = "{violation.property}"',
+        f"margin = {violation.margin!r}  # {unit}; what is not above 0 is violated",
+        f"unit = {quoted(violation.unit)}",
+        *_worst_lines(worst),
+        f"story = {quoted(violation.description)}",
+    ]
+
+
+def _worst_lines(worst: Worst | None) -> list[str]:
+    if worst is None:
+        return []
+    lines = [f"worst_margin = {worst.margin!r}  # of the search; a worse one is not excused"]
+    return [*lines, *([f"weakest_grade = {quoted(worst.grade)}"] if worst.grade else [])]
+
+
+def _read_worst(table: Table) -> Worst | None:
+    if "worst_margin" not in table.values:
+        if "weakest_grade" in table.values:
+            raise table.error("weakest_grade", "found a grade, expected one beside worst_margin")
+        return None
+    known = "weakest_grade" in table.values
+    return Worst(
+        margin=table.number("worst_margin"),
+        grade=table.string("weakest_grade", allowed=GRADES) if known else "",
+    )
+
+
+def _read_violation(table: Table) -> Violation:
+    table.refuse_unknown(_VIOLATION_KEYS)
+    return Violation(
+        signature=table.string("signature"),
+        type=cast(ViolationType, table.string("type", allowed=get_args(ViolationType))),
+        property=cast(PropertyName, table.string("property", allowed=get_args(PropertyName))),
+        margin=table.number("margin"),
+        unit=table.string("unit"),
+        description=table.string("story"),
+    )
+
+
+def _limits_lines(limits: Limits) -> list[str]:
+    return [
+        "[limits]",
+        f"distance_m = {limits.distance_m!r}",
+        f"time_s = {limits.time_s!r}",
+        f'abort = "{limits.abort}"',
+    ]
+
+
+def _read_limits_of(schema: int, table: Table) -> Limits:
+    """Return the limits of a case.
+
+    In the first schema "ok" was the default and nobody's choice, so today's default takes its
+    place; a test that flies the case has limits of its own.
+    """
+    found = read_limits(table)
+    if schema == FIRST_SCHEMA and found.abort == "ok":
+        return dataclasses.replace(found, abort=DEFAULT_LIMITS.abort)
+    return found
+
+
+def read_limits(table: Table) -> Limits:
+    """Return the limits in a table of their own."""
+    table.refuse_unknown({"distance_m", "time_s", "abort"})
+    abort = table.string("abort", allowed=("needless", "ok", "violation"))
+    return Limits(
+        distance_m=table.number("distance_m", low=0.0, high=FARTHEST_M),
+        time_s=table.number("time_s", low=0.0, high=LONGEST_S),
+        abort=cast(AbortRule, abort),
+    )
+
+
+def _policy_lines(case: Case) -> list[str]:
+    return [
+        "# Who moved the objects when this was found.",
+        "[policy]",
+        f"name = {quoted(case.policy)}",
+        f"sha256 = {quoted(case.policy_sha256)}",
+    ]
+
+
+def _behaviour_lines(case: Case) -> list[list[str]]:
+    moves = [
+        "# What they did: [times, x, y], each for half a second; x east and y north as shares of",
+        "# the object's speed. After the last they leave the marker's surroundings.",
+        "[moves]",
+        *move_lines(case.behaviour),
+    ]
+    if not case.changes:
+        return [moves]
+    changes = [
+        "# What their policies changed of the environment: [decision, gene, added to it], the",
+        "# number of the decision from 0, two a second.",
+        "[changes]",
+        *change_lines(case.behaviour),
+    ]
+    return [moves, changes]
+
+
+def _evidence_lines(evidence: Evidence) -> list[list[str]]:
+    sources = {
+        "system_sha256": evidence.system_sha256,
+        "simulator_sha256": evidence.simulator_sha256,
+    }
+    return [
+        [
+            "[evidence]",
+            f"trajectory_sha256 = {quoted(evidence.trajectory_sha256)}",
+            f"cpu = {quoted(evidence.cpu)}  # class of CPUs on which the hash holds",
+            f"map_sha256 = {quoted(evidence.map_sha256)}",
+            f"neighbours = {evidence.neighbours}  # slightly different scenarios flown",
+            f"neighbours_failed = {evidence.neighbours_failed}",
+            f"removed = {quoted(evidence.removed)}",
+            *(f'{key} = "{value}"' for key, value in sources.items() if value),
+        ],
+        [
+            "[evidence.versions]",
+            *(f"{quoted(name)} = {quoted(version)}" for name, version in evidence.versions),
+        ],
+    ]
+
+
+def _read_evidence(table: Table) -> Evidence:
+    hashes = {"trajectory_sha256", "map_sha256", "system_sha256", "simulator_sha256"}
+    table.refuse_unknown(hashes | {"cpu", "neighbours", "neighbours_failed", "removed", "versions"})
+    versions = table.table("versions")
+    return Evidence(
+        trajectory_sha256=table.string("trajectory_sha256"),
+        cpu=table.string("cpu"),
+        map_sha256=table.string("map_sha256"),
+        neighbours=table.integer("neighbours"),
+        neighbours_failed=table.integer("neighbours_failed"),
+        removed=table.string("removed"),
+        versions=tuple((name, versions.string(name)) for name in versions.values),
+        system_sha256=table.string("system_sha256", ""),
+        simulator_sha256=table.string("simulator_sha256", ""),
+    )

@@ -1,0 +1,104 @@
+"""The facts above the first table of a case file: schema, status, what gates, system, map, test."""
+
+from __future__ import annotations
+
+import textwrap
+from dataclasses import dataclass
+from typing import cast, get_args
+
+from pytest_garl.cases.case import Case, NoGateReason, Status, asserting_test
+from pytest_garl.execution.reference import SYSTEM_NAME
+from pytest_garl.files.toml import Table, quoted
+from pytest_garl.messages import shown
+from pytest_garl.scenarios.files import absent_line
+from pytest_garl.scenarios.maps.map import Map
+
+SCHEMA = 2
+FIRST_SCHEMA = 1
+"""Files of it are read; new ones are written in today's schema."""
+_KEYS = {"schema", "system", "status", "accepted", "map", "seed", "test", "assertion"}
+_KEYS_OF_SCHEMA = {1: {"avoidable"}, 2: {"gates", "reason", "live"}}
+_WIDTH = 98
+_STATUSES: dict[int, dict[str, Status]] = {
+    1: {"open": "open", "fixed": "fixed", "unavoidable": "open"},
+    2: {"open": "open", "fixed": "fixed"},
+}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class CaseHeader:
+    """The facts above a file's first table, which decide the items that fly the case."""
+
+    schema: int
+    system: str
+    status: Status
+    live: bool
+    reason: NoGateReason
+    map: str
+    test: str
+    asserting_test: str
+
+
+def keys_of(header: CaseHeader) -> set[str]:
+    """Return the keys that may stand above the first table."""
+    return _KEYS | _KEYS_OF_SCHEMA[header.schema]
+
+
+def header_lines(case: Case, map: Map) -> list[str]:
+    """Return the lines above the first table."""
+    text, scenario = case.violation.description, case.scenario
+    description = "".join(char if char.isprintable() else " " for char in text)
+    lines = [
+        *(f"# {line}" for line in textwrap.wrap(description, _WIDTH)),
+        f"schema = {SCHEMA}",
+        f"system = {quoted(case.system)}",
+        f'status = "{case.status}"',
+        *(["accepted = true"] if case.accepted else []),
+        *([] if case.gates else ["gates = false", f'reason = "{case.reason}"']),
+        *(["live = true  # a repair must hold against a live policy too"] if case.live else []),
+        f"map = {quoted(scenario.map)}",
+        f"seed = {scenario.seed}",
+    ]
+    if case.test:
+        lines.append(f"test = {quoted(case.test)}")
+    if case.assertion:
+        lines.append(f"assertion = {quoted(case.assertion)}")
+    return [*lines, *absent_line(scenario, map)]
+
+
+def read_header(top: Table) -> CaseHeader:
+    """Return the header; raise ScenarioError that names the key."""
+    schema = top.integer("schema")
+    if schema not in _KEYS_OF_SCHEMA:
+        expected = f"expected {FIRST_SCHEMA} or {SCHEMA}"
+        raise top.error("schema", f"found {shown(top.get('schema'))}, {expected}")
+    system = top.string("system")
+    if not SYSTEM_NAME.fullmatch(system):
+        raise top.error(
+            "system", f"found {shown(system)}, expected 'module:class', names with dots between"
+        )
+    statuses = _STATUSES[schema]
+    status = top.string("status", allowed=tuple(statuses))
+    if schema == FIRST_SCHEMA:
+        live = top.string("avoidable", allowed=("live", "recorded", "no")) == "live"
+        reason: NoGateReason = "unpreventable" if status == "unavoidable" else ""
+    else:
+        live, reason = top.boolean("live", default=False), _read_reason(top)
+    return CaseHeader(
+        schema=schema,
+        system=system,
+        status=statuses[status],
+        live=live,
+        reason=reason,
+        map=top.string("map"),
+        test=top.string("test", ""),
+        asserting_test=asserting_test(top.string("test", ""), top.string("assertion", "")),
+    )
+
+
+def _read_reason(top: Table) -> NoGateReason:
+    if top.boolean("gates", default=True):
+        if "reason" in top.values:
+            raise top.error("reason", "found a reason, expected one only beside 'gates = false'")
+        return ""
+    return cast(NoGateReason, top.string("reason", allowed=get_args(NoGateReason)[1:]))

@@ -1,0 +1,152 @@
+"""An NPC that sees the UAV in part: it comes, interferes for a while, and leaves."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+
+from pytest_garl.npcs.grades import GRADE_LIMITS, GradeLimits
+from pytest_garl.npcs.perception import Perception, Sighting
+from pytest_garl.npcs.steering import towards
+from pytest_garl.npcs.way_out import WayOut
+from pytest_garl.scenarios.story import APPROACH_S, LIMITS_S, Story, story_of
+from pytest_garl.simulation.npc_policy import DECISION_STEP_S, STAY, Move, Situation
+
+LEAVES_TO_M = 15.0
+"""An NPC leaves at least so far from the marker: out of sight of the UAV above it."""
+DRAWN_DELAY_S = 10.0
+"""If the scenario has no story, an NPC comes at most so long after its phase."""
+DRAWN_REACH_M = 3.0
+"""If the scenario has no story, a careless NPC crosses at most so far from the marker."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Belief(Situation):
+    """A situation as an NPC believes it to be: with the UAV where it was seen, moved on.
+
+    ``left_s`` is how long the NPC still interferes, ``keeps_m`` what it keeps from the UAV.
+    """
+
+    left_s: float
+    keeps_m: float
+
+
+class Mind(Protocol):
+    """Decides where an NPC goes that perceives the UAV in part."""
+
+    def decide(self, belief: Belief) -> Move:
+        """Return the move until the next decision of its grade."""
+
+
+class Interference:
+    """The part of one NPC without its mind: when it comes, what it perceives, when it leaves.
+
+    It comes after its phase and goes to the marker until it perceives the UAV.  From then on it
+    interferes, until its time is over or it perceived nothing for :data:`APPROACH_S`; it leaves.
+    """
+
+    def __init__(self, grade: str, situation: Situation, rng: np.random.Generator) -> None:
+        told = story_of(situation.scenario, situation.self.name)
+        self._story = told or drawn_story(grade, rng)
+        self._limits: GradeLimits = GRADE_LIMITS[grade]
+        self._lasts_s = min(self._story.lasts_s, LIMITS_S[grade])
+        self._perception = Perception(self._limits, situation.map)
+        self._way_out: WayOut | None = None
+        self._move = STAY
+        self._asked_s = -math.inf
+        self._ends_s = math.inf
+
+    @property
+    def is_over(self) -> bool:
+        """Whether it is leaving."""
+        return self._way_out is not None
+
+    def look(self, situation: Situation) -> Belief | None:
+        """Take a situation in; return what the NPC believes if it decides now."""
+        self._perception.take_in(situation)
+        now, begins_s = situation.time_s, self._story.begins_s(situation.phases_s)
+        if now < begins_s or self._way_out is not None:
+            return None
+        sighting = self._perception.sighting
+        if math.isinf(self._ends_s) and sighting is not None:
+            self._ends_s = now + self._lasts_s
+        if now >= min(self._ends_s, begins_s + APPROACH_S + self._lasts_s):
+            # One that keeps away from the UAV turns back; another one goes straight on.
+            last = (self._move.x, self._move.y) if self._limits.keeps_m == 0 else (0.0, 0.0)
+            self._way_out = WayOut(situation, last, LEAVES_TO_M)
+            return None
+        if now - self._asked_s < self._limits.decides_every_s - 1e-6:
+            return None
+        if sighting is None:
+            self._move = towards(situation.marker_position_m, situation)
+            return None
+        self._asked_s = now
+        return _belief(sighting, situation, self._ends_s - now, self._limits.keeps_m)
+
+    def answer(self, move: Move) -> None:
+        """Take the decision that follows from what the NPC believed."""
+        self._move = move
+
+    def move(self, situation: Situation) -> Move:
+        """Return the move until the next situation."""
+        move = self._move if self._way_out is None else self._way_out.decide(situation)
+        return kept_away(move, self._perception.sighting, situation, self._limits.keeps_m)
+
+
+class Interfering:
+    """An NPC policy: an interference with a mind."""
+
+    def __init__(self, grade: str, mind: Mind) -> None:
+        self.grade, self._mind = grade, mind
+
+    def reset(self, situation: Situation, rng: np.random.Generator) -> None:
+        """Read the story, or draw one."""
+        self._interference = Interference(self.grade, situation, rng)
+
+    def decide(self, situation: Situation) -> Move:
+        """Return the move until the next decision."""
+        belief = self._interference.look(situation)
+        if belief is not None:
+            self._interference.answer(self._mind.decide(belief))
+        return self._interference.move(situation)
+
+
+def _belief(sighting: Sighting, situation: Situation, left_s: float, keeps_m: float) -> Belief:
+    facts = {each.name: getattr(situation, each.name) for each in dataclasses.fields(Situation)}
+    facts["uav_position_m"] = (*sighting.place_m, sighting.height_m)
+    facts["uav_velocity_mps"] = sighting.velocity_mps
+    return Belief(**facts, left_s=left_s, keeps_m=keeps_m)
+
+
+def kept_away(move: Move, sighting: Sighting | None, situation: Situation, keeps_m: float) -> Move:
+    """Return the move, or another one if it leads nearer to the UAV's column than ``keeps_m``.
+
+    An NPC that would come too near stands; a bird, which cannot, flies away from there.
+    """
+    if sighting is None or keeps_m == 0:
+        return move
+    (x, y, _), (ux, uy) = situation.self.position_m, sighting.place_m
+    stride_m = situation.self.speed_mps * DECISION_STEP_S
+    after = math.dist((x + move.x * stride_m, y + move.y * stride_m), (ux, uy))
+    before = math.dist((x, y), (ux, uy))
+    if after >= keeps_m or after > before:
+        return move
+    if not situation.self.type.flies or before == 0:
+        return STAY
+    return Move(x=(x - ux) / before, y=(y - uy) / before)
+
+
+def drawn_story(grade: str, rng: np.random.Generator) -> Story:
+    """Draw a story for an NPC of a scenario that has none, such as one of the paper."""
+    angle, reach = rng.uniform(0, 2 * math.pi), DRAWN_REACH_M * math.sqrt(rng.uniform())
+    return Story(
+        grade=grade,
+        phase=int(rng.integers(0, 3)),
+        delay_s=float(rng.uniform(0, DRAWN_DELAY_S)),
+        lasts_s=LIMITS_S[grade],
+        crossing_m=(reach * math.cos(angle), reach * math.sin(angle)),
+    )

@@ -1,0 +1,40 @@
+"""Unlearned minds of NPCs that perceive the UAV in part: rivals of the learned ones."""
+
+from __future__ import annotations
+
+import math
+
+from pytest_garl.npcs.interference import Belief
+from pytest_garl.npcs.steering import towards
+from pytest_garl.simulation.npc_policy import Move
+
+LATEST_S = 5.0
+"""Nobody looks farther ahead."""
+
+
+class Direct:
+    """Goes to where it believes the UAV's column to be."""
+
+    def decide(self, belief: Belief) -> Move:
+        """Return the move straight there."""
+        x, y, _ = belief.uav_position_m
+        return towards((x, y), belief)
+
+
+class Intercepting:
+    """Goes to where the UAV will be when it gets there, if that flies straight on."""
+
+    def decide(self, belief: Belief) -> Move:
+        """Return the move straight there."""
+        (x, y, _), (vx, vy, _) = belief.uav_position_m, belief.uav_velocity_mps
+        distance = math.dist((x, y), belief.self.position_m[:2])
+        ahead_s = min(LATEST_S, distance / max(0.1, belief.self.speed_mps))
+        return towards((x + vx * ahead_s, y + vy * ahead_s), belief)
+
+
+class ToMarker:
+    """Goes to the marker and over it, whatever the UAV does."""
+
+    def decide(self, belief: Belief) -> Move:
+        """Return the move straight there."""
+        return towards(belief.marker_position_m, belief)

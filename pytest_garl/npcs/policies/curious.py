@@ -1,0 +1,18 @@
+"""curious: an NPC that sees the UAV late and from near; `grades.py` has its limits."""
+
+from __future__ import annotations
+
+from pytest_garl.npcs.interference import Interfering
+from pytest_garl.npcs.minds import Intercepting
+
+
+class Curious(Interfering):
+    """Interferes for a while, within the limits of its grade."""
+
+    grade = "curious"
+
+    def __init__(self) -> None:
+        super().__init__(self.grade, Intercepting())
+
+
+POLICY = Curious

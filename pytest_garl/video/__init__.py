@@ -1,6 +1,0 @@
-"""One recorded flight as a video: what the camera saw, the map from above, the height."""
-
-from pytest_garl.video.encoder import write
-from pytest_garl.video.flight_video import frames, rate_hz, save_video
-
-__all__ = ["frames", "rate_hz", "save_video", "write"]
