@@ -121,11 +121,6 @@ class MarkerSpec:
         )
 
 
-PAPER_MARKER = MarkerSpec()
-MARKER_SIDE_M = PAPER_MARKER.side_m
-"""Paper, section 4.2: marker of 1.5 m, id 0."""
-
-
 def _check(name: str, marker: NestedMarker, size: int, dictionary: str) -> None:
     if type(marker.id) is not int or not 0 <= marker.id < size:
         raise ScenarioError(
@@ -146,3 +141,8 @@ def _check(name: str, marker: NestedMarker, size: int, dictionary: str) -> None:
 
 def _within(value: object, low: float, high: float) -> bool:
     return isinstance(value, int | float) and type(value) is not bool and low <= value <= high
+
+
+PAPER_MARKER = MarkerSpec()
+MARKER_SIDE_M = PAPER_MARKER.side_m
+"""Paper, section 4.2: marker of 1.5 m, id 0."""

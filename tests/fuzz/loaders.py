@@ -34,7 +34,7 @@ from pytest_garl.scenarios import files as scenarios
 from pytest_garl.scenarios.chromosome import decode
 from pytest_garl.scenarios.files import parse_scenario
 from pytest_garl.scenarios.genes import genome_for
-from pytest_garl.scenarios.maps import map as maps
+from pytest_garl.scenarios.maps import loading as maps
 from pytest_garl.scenarios.validity import problems
 from pytest_garl.search.objectives import violation_proximity
 from tests.cases import samples as case_samples

@@ -81,7 +81,7 @@ def sampled(track: Track, times_s: Array) -> tuple[Array, Array]:
     """Return positions (n, 3) and attitudes (n, 4) of a track at times within it.
 
     Between samples positions change linearly and attitudes along the shorter turn, as in
-    ``video/pose.py``.  A simulator that records no attitudes has zeros, which become level.
+    ``film/pose.py``.  A simulator that records no attitudes has zeros, which become level.
     """
     positions = np.stack([np.interp(times_s, track.time_s, part) for part in track.position_m.T], 1)
     attitudes = track.attitude.copy()

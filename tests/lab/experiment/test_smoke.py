@@ -8,7 +8,7 @@ import pytest
 
 from lab.experiment.results import read_rows
 
-ROOT = Path(__file__).parents[2]
+ROOT = Path(__file__).parents[3]
 PLAN = "docs/experiments/smoke.toml"
 
 

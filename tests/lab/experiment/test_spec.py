@@ -8,7 +8,7 @@ from lab.experiment.campaign import check_experiment
 from lab.experiment.spec import Experiment, read_experiment
 from pytest_garl.errors import ExperimentError, ScenarioError
 
-DOCS = Path(__file__).parents[2] / "docs" / "experiments"
+DOCS = Path(__file__).parents[3] / "docs" / "experiments"
 TEXT = """
 title = "Mine"
 budget = 40
