@@ -6,8 +6,8 @@ import math
 
 import numpy as np
 
-from pytest_garl.scenarios.genes import SUN, WEATHER
-from pytest_garl.scenarios.groups.decoys import KINDS, REACH_M
+from pytest_garl.scenarios.genes import SUN
+from pytest_garl.scenarios.groups import DECOY_KINDS, DECOY_REACH_M, WEATHER
 from pytest_garl.simulation.camera.exposure import Movement
 
 ACTS = 0.25
@@ -25,7 +25,7 @@ RANGES = {
 }
 """The full ranges that a file may name.  An error of mounting is a tilt, and an error of the focal
 length another height; both are drawn."""
-CONDITIONS = (*(f"environment.{name}" for name, _ in WEATHER), SUN, *RANGES)
+CONDITIONS = (*WEATHER, SUN, *RANGES)
 """What a frame's row holds of its scenario."""
 
 
@@ -40,10 +40,10 @@ def random_conditions(rng: np.random.Generator) -> dict[str, float]:
     if "cover.share_percent" in found:
         found["cover.lasts_s"] = LAST_S
     if rng.random() < ACTS:
-        found["decoy-1.kind"] = float(rng.integers(1, len(KINDS)))
+        found["decoy-1.kind"] = float(rng.integers(1, len(DECOY_KINDS)))
         found["decoy-1.yaw_deg"] = float(rng.uniform(-180, 180))
         for axis in ("x", "y"):
-            found[f"decoy-1.{axis}_m"] = float(rng.uniform(-REACH_M, REACH_M))
+            found[f"decoy-1.{axis}_m"] = float(rng.uniform(-DECOY_REACH_M, DECOY_REACH_M))
     return found
 
 

@@ -19,7 +19,8 @@ from pytest_garl.fiducial import MARKER_SIDE_M
 from pytest_garl.flight.flight import MarkerView
 from pytest_garl.landing_system import Camera, Detection, Mission, Observation
 from pytest_garl.scenarios.chromosome import decode
-from pytest_garl.scenarios.genes import SUN, WEATHER, genome_for
+from pytest_garl.scenarios.genes import SUN, genome_for
+from pytest_garl.scenarios.groups import WEATHER
 from pytest_garl.scenarios.maps.loading import load_map
 from pytest_garl.scenarios.maps.map import Map
 from pytest_garl.scenarios.object_types import OBJECT_TYPES
@@ -140,7 +141,7 @@ def random_scenario(rng: np.random.Generator, map: Map) -> Scenario:
     """
     genome = genome_for(map, weather="full")
     values = dict(zip(genome.keys, genome.random(rng), strict=True))
-    names = [f"environment.{name}" for name, _ in WEATHER]
+    names = [*WEATHER]
     strong = rng.choice(len(names), size=int(rng.choice([0, 1, 1, 2, 2, 3, 8])), replace=False)
     quiet = float(rng.choice([0.0, 0.15]))
     for index, key in enumerate(names):

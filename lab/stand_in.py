@@ -19,7 +19,7 @@ import numpy as np
 from lab.stand_in_way import ORDINARY, TAKE_OFF_S, Event, LandingModel, Way, meet_bodies
 from pytest_garl.execution.result import FlightResult
 from pytest_garl.execution.severity import NO_SEVERITY
-from pytest_garl.scenarios.groups.decoys import KINDS
+from pytest_garl.scenarios.groups import DECOY_KINDS
 from pytest_garl.scenarios.maps.map import Map
 from pytest_garl.scenarios.placement import (
     marker_position_m,
@@ -145,7 +145,7 @@ def _slide_m(scenario: Scenario) -> float:
 def _decoys(scenario: Scenario) -> list[tuple[str, tuple[float, float]]]:
     found = []
     for number in (1, 2, 3):
-        kind = KINDS[int(scenario[f"decoy-{number}.kind"])]
+        kind = DECOY_KINDS[int(scenario[f"decoy-{number}.kind"])]
         place = scenario[f"decoy-{number}.x_m"], scenario[f"decoy-{number}.y_m"]
         found += [(kind, place)] if kind != "none" else []
     return found

@@ -19,7 +19,8 @@ from pytest_garl.execution.ledger import Ledger
 from pytest_garl.execution.ledger_queries import LedgerFlight
 from pytest_garl.flight.flight_file import load
 from pytest_garl.scenarios.files import parse_scenario
-from pytest_garl.scenarios.genes import WEATHER, genome_for
+from pytest_garl.scenarios.genes import genome_for
+from pytest_garl.scenarios.groups import WEATHER
 from pytest_garl.scenarios.maps.map import Map
 from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.verdicts.paper_metrics import empty_cells, mark_visited, mean_distance, top_k
@@ -177,7 +178,7 @@ def chromosomes(
     """
     genome = genome_for(map, weather="confined" if domain == "paper" else "full")
     nominal = dict(zip(genome.keys, genome.nominal, strict=True))
-    raw = [[each[f"environment.{name}"] for name, _ in WEATHER] for each in scenarios]
+    raw = [[each[gene] for gene in WEATHER] for each in scenarios]
     whole = [[each.get(key, nominal[key]) for key in genome.keys] for each in scenarios]
     return np.array(raw), genome.normalise(np.array(whole))
 

@@ -19,7 +19,8 @@ from landing_systems.opencv_mls import OpenCvLandingSystem
 from pytest_garl.flight.flight import Flight
 from pytest_garl.landing_system import Camera
 from pytest_garl.npcs.catalogue import policy_spec
-from pytest_garl.scenarios.genes import WEATHER, genome_for
+from pytest_garl.scenarios.genes import genome_for
+from pytest_garl.scenarios.groups import WEATHER
 from pytest_garl.scenarios.maps.loading import load_map
 from pytest_garl.scenarios.maps.map import Map
 from pytest_garl.scenarios.scenario import Scenario
@@ -37,7 +38,7 @@ SEED = 99
 
 def first_hit(map: Map, policy: str) -> tuple[Scenario, Flight] | None:
     """Return the first scenario in which the UAV and the object collide, and its flight."""
-    clear = {f"environment.{name}": 0.0 for name, _ in WEATHER}
+    clear = dict.fromkeys(WEATHER, 0.0)
     for candidate in random_scenarios(map, genome_for(map), SEED, 0, TRIES):
         scenario = candidate.replace(clear)
         flight = fly(scenario, OpenCvLandingSystem, policy_spec(policy), map=map)

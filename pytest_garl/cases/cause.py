@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pytest_garl.cases.case import Case
 from pytest_garl.scenarios.conditions import LIGHT_GROUP, NOON, active_conditions
 from pytest_garl.scenarios.genes import SUN
-from pytest_garl.scenarios.groups.catalogue import GROUPS, WEATHER_CAUSES
+from pytest_garl.scenarios.groups import GROUPS, WEATHER_CAUSES
 from pytest_garl.scenarios.maps.map import Map
 from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.scenarios.validity import repair
@@ -50,9 +50,7 @@ class Cause:
         values: dict[str, float] = {}
         for name in self.conditions:
             if name in GROUPS:
-                group = GROUPS[name]
-                pairs = zip(group.keys, group.parameters, strict=True)
-                values |= {key: each.nominal for key, each in pairs}
+                values |= GROUPS[name].nominal
             weather = [f"environment.{each}" for each in WEATHER_CAUSES.get(name, ())]
             values |= {key: 0.0 for key in weather if scenario.get(key, 0.0) > 0}
             if name == LIGHT_GROUP and scenario.get(SUN, NOON) != NOON:

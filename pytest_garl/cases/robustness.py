@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from pytest_garl.cases.simplification import CHOICES, genome_of
-from pytest_garl.scenarios.genes import Property
-from pytest_garl.scenarios.groups.catalogue import GROUPS
+from pytest_garl.scenarios.groups import GROUPS
 from pytest_garl.scenarios.maps.map import Map
+from pytest_garl.scenarios.quantities import Quantity
 from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.scenarios.story import STORY
 from pytest_garl.scenarios.validity import repair
@@ -45,7 +45,7 @@ def neighbours(scenario: Scenario, map: Map) -> tuple[Scenario, ...]:
     return tuple(found)
 
 
-def _range(item: Property) -> float:
+def _range(item: Quantity) -> float:
     """Return the width of a gene's range; of an object's story that which a search draws from.
 
     What can be flown is six times as wide: a bird would come four metres too late.

@@ -22,8 +22,8 @@ from pytest_garl.cases.simplification import (
     simplified,
     value_simplifications,
 )
-from pytest_garl.scenarios.genes import Property
 from pytest_garl.scenarios.maps.map import Map
+from pytest_garl.scenarios.quantities import Quantity
 from pytest_garl.scenarios.scenario import Scenario
 
 BISECTIONS = 3
@@ -134,7 +134,7 @@ def _bisect(trials: Trials) -> None:
                 least = share
 
 
-def _nearer(scenario: Scenario, items: Sequence[Property], share: float) -> Scenario:
+def _nearer(scenario: Scenario, items: Sequence[Quantity], share: float) -> Scenario:
     """Return a scenario whose genes have only a share of their distance from nominal."""
     near = {each.key: each.nominal + share * (scenario[each.key] - each.nominal) for each in items}
     return scenario.replace(near)

@@ -5,11 +5,12 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
-from pytest_garl.scenarios.conditions import active_conditions, cause_of_key, has_harsher_end
-from pytest_garl.scenarios.genes import Genome, NuclearGene, Property
+from pytest_garl.scenarios.conditions import active_conditions, cause_of_key
+from pytest_garl.scenarios.genes import Genome, NuclearGene
 from pytest_garl.scenarios.genome_like import genome_like
-from pytest_garl.scenarios.groups.catalogue import GROUPS
+from pytest_garl.scenarios.groups import QUANTITIES
 from pytest_garl.scenarios.maps.map import Map
+from pytest_garl.scenarios.quantities import Quantity
 from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.scenarios.story import STORY
 from pytest_garl.scenarios.validity import repair
@@ -84,18 +85,12 @@ def value_simplifications(scenario: Scenario, genome: Genome) -> list[list[Simpl
     """
     found = []
     for gene in genome.genes:
-        group = GROUPS.get(gene.properties[0].key.partition(".")[0])
-        if group is None:
+        if gene.properties[0].key not in QUANTITIES:
             continue
-        harsher = {
-            key
-            for key, each in zip(group.keys, group.parameters, strict=True)
-            if has_harsher_end(each)
-        }
         values = sorted(
             (_distance(scenario, item), item.key, item.nominal)
             for item in gene.properties
-            if item.key in harsher and scenario[item.key] != item.nominal
+            if QUANTITIES[item.key].has_harsher_end and scenario[item.key] != item.nominal
         )
         if len(values) > 1:
             found.append([_reset({key: nominal}) for _, key, nominal in values])
@@ -109,7 +104,7 @@ def _strength(scenario: Scenario, gene: NuclearGene) -> float:
     )
 
 
-def _distance(scenario: Scenario, item: Property) -> float:
+def _distance(scenario: Scenario, item: Quantity) -> float:
     return abs(scenario[item.key] - item.nominal) / (item.high - item.low)
 
 
@@ -161,7 +156,7 @@ def _reset(values: dict[str, float]) -> Simplification:
     return lambda scenario: scenario.replace(values)
 
 
-CHOICES = tuple(f".{name}" for name, each in STORY.items() if each.choices)
+CHOICES = tuple(f".{name}" for name, each in STORY.items() if each.quantity.choices)
 """Ends of the keys of an object's choices, such as its grade: there is nothing between two."""
 OBJECT_PLACES = (
     *("start_x", "start_y", "destination_x", "destination_y"),

@@ -14,7 +14,8 @@ from hypothesis import strategies as st
 from hypothesis.database import ExampleDatabase, choices_to_bytes
 
 from pytest_garl.cases.simplification import OBJECT_PLACES, BudgetSpentError, Trials
-from pytest_garl.scenarios.genes import NuclearGene, Property
+from pytest_garl.scenarios.genes import NuclearGene
+from pytest_garl.scenarios.quantities import Quantity
 from pytest_garl.scenarios.scenario import Scenario
 
 STEPS = 20
@@ -114,7 +115,7 @@ def _genes_off_nominal(
 
 
 def _stepped(
-    item: Property, end: float, first: int, value: float
+    item: Quantity, end: float, first: int, value: float
 ) -> Callable[[Scenario, int], Scenario]:
     """Return how to put a gene on a step; the first one is its present value, to the bit."""
 

@@ -140,7 +140,7 @@ def straight_crossing(bare: Scenario, encounter: Encounter, map: Map) -> Scenari
 def shifted(scenario: Scenario, name: str, by_s: float, map: Map) -> Scenario | None:
     """Return the scenario with an entry shifted by a time; None if it began before the flight."""
     delay_s = scenario[f"{name}.delay_s"] + by_s
-    if not 0 <= delay_s <= STORY["delay_s"].high:
+    if not 0 <= delay_s <= STORY["delay_s"].quantity.high:
         return None
     return repair(scenario.replace({f"{name}.delay_s": delay_s}), map)
 

@@ -11,10 +11,10 @@ from pytest_garl.npcs.domain_policy import domain_with_policy
 from pytest_garl.scenarios.domains.domain import ABSENT, CONDITIONS, ELEVATION, Domain
 from pytest_garl.scenarios.domains.names import BUILT_IN, DEFAULT_DOMAIN
 from pytest_garl.scenarios.genes import CONFINED_WEATHER
-from pytest_garl.scenarios.groups.catalogue import GROUPS
+from pytest_garl.scenarios.groups import GROUPS, WEATHER
 from pytest_garl.scenarios.light import NOON_DEG, TWILIGHT_DEG
+from pytest_garl.scenarios.quantities import unit_of
 from pytest_garl.scenarios.story import GRADES
-from pytest_garl.scenarios.units import WEATHER_UNITS, unit_of
 
 MEANINGS = {
     "field": "what a landing system in the field meets",
@@ -76,9 +76,11 @@ def ranges_of(domain: Domain) -> tuple[tuple[str, float, float], ...]:
     if not domain.paper:
         return domain.ranges
     top = CONFINED_WEATHER if domain.paper == "confined" else 1.0
-    ends = [(f"weather.{each.name}", each.physical(top), each) for each in WEATHER_UNITS.values()]
     weather = [
-        (key, end, math.inf) if each.is_visibility else (key, 0.0, end) for key, end, each in ends
+        (each.key, each.at(top), math.inf)
+        if each.scale == "inverse"
+        else (each.key, 0.0, each.at(top))
+        for each in WEATHER.values()
     ]
     return (*weather, (ELEVATION, TWILIGHT_DEG, NOON_DEG))
 

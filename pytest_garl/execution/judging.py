@@ -26,7 +26,7 @@ SIMULATOR = "the simulator"
 _JUDGING = (
     "execution.severity_of_flight",
     "scenarios.maps.reader",
-    "simulation.flight_file",
+    "flight.flight_file",
     "verdicts.judge",
 )
 

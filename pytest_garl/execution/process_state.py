@@ -22,14 +22,14 @@ from pytest_garl.npcs.catalogue import scripted_policies
 
 OURS = "pytest_garl"
 FLYING = (
-    "adversary.learned",
-    "adversary.recorded",
-    *(f"adversary.policies.{name}" for name in scripted_policies()),
+    "npcs.learned",
+    "npcs.recorded",
+    *(f"npcs.policies.{name}" for name in scripted_policies()),
     "execution.flight",
     "execution.severity_of_flight",
     "scenarios.files",
     "scenarios.maps.reader",
-    "simulation.flight_file",
+    "flight.flight_file",
     "simulation.fly",
     "simulation.system_under_test.reference_pilot",
     "verdicts.judge",

@@ -16,7 +16,7 @@ from pytest_garl.gate.pairs import FlightSummary, NoLanding
 from pytest_garl.messages import listed, printable, shown
 from pytest_garl.scenarios.genes import object_gene
 from pytest_garl.scenarios.genome_like import genome_like
-from pytest_garl.scenarios.groups.catalogue import PARAMETERS
+from pytest_garl.scenarios.groups import QUANTITIES
 from pytest_garl.scenarios.maps.map import Map
 from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.scenarios.story import STORY
@@ -35,7 +35,7 @@ def is_sparse(scenarios: Iterable[Scenario]) -> bool:
     return (
         len(shapes) > 1
         or any(shapes.values())
-        or any(key in PARAMETERS or key.endswith(f".{HEIGHT}") for key in keys)
+        or any(key in QUANTITIES or key.endswith(f".{HEIGHT}") for key in keys)
     )
 
 
@@ -181,7 +181,7 @@ class RowReader:
             ranges = ranges_of(name, self.map)
             if HEIGHT in ranges:
                 known[f"{name}.{HEIGHT}"] = ranges[HEIGHT]
-        return known | {key: (each.low, each.high) for key, each in PARAMETERS.items()}
+        return known | {key: (each.low, each.high) for key, each in QUANTITIES.items()}
 
     def _value(self, key: str, name: str, value: Any, limits: tuple[float, float]) -> float:
         number, (low, high) = finite(value), limits

@@ -12,8 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pytest_garl.errors import ScenarioError
-from pytest_garl.scenarios.genes import CLEAR, OFF, ON, Genome, NuclearGene, Property, active_genes
-from pytest_garl.scenarios.groups.catalogue import PARAMETERS
+from pytest_garl.scenarios.genes import CLEAR, OFF, ON, Genome, NuclearGene, active_genes
+from pytest_garl.scenarios.groups import QUANTITIES
+from pytest_garl.scenarios.quantities import Quantity
 from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.scenarios.story import STORY
 
@@ -38,7 +39,7 @@ def encode(scenario: Scenario, genome: Genome) -> NDArray[np.float64]:
         item.key
         for gene in genome.genes
         for item in gene.values
-        if item.key not in known and item.key not in PARAMETERS and gene.name not in gone
+        if item.key not in known and item.key not in QUANTITIES and gene.name not in gone
     )
     if missing or unknown:
         raise ScenarioError(
@@ -73,11 +74,11 @@ def decode(vector: NDArray[np.float64], genome: Genome, *, map: str, seed: int) 
             values |= {item.key: float(row[item.key]) for item in gene.values}
         elif _is_object(gene):
             removed.append(gene.name)
-    conditions = {key: value for key, value in values.items() if key in PARAMETERS}
+    conditions = {key: value for key, value in values.items() if key in QUANTITIES}
     scenario = Scenario(
         map=map,
         seed=seed,
-        genes=tuple((key, value) for key, value in values.items() if key not in PARAMETERS),
+        genes=tuple((key, value) for key, value in values.items() if key not in QUANTITIES),
         removed_objects=tuple(sorted(removed)),
         task=genome.task,
     )
@@ -91,7 +92,7 @@ def _without_rounding(vector: NDArray[np.float64], genome: Genome) -> NDArray[np
     return np.where(is_rounding, inside, vector)
 
 
-def _value(gene: NuclearGene, item: Property, value: float) -> float:
+def _value(gene: NuclearGene, item: Quantity, value: float) -> float:
     """Return a value; in a story, one that does not count may lie outside of the range."""
     if _is_object(gene) and item.key.partition(".")[2] in STORY:
         return min(item.high, max(item.low, value))

@@ -7,11 +7,11 @@ from collections.abc import Collection, Iterator
 from dataclasses import dataclass
 
 from pytest_garl.scenarios.genes import SUN
-from pytest_garl.scenarios.groups.catalogue import GROUPS, WEATHER_CAUSES
-from pytest_garl.scenarios.groups.parameter import Group, Parameter
+from pytest_garl.scenarios.groups import GROUPS, WEATHER, WEATHER_CAUSES
 from pytest_garl.scenarios.light import sun_elevation_deg
+from pytest_garl.scenarios.quantities import UNITS, Group, Quantity, significant, unit_of
 from pytest_garl.scenarios.scenario import Scenario
-from pytest_garl.scenarios.units import TURN, UNITS, WEATHER_UNITS, significant, unit_of
+from pytest_garl.scenarios.units import TURN
 
 LIGHT_GROUP = "light"
 TOLD_GROUP, TOLD_ERROR = "told", "told.error_m"
@@ -102,8 +102,8 @@ def _condition(cause: str, values: list[tuple[float, str]]) -> list[ActiveCondit
 
 
 def _weather(cause: str, name: str, gene: float) -> str:
-    unit = WEATHER_UNITS[f"environment.{name}"]
-    return _in_words(cause, unit.name, unit.physical(gene))
+    weather = WEATHER[f"environment.{name}"]
+    return _in_words(cause, weather.name, weather.at(gene))
 
 
 def _light(scenario: Scenario) -> list[tuple[float, str]]:
@@ -115,35 +115,26 @@ def _light(scenario: Scenario) -> list[tuple[float, str]]:
 
 
 def _values(scenario: Scenario, group: Group) -> Iterator[tuple[float, str]]:
-    for key, each in zip(group.keys, group.parameters, strict=True):
-        value = scenario[key]
+    for each in group.quantities:
+        value = scenario[each.key]
         if value != each.nominal:
-            yield _share(each, value), _value_in_words(group.name, each, value)
+            yield _share(each, value), _value_in_words(each, value)
 
 
-def has_harsher_end(parameter: Parameter) -> bool:
-    """Return whether more of it is harsher, as of no kind, direction, time or switch."""
-    return not (parameter.choices or parameter.even or _is_switch(parameter))
-
-
-def _share(parameter: Parameter, value: float) -> float:
+def _share(quantity: Quantity, value: float) -> float:
     """Return how far a value is from nominal, 0 if it has no harsher end."""
-    if not has_harsher_end(parameter):
+    if not quantity.has_harsher_end:
         return 0.0
-    nominal = parameter.nominal
-    reach = max(parameter.high - nominal, nominal - parameter.low)
+    nominal = quantity.nominal
+    reach = max(quantity.high - nominal, nominal - quantity.low)
     return abs(value - nominal) / reach if math.isfinite(reach) else 0.0
 
 
-def _is_switch(parameter: Parameter) -> bool:
-    """Whether it is on or off: told.surveyed."""
-    return parameter.whole and (parameter.low, parameter.high) == (0, 1)
-
-
-def _value_in_words(group: str, parameter: Parameter, value: float) -> str:
-    if parameter.choices:
-        return parameter.text_of(value)
-    return parameter.name if _is_switch(parameter) else _in_words(group, parameter.name, value)
+def _value_in_words(quantity: Quantity, value: float) -> str:
+    if quantity.choices:
+        return quantity.text_of(value)
+    cause, _, name = quantity.key.partition(".")
+    return name if quantity.is_switch else _in_words(cause, name, value)
 
 
 def _in_words(cause: str, name: str, value: float) -> str:

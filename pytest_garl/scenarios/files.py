@@ -12,7 +12,7 @@ from pytest_garl.files.reading import read_text
 from pytest_garl.files.toml import Table, parse, quoted
 from pytest_garl.messages import shown
 from pytest_garl.scenarios.genome_like import genome_like
-from pytest_garl.scenarios.groups.catalogue import GROUPS, PARAMETERS
+from pytest_garl.scenarios.groups import GROUPS, QUANTITIES
 from pytest_garl.scenarios.maps.map import Map
 from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.scenarios.story import STORY
@@ -66,10 +66,11 @@ def scenario_lines(scenario: Scenario, map: Map) -> list[str]:
 
 def _written(key: str, value: float) -> str:
     """Return a value in TOML: the name of a choice, or the number."""
-    if key in PARAMETERS and PARAMETERS[key].choices:
-        return quoted(PARAMETERS[key].text_of(value))
+    if key in QUANTITIES and QUANTITIES[key].choices:
+        return quoted(QUANTITIES[key].text_of(value))
     told = STORY.get(key.partition(".")[2])
-    return quoted(told.choices[int(value)]) if told and told.choices else repr(value)
+    choices = told.quantity.choices if told else ()
+    return quoted(choices[int(value)]) if choices else repr(value)
 
 
 def _gene_lines(scenario: Scenario) -> list[str]:
@@ -146,12 +147,11 @@ def _read_section(table: Table, head: str, map: Map) -> dict[str, float]:
 
 
 def _number(table: Table, head: str, name: str, low: float, high: float) -> float:
-    parameter = PARAMETERS.get(f"{head}.{name}")
-    if parameter and parameter.choices:
-        return table.choice(name, parameter.choices)
-    told = STORY.get(name) if parameter is None else None
-    if told and told.choices:
-        return table.choice(name, told.choices)
+    quantity = QUANTITIES.get(f"{head}.{name}")
+    if quantity is None and name in STORY:
+        quantity = STORY[name].quantity
+    if quantity and quantity.choices:
+        return table.choice(name, quantity.choices)
     return table.number(name, low=low, high=high)
 
 

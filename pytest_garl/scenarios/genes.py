@@ -8,14 +8,15 @@ little is unusual says what a failure is due to.
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Literal
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from pytest_garl.errors import ScenarioError
-from pytest_garl.scenarios.groups.parameter import Group, Parameter
+from pytest_garl.scenarios.groups import WEATHER
+from pytest_garl.scenarios.quantities import Group, Quantity
 from pytest_garl.scenarios.task import Task
 
 if TYPE_CHECKING:
@@ -39,29 +40,6 @@ ON_ABOVE = 0.5
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Property:
-    """One scalar of a gene: its key in scenarios and files, range, nominal value, meaning.
-
-    ``outward`` says that values far from the nominal one are harsher, so that half of the draws of
-    a sparse genome lie in the outer third of the range; places and directions are drawn evenly.
-    """
-
-    key: str
-    low: float
-    high: float
-    nominal: float
-    meaning: str
-    outward: bool = False
-
-    def __post_init__(self) -> None:
-        if not self.low <= self.nominal <= self.high or self.low == self.high:
-            raise ScenarioError(
-                f"property {self.key!r}: expected low <= nominal <= high and low < high, "
-                f"found {self.low}, {self.nominal}, {self.high}"
-            )
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
 class NuclearGene:
     """Properties that crossover never separates: a fog density, or a place (x, y).
 
@@ -70,7 +48,7 @@ class NuclearGene:
     """
 
     name: str
-    properties: tuple[Property, ...]
+    properties: tuple[Quantity, ...]
 
     @property
     def is_optional(self) -> bool:
@@ -78,7 +56,7 @@ class NuclearGene:
         return self.properties[0].key.startswith(ACTIVE)
 
     @property
-    def values(self) -> tuple[Property, ...]:
+    def values(self) -> tuple[Quantity, ...]:
         """The properties without the bit of activity."""
         return self.properties[1:] if self.is_optional else self.properties
 
@@ -119,7 +97,7 @@ class Genome:
         return tuple(gene for composite in self.composites for gene in composite.genes)
 
     @property
-    def properties(self) -> tuple[Property, ...]:
+    def properties(self) -> tuple[Quantity, ...]:
         """All properties in order: the columns of a chromosome."""
         return tuple(item for gene in self.genes for item in gene.properties)
 
@@ -213,9 +191,9 @@ def active_genes(genome: Genome, row: Mapping[str, float], seed: int) -> frozens
     return frozenset(names)
 
 
-def _value(item: Property, rng: np.random.Generator) -> float:
-    """Draw a value; of an outward property half lie in the third farthest from nominal."""
-    if not item.outward:
+def _value(item: Quantity, rng: np.random.Generator) -> float:
+    """Draw a value; of one that is not even half lie in the third farthest from nominal."""
+    if item.even:
         return float(rng.uniform(item.low, item.high))
     below, above = item.nominal - item.low, item.high - item.nominal
     side = above if rng.uniform(0, below + above) >= below else -below
@@ -224,11 +202,22 @@ def _value(item: Property, rng: np.random.Generator) -> float:
     return min(item.high, max(item.low, float(item.nominal + side * share)))
 
 
-def _scalar(composite: str, name: str, high: float, nominal: float, meaning: str) -> NuclearGene:
-    key = f"{composite}.{name}"
-    return NuclearGene(
-        name=name,
-        properties=(Property(key=key, low=0.0, high=high, nominal=nominal, meaning=meaning),),
+def weather_value(key: str, low: float, high: float, *, even: bool) -> Quantity:
+    """Return the value of a weather gene within limits, as a share of its strongest effect."""
+    return Quantity(
+        key=key, low=low, high=high, nominal=low, meaning=WEATHER[key].meaning, even=even
+    )
+
+
+def sun_value(lowest: float = 0.0, *, even: bool) -> Quantity:
+    """Return the sun's position on its way over the day, which ends as low as it begins."""
+    return Quantity(
+        key=SUN,
+        low=lowest,
+        high=1 - lowest,
+        nominal=0.5,
+        meaning="position of the sun (0: dawn in the east, 0.5: noon, 1: dusk in the west)",
+        even=even,
     )
 
 
@@ -237,32 +226,20 @@ def place_gene(prefix: str, name: str, meaning: str) -> NuclearGene:
     return NuclearGene(
         name=name,
         properties=tuple(
-            Property(
+            Quantity(
                 key=f"{prefix}.{axis}",
                 low=-1.0,
                 high=1.0,
-                nominal=0.0,
                 meaning=f"{meaning}, {axis}",
+                even=True,
             )
             for axis in ("x", "y")
         ),
     )
 
 
-WEATHER = (
-    ("dust", "dust in the air (1: visibility 20 m)"),
-    ("fog", "fog (1: visibility 10 m)"),
-    ("rain", "falling rain (1: 100 mm/h)"),
-    ("snow", "falling snow (1: 10 mm/h water equivalent)"),
-    ("road_wetness", "wetness of the ground (1: soaked)"),
-    ("maple_leaf", "falling maple leaves (1: 2 per cubic metre)"),
-    ("road_leaf", "share of the ground under leaves"),
-    ("road_snow", "share of the ground under snow"),
-)
-"""The paper's eight weather genes; ``simulation/camera/weather.py`` gives them their meaning."""
-
 SUN = "environment.sun_position"
-ENVIRONMENT = (*(f"environment.{name}" for name, _ in WEATHER), SUN)
+ENVIRONMENT = (*WEATHER, SUN)
 """Keys of the environment's properties; none is below 0 or above 1."""
 CLEAR = dict.fromkeys(ENVIRONMENT, 0.0) | {SUN: 0.5}
 """Their nominal values: clear weather at noon."""
@@ -280,17 +257,12 @@ def genome_for(
     Without a task its scenarios have the map's marker.
     """
     top = CONFINED_WEATHER if weather == "confined" else 1.0
+    values = [weather_value(key, 0.0, top, even=True) for key in WEATHER]
     environment = CompositeGene(
         name="environment",
-        genes=(
-            *(_scalar("environment", name, top, 0.0, meaning) for name, meaning in WEATHER),
-            _scalar(
-                "environment",
-                "sun_position",
-                1.0,
-                0.5,
-                "position of the sun (0: dawn in the east, 0.5: noon, 1: dusk in the west)",
-            ),
+        genes=tuple(
+            NuclearGene(name=each.name, properties=(each,))
+            for each in (*values, sun_value(even=True))
         ),
     )
     marker = CompositeGene(
@@ -308,32 +280,26 @@ def genome_for(
 
 def group_gene(group: Group) -> CompositeGene:
     """Return the gene of a group of conditions, in physical units over all that can be flown."""
-    pairs = zip(group.keys, group.parameters, strict=True)
-    properties = tuple(_group_property(key, each) for key, each in pairs)
-    return CompositeGene(
-        name=group.name, genes=(NuclearGene(name=group.name, properties=properties),)
-    )
+    gene = NuclearGene(name=group.name, properties=group.quantities)
+    return CompositeGene(name=group.name, genes=(gene,))
 
 
-def _group_property(key: str, parameter: Parameter) -> Property:
-    return Property(
-        key=key,
-        low=parameter.low,
-        high=parameter.high,
-        nominal=parameter.nominal,
-        meaning=parameter.meaning,
-    )
+def within(quantity: Quantity, low: float, high: float, **changes: Any) -> Quantity:
+    """Return a quantity with narrower limits; the nearest value in them is its nominal one."""
+    nominal = min(high, max(low, quantity.nominal))
+    return replace(quantity, low=low, high=high, nominal=nominal, **changes)
 
 
-def end_of_way(name: str, end: str) -> tuple[Property, ...]:
+def end_of_way(name: str, end: str) -> tuple[Quantity, ...]:
     """Return the place at one end of an NPC's way; both ends have the same nominal corner."""
     return tuple(
-        Property(
+        Quantity(
             key=f"{name}.{end}_{axis}",
             low=-1.0,
             high=1.0,
             nominal=0.9,
             meaning=f"{end} over the map's bounds, {axis}",
+            even=True,
         )
         for axis in ("x", "y")
     )
@@ -341,11 +307,11 @@ def end_of_way(name: str, end: str) -> tuple[Property, ...]:
 
 def object_gene(name: str) -> NuclearGene:
     """Return the gene of an NPC: where it starts, and how fast it is."""
-    velocity = Property(
+    velocity = Quantity(
         key=f"{name}.velocity",
         low=0.0,
         high=1.0,
-        nominal=0.0,
         meaning="speed as a share of the type's top speed",
+        even=True,
     )
     return NuclearGene(name=name, properties=(*end_of_way(name, "start"), velocity))

@@ -9,13 +9,14 @@ from typing import TYPE_CHECKING
 from pytest_garl.scenarios.genes import (
     Genome,
     NuclearGene,
-    Property,
     end_of_way,
     genome_for,
     group_gene,
+    within,
 )
-from pytest_garl.scenarios.groups.catalogue import GROUPS
-from pytest_garl.scenarios.story import STORY, StoryParameter
+from pytest_garl.scenarios.groups import GROUPS
+from pytest_garl.scenarios.quantities import Quantity
+from pytest_garl.scenarios.story import STORY, StoryValue
 
 if TYPE_CHECKING:
     from pytest_garl.scenarios.maps.map import Map
@@ -51,23 +52,16 @@ def with_values_of(genome: Genome, keys: tuple[str, ...]) -> Genome:
 
 def _with_story(gene: NuclearGene, keys: set[str]) -> NuclearGene:
     told = tuple(
-        story_property(gene.name, each, (each.low, each.high))
+        story_property(gene.name, each, (each.quantity.low, each.quantity.high))
         for each in STORY.values()
         if f"{gene.name}.{each.name}" in keys
     )
     return dataclasses.replace(gene, properties=(*gene.properties, *told))
 
 
-def story_property(name: str, parameter: StoryParameter, limits: tuple[float, float]) -> Property:
+def story_property(name: str, value: StoryValue, limits: tuple[float, float]) -> Quantity:
     """Return the property of one value of an NPC's story."""
-    low, high = limits
-    return Property(
-        key=f"{name}.{parameter.name}",
-        low=low,
-        high=high,
-        nominal=min(high, max(low, parameter.nominal)),
-        meaning=parameter.meaning,
-    )
+    return within(value.quantity, *limits, key=f"{name}.{value.name}")
 
 
 def with_destinations(genome: Genome) -> Genome:

@@ -7,7 +7,7 @@ import math
 from dataclasses import dataclass
 
 from pytest_garl.fiducial import DICTIONARIES, PAPER_MARKER, MarkerSpec
-from pytest_garl.scenarios.groups import decoys as decoy_groups
+from pytest_garl.scenarios.groups import DECOY_KINDS, DECOYS
 from pytest_garl.scenarios.maps.map import Layer, Map
 from pytest_garl.scenarios.object_types import OBJECT_TYPES, ObjectType
 from pytest_garl.scenarios.scenario import Scenario
@@ -170,8 +170,8 @@ def decoys_of(scenario: Scenario, map: Map) -> tuple[Decoy, ...]:
     """Return the decoys of a scenario, each as large as the marker."""
     spec, (east, north) = scenario.task.marker, map.gps_position_m
     found = []
-    for group in decoy_groups.GROUPS:
-        kind = decoy_groups.KINDS[math.ceil(scenario[f"{group.name}.kind"])]
+    for group in DECOYS:
+        kind = DECOY_KINDS[math.ceil(scenario[f"{group.name}.kind"])]
         if kind == "none":
             continue
         found.append(

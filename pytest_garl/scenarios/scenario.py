@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 from pytest_garl.errors import ScenarioError
-from pytest_garl.scenarios.groups.catalogue import PARAMETERS
+from pytest_garl.scenarios.groups import QUANTITIES
 from pytest_garl.scenarios.task import Task
 
 
@@ -39,8 +39,8 @@ class Scenario:
         for name, value in self.genes:
             if name == key:
                 return value
-        if key in PARAMETERS:
-            return PARAMETERS[key].nominal
+        if key in QUANTITIES:
+            return QUANTITIES[key].nominal
         raise ScenarioError(
             f"the scenario on map {self.map!r} has no gene {key!r}; "
             f"it has {', '.join(name for name, _ in self.genes)}"
@@ -57,12 +57,12 @@ class Scenario:
         kept = {name: float(values.get(name, value)) for name, value in self.genes}
         conditions = {
             key: float(values.get(key, kept.get(key, each.nominal)))
-            for key, each in PARAMETERS.items()
+            for key, each in QUANTITIES.items()
         }
-        genes = tuple(pair for pair in kept.items() if pair[0] not in PARAMETERS)
+        genes = tuple(pair for pair in kept.items() if pair[0] not in QUANTITIES)
         # In one order and without nominal ones, so that equal scenarios are equal values.
         genes += tuple(
-            (key, value) for key, value in conditions.items() if value != PARAMETERS[key].nominal
+            (key, value) for key, value in conditions.items() if value != QUANTITIES[key].nominal
         )
         return dataclasses.replace(self, genes=genes)
 

@@ -7,7 +7,9 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
+from typing import Any
 
+from pytest_garl.scenarios.quantities import Quantity
 from pytest_garl.scenarios.scenario import Scenario
 
 GRADES = ("careless", "curious", "chasing", "hostile")
@@ -28,24 +30,23 @@ LONGEST_PAUSE_S = 60.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class StoryParameter:
-    """One value of a story: its name, which ends with its unit, and its range.
+class StoryValue:
+    """One value of a story: what can be flown of it, and what a search draws of it.
 
-    ``low`` and ``high`` are what can be flown, ``draws`` what a search draws from; a draw outside
-    of what can be flown is its nearest end.  A value with ``choices`` names one of them by its
-    number.  ``grades`` are those in which it counts.
+    A draw outside of what can be flown is its nearest end.  A value with choices names one of them
+    by its number, rounded down.  ``grades`` are those in which it counts, ``types`` the NPCs that
+    have it.
     """
 
-    name: str
-    low: float
-    high: float
+    quantity: Quantity
     draws: tuple[float, float]
-    meaning: str
-    source: str
-    nominal: float = 0.0
-    choices: tuple[str, ...] = ()
     grades: tuple[str, ...] = GRADES[:3]
     types: tuple[str, ...] = WALKERS_AND_BIRDS
+
+    @property
+    def name(self) -> str:
+        """The name in files, which ends with its unit."""
+        return self.quantity.name
 
     @property
     def is_place(self) -> bool:
@@ -54,33 +55,41 @@ class StoryParameter:
 
     def flown(self, value: float) -> float:
         """Return what is flown for a value of a chromosome."""
-        value = min(self.high, max(self.low, value))
-        return float(int(value)) if self.choices else value
+        value = min(self.quantity.high, max(self.quantity.low, value))
+        return float(int(value)) if self.quantity.choices else value
 
 
-def _chosen(
+def _value(
     name: str,
-    choices: tuple[str, ...],
     *,
+    low: float,
+    high: float,
+    draws: tuple[float, float],
     meaning: str,
     source: str,
+    choices: tuple[str, ...] = (),
     grades: tuple[str, ...] = GRADES[:3],
     types: tuple[str, ...] = WALKERS_AND_BIRDS,
-) -> StoryParameter:
-    return StoryParameter(
-        name=name,
-        low=0.0,
-        high=len(choices) - 1.0,
-        draws=(0.0, len(choices) - 1e-6),
-        choices=choices,
+) -> StoryValue:
+    quantity = Quantity(
+        key=f"npcs.{name}",
+        low=low,
+        high=high,
         meaning=meaning,
         source=source,
-        grades=grades,
-        types=types,
+        choices=choices,
+        even=True,
     )
+    return StoryValue(quantity=quantity, draws=draws, grades=grades, types=types)
 
 
-STORY: Mapping[str, StoryParameter] = {
+def _chosen(name: str, choices: tuple[str, ...], **others: Any) -> StoryValue:
+    count = len(choices)
+    draws = 0.0, count - 1e-6
+    return _value(name, low=0.0, high=count - 1.0, draws=draws, choices=choices, **others)
+
+
+STORY: Mapping[str, StoryValue] = {
     each.name: each
     for each in (
         _chosen(
@@ -104,16 +113,16 @@ STORY: Mapping[str, StoryParameter] = {
             meaning="what it waits for before it comes",
             source="the phases of a landing",
         ),
-        StoryParameter(
-            name="delay_s",
+        _value(
+            "delay_s",
             low=0.0,
             high=120.0,
             draws=(0.0, 20.0),
             meaning="how long after its phase it comes",
             source="a descent from 10 m takes 10 to 20 s",
         ),
-        StoryParameter(
-            name="lasts_s",
+        _value(
+            "lasts_s",
             low=0.0,
             high=CURIOUS_S,
             draws=(0.0, CURIOUS_S),
@@ -122,8 +131,8 @@ STORY: Mapping[str, StoryParameter] = {
             grades=("curious", "chasing"),
         ),
         *(
-            StoryParameter(
-                name=f"crosses_{axis}_m",
+            _value(
+                f"crosses_{axis}_m",
                 low=-30.0,
                 high=30.0,
                 draws=(-3.0, 3.0),
@@ -133,8 +142,8 @@ STORY: Mapping[str, StoryParameter] = {
             )
             for axis in ("x", "y")
         ),
-        StoryParameter(
-            name="pause_s",
+        _value(
+            "pause_s",
             low=0.0,
             high=LONGEST_PAUSE_S,
             # Half of all draws have no pause.
@@ -144,8 +153,8 @@ STORY: Mapping[str, StoryParameter] = {
             grades=("careless",),
             types=("person", "child", "dog"),
         ),
-        StoryParameter(
-            name="stoop_m",
+        _value(
+            "stoop_m",
             low=0.0,
             high=14.0,
             draws=(-14.0, 14.0),
@@ -220,7 +229,7 @@ def story_values(scenario: Scenario, name: str, kind: str) -> dict[str, float]:
         if key == "lasts_s":
             value = min(value, LIMITS_S[grade])
         counts = grade in each.grades and kind in each.types
-        if key == "grade" or (counts and value != each.nominal):
+        if key == "grade" or (counts and value != each.quantity.nominal):
             values[key] = value
     return values
 
@@ -228,7 +237,7 @@ def story_values(scenario: Scenario, name: str, kind: str) -> dict[str, float]:
 def with_all_values(values: Mapping[str, float], name: str, kind: str) -> dict[str, float]:
     """Return the genes of a story; values that are not given are nominal."""
     return {
-        f"{name}.{key}": float(values.get(key, each.nominal))
+        f"{name}.{key}": float(values.get(key, each.quantity.nominal))
         for key, each in STORY.items()
         if kind in each.types
     }
@@ -240,5 +249,5 @@ def children_in(scenario: Scenario, names: Iterable[str]) -> tuple[str, ...]:
 
 
 def _flown(scenario: Scenario, name: str, key: str) -> float:
-    parameter = STORY[key]
-    return parameter.flown(scenario.get(f"{name}.{key}", parameter.nominal))
+    value = STORY[key]
+    return value.flown(scenario.get(f"{name}.{key}", value.quantity.nominal))

@@ -7,8 +7,9 @@ from pathlib import Path
 
 from hypothesis import strategies as st
 
-from pytest_garl.scenarios.genes import Property, WeatherRange, genome_for
+from pytest_garl.scenarios.genes import WeatherRange, genome_for
 from pytest_garl.scenarios.maps.loading import load_map
+from pytest_garl.scenarios.quantities import Quantity
 from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.scenarios.validity import repair
 
@@ -38,7 +39,7 @@ def scenarios(
     return st.tuples(values, st.integers(0, 2**32 - 1)).map(build)
 
 
-def _value(item: Property) -> st.SearchStrategy[float]:
+def _value(item: Quantity) -> st.SearchStrategy[float]:
     below = -_STEPS if item.nominal > item.low else 0
     above = _STEPS if item.nominal < item.high else 0
 

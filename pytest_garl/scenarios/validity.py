@@ -8,9 +8,7 @@ from collections.abc import Callable, Iterable
 from pytest_garl.errors import ScenarioError
 from pytest_garl.fiducial import MarkerSpec
 from pytest_garl.scenarios.bodies import Disc, discs_of
-from pytest_garl.scenarios.groups.catalogue import GROUPS
-from pytest_garl.scenarios.groups.decoys import REACH_M
-from pytest_garl.scenarios.groups.pad import CLEARANCE
+from pytest_garl.scenarios.groups import CLEARANCE, DECOY_REACH_M, GROUPS
 from pytest_garl.scenarios.maps.map import Map
 from pytest_garl.scenarios.object_types import OBJECT_TYPES
 from pytest_garl.scenarios.placement import (
@@ -163,13 +161,13 @@ def _with_free_decoys(scenario: Scenario, map: Map) -> Scenario:
             return scenario.replace({x: at[0], y: at[1]})
 
         def free(at: tuple[float, float], name: str = decoy.name) -> bool:
-            near = max(abs(at[0]), abs(at[1])) <= REACH_M
+            near = max(abs(at[0]), abs(at[1])) <= DECOY_REACH_M
             return near and not any(_decoy_problems(moved(at), map, name))
 
         place = scenario[x], scenario[y]
         if not free(place):
             try:
-                scenario = moved(_nearest(place, free, 2 * math.hypot(REACH_M, REACH_M)))
+                scenario = moved(_nearest(place, free, 2 * math.sqrt(2) * DECOY_REACH_M))
             except ScenarioError:
                 # A marker of several metres and its like can fill the square.
                 scenario = scenario.replace(GROUPS[decoy.name].nominal)

@@ -45,7 +45,7 @@ class Columns:
     def __init__(self, genome: Genome) -> None:
         self.genome = genome
         self.lower, self.upper, self.nominal = genome.lower, genome.upper, genome.nominal
-        self.outward: Mask = np.array([item.outward for item in genome.properties])
+        self.outward: Mask = np.array([not item.even for item in genome.properties])
         self.owner = tuple(gene.name for gene in genome.genes for _ in gene.properties)
         firsts = [0, *genome.borders]
         self.optional = tuple(

@@ -21,7 +21,7 @@ from pytest_garl.scenarios.bodies import discs_of
 from pytest_garl.scenarios.chromosome import decode
 from pytest_garl.scenarios.domains.domain import Domain
 from pytest_garl.scenarios.domains.genome import genome_of
-from pytest_garl.scenarios.groups.decoys import KINDS, REACH_M
+from pytest_garl.scenarios.groups import DECOY_KINDS, DECOY_REACH_M
 from pytest_garl.scenarios.maps.map import Map
 from pytest_garl.scenarios.placement import (
     map_in,
@@ -202,7 +202,7 @@ def _other_markers(twin: Flight, clear: Scenario, map: Map, limits: Limits) -> _
     """
     side_m = clear.task.marker.side_m
     wanted_m = max(2.5 * side_m, 0.4 * _top_m(twin), 1.5 * limits.distance_m)
-    away_m = round(min(wanted_m, REACH_M), 1)
+    away_m = round(min(wanted_m, DECOY_REACH_M), 1)
     (x, y), (east, north) = marker_position_m(clear, map), map.gps_position_m
     told_x, told_y = told_position_m(clear, map)
     inward = math.atan2(told_y - y, told_x - x)
@@ -223,9 +223,9 @@ def _other_markers(twin: Flight, clear: Scenario, map: Map, limits: Limits) -> _
 
 
 def _decoy(number: int, kind: str, place: tuple[float, float]) -> dict[str, float]:
-    x, y = (max(-REACH_M, min(REACH_M, each)) for each in place)
+    x, y = (max(-DECOY_REACH_M, min(DECOY_REACH_M, each)) for each in place)
     name = f"decoy-{number}"
-    return {f"{name}.kind": float(KINDS.index(kind)), f"{name}.x_m": x, f"{name}.y_m": y}
+    return {f"{name}.kind": float(DECOY_KINDS.index(kind)), f"{name}.x_m": x, f"{name}.y_m": y}
 
 
 def _thick_air(twin: Flight, clear: Scenario, map: Map, camera: Camera) -> _Made:

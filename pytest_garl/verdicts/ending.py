@@ -13,7 +13,7 @@ from __future__ import annotations
 import re
 from collections.abc import Collection, Sequence
 
-from pytest_garl.scenarios.groups.catalogue import GROUPS, WEATHER_CAUSES
+from pytest_garl.scenarios.groups import GROUPS, WEATHER_CAUSES
 
 
 def _cause(condition: str) -> str:

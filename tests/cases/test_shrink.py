@@ -11,7 +11,7 @@ from pytest_garl.cases.simplification import complexity, genome_of
 from pytest_garl.scenarios.chromosome import decode
 from pytest_garl.scenarios.genes import genome_for
 from pytest_garl.scenarios.genome_like import with_destinations
-from pytest_garl.scenarios.groups.catalogue import GROUPS
+from pytest_garl.scenarios.groups import GROUPS
 from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.scenarios.story import with_all_values
 from pytest_garl.scenarios.validity import problems, repair

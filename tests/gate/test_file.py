@@ -20,7 +20,7 @@ from pytest_garl.gate.pairs import FlightSummary
 from pytest_garl.messages import printable
 from pytest_garl.scenarios.genes import genome_for, group_gene
 from pytest_garl.scenarios.genome_like import with_destinations
-from pytest_garl.scenarios.groups.catalogue import GROUPS
+from pytest_garl.scenarios.groups import GROUPS
 from pytest_garl.scenarios.maps.loading import load_map
 from pytest_garl.scenarios.maps.map import Map
 from pytest_garl.scenarios.task import Start, Task

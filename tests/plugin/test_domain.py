@@ -11,7 +11,7 @@ from pytest_garl.execution.ledger import Ledger
 from pytest_garl.scenarios.domains.names import DEFAULT_DOMAIN
 from pytest_garl.scenarios.domains.reader import domain_named
 from pytest_garl.scenarios.files import parse_scenario
-from pytest_garl.scenarios.groups.catalogue import GROUPS
+from pytest_garl.scenarios.groups import GROUPS
 from pytest_garl.scenarios.maps.loading import load_map
 from tests.support.case_project import add_cases_to_git, cases
 from tests.support.case_project import run as run_cases

@@ -16,7 +16,7 @@ from pytest_garl.scenarios.chromosome import decode
 from pytest_garl.scenarios.domains.reader import domain_named
 from pytest_garl.scenarios.files import dumps, loads
 from pytest_garl.scenarios.genes import genome_for
-from pytest_garl.scenarios.groups.decoys import KINDS
+from pytest_garl.scenarios.groups import DECOY_KINDS
 from pytest_garl.scenarios.maps.loading import load_map
 from pytest_garl.scenarios.placement import decoys_of, marker_position_m
 from pytest_garl.scenarios.scenario import Scenario
@@ -59,7 +59,7 @@ def test_decoys_are_moved_off_the_marker_and_off_each_other(name: str) -> None:
         assert min(gaps) > 2.12
 
 
-@pytest.mark.parametrize("kind", range(1, len(KINDS)))
+@pytest.mark.parametrize("kind", range(1, len(DECOY_KINDS)))
 @pytest.mark.parametrize("name", MAPS)
 def test_every_kind_is_seen_on_both_maps(name: str, kind: int) -> None:
     pictures = []
@@ -77,9 +77,9 @@ def test_every_kind_is_seen_on_both_maps(name: str, kind: int) -> None:
     family = cv2.aruco.getPredefinedDictionary(cv2.aruco.DICT_5X5_50)
     _, ids, _ = cv2.aruco.ArucoDetector(family).detectMarkers(grey)
     found = set() if ids is None else set(np.ravel(ids).tolist())
-    if KINDS[kind] == "other-id":
+    if DECOY_KINDS[kind] == "other-id":
         assert found == {1}
-    elif KINDS[kind] != "same-id-without-margin":
+    elif DECOY_KINDS[kind] != "same-id-without-margin":
         assert 0 not in found
 
 
@@ -112,11 +112,11 @@ def test_a_decoy_without_room_is_left_out() -> None:
     assert repair(scenario, MAPS["lawn"]) == scenario
 
 
-@pytest.mark.parametrize("number", range(1, len(KINDS)))
+@pytest.mark.parametrize("number", range(1, len(DECOY_KINDS)))
 def test_a_file_states_the_name_of_the_kind_and_may_state_its_number(number: int) -> None:
     scenario = scenario_on("lawn", {"decoy-1.kind": float(number), "decoy-1.x_m": 4.0})
     text = dumps(scenario, MAPS["lawn"])
-    named = f'kind = "{KINDS[number]}"\n'
+    named = f'kind = "{DECOY_KINDS[number]}"\n'
     assert named in text
     assert loads(text, MAPS["lawn"]) == scenario
     for written in (f"kind = {number}\n", f"kind = {number}.0\n"):

@@ -19,7 +19,7 @@ from pytest_garl.scenarios.domains.reader import domain_named
 from pytest_garl.scenarios.files import dumps, loads
 from pytest_garl.scenarios.genes import Genome, active_genes, genome_for
 from pytest_garl.scenarios.genome_like import with_destinations
-from pytest_garl.scenarios.groups.catalogue import GROUPS, PARAMETERS
+from pytest_garl.scenarios.groups import GROUPS, QUANTITIES
 from pytest_garl.scenarios.maps.loading import load_map
 from pytest_garl.scenarios.placement import marker_position_m, told_position_m
 from pytest_garl.scenarios.scenario import Scenario
@@ -195,7 +195,7 @@ def test_drawn_scenarios_lie_inside_their_domain() -> None:
 
 def test_every_condition_has_a_meaning_and_a_source() -> None:
     assert all(each.meaning and each.source for each in CONDITIONS.values())
-    assert {*PARAMETERS} - {"light.turn_deg"} <= {*CONDITIONS}
+    assert {*QUANTITIES} - {"light.turn_deg"} <= {*CONDITIONS}
 
 
 @pytest.mark.parametrize("name", ["field", "calm"])

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pytest_garl.scenarios.genes import genome_for, group_gene
 from pytest_garl.scenarios.genome_like import genome_like, with_destinations
-from pytest_garl.scenarios.groups.catalogue import GROUPS
+from pytest_garl.scenarios.groups import GROUPS
 from pytest_garl.scenarios.maps.loading import load_map
 
 COURT = load_map("court")

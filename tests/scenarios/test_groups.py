@@ -7,7 +7,7 @@ import dataclasses
 import pytest
 
 from pytest_garl import Command, Mission, Observation, PositionSetpoint
-from pytest_garl.scenarios.groups.catalogue import GROUPS, PARAMETERS
+from pytest_garl.scenarios.groups import GROUPS, QUANTITIES
 from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.scenarios.task import Start, Task
 from pytest_garl.simulation.fly import fly
@@ -38,7 +38,7 @@ def test_every_group_changes_a_flight(name: str) -> None:
     without = dataclasses.replace(nominal(), task=Task(start=start))
     # What begins at the end of its range begins after this short flight.
     ends = {
-        key: PARAMETERS[key].low if key.endswith(".from_s") else PARAMETERS[key].high
+        key: QUANTITIES[key].low if key.endswith(".from_s") else QUANTITIES[key].high
         for key in group.keys
     }
     assert hash_of_flight(without) == hash_of_flight(without.replace(group.nominal))

@@ -7,7 +7,7 @@ import itertools
 import pytest
 
 from pytest_garl.errors import ScenarioError
-from pytest_garl.scenarios.groups.catalogue import PARAMETERS
+from pytest_garl.scenarios.groups import QUANTITIES
 from pytest_garl.scenarios.scenario import Scenario
 
 BARE = Scenario(map="court", seed=1, genes=(("marker.x", 0.25), ("environment.fog", 0.5)))
@@ -24,12 +24,12 @@ def test_conditions_have_one_order_however_they_are_set() -> None:
     assert orders == {one_by_one.genes}
     keys = [key for key, _ in one_by_one.genes]
     assert keys[:2] == ["marker.x", "environment.fog"]
-    assert keys[2:] == [key for key in PARAMETERS if key in CONDITIONS]
+    assert keys[2:] == [key for key in QUANTITIES if key in CONDITIONS]
 
 
 def test_a_condition_that_is_set_back_to_nominal_is_no_longer_named() -> None:
     windy = BARE.replace(CONDITIONS)
-    back = windy.replace({key: PARAMETERS[key].nominal for key in CONDITIONS})
+    back = windy.replace({key: QUANTITIES[key].nominal for key in CONDITIONS})
     assert back == BARE
     assert hash(back) == hash(BARE)
     named = Scenario(map="court", seed=1, genes=(("wind.mean_mps", 0.0), *BARE.genes))

@@ -12,7 +12,7 @@ from pytest_garl.fiducial import MarkerSpec
 from pytest_garl.scenarios.files import dumps, is_in_units, loads
 from pytest_garl.scenarios.genes import SUN, genome_for, group_gene
 from pytest_garl.scenarios.genome_like import with_destinations
-from pytest_garl.scenarios.groups.catalogue import GROUPS, PARAMETERS
+from pytest_garl.scenarios.groups import GROUPS, QUANTITIES
 from pytest_garl.scenarios.maps.loading import load_map, map_names
 from pytest_garl.scenarios.maps.map import Map
 from pytest_garl.scenarios.object_types import HEIGHTS_M
@@ -87,8 +87,8 @@ def test_snapping_keeps_a_marker_at_the_edge_of_its_disc_inside(angle: float) ->
 
 
 def test_a_file_takes_a_condition_that_counts_to_the_nearest_whole_number() -> None:
-    key = next(key for key, each in PARAMETERS.items() if each.whole)
-    low, high = PARAMETERS[key].low, PARAMETERS[key].high
+    key = next(key for key, each in QUANTITIES.items() if each.whole)
+    low, high = QUANTITIES[key].low, QUANTITIES[key].high
     value = high - 0.4 if high - 0.4 > low else low + 0.6
     scenario = snapped(PLAIN.replace({key: value}), COURT)
     assert scenario[key] == round(value) != value

@@ -6,7 +6,7 @@ import dataclasses
 
 import pytest
 
-from pytest_garl.scenarios.groups.catalogue import GROUPS
+from pytest_garl.scenarios.groups import GROUPS
 from pytest_garl.verdicts.ending import CAUSES, ending_of, with_cause
 from pytest_garl.verdicts.judge import judge
 from pytest_garl.verdicts.verdict import Limits

@@ -8,11 +8,12 @@ from dataclasses import dataclass
 from pytest_garl.cases.description import describe_scenario_on
 from pytest_garl.flight.flight import Flight, Step
 from pytest_garl.messages import printable, shortened
-from pytest_garl.scenarios.groups.catalogue import PARAMETERS
+from pytest_garl.scenarios.groups import QUANTITIES, WEATHER
 from pytest_garl.scenarios.light import NOON_DEG
 from pytest_garl.scenarios.maps.map import Map
+from pytest_garl.scenarios.quantities import unit_of
 from pytest_garl.scenarios.scenario import Scenario
-from pytest_garl.scenarios.units import WEATHER_GENES, WEATHER_UNITS, unit_of
+from pytest_garl.scenarios.units import GENE_OF_WEATHER
 
 MOST_ROWS = 120
 """A landing system that says something else in each frame fills no page."""
@@ -39,16 +40,16 @@ def condition_rows(scenario: Scenario, map: Map, policy: str) -> tuple[Condition
 
 
 def _nominal(name: str) -> str:
-    if name in WEATHER_GENES:
-        return "none" if WEATHER_UNITS[WEATHER_GENES[name]].is_visibility else f"0 {unit_of(name)}"
+    if name in GENE_OF_WEATHER:
+        return "none" if WEATHER[GENE_OF_WEATHER[name]].scale == "inverse" else f"0 {unit_of(name)}"
     if name == "light":
         return f"sun at an elevation of {NOON_DEG:.0f} degrees"
-    parameter = PARAMETERS.get(name)
-    if parameter is None:
+    quantity = QUANTITIES.get(name)
+    if quantity is None:
         return ""
-    if parameter.choices:
-        return parameter.text_of(parameter.nominal)
-    return f"{parameter.nominal:g} {unit_of(name)}".rstrip()
+    if quantity.choices:
+        return quantity.text_of(quantity.nominal)
+    return f"{quantity.nominal:g} {quantity.unit}".rstrip()
 
 
 def nearest_rows(flight: Flight) -> tuple[tuple[str, str, str], ...]:

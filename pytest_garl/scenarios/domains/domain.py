@@ -10,13 +10,14 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from pytest_garl.scenarios.genes import WeatherRange, genome_for
-from pytest_garl.scenarios.groups.catalogue import GROUPS, PARAMETERS
+from pytest_garl.scenarios.groups import GROUPS, QUANTITIES, WEATHER
 from pytest_garl.scenarios.light import NOON_DEG, TWILIGHT_DEG
 from pytest_garl.scenarios.maps.map import Map
 from pytest_garl.scenarios.object_types import HEIGHTS_M
+from pytest_garl.scenarios.quantities import Quantity
 from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.scenarios.story import GRADES, STORY, story_of
-from pytest_garl.scenarios.units import WEATHER_UNITS, sections_of
+from pytest_garl.scenarios.units import sections_of
 
 ABSENT = "absent"
 """The behaviour of NPCs in a domain without them."""
@@ -26,79 +27,37 @@ _TOLERANCE = 1e-4
 """Files keep five digits."""
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Condition:
-    """What a domain can give a range: name, unit in the name, limits, meaning, source."""
-
-    key: str
-    low: float
-    high: float
-    nominal: float
-    meaning: str
-    source: str
-
-
-def _conditions() -> dict[str, Condition]:
-    found = [
-        Condition(
-            key=f"weather.{each.name}",
-            low=each.limits[0] if each.is_visibility else 0.0,
-            high=float("inf") if each.is_visibility else each.top,
-            nominal=float("inf") if each.is_visibility else 0.0,
-            meaning=each.meaning,
-            source=each.source,
-        )
-        for each in WEATHER_UNITS.values()
-    ]
-    found.append(
-        Condition(
-            key=ELEVATION,
-            low=TWILIGHT_DEG,
-            high=NOON_DEG,
-            nominal=NOON_DEG,
-            meaning="elevation of the sun, which may stand in any direction",
-            source="-6 degrees: the end of civil twilight (AMS Glossary of Meteorology)",
-        )
+_LIGHT = Quantity(
+    key=ELEVATION,
+    low=TWILIGHT_DEG,
+    high=NOON_DEG,
+    nominal=NOON_DEG,
+    meaning="elevation of the sun, which may stand in any direction",
+    source="-6 degrees: the end of civil twilight (AMS Glossary of Meteorology)",
+)
+_HEIGHT = Quantity(
+    key=BIRD_HEIGHT,
+    low=HEIGHTS_M[0],
+    high=HEIGHTS_M[1],
+    nominal=3.0,
+    meaning="height at which birds fly",
+    source="engineering estimate: from above people's heads to above the search height",
+)
+CONDITIONS: Mapping[str, Quantity] = {
+    each.key: each
+    for each in (
+        *WEATHER.values(),
+        _LIGHT,
+        # The sun's turn follows from its elevation and azimuth.
+        *(each for key, each in QUANTITIES.items() if not key.startswith("light.")),
+        _HEIGHT,
+        *(
+            told.quantity
+            for told in STORY.values()
+            if not told.quantity.choices and not told.is_place
+        ),
     )
-    for key, each in PARAMETERS.items():
-        if not key.startswith("light."):
-            found.append(
-                Condition(
-                    key=key,
-                    low=each.low,
-                    high=each.high,
-                    nominal=each.nominal,
-                    meaning=each.meaning,
-                    source=each.source,
-                )
-            )
-    low, high = HEIGHTS_M
-    found.append(
-        Condition(
-            key=BIRD_HEIGHT,
-            low=low,
-            high=high,
-            nominal=3.0,
-            meaning="height at which birds fly",
-            source="engineering estimate: from above people's heads to above the search height",
-        )
-    )
-    for told in STORY.values():
-        if not told.choices and not told.is_place:
-            found.append(
-                Condition(
-                    key=f"npcs.{told.name}",
-                    low=told.low,
-                    high=told.high,
-                    nominal=told.nominal,
-                    meaning=told.meaning,
-                    source=told.source,
-                )
-            )
-    return {each.key: each for each in found}
-
-
-CONDITIONS: Mapping[str, Condition] = _conditions()
+}
 """All that a domain may state, by ``group.name``."""
 
 
@@ -178,20 +137,19 @@ def _beyond(key: str, value: float, limits: tuple[float, float] | None) -> str:
 
 
 def _text_of(key: str, value: float) -> str:
-    return PARAMETERS[key].text_of(value) if key in PARAMETERS else f"{value:g}"
+    return QUANTITIES[key].text_of(value) if key in QUANTITIES else f"{value:g}"
 
 
 def _outside_paper(scenario: Scenario, map: Map, weather: WeatherRange) -> tuple[str, ...]:
     tops = {each.key: each.high for each in genome_for(map, weather=weather).properties}
     found = []
     for key, value in scenario.genes:
-        if key in PARAMETERS and value != PARAMETERS[key].nominal:
+        if key in QUANTITIES and value != QUANTITIES[key].nominal:
             text = _text_of(key, value)
             found.append(f"{key} = {text}, the paper's world has only nominal values of it")
         elif value > tops.get(key, value) + _TOLERANCE:
-            unit = WEATHER_UNITS[key]
+            unit = WEATHER[key]
             found.append(
-                f"{unit.name} = {unit.physical(value):g}, the domain ends at "
-                f"{unit.physical(tops[key]):g}"
+                f"{unit.name} = {unit.at(value):g}, the domain ends at {unit.at(tops[key]):g}"
             )
     return tuple(found)

@@ -8,23 +8,24 @@ from collections.abc import Iterable
 from pytest_garl.scenarios.domains.domain import ABSENT, BIRD_HEIGHT, ELEVATION, Domain
 from pytest_garl.scenarios.genes import (
     ACTIVE,
-    SUN,
     CompositeGene,
     Genome,
     NuclearGene,
-    Property,
     genome_for,
     object_gene,
     place_gene,
+    sun_value,
+    weather_value,
+    within,
 )
 from pytest_garl.scenarios.genome_like import story_property
-from pytest_garl.scenarios.groups.catalogue import GROUPS, PARAMETERS, WEATHER_CAUSES
+from pytest_garl.scenarios.groups import GROUPS, QUANTITIES, WEATHER, WEATHER_CAUSES
 from pytest_garl.scenarios.light import position_of_elevation
 from pytest_garl.scenarios.maps.map import Map
 from pytest_garl.scenarios.object_types import OBJECT_TYPES
+from pytest_garl.scenarios.quantities import Quantity
 from pytest_garl.scenarios.story import GRADES, STORY
 from pytest_garl.scenarios.task import Task
-from pytest_garl.scenarios.units import WEATHER_UNITS
 
 _NO_RANGE = 1e-9
 """A range that files round to one value."""
@@ -58,7 +59,7 @@ def genome_of(
             if limits and limits[0] == limits[1]:
                 fixed[key] = limits[0]
             elif limits:
-                values.append(_condition(key, limits))
+                values.append(within(QUANTITIES[key], *limits))
         if values:
             composites.append(CompositeGene(name=name, genes=(_optional(name, values),)))
     return Genome(
@@ -72,55 +73,40 @@ def genome_of(
     )
 
 
-def _optional(name: str, values: Iterable[Property], *, may_rest: bool = True) -> NuclearGene:
+def _optional(name: str, values: Iterable[Quantity], *, may_rest: bool = True) -> NuclearGene:
     """Return a gene with a bit of activity, unless one of its nominal values is not allowed."""
     values = tuple(values)
     if not may_rest or any(_excludes_nominal(each) for each in values):
         return NuclearGene(name=name, properties=values)
-    bit = Property(
-        key=f"{ACTIVE}{name}", low=0.0, high=1.0, nominal=0.25, meaning=f"{name} acts above 0.5"
+    bit = Quantity(
+        key=f"{ACTIVE}{name}",
+        low=0.0,
+        high=1.0,
+        nominal=0.25,
+        meaning=f"{name} acts above 0.5",
+        even=True,
     )
     return NuclearGene(name=name, properties=(bit, *values))
 
 
-def _excludes_nominal(item: Property) -> bool:
-    return item.key in PARAMETERS and item.nominal != PARAMETERS[item.key].nominal
-
-
-def _condition(key: str, limits: tuple[float, float]) -> Property:
-    parameter, (low, high) = PARAMETERS[key], limits
-    return Property(
-        key=key,
-        low=low,
-        high=high,
-        nominal=min(high, max(low, parameter.nominal)),
-        meaning=parameter.meaning,
-        outward=not parameter.even,
-    )
+def _excludes_nominal(item: Quantity) -> bool:
+    return item.key in QUANTITIES and item.nominal != QUANTITIES[item.key].nominal
 
 
 def _weather(domain: Domain) -> Iterable[NuclearGene]:
     for cause, names in WEATHER_CAUSES.items():
         values, may_rest = [], True
         for name in names:
-            unit = WEATHER_UNITS[f"environment.{name}"]
-            limits = domain.range_of(f"weather.{unit.name}")
+            key = f"environment.{name}"
+            unit = WEATHER[key]
+            limits = domain.range_of(unit.key)
             if limits is None:
                 continue
-            low, high = sorted(0.0 if math.isinf(each) else unit.gene(each) for each in limits)
+            low, high = sorted(0.0 if math.isinf(each) else unit.share_of(each) for each in limits)
             if low == high == 0:
                 continue
             may_rest &= low == 0
-            values.append(
-                Property(
-                    key=f"environment.{name}",
-                    low=low,
-                    high=max(high, math.nextafter(low, 1.0)),
-                    nominal=low,
-                    meaning=unit.meaning,
-                    outward=True,
-                )
-            )
+            values.append(weather_value(key, low, max(high, math.nextafter(low, 1.0)), even=False))
         if values:
             yield _optional(cause, values, may_rest=may_rest)
 
@@ -129,20 +115,11 @@ def _light(domain: Domain) -> Iterable[NuclearGene]:
     limits = domain.range_of(ELEVATION)
     if limits is None or limits[0] == limits[1]:
         return
-    lowest = position_of_elevation(limits[0])
-    position = Property(
-        key=SUN,
-        low=lowest,
-        high=1 - lowest,
-        nominal=0.5,
-        meaning="position of the sun (0: dawn in the east, 0.5: noon, 1: dusk in the west)",
-        outward=True,
-    )
-    turn = _condition("light.turn_deg", (-180.0, 180.0))
-    yield _optional("light", (position, turn))
+    position = sun_value(position_of_elevation(limits[0]), even=False)
+    yield _optional("light", (position, QUANTITIES["light.turn_deg"]))
 
 
-def _story(domain: Domain, name: str, kind: str) -> Iterable[Property]:
+def _story(domain: Domain, name: str, kind: str) -> Iterable[Quantity]:
     """Yield the values of an NPC's story, if the domain names a grade of behaviour."""
     if domain.npc_behaviour not in GRADES:
         return
@@ -151,8 +128,9 @@ def _story(domain: Domain, name: str, kind: str) -> Iterable[Property]:
         low, high = each.draws
         if each.name == "grade":
             high = strongest + high % 1
-        elif not each.choices and not each.is_place:
-            limits = domain.range_of(f"npcs.{each.name}") or (each.nominal, each.nominal)
+        elif not each.quantity.choices and not each.is_place:
+            nominal = each.quantity.nominal
+            limits = domain.range_of(each.quantity.key) or (nominal, nominal)
             low, high = (limits[0] if low >= 0 else -limits[1]), limits[1]
         if kind in each.types:
             # A value that the domain fixes is part of every story too.
@@ -168,12 +146,13 @@ def _objects(domain: Domain, map: Map) -> Iterable[NuclearGene]:
         if OBJECT_TYPES[kind].flies and heights:
             low, high = heights
             values.append(
-                Property(
+                Quantity(
                     key=f"{name}.height_m",
                     low=low,
                     high=high,
                     nominal=min(high, max(low, OBJECT_TYPES[kind].altitude_m)),
                     meaning="height at which it flies",
+                    even=True,
                 )
             )
         values += _story(domain, name, kind)

@@ -8,7 +8,7 @@ from collections.abc import Mapping
 from pytest_garl.errors import ScenarioError
 from pytest_garl.landing_system import NavigationKind
 from pytest_garl.scenarios.domains.domain import Domain
-from pytest_garl.scenarios.groups.catalogue import PARAMETERS
+from pytest_garl.scenarios.groups import QUANTITIES
 
 RTK_LIMITS: Mapping[str, float] = {
     "navigation.position_m": 0.02,
@@ -37,9 +37,9 @@ def within(domain: Domain, navigation: NavigationKind) -> Domain:
         if key.partition(".")[0] not in _ERRING:
             ranges.append((key, low, high))
             continue
-        nominal = PARAMETERS[key].nominal
+        nominal = QUANTITIES[key].nominal
         # Directions and times say how something errs, not that it does.
-        errs = not PARAMETERS[key].even
+        errs = not QUANTITIES[key].even
         if navigation == "ideal":
             if errs and not low <= nominal <= high:
                 raise _contradiction(domain, navigation, key, low, nominal)

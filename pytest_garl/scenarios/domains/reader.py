@@ -16,7 +16,7 @@ from pytest_garl.messages import listed, shown
 from pytest_garl.scenarios.domains.domain import ABSENT, BIRD_HEIGHT, CONDITIONS, ELEVATION, Domain
 from pytest_garl.scenarios.domains.names import BUILT_IN, HIDDEN
 from pytest_garl.scenarios.genes import WeatherRange
-from pytest_garl.scenarios.groups.catalogue import GROUPS
+from pytest_garl.scenarios.groups import GROUPS
 from pytest_garl.scenarios.light import NOON_DEG
 
 _SECTIONS = ("weather", "light", *GROUPS, "npcs")

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pytest_garl.landing_system import Camera
-from pytest_garl.scenarios.groups.depth import NO_LIMIT_M
+from pytest_garl.scenarios.groups import NO_LIMIT_M
 from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.simulation.camera.lens import lens_of
 from pytest_garl.simulation.camera.weather import conditions_of

@@ -7,16 +7,16 @@ import math
 from dataclasses import dataclass
 
 from pytest_garl.scenarios.genes import ENVIRONMENT
-from pytest_garl.scenarios.light import sun_elevation_deg
-from pytest_garl.scenarios.scenario import Scenario
-from pytest_garl.scenarios.units import (
+from pytest_garl.scenarios.groups import (
     DUST_VISIBILITY_M,
     FOG_VISIBILITY_M,
     LEAVES_PER_M3,
     RAIN_MMPH,
     SNOW_MMPH,
-    TURN,
 )
+from pytest_garl.scenarios.light import sun_elevation_deg
+from pytest_garl.scenarios.scenario import Scenario
+from pytest_garl.scenarios.units import TURN
 
 KOSCHMIEDER = 3.912
 """Visibility = 3.912 / extinction: Koschmieder's law (1924) at a contrast threshold of 2 %."""

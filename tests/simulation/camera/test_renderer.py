@@ -8,7 +8,8 @@ import pytest
 
 from pytest_garl.fiducial import MarkerSpec
 from pytest_garl.scenarios.chromosome import decode
-from pytest_garl.scenarios.genes import WEATHER, genome_for
+from pytest_garl.scenarios.genes import genome_for
+from pytest_garl.scenarios.groups import WEATHER
 from pytest_garl.scenarios.maps.loading import map_names
 from pytest_garl.scenarios.placement import marker_position_m
 from pytest_garl.scenarios.task import Task
@@ -24,7 +25,7 @@ def picture(seed: int = 0, height: float = 6.0, **genes: float) -> Frame:
     return made.render((x, y, height), LEVEL, 1.0, poses(x, y))
 
 
-@pytest.mark.parametrize("gene", [name for name, _ in WEATHER])
+@pytest.mark.parametrize("gene", [key.partition(".")[2] for key in WEATHER])
 @pytest.mark.parametrize("value", [0.15, 1.0])
 def test_every_weather_gene_moves_the_picture(gene: str, value: float) -> None:
     clear, noisy = picture(), picture(seed=0, **{gene: value})
