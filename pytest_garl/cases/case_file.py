@@ -6,24 +6,24 @@ The sections stand in the file in the order of the functions here.
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable
+import itertools
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import cast, get_args
 
-from pytest_garl.cases.behaviour_toml import (
-    change_lines,
-    move_lines,
-    read_changes,
-    read_moves,
-)
 from pytest_garl.cases.case import (
     NOT_ASKED,
     Case,
+    ChangeList,
+    Changes,
     Escape,
     Evidence,
+    MoveList,
+    Moves,
     NoGateReason,
     Preventable,
     Prevention,
+    RecordedBehaviour,
     Violation,
     Worst,
 )
@@ -34,16 +34,18 @@ from pytest_garl.cases.case_header import (
     keys_of,
     read_header,
 )
-from pytest_garl.cases.severity_toml import read_severity, severity_lines
 from pytest_garl.errors import ScenarioError
+from pytest_garl.execution.severity import NO_SEVERITY, Severity
 from pytest_garl.files.reading import read_text
-from pytest_garl.files.toml import Table, parse, quoted
-from pytest_garl.messages import printable
+from pytest_garl.files.toml import Table, finite, parse, quoted
+from pytest_garl.messages import printable, shown
 from pytest_garl.scenarios.files import SCENARIO_KEYS, is_in_units, read_scenario, scenario_lines
+from pytest_garl.scenarios.genes import ENVIRONMENT
 from pytest_garl.scenarios.maps.loading import load_map
 from pytest_garl.scenarios.maps.map import Map
 from pytest_garl.scenarios.story import GRADES
 from pytest_garl.scenarios.task import task_lines
+from pytest_garl.simulation.npc_policy import DECISION_STEP_S
 from pytest_garl.verdicts.verdict import (
     DEFAULT_LIMITS,
     FARTHEST_M,
@@ -339,4 +341,186 @@ def _read_evidence(table: Table) -> Evidence:
         versions=tuple((name, versions.string(name)) for name in versions.values),
         system_sha256=table.string("system_sha256", ""),
         simulator_sha256=table.string("simulator_sha256", ""),
+    )
+
+
+MOST_MOVES = round(LONGEST_S / DECISION_STEP_S)
+"""Moves of an object in the longest flight."""
+
+
+def move_lines(behaviour: RecordedBehaviour) -> list[str]:
+    """Return a line for each object: its moves as a list of [times, x, y]."""
+    return [f"{name} = {_dump_moves(moves)}" for name, moves in behaviour.moves]
+
+
+def change_lines(behaviour: RecordedBehaviour) -> list[str]:
+    """Return a line for each object that changed the environment: [decision, gene, added value]."""
+    return [f"{name} = {_dump_changes(changes)}" for name, changes in behaviour.changes]
+
+
+def read_moves(table: Table, names: Sequence[str]) -> Moves:
+    """Return the moves of the named objects; raise ScenarioError that names the key."""
+    table.refuse_unknown(names)
+    return tuple((name, _read_runs(table, name)) for name in names)
+
+
+def read_changes(table: Table, names: Sequence[str]) -> Changes:
+    """Return the changes by the named objects; raise ScenarioError that names the key."""
+    table.refuse_unknown(names)
+    return tuple((name, _read_changes(table, name)) for name in names if name in table.values)
+
+
+def _dump_moves(moves: MoveList) -> str:
+    # Compared as text: -0.0 equals 0.0 but is another number.
+    runs = [
+        (len(list(run)), text) for text, run in itertools.groupby(f"{x!r}, {y!r}" for x, y in moves)
+    ]
+    return f"[{', '.join(f'[{count}, {text}]' for count, text in runs)}]"
+
+
+def _dump_changes(changes: ChangeList) -> str:
+    rows = (f"[{decision}, {quoted(key)}, {added!r}]" for decision, key, added in changes)
+    return f"[{', '.join(rows)}]"
+
+
+def _read_runs(table: Table, name: str) -> MoveList:
+    runs = table.get(name)
+    expected = "expected a list of [times, x, y] with times of at least 1 and x² + y² of at most 1"
+    if not isinstance(runs, list):
+        raise table.error(name, f"found {shown(runs)}, {expected}")
+    moves: list[tuple[float, float]] = []
+    for run in runs:
+        times, x, y = run if isinstance(run, list) and len(run) == 3 else (0, None, None)
+        x, y = finite(x), finite(y)
+        if type(times) is not int or times < 1 or x is None or y is None:
+            raise table.error(name, f"found {shown(run)}, {expected}")
+        if not max(abs(x), abs(y)) <= 1 or not x**2 + y**2 <= 1 + 1e-9:
+            raise table.error(name, f"found {shown(run)}, {expected}")
+        if len(moves) + times > MOST_MOVES:
+            raise table.error(
+                name,
+                f"found {shown(run)} after {len(moves)} moves, expected at most {MOST_MOVES} "
+                f"moves in all: no flight is longer than {LONGEST_S:g} s",
+            )
+        moves += [(x, y)] * times
+    return tuple(moves)
+
+
+def _read_changes(table: Table, name: str) -> ChangeList:
+    rows = table.get(name)
+    expected = f"expected a list of [decision, gene, number] with one of {', '.join(ENVIRONMENT)}"
+    if not isinstance(rows, list):
+        raise table.error(name, f"found {shown(rows)}, {expected}")
+    wrong = next((row for row in rows if not _is_change(row)), None)
+    if wrong is not None:
+        raise table.error(name, f"found {shown(wrong)}, {expected}")
+    return tuple((row[0], row[1], float(row[2])) for row in rows)
+
+
+def _is_change(row: object) -> bool:
+    if not isinstance(row, list) or [type(item) for item in row[:2]] != [int, str]:
+        return False
+    return (
+        len(row) == 3
+        and 0 <= row[0] < MOST_MOVES
+        and row[1] in ENVIRONMENT
+        and finite(row[2]) is not None
+    )
+
+
+MOST_OBJECTS = 1000
+FASTEST_MPS = 1000.0
+"""More is no object of a map, and no speed of a body."""
+_OF_BODY = {"grade", "type", "objects", "interference_s", "speed_mps", "window_s", "untried"}
+_OF_CONDITIONS = {"conditions", "values", "largest", "largest_share", "unread", "untried"}
+_OF_SHRUNK = {
+    "body": "# The adversary that it takes; the weaker, the worse.",
+    "conditions": "# The conditions that it takes; the fewer, the worse.",
+}
+_NOT_SHRUNK = "# Unusual in the flight that was found; the case is not shrunk."
+
+
+def severity_lines(severity: Severity, *, is_shrunk: bool) -> list[list[str]]:
+    """Return the section, in a list of one; an empty list for an empty severity."""
+    untried = _names("untried", severity.untried)
+    if severity.about == "body":
+        window_s = severity.window_s
+        return [
+            [
+                "# The adversary that it takes; the weaker, the worse."
+                if is_shrunk
+                else _NOT_SHRUNK,
+                "[severity]",
+                *([f"grade = {quoted(severity.grade)}"] if severity.grade else []),
+                f"type = {quoted(severity.type)}",
+                f"objects = {severity.objects}",
+                f"interference_s = {severity.interference_s!r}",
+                f"speed_mps = {severity.speed_mps!r}",
+                *([] if window_s is None else [f"window_s = {window_s!r}  # of its entry"]),
+                *untried,
+            ]
+        ]
+    if severity.about == "conditions":
+        names, values = (
+            ", ".join(quoted(each) for each in texts)
+            for texts in (severity.conditions, severity.values)
+        )
+        return [
+            [
+                "# The conditions that it takes; the fewer, the worse."
+                if is_shrunk
+                else _NOT_SHRUNK,
+                "[severity]",
+                f"conditions = [{names}]",
+                *([f"values = [{values}]"] if severity.values else []),
+                f"largest = {quoted(severity.largest)}",
+                f"largest_share = {severity.largest_share!r}",
+                *_names("unread", severity.unread),
+                *untried,
+            ]
+        ]
+    return []
+
+
+def _names(key: str, names: tuple[str, ...]) -> list[str]:
+    return [f"{key} = [{', '.join(quoted(each) for each in names)}]"] if names else []
+
+
+def _read_names(table: Table, key: str) -> tuple[str, ...]:
+    return tuple(table.strings(key)) if key in table.values else ()
+
+
+def read_severity(top: Table) -> Severity:
+    """Return the severity in a document, empty without one; raise ScenarioError for a wrong key."""
+    if "severity" not in top.values:
+        return NO_SEVERITY
+    table = top.table("severity")
+    if "conditions" in table.values:
+        table.refuse_unknown(_OF_CONDITIONS)
+        conditions = tuple(table.strings("conditions"))
+        values = _read_names(table, "values")
+        if values and len(values) != len(conditions):
+            expected = f"one text for each of {len(conditions)} conditions"
+            raise table.error("values", f"found {len(values)} texts, expected {expected}")
+        return Severity(
+            about="conditions",
+            conditions=conditions,
+            values=values,
+            largest=table.string("largest"),
+            largest_share=table.number("largest_share", low=0.0, high=1.0),
+            unread=_read_names(table, "unread"),
+            untried=_read_names(table, "untried"),
+        )
+    table.refuse_unknown(_OF_BODY)
+    return Severity(
+        about="body",
+        grade=table.string("grade", allowed=GRADES) if "grade" in table.values else "",
+        type=table.string("type"),
+        objects=table.integer("objects", high=MOST_OBJECTS),
+        interference_s=table.number("interference_s", low=0.0, high=LONGEST_S),
+        speed_mps=table.number("speed_mps", low=0.0, high=FASTEST_MPS),
+        window_s=table.number("window_s", low=0.0, high=LONGEST_S)
+        if "window_s" in table.values
+        else None,
+        untried=_read_names(table, "untried"),
     )
