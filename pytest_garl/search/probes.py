@@ -339,7 +339,11 @@ def _half_way(twin: Flight) -> tuple[float, float] | None:
 
 
 def _half_height(twin: Flight) -> tuple[float, float]:
-    """Return when a flight that landed came down through half of its height, and that height."""
+    """Return when a flight that landed came down through half of its height, and how high it was.
+
+    The height is that of the feet, as in all texts.
+    """
     half = _top_m(twin) / 2
     above = np.nonzero(twin.uav.position_m[:, 2] > half)[0]
-    return round(float(twin.uav.time_s[above[-1]]), 2), half
+    height = up_m(float(twin.uav.position_m[above[-1], 2]))
+    return round(float(twin.uav.time_s[above[-1]]), 2), height

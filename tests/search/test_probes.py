@@ -29,6 +29,7 @@ from pytest_garl.search.probes import (
 )
 from pytest_garl.simulation.flight import Flight, Track
 from pytest_garl.simulation.fly import fly
+from pytest_garl.simulation.physics.vehicle import up_m
 from pytest_garl.verdicts.judge import judge
 from pytest_garl.verdicts.verdict import DEFAULT_LIMITS, Verdict
 from tests.support.probed_landers import FirstOfTheList, GoesOn, Lander, ZeroByDefault
@@ -93,6 +94,13 @@ def test_until_its_event_a_probe_is_the_twin() -> None:
     before = [(track.position_m[track.time_s <= event_s]).tolist() for track in places]
     assert before[0] == before[1]
     assert event_s == pytest.approx(6.5, abs=1.0)
+
+
+def test_the_height_at_which_the_marker_goes_is_that_of_the_feet() -> None:
+    probe = probes()["marker-gone"]
+    index = int(twin().uav.time_s.searchsorted(probe.scenario["cover.from_s"], side="right")) - 1
+    height_m = up_m(float(twin().uav.position_m[index, 2]))
+    assert f"{height_m:.1f} m up" in probe.sentence
 
 
 def test_each_probe_is_valid_and_has_one_cause() -> None:
