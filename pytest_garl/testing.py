@@ -55,7 +55,6 @@ from pytest_garl.simulation.system_under_test.texts import shown
 from pytest_garl.verdicts.phases import landing_phase
 from pytest_garl.verdicts.sightings import reports_detections, reports_targets
 from pytest_garl.verdicts.verdict import Limits, default_distance_m
-from pytest_garl.verdicts.wording import headline
 
 FLIGHTS = 40
 """Flights of the search whose time the check estimates: the README's first budget."""
@@ -342,7 +341,7 @@ class _Checker:
         result = ProbeResult(
             name=probe.name,
             sentence=probe.sentence,
-            ending=headline(_ending(flight, judged)),
+            ending=_landed(flight, judged) or probe.ending(judged.verdict),
             violated=probe.is_violated(judged.verdict),
             outside=probe.outside,
         )
@@ -453,10 +452,15 @@ _REMEMBERS = (
 
 
 def _ending(flight: Flight, result: FlightResult) -> str:
+    return _landed(flight, result) or result.verdict.story
+
+
+def _landed(flight: Flight, result: FlightResult) -> str:
+    """Return where and when a flight landed; empty if it did not, or violates something."""
     touchdown = flight.touchdown
     if result.outcome == "landed" and touchdown and not result.verdict.violation:
         return f"landed {touchdown.distance_m:.2f} m off after {touchdown.time_s:.0f} s"
-    return result.verdict.story
+    return ""
 
 
 def _scenarios(plan: CheckPlan) -> tuple[Scenario, Scenario]:

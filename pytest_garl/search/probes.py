@@ -39,7 +39,7 @@ from pytest_garl.simulation.physics.vehicle import up_m
 from pytest_garl.verdicts.detectability import READABLE, readable_probability
 from pytest_garl.verdicts.sightings import readable_steps
 from pytest_garl.verdicts.verdict import Limits, Verdict
-from pytest_garl.verdicts.wording import compass_point
+from pytest_garl.verdicts.wording import compass_point, headline
 
 SEED = 1
 """Seed of all probes: of the noise of the sensors, which their twin has too."""
@@ -63,6 +63,9 @@ FARTHEST_VIEW, NEAREST_VIEW = 0.8, 0.2
 """A marker is readable low only if it is not from this share of the height on, but from the other.
 """
 
+_ON_EXCUSES = (", and never gave up where nobody could have landed", ", excused")
+"""What a verdict says in its first sentence of a flight in which nobody could have landed."""
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Probe:
@@ -83,6 +86,18 @@ class Probe:
         """Whether a flight of the probe violates what may be asked in it."""
         has_not_landed = verdict.primary in ("time", "abort")
         return verdict.violation and not (self.may_give_up and has_not_landed)
+
+    def ending(self, verdict: Verdict) -> str:
+        """Return how its flight ended in half a line.
+
+        Where landing may be given up, nothing is said of whether anybody could have landed: a
+        verdict asks that for the time of a nominal landing, and the marker may be back later.
+        """
+        text = headline(verdict.story)
+        if self.may_give_up and verdict.excuse:
+            for clause in _ON_EXCUSES:
+                text = text.replace(clause, "", 1)
+        return text
 
 
 def clear_scenario(map: Map, task: Task, domain: Domain) -> Scenario:

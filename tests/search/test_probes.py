@@ -165,6 +165,45 @@ def test_not_to_land_is_right_where_the_marker_is_hidden(
     assert probe.is_violated(verdict) is violated
 
 
+@pytest.mark.parametrize(
+    ("may_give_up", "story", "told"),
+    [
+        (
+            True,
+            "Not landed, and never gave up where nobody could have landed. Nobody could see it. "
+            "At 120.0 s the UAV was 7.5 m up, over the marker.",
+            "not landed, 7.5 m up, over the marker",
+        ),
+        (
+            True,
+            "Gave up, excused. Nobody could see it. At 46.0 s the UAV was 9.8 m up, over the "
+            "marker.",
+            "gave up, 9.8 m up, over the marker",
+        ),
+        (
+            False,
+            "Gave up, excused. Nobody could see it. At 46.0 s the UAV was 9.8 m up, over the "
+            "marker.",
+            "gave up, excused, 9.8 m up, over the marker",
+        ),
+    ],
+)
+def test_a_marker_that_comes_back_late_is_not_said_to_be_readable_by_nobody(
+    may_give_up: bool, story: str, told: str
+) -> None:
+    verdict = Verdict(
+        outcome="not_landed",
+        primary="time",
+        violation_type="late",
+        signature="late:never-gave-up",
+        paper_violation=True,
+        margins=(),
+        story=story,
+        excuse="undetectable",
+    )
+    assert dataclasses.replace(beside(), may_give_up=may_give_up).ending(verdict) == told
+
+
 def test_what_the_domain_does_not_have_is_a_note() -> None:
     field, calm = probes(), probes(domain_named("calm"))
     assert not [name for name, probe in field.items() if probe.outside]
