@@ -58,9 +58,6 @@ from pytest_garl.verdicts.verdict import Limits, default_distance_m
 
 FLIGHTS = 40
 """Flights of the search whose time the check estimates: the README's first budget."""
-FLIGHTS_OF_FAILURES = 4
-"""A search takes up to so many times its flights' time: flights that fail are longer than landings,
-and shrinking what they show takes as many flights again."""
 LARGEST_YAW_RAD = 2 * math.pi
 """A heading beyond a full turn is taken for degrees."""
 SLOW_FLIGHT_S = 10.0
@@ -118,10 +115,10 @@ class Check:
         return not self.faults and all(probe.passed for probe in self.probes)
 
     def __str__(self) -> str:
-        low, high = FLIGHTS * self.cpu_s, FLIGHTS * FLIGHTS_OF_FAILURES * self.cpu_s
         cost = (
             f"a flight takes {self.cpu_s:.1f} s of computing; a search of {FLIGHTS} flights takes "
-            f"{low:.0f} s of it if all land, and up to {high:.0f} s if many fail and are shrunk"
+            f"{FLIGHTS * self.cpu_s:.0f} s of it if all are like this one, and several times as "
+            "much if many fail: those are longer, and they are shrunk"
         )
         found = [f"fault: {text}" for text in self.faults]
         found += [f"warning: {text}" for text in self.warnings]
