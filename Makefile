@@ -7,6 +7,9 @@ FLIES := $(VENV)/.flies
 READY := $(VENV)/.installed
 SMOKE := .garl/experiment-smoke
 
+# The tests start some thousand processes; without the compiled files each would parse the sources.
+unexport PYTHONDONTWRITEBYTECODE
+
 .PHONY: search test test-long test-ray lint types layers tests bench faults experiment-smoke clean
 .DEFAULT_GOAL := help
 

@@ -56,13 +56,9 @@ from pytest_garl.simulation.system_under_test.reading import finite
 from pytest_garl.verdicts.phases import landing_phase
 from pytest_garl.verdicts.sightings import reports_detections, reports_targets
 from pytest_garl.verdicts.verdict import Limits, default_distance_m
-from pytest_garl.verdicts.wording import headline
 
 FLIGHTS = 40
 """Flights of the search whose time the check estimates: the README's first budget."""
-FLIGHTS_OF_FAILURES = 4
-"""A search takes up to so many times its flights' time: flights that fail are longer than landings,
-and shrinking what they show takes as many flights again."""
 LARGEST_YAW_RAD = 2 * math.pi
 """A heading beyond a full turn is taken for degrees."""
 SLOW_FLIGHT_S = 10.0
@@ -120,10 +116,10 @@ class Check:
         return not self.faults and all(probe.passed for probe in self.probes)
 
     def __str__(self) -> str:
-        low, high = FLIGHTS * self.cpu_s, FLIGHTS * FLIGHTS_OF_FAILURES * self.cpu_s
         cost = (
             f"a flight takes {self.cpu_s:.1f} s of computing; a search of {FLIGHTS} flights takes "
-            f"{low:.0f} s of it if all land, and up to {high:.0f} s if many fail and are shrunk"
+            f"{FLIGHTS * self.cpu_s:.0f} s of it if all are like this one, and several times as "
+            "much if many fail: those are longer, and they are shrunk"
         )
         found = [f"fault: {text}" for text in self.faults]
         found += [f"warning: {text}" for text in self.warnings]
@@ -343,7 +339,7 @@ class _Checker:
         result = ProbeResult(
             name=probe.name,
             sentence=probe.sentence,
-            ending=headline(_ending(flight, judged)),
+            ending=_landed(flight, judged) or probe.ending(judged.verdict),
             violated=probe.is_violated(judged.verdict),
             outside=probe.outside,
         )
@@ -454,10 +450,15 @@ _REMEMBERS = (
 
 
 def _ending(flight: Flight, result: FlightResult) -> str:
+    return _landed(flight, result) or result.verdict.story
+
+
+def _landed(flight: Flight, result: FlightResult) -> str:
+    """Return where and when a flight landed; empty if it did not, or violates something."""
     touchdown = flight.touchdown
     if result.outcome == "landed" and touchdown and not result.verdict.violation:
         return f"landed {touchdown.distance_m:.2f} m off after {touchdown.time_s:.0f} s"
-    return result.verdict.story
+    return ""
 
 
 def _scenarios(plan: CheckPlan) -> tuple[Scenario, Scenario]:

@@ -32,6 +32,11 @@ def test_files_for_github_follow_their_schema(schema: str, file: Path) -> None:
     assert done.returncode == 0, done.stdout
 
 
+def test_lines_of_the_readme_are_wrapped() -> None:
+    lines = (DOCS.parent / "README.md").read_text().splitlines()
+    assert [line for line in lines if len(line) > 130 and not line.startswith("|")] == []
+
+
 def test_every_command_of_the_cases_page_exists() -> None:
     from pytest_garl.cli.cases import cases
 

@@ -41,7 +41,7 @@ def describe(
 
     After a collision that is how the moving object came near, else the conditions.
     """
-    if severity.about == "conditions" and severity.conditions:
+    if severity.about == "conditions":
         if is_shrunk:
             return f"{_sentence(severity.text)}: {verdict.story}"
         return f"{unusual_in_flight(severity)} {verdict.story}"

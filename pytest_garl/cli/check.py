@@ -68,6 +68,7 @@ def check(
     planned = [each for target in targets for each in _planned(target, maps)]
     probed = [] if no_probes else _probed(planned)
     passed = True
+    warned: dict[type, set[str]] = {}
     # Nothing else interrupts a call that hangs in C code and holds the interpreter.
     faulthandler.dump_traceback_later(LIMIT_S, exit=True, file=sys.__stderr__ or 2)
     try:
@@ -76,7 +77,11 @@ def check(
             wanted = (system, plan) in probed
             flown = replace(plan, seconds=seconds, deterministic=deterministic, probes=wanted)
             result = check_as_planned(system, flown)
-            click.echo(result)
+            # The same problem on another map is no other one.
+            known = warned.setdefault(system, set())
+            new = tuple(text for text in result.warnings if text not in known)
+            known.update(new)
+            click.echo(replace(result, warnings=new))
             passed &= result.passed
     finally:
         faulthandler.cancel_dump_traceback_later()

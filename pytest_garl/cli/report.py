@@ -14,7 +14,7 @@ from pytest_garl.files.atomic import write_text_atomically
 from pytest_garl.messages import printable
 from pytest_garl.reports.html import MOST_FILMS
 from pytest_garl.reports.run_report import run_report_as_json
-from pytest_garl.reports.shares_text import in_control_text
+from pytest_garl.reports.shares_text import PAPER_DEFINITION, in_control_text
 
 
 @click.command()
@@ -112,11 +112,13 @@ def _text(found: dict[str, Any]) -> str:
     lines = []
     for search in found["searches"]:
         name = search["system"].split(":")[-1]
+        late = search["not_landed"]
         lines.append(
             f"{name} on {search['map']}: {search['flown']} of {search['wanted']} flown, "
             f"{search['landed']} landed, {search['violating']} violate "
-            f"({search['violating_by_the_paper']} by the paper's definition, no landing counted), "
+            f"({search['violating_by_the_paper']} {PAPER_DEFINITION}), "
             f"gave up: {_counts(search['gave_up'])}"
+            f"{f'; ran out of time: {_counts(late)}' if any(late.values()) else ''}"
         )
         control = search["control"]
         if control:
@@ -124,7 +126,7 @@ def _text(found: dict[str, Any]) -> str:
         for kind in search["signatures"]:
             severity = kind["severity"] or {}
             told = severity.get("text", "")
-            least = "at the least" if severity.get("took") else "unusual in the least of them"
+            least = "at the least" if severity.get("took") else "unusual in the mildest of them"
             seen = in_control_text(
                 kind["in_control"], control["random"]["flights"] if control else 0
             )

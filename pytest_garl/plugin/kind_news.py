@@ -113,6 +113,11 @@ def _shrunk(request: CaseRequest, result: CaseResult) -> str:
     name = f"{result.signature} ({request.job.system.name.split(':')[-1]} on {request.job.map})"
     if result.case is None:
         return f"garl: not confirmed {name}: {result.reason}"
-    # The first sentence says what it takes and what happens; the summary shows them all.
-    what = re.split(r"\.\s+(?=[A-Z])", result.case.violation.description, maxsplit=1)[0]
-    return f"garl: shrunk {name}: {what}"
+    # The first sentences say what it takes and what happens; the summary shows them all.
+    sentences = re.split(r"\.\s+(?=[A-Z])", result.case.violation.description)
+    if result.case.is_shrunk:
+        return f"garl: shrunk {name}: {sentences[0]}"
+    if result.case.severity.is_guess:
+        # What was unusual stands first, and nobody knows which of it the violation takes.
+        return f"garl: confirmed, not shrunk {name}: {'. '.join(sentences[:2])}".removesuffix(".")
+    return f"garl: confirmed {name}: {sentences[0]}"

@@ -189,7 +189,7 @@ class _Flown:
             known = self._known(probe, verdict)
             said = f"known, {known}" if known else "FAILED"
             said = "outside the domain" if probe.outside else said
-        return f"{probe.name}: {said}: {probe.sentence}: {headline(verdict.story)}"
+        return f"{probe.name}: {said}: {probe.sentence}: {probe.ending(verdict)}"
 
     def _known(self, probe: Probe, verdict: Verdict) -> str:
         """Return the file of a known case with the signature and the causes of a probe."""

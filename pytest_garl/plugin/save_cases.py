@@ -148,14 +148,13 @@ def _lines_about(each: InvestigatedSignature, config: pytest.Config, width: int)
 
 
 def _seen(each: InvestigatedSignature) -> str:
-    """Return in words what had gone wrong in how many flights before another event ended them."""
+    """Return in words what was noted in how many flights."""
     flights = counted(each.seen, "flight")
-    return f"{each.result.finding}, seen in {flights} before another event"
+    return f"{each.result.finding}, noted in {flights}"
 
 
 def _evidence(each: InvestigatedSignature, case: Case) -> list[str]:
     """Return in words how robust and preventable a case is, and how many flights it took."""
-    evidence = case.evidence
     if not each.result.flights:
         return ["as the search found it, not shrunk"]
     return [
@@ -163,19 +162,32 @@ def _evidence(each: InvestigatedSignature, case: Case) -> list[str]:
         *([case.prevention.text] if case.prevention.text else []),
         *([] if case.gates else [f"{case.reason.upper()}, gates nothing"]),
         *([f"flown without NPCs because of {_seen(each)}"] if each.result.finding else []),
-        f"shrinking removed {evidence.removed}",
+        _removed(case),
         counted(each.result.flights, "flight"),
     ]
 
 
+def _removed(case: Case) -> str:
+    """Return in words what shrinking removed, or that it had no flights to find that out."""
+    if case.severity.is_guess:
+        return "not shrunk: its flights were used up"
+    return f"shrinking removed {case.evidence.removed}"
+
+
+def _is_left(each: InvestigatedSignature) -> bool:
+    """Return whether more flights would shrink a kind."""
+    case = each.result.case
+    return not each.result.flights or (case is not None and case.severity.is_guess)
+
+
 def _not_shrunk(investigated: Sequence[InvestigatedSignature], width: int) -> list[str]:
     """Return how many kinds are not shrunk, and how many flights it takes to shrink them."""
-    left = sum(not each.result.flights for each in investigated)
+    left = sum(_is_left(each) for each in investigated)
     if not left:
         return []
     text = (
-        f"{counted(left, 'kind')} of violation not shrunk: by default shrinking has no more "
-        f"flights than the search. --garl-shrink={SHRINK} shrinks all of them (at most "
+        f"Not shrunk: {left} of {counted(len(investigated), 'violation')}. By default shrinking "
+        f"has no more flights than the search. --garl-shrink={SHRINK} shrinks all of them (at most "
         f"{SHRINK * len(investigated)} flights); `garl cases shrink FILE` shrinks a saved case."
     )
     return [wrapped(text, width)]

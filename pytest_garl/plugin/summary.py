@@ -214,7 +214,7 @@ def _costs(run: Run) -> str:
     counts = {
         "flown again after a time-out or a kill": meters.get("retried", 0),
         "to see whether violations repeat": max(0, repeating),
-        "to tell known causes from others": twins,
+        "to tell causes of one ending apart": twins,
         "to confirm and shrink": confirming,
     }
     words = [f"flights: {meters.get('flights', 0):.0f}"]
@@ -238,7 +238,7 @@ def search_table(
 ) -> list[str]:
     """Return the shares of a system on a map, then each kind of violation and how to see it.
 
-    ``films`` are those of the kinds by signature.  What had gone wrong before another event
+    ``films`` are those of the kinds by signature.  What else was noted
     follows; no item fails for it.
     """
     lines = [
@@ -250,7 +250,7 @@ def search_table(
         *_kind_lines(search, search.kinds, config, width, films),
     ]
     if search.findings:
-        lines.append("  before another event:")
+        lines.append("  also noted, no test fails for it:")
         lines += _kind_lines(search, search.findings, config, width)
     return lines
 

@@ -29,7 +29,7 @@ _ENDINGS = {
     "II:never-seen": "the marker is never readable",
     "II:lost": "the marker is lost from view",
     "II:gave-up-in-sight": "gives up with the marker in view",
-    "late:not-landed": "does not land in time",
+    "late:not-landed": "the time runs out",
     "late:never-gave-up": "neither lands nor gives up",
     "late:no-time": "gives up for want of time",
     "late:landed": "lands late",

@@ -26,6 +26,9 @@ marker for long enough; something never left it free for long enough."""
 
 
 NONE: Mapping[str, tuple[Severity, str]] = MappingProxyType({})
+NEVER_GAVE_UP = "late:never-gave-up"
+_BLOCKED = "The marker was blocked"
+"""In the story of a flight in which something never left the marker free for long enough."""
 DOMAINS = "domains of "
 """Begins the ledger's fact with the names of the domains of a system on a map."""
 CAMERA = "camera of "
@@ -99,6 +102,17 @@ class Spread:
         return cls(median=statistics.median(values), worst=max(values)) if values else None
 
 
+def _why_no_landing(verdict: Verdict) -> NoLanding:
+    """Return why a flight did not land.
+
+    One that never gave up where nobody could have landed violates something, so its verdict has no
+    excuse; but it was not needless that it did not land.
+    """
+    if verdict.cause != NEVER_GAVE_UP:
+        return verdict.no_landing
+    return "blocked" if _BLOCKED in verdict.story else "excused"
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SearchSummary:
     """All flights of a system on a map, and their kinds of violation, the most frequent first.
@@ -170,7 +184,7 @@ class SearchSummary:
     def without_landing(self, outcome: str) -> Mapping[str, int]:
         """Return how many flights with the outcome gave_up or not_landed had which reason."""
         reasons = [
-            each.result.verdict.no_landing
+            _why_no_landing(each.result.verdict)
             for each in self.flights
             if each.result.outcome == outcome
         ]
@@ -342,7 +356,7 @@ LEGEND = {
     "slid": "moved on over the ground after its touchdown",
     "abort": 'gave up where nobody could land, with limits(abort="violation")',
     "own": "an assertion of a test",
-    "slow": "took three times as long as the reference pilot",
+    "slow": "took more than three times as long as a nominal landing",
     "lost-while-detectable": "did not report the marker while it could be read",
 }
 """Meanings of the types of violations and findings: a signature's part before the first colon."""

@@ -64,7 +64,11 @@ def repair(scenario: Scenario, map: Map) -> Scenario:
     marker = marker_position_m(scenario, map)
     wanted = scenario
     if any(_marker_problems(marker, scenario, map, discs)):
-        place = _nearest(marker, lambda at: not any(_marker_problems(at, wanted, map, discs)))
+        place = _nearest(
+            marker,
+            lambda at: not any(_marker_problems(at, wanted, map, discs)),
+            lambda at: marker_position_m(wanted.replace(marker_genes(at, map)), map),
+        )
         scenario = scenario.replace(marker_genes(place, map))
     scenario = _with_free_decoys(scenario, map)
     for index, (name, _) in enumerate(map.present_objects):
@@ -79,17 +83,26 @@ def repair(scenario: Scenario, map: Map) -> Scenario:
         ) -> bool:
             return not any(_start_problems(scenario, map, discs, marker, index, at))
 
+        def kept(
+            at: tuple[float, float], scenario: Scenario = scenario, name: str = name
+        ) -> tuple[float, float]:
+            return object_start_m(scenario.replace(start_genes(name, at, map)), map, name)
+
         if not free(start):
-            scenario = scenario.replace(start_genes(name, _nearest(start, free), map))
+            scenario = scenario.replace(start_genes(name, _nearest(start, free, kept), map))
     return scenario
 
 
 def _nearest(
     origin: tuple[float, float],
     valid: Callable[[tuple[float, float]], bool],
+    kept: Callable[[tuple[float, float]], tuple[float, float]] = lambda at: at,
     within_m: float = 200.0,
 ) -> tuple[float, float]:
-    """Search rings of growing radius; a hundredth of a ring beyond so that rounding is harmless."""
+    """Search rings of growing radius for a place that is valid as a scenario keeps it.
+
+    ``kept`` returns a place as genes give it back, which may be nearer by a rounding error.
+    """
     ring = 0
     while True:
         ring += 1
@@ -98,7 +111,7 @@ def _nearest(
             radius = ring * _RING_STEP_M
             x, y = origin[0] + radius * math.cos(angle), origin[1] + radius * math.sin(angle)
             at = round(x, PLACE_DIGITS), round(y, PLACE_DIGITS)
-            if valid(at):
+            if valid(at) and valid(kept(at)):
                 return at
         if ring * _RING_STEP_M > within_m:
             raise ScenarioError(f"no valid place within {within_m:g} m; the map leaves no room")
@@ -167,7 +180,7 @@ def _with_free_decoys(scenario: Scenario, map: Map) -> Scenario:
         place = scenario[x], scenario[y]
         if not free(place):
             try:
-                scenario = moved(_nearest(place, free, 2 * math.sqrt(2) * DECOY_REACH_M))
+                scenario = moved(_nearest(place, free, within_m=2 * math.sqrt(2) * DECOY_REACH_M))
             except ScenarioError:
                 # A marker of several metres and its like can fill the square.
                 scenario = scenario.replace(GROUPS[decoy.name].nominal)

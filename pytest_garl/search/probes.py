@@ -40,7 +40,7 @@ from pytest_garl.simulation.nominal import LEVEL
 from pytest_garl.verdicts.detectability import READABLE, readable_probability
 from pytest_garl.verdicts.sightings import readable_steps
 from pytest_garl.verdicts.verdict import Limits, Verdict
-from pytest_garl.verdicts.wording import compass_point
+from pytest_garl.verdicts.wording import compass_point, headline
 
 SEED = 1
 """Seed of all probes: of the noise of the sensors, which their twin has too."""
@@ -64,6 +64,9 @@ FARTHEST_VIEW, NEAREST_VIEW = 0.8, 0.2
 """A marker is readable low only if it is not from this share of the height on, but from the other.
 """
 
+_ON_EXCUSES = (", and never gave up where nobody could have landed", ", excused")
+"""What a verdict says in its first sentence of a flight in which nobody could have landed."""
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Probe:
@@ -84,6 +87,18 @@ class Probe:
         """Whether a flight of the probe violates what may be asked in it."""
         has_not_landed = verdict.primary in ("time", "abort")
         return verdict.violation and not (self.may_give_up and has_not_landed)
+
+    def ending(self, verdict: Verdict) -> str:
+        """Return how its flight ended in half a line.
+
+        Where landing may be given up, nothing is said of whether anybody could have landed: a
+        verdict asks that for the time of a nominal landing, and the marker may be back later.
+        """
+        text = headline(verdict.story)
+        if self.may_give_up and verdict.excuse:
+            for clause in _ON_EXCUSES:
+                text = text.replace(clause, "", 1)
+        return text
 
 
 def clear_scenario(map: Map, task: Task, domain: Domain) -> Scenario:
@@ -340,7 +355,11 @@ def _half_way(twin: Flight) -> tuple[float, float] | None:
 
 
 def _half_height(twin: Flight) -> tuple[float, float]:
-    """Return when a flight that landed came down through half of its height, and that height."""
+    """Return when a flight that landed came down through half of its height, and how high it was.
+
+    The height is that of the feet, as in all texts.
+    """
     half = _top_m(twin) / 2
     above = np.nonzero(twin.uav.position_m[:, 2] > half)[0]
-    return round(float(twin.uav.time_s[above[-1]]), 2), half
+    height = up_m(float(twin.uav.position_m[above[-1], 2]))
+    return round(float(twin.uav.time_s[above[-1]]), 2), height

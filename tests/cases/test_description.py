@@ -43,4 +43,12 @@ def test_description_of_another_violation_begins_with_its_conditions() -> None:
     fog = Severity(about="conditions", conditions=("fog",), largest="visibility 11 m")
     told = describe(hits_a_person(), verdict, fog, is_shrunk=True)
     assert told == "Fog alone, visibility 11 m: Gave up."
-    assert describe(hits_a_person(), verdict, Severity(about="conditions")) == "Gave up."
+
+
+def test_description_of_a_violation_without_conditions_says_that_nothing_was_unusual() -> None:
+    verdict = flight_result("II:lost", violation_type="II", story="Gave up.").verdict
+    nothing = Severity(about="conditions")
+    told = describe(hits_a_person(), verdict, nothing, is_shrunk=True)
+    assert told == "Nothing unusual: Gave up."
+    told = describe(hits_a_person(), verdict, nothing)
+    assert told == "Nothing was unusual in this flight. Gave up."

@@ -90,7 +90,8 @@ def test_check_prints_its_observations_and_exits_with_zero() -> None:
     assert done.exit_code == 0, done.output
     assert "Climbs: lawn: Not landed" in done.output
     assert "Climbs: court: Not landed" in done.output
-    assert "warning: returns no diagnostics" in done.output
+    # The same on both maps is one warning.
+    assert done.output.count("warning: returns no diagnostics") == 1
 
 
 def test_check_exits_with_one_if_a_system_does_not_land() -> None:

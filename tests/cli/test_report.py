@@ -13,6 +13,7 @@ from typing import Any
 import pytest
 from jsonschema import Draft202012Validator
 
+from pytest_garl.cli.report import _text
 from pytest_garl.reports.run_report import SCHEMA
 from tests.support.landing_project import result_hash, write_project
 
@@ -198,7 +199,26 @@ def test_a_report_is_written_to_a_file_or_printed_as_text(searched: Path) -> Non
     assert "Good on lawn: 8 of 8 flown, 6 landed, 8 violate (3 by the paper's definition" in words
     assert "gave up: needless 0, excused 0, blocked 0" in words
     assert "IV:dog:last-metre:unseen: collided with dog-1" in words
-    assert "\n        unusual in the least of them: a hostile dog at 0.0 m/s for 14.2 s" in words
+    assert "\n        unusual in the mildest of them: a hostile dog at 0.0 m/s for 14.2 s" in words
+
+
+def test_the_text_counts_flights_whose_time_ran_out() -> None:
+    search = {
+        "system": "m:Patient",
+        "map": "lawn",
+        "flown": 3,
+        "wanted": 3,
+        "landed": 1,
+        "violating": 2,
+        "violating_by_the_paper": 2,
+        "gave_up": {"needless": 0, "excused": 0, "blocked": 0},
+        "not_landed": {"needless": 1, "excused": 1, "blocked": 0},
+        "control": None,
+        "signatures": [],
+    }
+    told = _text({"searches": [search]})
+    assert "2 violate (2 by the paper's definition, flights without a landing included)" in told
+    assert "blocked 0; ran out of time: needless 1, excused 1, blocked 0\n" in told
 
 
 def test_a_report_changes_no_result(pytester: pytest.Pytester, searched: Path) -> None:

@@ -2,10 +2,15 @@
 
 from __future__ import annotations
 
+import dataclasses
 import re
 
 import pytest
 
+from pytest_garl.cases.case_request import CaseResult
+from pytest_garl.execution.severity import Severity
+from pytest_garl.plugin.kind_news import _shrunk
+from tests.cases.samples import case, make_case_request
 from tests.plugin.test_progress_display import on_a_terminal, screen
 from tests.support.landing_project import project, run
 
@@ -67,3 +72,20 @@ def test_other_folder_stands_in_the_command_of_the_header(pytester: pytest.Pytes
     project(pytester)
     text = run(pytester, "--garl-budget=1", "-o", "garl_dir=a b").stdout.str()
     assert "garl: `garl report 'a b/ledger.sqlite'` in a second terminal" in text
+
+
+def shrunk(description: str, untried: tuple[str, ...] = ()) -> str:
+    """Return what is told of a violation by fog, with its neighbours flown."""
+    severity = Severity(about="conditions", conditions=("fog",), values=("",), untried=untried)
+    made = dataclasses.replace(case("II:never-seen", description), severity=severity)
+    result = CaseResult(signature="II:never-seen", case=made, flights=4)
+    return _shrunk(make_case_request(12), result).partition(": ")[2]
+
+
+def test_a_violation_is_shrunk_only_if_flights_showed_what_it_takes() -> None:
+    told = shrunk("Unusual in this flight: fog. Not landed. At 9.0 s it was up.", ("fog",))
+    assert told.startswith("confirmed, not shrunk II:never-seen (")
+    assert told.endswith("): Unusual in this flight: fog. Not landed")
+    told = shrunk("Fog alone: Not landed. At 9.0 s it was up.")
+    assert told.startswith("shrunk II:never-seen (")
+    assert told.endswith("): Fog alone: Not landed")

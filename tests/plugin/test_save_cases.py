@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import dataclasses
 import shutil
 import subprocess
 
@@ -7,6 +8,9 @@ import pytest
 
 from pytest_garl.cases.case_file import dump_case, load_case
 from pytest_garl.cases.shrink import BISECTIONS
+from pytest_garl.execution.severity import Severity
+from pytest_garl.plugin.save_cases import _removed
+from tests.cases.samples import case
 from tests.support.case_project import (
     CASES,
     SEARCH,
@@ -81,7 +85,7 @@ def test_kind_beyond_the_cap_is_saved_without_shrinking(
         [
             "*confirming and shrinking 2 new kinds of violation, at most * flights, about * s",
             "*(as the search*",
-            "1 kind of violation not shrunk: *",
+            "Not shrunk: 1 of 2 violations. By default *",
         ]
     )
     assert "--garl-shrink=12" in result.stdout.str()
@@ -200,9 +204,16 @@ def test_what_a_collision_hid_is_flown_again_without_npcs_and_saved(
     assert len(off.scenario.removed_objects) == 4
     assert off.scenario["environment.fog"] < 0.12
     output = " ".join(result.stdout.str().split())
-    assert "flown without NPCs because of off:descending-elsewhere, seen in " in output
-    assert " flights before another event" in output
+    assert "flown without NPCs because of off:descending-elsewhere, noted in " in output
     before = saved(pytester)
     again = run(pytester, *search)
     again.stdout.fnmatch_lines(["*without people, dogs and birds it fails as I:nothing:unseen*"])
     assert saved(pytester) == before
+
+
+def test_a_case_without_flights_to_shrink_it_is_not_said_to_have_lost_nothing() -> None:
+    fog = Severity(about="conditions", conditions=("fog",), values=("",), untried=("fog",))
+    guess = dataclasses.replace(case("II:never-seen"), severity=fog)
+    assert _removed(guess) == "not shrunk: its flights were used up"
+    tried = dataclasses.replace(guess, severity=dataclasses.replace(fog, untried=()))
+    assert _removed(tried) == "shrinking removed 3 of 4 objects"

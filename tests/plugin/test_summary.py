@@ -68,7 +68,7 @@ def test_summary_counts_failures_of_users_properties_as_violations(
     result.stdout.fnmatch_lines(
         [
             "Good on lawn: 4 flown, landed 100.0 %, violations 100.0 %*",
-            "  by the paper's definition, no landing counted: violations 0.0 %",
+            "  by the paper's definition, flights without a landing included: violations 0.0 %",
             "  gave up: needless 0.0 %, excused 0.0 %, blocked 0.0 %; not landed 0.0 %",
             "*distance decided in 4 of 4 flights, time in 4",
             "*4  own:test_own:*",
@@ -89,7 +89,7 @@ def test_step_summary_holds_a_table_of_violations(
     result = run(pytester, *SEARCH, "-rs", *parallel)
     lines = page.read_text().splitlines()
     assert lines[:2] == ["before", "## pytest-garl"]
-    paper = "by the paper's definition, no landing counted"
+    paper = "by the paper's definition, flights without a landing included"
     gave_up = "gave up: needless | gave up: excused | gave up: blocked"
     assert lines[3:6:2] == [
         f"| where | flown | landed | violations | {paper} | {gave_up} "

@@ -67,7 +67,7 @@ def test_landed_flights_come_first_and_each_reason_has_its_share() -> None:
     search = summary(RESULTS, violating=2)
     assert headline_shares(search) == "8 flown, landed 25.0 %, violations 25.0 % [3.2, 65.1]"
     assert share_lines(search)[:3] == [
-        "by the paper's definition, no landing counted: violations 62.5 %",
+        "by the paper's definition, flights without a landing included: violations 62.5 %",
         "gave up: needless 12.5 %, excused 12.5 %, blocked 12.5 %; "
         "not landed 12.5 % (of them blocked 1); hung 12.5 %; inconclusive 1",
         "landings: distance median 0.40 m, worst 0.60 m; time median 30.0 s, worst 40.0 s",
@@ -110,10 +110,24 @@ def test_findings_before_another_event_follow_the_violations(
     )
     search = summary((RESULTS[0], flight_result("IV:dog:descent:seen", findings=(finding,))))
     lines = search_table(search, pytestconfig, 120)
-    start = lines.index("  before another event:")
+    start = lines.index("  also noted, no test fails for it:")
     assert lines[start + 1].split()[:2] == ["1", "off:descending-elsewhere"]
     assert "--garl-repeat=lawn-g00-s01" in lines[start + 1]
     assert lines[start + 2].strip() == (
         "came down 4.8 m north of the marker, which had been in view before"
     )
     assert legend(search.findings) == "off: came down too far from the marker, up to 1.5 m"
+
+
+def test_never_giving_up_where_nobody_could_land_is_not_needless() -> None:
+    late: dict[str, Any] = {
+        "outcome": "not_landed",
+        "paper_violation": True,
+        "signature": "late:never-gave-up",
+        "violation_type": "late",
+        "primary": "time",
+    }
+    unseen = flight_result(**late, story="Not landed. Nobody could see the marker: 0.8 s.")
+    blocked = flight_result(**late, story="Not landed. The marker was blocked: 2 s.")
+    told = summary((unseen, unseen, blocked)).without_landing("not_landed")
+    assert told == {"needless": 0, "excused": 2, "blocked": 1}

@@ -37,3 +37,13 @@ def test_repair_changes_only_the_offending_genes() -> None:
         key for key, _ in nominal.genes if repair(nominal, COURT)[key] != nominal[key]
     }
     assert {"dog-1.start_x", "dog-1.start_y"} & changed
+
+
+def test_an_object_is_put_where_rounding_leaves_it_clear_of_others() -> None:
+    """The first ring with room ends as far from the bird as the two are wide, to the micrometre."""
+    lawn = load_map("lawn")
+    genome = genome_for(lawn)
+    nominal = decode(genome.nominal, genome, map="lawn", seed=1)
+    beside = {"bird-1.start_x": 1.0, "bird-1.start_y": 0.0}
+    mended = repair(nominal.replace({**beside, "dog-1.start_x": 1.0, "dog-1.start_y": 0.0}), lawn)
+    assert problems(mended, lawn) == ()

@@ -11,6 +11,7 @@ import pytest
 
 from pytest_garl import Camera, Start
 from pytest_garl.flight.flight import Flight, Track
+from pytest_garl.flight.thresholds import up_m
 from pytest_garl.npcs.catalogue import policy_spec
 from pytest_garl.scenarios.conditions import active_conditions
 from pytest_garl.scenarios.domains.domain import Domain
@@ -95,6 +96,13 @@ def test_until_its_event_a_probe_is_the_twin() -> None:
     assert event_s == pytest.approx(6.5, abs=1.0)
 
 
+def test_the_height_at_which_the_marker_goes_is_that_of_the_feet() -> None:
+    probe = probes()["marker-gone"]
+    index = int(twin().uav.time_s.searchsorted(probe.scenario["cover.from_s"], side="right")) - 1
+    height_m = up_m(float(twin().uav.position_m[index, 2]))
+    assert f"{height_m:.1f} m up" in probe.sentence
+
+
 def test_each_probe_is_valid_and_has_one_cause() -> None:
     causes = {
         name: {each.cause.partition("-")[0] for each in active_conditions(probe.scenario)}
@@ -155,6 +163,45 @@ def test_not_to_land_is_right_where_the_marker_is_hidden(
     )
     probe = dataclasses.replace(beside(), may_give_up=may_give_up)
     assert probe.is_violated(verdict) is violated
+
+
+@pytest.mark.parametrize(
+    ("may_give_up", "story", "told"),
+    [
+        (
+            True,
+            "Not landed, and never gave up where nobody could have landed. Nobody could see it. "
+            "At 120.0 s the UAV was 7.5 m up, over the marker.",
+            "not landed, 7.5 m up, over the marker",
+        ),
+        (
+            True,
+            "Gave up, excused. Nobody could see it. At 46.0 s the UAV was 9.8 m up, over the "
+            "marker.",
+            "gave up, 9.8 m up, over the marker",
+        ),
+        (
+            False,
+            "Gave up, excused. Nobody could see it. At 46.0 s the UAV was 9.8 m up, over the "
+            "marker.",
+            "gave up, excused, 9.8 m up, over the marker",
+        ),
+    ],
+)
+def test_a_marker_that_comes_back_late_is_not_said_to_be_readable_by_nobody(
+    may_give_up: bool, story: str, told: str
+) -> None:
+    verdict = Verdict(
+        outcome="not_landed",
+        primary="time",
+        violation_type="late",
+        signature="late:never-gave-up",
+        paper_violation=True,
+        margins=(),
+        story=story,
+        excuse="undetectable",
+    )
+    assert dataclasses.replace(beside(), may_give_up=may_give_up).ending(verdict) == told
 
 
 def test_what_the_domain_does_not_have_is_a_note() -> None:

@@ -42,11 +42,15 @@ def hints_of(
         return (_moving(flight, prevention),)
     if kind in ("II", "abort") or verdict.signature.startswith("late:not-landed"):
         return tuple(_not_landed(flight))
+    if kind == "V":
+        return _crashed(verdict)
     if verdict.cause in _OF_CAUSE:
         return _OF_CAUSE[verdict.cause]
     decoy = next((name for name in _signatures(verdict) if name.startswith(_DECOY)), "")
     if decoy:
-        first = _decoy(flight, decoy.split(":")[1])
+        name = decoy.split(":")[1].removeprefix("decoy-")
+        way = "It came down on" if kind == "I" else "It was coming down to"
+        first = _decoy(flight, f"{way} a decoy, {name}")
         return (first,) if kind == "I" else (first, *_OF_TYPE.get(kind or "", ()))
     if kind in ("I", "off"):
         return (_elsewhere(flight),)
@@ -69,11 +73,31 @@ _OF_TYPE = {
         "A body that does not move was hit: look at the way that the system took there, and "
         "at its clearance from what it could see or knew.",
     ),
-    "V": ("The traceback below names the line that failed, with the frame that it got.",),
-    "late": ("It was too slow: the timeline shows which phase took the time.",),
+    "late": ("It was too slow: the charts below show where the UAV was, and for how long.",),
     "hard": ("Look at the descent of the last metres: speed and tilt at the touchdown.",),
     "slid": ("Look at the speed over the ground at the touchdown, and at when motors stop.",),
 }
+
+
+_OF_CRASH = (
+    ("The landing system raised", "The traceback below names the line that failed."),
+    ("The landing system returned nonsense", "Look at what the method returned just before."),
+    (
+        "The landing system died",
+        "Its process ended without a Python exception: look at native code, memory and exits. What "
+        "is known of it stands below.",
+    ),
+    (
+        "The landing system hung",
+        "A call did not return in time: look at loops and at what waits. Where it was then stands "
+        "below.",
+    ),
+)
+"""Hints for a crash, by how its story begins."""
+
+
+def _crashed(verdict: Verdict) -> tuple[str, ...]:
+    return tuple(hint for begin, hint in _OF_CRASH if verdict.story.startswith(begin))
 
 
 def _signatures(verdict: Verdict) -> Iterator[str]:
@@ -82,16 +106,17 @@ def _signatures(verdict: Verdict) -> Iterator[str]:
     yield from (finding.signature for finding in verdict.findings)
 
 
-def _decoy(flight: Flight | None, kind: str) -> str:
+def _decoy(flight: Flight | None, what: str) -> str:
     """Return what a descent to a decoy points to, and when the target became another one."""
-    text = (
-        f"It came down towards a {kind}: look at how the system chooses among the markers that it "
-        "detects."
-    )
     targets = [(step.time_s, target_of(step)) for step in flight.steps] if flight else []
     known = [(time_s, target) for time_s, target in targets if target is not None]
     if flight is None or not known:
-        return text
+        return (
+            f"{what}: look at how the system chooses the place to come down. It reported no target "
+            "in this flight, so nothing tells whether it took the decoy for the marker. "
+            f"{_patch(flight)}"
+        )
+    text = f"{what}: look at how the system chooses among what it may take for the marker."
     marker = flight.marker_position_m
     right = [time_s for time_s, target in known if math.dist(target, marker) < AT_MARKER_M]
     if not right:
@@ -175,10 +200,16 @@ def _not_landed(flight: Flight | None) -> Iterator[str]:
         )
     elif not reports_anything(flight):
         yield from _nothing_reported(flight, readable)
+    elif reported < MISSED * readable and reports_detections(flight):
+        yield (
+            f"The marker could be read in {readable} frames, and the system reported it in "
+            f"{reported} of them: look at the detector under the conditions below."
+        )
     elif reported < MISSED * readable:
         yield (
-            f"The marker could be read in {readable} frames, and the system {_verb(flight)} in "
-            f"{reported} of them: look at the detector under the conditions below."
+            f"The marker could be read in {readable} frames, and the system had a target at it in "
+            f"{reported} of them. It reports no detections, so nothing tells whether it did not "
+            "see the marker, or saw it and did not take it for its target: look at both."
         )
     elif reports_detections(flight):
         yield (
@@ -197,10 +228,6 @@ def _not_landed(flight: Flight | None) -> Iterator[str]:
 _DECISION = (
     "Look at why the system did not descend, and at the decision to end the flight at {:.1f} s."
 )
-
-
-def _verb(flight: Flight) -> str:
-    return "reported it" if reports_detections(flight) else "had a target at it"
 
 
 def _nothing_reported(flight: Flight, readable: int) -> Iterator[str]:

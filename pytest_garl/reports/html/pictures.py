@@ -92,7 +92,7 @@ def _facts(step: Step | None) -> Iterator[str]:
     if step.marker_visible <= 0:
         yield "marker not in the picture"
     elif step.marker is not None:
-        yield f"marker readable with {100 * readable_probability(step.marker):.0f} %"
+        yield f"chance to read the marker {100 * readable_probability(step.marker):.0f} %"
     else:
         yield f"{100 * step.marker_visible:.0f} % of the marker unhidden"
     seen = step.diagnostics.detections if step.diagnostics else ()

@@ -75,9 +75,9 @@ def cost_rows(found: Mapping[str, Any]) -> tuple[Fact, ...]:
     in_all = flights["flown"] + flights["beside"]
     return (
         ("flights of the search", f"{flights['flown']} of {flights['wanted']}"),
-        ("flights to repeat, confirm and shrink", str(flights["beside"])),
+        ("flights to repeat, confirm, shrink and tell causes apart", str(flights["beside"])),
         ("flown again after a time-out or a kill", str(flights["flown_again"])),
-        ("computing time of all flights", _duration(flying_s)),
+        ("time that workers spent on all flights", _duration(flying_s)),
         ("a flight on average", f"{flying_s / in_all:.1f} s" if in_all and flying_s else ""),
         (
             "workers idle",
