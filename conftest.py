@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib
 import os
 import signal
 
@@ -9,6 +10,8 @@ from pytest_garl import cpu_dispatch
 
 # Before a test module loads NumPy: what is flown inside pytest is flown as in a child.
 cpu_dispatch.pin()
+# ``pytester`` forgets modules that a test loads, and NumPy cannot be loaded twice in a process.
+importlib.import_module("numpy")
 
 pytest_plugins = ["pytester"]
 

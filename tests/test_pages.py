@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import dataclasses
 import re
-import sys
 import tomllib
 import typing
 from pathlib import Path
@@ -13,7 +12,6 @@ import pytest
 
 from pytest_garl import landing_system
 from pytest_garl.verdicts.verdict import ViolationType
-from tests.support.landing_project import project
 
 ROOT = Path(__file__).parents[1]
 README, DOCS = ROOT / "README.md", ROOT / "docs"
@@ -98,8 +96,7 @@ def test_architecture_shows_the_layers_that_are_checked() -> None:
     (layers,) = (each["layers"] for each in contracts if each["type"] == "layers")
     table = (ROOT / "ARCHITECTURE.md").read_text().partition("| room | ")[2].partition("\n\n")[0]
     rows = [re.findall(r"`(\w+)`", line.split("|")[1]) for line in table.splitlines()[2:]]
-    # The alias module of one release stands alone at the top.
-    checked = [sorted(each.split(" | ")) for each in layers if each != "fixtures"]
+    checked = [sorted(each.split(" | ")) for each in layers]
     assert [sorted(row) for row in rows] == checked
 
 
@@ -160,20 +157,6 @@ def test_every_command_of_the_readme_is_run() -> None:
     assert shown == set(RUN_BY)
     for file, word in RUN_BY.values():
         assert word in (ROOT / file).read_text(), file
-
-
-def test_every_command_of_the_migration_page_runs(pytester: pytest.Pytester) -> None:
-    project(pytester)
-    commands = [line for block in indented(DOCS / "migration.md") for line in block]
-    assert {command.split()[0] for command in commands} == {"pytest", "garl"}
-    for command in commands:
-        # So few flights take seconds.
-        words = re.sub(r"(budget|population)=\d+", r"\1=4", command).split()
-        code = "from pytest_garl.cli import main; main()"
-        start = ("-m", "pytest") if words[0] == "pytest" else ("-c", code)
-        result = pytester.run(sys.executable, *start, *words[1:])
-        # Status 1: the search went well and found violations.
-        assert result.ret in ((0, 1) if words[0] == "pytest" else (0,)), command
 
 
 def test_code_of_the_readme_flies(pytester: pytest.Pytester) -> None:

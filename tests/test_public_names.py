@@ -42,15 +42,3 @@ def test_importing_the_package_loads_no_other_module_of_it() -> None:
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout == "[]\n"
-
-
-def test_names_of_the_last_release_are_the_same_objects() -> None:
-    from pytest_garl import fixtures
-    from pytest_garl.reports import video
-    from pytest_garl.simulation import npc_policy, policy
-
-    assert fixtures.Landing is pytest_garl.Landing
-    assert video.save_video is pytest_garl.save_video
-    assert policy.PolicySpec is pytest_garl.PolicySpec
-    assert policy.ObjectPolicy is npc_policy.NpcPolicy
-    assert policy.ObjectState is npc_policy.NpcState

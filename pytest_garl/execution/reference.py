@@ -44,7 +44,6 @@ NOT_HASHED = (
     "cases",
     "cli",
     "errors.py",
-    "fixtures.py",
     "gate",
     "messages.py",
     "plugin",
