@@ -53,8 +53,7 @@ from pytest_garl.search.probes import (
 from pytest_garl.simulation.fly import fly
 from pytest_garl.simulation.system_under_test.ground_truth import PilotWrapper, is_own
 from pytest_garl.simulation.system_under_test.reading import finite
-from pytest_garl.verdicts.phases import landing_phase
-from pytest_garl.verdicts.sightings import reports_detections, reports_targets
+from pytest_garl.verdicts.evidence import Evidence
 from pytest_garl.verdicts.verdict import Limits, default_distance_m
 
 FLIGHTS = 40
@@ -410,7 +409,7 @@ class _Checker:
                 "phase=...): the place that it takes for the marker, the markers that it sees in "
                 "the frame, what it does"
             )
-        elif self._whole and not (reports_detections(flight) or reports_targets(flight)):
+        elif self._whole and not Evidence(flight).reports_anything:
             warn(
                 "its diagnostics never name a detection (Diagnostics.detections) or a target "
                 "(Diagnostics.target_m)"
@@ -483,8 +482,9 @@ def _place(flight: Flight, time_s: float) -> str:
     index = max(0, int(flight.uav.time_s.searchsorted(time_s, side="right")) - 1)
     x, y, z = (float(value) for value in flight.uav.position_m[index])
     beside_m = math.dist((x, y), flight.marker_position_m)
+    phase = Evidence(flight).phase_at(time_s)
     return (
-        f"at {time_s:.1f} s, in the phase {landing_phase(flight, time_s)}, {up_m(z):.1f} m up and "
+        f"at {time_s:.1f} s, in the phase {phase}, {up_m(z):.1f} m up and "
         f"{beside_m:.1f} m from the marker"
     )
 

@@ -44,7 +44,7 @@ from pytest_garl.simulation.navigation import error_m_at
 from pytest_garl.simulation.npc_policy import PolicySpec
 from pytest_garl.simulation.physics.world import PHYSICS_RATE_HZ, World
 from pytest_garl.simulation.system_under_test.takeover import Leg, Pilot, Takeover
-from pytest_garl.verdicts.touchdowns import stays
+from pytest_garl.verdicts.evidence import Evidence
 
 STEADY_S = 1.0
 """From so long after its touchdown on a UAV that is still on the ground may stop its motors: the
@@ -135,7 +135,7 @@ class Collision:
 
     def stood_since_s(self) -> float | None:
         """Return since when the UAV had stood on the ground at the contact; None in the air."""
-        found = stays(self.flight)
+        found = Evidence(self.flight).stays
         return found[-1].since_s if found and found[-1].end_s is None else None
 
     def survives(self, completed: CompletedFlight, from_s: float, world: World) -> bool:

@@ -122,10 +122,11 @@ def time_limit_s(limits: Limits) -> float:
 
 def judged(flight: Flight, limits: Limits) -> FlightResult:
     """Return the result of a flight, without the severity of a violation."""
-    from pytest_garl.verdicts.judge import closest_call, judge, off_marker_m, why_undecided
-    from pytest_garl.verdicts.touchdowns import landed_s
+    from pytest_garl.verdicts.evidence import Evidence
+    from pytest_garl.verdicts.judge import closest_call, verdict_on, why_undecided
 
-    call, body = closest_call(flight)
+    evidence = Evidence(flight, limits)
+    call, body = closest_call(evidence)
     collided = flight.outcome == "collision"
     return FlightResult(
         outcome=flight.outcome,
@@ -140,10 +141,10 @@ def judged(flight: Flight, limits: Limits) -> FlightResult:
         if collided
         else (),
         undecided=why_undecided(flight),
-        off_marker_m=off_marker_m(flight, limits),
+        off_marker_m=evidence.off_marker_m,
         closest_call=call,
         closest_body=body,
-        verdict=judge(flight, limits),
+        verdict=verdict_on(evidence),
         crash=flight.crash,
-        landed_s=landed_s(flight) if flight.outcome == "landed" else None,
+        landed_s=evidence.landed_s if flight.outcome == "landed" else None,
     )

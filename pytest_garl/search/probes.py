@@ -38,7 +38,7 @@ from pytest_garl.simulation.camera.projection import eye_under
 from pytest_garl.simulation.camera.true_camera import true_camera
 from pytest_garl.simulation.nominal import LEVEL
 from pytest_garl.verdicts.detectability import READABLE, readable_probability
-from pytest_garl.verdicts.sightings import readable_steps
+from pytest_garl.verdicts.evidence import Evidence
 from pytest_garl.verdicts.verdict import Limits, Verdict
 from pytest_garl.verdicts.wording import compass_point, headline
 
@@ -341,12 +341,12 @@ def _half_way(twin: Flight) -> tuple[float, float] | None:
 
     And how far that is, seen from above; None if it was never farther than ``FAR_M`` away.
     """
-    first = next(readable_steps(twin), None)
-    if first is None:
+    readable = Evidence(twin).readable
+    if not readable:
         return None
     places = twin.uav.position_m[:, :2] - np.array(twin.marker_position_m)
     away = np.hypot(places[:, 0], places[:, 1])
-    since = int(np.searchsorted(twin.uav.time_s, first.time_s))
+    since = int(np.searchsorted(twin.uav.time_s, readable[0].time_s))
     near = np.nonzero(away[since:] < away[since] / 2)[0]
     if away[since] < FAR_M or not len(near):
         return None

@@ -6,15 +6,13 @@ nothing, and is not excused.
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 from numpy.typing import NDArray
 
-from pytest_garl.flight.flight import Flight, ObjectRecord
+from pytest_garl.flight.flight import ObjectRecord
 from pytest_garl.scenarios.object_types import OBJECT_TYPES
-from pytest_garl.verdicts.detectability import readable_probability
-from pytest_garl.verdicts.verdict import Excuse
+from pytest_garl.verdicts.evidence import Evidence
+from pytest_garl.verdicts.verdict import NO_LANDING, Excuse
 
 READABLE_S = 2.0
 """A nominal landing must be able to read the marker for this long in all: from the search, and
@@ -28,31 +26,28 @@ BLOCKED_S = 30.0
 """A landing system has to wait at least this long above an occupied marker."""
 
 
-def excuse(flight: Flight, gave_up_s: float) -> tuple[Excuse, str]:
+def excuse(evidence: Evidence) -> tuple[Excuse, str]:
     """Return why nobody could have landed, and the reason in a sentence; both empty if one could.
 
-    ``gave_up_s`` is when the landing was given up, or when the time was over.
+    A flight that came down has no excuse, and neither has a UAV that stands on the marker.
     """
-    if flight.nominal_views:
-        readable_s = expected_readable_s(flight)
-        if readable_s < READABLE_S:
-            return "undetectable", (
-                "Nobody could see the marker: where a landing looks for it, it could be read for "
-                f"{readable_s:.1f} s in all, and {READABLE_S:g} s are needed."
-            )
-    blocked = _blocked(flight, gave_up_s)
+    if evidence.flight.outcome not in NO_LANDING or evidence.off_marker_m is not None:
+        return "", ""
+    if evidence.stands_since_s(evidence.gave_up_s) is not None:
+        return "", ""
+    readable_s = evidence.expected_readable_s
+    if evidence.flight.nominal_views and readable_s < READABLE_S:
+        return "undetectable", (
+            "Nobody could see the marker: where a landing looks for it, it could be read for "
+            f"{readable_s:.1f} s in all, and {READABLE_S:g} s are needed."
+        )
+    blocked = _blocked(evidence)
     return ("blocked", blocked) if blocked else ("", "")
 
 
-def expected_readable_s(flight: Flight) -> float:
-    """Return for how long a nominal landing could read the marker, by expectation."""
-    return math.fsum(
-        view.duration_s * readable_probability(view.marker) for view in flight.nominal_views
-    )
-
-
-def _blocked(flight: Flight, gave_up_s: float) -> str:
+def _blocked(evidence: Evidence) -> str:
     """Return that the marker was never free for long enough; empty if it was."""
+    flight, gave_up_s = evidence.flight, evidence.gave_up_s
     arrival_s = flight.nominal_arrival_s
     if arrival_s is None or gave_up_s - arrival_s < BLOCKED_S:
         return ""

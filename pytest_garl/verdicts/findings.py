@@ -6,17 +6,9 @@ import math
 
 import numpy as np
 
-from pytest_garl.flight.flight import Flight
 from pytest_garl.flight.thresholds import up_m
-from pytest_garl.verdicts.phases import landing_phase
-from pytest_garl.verdicts.sightings import (
-    AT_MARKER_M,
-    readable_steps,
-    reports_detections,
-    reports_marker,
-)
-from pytest_garl.verdicts.touchdowns import gave_up_s, landed_s
-from pytest_garl.verdicts.verdict import Finding, Limits
+from pytest_garl.verdicts.evidence import AT_MARKER_M, Evidence
+from pytest_garl.verdicts.verdict import Finding
 from pytest_garl.verdicts.wording import compass_point
 
 DESCENT_WINDOW_S = 3.0
@@ -34,27 +26,27 @@ REPORTED_ONLY = (SLOW,)
 """Findings that are reported, but not flown again."""
 
 
-def findings(flight: Flight, limits: Limits) -> tuple[Finding, ...]:
-    """Return what had gone wrong before the flight's end, in the order of time."""
-    found = (
-        descent_elsewhere(flight, limits),
-        _lost_while_detectable(flight),
-        _slow(flight),
-    )
+def findings(evidence: Evidence, elsewhere: Finding | None) -> tuple[Finding, ...]:
+    """Return what had gone wrong before the flight's end, in the order of time.
+
+    ``elsewhere`` is the descent beside the marker, if :func:`descent_elsewhere` found one.
+    """
+    found = (elsewhere, _lost_while_detectable(evidence), _slow(evidence))
     return tuple(sorted((each for each in found if each), key=lambda each: each.time_s))
 
 
-def descent_elsewhere(flight: Flight, limits: Limits) -> Finding | None:
+def descent_elsewhere(evidence: Evidence) -> Finding | None:
     """Return that a flight which hit something was coming down beside the marker.
 
     Both its last place and the place at which its motion of the last seconds would have ended on
     the ground lie beyond the limit, and by more than the marker's length.
     """
-    if flight.outcome != "collision" or flight.contacts[-1].body_class == "ground":
+    if evidence.hit is None or evidence.hit.body_class == "ground":
         return None
+    flight, limit_m = evidence.flight, evidence.limits.distance_m
     times, places = flight.uav.time_s, flight.uav.position_m
     end_s = float(times[-1])
-    if landing_phase(flight, end_s) not in ("descent", "last-metre"):
+    if evidence.phase_at(end_s) not in ("descent", "last-metre"):
         return None
     start = int(np.searchsorted(times, end_s - DESCENT_WINDOW_S))
     moved = places[-1] - places[start]
@@ -65,17 +57,16 @@ def descent_elsewhere(flight: Flight, limits: Limits) -> Finding | None:
     aim = places[-1, :2] + left * moved[:2]
     marker = flight.marker_position_m
     off_m = min(math.dist(place, marker) for place in (tuple(places[-1, :2]), tuple(aim)))
-    if off_m <= max(AT_MARKER_M, limits.distance_m):
+    if off_m <= max(AT_MARKER_M, limit_m):
         return None
     x, y = float(places[-1, 0] - marker[0]), float(places[-1, 1] - marker[1])
-    seen = any(readable_steps(flight, end_s))
+    seen = evidence.readable_until(end_s)
     view = "which had been in view before" if seen else "which had never been in view"
-    near = [(math.dist(tuple(aim), place), name) for name, *place in flight.decoys]
-    distance_m, name = min(near, default=(math.inf, ""))
-    onto = f" onto {name}" if distance_m <= AT_MARKER_M else ""
+    name = evidence.decoy_at((float(aim[0]), float(aim[1])))
+    onto = f" onto {name}" if name else ""
     return Finding(
         signature=f"I:{name}" if onto else ELSEWHERE,
-        margin=limits.distance_m - off_m,
+        margin=limit_m - off_m,
         unit="m",
         time_s=float(times[start]),
         story=(
@@ -84,28 +75,8 @@ def descent_elsewhere(flight: Flight, limits: Limits) -> Finding | None:
     )
 
 
-def undetected_s(flight: Flight) -> tuple[float, float]:
-    """Return for how long the marker could be read without being reported, and since when.
-
-    Longest span of frames in a row.  It is 0 for a system that reports no detections.
-    """
-    if not reports_detections(flight):
-        return 0.0, 0.0
-    # A system that gave up is not asked any more.
-    readable = {step.time_s for step in readable_steps(flight, gave_up_s(flight))}
-    longest, began, since = 0.0, 0.0, None
-    for step in flight.steps:
-        if step.time_s in readable and not reports_marker(flight, step):
-            since = step.time_s if since is None else since
-            if step.time_s - since > longest:
-                longest, began = step.time_s - since, since
-        else:
-            since = None
-    return longest, began
-
-
-def _lost_while_detectable(flight: Flight) -> Finding | None:
-    longest, began = undetected_s(flight)
+def _lost_while_detectable(evidence: Evidence) -> Finding | None:
+    longest, began = evidence.undetected
     if longest < UNDETECTED_S:
         return None
     return Finding(
@@ -120,11 +91,11 @@ def _lost_while_detectable(flight: Flight) -> Finding | None:
     )
 
 
-def _slow(flight: Flight) -> Finding | None:
-    nominal_s = flight.nominal_landing_s
-    if flight.outcome != "landed" or not nominal_s:
+def _slow(evidence: Evidence) -> Finding | None:
+    nominal_s = evidence.flight.nominal_landing_s
+    if evidence.flight.outcome != "landed" or not nominal_s:
         return None
-    took_s = landed_s(flight)
+    took_s = evidence.landed_s
     if took_s <= SLOW_FACTOR * nominal_s:
         return None
     return Finding(

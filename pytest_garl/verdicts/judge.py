@@ -13,29 +13,17 @@ import numpy as np
 from pytest_garl.flight.flight import Flight
 from pytest_garl.flight.thresholds import up_m
 from pytest_garl.verdicts.ending import with_cause
+from pytest_garl.verdicts.evidence import Evidence
 from pytest_garl.verdicts.excuses import excuse
-from pytest_garl.verdicts.findings import findings
+from pytest_garl.verdicts.findings import descent_elsewhere, findings
 from pytest_garl.verdicts.margins import margins
 from pytest_garl.verdicts.mechanism import (
-    NO_LANDING,
     collision_signature,
     hops_text,
     mechanism_of,
     must_give_up,
 )
-from pytest_garl.verdicts.touchdowns import (
-    dragged,
-    gave_up_s,
-    stands_since_s,
-    stays,
-    touchdown_off_marker,
-)
-from pytest_garl.verdicts.verdict import (
-    PAPER_LIMITS,
-    Excuse,
-    Limits,
-    Verdict,
-)
+from pytest_garl.verdicts.verdict import PAPER_LIMITS, Limits, Verdict
 from pytest_garl.verdicts.wording import compass_point
 
 CLOSE_CALL_M = 3.0
@@ -49,14 +37,21 @@ OVER_MARKER_M = 0.3
 
 
 def judge(flight: Flight, limits: Limits) -> Verdict:
-    """Return the verdict: the first violation of the flight, or none.
+    """Return the verdict on a flight: its first violation, or none."""
+    return verdict_on(Evidence(flight, limits))
+
+
+def verdict_on(evidence: Evidence) -> Verdict:
+    """Return the verdict that the evidence of a flight leads to.
 
     A touchdown off the marker before the landing is given up is a violation, but not by the paper's
     definition, which measures the distance of landings only.
     """
-    why, why_text = _excuse(flight, limits)
-    mechanism = mechanism_of(flight, limits, why, why_text)
-    if must_give_up(flight, limits):
+    flight = evidence.flight
+    why, why_text = excuse(evidence)
+    elsewhere = descent_elsewhere(evidence)
+    mechanism = mechanism_of(evidence, why, why_text, elsewhere)
+    if must_give_up(evidence):
         # What excuses giving up does not excuse waiting until the time is up.
         why, why_text = "", ""
     far = flight.final_distance_m > PAPER_LIMITS.distance_m
@@ -67,29 +62,29 @@ def judge(flight: Flight, limits: Limits) -> Verdict:
         violation_type=mechanism.violation_type,
         signature=with_cause(mechanism.signature, flight.conditions, flight.objects),
         paper_violation=far if came_down else True,
-        margins=margins(flight, limits, violates_time=mechanism.primary in ("time", "abort")),
-        story=" ".join(filter(None, (mechanism.sentence, _standing(flight), _where(flight)))),
+        margins=margins(evidence, violates_time=mechanism.primary in ("time", "abort")),
+        story=" ".join(filter(None, (mechanism.sentence, _standing(evidence), _where(flight)))),
         completed=flight.outcome == "landed" and mechanism.primary != "distance",
         excuse=why,
         excuse_text=why_text,
-        findings=findings(flight, limits),
+        findings=findings(evidence, elsewhere),
     )
 
 
-def closest_call(flight: Flight) -> tuple[str, str]:
+def closest_call(evidence: Evidence) -> tuple[str, str]:
     """Return the signature of a collision with the nearest body, and that body's name.
 
     Both are empty if no body but the ground came within :data:`CLOSE_CALL_M`.
     """
     near = [
         gap
-        for gap in flight.separations
+        for gap in evidence.flight.separations
         if gap.body_class != "ground" and gap.distance_m < CLOSE_CALL_M
     ]
     if not near:
         return "", ""
     nearest = min(near, key=lambda gap: (gap.distance_m, gap.body))
-    return collision_signature(flight, nearest), nearest.body
+    return collision_signature(evidence, nearest), nearest.body
 
 
 def why_undecided(flight: Flight) -> str:
@@ -109,39 +104,12 @@ def why_undecided(flight: Flight) -> str:
     return f"not landed after {flight.elapsed_s:.0f} s"
 
 
-def off_marker_m(flight: Flight, limits: Limits) -> float | None:
-    """Return the distance from the marker at which the UAV came down; None if it did not.
-
-    A landing that was given up came down if it touched the ground beyond the limit.
-    """
-    touchdown = touchdown_off_marker(flight, limits)
-    if touchdown is not None:
-        return touchdown.distance_m
-    stay = dragged(flight, limits)
-    if stay is not None:
-        return stay.farthest_m
-    return flight.final_distance_m if flight.outcome == "landed" else None
-
-
-def _excuse(flight: Flight, limits: Limits) -> tuple[Excuse, str]:
-    """Return the excuse of a flight without landing.
-
-    A touchdown elsewhere has none, and neither has a UAV that stands on the marker.
-    """
-    if flight.outcome not in NO_LANDING or touchdown_off_marker(flight, limits):
-        return "", ""
-    at_s = gave_up_s(flight)
-    if dragged(flight, limits) or stands_since_s(flight, at_s) is not None:
-        return "", ""
-    return excuse(flight, at_s)
-
-
-def _standing(flight: Flight) -> str:
+def _standing(evidence: Evidence) -> str:
     """Return a sentence about a UAV that stood on the ground and did not stop its motors."""
-    found = stays(flight)
-    if not found or flight.outcome in ("landed", "slid"):
+    flight = evidence.flight
+    if not evidence.stays or flight.outcome in ("landed", "slid"):
         return ""
-    stay, end_s = found[-1], flight.elapsed_s
+    stay, end_s = evidence.stays[-1], flight.elapsed_s
     if stay.stopped_s is not None:
         return ""
     hops = hops_text(stay)

@@ -11,13 +11,11 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from pytest_garl.flight.flight import Flight, Touchdown
+from pytest_garl.flight.flight import Touchdown
 from pytest_garl.flight.thresholds import BODY_ABOVE_FEET_M, HARD_TOUCHDOWN_MPS, SLID_M, UPRIGHT_RAD
-from pytest_garl.verdicts.findings import UNDETECTED_S, undetected_s
-from pytest_garl.verdicts.phases import flying_from
-from pytest_garl.verdicts.sightings import target_of
-from pytest_garl.verdicts.touchdowns import Stay, dragged, landed_s, stays, touchdown_off_marker
-from pytest_garl.verdicts.verdict import Limits, Margin, MarginName
+from pytest_garl.verdicts.evidence import Evidence
+from pytest_garl.verdicts.findings import UNDETECTED_S
+from pytest_garl.verdicts.verdict import NO_LANDING, Margin, MarginName
 
 COMMIT_M = 2.0
 """Height of the feet below which a landing cannot see the whole marker, and commits itself."""
@@ -29,21 +27,19 @@ FARTHEST_M = 10.0
 """Margins of distances to bodies and decoys that are not there."""
 
 
-def margins(flight: Flight, limits: Limits, *, violates_time: bool) -> tuple[Margin, ...]:
+def margins(evidence: Evidence, *, violates_time: bool) -> tuple[Margin, ...]:
     """Return the margin of every property.
 
     ``decided`` is True for a flight that touched down, ran out of time or gave up; the margins of
     distances to bodies are always measured.  ``violates_time`` says whether a landing that was
     given up violates the limit of time: it does unless it is excused.
     """
-    decided = flight.outcome in ("landed", "slid", "gave_up", "not_landed")
+    flight, limit_m = evidence.flight, evidence.limits.distance_m
+    decided = flight.outcome in ("landed", "slid", *NO_LANDING)
     reason = "" if decided else f"the flight ended at {flight.elapsed_s:.1f} s"
-    stay = dragged(flight, limits)
-    came_down = stay is not None or touchdown_off_marker(flight, limits) is not None
-    down = flight.outcome in ("landed", "slid") or came_down
-    low = _low(flight)
-    moving, static = _separation(flight, "dynamic"), _separation(flight, "static")
-    reported = any(target_of(step) for step in flight.steps)
+    down = flight.outcome == "slid" or evidence.off_marker_m is not None
+    low = _low(evidence)
+    moving, static = _separation(evidence, "dynamic"), _separation(evidence, "static")
 
     def margin(
         name: MarginName, value: float, unit: str, *, known: bool = decided, why: str = reason
@@ -57,146 +53,138 @@ def margins(flight: Flight, limits: Limits, *, violates_time: bool) -> tuple[Mar
         )
 
     return (
-        margin("distance", limits.distance_m - _distance_m(flight, limits), "m"),
-        margin("time", _time_left_s(flight, limits, violates_time), "s"),
+        margin("distance", limit_m - _distance_m(evidence), "m"),
+        margin("time", _time_left_s(evidence, violates_time), "s"),
         margin("collision", min(moving, static), "m", known=True),
         margin("moving", moving, "m", known=True),
         margin("static", static, "m", known=True),
-        margin("touchdown_speed", HARD_TOUCHDOWN_MPS - _sink_mps(flight, low), "m/s", known=down),
-        margin("touchdown_tilt", UPRIGHT_RAD - _tilt_rad(flight, low), "rad", known=down),
-        margin("dropout", UNDETECTED_S - undetected_s(flight)[0], "s", known=True),
-        margin("decoy", _decoy_m(flight), "m", known=True),
+        margin("touchdown_speed", HARD_TOUCHDOWN_MPS - _sink_mps(evidence, low), "m/s", known=down),
+        margin("touchdown_tilt", UPRIGHT_RAD - _tilt_rad(evidence, low), "rad", known=down),
+        margin("dropout", UNDETECTED_S - evidence.undetected[0], "s", known=True),
+        margin("decoy", _decoy_m(evidence), "m", known=True),
         margin(
             "tracking",
-            limits.distance_m - _tracking_error_m(flight),
+            limit_m - _tracking_error_m(evidence, low),
             "m",
-            known=reported and bool(low.any()),
+            known=bool(evidence.targets) and bool(low.any()),
             why="the system reports no target, or did not come down",
         ),
-        margin("slide", SLID_M - _slid_m(flight, stay), "m", known=down),
+        margin("slide", SLID_M - _slid_m(evidence), "m", known=down),
         margin("crash", 0.0 if flight.outcome == "crashed" else 1.0, "1", known=True),
     )
 
 
-def commit_distance_m(flight: Flight, place: tuple[float, float]) -> float:
+def _commit_distance_m(evidence: Evidence, place: tuple[float, float]) -> float:
     """Return how far from a place the flight committed itself to landing.
 
     That is the least distance after the take-off, plus a share of the height above the commit
     height, so that a flight that stayed high is no nearer than its approach would have been.
     """
-    x, y, z = _after_take_off(flight).T
+    x, y, z = evidence.flight.uav.position_m[_start(evidence) :].T
     above = np.maximum(0.0, z - BODY_ABOVE_FEET_M - COMMIT_M)
     return float((np.hypot(x - place[0], y - place[1]) + CONE * above).min())
 
 
-def _after_take_off(flight: Flight) -> NDArray[np.float64]:
-    """Return the positions (n, 3) from the end of the take-off on, or the last one."""
-    places = flight.uav.position_m
-    return places[_start(flight) :]
+def _start(evidence: Evidence) -> int:
+    """Return the first sample after the take-off, or the last one of the track."""
+    return min(evidence.flying_from, len(evidence.flight.uav.time_s) - 1)
 
 
-def _start(flight: Flight) -> int:
-    return min(flying_from(flight), len(flight.uav.time_s) - 1)
-
-
-def _low(flight: Flight) -> NDArray[np.bool_]:
+def _low(evidence: Evidence) -> NDArray[np.bool_]:
     """Whether the flight was below the commit height, after its take-off, at each sample."""
-    low: NDArray[np.bool_] = flight.uav.position_m[:, 2] < COMMIT_M + BODY_ABOVE_FEET_M
+    low: NDArray[np.bool_] = evidence.flight.uav.position_m[:, 2] < COMMIT_M + BODY_ABOVE_FEET_M
     low = low.copy()
-    low[: _start(flight)] = False
+    low[: _start(evidence)] = False
     return low
 
 
-def _distance_m(flight: Flight, limits: Limits) -> float:
-    touchdown = touchdown_off_marker(flight, limits)
-    if touchdown is not None:
-        return touchdown.distance_m
-    stay = dragged(flight, limits)
-    if flight.outcome == "slid" or (flight.outcome == "landed" and stay is None):
+def _distance_m(evidence: Evidence) -> float:
+    flight, off_m = evidence.flight, evidence.off_marker_m
+    if flight.outcome == "slid" and evidence.touchdown_off_marker is None:
         return flight.final_distance_m
-    if stay is not None:
-        return stay.farthest_m
-    return commit_distance_m(flight, flight.marker_position_m)
+    if off_m is not None:
+        return off_m
+    return _commit_distance_m(evidence, flight.marker_position_m)
 
 
-def _time_left_s(flight: Flight, limits: Limits, violates_time: bool) -> float:
+def _time_left_s(evidence: Evidence, violates_time: bool) -> float:
     """Return the time that is left; of a flight that ended early, after the descent it needed."""
+    flight, limit_s = evidence.flight, evidence.limits.time_s
     if flight.outcome in ("landed", "slid"):
-        return limits.time_s - landed_s(flight)
-    if flight.outcome in ("gave_up", "not_landed"):
-        left_s = limits.time_s - flight.elapsed_s
+        return limit_s - evidence.landed_s
+    left_s = limit_s - flight.elapsed_s
+    if flight.outcome in NO_LANDING:
         return min(0.0, left_s) if violates_time else max(0.0, left_s)
     height_m = max(0.0, float(flight.uav.position_m[-1, 2]) - BODY_ABOVE_FEET_M)
-    return limits.time_s - flight.elapsed_s - height_m / DESCENT_MPS
+    return left_s - height_m / DESCENT_MPS
 
 
-def _separation(flight: Flight, body_class: str) -> float:
-    hit = flight.outcome == "collision" and flight.contacts[-1].body_class == body_class
-    if hit:
+def _separation(evidence: Evidence, body_class: str) -> float:
+    if evidence.hit and evidence.hit.body_class == body_class:
         return 0.0
-    gaps = [gap.distance_m for gap in flight.separations if gap.body_class == body_class]
+    gaps = [gap.distance_m for gap in evidence.flight.separations if gap.body_class == body_class]
     return min([FARTHEST_M, *gaps])
 
 
-def _sink_mps(flight: Flight, low: NDArray[np.bool_]) -> float:
+def _sink_mps(evidence: Evidence, low: NDArray[np.bool_]) -> float:
     """Return the touchdown's vertical speed, or the fastest sinking below the commit height."""
+    flight = evidence.flight
     if flight.touchdown:
-        return max(each.speed_mps for each in _last_touchdowns(flight))
+        return max(each.speed_mps for each in _last_touchdowns(evidence))
     ground = [each.speed_mps for each in flight.contacts if each.body_class == "ground"]
     sinking = -flight.uav.velocity_mps[low, 2]
     return max([0.0, *ground]) if ground else float(max(0.0, sinking.max(initial=0.0)))
 
 
-def _tilt_rad(flight: Flight, low: NDArray[np.bool_]) -> float:
+def _tilt_rad(evidence: Evidence, low: NDArray[np.bool_]) -> float:
+    flight = evidence.flight
     if flight.touchdown:
-        return max(each.tilt_rad for each in _last_touchdowns(flight))
+        return max(each.tilt_rad for each in _last_touchdowns(evidence))
     x, y = flight.uav.attitude[low, 0], flight.uav.attitude[low, 1]
     tilts = np.arccos(np.clip(1 - 2 * (x * x + y * y), -1.0, 1.0))
     return float(tilts.max(initial=0.0))
 
 
-def _last_touchdowns(flight: Flight) -> tuple[Touchdown, ...]:
+def _last_touchdowns(evidence: Evidence) -> tuple[Touchdown, ...]:
     """Return the last touchdown, with those of the same stay on the ground before its hops."""
-    found = stays(flight)
-    if found and found[-1].touchdowns[-1] is flight.touchdown:
-        return found[-1].touchdowns
-    return (flight.touchdown,) if flight.touchdown else ()
+    stays, last = evidence.stays, evidence.flight.touchdown
+    if stays and stays[-1].touchdowns[-1] is last:
+        return stays[-1].touchdowns
+    return (last,) if last else ()
 
 
-def _decoy_m(flight: Flight) -> float:
+def _decoy_m(evidence: Evidence) -> float:
     """Return by how much the flight kept nearer to the marker than to a decoy.
 
     Both by the path that was flown and by each target that the system reported.
     """
-    decoys = [(x, y) for _, x, y in flight.decoys]
+    decoys = [(x, y) for _, x, y in evidence.flight.decoys]
     if not decoys:
         return FARTHEST_M
-    marker = flight.marker_position_m
-    own = commit_distance_m(flight, marker)
-    gaps = [commit_distance_m(flight, place) - own for place in decoys]
-    targets = [target for step in flight.steps if (target := target_of(step))]
+    marker = evidence.flight.marker_position_m
+    own = _commit_distance_m(evidence, marker)
+    gaps = [_commit_distance_m(evidence, place) - own for place in decoys]
     gaps += [
         math.dist(target, place) - math.dist(target, marker)
-        for target in targets
+        for _, target in evidence.targets
         for place in decoys
     ]
     return min([FARTHEST_M, *gaps])
 
 
-def _tracking_error_m(flight: Flight) -> float:
+def _tracking_error_m(evidence: Evidence, low: NDArray[np.bool_]) -> float:
     """Return the largest distance from the reported target below the commit height."""
-    times, places = flight.uav.time_s, flight.uav.position_m
-    low = _low(flight)
+    times, places = evidence.flight.uav.time_s, evidence.flight.uav.position_m
     errors = []
-    for step in flight.steps:
-        index = max(0, int(np.searchsorted(times, step.time_s, side="right")) - 1)
-        target = target_of(step)
-        if target is not None and low[index]:
+    for time_s, target in evidence.targets:
+        index = max(0, int(np.searchsorted(times, time_s, side="right")) - 1)
+        if low[index]:
             errors.append(math.dist(target, tuple(places[index, :2])))
     return max(errors, default=0.0)
 
 
-def _slid_m(flight: Flight, stay: Stay | None) -> float:
-    if stay is not None:
-        return stay.moved_m
-    return flight.touchdown.slid_m if flight.touchdown else 0.0
+def _slid_m(evidence: Evidence) -> float:
+    if evidence.dragged:
+        return evidence.dragged.moved_m
+    last = evidence.flight.touchdown
+    return last.slid_m if last else 0.0

@@ -10,32 +10,13 @@ from dataclasses import dataclass
 
 from pytest_garl.flight.flight import Contact, Crash, Flight, Separation, Touchdown
 from pytest_garl.foreign_text import cut
-from pytest_garl.verdicts.excuses import expected_readable_s
-from pytest_garl.verdicts.findings import descent_elsewhere
-from pytest_garl.verdicts.phases import flying_from, landing_phase
-from pytest_garl.verdicts.sightings import (
-    AT_MARKER_M,
-    last_report_s,
-    last_target,
-    readable_steps,
-    reports_detections,
-    was_in_view,
-)
-from pytest_garl.verdicts.touchdowns import (
-    STANDS_S,
-    Stay,
-    dragged,
-    gave_up_s,
-    landed_s,
-    said_abort_s,
-    stands_since_s,
-    stays,
-    touchdown_off_marker,
-)
+from pytest_garl.verdicts.evidence import AT_MARKER_M, Evidence
+from pytest_garl.verdicts.touchdowns import STANDS_S, Stay
 from pytest_garl.verdicts.verdict import (
+    NO_LANDING,
     PAPER_LIMITS,
     Excuse,
-    Limits,
+    Finding,
     PropertyName,
     ViolationType,
 )
@@ -52,8 +33,6 @@ MESSAGE_CHARS = 300
 """Length of an exception's message in a description; the flight's record has 1,000 characters."""
 TILTED_RAD = math.radians(20)
 """A touchdown beyond this angle is called tilted."""
-NO_LANDING = ("gave_up", "not_landed")
-"""Outcomes of flights that never came down."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -66,28 +45,33 @@ class Mechanism:
     sentence: str
 
 
-def mechanism_of(flight: Flight, limits: Limits, why: Excuse, why_text: str) -> Mechanism:
-    """Return the first violation of the flight, or how it ended without one."""
+def mechanism_of(
+    evidence: Evidence, why: Excuse, why_text: str, elsewhere: Finding | None
+) -> Mechanism:
+    """Return the first violation of the flight, or how it ended without one.
+
+    ``elsewhere`` is the descent beside the marker before a collision, if there was one.
+    """
+    flight, limits = evidence.flight, evidence.limits
     if flight.outcome == "crashed" and flight.crash:
         return _crash(flight.crash)
-    if touchdown := touchdown_off_marker(flight, limits):
+    if touchdown := evidence.touchdown_off_marker:
         beginning = f"Touched the ground {{}}{_then(flight)}"
-        return _missed(flight, limits, touchdown, touchdown.distance_m, beginning)
-    stay = dragged(flight, limits)
-    if stay or flight.outcome == "slid":
-        return _slid(flight, stay)
+        return _missed(evidence, touchdown, touchdown.distance_m, beginning)
+    if evidence.dragged or flight.outcome == "slid":
+        return _slid(flight, evidence.dragged)
     if flight.outcome == "collision":
-        return _collision(flight, flight.contacts[-1], limits)
+        return _collision(evidence, flight.contacts[-1], elsewhere)
     if flight.outcome in NO_LANDING:
-        return _no_landing(flight, limits, why, why_text)
-    at_s = landed_s(flight)
+        return _no_landing(evidence, why, why_text)
+    at_s = evidence.landed_s
     if flight.final_distance_m > limits.distance_m:
-        return _missed(flight, limits, flight.touchdown, flight.final_distance_m, "Landed {}")
+        return _missed(evidence, flight.touchdown, flight.final_distance_m, "Landed {}")
     if at_s > limits.time_s:
         return Mechanism(
             primary="time",
             violation_type="late",
-            signature=f"late:landed:{landing_phase(flight, limits.time_s)}",
+            signature=f"late:landed:{evidence.phase_at(limits.time_s)}",
             sentence=f"Landed late, after {at_s:.1f} s.",
         )
     return Mechanism(sentence=f"Landed after {at_s:.1f} s.")
@@ -107,7 +91,7 @@ def _crash(crash: Crash) -> Mechanism:
     )
 
 
-def _collision(flight: Flight, contact: Contact, limits: Limits) -> Mechanism:
+def _collision(evidence: Evidence, contact: Contact, elsewhere: Finding | None) -> Mechanism:
     speed = f"at {contact.speed_mps:.1f} m/s"
     if contact.body_class == "ground":
         how = "tilted" if contact.tilt_rad > TILTED_RAD else "fast"
@@ -118,31 +102,30 @@ def _collision(flight: Flight, contact: Contact, limits: Limits) -> Mechanism:
             sentence=f"Touched down too {how}, {speed}.",
         )
     static = contact.body_class == "static"
-    elsewhere = descent_elsewhere(flight, limits)
     if elsewhere:
         # A collision hides the landing that had gone wrong before it.
         verb = f"{elsewhere.story.removesuffix('.')}, then hit"
     else:
         verb = "Hit" if static else "Collided with"
     view = ""
-    if not static and was_in_view(flight, contact.body, contact.time_s):
+    if not static and evidence.was_in_view(contact.body, contact.time_s):
         view = " The camera had it in view within the last 2 s."
     elif not static:
         view = " The camera had not had it in view for 2 s."
     return Mechanism(
         primary="collision",
         violation_type="III" if static else "IV",
-        signature=collision_signature(flight, contact),
+        signature=collision_signature(evidence, contact),
         sentence=f"{verb} {contact.body} {speed}.{view}",
     )
 
 
-def collision_signature(flight: Flight, body: Contact | Separation) -> str:
+def collision_signature(evidence: Evidence, body: Contact | Separation) -> str:
     """Return the signature of a collision with a body, or what that of a near miss would be."""
-    phase = landing_phase(flight, body.time_s)
+    phase = evidence.phase_at(body.time_s)
     if body.body_class == "static":
         return f"III:{body.kind}:{phase}"
-    sight = "seen" if was_in_view(flight, body.body, body.time_s) else "unseen"
+    sight = "seen" if evidence.was_in_view(body.body, body.time_s) else "unseen"
     return f"IV:{body.kind}:{phase}:{sight}"
 
 
@@ -174,9 +157,9 @@ def hops_text(stay: Stay) -> str:
     return f", with hops of up to {max(1.0, 100 * stay.hop_m):.0f} cm,"
 
 
-def _no_landing(flight: Flight, limits: Limits, why: Excuse, why_text: str) -> Mechanism:
+def _no_landing(evidence: Evidence, why: Excuse, why_text: str) -> Mechanism:
     """Return the violation of a landing that was given up, or that ran out of time."""
-    gave_up = flight.outcome == "gave_up"
+    limits, gave_up = evidence.limits, evidence.flight.outcome == "gave_up"
     end = "Gave up" if gave_up else "Not landed"
     forbidden = limits.abort == "violation" and gave_up
     if why and forbidden:
@@ -186,7 +169,7 @@ def _no_landing(flight: Flight, limits: Limits, why: Excuse, why_text: str) -> M
             signature=f"abort:{why}",
             sentence=f"{end}. {why_text}",
         )
-    if why and must_give_up(flight, limits):
+    if why and must_give_up(evidence):
         return Mechanism(
             primary="time",
             violation_type="late",
@@ -195,7 +178,7 @@ def _no_landing(flight: Flight, limits: Limits, why: Excuse, why_text: str) -> M
         )
     if why:
         return Mechanism(sentence=f"{end}, excused. {why_text}")
-    violation_type, signature, sentence = _no_landing_cause(flight, limits, end)
+    violation_type, signature, sentence = _no_landing_cause(evidence, end)
     if gave_up and limits.abort == "ok":
         return Mechanism(sentence=sentence)
     return Mechanism(
@@ -206,33 +189,31 @@ def _no_landing(flight: Flight, limits: Limits, why: Excuse, why_text: str) -> M
     )
 
 
-def must_give_up(flight: Flight, limits: Limits) -> bool:
+def must_give_up(evidence: Evidence) -> bool:
     """Whether a flight ran out of time without giving up, by limits that allow to give up.
 
     Where nobody can land, the right answer is to give up in time.  Where giving up is forbidden, no
     right answer is left but to wait.
     """
-    waited = flight.outcome == "not_landed" and said_abort_s(flight) is None
-    return waited and limits.abort != "violation"
+    waited = evidence.flight.outcome == "not_landed" and evidence.said_abort_s is None
+    return waited and evidence.limits.abort != "violation"
 
 
-def _no_landing_cause(flight: Flight, limits: Limits, end: str) -> tuple[ViolationType, str, str]:
+def _no_landing_cause(evidence: Evidence, end: str) -> tuple[ViolationType, str, str]:
     """Distinguish a marker never seen or lost (II), one in sight, and a lack of time (late)."""
-    at_s = gave_up_s(flight)
-    if stands_since_s(flight, at_s) is not None:
-        off_m = stays(flight)[-1].first.distance_m
-        when = f" at {at_s:.1f} s" if flight.outcome == "gave_up" else ""
-        text = f"{end}{when}, although it stood {off_m:.1f} m off the marker."
-        return "late", "late:standing", f"{text}{_unranged_text(flight, at_s)}"
-    phase = landing_phase(flight, at_s)
-    readable = [step.time_s for step in readable_steps(flight, at_s)]
-    report = (
-        f"{_report_text(flight, at_s)}{_unranged_text(flight, at_s)}{_opportunity_text(flight)}"
-    )
+    flight, at_s = evidence.flight, evidence.gave_up_s
     when = f" at {at_s:.1f} s" if flight.outcome == "gave_up" else ""
+    unranged = _unranged_text(evidence)
+    if evidence.stands_since_s(at_s) is not None:
+        off_m = evidence.stays[-1].first.distance_m
+        text = f"{end}{when}, although it stood {off_m:.1f} m off the marker."
+        return "late", "late:standing", f"{text}{unranged}"
+    phase = evidence.phase_at(at_s)
+    readable = [step.time_s for step in evidence.readable_until(at_s)]
+    report = f"{_report_text(evidence)}{unranged}{_opportunity_text(evidence)}"
     if not readable:
         # A detector may read a frame that a good one reads with less than one half.
-        view = "readable" if last_report_s(flight, at_s) is None else "well readable"
+        view = "readable" if evidence.last_report_s(at_s) is None else "well readable"
         return "II", "II:never-seen", f"{end}{when}; the marker was never {view}.{report}"
     last = readable[-1]
     lost = at_s - last > LOST_AFTER_S
@@ -240,7 +221,7 @@ def _no_landing_cause(flight: Flight, limits: Limits, end: str) -> tuple[Violati
         text = f"Not landed although the marker was in view to the end.{report}"
         return "late", f"late:not-landed:{phase}", text
     view = f"the marker was last in view at {last:.1f} s" if lost else "the marker was in view"
-    if flight.outcome == "gave_up" and at_s >= (1 - RESERVE_SHARE) * limits.time_s:
+    if flight.outcome == "gave_up" and at_s >= (1 - RESERVE_SHARE) * evidence.limits.time_s:
         text = f"Gave up{when} for want of time; {view}.{report}"
         return "late", f"late:no-time:{phase}", text
     if lost:
@@ -254,24 +235,21 @@ def _no_landing_cause(flight: Flight, limits: Limits, end: str) -> tuple[Violati
     return "II", f"II:gave-up-in-sight:{phase}", text
 
 
-def _report_text(flight: Flight, until_s: float) -> str:
+def _report_text(evidence: Evidence) -> str:
     """Return a sentence about the last report of the marker by the system, if it reports any."""
-    last = last_report_s(flight, until_s)
-    if last is not None and reports_detections(flight):
+    last = evidence.last_report_s(evidence.gave_up_s)
+    if last is not None and evidence.reports_detections:
         return f" The system last reported it at {last:.1f} s."
     if last is not None:
         # A target may be a memory: it is no sighting.
         return f" Its place was the system's target up to {last:.1f} s."
-    reports = any(
-        step.diagnostics and (step.diagnostics.detections or step.diagnostics.target_m)
-        for step in flight.steps
-    )
-    return " The system reported other places, never the marker's." if reports else ""
+    other = " The system reported other places, never the marker's."
+    return other if evidence.reports_anything else ""
 
 
-def _unranged_text(flight: Flight, until_s: float) -> str:
+def _unranged_text(evidence: Evidence) -> str:
     """Return for how long after the take-off the rangefinder had no reading; empty if briefly."""
-    start = flying_from(flight)
+    flight, start, until_s = evidence.flight, evidence.flying_from, evidence.gave_up_s
     if flight.rangefinder is None or start == len(flight.uav.time_s):
         return ""
     flown = [s for s in flight.steps if flight.uav.time_s[start] <= s.time_s <= until_s]
@@ -286,26 +264,26 @@ def _unranged_text(flight: Flight, until_s: float) -> str:
     )
 
 
-def _opportunity_text(flight: Flight) -> str:
+def _opportunity_text(evidence: Evidence) -> str:
     """Return for how long a nominal landing could have read the marker."""
-    if not flight.nominal_views:
+    if not evidence.flight.nominal_views:
         return ""
-    readable_s = expected_readable_s(flight)
+    readable_s = evidence.expected_readable_s
     return f" Where a landing looks for it, it could be read for {readable_s:.0f} s."
 
 
 def _missed(
-    flight: Flight, limits: Limits, touchdown: Touchdown | None, off_m: float, beginning: str
+    evidence: Evidence, touchdown: Touchdown | None, off_m: float, beginning: str
 ) -> Mechanism:
     """Return the violation of a touchdown off the marker, with what lies under the UAV.
 
     ``beginning`` is the beginning of the sentence, with a gap for the distance.
     """
-    at_s = touchdown.time_s if touchdown else flight.elapsed_s
+    at_s = touchdown.time_s if touchdown else evidence.flight.elapsed_s
     start = beginning.format(f"{off_m:.1f} m off the marker")
-    readable = [step.time_s for step in readable_steps(flight, at_s)]
-    target = _target_text(flight, at_s)
-    if off_m <= max(PAPER_LIMITS.distance_m, limits.distance_m):
+    readable = [step.time_s for step in evidence.readable_until(at_s)]
+    target = _target_text(evidence, at_s)
+    if off_m <= max(PAPER_LIMITS.distance_m, evidence.limits.distance_m):
         recent = bool(readable) and at_s - readable[-1] <= LOST_AFTER_S
         view = "was in view" if recent else "was not in view for the last 3 s"
         return Mechanism(
@@ -314,7 +292,7 @@ def _missed(
             signature=f"off:{'seen' if recent else 'unseen'}",
             sentence=f"{start}; the marker {view}{target}.",
         )
-    on = _ground_under(flight, touchdown)
+    on = _ground_under(evidence, touchdown)
     seen = "seen" if readable else "unseen"
     view = "had been in view" if readable else "was never readable"
     what = "on open ground" if on == "nothing" else f"on a {on}" if on in _PLAIN else f"on {on}"
@@ -343,28 +321,24 @@ def _then(flight: Flight) -> str:
 _PLAIN = ("line", "shadow")
 
 
-def _ground_under(flight: Flight, touchdown: Touchdown | None) -> str:
+def _ground_under(evidence: Evidence, touchdown: Touchdown | None) -> str:
     """Return what lies under the UAV; for simulators without touchdowns the decoy there."""
     if touchdown is not None:
         return touchdown.on
-    x, y = (float(value) for value in flight.uav.position_m[-1, :2])
-    near = [(math.dist((x, y), place), name) for name, *place in flight.decoys]
-    distance_m, name = min(near, default=(math.inf, ""))
-    return name if distance_m <= AT_MARKER_M else "nothing"
+    x, y = (float(value) for value in evidence.flight.uav.position_m[-1, :2])
+    return evidence.decoy_at((x, y)) or "nothing"
 
 
-def _target_text(flight: Flight, at_s: float) -> str:
+def _target_text(evidence: Evidence, at_s: float) -> str:
     """Return words about the target that the system reported last; empty without reports."""
-    target = last_target(flight, at_s)
+    flight, target = evidence.flight, evidence.last_target(at_s)
     if target is None:
         return "; it reported no target" if any(s.diagnostics for s in flight.steps) else ""
-    if math.dist(target, flight.marker_position_m) <= AT_MARKER_M:
-        return "; its target was right"
-    near = [(math.dist(target, place), name) for name, *place in flight.decoys]
-    distance_m, name = min(near, default=(math.inf, ""))
-    if distance_m <= AT_MARKER_M:
-        return f"; its target was {name}"
     off_m = math.dist(target, flight.marker_position_m)
+    if off_m <= AT_MARKER_M:
+        return "; its target was right"
+    if name := evidence.decoy_at(target):
+        return f"; its target was {name}"
     return f"; its target was {off_m:.1f} m off the marker"
 
 

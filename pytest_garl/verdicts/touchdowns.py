@@ -1,4 +1,4 @@
-"""Stays on the ground in a flight's record, and when a flight landed or was given up.
+"""Stays on the ground in a flight's record.
 
 The simulator notes a touchdown whenever the UAV has lost contact for more than a quarter of a
 second, which is right for its land detector.  A UAV that holds its place with running motors skips
@@ -16,13 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pytest_garl.flight.flight import Flight, Touchdown
-from pytest_garl.flight.thresholds import (
-    BODY_ABOVE_FEET_M,
-    GRAVITY_MPS2,
-    HARD_TOUCHDOWN_MPS,
-    SLID_M,
-)
-from pytest_garl.verdicts.verdict import Limits
+from pytest_garl.flight.thresholds import BODY_ABOVE_FEET_M, GRAVITY_MPS2, HARD_TOUCHDOWN_MPS
 
 ON_GROUND_M = 0.02
 """After its first contact with the ground, the UAV counts as on the ground up to this much above
@@ -76,7 +70,7 @@ class Stay:
         return time_s - self.since_s >= STANDS_S and not ended and not stopped
 
 
-def stays(flight: Flight) -> tuple[Stay, ...]:
+def stays_of(flight: Flight) -> tuple[Stay, ...]:
     """Return the flight's stays on the ground, in order; empty for simulators without touchdowns.
 
     A hard touchdown ends the flight; it is none.
@@ -93,11 +87,6 @@ def stays(flight: Flight) -> tuple[Stay, ...]:
         else:
             groups.append([each])
     return tuple(_stay(flight, group) for group in groups)
-
-
-def stands_since_s(flight: Flight, time_s: float) -> float | None:
-    """Return since when the UAV has stood with running motors at a time; None if it does not."""
-    return next((each.since_s for each in stays(flight) if each.stands_at(time_s)), None)
 
 
 def _stay(flight: Flight, touchdowns: Sequence[Touchdown]) -> Stay:
@@ -138,72 +127,8 @@ def _hop_m(flight: Flight, from_s: float, to_s: float) -> float:
     return float(heights.max(initial=0.0))
 
 
-def landed_s(flight: Flight) -> float:
-    """Return the time of the touchdown; the flight's end for simulators that record none.
-
-    A UAV that landed with hops had come down with the first one.
-    """
-    if flight.touchdown is None:
-        return flight.elapsed_s
-    found = stays(flight)
-    return found[-1].since_s if found else flight.touchdown.time_s
-
-
-def gave_up_s(flight: Flight) -> float:
-    """Return when the landing was given up: at the command, or when the time was over."""
-    said_s = said_abort_s(flight)
-    return flight.elapsed_s if said_s is None else said_s
-
-
-def said_abort_s(flight: Flight) -> float | None:
-    """Return when the system gave the landing up; None if it never did."""
-    return next((e.time_s for e in flight.events if e.name == "abort_command"), None)
-
-
-def touchdown_off_marker(flight: Flight, limits: Limits) -> Touchdown | None:
-    """Return the first touchdown beyond the limit that was not a landing; None if there was none.
-
-    The UAV took off again, slid on, gave up, or was hit where it stood.  None as well if it had
-    come down within the limit and was dragged beyond it before.
-    """
-    if not stays(flight) and flight.outcome in ("gave_up", "not_landed"):
-        return _from_track(flight, limits)
-    off = _first_off(flight, limits)
-    return off if isinstance(off, Touchdown) else None
-
-
-def dragged(flight: Flight, limits: Limits) -> Stay | None:
-    """Return the stay that began within the limit and in which the UAV slid; None without one.
-
-    It slid by the simulator's outcome, or moved by more than that limit of a slide to beyond the
-    limit of distance, hops included.
-    """
-    off = _first_off(flight, limits)
-    return off if isinstance(off, Stay) else None
-
-
-def _first_off(flight: Flight, limits: Limits) -> Touchdown | Stay | None:
-    """Return the first touchdown beyond the limit, or the stay that was dragged before it."""
-    found = stays(flight)
-    for stay in found:
-        off = next((each for each in stay.touchdowns if _misses(flight, each, limits)), None)
-        slid = flight.outcome == "slid" and stay is found[-1]
-        went_off = slid or stay.farthest_m > limits.distance_m
-        within = stay.first.distance_m <= limits.distance_m
-        if within and went_off and stay.moved_m > SLID_M:
-            return stay
-        if off:
-            return off
-    return None
-
-
-def _misses(flight: Flight, touchdown: Touchdown, limits: Limits) -> bool:
-    landing = flight.outcome == "landed" and touchdown is flight.touchdown
-    return touchdown.distance_m > limits.distance_m and not landing
-
-
-def _from_track(flight: Flight, limits: Limits) -> Touchdown | None:
-    """Find the first place on the ground beyond the limit, for simulators without touchdowns.
+def off_in_track(flight: Flight, limit_m: float) -> Touchdown | None:
+    """Return the first place on the ground beyond a limit, for simulators without touchdowns.
 
     The record's contacts hold only the first one with the ground; later ones follow from the
     height.
@@ -219,7 +144,7 @@ def _from_track(flight: Flight, limits: Limits) -> Touchdown | None:
     for index in range(start, len(track.time_s)):
         x, y, z = (float(value) for value in track.position_m[index])
         off_m = math.hypot(x - mx, y - my)
-        if (index == start or z <= height) and off_m > limits.distance_m:
+        if (index == start or z <= height) and off_m > limit_m:
             return Touchdown(
                 time_s=max(first.time_s, float(track.time_s[index])),
                 position_m=(x, y, z),

@@ -54,6 +54,8 @@ birds never left it free for long enough.  Empty if somebody could."""
 NoLanding = Literal["", "blocked", "excused", "needless"]
 """Why a flight that was given up or ran out of time is excused, or that it is needless; empty for
 any other flight."""
+NO_LANDING = ("gave_up", "not_landed")
+"""Outcomes of flights that never came down."""
 _NO_LANDING: Mapping[Excuse, NoLanding] = {
     "blocked": "blocked",
     "undetectable": "excused",
@@ -197,7 +199,7 @@ class Verdict:
     @property
     def no_landing(self) -> NoLanding:
         """Why a flight that was given up or ran out of time is excused, or that it is not."""
-        if self.outcome not in ("gave_up", "not_landed"):
+        if self.outcome not in NO_LANDING:
             return ""
         return _NO_LANDING[self.excuse]
 

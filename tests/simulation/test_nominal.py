@@ -24,7 +24,8 @@ from pytest_garl.simulation.nominal import (
     nominal_views,
 )
 from pytest_garl.simulation.system_under_test.reference_pilot import ReferencePilot
-from pytest_garl.verdicts.excuses import READABLE_S, expected_readable_s
+from pytest_garl.verdicts.evidence import Evidence
+from pytest_garl.verdicts.excuses import READABLE_S
 from tests.support.flights import EMPTY, LAWN, STAND, Hovers, Scripted, nominal
 
 PEOPLE = dataclasses.replace(LAWN, objects=(("person", 4),))
@@ -104,7 +105,7 @@ def test_the_search_shows_every_marker_of_the_disc(place: tuple[float, float]) -
     flight = given_up(EMPTY, {}, marker__x=place[0], marker__y=place[1])
     search = [view for view in flight.nominal_views if view.place == "search"]
     assert max(view.marker.share_in_frame for view in search) == 1.0
-    assert expected_readable_s(flight) > 5 * READABLE_S
+    assert Evidence(flight).expected_readable_s > 5 * READABLE_S
 
 
 def test_the_search_shows_a_marker_far_from_a_wrong_coordinate() -> None:
@@ -115,7 +116,7 @@ def test_the_search_shows_a_marker_far_from_a_wrong_coordinate() -> None:
 
 
 def test_a_clear_sight_can_be_read_and_thick_fog_cannot() -> None:
-    clear = expected_readable_s(given_up(EMPTY, {}))
+    clear = Evidence(given_up(EMPTY, {})).expected_readable_s
     foggy = given_up(EMPTY, {}, environment__fog=1.0, environment__dust=1.0)
     far = [view.marker.contrast for view in foggy.nominal_views if view.height_m > 9]
     assert clear > 5 * READABLE_S
@@ -125,7 +126,7 @@ def test_a_clear_sight_can_be_read_and_thick_fog_cannot() -> None:
 def test_a_marker_wholly_under_snow_is_hidden() -> None:
     flight = given_up(EMPTY, {}, environment__road_snow=1.0)
     assert all(view.marker.border_hidden > 0.95 for view in flight.nominal_views)
-    assert expected_readable_s(flight) < READABLE_S
+    assert Evidence(flight).expected_readable_s < READABLE_S
 
 
 def test_people_who_stand_on_the_marker_hide_it() -> None:
@@ -140,10 +141,10 @@ def test_people_who_stand_on_the_marker_hide_it() -> None:
         np.mean([view.marker.bits_hidden for view in above(each)]) for each in (free, crowded)
     ]
     assert hidden[0] < 0.05 < 0.15 < hidden[1]
-    assert expected_readable_s(crowded) < expected_readable_s(free) - 3
+    assert Evidence(crowded).expected_readable_s < Evidence(free).expected_readable_s - 3
 
 
 def test_objects_stay_where_a_flight_that_ended_early_left_them() -> None:
     flight = fly(nominal(), AbortsAtOnce, STAND, map=EMPTY, time_limit_s=20)
     assert flight.elapsed_s < min(view.time_s for view in above(flight))
-    assert math.isfinite(expected_readable_s(flight))
+    assert math.isfinite(Evidence(flight).expected_readable_s)

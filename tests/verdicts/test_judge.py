@@ -7,7 +7,8 @@ import pytest
 
 from pytest_garl.airframe import Rangefinder
 from pytest_garl.flight.flight import Event, Flight
-from pytest_garl.verdicts.judge import closest_call, judge, off_marker_m, why_undecided
+from pytest_garl.verdicts.evidence import Evidence
+from pytest_garl.verdicts.judge import closest_call, judge, why_undecided
 from pytest_garl.verdicts.verdict import Limits
 from pytest_garl.verdicts.wording import headline
 from tests.verdicts.flights import (
@@ -250,18 +251,18 @@ def test_closest_call_has_the_signature_of_the_near_collision() -> None:
             gap("dog-1", "dog", "dynamic", 0.4, 30.0),
         ),
     )
-    assert closest_call(near) == ("IV:dog:last-metre:seen", "dog-1")
+    assert closest_call(Evidence(near)) == ("IV:dog:last-metre:seen", "dog-1")
     collided = dataclasses.replace(
         near, outcome="collision", contacts=hit("dog-1", "dog", "dynamic")
     )
-    assert judge(collided, Limits(distance_m=1.5)).signature == closest_call(near)[0]
+    assert judge(collided, Limits(distance_m=1.5)).signature == closest_call(Evidence(near))[0]
 
 
 def test_a_body_three_metres_away_is_no_close_call() -> None:
     far = flight(
         "landed", (0.0, 0.0, 0.2), separations=(gap("tree-1", "tree", "static", 3.0, 10.0),)
     )
-    assert closest_call(far) == ("", "")
+    assert closest_call(Evidence(far)) == ("", "")
 
 
 DESCENT_AND_CLIMB = (
@@ -300,7 +301,7 @@ def test_a_touchdown_off_the_marker_before_an_abort_is_judged_as_a_landing(
     assert words in verdict.story
     margins = {each.property: each for each in verdict.margins}
     assert (margins["distance"].value, margins["distance"].decided) == (-3.5, True)
-    assert off_marker_m(subject, Limits(distance_m=1.5)) == 5.0
+    assert Evidence(subject, Limits(distance_m=1.5)).off_marker_m == 5.0
 
 
 def test_a_touchdown_within_the_limit_before_an_abort_is_no_violation() -> None:
@@ -308,7 +309,7 @@ def test_a_touchdown_within_the_limit_before_an_abort_is_no_violation() -> None:
         "gave_up", (5.0, 0.0, 5.0), uav=track(*DESCENT_AND_CLIMB), contacts=touch(10.0)
     )
     assert judge(subject, Limits(distance_m=5.0)).primary == "time"
-    assert off_marker_m(subject, Limits(distance_m=5.0)) is None
+    assert Evidence(subject, Limits(distance_m=5.0)).off_marker_m is None
     assert judge(subject, Limits(distance_m=4.99)).primary == "distance"
 
 
@@ -326,7 +327,7 @@ def test_sliding_off_the_marker_before_an_abort_violates_and_flying_off_does_not
 
 def test_an_abort_in_the_air_is_no_landing_anywhere() -> None:
     subject = flight("gave_up", (5.0, 0.0, 5.0))
-    assert off_marker_m(subject, Limits()) is None
+    assert Evidence(subject, Limits()).off_marker_m is None
     assert why_undecided(subject) == "gave up at 30.0 s"
 
 

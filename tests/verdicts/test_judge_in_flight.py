@@ -22,8 +22,8 @@ from pytest_garl.npcs.catalogue import policy_spec
 from pytest_garl.scenarios.maps.loading import load_map
 from pytest_garl.scenarios.task import Start, Task
 from pytest_garl.simulation.fly import fly
-from pytest_garl.verdicts.judge import judge, off_marker_m
-from pytest_garl.verdicts.phases import landing_phase
+from pytest_garl.verdicts.evidence import Evidence
+from pytest_garl.verdicts.judge import judge
 from pytest_garl.verdicts.verdict import Limits
 from tests.support.flights import EMPTY, STAND, Scripted, nominal
 
@@ -55,7 +55,7 @@ def test_a_system_that_touches_the_ground_far_off_and_gives_up_violates_the_dist
     assert flight.outcome == "gave_up"
     assert [each.body for each in flight.contacts] == ["ground"]
     assert (verdict.primary, verdict.violation_type) == ("distance", "I")
-    off = off_marker_m(flight, Limits())
+    off = Evidence(flight, Limits()).off_marker_m
     assert off is not None
     assert f"Touched the ground {off:.1f} m off the marker before it gave up" in verdict.story
     wide = judge(flight, Limits(distance_m=off + 0.5))
@@ -85,7 +85,7 @@ def test_a_flight_that_starts_low_in_the_air_has_the_margins_of_one_that_starts_
     def margins(height_m: float) -> dict[str, float]:
         scenario = hovering(height_m, offset_m=(1.0, 0.0))
         flight = fly(scenario, TurnsBack, STAND, map=EMPTY, time_limit_s=height_m + 4.0)
-        assert [landing_phase(flight, at_s) for at_s in (0.2, height_m - 2.5)] == [
+        assert [Evidence(flight).phase_at(at_s) for at_s in (0.2, height_m - 2.5)] == [
             "approach",
             "descent",
         ]

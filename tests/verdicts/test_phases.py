@@ -2,7 +2,7 @@ from __future__ import annotations
 
 import pytest
 
-from pytest_garl.verdicts.phases import landing_phase
+from pytest_garl.verdicts.evidence import Evidence
 from tests.verdicts.flights import flight, step, track
 
 
@@ -10,7 +10,7 @@ def at(x: float, z: float, highest: float = 10.0, visible: float = 0.0) -> str:
     """Return the phase of a UAV that was ``highest`` and is ``x`` m off the marker, ``z`` m up."""
     path = track((0.0, -10.0, 0.0, highest), (10.0, x, 0.0, z))
     subject = flight("gave_up", (x, 0.0, z), uav=path, steps=(step(5.0, visible=visible),))
-    return landing_phase(subject, 10.0)
+    return Evidence(subject).phase_at(10.0)
 
 
 # Each threshold from both sides.
@@ -30,7 +30,7 @@ def phases(*samples: tuple[float, float]) -> list[str]:
     """Return the phase at each sample (time, height) of a flight over the marker."""
     path = track(*((time_s, 0.0, 0.0, z) for time_s, z in samples))
     subject = flight("gave_up", (0.0, 0.0, samples[-1][1]), uav=path, steps=())
-    return [landing_phase(subject, time_s) for time_s, _ in samples]
+    return [Evidence(subject).phase_at(time_s) for time_s, _ in samples]
 
 
 @pytest.mark.parametrize(("top", "name"), [(6.499, "take-off"), (7.0, "approach")])
@@ -72,7 +72,7 @@ def test_a_uav_that_starts_in_the_air_never_takes_off(height: float) -> None:
 
 
 def test_a_collision_without_a_recorded_contact_has_a_phase() -> None:
-    assert landing_phase(flight("collision", (0.0, 0.0, 1.0)), 30.0) == "last-metre"
+    assert Evidence(flight("collision", (0.0, 0.0, 1.0))).phase_at(30.0) == "last-metre"
 
 
 def test_a_descent_begins_half_a_metre_below_a_low_search() -> None:
@@ -94,4 +94,4 @@ def test_transit_ends_when_the_marker_comes_into_view(visible: float, name: str)
         uav=track((0.0, -10.0, 0.0, 10.0), (10.0, 5.0, 0.0, 8.0)),
         steps=(step(10.1, visible=1.0),),
     )
-    assert landing_phase(later, 10.0) == "transit"
+    assert Evidence(later).phase_at(10.0) == "transit"

@@ -8,9 +8,9 @@ from typing import Any
 import pytest
 
 from pytest_garl.flight.flight import Event, Flight, Touchdown, Track
-from pytest_garl.verdicts.judge import judge, off_marker_m
-from pytest_garl.verdicts.phases import landing_phase
-from pytest_garl.verdicts.touchdowns import HOP_M, landed_s, stands_since_s, stays
+from pytest_garl.verdicts.evidence import Evidence
+from pytest_garl.verdicts.judge import judge
+from pytest_garl.verdicts.touchdowns import HOP_M
 from pytest_garl.verdicts.verdict import Limits
 from pytest_garl.verdicts.wording import headline
 from tests.verdicts.flights import CLEAR, FOGGY, flight, hit, nominal, step, touchdown, track
@@ -45,10 +45,10 @@ def dog(time_s: float) -> Any:
 def test_a_hop_from_which_a_fall_is_not_hard_begins_no_new_stay(up: float, number: int) -> None:
     path = on_ground((20.0, 0.0, 0.0), (21.0, 0.0, up), (22.0, 0.0, 0.0), (30.0, 0.0, 0.0))
     subject = stay("not_landed", path, touched(20.0), touched(22.0))
-    found = stays(subject)
+    found = Evidence(subject).stays
     assert len(found) == number
     assert [each.since_s for each in found] == [20.0, 22.0][:number]
-    assert stands_since_s(subject, 30.0) == (20.0 if number == 1 else 22.0)
+    assert Evidence(subject).stands_since_s(30.0) == (20.0 if number == 1 else 22.0)
 
 
 @pytest.mark.parametrize("outcome", ["slid", "not_landed", "gave_up", "collision"])
@@ -72,7 +72,7 @@ def test_a_uav_that_stood_on_the_marker_and_was_dragged_is_told_from_its_touchdo
     assert margins["distance"].value == pytest.approx(0.75 - 3.0)
     assert margins["slide"].value == pytest.approx(0.5 - 3.0)
     if outcome != "slid":
-        assert off_marker_m(subject, Limits()) == pytest.approx(3.0)
+        assert Evidence(subject, Limits()).off_marker_m == pytest.approx(3.0)
 
 
 def test_a_uav_that_hops_within_the_limit_and_lands_has_landed() -> None:
@@ -81,7 +81,7 @@ def test_a_uav_that_hops_within_the_limit_and_lands_has_landed() -> None:
     subject = stay("landed", path, first, touched(23.0, 0.6, speed_mps=0.1, stopped_s=24.0))
     verdict = judge(subject, Limits())
     assert (verdict.primary, verdict.completed) == (None, True)
-    assert landed_s(subject) == 20.0
+    assert Evidence(subject).landed_s == 20.0
     margins = {each.property: each.value for each in verdict.margins}
     assert margins["time"] == pytest.approx(100.0)
     assert margins["touchdown_speed"] == pytest.approx(0.8)
@@ -141,5 +141,5 @@ def test_a_body_that_hits_a_standing_uav_is_told_apart_from_one_that_hits_a_land
 def test_a_uav_whose_motors_stop_does_not_stand_with_running_motors() -> None:
     path = on_ground((20.0, 0.0, 0.0), (25.0, 0.0, 0.0))
     subject = stay("landed", path, touched(20.0, stopped_s=22.0))
-    assert landing_phase(subject, 21.9) == "standing"
-    assert landing_phase(subject, 22.0) == "last-metre"
+    assert Evidence(subject).phase_at(21.9) == "standing"
+    assert Evidence(subject).phase_at(22.0) == "last-metre"

@@ -39,7 +39,7 @@ from pytest_garl.scenarios.maps.map import Map
 from pytest_garl.scenarios.placement import map_in
 from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.simulation.camera.cover_event import renderer_of
-from pytest_garl.verdicts.sightings import reports_detections
+from pytest_garl.verdicts.evidence import Evidence
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -132,9 +132,10 @@ def shown_flight(task: FlightTask) -> ShownFlight:
             traceback=traceback,
             sha256=task.sha256,
         )
-    moments = moments_of(flight)
-    data = flight_data(flight, moments)
-    drawn = _drawn(task, flight, place, moments) if place else _Drawn()
+    evidence = Evidence(flight, task.job.limits)
+    moments = moments_of(evidence)
+    data = flight_data(evidence, moments)
+    drawn = _drawn(task, evidence, place, moments) if place else _Drawn()
     return ShownFlight(
         description=describe(flight, verdict, severity),
         data=data | {"scene": drawn.scene, "film_start_s": _film_start_s(flight)},
@@ -142,9 +143,9 @@ def shown_flight(task: FlightTask) -> ShownFlight:
         thumbnail=drawn.thumbnail,
         film=drawn.film,
         notes=(*notes, *drawn.notes),
-        sightings=sighting_sentences(flight),
-        reports_detections=reports_detections(flight),
-        hints=hints_of(flight, verdict, task.prevention),
+        sightings=sighting_sentences(evidence),
+        reports_detections=evidence.reports_detections,
+        hints=hints_of(evidence, verdict, task.prevention),
         conditions=conditions,
         events=event_rows(flight),
         nearest=nearest_rows(flight),
@@ -211,7 +212,9 @@ def _film_start_s(flight: Flight) -> float:
     return round(flight.steps[0].time_s, 3) if flight.steps else 0.0
 
 
-def _drawn(task: FlightTask, flight: Flight, place: Place, moments: tuple[Moment, ...]) -> _Drawn:
+def _drawn(
+    task: FlightTask, evidence: Evidence, place: Place, moments: tuple[Moment, ...]
+) -> _Drawn:
     """Return the pictures of a flight in the built-in simulator."""
     scenario, map = place
     if task.job.simulator != BUILT_IN:
@@ -230,10 +233,10 @@ def _drawn(task: FlightTask, flight: Flight, place: Place, moments: tuple[Moment
         if task.camera is None:
             note = "The ledger does not name the camera, as those of earlier versions: no pictures."
             return _Drawn(scene=scene, notes=(note,))
-        stills, thumbnail = stills_of(flight, scenario, renderer, moments)
+        stills, thumbnail = stills_of(evidence, scenario, renderer, moments)
     except (GarlError, ValueError) as error:
         return _Drawn(notes=(f"No pictures: {cut_text(str(error), 400)}",))
-    film, notes = _film(task, flight, place, camera) if task.with_film else ("", ())
+    film, notes = _film(task, evidence.flight, place, camera) if task.with_film else ("", ())
     return _Drawn(scene=scene, stills=stills, thumbnail=thumbnail, film=film, notes=notes)
 
 

@@ -13,17 +13,10 @@ from numpy.typing import NDArray
 from pytest_garl.flight.flight import Flight, ObjectRecord, Step, Track
 from pytest_garl.flight.thresholds import BODY_ABOVE_FEET_M, up_m
 from pytest_garl.messages import shortened
-from pytest_garl.reports.html.moments import Moment, decisive_s, telling_moment
+from pytest_garl.reports.html.moments import Moment, telling_moment
 from pytest_garl.scenarios.object_types import OBJECT_TYPES
 from pytest_garl.verdicts.detectability import readable_probability
-from pytest_garl.verdicts.sightings import (
-    readable_steps,
-    reports_detections,
-    reports_marker,
-    reports_other_place,
-    reports_targets,
-    target_of,
-)
+from pytest_garl.verdicts.evidence import Evidence, Report
 
 MOST_SAMPLES = 900
 """More samples than a chart of a wide screen has pixels for; a page stays small."""
@@ -50,14 +43,15 @@ class Strip:
     spans: tuple[Span, ...]
 
 
-def flight_data(flight: Flight, moments: Sequence[Moment]) -> dict[str, Any]:
+def flight_data(evidence: Evidence, moments: Sequence[Moment]) -> dict[str, Any]:
     """Return the values that path, timeline and cursor of a page draw, for JSON."""
+    flight = evidence.flight
     picked = _picked(flight.uav.time_s)
-    opens = telling_moment(flight, moments)
+    opens = telling_moment(evidence, moments)
     times = flight.uav.time_s[picked]
     return {
         "end_s": round(float(flight.elapsed_s), 2),
-        "opens_s": round(opens.time_s if opens else decisive_s(flight), 2),
+        "opens_s": round(opens.time_s if opens else evidence.decided_s, 2),
         "marker": [round(each, 2) for each in flight.marker_position_m],
         "t": _rounded(times),
         "uav": _path(flight.uav, picked, lift_m=-BODY_ABOVE_FEET_M),
@@ -66,13 +60,13 @@ def flight_data(flight: Flight, moments: Sequence[Moment]) -> dict[str, Any]:
             [shortened(name, WORDS), round(x, 2), round(y, 2)]
             for name, x, y in flight.decoys[:MOST_DECOYS]
         ],
-        "metres": _metres(flight, picked),
+        "metres": _metres(evidence, picked),
         "percent": _percent(flight, times),
         "strips": [
-            {"name": each.name, "kind": each.kind, "spans": each.spans} for each in strips(flight)
+            {"name": each.name, "kind": each.kind, "spans": each.spans} for each in strips(evidence)
         ],
         "phases": [[a, b, name] for a, b, name in phases(flight.steps, flight.elapsed_s)],
-        "targets": _targets(flight),
+        "targets": _targets(evidence),
         "plans": _plans(flight.steps),
         "moments": [{"t": round(each.time_s, 2), "label": each.label} for each in moments],
     }
@@ -113,8 +107,9 @@ def _size_m(item: ObjectRecord) -> tuple[float, float, float]:
     return (kind.radius_m, kind.height_m, kind.low_m) if kind else UNKNOWN_SIZE_M
 
 
-def _metres(flight: Flight, picked: NDArray[np.intp]) -> list[dict[str, Any]]:
+def _metres(evidence: Evidence, picked: NDArray[np.intp]) -> list[dict[str, Any]]:
     """Return the lines of the chart in metres: name, colour's name, values; gaps are null."""
+    flight = evidence.flight
     x, y, z = flight.uav.position_m[picked].T
     mx, my = flight.marker_position_m
     lines = [
@@ -124,8 +119,8 @@ def _metres(flight: Flight, picked: NDArray[np.intp]) -> list[dict[str, Any]]:
     if flight.objects:
         lines.append(_line("gap to the nearest NPC", "npc", gap_m(flight)[picked]))
     times = flight.uav.time_s[picked]
-    if reports_targets(flight):
-        off = [(s.time_s, math.dist(p, (mx, my))) for s in flight.steps if (p := target_of(s))]
+    if evidence.targets:
+        off = [(time_s, math.dist(place, (mx, my))) for time_s, place in evidence.targets]
         lines.append(_line("system's target off the marker", "target", _held(off, times)))
     errors = [(s.time_s, math.hypot(*s.estimation_error_m)) for s in flight.steps]
     if max((error for _, error in errors), default=0.0) >= 0.1:
@@ -190,38 +185,35 @@ def _percent(flight: Flight, times: Array) -> list[dict[str, Any]]:
     return lines
 
 
-def strips(flight: Flight) -> tuple[Strip, ...]:
+def strips(evidence: Evidence) -> tuple[Strip, ...]:
     """Return what held when: the marker could be read, the system reported it, NPCs in view."""
-    steps = flight.steps
-    readable = {step.time_s for step in readable_steps(flight)}
-    found = [_strip("marker can be read", "readable", steps, lambda s: s.time_s in readable)]
-    if reports_detections(flight):
-        seen = _strip("system reports it", "reported", steps, lambda s: reports_marker(flight, s))
-        other = _strip(
-            "system reports another place", "other", steps, lambda s: reports_other_place(flight, s)
-        )
+    reports = evidence.reports
+    readable = {step.time_s for step in evidence.readable}
+    found = [_strip("marker can be read", "readable", reports, lambda r: r.step.time_s in readable)]
+    if evidence.reports_detections:
+        seen = _strip("system reports it", "reported", reports, lambda r: r.marker)
+        other = _strip("system reports another place", "other", reports, lambda r: r.elsewhere)
         found += [each for each in (seen, other) if each.spans or each is seen]
-    elif reports_targets(flight):
-        found.append(
-            _strip("system has a target", "reported", steps, lambda s: target_of(s) is not None)
-        )
-    for item in flight.objects:
+    elif evidence.targets:
+        found.append(_strip("system has a target", "reported", reports, lambda r: bool(r.target_m)))
+    for item in evidence.flight.objects:
         strip = _strip(
             f"{item.name} in view",
             "npc",
-            steps,
-            lambda s, name=item.name: name in s.objects_visible,
+            reports,
+            lambda r, name=item.name: name in r.step.objects_visible,
         )
         if strip.spans:
             found.append(strip)
     return tuple(found)
 
 
-def _strip(name: str, kind: str, steps: Sequence[Step], holds: Any) -> Strip:
+def _strip(name: str, kind: str, reports: Sequence[Report], holds: Any) -> Strip:
     spans: list[Span] = []
+    steps = [each.step for each in reports]
     frame_s = steps[1].time_s - steps[0].time_s if len(steps) > 1 else 0.1
-    for step in steps:
-        if holds(step):
+    for report, step in zip(reports, steps, strict=True):
+        if holds(report):
             end = round(step.time_s + frame_s, 2)
             if spans and step.time_s - spans[-1][1] < frame_s / 2:
                 spans[-1] = (spans[-1][0], end)
@@ -244,13 +236,12 @@ def phases(steps: Sequence[Step], end_s: float) -> list[tuple[float, float, str]
     return named[:MOST_PHASES]
 
 
-def _targets(flight: Flight) -> list[list[float]]:
+def _targets(evidence: Evidence) -> list[list[float]]:
     """Return (time, x, y) of the system's target where it changed by more than a decimetre."""
     found: list[list[float]] = []
-    for step in flight.steps:
-        place = target_of(step)
-        if place and (not found or math.dist(place, (found[-1][1], found[-1][2])) > 0.1):
-            found.append(_rounded((step.time_s, *place)))
+    for time_s, place in evidence.targets:
+        if not found or math.dist(place, (found[-1][1], found[-1][2])) > 0.1:
+            found.append(_rounded((time_s, *place)))
     return found
 
 

@@ -15,14 +15,8 @@ import numpy as np
 from pytest_garl.cases.case import NOT_ASKED, Prevention
 from pytest_garl.flight.flight import Flight
 from pytest_garl.flight.thresholds import up_m
-from pytest_garl.reports.html.moments import decisive_s
 from pytest_garl.reports.html.sightings_text import readable_and_reported
-from pytest_garl.verdicts.sightings import (
-    last_target,
-    reports_anything,
-    reports_detections,
-    target_of,
-)
+from pytest_garl.verdicts.evidence import Evidence
 from pytest_garl.verdicts.verdict import Verdict
 
 AT_MARKER_M = 1.0
@@ -34,14 +28,14 @@ MISSED = 0.5
 
 
 def hints_of(
-    flight: Flight | None, verdict: Verdict, prevention: Prevention = NOT_ASKED
+    evidence: Evidence | None, verdict: Verdict, prevention: Prevention = NOT_ASKED
 ) -> tuple[str, ...]:
     """Return one or two sentences; none for an assertion of the user's own."""
     kind = verdict.violation_type
     if kind == "IV":
-        return (_moving(flight, prevention),)
+        return (_moving(evidence.flight if evidence else None, prevention),)
     if kind in ("II", "abort") or verdict.signature.startswith("late:not-landed"):
-        return tuple(_not_landed(flight))
+        return tuple(_not_landed(evidence)) if evidence else ()
     if kind == "V":
         return _crashed(verdict)
     if verdict.cause in _OF_CAUSE:
@@ -50,10 +44,10 @@ def hints_of(
     if decoy:
         name = decoy.split(":")[1].removeprefix("decoy-")
         way = "It came down on" if kind == "I" else "It was coming down to"
-        first = _decoy(flight, f"{way} a decoy, {name}")
+        first = _decoy(evidence, f"{way} a decoy, {name}")
         return (first,) if kind == "I" else (first, *_OF_TYPE.get(kind or "", ()))
     if kind in ("I", "off"):
-        return (_elsewhere(flight),)
+        return (_elsewhere(evidence),)
     return _OF_TYPE.get(kind or "", ())
 
 
@@ -106,19 +100,17 @@ def _signatures(verdict: Verdict) -> Iterator[str]:
     yield from (finding.signature for finding in verdict.findings)
 
 
-def _decoy(flight: Flight | None, what: str) -> str:
+def _decoy(evidence: Evidence | None, what: str) -> str:
     """Return what a descent to a decoy points to, and when the target became another one."""
-    targets = [(step.time_s, target_of(step)) for step in flight.steps] if flight else []
-    known = [(time_s, target) for time_s, target in targets if target is not None]
-    if flight is None or not known:
+    if evidence is None or not evidence.targets:
         return (
             f"{what}: look at how the system chooses the place to come down. It reported no target "
             "in this flight, so nothing tells whether it took the decoy for the marker. "
-            f"{_patch(flight)}"
+            f"{_patch(evidence)}"
         )
     text = f"{what}: look at how the system chooses among what it may take for the marker."
-    marker = flight.marker_position_m
-    right = [time_s for time_s, target in known if math.dist(target, marker) < AT_MARKER_M]
+    marker = evidence.flight.marker_position_m
+    right = [at_s for at_s, target in evidence.targets if math.dist(target, marker) < AT_MARKER_M]
     if not right:
         return f"{text} Its target was never the marker."
     return f"{text} Its target was last at the marker at {right[-1]:.1f} s."
@@ -162,17 +154,17 @@ def _moving(flight: Flight | None, prevention: Prevention) -> str:
     )
 
 
-def _elsewhere(flight: Flight | None) -> str:
+def _elsewhere(evidence: Evidence | None) -> str:
     """Return what a landing beside the marker points to, by the target that the system had."""
-    target = last_target(flight, decisive_s(flight)) if flight else None
-    if flight is None or target is None:
+    target = evidence.last_target(evidence.decided_s) if evidence else None
+    if evidence is None or target is None:
         return (
             "Look at how the system chooses the place to come down. It reported no target in this "
             "flight, so this page cannot tell a wrong target from a wrong way there. "
-            f"{_patch(flight)}"
+            f"{_patch(evidence)}"
         )
+    flight, down = evidence.flight, evidence.decided_s
     off_m = math.dist(target, flight.marker_position_m)
-    down = decisive_s(flight)
     index = max(0, int(np.searchsorted(flight.uav.time_s, down, side="right")) - 1)
     x, y = (float(value) for value in flight.uav.position_m[index, :2])
     missed_m = math.dist(target, (x, y))
@@ -189,18 +181,16 @@ def _elsewhere(flight: Flight | None) -> str:
     )
 
 
-def _not_landed(flight: Flight | None) -> Iterator[str]:
-    if flight is None:
-        return
-    readable, reported = readable_and_reported(flight)
+def _not_landed(evidence: Evidence) -> Iterator[str]:
+    readable, reported = readable_and_reported(evidence)
     if not readable:
         yield (
             "The marker could not be read from where the UAV flew: look at where and how high the "
             "system searches, and for how long."
         )
-    elif not reports_anything(flight):
-        yield from _nothing_reported(flight, readable)
-    elif reported < MISSED * readable and reports_detections(flight):
+    elif not evidence.reports_anything:
+        yield from _nothing_reported(evidence, readable)
+    elif reported < MISSED * readable and evidence.reports_detections:
         yield (
             f"The marker could be read in {readable} frames, and the system reported it in "
             f"{reported} of them: look at the detector under the conditions below."
@@ -211,17 +201,17 @@ def _not_landed(flight: Flight | None) -> Iterator[str]:
             f"{reported} of them. It reports no detections, so nothing tells whether it did not "
             "see the marker, or saw it and did not take it for its target: look at both."
         )
-    elif reports_detections(flight):
+    elif evidence.reports_detections:
         yield (
             f"The system reported the marker in {reported} of {readable} readable frames: it is "
-            f"not the detector. {_DECISION.format(decisive_s(flight))}"
+            f"not the detector. {_DECISION.format(evidence.decided_s)}"
         )
     else:
         # A target may be a memory: it is no sighting.
         yield (
             f"The system had a target at the marker in {reported} of {readable} readable frames, "
             "but reports no detections, so nothing tells whether it saw the marker. "
-            f"{_DECISION.format(decisive_s(flight))}"
+            f"{_DECISION.format(evidence.decided_s)}"
         )
 
 
@@ -230,20 +220,20 @@ _DECISION = (
 )
 
 
-def _nothing_reported(flight: Flight, readable: int) -> Iterator[str]:
+def _nothing_reported(evidence: Evidence, readable: int) -> Iterator[str]:
     """Yield what is known of a flight whose system reported neither detections nor a target."""
     yield (
         f"The marker could be read in {readable} frames. The system reported neither detections "
         "nor a target in this flight, so nothing tells whether it saw the marker. "
-        f"{_path_at_marker(flight)} {_commanded(flight)}"
+        f"{_path_at_marker(evidence)} {_commanded(evidence)}"
     )
-    yield _patch(flight)
+    yield _patch(evidence)
 
 
-def _path_at_marker(flight: Flight) -> str:
+def _path_at_marker(evidence: Evidence) -> str:
     """Return for how long the UAV was above the marker, and how low it came there."""
-    track, end_s = flight.uav, decisive_s(flight)
-    marker = flight.marker_position_m
+    track, end_s = evidence.flight.uav, evidence.decided_s
+    marker = evidence.flight.marker_position_m
     away = np.hypot(track.position_m[:, 0] - marker[0], track.position_m[:, 1] - marker[1])
     heights = np.array([up_m(float(z)) for z in track.position_m[:, 2]])
     counted = (track.time_s <= end_s) & (heights >= FLYING_M)
@@ -265,19 +255,19 @@ def _path_at_marker(flight: Flight) -> str:
     )
 
 
-def _commanded(flight: Flight) -> str:
+def _commanded(evidence: Evidence) -> str:
     """Return whether the system ever said Land(), and how it ended the flight."""
-    given_up = [each.time_s for each in flight.events if each.name == "abort_command"]
-    until = f"; it said Abort() at {given_up[0]:.1f} s" if given_up else ""
-    land = [step.time_s for step in flight.steps if step.command == "Land"]
+    said_s = evidence.said_abort_s
+    until = "" if said_s is None else f"; it said Abort() at {said_s:.1f} s"
+    land = [step.time_s for step in evidence.flight.steps if step.command == "Land"]
     if not land:
         return f"It never said Land(){until}."
     return f"It said Land() in {len(land)} frames, first at {land[0]:.1f} s{until}."
 
 
-def _patch(flight: Flight | None) -> str:
+def _patch(evidence: Evidence | None) -> str:
     """Return the line of code that would report a target, with the command that is used most."""
-    used = Counter(step.command for step in flight.steps) if flight else Counter[str]()
+    used = Counter(step.command for step in (evidence.flight.steps if evidence else ()))
     for command in ("Land", "Abort"):
         used.pop(command, None)
     name = used.most_common(1)[0][0] if used else "PositionSetpoint"

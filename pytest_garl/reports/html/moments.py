@@ -11,17 +11,9 @@ import numpy as np
 from pytest_garl.flight.flight import Flight, Step
 from pytest_garl.flight.thresholds import up_m
 from pytest_garl.verdicts.detectability import readable_probability
+from pytest_garl.verdicts.evidence import LOW_M, Evidence
 from pytest_garl.verdicts.margins import COMMIT_M
-from pytest_garl.verdicts.mechanism import NO_LANDING
-from pytest_garl.verdicts.phases import LOW_M
-from pytest_garl.verdicts.sightings import (
-    last_report_s,
-    readable_steps,
-    reports_detections,
-    reports_marker,
-    reports_other_place,
-    target_of,
-)
+from pytest_garl.verdicts.verdict import NO_LANDING
 
 MOST = 8
 """Pictures that fit in two rows and tell a flight."""
@@ -40,14 +32,13 @@ class Moment:
     label: str
 
 
-def moments_of(flight: Flight) -> tuple[Moment, ...]:
+def moments_of(evidence: Evidence) -> tuple[Moment, ...]:
     """Return the moments in the order of time; those at almost the same time are one.
 
     Of too many the last ones stay, the first one, and the one that shows the cause best.
     """
-    end_s = decisive_s(flight)
     merged: list[Moment] = []
-    for each in sorted(_all(flight, end_s), key=lambda each: each.time_s):
+    for each in sorted(_all(evidence), key=lambda each: each.time_s):
         last = merged[-1] if merged else None
         if last is not None and each.time_s - last.time_s < SAME_S:
             if each.label not in last.label:
@@ -56,38 +47,29 @@ def moments_of(flight: Flight) -> tuple[Moment, ...]:
         else:
             merged.append(each)
     if len(merged) > MOST:
-        shows = telling_moment(flight, merged)
+        shows = telling_moment(evidence, merged)
         latest = [each for each in merged[1:] if each is not shows][2 - MOST :]
         merged = [each for each in merged if each is merged[0] or each is shows or each in latest]
     return tuple(Moment(time_s=m.time_s, label=m.label[:1].upper() + m.label[1:]) for m in merged)
 
 
-def decisive_s(flight: Flight) -> float:
-    """Return when the event happened that decided the flight; the end if nothing tells it."""
-    if flight.outcome == "collision" and flight.contacts:
-        return flight.contacts[-1].time_s
-    if flight.outcome in ("landed", "slid") and flight.touchdown:
-        return flight.touchdown.time_s
-    given_up = (each.time_s for each in flight.events if each.name == "abort_command")
-    return next(given_up, flight.elapsed_s)
-
-
-def telling_moment(flight: Flight, moments: Sequence[Moment]) -> Moment | None:
+def telling_moment(evidence: Evidence, moments: Sequence[Moment]) -> Moment | None:
     """Return the moment that shows best why a flight ended as it did.
 
     Of a collision that is when the camera shows the body for the last time, of a touchdown when the
     UAV passes ``COMMIT_M``, and of a flight without a landing when the marker is best to read.
     """
-    time_s = _telling_s(flight, decisive_s(flight))
+    time_s = _telling_s(evidence)
     if time_s is None:
-        return last_far(flight, moments)
+        return last_far(evidence.flight, moments)
     return min(moments, key=lambda each: abs(each.time_s - time_s), default=None)
 
 
-def _telling_s(flight: Flight, end_s: float) -> float | None:
+def _telling_s(evidence: Evidence) -> float | None:
     """Return when a flight shows best why it ended so; None if nothing was to be seen."""
-    if flight.outcome == "collision" and flight.contacts:
-        body = flight.contacts[-1].body
+    flight, end_s = evidence.flight, evidence.decided_s
+    if evidence.hit:
+        body = evidence.hit.body
         return max(
             (s.time_s for s in flight.steps if body in s.objects_visible and s.time_s <= end_s),
             default=end_s,
@@ -120,25 +102,27 @@ def last_far(flight: Flight, moments: Sequence[Moment]) -> Moment | None:
     return moments[-1] if moments else None
 
 
-def _all(flight: Flight, end_s: float) -> Iterator[Moment]:
-    readable = [step.time_s for step in readable_steps(flight, end_s)]
+def _all(evidence: Evidence) -> Iterator[Moment]:
+    flight, end_s = evidence.flight, evidence.decided_s
+    readable = [step.time_s for step in evidence.readable_until(end_s)]
     if readable:
         yield Moment(time_s=readable[0], label="the marker can be read for the first time")
         gap = _longest_gap(readable, end_s)
         if gap:
             yield Moment(time_s=gap, label="the marker can be read for the last time before a gap")
-    reported = [s.time_s for s in flight.steps if s.time_s <= end_s and reports_marker(flight, s)]
-    targeted = [s.time_s for s in flight.steps if s.time_s <= end_s and target_of(s)]
+    until = [each for each in evidence.reports if each.step.time_s <= end_s]
+    reported = [each.step.time_s for each in until if each.marker]
+    targeted = [each.step.time_s for each in until if each.target_m]
+    elsewhere = [each.step.time_s for each in until if each.elsewhere]
     if reported:
         yield Moment(time_s=reported[0], label="the system reports the marker for the first time")
     elif targeted:
         yield Moment(time_s=targeted[0], label="the system has a target for the first time")
-    elsewhere = [each.time_s for each in flight.steps if reports_other_place(flight, each)]
-    if elsewhere and elsewhere[0] <= end_s:
+    if elsewhere:
         yield Moment(time_s=elsewhere[0], label="the system reports another place")
-    last = last_report_s(flight, end_s)
+    last = evidence.last_report_s(end_s)
     if last is not None and end_s - last > BEFORE_END_S:
-        verb = "reports the marker" if reports_detections(flight) else "has its target there"
+        verb = "reports the marker" if evidence.reports_detections else "has its target there"
         yield Moment(time_s=last, label=f"the system {verb} for the last time")
     low = _descends_below(flight, COMMIT_M, end_s)
     if low is not None:
@@ -147,12 +131,11 @@ def _all(flight: Flight, end_s: float) -> Iterator[Moment]:
         yield Moment(time_s=best.time_s, label="the marker is best to read")
     if flight.outcome in NO_LANDING and (lowest := _turns_back(flight, end_s)) is not None:
         yield Moment(time_s=lowest, label="the UAV turns back up")
-    body = flight.contacts[-1].body if flight.outcome == "collision" and flight.contacts else ""
-    if body and flight.contacts[-1].body_class == "dynamic":
-        yield from _sightings(flight, body, end_s)
+    if evidence.hit and evidence.hit.body_class == "dynamic":
+        yield from _sightings(flight, evidence.hit.body, end_s)
     if end_s > 2 * BEFORE_END_S:
         yield Moment(time_s=end_s - BEFORE_END_S, label=f"{BEFORE_END_S:g} s before the end")
-    yield Moment(time_s=end_s, label=_end_label(flight, body))
+    yield Moment(time_s=end_s, label=_end_label(evidence))
     if flight.elapsed_s - end_s > BEFORE_END_S:
         yield Moment(time_s=flight.elapsed_s, label="the flight ends")
 
@@ -200,14 +183,13 @@ def _turns_back(flight: Flight, end_s: float) -> float | None:
     return float(times[sunk[0] + lowest])
 
 
-def _end_label(flight: Flight, body: str) -> str:
-    if body == "ground":
-        return "the UAV hits the ground"
-    if body:
-        return f"the UAV hits {body}"
+def _end_label(evidence: Evidence) -> str:
+    if evidence.hit:
+        body = evidence.hit.body
+        return f"the UAV hits {'the ground' if body == 'ground' else body}"
     return {
         "landed": "the UAV touches down",
         "slid": "the UAV touches down",
         "gave_up": "the landing system gives up",
         "crashed": "the landing system fails",
-    }.get(flight.outcome, "the flight ends")
+    }.get(evidence.flight.outcome, "the flight ends")

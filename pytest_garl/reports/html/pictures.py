@@ -25,6 +25,7 @@ from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.simulation.camera.renderer import Renderer
 from pytest_garl.simulation.environment import environment_at
 from pytest_garl.verdicts.detectability import readable_probability
+from pytest_garl.verdicts.evidence import Evidence
 
 STILL_PX = (400, 300)
 STILL_QUALITY = 76
@@ -49,7 +50,7 @@ class Still:
 
 
 def stills_of(
-    flight: Flight, scenario: Scenario, renderer: Renderer, moments: Sequence[Moment]
+    evidence: Evidence, scenario: Scenario, renderer: Renderer, moments: Sequence[Moment]
 ) -> tuple[tuple[Still, ...], str]:
     """Return the pictures at the moments, and a small one of the moment that shows the cause.
 
@@ -57,7 +58,7 @@ def stills_of(
     """
     pane, shown = CameraPane(renderer), scenario
     found, small = [], ""
-    shows = telling_moment(flight, moments)
+    flight, shows = evidence.flight, telling_moment(evidence, moments)
     for moment in moments:
         step = _step_at(flight.steps, moment.time_s)
         time_s = step.time_s if step else moment.time_s

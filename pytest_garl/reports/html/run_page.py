@@ -21,7 +21,7 @@ from pytest_garl.reports.search_summary import LEGEND, SearchSummary
 from pytest_garl.reports.shares_text import in_control_text, kinds_lines, percent
 
 PHASES = ("take-off", "transit", "search", "approach", "descent", "last-metre", "standing")
-"""Phases of a landing (``verdicts/phases.py``), in its order."""
+"""Phases of a landing (``verdicts/evidence.py``), in its order."""
 NO_PHASE = "not of a phase"
 MOST_THUMBNAILS = 24
 """So that the index stays below 300 kB: a small picture takes some 6 kB."""

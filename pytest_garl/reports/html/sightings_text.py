@@ -8,38 +8,34 @@ import numpy as np
 
 from pytest_garl.cases.case import OBSERVED_WITHIN_S
 from pytest_garl.cases.observation import OBSERVABLE_PX, pixels_of
-from pytest_garl.flight.flight import Flight, Step
+from pytest_garl.flight.flight import Step
 from pytest_garl.flight.thresholds import up_m
 from pytest_garl.messages import shortened
 from pytest_garl.reports.html.flight_view import gap_m, phases
-from pytest_garl.reports.html.moments import decisive_s
-from pytest_garl.verdicts.sightings import (
-    readable_steps,
-    reporting_steps,
-    reports_detections,
-    reports_targets,
-)
+from pytest_garl.verdicts.evidence import Evidence
 
 MOST_PHASES = 8
 
 
-def sighting_sentences(flight: Flight) -> tuple[str, ...]:
+def sighting_sentences(evidence: Evidence) -> tuple[str, ...]:
     """Return the sentences in the order of a landing: the marker, the reports, the body."""
-    if not flight.steps:
+    if not evidence.flight.steps:
         return ("The record holds no camera frames.",)
-    end_s = decisive_s(flight)
-    steps = [step for step in flight.steps if step.time_s <= end_s]
-    return (*_marker(flight, steps, end_s), *_body(flight, steps, end_s), *_phases(steps, end_s))
+    end_s = evidence.decided_s
+    steps = [step for step in evidence.flight.steps if step.time_s <= end_s]
+    return (*_marker(evidence, steps), *_body(evidence, steps), *_phases(steps, end_s))
 
 
-def readable_and_reported(flight: Flight) -> tuple[int, int]:
+def readable_and_reported(evidence: Evidence) -> tuple[int, int]:
     """Return in how many frames the marker could be read, and in how many of these reported."""
-    readable = list(readable_steps(flight, decisive_s(flight)))
-    return len(readable), len(reporting_steps(flight, readable))
+    readable = evidence.readable_until(evidence.decided_s)
+    reporting = {id(step) for step in evidence.reporting}
+    return len(readable), sum(id(step) in reporting for step in readable)
 
 
-def _marker(flight: Flight, steps: Sequence[Step], end_s: float) -> Iterator[str]:
-    readable = list(readable_steps(flight, end_s))
+def _marker(evidence: Evidence, steps: Sequence[Step]) -> Iterator[str]:
+    end_s = evidence.decided_s
+    readable = evidence.readable_until(end_s)
     if not readable:
         in_frame = sum(step.marker_visible > 0 for step in steps)
         yield (
@@ -51,21 +47,21 @@ def _marker(flight: Flight, steps: Sequence[Step], end_s: float) -> Iterator[str
             f"The marker could be read in {len(readable)} of {len(steps)} frames, first at "
             f"{readable[0].time_s:.1f} s and last at {readable[-1].time_s:.1f} s."
         )
-    if not reports_detections(flight) and not reports_targets(flight):
+    if not evidence.reports_anything:
         yield "The landing system reports neither detections nor a target."
         return
-    what = "reported it" if reports_detections(flight) else "had a target at it"
-    told = [step.time_s for step in reporting_steps(flight, steps)]
+    what = "reported it" if evidence.reports_detections else "had a target at it"
+    told = [step.time_s for step in evidence.reporting if step.time_s <= end_s]
     if not told:
         yield f"The landing system never {what}."
         return
-    both = len(reporting_steps(flight, readable))
+    _, both = readable_and_reported(evidence)
     of = f"in {both} of these {len(readable)} frames, " if readable else ""
     yield f"The landing system {what} {of}first at {told[0]:.1f} s and last at {told[-1]:.1f} s."
 
 
-def _body(flight: Flight, steps: Sequence[Step], end_s: float) -> Iterator[str]:
-    contact = flight.contacts[-1] if flight.outcome == "collision" and flight.contacts else None
+def _body(evidence: Evidence, steps: Sequence[Step]) -> Iterator[str]:
+    flight, contact = evidence.flight, evidence.hit
     if contact is None or contact.body_class != "dynamic":
         return
     body = contact.body
@@ -78,8 +74,8 @@ def _body(flight: Flight, steps: Sequence[Step], end_s: float) -> Iterator[str]:
     up = up_m(float(flight.uav.position_m[index, 2]))
     yield (
         f"The camera showed {body} in {frames}, first at {seen[0]:.1f} s, which is "
-        f"{end_s - seen[0]:.1f} s before the contact: the UAV was {up:.1f} m up, and the nearest "
-        f"NPC {float(gap_m(flight)[index]):.1f} m away."
+        f"{contact.time_s - seen[0]:.1f} s before the contact: the UAV was {up:.1f} m up, and the "
+        f"nearest NPC {float(gap_m(flight)[index]):.1f} m away."
     )
     recent = [s for s in steps if s.time_s >= contact.time_s - OBSERVED_WITHIN_S]
     shown = [pixels_of(step, body) for step in recent if body in step.objects_visible]

@@ -13,7 +13,7 @@ from pytest_garl.reports.html.flight_view import gap_m
 from pytest_garl.reports.mcap.numbers import Numbers
 from pytest_garl.reports.mcap.values import Logged, ns
 from pytest_garl.verdicts.detectability import readable_probability
-from pytest_garl.verdicts.sightings import target_of
+from pytest_garl.verdicts.evidence import target_of
 from pytest_garl.verdicts.verdict import Limits
 
 STATE, SIGHT, MARGINS = "/state", "/sight", "/margins"

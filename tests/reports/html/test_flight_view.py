@@ -19,6 +19,7 @@ from pytest_garl.reports.html.flight_view import (
     strips,
 )
 from pytest_garl.scenarios.object_types import OBJECT_TYPES
+from pytest_garl.verdicts.evidence import Evidence
 from tests.support.recorded_flights import recorded, seen
 from tests.support.videos import TARGET, Video
 
@@ -36,7 +37,7 @@ def standing(flight: Flight, x: float, kind: str = "person") -> ObjectRecord:
 
 def test_data_are_json_and_of_one_length() -> None:
     flight = recorded(steps=seen(range(20, 60), reported=range(25, 60)))
-    data = flight_data(flight, ())
+    data = flight_data(Evidence(flight), ())
     json.dumps(data, allow_nan=False)
     count = len(data["t"])
     assert data["t"][-1] == 10.0
@@ -47,13 +48,13 @@ def test_data_are_json_and_of_one_length() -> None:
 
 def test_the_readings_of_a_rangefinder_are_a_line_with_gaps() -> None:
     without = recorded(steps=seen(range(20, 60)))
-    assert "laser" not in {line["kind"] for line in flight_data(without, ())["metres"]}
+    assert "laser" not in {line["kind"] for line in flight_data(Evidence(without), ())["metres"]}
     steps = tuple(
         dataclasses.replace(step, rangefinder_m=5.5 if step.time_s < 4.0 else None)
         for step in without.steps
     )
     flight = dataclasses.replace(without, steps=steps, rangefinder=Rangefinder(most_m=6.0))
-    data = flight_data(flight, ())
+    data = flight_data(Evidence(flight), ())
     (line,) = (line for line in data["metres"] if line["kind"] == "laser")
     shown = dict(zip(data["t"], line["values"], strict=True))
     assert (shown[2.0], shown[5.0]) == (5.5, None)
@@ -61,7 +62,7 @@ def test_the_readings_of_a_rangefinder_are_a_line_with_gaps() -> None:
 
 def test_a_long_flight_is_thinned_and_keeps_its_end() -> None:
     places = np.tile([0.0, 0.0, 9.0], (24 * 300, 1))
-    data = flight_data(recorded(steps=(), places=places, end_s=300.0), ())
+    data = flight_data(Evidence(recorded(steps=(), places=places, end_s=300.0)), ())
     assert len(data["t"]) <= MOST_SAMPLES + 1
     assert data["t"][-1] == round((len(places) - 1) / 24, 2)
 
@@ -79,19 +80,19 @@ def test_an_object_of_an_unknown_type_has_a_gap_too() -> None:
     flight = recorded(steps=(), places=np.tile([0.0, 0.0, 1.0], (10, 1)))
     strange = dataclasses.replace(flight, objects=(standing(flight, 5.0, "robot"),))
     assert (gap_m(strange) > 3).all()
-    json.dumps(flight_data(strange, ()), allow_nan=False)
+    json.dumps(flight_data(Evidence(strange), ()), allow_nan=False)
 
 
 def test_strips_are_the_spans_in_which_something_held() -> None:
     steps = seen([*range(10, 20), *range(40, 50)], reported=range(15, 20))
-    readable, reported = strips(recorded(steps=steps))
+    readable, reported = strips(Evidence(recorded(steps=steps)))
     assert readable.spans == ((1.0, 2.0), (4.0, 5.0))
     assert reported.spans == ((1.5, 2.0),)
 
 
 def test_a_report_of_another_place_is_a_strip_of_its_own() -> None:
     steps = seen(range(10, 20), reported=range(10, 20), place=(5.0, 5.0, 0.0))
-    names = {each.name: each.spans for each in strips(recorded(steps=steps))}
+    names = {each.name: each.spans for each in strips(Evidence(recorded(steps=steps)))}
     assert names["system reports it"] == ()
     assert names["system reports another place"] == ((1.0, 2.0),)
 
@@ -111,7 +112,7 @@ def test_phases_are_spans_and_never_too_many() -> None:
 
 
 def test_target_and_plan_of_a_real_flight_are_shown(video: Video) -> None:
-    data = flight_data(video.flight, ())
+    data = flight_data(Evidence(video.flight), ())
     ((_, x, y), *_) = data["targets"]
     # The system reports it in its own frame, in which the estimated position errs.
     assert np.hypot(x - TARGET[0], y - TARGET[1]) < 0.5

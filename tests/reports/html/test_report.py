@@ -20,6 +20,7 @@ from pytest_garl.flight.flight import Crash
 from pytest_garl.reports.html.index_markdown import index_parts
 from pytest_garl.reports.html.moments import moments_of, telling_moment
 from pytest_garl.reports.html.report import WrittenReport, write_html_report
+from pytest_garl.verdicts.evidence import Evidence
 from tests.reports.html.test_rendering import HOSTILE, Elements
 from tests.support.ffmpeg import hide_encoders
 from tests.support.report_ledgers import Flown, write_ledger
@@ -266,8 +267,9 @@ def test_the_picture_of_a_build_is_the_one_that_shows_the_cause(
     flight = dataclasses.replace(video.flight, uav=dataclasses.replace(uav, position_m=sinks))
     write_ledger(tmp_path, [Flown(result=lost(), flight=flight)])
     (kind,) = write(tmp_path).page.kinds
-    moments = moments_of(flight)
-    shows = telling_moment(flight, moments)
+    evidence = Evidence(flight)
+    moments = moments_of(evidence)
+    shows = telling_moment(evidence, moments)
     assert shows is not None
     assert shows != moments[-1]
     page = kind_page(tmp_path)
