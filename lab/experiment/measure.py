@@ -28,7 +28,6 @@ from pytest_garl.verdicts.verdict import Limits, Verdict
 
 HASH_DIGITS = 12
 """Number of digits of a hash in a row."""
-FACT_VERSION, FACT_SOURCES = "version", "sources of pytest-garl"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -99,7 +98,7 @@ def result_row(
         result_hash=ledger.queries.result_hash(search.key)[:HASH_DIGITS],
         limits=limits_text(search.job.limits),
         **_violations(search),
-        **_diversity(search, str(ledger.fact("domain"))),
+        **_diversity(search, str(ledger.facts.domain)),
         **_durations(search, ledger),
         **_versions(search.job, ledger),
     )
@@ -162,8 +161,8 @@ def _versions(job: FlightJob, ledger: Ledger) -> dict[str, Any]:
         "map_sha256": job.map_sha256[:HASH_DIGITS],
         "policy": job.npcs.name,
         "policy_sha256": job.npcs.sha256[:HASH_DIGITS],
-        "version": str(ledger.fact(FACT_VERSION)),
-        "package_sha256": str(ledger.fact(FACT_SOURCES)),
+        "version": str(ledger.facts.version),
+        "package_sha256": str(ledger.facts.package_sha256),
     }
 
 

@@ -114,7 +114,7 @@ def _has_ledger(ledger: Path) -> bool:
     if not ledger.is_file():
         return False
     with contextlib.suppress(LedgerError), closing(Ledger(ledger)) as opened:
-        return opened.fact("ledger") is not None
+        return opened.facts.ledger_version is not None
     return False
 
 

@@ -41,9 +41,6 @@ from pytest_garl.scenarios.files import dump_scenario, parse_scenario
 from pytest_garl.scenarios.scenario import Scenario
 from pytest_garl.verdicts.verdict import Verdict, cause_of
 
-TWIN = "twin "
-"""Begins the ledger's fact about a twin: by its key, the search whose violation it is of."""
-
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class KnownCase:
@@ -158,7 +155,7 @@ def request_twin(
     text = dump_scenario(twin)
     flight = FlightId(search=search_key(f"twin {search} {job.flown_facts()} {text}"), map=job.map)
     ledger.add_flight(flight, job.system.name, job.dumps(), text)
-    ledger.first_fact(f"{TWIN}{flight.search}", search)
+    ledger.facts.note_twin(flight.search, search)
     return Twin(flight=flight, scenario=twin, cause=cause)
 
 

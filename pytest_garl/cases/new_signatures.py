@@ -15,11 +15,6 @@ from pytest_garl.execution.ledger import Ledger
 from pytest_garl.execution.ledger_queries import LedgerFlight
 from pytest_garl.scenarios.files import parse_scenario
 
-EXPECTED = "cases known before the search "
-"""Prefix of the ledger's facts: by search, the files of the cases that were known when they were
-asked for first.  Cases are saved later, and a run that is resumed after some of them were saved has
-the same new signatures."""
-
 
 class NewSignatures:
     """Makes a request of each signature that no saved case excuses, generation by generation.
@@ -105,11 +100,9 @@ def request_of(
 
 def known_cases(ledger: Ledger, corpus: Corpus, search: str, job: FlightJob) -> list[KnownCase]:
     """Return the cases that were known when a search was asked about first."""
-    key = f"{EXPECTED}{search}"
     expected = corpus.expected_cases(job.system.name, job.map)
-    noted = ledger.fact(key)
-    if noted is None:
-        noted = ledger.first_fact(key, sorted(entry.path.name for entry, _ in expected))
+    names = sorted(entry.path.name for entry, _ in expected)
+    noted = ledger.facts.first_known_cases(search, names)
     return [
         KnownCase(name=entry.path.name, case=case)
         for entry, case in expected

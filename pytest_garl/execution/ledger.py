@@ -18,26 +18,24 @@ from pytest_garl.execution.database import (
     SearchKind,
     set_aside,
 )
+from pytest_garl.execution.facts import Facts
 from pytest_garl.execution.flight_id import CompletedFlight, FlightId
 from pytest_garl.execution.ledger_queries import LedgerQueries
 from pytest_garl.execution.ledger_queue import WorkQueue
 from pytest_garl.execution.result import FlightResult, parse_result
-from pytest_garl.files.json_values import parse_json
 from pytest_garl.messages import shortened
-
-SESSION_FACT = "session "
-"""Prefix of the keys of facts that hold for one session of pytest; a resumed run forgets them."""
 
 
 class Ledger:
     """A run's facts, searches, slots and results; several processes may use it at once.
 
-    ``queue`` hands out the slots, ``queries`` reads what was flown.
+    ``facts`` are about the run, ``queue`` hands out the slots, ``queries`` reads what was flown.
     """
 
     def __init__(self, path: Path) -> None:
         self.path = path
         self.database = Database(path)
+        self.facts = Facts(self.database, path)
         self.queue = WorkQueue(self.database)
         self.queries = LedgerQueries(self.database)
 
@@ -52,9 +50,7 @@ class Ledger:
             raise LedgerError(f"{path}: {error.strerror}. {REMEDY}") from error
         ledger = cls(path)
         ledger.database.create_tables()
-        facts = {**run, "ledger": VERSION}
-        rows = [(key, json.dumps(value)) for key, value in sorted(facts.items())]
-        ledger.database.executemany("INSERT INTO run VALUES (?, ?)", rows)
+        ledger.facts.note_run({**run, "ledger": VERSION})
         return ledger
 
     @classmethod
@@ -67,7 +63,7 @@ class Ledger:
             raise LedgerError(f"--garl-resume: there is no ledger at {path}; run without it first")
         try:
             ledger = cls(path)
-            version = ledger.fact("ledger")
+            version = ledger.facts.ledger_version
             problem = ledger.database.execute("PRAGMA quick_check").fetchone()[0]
         except LedgerError as error:
             problem, version = str(error.__cause__ or error), VERSION
@@ -77,7 +73,7 @@ class Ledger:
                 "--garl-resume to start over"
             )
         wanted = {**run, "ledger": VERSION}
-        found = {"ledger": version, **{key: ledger.fact(key) for key in run}}
+        found = {"ledger": version, **ledger.facts.of_run(run)}
         differing = [key for key in wanted if wanted[key] != found[key]]
         if differing:
             facts = "; ".join(
@@ -88,7 +84,7 @@ class Ledger:
                 "run without --garl-resume to start over"
             )
         ledger.queue.reset()
-        ledger.database.execute("DELETE FROM run WHERE key LIKE ?", (f"{SESSION_FACT}%",))
+        ledger.facts.forget_session()
         return ledger
 
     def close(self) -> None:
@@ -100,30 +96,6 @@ class Ledger:
         for suffix in ("", "-wal", "-shm"):
             self.path.with_name(self.path.name + suffix).unlink(missing_ok=True)
         self.path.with_suffix(".lock").unlink(missing_ok=True)
-
-    def note_fact(self, key: str, value: Any) -> None:
-        """Set a fact about the run."""
-        self.database.execute("INSERT OR REPLACE INTO run VALUES (?, ?)", (key, json.dumps(value)))
-
-    def fact(self, key: str) -> Any:
-        """Return a fact about the run, or None."""
-        row = self.database.execute("SELECT value FROM run WHERE key = ?", (key,)).fetchone()
-        try:
-            return None if row is None else parse_json(row[0])
-        except ValueError as error:
-            raise LedgerError(f"{self.path}: the fact {key!r} is damaged: {error}") from error
-
-    def count_facts(self, prefix: str) -> int:
-        """Return how many facts have keys that begin with a prefix."""
-        row = self.database.execute(
-            "SELECT count(*) FROM run WHERE substr(key, 1, ?) = ?", (len(prefix), prefix)
-        ).fetchone()
-        return int(row[0])
-
-    def first_fact(self, key: str, value: Any) -> Any:
-        """Set a fact unless it is set already; return its value."""
-        self.database.execute("INSERT OR IGNORE INTO run VALUES (?, ?)", (key, json.dumps(value)))
-        return self.fact(key)
 
     def add_search(
         self, search: str, system: str, map: str, wanted: int, job: str, kind: SearchKind = "search"

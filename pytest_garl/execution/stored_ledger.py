@@ -141,7 +141,7 @@ def _wrong_type(ledger: Ledger, table: str) -> str:
 
 
 def _wrong_version(ledger: Ledger) -> str:
-    found = ledger.fact("ledger")
+    found = ledger.facts.ledger_version
     wrong = f"found a ledger of version {shown(found)}, expected {VERSION}"
     return "" if found == VERSION else wrong
 

@@ -127,7 +127,7 @@ def baseline_from_ledger(path: Path) -> Baseline:
         searches = [
             (parse_job(job), ledger.queries.flights(search)) for search, job in ledger.searches()
         ]
-        method = str(ledger.fact("method") or "")
+        method = ledger.facts.method or ""
     sets = []
     for job, rows in searches:
         _check_npcs(path, job.npcs)

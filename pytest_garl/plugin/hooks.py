@@ -224,7 +224,7 @@ def pytest_runtest_makereport(
         try:
             if report.when == "call":
                 report_item(report, item, run, target, call.excinfo.value if call.excinfo else None)
-            run.claims.note_ran(item.nodeid)
+            run.ledger.facts.note_ran(item.nodeid)
         except GarlError as error:
             fail_report(report, error)
     return report

@@ -204,7 +204,7 @@ def first_with_same_signature(run: Run, target: Target, failure: ItemFailure, no
             for item in run.items[other.flight]
             if item.shows
             and (failure.failed_assertion is None or item.test == failure.test)
-            and not run.claims.has_run(item.nodeid)
+            and not run.ledger.facts.has_run(item.nodeid)
         ]
         shows = waiting and failure.shows_in(run, other, run.flight(other))
         if shows and not failure.user_property and run.known.excuse(other, failure.signature).known:

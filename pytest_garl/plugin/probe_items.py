@@ -49,8 +49,6 @@ if TYPE_CHECKING:
 
 PASSED = "probes.json"
 """The file beside the ledger that names the landing systems whose probes have passed."""
-VIOLATED = "violated probes of "
-"""Prefix of the ledger's facts: by search, signature and hash of each flight that violated."""
 
 
 class ProbesPlugin:
@@ -175,12 +173,12 @@ class _Flown:
         """Note in the ledger which flights violate, for the process that saves cases."""
         violated = self.violated()
         found = [
-            [flight.signature, flight.sha256]
+            (flight.signature, flight.sha256)
             for probe, flight in self.results
             if probe in violated and flight.sha256
         ]
         if found:
-            self._run.ledger.note_fact(f"{VIOLATED}{self._target.search}", found)
+            self._run.ledger.facts.note_violated_probes(self._target.search, found)
 
     def _line(self, probe: Probe, verdict: Verdict) -> str:
         """Return how a probe ended."""
@@ -217,7 +215,7 @@ def probe_requests(ledger: Ledger, budget: int) -> tuple[CaseRequest, ...]:
     """
     requests: dict[str, CaseRequest] = {}
     for search, _ in ledger.searches():
-        for signature, sha256 in ledger.fact(f"{VIOLATED}{search}") or ():
+        for signature, sha256 in ledger.facts.violated_probes(search):
             flight = ledger.queries.flight_with_hash(sha256)
             job = ledger.job(flight.id.search) if flight is not None else None
             if flight is None or job is None:

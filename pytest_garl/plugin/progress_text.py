@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 from pytest_garl.execution.ledger import Ledger
 from pytest_garl.execution.ledger_queries import SearchProgress
-from pytest_garl.plugin.run import SELECTED, Run
+from pytest_garl.plugin.run import Run
 from pytest_garl.plugin.terminal_text import counted, duration
 from pytest_garl.plugin.time_left import TimeLeft
 
@@ -137,7 +137,7 @@ class ProgressReader:
             return None
         self._last_read = now
         queries = ledger.queries
-        searches, selected = queries.progress(), int(ledger.fact(SELECTED) or 0)
+        searches, selected = queries.progress(), ledger.facts.selected
         if not searches:
             return None
         self._began = self._began or now

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 import functools
 import os
 from collections.abc import Callable, Mapping, Sequence
@@ -17,10 +16,11 @@ from pytest_garl.cases.reference_proofs import Proofs, proves_reference
 from pytest_garl.cases.replay import SourceHashes, stale_reasons
 from pytest_garl.errors import LedgerError
 from pytest_garl.execution.batch import fly_all
+from pytest_garl.execution.facts import Facts
 from pytest_garl.execution.first_violations import FirstViolations
 from pytest_garl.execution.flight_id import CompletedFlight, FlightId, Slot
 from pytest_garl.execution.job import parse_job
-from pytest_garl.execution.ledger import SESSION_FACT, Ledger
+from pytest_garl.execution.ledger import Ledger
 from pytest_garl.execution.pool import Pool, wait_for
 from pytest_garl.execution.reference import Reference, simulator_sha256
 from pytest_garl.execution.sources import combined_sha256
@@ -28,7 +28,6 @@ from pytest_garl.plugin.keys import target_of
 from pytest_garl.plugin.options import Options
 from pytest_garl.plugin.search_setup import Searches
 from pytest_garl.plugin.target import Target
-from pytest_garl.reports.search_summary import CAMERA, DOMAINS
 from pytest_garl.scenarios.files import parse_scenario
 from pytest_garl.scenarios.maps.loading import load_map
 from pytest_garl.scenarios.scenario import Scenario
@@ -40,8 +39,6 @@ if TYPE_CHECKING:
     from pytest_garl.cases.investigations import Investigations
     from pytest_garl.plugin.user_assertions import ItemAssertion
 
-SELECTED = "selected flights"
-"""The ledger's fact: how many flights of searches the selected tests want."""
 REFLIGHTS = 4
 """A violation of a system that need not be deterministic is flown so many times more."""
 NOTHING_KNOWN = Excuse(known=None)
@@ -91,37 +88,24 @@ class ReportClaims:
     them when a run is resumed, because its tests run again.
     """
 
-    ledger: Ledger
+    facts: Facts
 
     def claim_slot(self, target: Target, nodeid: str) -> bool:
         """Claim a slot for an item; return whether no other item claimed it earlier."""
-        key = f"{SESSION_FACT}slot {target.search} {target.slot.id(target.map)}"
-        return bool(self.ledger.first_fact(key, nodeid) == nodeid)
+        return self.facts.claim_slot(target.search, target.slot.id(target.map), nodeid)
 
     def claim_failure(self, key: str, slot: str, nodeid: str) -> str:
         """Claim a failure for an item; return the slot of the item that claimed it earlier, if any.
 
         ``key`` identifies the failure in all processes.
         """
-        first_slot, first_nodeid = self.ledger.first_fact(_failure_fact(key), [slot, nodeid])
-        return "" if first_nodeid == nodeid else str(first_slot)
+        first_slot, first_nodeid = self.facts.claim_failure(key, slot, nodeid)
+        return "" if first_nodeid == nodeid else first_slot
 
     def reporting_slot(self, key: str, nodeid: str) -> str:
         """Return the slot of another item that has claimed a failure; empty if there is none."""
-        first = self.ledger.fact(_failure_fact(key))
-        return str(first[0]) if first is not None and first[1] != nodeid else ""
-
-    def note_ran(self, nodeid: str) -> None:
-        """Note that a test has run; its claims are in the ledger by then."""
-        self.ledger.note_fact(f"{SESSION_FACT}ran {nodeid}", value=True)
-
-    def has_run(self, nodeid: str) -> bool:
-        """Return whether a test has run in any process."""
-        return bool(self.ledger.fact(f"{SESSION_FACT}ran {nodeid}"))
-
-
-def _failure_fact(key: str) -> str:
-    return f"{SESSION_FACT}failure {key}"
+        first = self.facts.claimed_failure(key)
+        return first[0] if first is not None and first[1] != nodeid else ""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -198,28 +182,29 @@ class Run:
 
         Raises LedgerError if a search to resume flew something else.
         """
-        files: dict[str, set[str]] = {}
-        domains: dict[str, set[str]] = {}
+        files: dict[tuple[str, str], set[str]] = {}
+        domains: dict[tuple[str, str], set[str]] = {}
         for item in items:
             target = target_of(item)
             if target is not None:
                 self.searches.select(target)
                 self.items.setdefault(target.flight, []).append(selected(item))
-                search = f"{target.system_name} on {target.map}"
-                files.setdefault(search, set()).add(item.nodeid.partition("::")[0])
+                place = target.system_name, target.map
+                files.setdefault(place, set()).add(item.nodeid.partition("::")[0])
                 if target.is_searched and target.domain and not self.options.repeat:
-                    domains.setdefault(search, set()).add(target.domain.label)
+                    domains.setdefault(place, set()).add(target.domain.label)
         # xdist's controller, which writes the summary and the progress line, has no items.
-        for search, names in files.items():
-            self.ledger.note_fact(f"files of {search}", " ".join(sorted(names)))
-        for search, labels in domains.items():
-            _note_domains(self.ledger, search, labels, resumed=self.options.resume)
-        _note_cameras(self.ledger, items)
+        facts = self.ledger.facts
+        for (system, map), names in files.items():
+            facts.note_files(system, map, names)
+        for (system, map), labels in domains.items():
+            _note_domains(facts, system, map, labels, resumed=self.options.resume)
+        _note_cameras(facts, items)
         wanted = self.searches.targets.values()
         searched = [slots for slots in wanted if not any(each.entry for each in slots.values())]
         self.search_sizes = [len(slots) for slots in searched]
         if searched:
-            self.ledger.note_fact(SELECTED, sum(self.search_sizes))
+            facts.note_selected(sum(self.search_sizes))
         if self.options.resume:
             self.searches.check_resumed()
 
@@ -247,7 +232,7 @@ class Run:
     @functools.cached_property
     def claims(self) -> ReportClaims:
         """Which item of which process reports what."""
-        return ReportClaims(ledger=self.ledger)
+        return ReportClaims(facts=self.ledger.facts)
 
     def fly(self, target: Target, npcs: PolicySpec | None) -> CompletedFlight:
         """Return a slot's flight after it and all lower selected slots are flown."""
@@ -452,22 +437,19 @@ class KnownViolations:
             kinds.advance()
 
 
-def _note_cameras(ledger: Ledger, items: Sequence[pytest.Item]) -> None:
-    """Note the camera of each landing system, so that a report can draw its frames again."""
+def _note_cameras(facts: Facts, items: Sequence[pytest.Item]) -> None:
     targets = {each.system_name: each for item in items if (each := target_of(item)) is not None}
     for name, target in targets.items():
-        airframe = target.airframe
-        if airframe is not None:
-            ledger.note_fact(f"{CAMERA}{name}", dataclasses.asdict(airframe.camera))
+        if target.airframe is not None:
+            facts.note_camera(name, target.airframe.camera)
 
 
-def _note_domains(ledger: Ledger, search: str, wanted: set[str], *, resumed: bool) -> None:
+def _note_domains(facts: Facts, system: str, map: str, wanted: set[str], *, resumed: bool) -> None:
     """Note in which domains a system is flown on a map; a resumed run has the same ones."""
-    key = f"{DOMAINS}{search}"
-    known = ledger.fact(key)
-    if resumed and known is not None and not wanted <= {*known}:
+    known = facts.domains(system, map)
+    if resumed and known and not wanted <= {*known}:
         raise LedgerError(
-            f"--garl-resume: the domain of {search} was {' and '.join(known)}, is "
+            f"--garl-resume: the domain of {system} on {map} was {' and '.join(known)}, is "
             f"{' and '.join(sorted(wanted))}; run without --garl-resume to begin anew"
         )
-    ledger.note_fact(key, sorted({*(known or ()), *wanted}))
+    facts.note_domains(system, map, wanted)

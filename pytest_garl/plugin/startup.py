@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any, TextIO
 import pytest
 
 from pytest_garl.errors import GarlError, LedgerError
+from pytest_garl.execution.facts import Facts
 from pytest_garl.execution.ledger import Ledger
 from pytest_garl.execution.local_pool import local_pool
 from pytest_garl.execution.pool import Pool
@@ -24,13 +25,9 @@ from pytest_garl.plugin.keys import RUN, is_xdist_worker
 from pytest_garl.plugin.options import Options
 from pytest_garl.plugin.run import Run
 from pytest_garl.plugin.termination import interrupt_on_sigterm
-from pytest_garl.reports.run_report import BEGAN, utc_now
 
 if TYPE_CHECKING:
     from pytest_garl.cases.investigations import Investigations
-
-EARLIER_FLIGHT_S = "seconds_per_flight"
-"""The ledger's fact: wall time of a flight in the run before, for the forecast."""
 
 
 def begin_run(config: pytest.Config, options: Options) -> None:
@@ -53,7 +50,7 @@ def begin_run(config: pytest.Config, options: Options) -> None:
             investigations=_investigations(config, options, ledger, pool),
             simulator=reference_to(own) if own else BUILT_IN,
             lock=lock,
-            flight_s=_flight_s(ledger),
+            flight_s=ledger.facts.earlier_flight_s,
         )
         interrupt_on_sigterm(config)
     except GarlError as error:
@@ -81,9 +78,9 @@ def _open_ledger(config: pytest.Config, options: Options) -> tuple[Ledger, TextI
         check_stored(ledger)
     else:
         ledger = Ledger.create(path, _facts(options))
-        ledger.note_fact(BEGAN, utc_now())
+        ledger.facts.note_began()
     if earlier_s:
-        ledger.note_fact(EARLIER_FLIGHT_S, earlier_s)
+        ledger.facts.note_earlier_flight_s(earlier_s)
     return ledger, lock
 
 
@@ -100,19 +97,19 @@ def _ledger_file(options: Options) -> Path:
 
 def _facts(options: Options) -> dict[str, Any]:
     """Return the facts that must be equal when the run is resumed."""
-    return {
-        "version": version("pytest-garl"),
-        "sources of pytest-garl": package_sha256()[:12],
-        "python": sys.version.split()[0],
-        "seed": options.seed,
-        "budget": options.budget,
-        # A scenario that is flown again is nobody's search.
-        "method": None if options.repeat else options.method,
-        "population": options.population,
-        "map": ",".join(options.maps),
-        "domain": options.domain.label,
-        "npcs": options.policy_in(options.domain),
-    }
+    return Facts.that_identify(
+        version=version("pytest-garl"),
+        package_sha256=package_sha256()[:12],
+        python=sys.version.split()[0],
+        seed=options.seed,
+        budget=options.budget,
+        # A scenario that is flown again belongs to no search.
+        method=None if options.repeat else options.method,
+        population=options.population,
+        map=",".join(options.maps),
+        domain=options.domain.label,
+        npcs=options.policy_in(options.domain),
+    )
 
 
 def _pool(ledger: Ledger, options: Options) -> Pool:
@@ -185,8 +182,3 @@ def _lock(ledger: Path) -> TextIO:
     file.write(str(os.getpid()))
     file.flush()
     return file
-
-
-def _flight_s(ledger: Ledger) -> float | None:
-    known = ledger.fact(EARLIER_FLIGHT_S)
-    return float(known) if isinstance(known, int | float) else None

@@ -10,7 +10,6 @@ from typing import Any
 
 import pytest
 
-from pytest_garl.cases.known_kinds import TWIN
 from pytest_garl.cases.reference_proofs import renewal_line
 from pytest_garl.messages import command
 from pytest_garl.plugin.films import film_lines
@@ -23,7 +22,6 @@ from pytest_garl.plugin.session_status import notes
 from pytest_garl.plugin.suggested_commands import repeat_kind_command, shown_path
 from pytest_garl.plugin.tally import Tally
 from pytest_garl.plugin.terminal_text import counted, width_of, wrapped
-from pytest_garl.reports.run_report import ENDED, USER_FAILURES, utc_now
 from pytest_garl.reports.search_summary import SearchSummary, ViolationKind, legend
 from pytest_garl.reports.shares_text import (
     headline_shares,
@@ -135,8 +133,8 @@ def _write_searches(reporter: Any, run: Run, tally: Tally) -> list[SearchSummary
     searches = _with_cases(run, tally.search_summaries(run.ledger))
     if run.options.searches_or_repeats:
         failures = [dataclasses.asdict(each) for each in tally.user_failures]
-        run.ledger.note_fact(USER_FAILURES, failures)
-        run.ledger.note_fact(ENDED, utc_now())
+        run.ledger.facts.note_user_failures(failures)
+        run.ledger.facts.note_ended()
     if searches:
         reporter.section("garl: violations", sep="=")
         for line in _lines_about(searches, run, tally, reporter):
@@ -209,7 +207,7 @@ def _costs(run: Run) -> str:
     meters = run.ledger.queries.meters()
     flying, idle = meters.get("flying_s", 0.0), meters.get("idle_s", 0.0)
     confirming = run.investigations.flown if run.investigations else 0
-    twins = run.ledger.count_facts(TWIN)
+    twins = run.ledger.facts.twins
     repeating = meters.get("on_demand", 0) - confirming - twins
     counts = {
         "flown again after a time-out or a kill": meters.get("retried", 0),

@@ -15,14 +15,11 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from pytest_garl.execution.ledger import SESSION_FACT
 from pytest_garl.plugin.keys import is_xdist_worker
 
 if TYPE_CHECKING:
     from pytest_garl.execution.ledger import Ledger
 
-INTERRUPTED = "interrupted"
-"""The ledger's fact: xdist's controller was interrupted, so its workers wait for no flight."""
 _LOOK_S = 0.5
 
 
@@ -72,7 +69,7 @@ def telling_workers(ledger: Ledger) -> Iterator[None]:
     try:
         yield
     except KeyboardInterrupt:
-        ledger.note_fact(f"{SESSION_FACT}{INTERRUPTED}", value=True)
+        ledger.facts.note_interrupted()
         raise
 
 
@@ -87,7 +84,7 @@ class ControllerWatch:
         if time.monotonic() - self._looked < _LOOK_S:
             return
         self._looked = time.monotonic()
-        if ledger.fact(f"{SESSION_FACT}{INTERRUPTED}"):
+        if ledger.facts.interrupted:
             raise KeyboardInterrupt
 
 

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from pytest_garl.cases.forecast import RemainingWork, expected_kinds, flights_after_search
 from pytest_garl.execution.job import parse_job
 from pytest_garl.execution.ledger import Ledger
-from pytest_garl.plugin.run import SELECTED, Run
+from pytest_garl.plugin.run import Run
 
 FIRST_FLIGHTS = 8
 """The time left is told after so many flights: half as many hold one kind or none of those that end
@@ -80,7 +80,7 @@ class TimeLeft:
         queries = ledger.queries
         searches = queries.progress()
         searched = sum(each.flown for each in searches)
-        wanted = max(int(ledger.fact(SELECTED) or 0), sum(each.total for each in searches))
+        wanted = max(ledger.facts.selected, sum(each.total for each in searches))
         expected = max(after, self._flights_after(ledger, searched, wanted))
         seconds = queries.flight_seconds()
         if searched + after < FIRST_FLIGHTS:

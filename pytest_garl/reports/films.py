@@ -18,7 +18,6 @@ from pytest_garl.messages import shortened
 from pytest_garl.reports.film import save_video
 from pytest_garl.reports.html.flight_task import FlightTask, record_of, task_of
 from pytest_garl.reports.html.page_workers import in_processes
-from pytest_garl.reports.search_summary import CAMERA
 from pytest_garl.scenarios.files import parse_scenario
 
 NO_RECORD = "its process ended before its record was written"
@@ -43,7 +42,7 @@ class FilmTask:
 
 def recorded_flight(ledger: Ledger, flight: LedgerFlight) -> FlightTask:
     """Return a flight of a ledger with all that its film needs."""
-    return task_of(ledger, flight, flight.scenario, ledger.fact(f"{CAMERA}{flight.system}"))
+    return task_of(ledger, flight, flight.scenario, ledger.facts.camera(flight.system))
 
 
 def why_no_camera(simulator: str) -> str:

@@ -9,7 +9,6 @@ from __future__ import annotations
 import contextlib
 import dataclasses
 from collections import Counter
-from datetime import UTC, datetime
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
@@ -36,16 +35,6 @@ from pytest_garl.verdicts.verdict import count_decided
 
 VERSION = 1
 SCHEMA = Path(__file__).with_name("report.schema.json")
-USER_FAILURES = "own failures"
-"""The ledger's fact with the failed assertions about users' own properties."""
-BEGAN, ENDED = "began", "ended"
-"""The ledger's facts: when the run began and ended, in UTC."""
-_RUN_FACTS = ("seed", "budget", "method", "population", "domain", "npcs", "python")
-
-
-def utc_now() -> str:
-    """Return the present time as the ledger's facts store it."""
-    return datetime.now(UTC).isoformat(timespec="seconds")
 
 
 def run_report_as_json(path: Path, corpus: Corpus) -> dict[str, Any]:
@@ -64,7 +53,7 @@ def summaries_of(ledger: Ledger, corpus: Corpus) -> list[SearchSummary]:
 
     Failed assertions about users' own properties are among the kinds.
     """
-    failures = [SlotUserFailure(**each) for each in ledger.fact(USER_FAILURES) or ()]
+    failures = [SlotUserFailure(**each) for each in ledger.facts.user_failures]
     cases = [entry.case for entry in corpus.all_entries() if entry.case is not None]
     return [each.with_cases(cases) for each in search_summaries(ledger, failures)]
 
@@ -82,15 +71,15 @@ def run_report_of(ledger: Ledger, path: Path, corpus: Corpus) -> dict[str, Any]:
     return {
         "schema": "pytest-garl-report",
         "version": VERSION,
-        "pytest_garl": ledger.fact("version") or version("pytest-garl"),
+        "pytest_garl": ledger.facts.version or version("pytest-garl"),
         "ledger": str(path),
-        "complete": ledger.fact(ENDED) is not None
+        "complete": ledger.facts.ended is not None
         and all(each.flown == each.total for each in progress),
-        "run": {key: ledger.fact(key) for key in _RUN_FACTS},
+        "run": ledger.facts.reported,
         "results_sha256": ledger.queries.result_hash(),
         "time": {
-            "began": ledger.fact(BEGAN),
-            "ended": ledger.fact(ENDED),
+            "began": ledger.facts.began,
+            "ended": ledger.facts.ended,
             "flying_s": meters.get("flying_s", 0.0),
             "idle_s": meters.get("idle_s", 0.0),
         },

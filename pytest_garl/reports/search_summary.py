@@ -29,10 +29,6 @@ NONE: Mapping[str, tuple[Severity, str]] = MappingProxyType({})
 NEVER_GAVE_UP = "late:never-gave-up"
 _BLOCKED = "The marker was blocked"
 """In the story of a flight in which something never left the marker free for long enough."""
-DOMAINS = "domains of "
-"""Begins the ledger's fact with the names of the domains of a system on a map."""
-CAMERA = "camera of "
-"""Begins the ledger's fact with the camera of a landing system, which its frames take."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -239,7 +235,7 @@ def search_summaries(
     failures: dict[tuple[str, str], list[SlotUserFailure]] = {}
     for each in user_failures:
         failures.setdefault((each.system, each.map), []).append(each)
-    method = ledger.fact("method")
+    method = ledger.facts.method
     return [
         _summary(ledger, system, map, method, flights, failures.get((system, map), []))
         for (system, map), flights in flown.items()
@@ -269,20 +265,19 @@ def _summary(
             before = flight.id.slot_id, finding.story
             findings.setdefault(finding.signature, []).append(before)
     jobs = _jobs(ledger, flights)
-    files = str(ledger.fact(f"files of {system} on {map}") or "")
     control = control_arm(method, flights)
     random = {f.id.slot_id for f in flights if is_control(method, f.id.slot.generation)}
     compares = control is not None and control.later.flights > 0
     return SearchSummary(
         system=system,
         map=map,
-        files=tuple(files.split()),
+        files=ledger.facts.files(system, map),
         flights=tuple(flights),
         kinds=_kinds(violations, _lowest_severities(flights), random if compares else None),
         violating=len({slot for items in violations.values() for slot, _ in items}),
         findings=_kinds(findings),
         limits=tuple(dict.fromkeys(job.limits for job in jobs)),
-        domains=tuple(ledger.fact(f"{DOMAINS}{system} on {map}") or ()),
+        domains=ledger.facts.domains(system, map),
         npcs=tuple(dict.fromkeys(job.npcs.name for job in jobs)),
         control=control,
     )

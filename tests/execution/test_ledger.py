@@ -10,7 +10,7 @@ import pytest
 from pytest_garl.errors import LedgerError
 from pytest_garl.execution.database import VERSION
 from pytest_garl.execution.flight_id import FlightId
-from pytest_garl.execution.ledger import SESSION_FACT, Ledger
+from pytest_garl.execution.ledger import Ledger
 from tests.execution.ledgers import FACTS, result_of, waiting_ledger
 from tests.support.results import flight_result
 
@@ -89,9 +89,9 @@ def test_resume_refuses_a_missing_ledger(tmp_path: Path) -> None:
 
 def test_resumed_ledger_forgets_the_facts_of_the_session(tmp_path: Path) -> None:
     ledger = waiting_ledger(tmp_path / "ledger.sqlite")
-    ledger.note_fact(f"{SESSION_FACT}ran test_one", value=True)
-    ledger.note_fact("files", "test_one.py")
+    ledger.facts.note_ran("test_one")
+    ledger.facts.note_selected(7)
     ledger.close()
     ledger = Ledger.resume(tmp_path / "ledger.sqlite", FACTS)
-    assert ledger.fact(f"{SESSION_FACT}ran test_one") is None
-    assert ledger.fact("files") == "test_one.py"
+    assert not ledger.facts.has_run("test_one")
+    assert ledger.facts.selected == 7

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-import dataclasses
 from collections.abc import Sequence
 from dataclasses import dataclass
+from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
@@ -17,8 +17,6 @@ from pytest_garl.flight.flight import Flight
 from pytest_garl.flight.flight_file import save
 from pytest_garl.landing_system import Camera
 from pytest_garl.npcs.catalogue import policy_spec
-from pytest_garl.reports.run_report import BEGAN, ENDED
-from pytest_garl.reports.search_summary import CAMERA
 from pytest_garl.scenarios.files import dump_scenario
 from pytest_garl.scenarios.maps.loading import load_map
 from pytest_garl.scenarios.scenario import Scenario
@@ -74,9 +72,9 @@ def write_ledger(
             (each.result.dumps(), sha256, search, index),
         )
     if camera is not None:
-        ledger.note_fact(f"{CAMERA}{system}", dataclasses.asdict(camera))
-    ledger.note_fact(f"files of {system} on lawn", "test_it.py")
-    ledger.note_fact(BEGAN, "2026-01-02T03:04:05+00:00")
-    ledger.note_fact(ENDED, "2026-01-02T03:05:05+00:00")
+        ledger.facts.note_camera(system, camera)
+    ledger.facts.note_files(system, "lawn", ["test_it.py"])
+    ledger.facts.note_began(datetime(2026, 1, 2, 3, 4, 5, tzinfo=UTC))
+    ledger.facts.note_ended(datetime(2026, 1, 2, 3, 5, 5, tzinfo=UTC))
     ledger.close()
     return path

@@ -15,7 +15,7 @@ from pytest_garl.messages import command, shortened
 from pytest_garl.reports.html.flight_tables import cut_text
 from pytest_garl.reports.html.flight_task import FlightTask, ShownFlight, task_of
 from pytest_garl.reports.html.naming import page_name, shown_file
-from pytest_garl.reports.search_summary import CAMERA, LEGEND, SearchSummary, ViolationKind
+from pytest_garl.reports.search_summary import LEGEND, SearchSummary, ViolationKind
 from pytest_garl.reports.shares_text import in_control_text
 from pytest_garl.scenarios.files import dump_scenario
 from pytest_garl.verdicts.wording import headline
@@ -88,7 +88,7 @@ def plan_kinds(
     filmed = {(i, j) for _, i, j in sorted(order)[:films]}
     for i, (search, told) in enumerate(zip(searches, found["searches"], strict=True)):
         cases = _cases(corpus, search)
-        camera = ledger.fact(f"{CAMERA}{search.system}")
+        camera = ledger.facts.camera(search.system)
         for j, (kind, row) in enumerate(zip(search.kinds, told["signatures"], strict=True)):
             first = search.flight(kind.first)
             as_found = task_of(ledger, first, first.scenario, camera)

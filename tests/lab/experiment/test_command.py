@@ -131,7 +131,7 @@ def test_rows_hold_the_figures_of_the_ledger(project: Path) -> None:
     assert row.paper == sum(verdict.paper_violation for verdict in verdicts)
     assert row.policy == "dqn"
     assert row.landing_system == "systems:Good"
-    assert row.package_sha256 == str(ledger.fact("sources of pytest-garl"))
+    assert row.package_sha256 == ledger.facts.package_sha256
 
 
 @pytest.mark.parametrize(
