@@ -235,6 +235,14 @@ class Case:
         return was_flown and not self.severity.is_guess
 
     @property
+    def shrinking(self) -> str:
+        """What shrinking removed, in words, or that the case was not shrunk."""
+        removed = self.evidence.removed
+        if removed == "nothing" and self.severity.about and not self.is_shrunk:
+            return "not shrunk"
+        return f"shrinking removed {removed}"
+
+    @property
     def asserting_test(self) -> str:
         """The name of the test whose own assertion failed; empty for the built-in verdict."""
         return asserting_test(self.test, self.assertion)

@@ -128,7 +128,6 @@ def list_(project: _Project) -> None:
 def show(project: _Project, file: Path) -> None:
     """Show what happens in a case, in words and physical units."""
     case = project.case(file)
-    evidence = case.evidence
     say(f"{case.id}  {case.status}  {case.system}")
     say(f"{case.violation.signature}: {case.violation.description}")
     if case.severity.about:
@@ -146,8 +145,8 @@ def show(project: _Project, file: Path) -> None:
     if not case.gates:
         say(f"\nIt gates nothing: {NO_GATE_TEXTS[case.reason]}.")
     tried = f"{case.robustness}; " if case.robustness else ""
-    moved = f"; objects were moved by {case.policy}" if case.moves else ""
-    say(f"\n{tried}shrinking removed {evidence.removed}{moved}")
+    moved = f"; the policy {case.policy} moved the objects" if case.moves else ""
+    say(f"\n{tried}{case.shrinking}{moved}")
     say(f"Fly it: {command('garl', 'cases', 'replay', file)}")
 
 

@@ -12,6 +12,7 @@ import sys
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
+from pytest_garl.errors import LandingSystemError
 from pytest_garl.execution.flight_id import FlightId
 from pytest_garl.execution.job import FlightJob
 from pytest_garl.execution.reference import BUILT_IN
@@ -48,7 +49,7 @@ def fly_and_save(job: FlightJob, scenario: Scenario, flight: FlightId, guard: An
         if entry not in sys.path:
             sys.path.append(entry)
     map = job.load_map()
-    system = job.system.load()
+    system = _loaded(job)
     if job.takeover is not None:
         system = with_takeover(system, job.takeover)
     flown = job.simulator.load()(
@@ -64,6 +65,16 @@ def fly_and_save(job: FlightJob, scenario: Scenario, flight: FlightId, guard: An
     except NotFiniteError as error:
         return FlownJob(wall_s=flown.wall_s, refusal=str(error))
     return FlownJob(wall_s=flown.wall_s)
+
+
+def _loaded(job: FlightJob) -> Any:
+    """Return the landing system; raise LandingSystemError if this process cannot import it."""
+    try:
+        return job.system.load()
+    except Exception as error:
+        raise LandingSystemError(
+            f"{job.system.name} cannot be imported by its name: {type(error).__name__}: {error}"
+        ) from error
 
 
 def judge_record(

@@ -69,8 +69,12 @@ class _Worker:
         """Return whether the process has ended; if so, end the rest of its session."""
         pid = self.process.pid
         # Popen.poll would free the id, by which the rest of the session is ended.
-        if os.waitid(os.P_PID, pid, os.WEXITED | os.WNOHANG | os.WNOWAIT) is None:
-            return False
+        try:
+            if os.waitid(os.P_PID, pid, os.WEXITED | os.WNOHANG | os.WNOWAIT) is None:
+                return False
+        except ChildProcessError:
+            # Somebody in this process ignores SIGCHLD, so that the kernel has buried it.
+            pass
         self._end_session()
         self.process.wait()
         return True

@@ -165,4 +165,14 @@ def check_system(system: Any) -> None:
                 f"system={system.__name__} has no method {method!r}; a landing system has "
                 "reset(mission) and step(observation)"
             )
-    reference_to(system)
+    reference = reference_to(system)
+    known = sys.modules.get(reference.module)
+    try:
+        operator.attrgetter(reference.qualname)(known)
+    except AttributeError as error:
+        if known is not None:
+            raise LandingSystemError(
+                f"system={reference.qualname}: the module {reference.module} has no class of this "
+                "name, by which worker processes import it; give the class the name that it has "
+                "in its module"
+            ) from error

@@ -11,6 +11,7 @@ from __future__ import annotations
 import signal
 from dataclasses import dataclass, replace
 
+from pytest_garl.errors import LandingSystemError
 from pytest_garl.execution.job import FlightJob, parse_job
 from pytest_garl.execution.ledger_queue import Claim, WorkQueue
 from pytest_garl.execution.result import FlightResult, broken_result
@@ -84,7 +85,10 @@ def _crash(ended: WorkerExit) -> Crash:
         return Crash(kind="hung", error="Timeout", message=ended.hung, traceback=ended.stacks)
     if ended.failure:
         error, message, text = ended.failure
-        message = f"the simulator, which flies the reference pilot, failed with {error}: {message}"
+        if error != LandingSystemError.__name__:
+            message = (
+                f"the simulator, which flies the reference pilot, failed with {error}: {message}"
+            )
         return Crash(kind="broke", error=error, message=message, traceback=text)
     how = f"signal {-ended.status}" if ended.status < 0 else f"exit status {ended.status}"
     return Crash(

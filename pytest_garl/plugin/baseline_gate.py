@@ -19,7 +19,14 @@ from pytest_garl.gate.pairs import PairResult
 from pytest_garl.messages import command
 from pytest_garl.npcs.catalogue import policy_spec
 from pytest_garl.plugin.abort import abort_session
-from pytest_garl.plugin.keys import GATE_PLUGIN, GATE_REPORT, RUN, is_xdist_worker, marker_of
+from pytest_garl.plugin.keys import (
+    FOUND,
+    GATE_PLUGIN,
+    GATE_REPORT,
+    RUN,
+    is_xdist_worker,
+    marker_of,
+)
 from pytest_garl.plugin.marker import read_marker
 from pytest_garl.plugin.options import Options
 from pytest_garl.plugin.run import Run
@@ -72,6 +79,7 @@ class BaselineGateItem(pytest.Item):
         hint = self._hint(comparison, run.options.baseline)
         self._report([*report_lines(comparison), *hint, *warning])
         if not comparison.passed:
+            self.user_properties.append((FOUND, "the gate failed"))
             # The summary lists the pairs, so the failure does not.
             pytest.fail("\n".join(summary_lines(comparison)), pytrace=False)
 
@@ -82,6 +90,7 @@ class BaselineGateItem(pytest.Item):
             "If the difference is intended, save a new baseline.",
         ]
         self._report(lines)
+        self.user_properties.append((FOUND, "the gate refused to compare"))
         pytest.fail("\n".join(lines), pytrace=False)
 
     def _report(self, lines: Iterable[str]) -> None:

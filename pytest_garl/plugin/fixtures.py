@@ -10,6 +10,8 @@ from pytest_garl.errors import GarlError
 from pytest_garl.plugin.abort import abort_session
 from pytest_garl.plugin.keys import (
     BODY_RUNS,
+    EXPECTED,
+    FLIGHT,
     LANDING,
     NO_PARAMETERS,
     OUTCOME,
@@ -56,7 +58,7 @@ def npcs(request: pytest.FixtureRequest) -> PolicySpec | None:
 @pytest.fixture
 def landing(request: pytest.FixtureRequest, garl_slot: Target, npcs: PolicySpec | None) -> Landing:
     """Return the landing of the item's slot; wait until it is flown."""
-    from pytest_garl.plugin.item_facts import another_test_fails
+    from pytest_garl.plugin.item_facts import another_test_fails, is_known_case
     from pytest_garl.plugin.item_report import end_unjudged
     from pytest_garl.plugin.landing import Landing
 
@@ -73,6 +75,7 @@ def landing(request: pytest.FixtureRequest, garl_slot: Target, npcs: PolicySpec 
         is_shown_elsewhere=lambda: another_test_fails(run, garl_slot, flight),
     )
     item.user_properties += [
+        (FLIGHT, garl_slot.flight_key),
         (OUTCOME, result.outcome),
         (SIGNATURE, result.signature),
         ("garl.story", result.verdict.story),
@@ -81,6 +84,8 @@ def landing(request: pytest.FixtureRequest, garl_slot: Target, npcs: PolicySpec 
         ("garl.elapsed_s", result.elapsed_s),
         (TRAJECTORY, flight.sha256),
     ]
+    if is_known_case(run, garl_slot, result):
+        item.user_properties.append((EXPECTED, flight.signature))
     if outside := garl_slot.outside_domain(run.options.map_folders):
         item.user_properties.append((OUTSIDE, outside))
     if reasons := run.unproven(garl_slot):

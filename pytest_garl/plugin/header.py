@@ -122,7 +122,8 @@ def _workers(run: Run) -> str:
     pool = ray if options.pool == "ray" else ""
     if options.workers is None:
         return f"all workers{pool}"
-    workers = counted(options.workers, "worker") if options.workers else "flown inside pytest"
+    inside = run.pool.in_process
+    workers = "flown inside pytest" if inside else counted(options.workers or 1, "worker")
     if run.flight_s is None:
         told = f"the time is told after {FIRST_FLIGHTS} flights"
         return f"{workers}{pool}" + (f"; {told}" if options.budget > FIRST_FLIGHTS else "")

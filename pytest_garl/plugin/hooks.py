@@ -28,6 +28,7 @@ from pytest_garl.plugin.keys import (
     RUN,
     TALLY,
     WORKER_ASSERTION,
+    closest_mark,
     has_slot,
     is_landing_item,
     is_xdist_worker,
@@ -111,7 +112,7 @@ def pytest_configure(config: pytest.Config) -> None:
 def pytest_generate_tests(metafunc: pytest.Metafunc) -> Generator[None, object, object]:
     """Make the items of a marked test."""
     takes_landing = "garl_slot" in metafunc.fixturenames
-    marker = metafunc.definition.get_closest_marker("garl")
+    marker = closest_mark(metafunc.definition)
     if not takes_landing:
         if marker is not None:
             raise pytest.Collector.CollectError(without_landing(metafunc.definition))

@@ -16,11 +16,13 @@ from pytest_garl.plugin.failed_statement import failure_of
 from pytest_garl.plugin.keys import LANDING
 from pytest_garl.plugin.outcomes import (
     CaseState,
+    Decision,
     FailedItem,
     Need,
     PassedCase,
     Reflights,
     UnjudgedFlight,
+    decide,
 )
 from pytest_garl.plugin.run import REFLIGHTS, Run, test_of
 from pytest_garl.plugin.target import Target
@@ -60,6 +62,16 @@ def case_state(run: Run, target: Target) -> CaseState | None:
         reason=entry.case.reason,
         accepted=run.options.corpus.is_accepted(entry),
     )
+
+
+def is_known_case(run: Run, target: Target, result: FlightResult) -> bool:
+    """Return whether a flight is that of a saved case, and a test that fails for it is excused."""
+    case = case_state(run, target)
+    if case is None or result.inconclusive:
+        return False
+    crashed = result.verdict.violation_type == "V"
+    decided = decide(FailedItem(signature=result.signature, crashed=crashed, case=case))
+    return isinstance(decided, Decision) and decided.outcome == "xfailed"
 
 
 def passed_case(run: Run, target: Target, result: FlightResult, unproven: str) -> PassedCase | None:

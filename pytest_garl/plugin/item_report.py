@@ -111,10 +111,6 @@ class _Writer:
         return self.target.entry.case if self.target.entry is not None else None
 
     @property
-    def _slot_key(self) -> str:
-        return f"{self.target.search} {self.target.name}"
-
-    @property
     def _case_file(self) -> str:
         entry = self.target.entry
         return shown_path(entry.path, self.item.config) if entry is not None else ""
@@ -126,7 +122,7 @@ class _Writer:
             self._note_user_failure(failure)
         facts = failed_item(self.run, self.target, self.result, failure)
         if failure is not None and not failure.user_property:
-            self._note(SHOWN_VIOLATION, self._slot_key)
+            self._note(SHOWN_VIOLATION, self.target.flight_key)
         gather = failure_facts(self.run, self.target, failure, self.item.nodeid)
         decision, facts = resolve(facts, gather)
         if decision.reason is Reason.TEST_ERROR:
@@ -142,7 +138,7 @@ class _Writer:
 
     def write_left(self) -> None:
         """Note that another test of the slot reports the violation; the session checks that."""
-        self._note(LEFT_TO_ANOTHER, self._slot_key)
+        self._note(LEFT_TO_ANOTHER, self.target.flight_key)
 
     def write_pass(self) -> None:
         """Write the outcome of a test that passed; only a saved case has more to say."""

@@ -29,6 +29,8 @@ GATE_PLUGIN = "garl_baseline_gate"
 # User properties of reports, which xdist carries from its workers to the controller.
 SLOT = "garl.slot"
 """The slot of an item; empty if it has nothing to fly."""
+FLIGHT = "garl.flight"
+"""The search and the slot of an item's flight; all items that judge this flight have the same."""
 NO_FLIGHT = "garl.nothing"
 """Why an item has nothing to fly."""
 OUTCOME = "garl.outcome"
@@ -41,6 +43,8 @@ TRAJECTORY = "garl.trajectory_sha256"
 """The hash of a flight's trajectory; empty if its process left no record."""
 UNPROVEN = "garl.unproven"
 """Why it proves nothing if a saved case passes."""
+EXPECTED = "garl.expected"
+"""A saved case whose flight violates what is known of it, so that a failing test is excused."""
 REPORTED_FAILURE = "garl.failure"
 """The failure that an item reports, as a key that is the same for all items which show it."""
 DUPLICATE_OF = "garl.excused"
@@ -75,6 +79,8 @@ RENEWABLE = "garl.renewable"
 """A case that fails to the byte with other sources than its own."""
 LOST = "garl.lost"
 """A file of the corpus that nothing can fly any more, and why."""
+FOUND = "garl.item"
+"""What an item found that is no test: a gate, probes, or a file that is lost; it fails for that."""
 NO_PARAMETERS = (
     "the fixture 'landing' needs an item for each flight, and pytest makes them only of a "
     "function, or of a method of a plain class (no unittest.TestCase), that takes landing as an "
@@ -98,7 +104,42 @@ def is_landing_item(item: pytest.Item) -> bool:
 def marker_of(item: pytest.Item) -> pytest.Mark | None:
     """Return an item's mark ``garl``; that of a parameter comes before that of the test."""
     callspec: Any = getattr(item, "callspec", None)
-    return marker_among(callspec.marks if callspec else ()) or item.get_closest_marker("garl")
+    return marker_among(callspec.marks if callspec else ()) or closest_mark(item)
+
+
+def closest_mark(item: pytest.Item) -> pytest.Mark | None:
+    """Return the mark ``garl`` of a test, or of its class, or of its module; the nearest wins.
+
+    Raises CollectError if two stand at one place: pytest would take either, and the landing system
+    of the other would never be flown.
+    """
+    for node in item.iter_parents():
+        marks = [mark for mark in node.own_markers if mark.name == "garl"]
+        if len(marks) > 1 and isinstance(node, pytest.Class):
+            marks = _marks_of_class(node.obj) or marks
+        if len(marks) > 1:
+            raise pytest.Collector.CollectError(
+                f"{node.nodeid}: has {len(marks)} marks garl, and a test flies one of them; for "
+                "several maps name all in maps=[...], for several landing systems give each to a "
+                "parameter: pytest.param(System, marks=pytest.mark.garl(system=System))"
+            )
+        if marks:
+            return marks[0]
+    return None
+
+
+def _marks_of_class(cls: type) -> list[pytest.Mark]:
+    """Return the marks ``garl`` of a class, else those of its nearest base class.
+
+    To pytest those of all base classes are the class's own, and come first.
+    """
+    for each in cls.__mro__:
+        found: Any = vars(each).get("pytestmark", ())
+        own: list[Any] = found if isinstance(found, list) else [found]
+        marks = [getattr(mark, "mark", mark) for mark in own]
+        if found := [mark for mark in marks if getattr(mark, "name", "") == "garl"]:
+            return list(found)
+    return []
 
 
 def marker_among(marks: Iterable[Any]) -> pytest.Mark | None:
@@ -123,9 +164,16 @@ def has_slot(item: pytest.Item) -> bool:
 
 def without_landing(item: pytest.Item) -> str:
     """Return why a marked test that does not take ``landing`` is an error."""
-    if "landing" in getattr(item, "fixturenames", ()):
+    names = getattr(item, "fixturenames", ())
+    if "garl_slot" in names:
         # Plain functions and methods that name the fixture have their slots by then.
         return f"{item.nodeid}: {NO_PARAMETERS}"
+    if "landing" in names:
+        return (
+            f"{item.nodeid}: its 'landing' is not the fixture of pytest-garl, but a fixture of the "
+            "project or a parameter of the same name, so it flies nothing; rename that, or let it "
+            "take landing itself"
+        )
     return (
         f"{item.nodeid}: carries @pytest.mark.garl and does not take the fixture 'landing', so "
         "it flies nothing; give it the argument landing, or take the mark off it (the mark of "

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from pytest_garl.plugin.keys import LOST, is_xdist_worker
+from pytest_garl.plugin.keys import FOUND, LOST, is_xdist_worker
 
 if TYPE_CHECKING:
     from pytest_garl.cases.collected_tests import CollectedTest, Collection
@@ -115,4 +115,5 @@ def _item(session: pytest.Session, path: Path, reason: str) -> LostCaseItem:
     # `-m garl` selects it, as the tests that should fly the case.
     item.add_marker("garl")
     item.user_properties.append((LOST, f"{item.nodeid.partition('::')[0]}: {reason}"))
+    item.user_properties.append((FOUND, "nothing flies this case"))
     return item

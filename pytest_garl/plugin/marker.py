@@ -71,7 +71,10 @@ def read_marker(marker: pytest.Mark, options: Options) -> MarkerArguments:
     system = marker.kwargs["system"]
     check_system(system)
     maps = marker.kwargs.get("maps", ("court", "lawn"))
-    maps = (maps,) if isinstance(maps, str) else tuple(maps)
+    maps = [maps] if isinstance(maps, str) else maps
+    if not isinstance(maps, list | tuple) or not all(isinstance(each, str) for each in maps):
+        raise GarlError(f"mark.garl: maps={maps!r}: expected a list of names, as ['court', 'lawn']")
+    maps = tuple(dict.fromkeys(maps))
     if not maps:
         there = ", ".join(map_names(options.map_folders))
         raise GarlError(f"mark.garl: maps=[]: nothing to fly on; expected one or more of {there}")

@@ -29,7 +29,7 @@ from pytest_garl.messages import command
 from pytest_garl.npcs.catalogue import policy_spec
 from pytest_garl.npcs.domain_policy import NOBODY
 from pytest_garl.plugin.abort import abort_session
-from pytest_garl.plugin.keys import RUN, target_of
+from pytest_garl.plugin.keys import FOUND, RUN, target_of
 from pytest_garl.plugin.options import Options
 from pytest_garl.plugin.run import Run
 from pytest_garl.plugin.suggested_commands import shown_path
@@ -108,6 +108,7 @@ class ProbesItem(pytest.Item):
             _note_passed(run.options, self._target)
             return
         number = f"{len(violated)} of {counted(len(flown.results), 'probe')}"
+        self.user_properties.append((FOUND, f"violates {number}"))
         lines = [f"{self._target.system.__name__} violates {number} on {self._target.map}:"]
         lines += flown.lines
         for probe in violated:

@@ -97,7 +97,10 @@ def violation_text(
     own = failure.failed_assertion if failure.user_property else None
     lines = [f"{failure.signature}: a property of your own" if own else failure.signature]
     if not failure.savable:
-        lines.append("It is not saved: its test takes other fixtures than landing and scenario.")
+        lines.append(
+            "It is not saved: its test is asynchronous, or takes other fixtures than landing and "
+            "scenario."
+        )
     elif own and verdict.primary is not None:
         lines.append("It is saved only if it also fails in a flight that violates nothing else.")
     told = "" if own or result.severity is None else _unusual(result.severity)

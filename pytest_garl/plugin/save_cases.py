@@ -162,16 +162,9 @@ def _evidence(each: InvestigatedSignature, case: Case) -> list[str]:
         *([case.prevention.text] if case.prevention.text else []),
         *([] if case.gates else [f"{case.reason.upper()}, gates nothing"]),
         *([f"flown without NPCs because of {_seen(each)}"] if each.result.finding else []),
-        _removed(case),
+        case.shrinking,
         counted(each.result.flights, "flight"),
     ]
-
-
-def _removed(case: Case) -> str:
-    """Return in words what shrinking removed, or that it had no flights to find that out."""
-    if case.severity.is_guess:
-        return "not shrunk: its flights were used up"
-    return f"shrinking removed {case.evidence.removed}"
 
 
 def _is_left(each: InvestigatedSignature) -> bool:

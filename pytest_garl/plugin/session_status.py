@@ -70,6 +70,7 @@ def set_exit_status(
     broken = run is not None and bool(run.save_problem)
     if tally is not None:
         try:
+            tally.stopped = session.exitstatus != pytest.ExitCode.OK and not tally.tests_ran
             tally.problems = list(problems(tally, run, options))
         except Exception as error:  # noqa: BLE001 (the summary, which follows, says what it was)
             broken = True
@@ -103,7 +104,7 @@ def problem_text(part: str, error: Exception) -> str:
 
 def problems(tally: Tally, run: Run | None, options: Options) -> Iterator[str]:
     """Yield why the session fails, beside its items."""
-    excused = tally.wrongly_excused()
+    excused = [] if tally.stopped else tally.wrongly_excused()
     if excused:
         yield (
             f"{counted(len(excused), 'test')} excused by a failure that no test shows (its test "
@@ -117,16 +118,16 @@ def problems(tally: Tally, run: Run | None, options: Options) -> Iterator[str]:
             yield from _without_landing(searches)
     if _flights_were_asked_for(tally, options) and not tally.flown:
         yield f"nothing was flown, although flights were asked for: {_why_nothing_flew(tally)}"
-    if options.unasserted == "fail" and tally.unasserted:
-        yield f"{_unasserted(tally)} (garl_unasserted = note makes this a note)"
+    if options.unasserted == "fail":
+        for text in _hidden(tally):
+            yield f"{text} (garl_unasserted = note makes this a note)"
 
 
 def notes(tally: Tally) -> Iterator[str]:
     """Yield what a green session leaves open."""
     if tally.items and not tally.flown and not tally.gated:
         yield f"nothing was flown: {_why_nothing_flew(tally)}"
-    if tally.unasserted:
-        yield _unasserted(tally)
+    yield from _hidden(tally)
     for search in tally.without_landing:
         flights = counted(len(search.flights), "flight")
         yield f"{search.name} on {search.map}: landed in none of {flights}"
@@ -142,9 +143,18 @@ def _flights_were_asked_for(tally: Tally, options: Options) -> bool:
     return tally.tests_ran and not options.given.isdisjoint(_ASK_FOR_FLIGHTS)
 
 
-def _unasserted(tally: Tally) -> str:
-    kinds = [f"{name} ({counted(n, 'flight')})" for name, n in tally.unasserted.most_common()]
-    return f"no selected test fails for these violations: {', '.join(kinds)}"
+def _hidden(tally: Tally) -> Iterator[str]:
+    """Yield what was found without a failure that pytest reports."""
+    if tally.stopped:
+        return
+    if tally.unasserted:
+        kinds = [f"{name} ({counted(n, 'flight')})" for name, n in tally.unasserted.most_common()]
+        yield f"no selected test fails for these violations: {', '.join(kinds)}"
+    if tally.hidden:
+        found = [f"{nodeid} ({text})" for nodeid, text in sorted(tally.hidden.items())]
+        yield (
+            f"{counted(len(found), 'failure')} hidden by a mark xfail or by a hook: {_names(found)}"
+        )
 
 
 def _why_nothing_flew(tally: Tally) -> str:

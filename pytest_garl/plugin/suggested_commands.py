@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Iterable
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import pytest
 
@@ -25,8 +26,9 @@ def repeat_command(config: pytest.Config, tests: Iterable[str], scenario: str) -
 
 def repeat_line(item: pytest.Item, target: Target) -> str:
     """Return the line of a failure with the command that repeats its scenario."""
-    nodeid: Any = item.nodeid
-    test = str(item.config.cwd_relative_nodeid(nodeid))
+    file, separator, name = item.nodeid.partition("::")
+    path = os.path.relpath(item.config.rootpath / file, item.config.invocation_params.dir)
+    test = f"{path}{separator}{name}"
     return f"Repeat: {repeat_command(item.config, [test], target.file or target.name)}"
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections import Counter
-from collections.abc import Generator
+from collections.abc import Generator, Mapping
 from typing import TYPE_CHECKING
 
 import pytest
@@ -12,6 +12,9 @@ import pytest
 from pytest_garl.plugin.keys import (
     DUPLICATE_OF,
     EXCUSED,
+    EXPECTED,
+    FLIGHT,
+    FOUND,
     GATE_REPORT,
     LEFT_TO_ANOTHER,
     NO_FLIGHT,
@@ -44,10 +47,15 @@ class Tally:
         self.problems: list[str] = []
         self.tests_ran = False
         """Whether pytest ran all selected tests, and did not only collect them."""
+        self.stopped = False
+        """Whether the session is red and ended before all tests ran (``-x``, Ctrl-C): those that
+        would have failed for what was found may be among the others."""
         self.interrupted = False
         """Whether somebody ended the session with Ctrl-C or SIGTERM."""
-        self._signatures: dict[tuple[str, str], str] = {}
-        self._failing_flights: set[tuple[str, str]] = set()
+        self.hidden: dict[str, str] = {}
+        """What pytest-garl's own items found that pytest does not report as a failure."""
+        self._signatures: dict[str, str] = {}
+        self._failing_flights: set[str] = set()
         self._failures: dict[str, str] = {}
         self._excused: dict[str, set[str]] = {}
         self._shown: dict[str, str] = {}
@@ -61,23 +69,20 @@ class Tally:
         if report.when == "setup":
             # A test that runs again reports anew; one with subtests reports more than once.
             self._failures.pop(report.nodeid, None)
-            for noted in (self._user_failures, self._shown, self._left_to_others):
+            for noted in (self._user_failures, self._shown, self._left_to_others, self.hidden):
                 noted.pop(report.nodeid, None)
         properties = dict(report.user_properties)
         self.gated = self.gated or GATE_REPORT in properties
+        if FOUND in properties and report.when == "call" and not report.failed:
+            self.hidden[report.nodeid] = str(properties[FOUND])
+        if FLIGHT in properties:
+            self._note_flight(str(properties[FLIGHT]), report, properties)
         if SLOT not in properties or report.when == "teardown":
             return
         if NO_FLIGHT in properties and report.nodeid not in self.items:
             self.no_flight[str(properties[NO_FLIGHT])] += 1
         self.items.add(report.nodeid)
         self.flown = self.flown or OUTCOME in properties
-        flight = (report.nodeid.partition("::")[0], str(properties[SLOT]))
-        if properties.get(SIGNATURE):
-            self._signatures[flight] = str(properties[SIGNATURE])
-        # An item that pytest-garl excuses shows its violation; a mark xfail of the test's hides it.
-        excused = SHOWN_VIOLATION in properties and hasattr(report, "wasxfail")
-        if report.failed or excused:
-            self._failing_flights.add(flight)
         if REPORTED_FAILURE in properties and report.failed:
             self._failures[report.nodeid] = str(properties[REPORTED_FAILURE])
         if SHOWN_VIOLATION in properties and (report.failed or hasattr(report, "wasxfail")):
@@ -92,6 +97,17 @@ class Tally:
             self.excused.add(tuple(json.loads(str(properties[EXCUSED]))))
         if NOT_REPEATED in properties:
             self.not_repeated.add(tuple(json.loads(str(properties[NOT_REPEATED]))))
+
+    def _note_flight(
+        self, flight: str, report: pytest.TestReport, properties: Mapping[str, object]
+    ) -> None:
+        """Note whether a flight violates something, and whether an item fails for it."""
+        if properties.get(SIGNATURE) and EXPECTED not in properties:
+            self._signatures[flight] = str(properties[SIGNATURE])
+        # An item that pytest-garl excuses shows its violation; a mark xfail of the test's hides it.
+        excused = SHOWN_VIOLATION in properties and hasattr(report, "wasxfail")
+        if report.failed or excused:
+            self._failing_flights.add(flight)
 
     @pytest.hookimpl(wrapper=True)
     def pytest_runtestloop(self, session: pytest.Session) -> Generator[None, object, object]:

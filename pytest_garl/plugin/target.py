@@ -111,6 +111,11 @@ class Target:
         return search_key(json.dumps(facts))
 
     @property
+    def flight_key(self) -> str:
+        """Names the flight that the item judges in reports: its search and its slot."""
+        return f"{self.search} {self.name}"
+
+    @property
     def flight(self) -> FlightId:
         """The flight that the item judges."""
         return FlightId(search=self.search, map=self.map, slot=self.slot)

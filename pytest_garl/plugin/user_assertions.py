@@ -49,8 +49,11 @@ class ItemAssertion:
 
     @property
     def runs_on_any_flight(self) -> bool:
-        """Whether the test can run on any flight: it takes no fixture but landing and scenario."""
-        return self._parameters <= _AVAILABLE
+        """Whether the test can run on any flight: it takes no fixture but landing and scenario.
+
+        An asynchronous test runs only in the loop of its plugin.
+        """
+        return self._parameters <= _AVAILABLE and not inspect.iscoroutinefunction(self._function)
 
     def __call__(self, flight: CompletedFlight, scenario: Scenario) -> UserFailure | None:
         """Return how the test fails on a flight without built-in violation, or None.

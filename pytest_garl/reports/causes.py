@@ -27,7 +27,7 @@ _SPEAKS_FOR_ITSELF = ("light", "camera", "leaves")
 """Conditions whose single value says what it is: "sun 23 degrees high", "dirt 20 %"."""
 _ENDINGS = {
     "II:never-seen": "the marker is never readable",
-    "II:lost": "the marker is lost from view",
+    "II:lost": "the marker is no longer readable",
     "II:gave-up-in-sight": "gives up with the marker in view",
     "late:not-landed": "the time runs out",
     "late:never-gave-up": "neither lands nor gives up",

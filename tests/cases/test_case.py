@@ -6,6 +6,7 @@ import pytest
 
 from pytest_garl.cases.case import Prevention
 from pytest_garl.cases.case_file import dump_case, parse_case
+from pytest_garl.execution.severity import Severity
 from pytest_garl.scenarios.maps.loading import load_map
 from tests.cases.samples import case, case_with_changes
 
@@ -93,3 +94,15 @@ def test_case_of_an_own_assertion_belongs_to_its_test_in_any_file() -> None:
 )
 def test_prevention_is_told_with_its_seconds(prevention: Prevention, text: str) -> None:
     assert prevention.text == text
+
+
+def test_a_case_that_was_not_shrunk_is_not_said_to_have_lost_nothing() -> None:
+    fog = Severity(about="conditions", conditions=("fog",), values=("",), untried=("fog",))
+    nothing = dataclasses.replace(case().evidence, removed="nothing")
+    guess = dataclasses.replace(case("II:never-seen"), severity=fog, evidence=nothing)
+    assert guess.shrinking == "not shrunk"
+    tried = dataclasses.replace(guess, severity=dataclasses.replace(fog, untried=()))
+    assert tried.shrinking == "shrinking removed nothing"
+    unflown = dataclasses.replace(nothing, neighbours=0, neighbours_failed=0)
+    assert dataclasses.replace(tried, evidence=unflown).shrinking == "not shrunk"
+    assert case().shrinking == "shrinking removed 3 of 4 objects"

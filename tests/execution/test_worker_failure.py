@@ -17,6 +17,10 @@ from tests.support.results import flight_result
 DIED = WorkerExit(status=-11, stderr="no fuel")
 KILLED = WorkerExit(status=-9)
 BROKE = WorkerExit(status=0, failure=("TypeError", "no array", "Traceback"))
+UNKNOWN = WorkerExit(
+    status=0,
+    failure=("LandingSystemError", "my:Lander cannot be imported by its name", "Traceback"),
+)
 HUNG = WorkerExit(status=-9, stacks="in step", hung="one call took longer than 30 s of wall time")
 
 
@@ -85,6 +89,7 @@ def test_process_that_ends_itself_is_a_finding_at_once(ledger: Ledger) -> None:
             "the simulator, which flies the reference pilot, failed with TypeError: no array, "
             "twice",
         ),
+        (UNKNOWN, "V:broke:LandingSystemError", "my:Lander cannot be imported by its name, twice"),
     ],
 )
 def test_repeated_exit_is_a_finding(

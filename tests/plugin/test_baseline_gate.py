@@ -92,6 +92,18 @@ def test_worse_system_fails_and_summary_lists_its_broken_pairs(
     assert result.ret == pytest.ExitCode.TESTS_FAILED
 
 
+def test_a_mark_of_the_module_hides_no_failed_gate_from_a_build_server(
+    saved: pytest.Pytester, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    change(saved.path / "tiny_simulator.py", *WORSE)
+    with (saved.path / "test_it.py").open("a") as tests:
+        tests.write("\npytestmark = [pytestmark, pytest.mark.xfail(reason='later')]\n")
+    monkeypatch.setenv("CI", "true")
+    result = run(saved)
+    assert result.ret == pytest.ExitCode.TESTS_FAILED
+    result.stdout.fnmatch_lines(["1 failure hidden by a mark xfail or by a hook:*"])
+
+
 def test_level_decides_and_better_system_passes(saved: pytest.Pytester) -> None:
     change(saved.path / "tiny_simulator.py", *WORSE)
     lenient = run(saved, *GATE, "--garl-level=1e-9")

@@ -87,6 +87,10 @@ HABITS = {
         },
         conftest=SKIPS,
     ),
+    "ignores its children": Habit(
+        conftest="import signal\nsignal.signal(signal.SIGCHLD, signal.SIG_IGN)\n",
+        args=("--garl-workers=1",),
+    ),
     "subtests": Habit(files={"test_it.py": SUBTESTS}),
     "classes and fixtures": Habit(files={"test_it.py": CLASSES}),
     "marked parameters": Habit(files={"test_it.py": PARAMETERS}),

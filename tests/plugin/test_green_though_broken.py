@@ -53,6 +53,31 @@ def _ends(*lines: str) -> dict[str, str]:
     return {"systems.py": ENDS_PROCESS % "; ".join(lines), "test_it.py": TESTS_OF_ENDS}
 
 
+INHERITED = f"""{HEAD}
+class Careful(Good):
+    dodges = True
+
+@pytest.mark.garl(system=Careful, maps=["lawn"])
+class TestCareful:
+    def test_a(self, landing): assert not landing.collisions
+
+@pytest.mark.garl(system=Good, maps=["lawn"])
+class TestGood(TestCareful): pass
+"""
+TWO_SYSTEMS = f"""{HEAD}
+class Other(Good): pass
+
+@pytest.mark.garl(system=Good, maps=["lawn"])
+def test_reads_nothing(landing): pass
+
+@pytest.mark.garl(system=Other, maps=["lawn"])
+def test_asserts(landing):
+    assert not landing.collisions
+    assert landing.distance_to_landing_m <= 1.5
+"""
+WORDS_OF_TWO_MARKS = "has 2 marks garl, and a test flies one of them"
+
+
 TRICKS = {
     # Tests that fail for the violation are not there, or cannot fail.
     "k": Trick(args=(*SEARCH, "-k", "test_time"), words=UNASSERTED),
@@ -107,6 +132,37 @@ TRICKS = {
             "    return report\n"
         },
         words=UNASSERTED,
+    ),
+    "another system fails in its slots": Trick(files={"test_it.py": TWO_SYSTEMS}, words=UNASSERTED),
+    # Something else flies.
+    "a class inherits a mark": Trick(
+        files={"test_it.py": INHERITED},
+        words="FAILED test_it.py::TestGood::test_a?lawn-g00-s02? - collided with dog-1",
+    ),
+    "two marks of a module": Trick(
+        files={
+            "test_it.py": f"{HEAD}class Careful(Good): dodges = True\n"
+            "pytestmark = [pytest.mark.garl(system=Careful, maps=['lawn']), MARK]\n"
+            "def test_a(landing): assert not landing.collisions\n"
+        },
+        words=WORDS_OF_TWO_MARKS,
+        status=REFUSED,
+    ),
+    "two marks of a test": Trick(
+        files={
+            "test_it.py": f"{HEAD}@MARK\n@pytest.mark.garl(system=Good, maps=['court'])\n"
+            "def test_a(landing): assert landing.final_distance_m <= 1.5\n"
+        },
+        words=WORDS_OF_TWO_MARKS,
+        status=REFUSED,
+    ),
+    "another fixture of this name": Trick(
+        files={
+            "test_it.py": f"{MARKED}@pytest.fixture\ndef landing(): return None\n"
+            "def test_a(landing): pass\n"
+        },
+        words="its 'landing' is not the fixture of pytest-garl",
+        status=REFUSED,
     ),
     # Nothing flies.
     "marker without fixture": Trick(

@@ -29,6 +29,16 @@ def timed(pytester: pytest.Pytester, seconds: float, maps: str = "['lawn']") -> 
     pytester.makeconftest("import timed\ndef pytest_garl_fly(config):\n    return timed.fly\n")
 
 
+def test_header_says_where_it_flies_if_pytest_itself_cannot(pytester: pytest.Pytester) -> None:
+    """A library that another plugin has loaded keeps pytest from flying itself."""
+    project(pytester)
+    (pytester.path / "early.py").write_text("import numpy\n")
+    result = pytester.runpytest_subprocess("-p", "early", "--garl-budget=1", "--garl-workers=0")
+    inside = "flown in a worker process, not inside pytest" not in result.stdout.str()
+    expected = "flown inside pytest" if inside else "1 worker"
+    result.stdout.fnmatch_lines([f"garl: budget 1 * {expected}*"])
+
+
 def test_first_run_tells_the_time_when_it_knows_it(pytester: pytest.Pytester) -> None:
     timed(pytester, 0.2, "['lawn', 'court']")
     args = ("--garl-budget=12", "--garl-workers=1", "-k", "test_collisions")

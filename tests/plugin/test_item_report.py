@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import os
 import shutil
 from pathlib import Path
 
@@ -16,8 +17,28 @@ from tests.support.case_project import (
     run,
     violations,
 )
+from tests.support.landing_project import project
 
 EDGE = 'gates = false\nreason = "edge"'
+
+
+@pytest.mark.parametrize("folder", ["below", ".."])
+def test_commands_work_where_pytest_was_called(
+    pytester: pytest.Pytester, monkeypatch: pytest.MonkeyPatch, folder: str
+) -> None:
+    """People call pytest in a folder below its root, or above it."""
+    project(pytester)
+    (pytester.path / "below").mkdir()
+    here = pytester.path / folder
+    monkeypatch.chdir(here)
+    path = os.path.relpath(pytester.path / "test_it.py", here.resolve())
+    search = ("--garl-budget=3", "--garl-workers=0", "--garl-shrink=0")
+    result = run(pytester, path, *search)
+    assert result.ret == pytest.ExitCode.TESTS_FAILED
+    repeat = f"Repeat: pytest '{path}::test_distance[[]lawn-g00-s00]' --garl-repeat=lawn-g00-s00"
+    result.stdout.fnmatch_lines([repeat])
+    again = (f"{path}::test_distance[lawn-g00-s00]", "--garl-repeat=lawn-g00-s00")
+    run(pytester, *again, "--garl-workers=0").assert_outcomes(failed=1)
 
 
 def test_cases_fly_under_xdist(searched: pytest.Pytester) -> None:

@@ -34,6 +34,20 @@ def test_case_on_an_edge_excuses_no_violation_of_a_search(searched: pytest.Pytes
     assert load_case(fog).gates
 
 
+def test_known_case_is_red_in_no_session_whose_tests_do_not_assert_it(
+    searched: pytest.Pytester, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("CI", "true")
+    result = run(searched, "--garl-workers=0", "-k", "test_time")
+    assert result.ret == pytest.ExitCode.OK
+    result.assert_outcomes(passed=1, skipped=1, deselected=4)
+    result.stdout.no_fnmatch_line("*no selected test fails*")
+    (path,) = [each for each in cases(searched) if each.name.startswith("lawn-I-nothing")]
+    replace_text(path, 'status = "open"', 'status = "fixed"')
+    result = run(searched, "--garl-workers=0", "-k", "test_time")
+    assert result.ret == pytest.ExitCode.TESTS_FAILED
+
+
 def test_search_in_which_no_flight_lands_is_red_although_all_is_known(
     searched: pytest.Pytester,
 ) -> None:

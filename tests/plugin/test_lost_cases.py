@@ -306,6 +306,22 @@ def test_two_classes_of_one_module_share_a_folder(pytester: pytest.Pytester, fil
     result.assert_outcomes(xfailed=2, skipped=4)
 
 
+def test_a_hook_that_expects_all_failures_hides_no_lost_case_from_a_build_server(
+    pytester: pytest.Pytester, file: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    drop_map(pytester.path, file)
+    with (pytester.path / "conftest.py").open("a") as conftest:
+        conftest.write(
+            "import pytest\ndef pytest_collection_modifyitems(items):\n"
+            "    for item in items: item.add_marker(pytest.mark.xfail)\n"
+        )
+    assert run(pytester).ret == pytest.ExitCode.OK
+    monkeypatch.setenv("CI", "true")
+    result = run(pytester)
+    assert result.ret == pytest.ExitCode.TESTS_FAILED
+    result.stdout.fnmatch_lines(["1 failure hidden by a mark xfail or by a hook:*"])
+
+
 def test_xdist_reports_a_lost_case_once(pytester: pytest.Pytester, file: Path) -> None:
     pytest.importorskip("xdist")
     drop_map(pytester.path, file)

@@ -46,6 +46,33 @@ def test_a_marker_refuses_an_empty_list_of_maps(pytester: pytest.Pytester) -> No
     result.stdout.fnmatch_lines(["*maps=[[]]: nothing to fly on; expected one or more of court*"])
 
 
+@pytest.mark.parametrize("maps", ["3", "['lawn', None]", "(each for each in ['lawn'])"])
+def test_a_marker_refuses_maps_that_are_no_list_of_names(
+    pytester: pytest.Pytester, maps: str
+) -> None:
+    project(pytester, maps=maps)
+    result = run(pytester, "--garl-budget=2")
+    assert result.ret == pytest.ExitCode.INTERRUPTED
+    result.stdout.fnmatch_lines(["*mark.garl: maps=*: expected a list of names, as [[]'court', *"])
+
+
+def test_a_map_that_is_named_twice_is_flown_once(pytester: pytest.Pytester) -> None:
+    project(pytester, maps="['lawn', 'lawn']")
+    result = run(pytester, "--garl-budget=1", "--garl-workers=0", "--collect-only", "-q")
+    assert result.outlines.count("test_it.py::test_time[lawn-g00-s00]") == 1
+
+
+def test_a_marker_refuses_a_class_that_its_module_does_not_hold_by_its_name(
+    pytester: pytest.Pytester,
+) -> None:
+    project(pytester, "Made")
+    with (pytester.path / "systems.py").open("a") as systems:
+        systems.write("\nMade = type('Other', (Good,), {})\n")
+    result = run(pytester, "--garl-budget=2")
+    assert result.ret == pytest.ExitCode.INTERRUPTED
+    result.stdout.fnmatch_lines(["*system=Other: the module systems has no class of this name*"])
+
+
 def test_a_marker_refuses_an_unknown_limit_and_names_the_known_ones(
     pytester: pytest.Pytester,
 ) -> None:

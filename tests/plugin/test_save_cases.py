@@ -1,6 +1,5 @@
 from __future__ import annotations
 
-import dataclasses
 import shutil
 import subprocess
 
@@ -8,9 +7,6 @@ import pytest
 
 from pytest_garl.cases.case_file import dump_case, load_case
 from pytest_garl.cases.shrink import BISECTIONS
-from pytest_garl.execution.severity import Severity
-from pytest_garl.plugin.save_cases import _removed
-from tests.cases.samples import case
 from tests.support.case_project import (
     CASES,
     SEARCH,
@@ -209,11 +205,3 @@ def test_what_a_collision_hid_is_flown_again_without_npcs_and_saved(
     again = run(pytester, *search)
     again.stdout.fnmatch_lines(["*without people, dogs and birds it fails as I:nothing:unseen*"])
     assert saved(pytester) == before
-
-
-def test_a_case_without_flights_to_shrink_it_is_not_said_to_have_lost_nothing() -> None:
-    fog = Severity(about="conditions", conditions=("fog",), values=("",), untried=("fog",))
-    guess = dataclasses.replace(case("II:never-seen"), severity=fog)
-    assert _removed(guess) == "not shrunk: its flights were used up"
-    tried = dataclasses.replace(guess, severity=dataclasses.replace(fog, untried=()))
-    assert _removed(tried) == "shrinking removed 3 of 4 objects"

@@ -149,6 +149,42 @@ def test_summary_notes_a_violation_whose_tests_are_all_expected_to_fail(
     result.stdout.fnmatch_lines(["garl: no selected test fails for *: I:nothing:unseen (1 flight)"])
 
 
+def test_stopped_session_says_nothing_of_tests_that_did_not_run(
+    pytester: pytest.Pytester, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    completed = "def test_completes(landing):\n    assert landing.completed\n"
+    write_tests(pytester, "Good", completed + COLLISIONS + DISTANCE)
+    monkeypatch.setenv("CI", "true")
+    result = run(pytester, "--garl-budget=8", "--garl-workers=0", "-x")
+    assert result.ret == RED
+    result.assert_outcomes(failed=1, passed=7, skipped=3)
+    result.stdout.no_fnmatch_line("*no selected test fails*")
+    result.stdout.no_fnmatch_line("*excused by a failure*")
+
+
+@pytest.mark.parametrize(
+    "tests",
+    [
+        "\ndef test_reads_nothing(landing): pass\n",
+        "\n@pytest.fixture\ndef flown(landing):\n    yield\n"
+        "    assert not landing.collisions and landing.final_distance_m < 1\n"
+        "def test_at_the_end(flown): pass\n",
+    ],
+    ids=["in another file", "in a fixture's teardown"],
+)
+def test_a_violation_is_asserted_wherever_a_test_fails_for_its_flight(
+    pytester: pytest.Pytester, tests: str
+) -> None:
+    write_tests(pytester, "Good", tests)
+    if "teardown" not in tests and "yield" not in tests:
+        text = (pytester.path / "test_it.py").read_text()
+        asserting = text.replace(tests, COLLISIONS + DISTANCE)
+        (pytester.path / "test_that.py").write_text(asserting)
+    result = run(pytester, "--garl-budget=8", "--garl-workers=0")
+    assert result.ret == RED
+    result.stdout.no_fnmatch_line("*no selected test fails*")
+
+
 def test_budget_of_an_ini_key_asks_nothing_of_a_session_without_landing_tests(
     pytester: pytest.Pytester,
 ) -> None:
