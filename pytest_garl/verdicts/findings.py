@@ -69,7 +69,7 @@ def descent_elsewhere(flight: Flight, limits: Limits) -> Finding | None:
         return None
     x, y = float(places[-1, 0] - marker[0]), float(places[-1, 1] - marker[1])
     seen = any(readable_steps(flight, end_s))
-    view = "which had been in view before" if seen else "which had never been in view"
+    view = "which had been in view before" if seen else "which had never been readable"
     near = [(math.dist(tuple(aim), place), name) for name, *place in flight.decoys]
     distance_m, name = min(near, default=(math.inf, ""))
     onto = f" onto {name}" if distance_m <= AT_MARKER_M else ""
