@@ -110,7 +110,8 @@ def _light(scenario: Scenario) -> list[tuple[float, str]]:
     position = scenario.get(SUN, NOON)
     if position == NOON and scenario[TURN] == 0:
         return []
-    words = f"sun {sun_elevation_deg(position):.0f} degrees high"
+    up_deg = round(sun_elevation_deg(position))
+    words = f"sun {abs(up_deg)} degrees {'below the horizon' if up_deg < 0 else 'high'}"
     return [(abs(position - NOON) / NOON, words)]
 
 

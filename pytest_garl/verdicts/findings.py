@@ -61,7 +61,7 @@ def descent_elsewhere(evidence: Evidence) -> Finding | None:
         return None
     x, y = float(places[-1, 0] - marker[0]), float(places[-1, 1] - marker[1])
     seen = evidence.readable_until(end_s)
-    view = "which had been in view before" if seen else "which had never been in view"
+    view = "which had been in view before" if seen else "which had never been readable"
     name = evidence.decoy_at((float(aim[0]), float(aim[1])))
     onto = f" onto {name}" if name else ""
     return Finding(

@@ -220,7 +220,7 @@ def _no_landing_cause(evidence: Evidence, end: str) -> tuple[ViolationType, str,
     if flight.outcome == "not_landed" and not lost:
         text = f"Not landed although the marker was in view to the end.{report}"
         return "late", f"late:not-landed:{phase}", text
-    view = f"the marker was last in view at {last:.1f} s" if lost else "the marker was in view"
+    view = f"the marker was last readable at {last:.1f} s" if lost else "the marker was in view"
     if flight.outcome == "gave_up" and at_s >= (1 - RESERVE_SHARE) * evidence.limits.time_s:
         text = f"Gave up{when} for want of time; {view}.{report}"
         return "late", f"late:no-time:{phase}", text
@@ -285,7 +285,7 @@ def _missed(
     target = _target_text(evidence, at_s)
     if off_m <= max(PAPER_LIMITS.distance_m, evidence.limits.distance_m):
         recent = bool(readable) and at_s - readable[-1] <= LOST_AFTER_S
-        view = "was in view" if recent else "was not in view for the last 3 s"
+        view = "was in view" if recent else "was not readable for the last 3 s"
         return Mechanism(
             primary="distance",
             violation_type="off",

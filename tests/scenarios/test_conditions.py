@@ -24,6 +24,7 @@ def test_nominal_scenario_has_no_active_condition() -> None:
         ({"environment.rain": 0.3}, "rain", 0.3, "30 mm/h"),
         ({"environment.road_snow": 0.4}, "snow", 0.4, "cover 40 %"),
         ({"environment.sun_position": 0.1}, "light", 0.8, "sun 14 degrees high"),
+        ({"environment.sun_position": 0.0}, "light", 1.0, "sun 6 degrees below the horizon"),
         ({"told.surveyed": 1.0, "told.error_m": 5.0}, "told", 0.25, "error 5 m"),
         ({"decoy-1.kind": 7.0}, "decoy-1", 0.0, "qr-code"),
     ],

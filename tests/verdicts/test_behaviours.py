@@ -92,7 +92,7 @@ def test_a_landing_in_a_shadow_names_the_shadow() -> None:
         (give_up, 20.0, "II:gave-up-in-sight:approach", "with the marker in view"),
         (give_up, 95.0, "late:no-time:approach", "for want of time; the marker was in view"),
         (hover, 0.0, "late:not-landed:approach", "although the marker was in view to the end"),
-        (fly_on_and_give_up((3.0, -13.0), 20.0), 5.0, "II:lost:search", "was last in view at"),
+        (fly_on_and_give_up((3.0, -13.0), 20.0), 5.0, "II:lost:search", "was last readable at"),
     ],
 )
 def test_a_flight_without_landing_has_its_cause(

@@ -345,7 +345,7 @@ def test_a_collision_of_a_uav_that_came_down_elsewhere_says_so() -> None:
     verdict = judge(subject, Limits())
     assert verdict.signature == "IV:bird:descent:unseen"
     assert verdict.story.startswith(
-        "Came down 3.0 m east of the marker, which had never been in view, then hit bird-1"
+        "Came down 3.0 m east of the marker, which had never been readable, then hit bird-1"
     )
     assert [each.signature for each in verdict.findings] == ["off:descending-elsewhere"]
     onto = judge(dataclasses.replace(subject, decoys=(("pad", 3.5, 0.5),)), Limits())

@@ -91,7 +91,7 @@ def test_a_marker_readable_in_the_last_three_seconds_was_seen(seen_s: float, sig
     ("last_s", "signature", "words"),
     [
         (27.0, "late:not-landed:approach", "although the marker was in view to the end"),
-        (26.9, "II:lost:approach", "the marker was last in view at 26.9 s"),
+        (26.9, "II:lost:approach", "the marker was last readable at 26.9 s"),
     ],
 )
 def test_a_marker_not_readable_for_three_seconds_is_lost(

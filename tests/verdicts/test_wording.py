@@ -30,15 +30,15 @@ PLACE = "At 32.7 s the UAV was 1.4 m up, over the marker."
             "landed 3.0 m off the marker, on open ground",
         ),
         (
-            "Came down 4.2 m north of the marker, which had never been in view, then hit tree-3 at "
-            "1.2 m/s. At 30.1 s the UAV was 1.6 m up, 4.1 m north of the marker.",
-            "came down 4.2 m north of the marker, which had never been in view, then hit tree-3 at "
-            "1.2 m/s, 1.6 m up",
+            "Came down 4.2 m north of the marker, which had never been readable, then hit tree-3 "
+            "at 1.2 m/s. At 30.1 s the UAV was 1.6 m up, 4.1 m north of the marker.",
+            "came down 4.2 m north of the marker, which had never been readable, then hit tree-3 "
+            "at 1.2 m/s, 1.6 m up",
         ),
         (
-            f"Gave up at 32.7 s for want of time; the marker was last in view at 22.3 s. {PLACE}",
+            f"Gave up at 32.7 s for want of time; the marker was last readable at 22.3 s. {PLACE}",
             "gave up at 32.7 s for want of time, 1.4 m up, over the marker; the marker was last "
-            "in view at 22.3 s",
+            "readable at 22.3 s",
         ),
         (
             # It climbed away after that: the place is not where it gave up.

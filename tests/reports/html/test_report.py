@@ -36,7 +36,7 @@ def lost(**fields: Any) -> Any:
         outcome="not_landed",
         primary="time",
         violation_type="II",
-        story=fields.pop("story", "Not landed; the marker was last in view at 1.0 s."),
+        story=fields.pop("story", "Not landed; the marker was last readable at 1.0 s."),
         **fields,
     )
 
@@ -85,7 +85,7 @@ def test_a_report_has_an_index_and_a_page_for_each_kind(run: Path) -> None:
     assert "1 of 3 flights violate something, in one way" in found["index.html"]
     assert SIGNATURE in found["index.html"]
     assert found[kind].count('class="moment"') == len(data_of(found[kind])["moments"])
-    assert "Not landed; the marker was last in view at 1.0 s." in found[kind]
+    assert "Not landed; the marker was last readable at 1.0 s." in found[kind]
     assert "--garl-repeat=lawn-g00-s01" in found[kind]
     assert data_of(found[kind])["scene"]["ground"].startswith("data:image/jpeg")
 
