@@ -81,6 +81,8 @@ LOST = "garl.lost"
 """A file of the corpus that nothing can fly any more, and why."""
 FOUND = "garl.item"
 """What an item found that is no test: a gate, probes, or a file that is lost; it fails for that."""
+VIOLATED_PROBE = "garl.probe"
+"""A probe that a landing system violates: the system, the map, and how the probe ended."""
 NO_PARAMETERS = (
     "the fixture 'landing' needs an item for each flight, and pytest makes them only of a "
     "function, or of a method of a plain class (no unittest.TestCase), that takes landing as an "
