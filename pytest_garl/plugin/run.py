@@ -156,7 +156,7 @@ class Run:
     remaining: RemainingWork | None = None
     """The work that follows the search, once it is known."""
     news: KindNews | None = None
-    """Which new kinds were told while the run goes on."""
+    """Writes a sentence about each new kind while the run goes on."""
     save_problem: str = ""
     """Why not everything was saved, empty if it was."""
     user_assertions: dict[tuple[str, str], ItemAssertion] = field(default_factory=dict)
