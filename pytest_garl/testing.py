@@ -6,6 +6,7 @@ import contextlib
 import dataclasses
 import inspect
 import math
+import os
 import threading
 import time
 from collections.abc import Callable, Iterator
@@ -14,9 +15,11 @@ from typing import Any, NamedTuple
 
 from pytest_garl import cpu_dispatch
 from pytest_garl.errors import LandingSystemError
+from pytest_garl.execution.exit_guard import refusing_end
 from pytest_garl.execution.flight import time_limit_s
 from pytest_garl.execution.judge_process import JudgeProcess
 from pytest_garl.execution.metering import CallMeter, OutOfTimeError
+from pytest_garl.execution.processes import descendants_of
 from pytest_garl.execution.reference import check_system
 from pytest_garl.execution.result import FlightResult
 from pytest_garl.execution.separate_process import call_in_separate_process
@@ -367,7 +370,8 @@ class _Checker:
 
     def _check_yaw(self, flight: Flight, yaws: list[tuple[float, float]]) -> None:
         """Refuse a heading of several turns, which radians rarely are."""
-        for time_s, yaw in yaws:
+        if yaws:
+            time_s, yaw = yaws[0]
             raise LandingSystemError(
                 f"{self._system.__name__}.step: {_place(flight, time_s)}: returned yaw_rad = "
                 f"{yaw:g}; expected radians from -2π to 2π. Are these degrees? "
@@ -424,7 +428,7 @@ class _Checker:
         self, system: Any, scenario: Scenario, seconds: float, *, raises: bool = True
     ) -> _TimedFlight:
         began = time.process_time()
-        with self._meter.timed():
+        with self._meter.timed(), refusing_end(self._system.__name__):
             flight = fly(
                 scenario,
                 system,
@@ -517,19 +521,14 @@ def _check_signature(system: type, method: str, count: int) -> None:
 @contextlib.contextmanager
 def _warning_of_leftovers(warn: Callable[[str], None]) -> Iterator[None]:
     """Warn of threads and processes that a landing system leaves running."""
-    threads, processes = set(threading.enumerate()), _children()
+    threads, processes = set(threading.enumerate()), descendants_of(os.getpid())
     yield
     left = [item for item in threading.enumerate() if item not in threads and item.is_alive()]
     if left:
         warn(f"leaves {len(left)} threads running ({left[0].name})")
-    started = _children() - processes
+    started = descendants_of(os.getpid()) - processes
     if started:
         warn(f"leaves {len(started)} processes running; a search ends them after each flight")
-
-
-def _children() -> set[str]:
-    files = Path("/proc/self/task").glob("*/children")
-    return {pid for file in files for pid in file.read_text().split()}
 
 
 def _reusing_one_instance(system: type, yaws: list[tuple[float, float]]) -> Any:

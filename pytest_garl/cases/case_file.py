@@ -443,13 +443,12 @@ _NOT_SHRUNK = "# Unusual in the flight that was found; the case is not shrunk."
 def severity_lines(severity: Severity, *, is_shrunk: bool) -> list[list[str]]:
     """Return the section, in a list of one; an empty list for an empty severity."""
     untried = _names("untried", severity.untried)
+    comment = _OF_SHRUNK.get(severity.about, "") if is_shrunk else _NOT_SHRUNK
     if severity.about == "body":
         window_s = severity.window_s
         return [
             [
-                "# The adversary that it takes; the weaker, the worse."
-                if is_shrunk
-                else _NOT_SHRUNK,
+                comment,
                 "[severity]",
                 *([f"grade = {quoted(severity.grade)}"] if severity.grade else []),
                 f"type = {quoted(severity.type)}",
@@ -467,9 +466,7 @@ def severity_lines(severity: Severity, *, is_shrunk: bool) -> list[list[str]]:
         )
         return [
             [
-                "# The conditions that it takes; the fewer, the worse."
-                if is_shrunk
-                else _NOT_SHRUNK,
+                comment,
                 "[severity]",
                 f"conditions = [{names}]",
                 *([f"values = [{values}]"] if severity.values else []),

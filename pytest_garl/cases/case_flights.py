@@ -90,10 +90,8 @@ class CaseFlights:
         names = []
         for name, steps in removals(scenario, map, hit).items():
             ways = [[step] for step in steps] + ([steps] if len(steps) > 1 else [])
-            known = dict.fromkeys((scenario, *self._failed))
-            if not any(
-                repair(simplified(e, way), map) in self._flown for e in known for way in ways
-            ):
+            without = (repair(simplified(each, way), map) for each in known for way in ways)
+            if self._flown.isdisjoint(without):
                 names.append(name)
         return tuple(names)
 

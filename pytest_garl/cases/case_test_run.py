@@ -7,7 +7,7 @@ import subprocess
 import sys
 import tempfile
 import xml.etree.ElementTree as ElementTree
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -23,7 +23,7 @@ CASE_NAME = "judged"
 """Name of the case's file in the temporary corpus, and so part of the items' ids."""
 TestOutcome = Literal["passed", "failed", "skipped"]
 _CLEARED_OPTIONS = ("budget", "repeat", "baseline")
-"""Options that a project's configuration may set, and that this run resets."""
+"""Options that a project's configuration may set, and that these runs reset."""
 _COMPLETED_STATUSES = (0, 1, 5)
 """Exit statuses of a complete pytest run; 5 says that no test flies the case."""
 _OUTPUT_LINES = 20
@@ -59,22 +59,11 @@ def run_case_tests(
     """
     with single_case_corpus(case, live=live) as folder:
         report = folder / "report.xml"
-        done = subprocess.run(
-            [
-                *(sys.executable, "-m", "pytest", f"--junitxml={report}"),
-                *pytest_arguments(case, folder, live=live),
-            ],
-            cwd=root,
-            stdin=subprocess.DEVNULL,
-            capture_output=True,
-            text=True,
-            errors="replace",
-            check=False,
-        )
+        arguments = pytest_arguments(case, folder, live=live)
+        done = run_pytest([f"--junitxml={report}", *arguments], root)
         found = _read(report)
         if done.returncode not in _COMPLETED_STATUSES:
-            output = "\n".join((done.stdout + done.stderr).splitlines()[-_OUTPUT_LINES:])
-            raise GarlError(f"pytest could not fly the case (status {done.returncode}):\n{output}")
+            raise GarlError(f"pytest could not fly the case {end_of(done)}")
         yield found, folder / "garl" / "flights"
 
 
@@ -98,17 +87,41 @@ def pytest_arguments(case: Case, folder: Path, *, live: bool) -> list[str]:
     """Return pytest's arguments that select the tests of the case in ``folder``."""
     file = case.test.partition("::")[0] if "::" in case.test else ""
     ids = f"case-{CASE_NAME}-live" if live else f"case-{CASE_NAME} and not case-{CASE_NAME}-live"
-    overrides = {
-        "garl_cases": str(folder / "cases"),
-        "garl_dir": str(folder / "garl"),
-        "cache_dir": str(folder / "cache"),
-        **{f"garl_{name}": "" for name in _CLEARED_OPTIONS},
-    }
     return [
         *filter(None, [file]),
         *("-k", ids, "--maxfail=0", "--garl-workers=1"),
-        *(word for key, value in overrides.items() for word in ("-o", f"{key}={value}")),
+        *ini_options(folder, folder / "cases"),
     ]
+
+
+def ini_options(scratch: Path, cases: Path | None) -> list[str]:
+    """Return pytest's arguments for a run that searches nothing and leaves its files in a folder.
+
+    ``cases`` is the folder of the saved cases; None for that of the ini key.
+    """
+    values = {f"garl_{name}": "" for name in _CLEARED_OPTIONS}
+    values |= {"cache_dir": f"{scratch / 'cache'}", "garl_dir": f"{scratch / 'garl'}"}
+    values |= {"garl_cases": f"{cases.absolute()}"} if cases is not None else {}
+    return [word for key, value in values.items() for word in ("-o", f"{key}={value}")]
+
+
+def run_pytest(arguments: Sequence[str], folder: Path) -> subprocess.CompletedProcess[str]:
+    """Run pytest in a process of its own, and return what it wrote."""
+    return subprocess.run(
+        [sys.executable, "-m", "pytest", *arguments],
+        cwd=folder,
+        stdin=subprocess.DEVNULL,
+        capture_output=True,
+        text=True,
+        errors="replace",
+        check=False,
+    )
+
+
+def end_of(done: subprocess.CompletedProcess[str]) -> str:
+    """Return how a run of pytest ended: its status, and its last lines."""
+    output = "\n".join((done.stdout + done.stderr).splitlines()[-_OUTPUT_LINES:])
+    return f"(status {done.returncode}):\n{output}"
 
 
 def _read(report: Path) -> tuple[CaseTestResult, ...]:

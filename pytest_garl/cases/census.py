@@ -321,13 +321,14 @@ def _may_land(path: Path) -> bool:
 
 def _python_files(root: Path, skipped: Sequence[str]) -> Iterator[Path]:
     for folder, folders, files in os.walk(root):
+        if "pyvenv.cfg" in files and Path(folder) != root:
+            # A virtual environment.
+            folders.clear()
+            continue
         folders[:] = sorted(
             name
             for name in folders
-            if not name.startswith(".")
-            and name != "__pycache__"
-            and not _matches(name, skipped)
-            and not Path(folder, name, "pyvenv.cfg").exists()
+            if not name.startswith(".") and name != "__pycache__" and not _matches(name, skipped)
         )
         yield from (Path(folder, name) for name in sorted(files) if name.endswith(".py"))
 

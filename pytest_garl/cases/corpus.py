@@ -313,17 +313,8 @@ class Acceptance:
 
 def read_acceptance(cases: Path) -> Acceptance:
     """Ask git which files of a folder are in its index."""
-    if not cases.is_dir():
-        return Acceptance(cases=cases, committed=frozenset())
-    command = ["git", "-C", str(cases), "ls-files", "-z"]
-    try:
-        done = subprocess.run(command, capture_output=True, text=True, check=False)
-    except OSError as error:
-        return Acceptance(cases=cases, committed=frozenset(), problem=f"git: {error.strerror}")
-    if done.returncode:
-        problem = done.stderr.strip().partition("\n")[0]
-        return Acceptance(cases=cases, committed=frozenset(), problem=problem)
-    return Acceptance(cases=cases, committed=frozenset(done.stdout.split("\0")[:-1]))
+    committed, problem = _git_files(cases, ".") if cases.is_dir() else ([], "")
+    return Acceptance(cases=cases, committed=frozenset(committed), problem=problem)
 
 
 def committed_cases(cases: Path) -> list[str]:
@@ -334,12 +325,22 @@ def committed_cases(cases: Path) -> list[str]:
     at = next((each for each in cases.absolute().parents if each.is_dir()), None)
     if at is None:
         return []
-    command = ["git", "-C", str(at), "ls-files", "-z", "--", str(cases.absolute())]
-    try:
-        done = subprocess.run(command, capture_output=True, text=True, check=False)
-    except OSError:
-        # Without git nothing is known of a folder that is gone.
-        return []
+    # Without git nothing is known of a folder that is gone.
+    found, _ = _git_files(at, str(cases.absolute()))
     below = cases.absolute().relative_to(at).as_posix()
-    names = [name.removeprefix(f"{below}/") for name in done.stdout.split("\0")[:-1]]
+    names = [name.removeprefix(f"{below}/") for name in found]
     return [name for name in names if name.endswith(".toml") and name.count("/") == 1]
+
+
+def _git_files(folder: Path, files: str) -> tuple[list[str], str]:
+    """Return which of some files git's index has, as seen from a folder, or why it cannot tell."""
+    command = ["git", "-C", str(folder), "ls-files", "-z", "--", files]
+    try:
+        done = subprocess.run(
+            command, capture_output=True, text=True, errors="surrogateescape", check=False
+        )
+    except OSError as error:
+        return [], f"git: {error.strerror}"
+    if done.returncode:
+        return [], done.stderr.strip().partition("\n")[0]
+    return done.stdout.split("\0")[:-1], ""

@@ -12,6 +12,7 @@ from pytest_garl import cpu_dispatch
 from pytest_garl.cases.case import Case, Evidence
 from pytest_garl.cases.case_test_run import CaseTestResult, run_case_tests
 from pytest_garl.errors import GarlError, LandingSystemError
+from pytest_garl.execution.exit_guard import refusing_end
 from pytest_garl.execution.flight import time_limit_s
 from pytest_garl.execution.judge_process import JudgeProcess
 from pytest_garl.execution.reference import (
@@ -140,10 +141,12 @@ def _by_verdict(case: Case, folder: Path, map: Map, judged_by: str, live: bool) 
     from pytest_garl.simulation.fly import fly
 
     with JudgeProcess() as judge:
-        system = system_of(case, folder)
-        cpu_dispatch.check()
-        npcs = policy_spec(case.policy) if live else case.behaviour.policy
-        flight = fly(case.scenario, system, npcs, map=map, time_limit_s=time_limit_s(case.limits))
+        with refusing_end(case.system):
+            system = system_of(case, folder)
+            cpu_dispatch.check()
+            npcs = policy_spec(case.policy) if live else case.behaviour.policy
+            limit_s = time_limit_s(case.limits)
+            flight = fly(case.scenario, system, npcs, map=map, time_limit_s=limit_s)
         judged = judge.judge_flight(flight, case.limits)
     verdict = judged.verdict
     sources = SourceHashes(

@@ -27,6 +27,7 @@ from pytest_garl.cli.case_tables import (
     renamed_table,
     scenario_table,
 )
+from pytest_garl.cli.pytest_settings import find_settings
 from pytest_garl.cli.shared import FOLDER, say
 from pytest_garl.errors import CorpusError, GarlError
 from pytest_garl.messages import command, printable
@@ -58,7 +59,8 @@ class _Project:
 
     def proved(self, case: Case) -> Case:
         """Return a case with the reference that the latest run here proved."""
-        return Proofs(self.root / ".garl").renewed(case)
+        folder = str(find_settings(self.root).values.get("garl_dir") or ".garl")
+        return Proofs(self.root / folder).renewed(case)
 
     def collected(self) -> tuple[ProjectTests, Corpus]:
         """Return the landing tests, and the corpus that pytest flies, or that of ``--folder``."""

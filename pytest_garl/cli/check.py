@@ -63,9 +63,12 @@ def check(
     pytest. The exit status is 1 if there is a fault that a search would meet in every flight, as if
     it does not land in clear air, or if a probe violates. Warnings name other problems of a search.
     """
+    from pytest_garl.execution.exit_guard import refusing_end
     from pytest_garl.testing import check_as_planned
 
-    planned = [each for target in targets for each in _planned(target, maps)]
+    # A module that ends this process when it is imported would end it as if all were well.
+    with refusing_end(" ".join(targets)):
+        planned = [each for target in targets for each in _planned(target, maps)]
     probed = [] if no_probes else _probed(planned)
     passed = True
     warned: dict[type, set[str]] = {}

@@ -64,7 +64,8 @@ class SettingsFile:
         lines = []
         for key in missing:
             value, meaning = settings[key]
-            lines += [f"# {meaning}", f'{key} = "{value}"' if is_toml else f"{key} = {value}"]
+            shown = _in_toml(key, value) if is_toml else value
+            lines += [f"# {meaning}", f"{key} = {shown}"]
         if self.section:
             text = _with_lines_in(before, self.section, lines)
         else:
@@ -112,6 +113,11 @@ def _read(file: Path) -> SettingsFile | None:
     if parsed.has_section(section):
         return SettingsFile(file=file, section=section, values=parsed[section])
     return SettingsFile(file=file, section="") if file.stem.endswith("pytest") else None
+
+
+def _in_toml(key: str, value: str) -> str:
+    """Return a value as TOML; where pytest takes TOML's own types, paths are a list."""
+    return f'["{value}"]' if key in PYTHONPATH else f'"{value}"'
 
 
 def _with_lines_in(text: str, section: str, lines: list[str]) -> str:

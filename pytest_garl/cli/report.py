@@ -125,14 +125,14 @@ def _text(found: dict[str, Any]) -> str:
             lines.append(f"  {control['text']}")
         for kind in search["signatures"]:
             severity = kind["severity"] or {}
-            told = severity.get("text", "")
+            unusual = severity.get("text", "")
             least = "at the least" if severity.get("took") else "unusual in the mildest of them"
             seen = in_control_text(
                 kind["in_control"], control["random"]["flights"] if control else 0
             )
-            title, *ending = filter(None, (kind["title"], kind["headline"]))
+            title, *ending = [*filter(None, (kind["title"], kind["headline"]))] or [""]
             lines.append(f"  {kind['count']:4d}  {kind['signature']}: {title}")
             lines += [f"        {text}" for text in ending]
-            lines += [f"        {least}: {told}"] if told else []
+            lines += [f"        {least}: {unusual}"] if unusual else []
             lines += [f"        {text}" for text in (seen, kind["repeat"]) if text]
     return "\n".join([*lines, ""]) if lines else "no flights yet\n"

@@ -16,6 +16,8 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from typing import Any, NoReturn
 
+from pytest_garl.errors import LandingSystemError
+
 REFUSED_STATUS = 3
 """The status with which a process ends that a thread of a flight before tried to end with 0."""
 _NAMES = ("_exit", "execv", "execve")
@@ -82,6 +84,33 @@ def watched_flight() -> Iterator[Watch]:
             raise
     finally:
         _guards.flight = None
+
+
+@contextlib.contextmanager
+def refusing_end(system: str) -> Iterator[None]:
+    """Raise LandingSystemError if the code inside, of a landing system, tries to end this process.
+
+    Afterwards the functions that end it are those from before.
+    """
+    with contextlib.ExitStack() as stack:
+        if not _guards.originals:
+            stack.callback(uninstall)
+        watch = stack.enter_context(watched_flight())
+        try:
+            yield
+        except Exception as error:
+            if watch.status is None:
+                raise
+            raise _ended(system, watch) from error
+    if watch.status is not None:
+        raise _ended(system, watch)
+
+
+def _ended(system: str, watch: Watch) -> LandingSystemError:
+    return LandingSystemError(
+        f"{system}: tried to end this process, with status {watch.status}; expected that it "
+        f"returns Abort() to give up, or raises an error. It was here:\n{watch.stack.rstrip()}"
+    )
 
 
 def _set(name: str, function: Callable[..., Any]) -> None:

@@ -220,6 +220,11 @@ class Facts:
         """Return whether a test has run in any process."""
         return bool(self._get(f"{_SESSION}ran {nodeid}"))
 
+    def first_passed_probes(self, keys: Sequence[str]) -> Sequence[str]:
+        """Note which probes had passed when the session began; return what was noted first."""
+        found: Sequence[str] = self._first(f"{_SESSION}passed probes", [*keys])
+        return found
+
     def note_interrupted(self) -> None:
         """Note that the session's main process was interrupted."""
         self._set(f"{_SESSION}interrupted", True)

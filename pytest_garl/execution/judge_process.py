@@ -6,6 +6,7 @@ that asks for them.  The landing system may have replaced what judges there, suc
 
 from __future__ import annotations
 
+import contextlib
 import dataclasses
 import json
 import os
@@ -60,7 +61,7 @@ class JudgeProcess:
         read_questions, write_questions = os.pipe()
         read_answers, write_answers = os.pipe()
         files = [read_questions, write_answers]
-        self._process = subprocess.Popen(
+        process = subprocess.Popen(
             [sys.executable, "-m", __name__, str(os.getpid()), *map(str, files)],
             env={**os.environ, **cpu_dispatch.environment()},
             stdin=subprocess.DEVNULL,
@@ -72,6 +73,7 @@ class JudgeProcess:
             os.close(each)
         self._questions = os.fdopen(write_questions, "wb")
         self._answers = os.fdopen(read_answers, "rb")
+        self._process = process
 
     def judge(
         self, job: FlightJob, scenario: Scenario, flight: FlightId, flown: FlownJob
@@ -106,27 +108,35 @@ class JudgeProcess:
         """End the process."""
         if self._process is None:
             return
-        for file in (self._questions, self._answers):
-            assert file is not None
-            file.close()
         self._process.kill()
         self._process.wait()
         self._process = None
+        for file in (self._questions, self._answers):
+            assert file is not None
+            # Of a question that was not sent whole nothing can be sent any more.
+            with contextlib.suppress(OSError):
+                file.close()
 
     def _ask(self, question: dict[str, Any]) -> dict[str, Any]:
         self.start()
         assert self._process is not None
         assert self._questions is not None
         assert self._answers is not None
+        text = b""
         try:
             self._questions.write(json.dumps(question).encode() + b"\n")
             self._questions.flush()
             text = self._answers.readline()
+            if not text:
+                status = self._process.wait()
+                raise PoolError(f"the process that judges flights ended with status {status}")
         except OSError as error:
             raise PoolError(f"the process that judges flights cannot be asked: {error}") from error
-        if not text:
-            status = self._process.wait()
-            raise PoolError(f"the process that judges flights ended with status {status}")
+        finally:
+            if not text:
+                # A signal may have interrupted it: the answer to this question would be taken for
+                # that to the next.
+                self.close()
         answer: dict[str, Any] = json.loads(text)
         if "error" in answer:
             raise GarlError(f"the flight cannot be judged: {answer['error']}")

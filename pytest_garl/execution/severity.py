@@ -82,10 +82,10 @@ class Severity:
 
         It may be empty.  What shrinking did not try is named.
         """
-        told = {"": "", "body": self._body_text(), "conditions": self._conditions_text()}[
-            self.about
-        ]
-        return f"{told}{self._untried_text()}" if told else ""
+        if not self.about:
+            return ""
+        took = self._body_text() if self.about == "body" else self._conditions_text()
+        return f"{took}{self._untried_text()}"
 
     @property
     def unusual(self) -> str:
@@ -132,8 +132,8 @@ class Severity:
             return ""
         if len(names) > MOST_LISTED:
             names = [*names[: MOST_LISTED - 1], f"{len(names) - MOST_LISTED + 1} more"]
-        told = ", ".join(names[:-1]) + " and " + names[-1] if len(names) > 1 else names[0]
-        return f"; {told} {'were' if len(names) > 1 else 'was'} not tried"
+        listed = ", ".join(names[:-1]) + " and " + names[-1] if len(names) > 1 else names[0]
+        return f"; {listed} {'were' if len(names) > 1 else 'was'} not tried"
 
     def _body_text(self) -> str:
         words = " ".join(word for word in (self.grade, self.type) if word)
@@ -152,8 +152,8 @@ class Severity:
         if not count:
             return "nothing unusual"
         if count == 1:
-            told = self._value_of_one(acting[0][1])
-            return f"{names[0]} alone{f', {told}' if told else ''}"
+            value = self._value_of_one(acting[0][1])
+            return f"{names[0]} alone{f', {value}' if value else ''}"
         if count > MOST_LISTED:
             more = f"{count - MOST_LISTED} more"
             return f"{count} conditions: {', '.join([*names[:MOST_LISTED], more])}"

@@ -288,11 +288,13 @@ class _Supervisor:
         Such a process might hold the ledger's lock.
         """
         left = self._end_what_is_left()
-        self._judged = self._judge(request, self._end_flying)
+        try:
+            self._judged = self._judge(request, self._end_flying)
+        except Exception as error:  # noqa: BLE001 (the pool raises it)
+            self._judged = {"cannot_go_on": failure_text(error, "the judge of flights")}
         if self._judged:
             self._end_flying()
-        else:
-            self._monitor.answer(goes_on=not left)
+        self._monitor.answer(goes_on=not (left or self._judged))
 
     def _end_flying(self) -> None:
         self._monitor.note_ending()

@@ -7,6 +7,7 @@ values mean is read in ``options.py`` once there is something to fly.
 from __future__ import annotations
 
 from collections import namedtuple
+from collections.abc import Iterable
 
 import pytest
 
@@ -200,19 +201,17 @@ def check_keys(config: pytest.Config) -> None:
 
     pytest itself warns at most, and the key that was meant keeps its default.
     """
-    # pytest has no public list of the keys that are given.
+    # pytest has no public list of the keys that are given, nor of those that are known.
+    known = config._parser._inidict
     for key in config._inicfg:
-        if key.startswith("garl_"):
-            try:
-                config.getini(key)
-            except ValueError as error:
-                raise pytest.UsageError(_unknown_key(key)) from error
+        if key.startswith("garl_") and key not in known:
+            raise pytest.UsageError(_unknown_key(key, known))
 
 
-def _unknown_key(key: str) -> str:
+def _unknown_key(key: str, known: Iterable[str]) -> str:
     import difflib
 
-    near = difflib.get_close_matches(key, [f"garl_{option.name}" for option in OPTIONS], n=1)
+    near = difflib.get_close_matches(key, [each for each in known if each[:5] == "garl_"], n=1)
     meant = f"did you mean {near[0]}? " if near else ""
     return f"{key}: unknown ini key; {meant}`pytest --help` lists those that begin with garl_"
 

@@ -21,6 +21,7 @@ from pytest_garl.npcs.catalogue import policy_spec
 from pytest_garl.plugin.abort import abort_session
 from pytest_garl.plugin.keys import (
     FOUND,
+    GATE,
     GATE_PLUGIN,
     GATE_REPORT,
     RUN,
@@ -52,6 +53,7 @@ class BaselineGateItem(pytest.Item):
         super().__init__(**rest)
         self.garl_gate = base
         self._target = target
+        self.user_properties.append((GATE, base.title))
 
     def runtest(self) -> None:
         """Fly and compare."""
@@ -109,8 +111,8 @@ class BaselineGateItem(pytest.Item):
             )
 
     def reportinfo(self) -> tuple[os.PathLike[str] | str, int | None, str]:
-        """Return the item's file and name."""
-        return self.path, None, self.name
+        """Return the item's file and name; pytest names the first line if a mark skips it."""
+        return self.path, 0, self.name
 
 
 class BaselineGatePlugin:
@@ -121,6 +123,7 @@ class BaselineGatePlugin:
         self._gates_made: set[tuple[str, str, str]] = set()
         self._gate_reports: dict[str, list[str]] = {}
         self._problem = ""
+        self._skipped: list[str] = []
 
     @pytest.hookimpl(wrapper=True)
     def pytest_pycollect_makeitem(
@@ -167,13 +170,18 @@ class BaselineGatePlugin:
         lines = [str(text) for key, text in report.user_properties if key == GATE_REPORT]
         if lines and report.when == "call":
             self._gate_reports[report.nodeid] = lines
+        if report.skipped and report.when == "setup" and GATE in dict(report.user_properties):
+            self._skipped.append(report.nodeid)
 
     def note_missing_gate(self, session: pytest.Session) -> bool:
-        """Note under xdist, whose workers alone know the items, whether a gate is missing."""
-        if not session.config.pluginmanager.hasplugin("dsession") or self._gate_reports:
+        """Note whether a gate is missing: skipped, or not there.
+
+        Under xdist the workers alone know the items.
+        """
+        if self._gate_reports or session.config.option.collectonly:
             return False
         if session.exitstatus in (pytest.ExitCode.OK, pytest.ExitCode.NO_TESTS_COLLECTED):
-            self._problem = self._missing_gate()
+            self._problem = self._missing()
         return bool(self._problem)
 
     def _missing_gate(self) -> str:
@@ -185,6 +193,16 @@ class BaselineGatePlugin:
             f"--garl-baseline={self._file}: nothing to compare: it holds {wanted}, and no selected "
             "test is marked with one of these"
         )
+
+    def _missing(self) -> str:
+        """Return what is wrong with a session that has compared nothing."""
+        if "baseline" in self._options.given and self._skipped:
+            names = ", ".join(self._skipped)
+            return (
+                f"--garl-baseline={self._file}: nothing was compared: {names} was skipped, by a "
+                "mark of its module or by a hook"
+            )
+        return self._missing_gate()
 
     def pytest_report_header(self) -> str:
         """Return how many flights the gate compares."""

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
-from pytest_garl.plugin.keys import LOST, SEVERITY, SIGNATURE, SLOT
+from pytest_garl.plugin.keys import LOST, SEVERITY, SIGNATURE, SLOT, VIOLATED_PROBE
 from pytest_garl.plugin.run import Run
 from pytest_garl.plugin.suggested_commands import repeat_kind_command
 from pytest_garl.plugin.summary import renewal_lines
@@ -44,6 +44,8 @@ SHARES = (
     "crashed",
     "inconclusive",
 )
+_BESIDE = {LOST: "Lost", VIOLATED_PROBE: "Probe"}
+"""Properties of items that fail and are no flight of a search, and what their lines begin with."""
 
 Row = tuple[str, ...]
 
@@ -80,14 +82,14 @@ def write_step_summary(
         escaped(f"{_where(search)}: {line}") for search in searches for line in kinds_lines(search)
     ]
     parts.append(_kinds_table(rows) if rows else none)
-    parts += [*_lost_cases(reporter), *renewal_lines(reporter)]
+    parts += [*_failed_beside(reporter), *renewal_lines(reporter)]
     parts += index_parts(report.page, report.index.parent, url) if report else ()
     _append(reporter, parts)
 
 
 def write_lost_cases(reporter: Any) -> None:
     """Append the lost cases of a session that flew nothing, if GitHub names a file."""
-    lines = _lost_cases(reporter)
+    lines = _failed_beside(reporter)
     if lines:
         _append(reporter, lines)
 
@@ -140,13 +142,13 @@ def _shares(search: SearchSummary) -> tuple[str, ...]:
     return escaped(_where(search)), str(total), *(percent(count, total) for count in counts)
 
 
-def _lost_cases(reporter: Any) -> list[str]:
-    """Return a line for each file of the corpus that nothing can fly any more."""
+def _failed_beside(reporter: Any) -> list[str]:
+    """Return a line for each violated probe, and each file that nothing can fly any more."""
     return [
-        f"Lost: {escaped(str(value))}"
+        f"{_BESIDE[key]}: {escaped(str(value))}"
         for report in reporter.getreports("failed")
         for key, value in report.user_properties
-        if key == LOST and report.when == "call"
+        if key in _BESIDE and report.when == "call"
     ]
 
 

@@ -125,8 +125,8 @@ def _workers(run: Run) -> str:
     inside = run.pool.in_process
     workers = "flown inside pytest" if inside else counted(options.workers or 1, "worker")
     if run.flight_s is None:
-        told = f"the time is told after {FIRST_FLIGHTS} flights"
-        return f"{workers}{pool}" + (f"; {told}" if options.budget > FIRST_FLIGHTS else "")
+        follows = f"; the time left follows after {FIRST_FLIGHTS} flights"
+        return f"{workers}{pool}{follows if options.budget > FIRST_FLIGHTS else ''}"
     time = _duration_of(run, run.flight_s, [options.budget])
     return f"{workers}{pool}; {time} per system and map{_shrinking(run, run.flight_s)}"
 

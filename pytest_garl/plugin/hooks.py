@@ -134,7 +134,7 @@ def pytest_make_collect_report(
     report = yield
     if isinstance(collector, pytest.Class):
         for item in report.result or ():
-            if isinstance(item, pytest.Item) and marker_of(item) and not has_slot(item):
+            if isinstance(item, pytest.Function) and marker_of(item) and not has_slot(item):
                 report.outcome, report.longrepr = "failed", without_landing(item)
                 report.result = []
                 break

@@ -5,15 +5,13 @@ from __future__ import annotations
 import re
 import time
 from collections.abc import Iterator
-from contextlib import nullcontext
-from typing import Any
 
 import pytest
 
 from pytest_garl.cases.case_request import CaseRequest, CaseResult
 from pytest_garl.execution.ledger import Ledger
 from pytest_garl.plugin.run import Run
-from pytest_garl.plugin.terminal_text import begin_line, duration, width_of, wrapped
+from pytest_garl.plugin.terminal_text import duration, wrapped, write_lines
 from pytest_garl.plugin.time_left import NewKinds, TimeLeft
 from pytest_garl.verdicts.wording import headline
 
@@ -56,18 +54,9 @@ class KindNews:
 
     def show(self, lines: list[str]) -> None:
         """Write lines, also while pytest captures what a test prints."""
-        reporter: Any = self._config.pluginmanager.get_plugin("terminalreporter")
-        capture: Any = self._config.pluginmanager.get_plugin("capturemanager")
-        if reporter is None:
-            return
-        with capture.global_and_fixture_disabled() if capture else nullcontext():
-            begin_line(reporter)
-            # Captured, standard output is no terminal and has no width.
-            width = width_of(self._config)
-            for line in lines:
-                reporter.write_line(wrapped(line, width, others="  "))
-            # A pipe, such as the log of a build server, would get it with the next test's dot.
-            reporter.flush()
+        write_lines(
+            self._config, lambda width: (wrapped(line, width, others="  ") for line in lines)
+        )
 
     def _new_kinds(self, ledger: Ledger) -> Iterator[str]:
         for search, signature in self._kinds.found(ledger):
@@ -76,8 +65,8 @@ class KindNews:
             self._found.add((search, signature))
             flight = ledger.queries.first_of(search, signature)
             where = f"{flight.system.split(':')[-1]} on {flight.id.map}"
-            told = headline(flight.result.verdict.story)
-            yield f"garl: found {signature}: {told} ({where}, {flight.id.slot_id})"
+            what = headline(flight.result.verdict.story)
+            yield f"garl: found {signature}: {what} ({where}, {flight.id.slot_id})"
 
     def _time(self, ledger: Ledger, now: float) -> Iterator[str]:
         """Yield the time left once, in a run whose header could not tell it."""

@@ -44,8 +44,8 @@ class LostCaseItem(pytest.Item):
         pytest.fail(self.reason, pytrace=False)
 
     def reportinfo(self) -> tuple[os.PathLike[str] | str, int | None, str]:
-        """Return the item's file and name."""
-        return self.path, None, self.nodeid
+        """Return the item's file and name; pytest names the first line if a mark skips it."""
+        return self.path, 0, self.nodeid
 
 
 class _LostFile(pytest.File):

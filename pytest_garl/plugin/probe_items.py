@@ -8,13 +8,15 @@ from __future__ import annotations
 
 import json
 import os
-from collections.abc import Iterator, Sequence
-from dataclasses import replace
+from collections.abc import Collection, Iterator, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import pytest
 
 from pytest_garl.cases.case_request import CaseRequest
+from pytest_garl.cases.corpus import Corpus
 from pytest_garl.cases.new_signatures import request_of
 from pytest_garl.errors import GarlError
 from pytest_garl.execution.flight_id import FIRST_SLOT, CompletedFlight, search_key
@@ -22,14 +24,14 @@ from pytest_garl.execution.job import parse_job
 from pytest_garl.execution.ledger import Ledger
 from pytest_garl.execution.reference import package_sha256
 from pytest_garl.execution.sources import combined_sha256, data_files, source_hashes
-from pytest_garl.files.atomic import write_text_atomically
+from pytest_garl.files.atomic import locked, write_text_atomically
 from pytest_garl.flight.flight_file import load
 from pytest_garl.landing_system import Airframe
 from pytest_garl.messages import command
 from pytest_garl.npcs.catalogue import policy_spec
 from pytest_garl.npcs.domain_policy import NOBODY
 from pytest_garl.plugin.abort import abort_session
-from pytest_garl.plugin.keys import FOUND, RUN, target_of
+from pytest_garl.plugin.keys import FOUND, RUN, VIOLATED_PROBE, target_of
 from pytest_garl.plugin.options import Options
 from pytest_garl.plugin.run import Run
 from pytest_garl.plugin.suggested_commands import shown_path
@@ -66,15 +68,19 @@ class ProbesPlugin:
         A simulator of the user's own need not know the conditions of probes.
         """
         if not config.hook.pytest_garl_fly(config=config):
-            items[:0] = list(probe_items(self._options, items))
+            run = config.stash.get(RUN, None)
+            passed = passed_before(run.ledger if run is not None else None, self._options.folder)
+            items[:0] = list(probe_items(self._options, items, passed))
 
 
-def probe_items(options: Options, items: Sequence[pytest.Item]) -> Iterator[pytest.Item]:
+def probe_items(
+    options: Options, items: Sequence[pytest.Item], passed: Collection[str]
+) -> Iterator[pytest.Item]:
     """Yield an item for each landing system that the selected items search for violations.
 
-    With ``garl_probes = first`` none for a system whose probes passed with its present sources.
+    With ``garl_probes = first`` none for a system whose probes have ``passed`` with its present
+    sources.
     """
-    passed = _passed(options)
     names: set[str] = set()
     for target, module in _searched(options, items):
         name = f"probes[{target.system.__name__}]"
@@ -88,6 +94,9 @@ def probe_items(options: Options, items: Sequence[pytest.Item]) -> Iterator[pyte
 class ProbesItem(pytest.Item):
     """Flies the probes of a landing system, and fails if one violates."""
 
+    fixturenames: tuple[str, ...] = ()
+    """Hooks of projects ask every item for it."""
+
     def __init__(self, *, target: Target, **rest: Any) -> None:
         super().__init__(**rest)
         self._target = target
@@ -97,32 +106,63 @@ class ProbesItem(pytest.Item):
         run: Run = self.config.stash[RUN]
         try:
             flown = _Flown(run, self._target)
-            violated = flown.violated()
             flown.note()
         except GarlError as error:
             abort_session(self, error)
         if flown.problem:
             pytest.skip(flown.problem)
-        self.add_report_section("call", "stdout", "\n".join(flown.lines))
-        if not violated:
+        lines = [each.line for each in flown.results]
+        self.add_report_section("call", "stdout", "\n".join(lines))
+        if not flown.violated:
             _note_passed(run.options, self._target)
             return
-        number = f"{len(violated)} of {counted(len(flown.results), 'probe')}"
+        system, map = self._target.system.__name__, self._target.map
+        number = f"{len(flown.violated)} of {counted(len(lines), 'probe')}"
         self.user_properties.append((FOUND, f"violates {number}"))
-        lines = [f"{self._target.system.__name__} violates {number} on {self._target.map}:"]
-        lines += flown.lines
-        for probe in violated:
+        lines = [f"{system} violates {number} on {map}:", *lines]
+        for each in flown.violated:
+            self.user_properties.append((VIOLATED_PROBE, f"{system} on {map}: {each.line}"))
             file = write_text_atomically(
-                run.options.folder / "probes" / f"{self._target.map}-{probe.name}.toml",
-                dump_scenario(probe.scenario),
+                run.options.folder / "probes" / f"{map}-{each.probe.name}.toml",
+                dump_scenario(each.probe.scenario),
             )
             repeat = f"--garl-repeat={shown_path(file, self.config)}"
             lines.append(f"fly it: {command('pytest', shown_path(self.path, self.config), repeat)}")
         pytest.fail("\n".join(lines), pytrace=False)
 
     def reportinfo(self) -> tuple[os.PathLike[str] | str, int | None, str]:
-        """Return the item's file and name."""
-        return self.path, None, self.name
+        """Return the item's file and name; pytest names the first line if a mark skips it."""
+        return self.path, 0, self.name
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Result:
+    """A flown probe, and the file of the known case that excuses it; empty if none does."""
+
+    probe: Probe
+    flight: CompletedFlight
+    known: str
+
+    @property
+    def verdict(self) -> Verdict:
+        """The verdict on its flight."""
+        return self.flight.result.verdict
+
+    @property
+    def violated(self) -> bool:
+        """Whether it violates what may be asked, and no known case excuses it."""
+        excused = self.probe.outside or self.known
+        return self.probe.is_violated(self.verdict) and not excused
+
+    @property
+    def line(self) -> str:
+        """How it ended."""
+        colour = "ok"
+        if self.probe.is_violated(self.verdict):
+            colour = f"known, {self.known}" if self.known else "FAILED"
+            colour = "outside the domain" if self.probe.outside else colour
+        probe = self.probe
+        return f"{probe.name}: {colour}: {probe.sentence}: {probe.ending(self.verdict)}"
 
 
 class _Flown:
@@ -130,80 +170,43 @@ class _Flown:
 
     def __init__(self, run: Run, target: Target) -> None:
         self._run, self._target = run, target
-        self.results: list[tuple[Probe, CompletedFlight]] = []
+        self.results: list[_Result] = []
         self.problem = ""
         map = load_map(target.map, run.options.map_folders)
         domain = within(_domain(run.options, target), target.navigation)
         from pytest_garl.search.probes import clear_scenario, probes_for, start_beside
 
-        clear = self._twin = clear_scenario(map, target.task, domain)
+        clear = clear_scenario(map, target.task, domain)
         beside = start_beside(clear, map, domain)
         first, second = self._fly([clear, beside.scenario])
         if not _has_landed(first):
             story = headline(first.result.verdict.story)
             self.problem = f"no probes: it does not land in clear air: {story}"
             return
-        self.results.append((beside, second))
-        base, scenario = (second, beside.scenario) if _has_landed(second) else (first, clear)
-        self._twin = scenario
+        base, twin = (second, beside.scenario) if _has_landed(second) else (first, clear)
         camera = (target.airframe or Airframe()).camera
         others = [
             probe
-            for probe in probes_for(load(base.record), scenario, map, domain, target.limits, camera)
+            for probe in probes_for(load(base.record), twin, map, domain, target.limits, camera)
             if probe.scenario not in (clear, beside.scenario)
         ]
-        flights = self._fly([probe.scenario for probe in others])
-        self.results += zip(others, flights, strict=True)
+        flights = (second, *self._fly([probe.scenario for probe in others]))
+        for probe, flight in zip((beside, *others), flights, strict=True):
+            alike = run.options.corpus, target.system_name, flight.signature
+            known = excusing_case(*alike, probe.scenario, twin)
+            self.results.append(_Result(probe=probe, flight=flight, known=known))
 
     @property
-    def lines(self) -> list[str]:
-        """One line for each probe."""
-        return [self._line(probe, flight.result.verdict) for probe, flight in self.results]
-
-    def violated(self) -> list[Probe]:
-        """Return the probes that violate what may be asked, and that no known case excuses."""
-        return [
-            probe
-            for probe, flight in self.results
-            if not probe.outside
-            and probe.is_violated(flight.result.verdict)
-            and not self._known(probe, flight.result.verdict)
-        ]
+    def violated(self) -> list[_Result]:
+        """The probes that violate what may be asked, and that no known case excuses."""
+        return [each for each in self.results if each.violated]
 
     def note(self) -> None:
         """Note in the ledger which flights violate, for the process that saves cases."""
-        violated = self.violated()
-        found = [
-            (flight.signature, flight.sha256)
-            for probe, flight in self.results
-            if probe in violated and flight.sha256
-        ]
+        flights = [each.flight for each in self.violated]
+        found = [(each.signature, each.sha256) for each in flights if each.sha256]
         if found:
             self._run.ledger.facts.note_violated_probes(self._target.search, found)
-
-    def _line(self, probe: Probe, verdict: Verdict) -> str:
-        """Return how a probe ended."""
-        said = "ok"
-        if probe.is_violated(verdict):
-            known = self._known(probe, verdict)
-            said = f"known, {known}" if known else "FAILED"
-            said = "outside the domain" if probe.outside else said
-        return f"{probe.name}: {said}: {probe.sentence}: {probe.ending(verdict)}"
-
-    def _known(self, probe: Probe, verdict: Verdict) -> str:
-        """Return the file of a known case with the signature and the causes of a probe."""
-        corpus = self._run.options.corpus
-        for entry in corpus.entries(self._target.system_name):
-            case = entry.case
-            if (
-                case is not None
-                and case.status == "open"
-                and case.ending == verdict.ending
-                and corpus.is_accepted(entry)
-                and has_cause_of(case.scenario, probe.scenario, self._twin)
-            ):
-                return entry.path.name
-        return ""
 
     def _fly(self, scenarios: Sequence[Scenario]) -> Sequence[CompletedFlight]:
         return self._run.fly_all(self._target, policy_spec(NOBODY), scenarios)
@@ -256,6 +259,21 @@ def _domain(options: Options, target: Target) -> Domain:
     return target.domain or options.domain
 
 
+def excusing_case(corpus: Corpus, system: str, ending: str, probe: Scenario, twin: Scenario) -> str:
+    """Return the file of a known case with the ending and the causes of a probe; empty if none."""
+    for entry in corpus.entries(system):
+        case = entry.case
+        if (
+            case is not None
+            and case.expects_signature
+            and case.ending == ending
+            and corpus.is_accepted(entry)
+            and has_cause_of(case.scenario, probe, twin)
+        ):
+            return entry.path.name
+    return ""
+
+
 def has_cause_of(case: Scenario, probe: Scenario, twin: Scenario) -> bool:
     """Whether a case has the cause of a probe, which its twin has not, and no other one."""
     own = _causes(probe) - _causes(twin)
@@ -274,14 +292,25 @@ def _key(options: Options, target: Target) -> str:
     return search_key(json.dumps([target.search, combined_sha256(sources), package_sha256()]))
 
 
-def _passed(options: Options) -> list[str]:
+def passed_before(ledger: Ledger | None, folder: Path) -> list[str]:
+    """Return what had passed when the session began.
+
+    All workers of xdist must collect the same items, also one that replaces another one later.
+    """
+    known = _passed(folder)
+    return known if ledger is None else [*ledger.facts.first_passed_probes(known)]
+
+
+def _passed(folder: Path) -> list[str]:
     try:
-        known = json.loads((options.folder / PASSED).read_text(encoding="utf-8"))
+        known = json.loads((folder / PASSED).read_text(encoding="utf-8"))
     except (OSError, ValueError):
         return []
     return [str(each) for each in known] if isinstance(known, list) else []
 
 
 def _note_passed(options: Options, target: Target) -> None:
-    keys = [*_passed(options), _key(options, target)]
-    write_text_atomically(options.folder / PASSED, json.dumps(sorted({*keys})))
+    # Another worker of xdist may note another landing system.
+    with locked(options.folder):
+        keys = {*_passed(options.folder), _key(options, target)}
+        write_text_atomically(options.folder / PASSED, json.dumps(sorted(keys)))

@@ -7,7 +7,7 @@ import sqlite3
 import sys
 import threading
 from collections.abc import Callable, Generator, Iterator
-from contextlib import closing, contextmanager, nullcontext
+from contextlib import closing, contextmanager
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -20,7 +20,7 @@ from pytest_garl.plugin.keys import is_xdist_worker
 from pytest_garl.plugin.kind_news import KindNews, news_of
 from pytest_garl.plugin.progress_text import ProgressReader, RunProgress, progress_line
 from pytest_garl.plugin.run import Run
-from pytest_garl.plugin.terminal_text import begin_line, width_of
+from pytest_garl.plugin.terminal_text import write_lines
 from pytest_garl.plugin.termination import ControllerWatch
 
 REFRESH_S = 0.5
@@ -127,14 +127,8 @@ class ProgressLog:
     def refresh(self, ledger: Ledger) -> None:
         """Write a line if it is time."""
         progress = self._reader.read(ledger)
-        reporter: Any = self._config.pluginmanager.get_plugin("terminalreporter")
-        if progress is None or reporter is None:
-            return
-        capture: Any = self._config.pluginmanager.get_plugin("capturemanager")
-        with capture.global_and_fixture_disabled() if capture else nullcontext():
-            begin_line(reporter)
-            reporter.write_line(progress_line(progress, width_of(self._config)))
-            reporter.flush()
+        if progress is not None:
+            write_lines(self._config, lambda width: [progress_line(progress, width)])
 
 
 class TerminalLine:

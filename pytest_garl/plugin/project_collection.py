@@ -8,8 +8,6 @@ from __future__ import annotations
 import dataclasses
 import json
 import os
-import subprocess
-import sys
 import tempfile
 from collections.abc import Generator
 from dataclasses import dataclass
@@ -18,6 +16,7 @@ from typing import Any
 
 import pytest
 
+from pytest_garl.cases.case_test_run import end_of, ini_options, run_pytest
 from pytest_garl.cases.census import marked_test_files
 from pytest_garl.cases.collected_tests import CollectedTest, Collection
 from pytest_garl.errors import GarlError
@@ -26,8 +25,6 @@ from pytest_garl.plugin.keys import COLLECTED
 from pytest_garl.plugin.lost_cases import collection_of
 from pytest_garl.plugin.options import options_of
 
-_OUTPUT_LINES = 20
-"""Number of last lines of pytest's output in the error of a run that collected nothing."""
 _BROKEN = pytest.StashKey[dict[str, str]]()
 
 
@@ -71,28 +68,14 @@ def collect_project(root: Path, cases: Path | None) -> ProjectTests:
 def _collect(root: Path, cases: Path | None, files: tuple[str, ...]) -> ProjectTests:
     with tempfile.TemporaryDirectory(prefix="garl-") as scratch:
         target = Path(scratch, "collected.json")
-        overrides = [f"garl_{name}=" for name in ("budget", "repeat", "baseline")]
-        overrides += [f"cache_dir={scratch}/cache", f"garl_dir={scratch}/garl"]
-        overrides += [f"garl_cases={cases.absolute()}"] if cases is not None else []
-        done = subprocess.run(
-            [
-                *(sys.executable, "-m", "pytest", "-p", __name__, "--collect-only", "-q"),
-                *("--maxfail=0", f"--garl-collected={target}"),
-                *(f"--garl-collect={file}" for file in files),
-                *(word for each in overrides for word in ("-o", each)),
-            ],
-            cwd=root,
-            stdin=subprocess.DEVNULL,
-            capture_output=True,
-            text=True,
-            errors="replace",
-            check=False,
-        )
+        arguments = [
+            *("-p", __name__, "--collect-only", "-q", "--maxfail=0", f"--garl-collected={target}"),
+            *(f"--garl-collect={file}" for file in files),
+            *ini_options(Path(scratch), cases),
+        ]
+        done = run_pytest(arguments, root)
         if not target.is_file():
-            output = "\n".join((done.stdout + done.stderr).splitlines()[-_OUTPUT_LINES:])
-            raise GarlError(
-                f"pytest could not collect the landing tests (status {done.returncode}):\n{output}"
-            )
+            raise GarlError(f"pytest could not collect the landing tests {end_of(done)}")
         return _read(json.loads(target.read_text(encoding="utf-8")))
 
 

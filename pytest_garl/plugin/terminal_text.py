@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import re
 import textwrap
+from collections.abc import Callable, Iterable
+from contextlib import nullcontext
 from typing import Any
 
 import pytest
@@ -51,3 +53,18 @@ def begin_line(reporter: Any) -> None:
     reporter.ensure_newline()
     if reporter._tw.width_of_current_line:
         reporter.line("")
+
+
+def write_lines(config: pytest.Config, lines: Callable[[int], Iterable[str]]) -> None:
+    """Write lines of their own, made for a width, also while pytest captures what a test prints."""
+    reporter: Any = config.pluginmanager.get_plugin("terminalreporter")
+    capture: Any = config.pluginmanager.get_plugin("capturemanager")
+    if reporter is None:
+        return
+    with capture.global_and_fixture_disabled() if capture else nullcontext():
+        begin_line(reporter)
+        # Captured, standard output is no terminal and has no width.
+        for line in lines(width_of(config)):
+            reporter.write_line(line)
+        # A pipe, such as the log of a build server, would get it with the next test's dot.
+        reporter.flush()

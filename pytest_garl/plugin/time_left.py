@@ -1,6 +1,6 @@
 """How many flights follow the searches, and how long all that is left takes.
 
-No time is told before some flights were flown: those of one landing system take 1 s, those of
+Nothing is forecast before some flights were flown: those of one landing system take 1 s, those of
 another 10 s, and the same on another machine half or twice as long.
 """
 
@@ -15,8 +15,8 @@ from pytest_garl.execution.ledger import Ledger
 from pytest_garl.plugin.run import Run
 
 FIRST_FLIGHTS = 8
-"""The time left is told after so many flights: half as many hold one kind or none of those that end
-late."""
+"""The time left is forecast after this number of flights: half as many hold at most one kind of
+those that end late."""
 _LEAST_BUSY = 0.5
 """Workers that idle more than this do so because the search has just begun."""
 

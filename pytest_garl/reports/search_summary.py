@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import dataclasses
 import statistics
-from collections.abc import Iterable, Mapping, Sequence, Set
+from collections.abc import Callable, Iterable, Mapping, Sequence, Set
 from dataclasses import dataclass
 from types import MappingProxyType
-from typing import Self
+from typing import Self, TypeVar
 
 from pytest_garl.cases.case import Case
 from pytest_garl.execution.job import FlightJob, parse_job
@@ -20,6 +20,7 @@ from pytest_garl.verdicts.kinds import hill_number
 from pytest_garl.verdicts.verdict import Limits, NoLanding, Verdict
 from pytest_garl.verdicts.wording import headline
 
+T = TypeVar("T")
 WHY_NO_LANDING: tuple[NoLanding, ...] = ("needless", "excused", "blocked")
 """Columns of the flights without landing: somebody could have landed; nobody could have read the
 marker for long enough; something never left it free for long enough."""
@@ -152,7 +153,7 @@ class SearchSummary:
             )
             for kind in self.kinds
         ]
-        return dataclasses.replace(self, kinds=tuple(by_cause(told)))
+        return dataclasses.replace(self, kinds=tuple(by_cause(told, lambda kind: kind)))
 
     @property
     def effective_kinds(self) -> float:
@@ -283,17 +284,19 @@ def _summary(
     )
 
 
-def by_cause(kinds: Sequence[ViolationKind]) -> list[ViolationKind]:
-    """Return kinds with those of one cause together, the most frequent cause first.
+def by_cause(shown: Iterable[T], kind_of: Callable[[T], ViolationKind]) -> list[T]:
+    """Return what shows kinds, those of one cause together, the most frequent cause first.
 
-    A kind of which nobody knows the cause stands for itself.  The order within a cause is kept.
+    A kind of which nobody knows the cause stands for itself.  The order within a cause is kept, and
+    so is that of causes which are equally frequent.
     """
-    groups: dict[tuple[str, ...], list[ViolationKind]] = {}
-    for kind in kinds:
-        key = cause_of(kind.case.severity) if kind.case else ("", kind.signature)
-        groups.setdefault(key, []).append(kind)
-    ordered = sorted(groups.values(), key=lambda group: -sum(kind.count for kind in group))
-    return [kind for group in ordered for kind in group]
+    groups: dict[tuple[str, ...], list[T]] = {}
+    for number, each in enumerate(shown):
+        case = kind_of(each).case
+        key = cause_of(case.severity) if case else ("", str(number))
+        groups.setdefault(key, []).append(each)
+    ordered = sorted(groups.values(), key=lambda group: -sum(kind_of(e).count for e in group))
+    return [each for group in ordered for each in group]
 
 
 def _lowest_severities(flights: Sequence[LedgerFlight]) -> dict[str, tuple[Severity, str]]:

@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import dataclasses
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
 
 from pytest_garl.cases.case import Case
+from pytest_garl.cases.case_file import dump_case
 from pytest_garl.cases.case_flights import recorded_behaviour
 from pytest_garl.cases.case_test_run import CaseTestResult
 from pytest_garl.cases.replay import (
@@ -53,6 +56,31 @@ def recorded(tmp_path: Path) -> Case:
 def test_replay_is_identical_only_with_the_recorded_changes(recorded: Case, tmp_path: Path) -> None:
     assert replay(recorded, tmp_path).same_flight is True
     assert replay(dataclasses.replace(recorded, changes=()), tmp_path).same_flight is False
+
+
+ENDS_ITS_PROCESS = """
+from pathlib import Path
+from pytest_garl.cases.case_file import load_case
+from pytest_garl.cases.replay import replay
+print(replay(load_case(Path("case.toml")), Path()).result)
+"""
+
+
+@pytest.mark.sim
+def test_a_system_that_ends_the_process_is_not_fixed(tmp_path: Path) -> None:
+    plain = dataclasses.replace(case(), system="lander:Lander", test="")
+    (tmp_path / "case.toml").write_text(dump_case(plain))
+    (tmp_path / "lander.py").write_text(
+        "import os\n"
+        "class Lander:\n"
+        "    needs_camera = False\n"
+        "    def reset(self, mission): os._exit(0)\n"
+        "    def step(self, observation): ...\n"
+    )
+    command = [sys.executable, "-c", ENDS_ITS_PROCESS]
+    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)
+    assert done.returncode == 1
+    assert "lander:Lander: tried to end this process, with status 0" in done.stderr
 
 
 PLAIN = case()

@@ -11,7 +11,10 @@ from click.testing import CliRunner, Result
 from pytest_garl.cases.case import Prevention
 from pytest_garl.cases.case_file import load_case
 from pytest_garl.cases.corpus import Corpus, replace_file
+from pytest_garl.cases.reference_proofs import Proofs
+from pytest_garl.cases.replay import SourceHashes
 from pytest_garl.cli import main
+from pytest_garl.cli.cases import _Project
 from pytest_garl.execution.severity import Severity
 from pytest_garl.verdicts.verdict import Limits
 from tests.cases.samples import case as dog_case
@@ -259,3 +262,12 @@ def test_video_without_an_encoder_is_refused_before_the_flight(
     assert result.exit_code == 1
     assert "pip install 'pytest-garl[video]'" in result.output
     assert "FAILED" not in result.output
+
+
+def test_a_proof_is_read_from_the_folder_of_the_runs(tmp_path: Path) -> None:
+    (tmp_path / "pytest.ini").write_text("[pytest]\ngarl_dir = out\n")
+    (tmp_path / "out").mkdir()
+    sources = SourceHashes(system_sha256="11", simulator_sha256="22", map_sha256="33")
+    Proofs(tmp_path / "out").note(dog_case(), sources)
+    project = _Project(root=tmp_path, corpus=Corpus(tmp_path / "cases"), named=False)
+    assert SourceHashes.of(project.proved(dog_case()).evidence) == sources

@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import platform
+import subprocess
 import sys
 from pathlib import Path
 
@@ -192,3 +193,32 @@ def test_check_reports_a_fault_as_one_error(system: str, words: str) -> None:
     assert done.exit_code == 1
     assert words in done.output
     assert "Traceback" not in done.output
+
+
+EXITS = """
+import os
+from checked_stack import Climbs
+
+class Exits(Climbs):
+    def step(self, observation):
+        os._exit(0)
+"""
+
+
+@pytest.mark.parametrize(
+    ("target", "words"),
+    [
+        ("exits:Exits", "Exits: tried to end this process, with status 0"),
+        ("gone:Gone", "gone:Gone: tried to end this process, with status 0"),
+        ("test_gone.py", "test_gone.py: tried to end this process, with status 0"),
+    ],
+)
+def test_check_is_not_ended_by_what_it_checks(tmp_path: Path, target: str, words: str) -> None:
+    (tmp_path / "exits.py").write_text(EXITS)
+    (tmp_path / "gone.py").write_text("import os\nos._exit(0)\n")
+    (tmp_path / "test_gone.py").write_text("import gone\n")
+    garl_file = str(Path(sys.executable).with_name("garl"))
+    command = [garl_file, "check", target, "--seconds=2"]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert done.returncode == 1
+    assert words in done.stderr

@@ -87,7 +87,7 @@ def test_existing_project_keeps_all_that_it_has(folder: Path) -> None:
     assert settings == {
         "testpaths": ["tests"],
         "garl_domain": "calm",
-        "pythonpath": ".",
+        "pythonpath": ["."],
     }
     assert (folder / ".gitignore").read_text() == "*.pyc\n.garl/\n"
     assert "from lander import Slow\n" in (tests / "test_lander.py").read_text()
@@ -124,6 +124,20 @@ def test_settings_go_to_the_file_that_pytest_reads(
     before = contents(folder)
     init()
     assert contents(folder) == before
+
+
+@pytest.mark.parametrize(
+    ("name", "table"),
+    [("pytest.toml", "pytest"), ("pyproject.toml", "tool.pytest"), ("pytest.ini", "pytest")],
+)
+def test_tests_in_a_folder_of_their_own_find_the_landing_system(
+    folder: Path, name: str, table: str
+) -> None:
+    (folder / "tests").mkdir()
+    quoted = "tests" if name.endswith(".ini") else '["tests"]'
+    (folder / name).write_text(f"[{table}]\ntestpaths = {quoted}\n")
+    assert init().exit_code == 0
+    assert "tests/test_my_landing.py::test_lands_in_time[lawn-g00-s00]" in collected(folder)
 
 
 @pytest.mark.parametrize(

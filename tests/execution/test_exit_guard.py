@@ -13,8 +13,9 @@ from typing import Any
 
 import pytest
 
+from pytest_garl.errors import LandingSystemError
 from pytest_garl.execution import exit_guard
-from pytest_garl.execution.exit_guard import watched_flight
+from pytest_garl.execution.exit_guard import refusing_end, watched_flight
 
 ORIGINAL = os._exit
 
@@ -79,6 +80,29 @@ def test_a_forked_child_ends_as_it_likes() -> None:
         _, status = os.waitpid(child, 0)
     assert os.waitstatus_to_exitcode(status) == 5
     assert watch.status is None
+
+
+def _ends_and_goes_on() -> None:
+    with contextlib.suppress(SystemExit):
+        os._exit(0)
+    raise ValueError("it goes on")
+
+
+@pytest.mark.parametrize("end", [lambda: os._exit(0), _ends_and_goes_on])
+def test_a_refused_end_is_an_error_that_names_the_place(end: Callable[[], Any]) -> None:
+    words = r"(?s)Lander: tried to end this process, with status 0; .*test_exit_guard\.py"
+    with pytest.raises(LandingSystemError, match=words), refusing_end("Lander"):
+        end()
+    assert os._exit is ORIGINAL
+
+
+def test_a_refused_end_leaves_all_else_as_it_was() -> None:
+    with pytest.raises(ValueError, match="its own"), refusing_end("Lander"):
+        raise ValueError("its own")
+    exit_guard.install()
+    with refusing_end("Lander"):
+        pass
+    assert os._exit is not ORIGINAL
 
 
 LATER = """

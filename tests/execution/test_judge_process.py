@@ -2,20 +2,25 @@
 
 from __future__ import annotations
 
+import contextlib
 import dataclasses
+import os
+import signal
+import time
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
-from pytest_garl.errors import GarlError, NotFiniteError
+from pytest_garl.errors import GarlError, NotFiniteError, PoolError
 from pytest_garl.execution.batch import fly_all, temporary_pool
 from pytest_garl.execution.flight import FlownJob, fly_and_save, fly_job, judged
 from pytest_garl.execution.flight_id import FlightId
 from pytest_garl.execution.judge_process import JudgeProcess
 from pytest_garl.execution.ledger import Ledger
 from pytest_garl.execution.local_pool import local_pool
+from pytest_garl.execution.processes import alive, descendants_of
 from pytest_garl.execution.reference import reference_to
 from pytest_garl.flight.flight import Flight
 from pytest_garl.flight.flight_file import load
@@ -60,6 +65,51 @@ def test_record_that_cannot_be_judged_is_an_error(tmp_path: Path) -> None:
         flight.uav.position_m[-1, 2] = np.nan
         with pytest.raises(NotFiniteError, match=r"a NaN or an infinity in 0\.position_m"):
             judge.judge_flight(flight, Limits())
+
+
+class InterruptedByTimeError(Exception):
+    """What a signal raises, as pytest-timeout's does."""
+
+
+def test_an_interrupted_question_is_not_answered_later(tmp_path: Path) -> None:
+    def interrupt(number: int, frame: object) -> None:
+        raise InterruptedByTimeError
+
+    job = dataclasses.replace(job_of(Good, tmp_path), simulator=reference_to(tiny_simulator.fly))
+    off, near = (dataclasses.replace(FLIGHT, search=name) for name in ("off", "near"))
+    flown = {off: fly_and_save(job, scenario(0.2), off, None)}
+    flown[near] = fly_and_save(job, scenario(), near, None)
+    before = signal.signal(signal.SIGALRM, interrupt)
+    others = descendants_of(os.getpid())
+    try:
+        with JudgeProcess() as judge:
+            (process,) = descendants_of(os.getpid()) - others
+            os.kill(process, signal.SIGSTOP)
+            signal.setitimer(signal.ITIMER_REAL, 0.3)
+            with pytest.raises(InterruptedByTimeError):
+                judge.judge(job, scenario(0.2), off, flown[off])
+            with contextlib.suppress(ProcessLookupError):
+                os.kill(process, signal.SIGCONT)
+            result, *_ = judge.judge(job, scenario(), near, flown[near])
+    finally:
+        signal.setitimer(signal.ITIMER_REAL, 0)
+        signal.signal(signal.SIGALRM, before)
+    assert result.signature == ""
+
+
+def test_a_judge_that_was_killed_is_an_error_in_one_sentence(tmp_path: Path) -> None:
+    job = job_of(Good, tmp_path)
+    flown = fly_and_save(job, scenario(), FLIGHT, None)
+    others = descendants_of(os.getpid())
+    with JudgeProcess() as judge:
+        (process,) = descendants_of(os.getpid()) - others
+        os.kill(process, signal.SIGKILL)
+        while alive(process):
+            time.sleep(0.01)
+        with pytest.raises(PoolError, match="the process that judges flights "):
+            judge.judge(job, scenario(), FLIGHT, flown)
+        # Another one judges the next flight.
+        assert judge.judge(job, scenario(), FLIGHT, flown)[0].outcome == "landed"
 
 
 def test_lock_that_a_flight_leaves_ends_no_run_without_workers(

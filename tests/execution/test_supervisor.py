@@ -160,6 +160,17 @@ def test_simulator_whose_records_cannot_be_judged_ends_the_run(field: Field) -> 
         field.fly(Good, simulator=records_no_samples)
 
 
+def has_a_hash_that_no_file_takes(*args: Any, **more: Any) -> Any:
+    """Return a flight whose result cannot be written."""
+    return dataclasses.replace(tiny_simulator.fly(*args, **more), sha256="\ud800")
+
+
+def test_an_error_of_what_judges_ends_the_run(field: Field) -> None:
+    words = r"(?s)the judge of flights failed in a worker process.*UnicodeEncodeError"
+    with pytest.raises(PoolError, match=words):
+        field.fly(Good, simulator=has_a_hash_that_no_file_takes)
+
+
 def test_limit_of_a_call_ignores_the_simulators_time(field: Field) -> None:
     flown = field.fly(Good, timeout_s=2.0, simulator=works_between_calls)
     assert flown.result.outcome == "landed"

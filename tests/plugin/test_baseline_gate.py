@@ -104,6 +104,32 @@ def test_a_mark_of_the_module_hides_no_failed_gate_from_a_build_server(
     result.stdout.fnmatch_lines(["1 failure hidden by a mark xfail or by a hook:*"])
 
 
+@pytest.mark.parametrize("workers", [(), ("-n1",)])
+def test_a_gate_that_a_mark_skips_is_no_success(
+    saved: pytest.Pytester, workers: tuple[str, ...]
+) -> None:
+    with (saved.path / "test_it.py").open("a") as tests:
+        tests.write("\npytestmark = [pytestmark, pytest.mark.skip(reason='later')]\n")
+    result = run(saved, *GATE, *workers)
+    assert result.ret == pytest.ExitCode.USAGE_ERROR
+    output = " ".join(result.stdout.str().split())
+    assert "nothing was compared: test_it.py::baseline[Good-lawn] was skipped" in output
+    assert run(saved, *GATE, "--collect-only").ret == pytest.ExitCode.OK
+
+
+def test_a_class_may_carry_the_marker_of_a_gate(saved: pytest.Pytester) -> None:
+    saved.makepyfile(
+        test_it="import pytest\nfrom systems import *\n"
+        "@pytest.mark.garl(system=Good, maps=['lawn'])\n"
+        "class TestGood:\n    def test_a(self, landing): pass\n"
+    )
+    assert run(saved).ret == pytest.ExitCode.OK
+    change(saved.path / "tiny_simulator.py", *WORSE)
+    result = run(saved)
+    result.assert_outcomes(failed=1, skipped=1)
+    result.stdout.fnmatch_lines(["*TestGood::baseline[[]Good-lawn]*"])
+
+
 def test_level_decides_and_better_system_passes(saved: pytest.Pytester) -> None:
     change(saved.path / "tiny_simulator.py", *WORSE)
     lenient = run(saved, *GATE, "--garl-level=1e-9")

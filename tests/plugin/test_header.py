@@ -6,7 +6,7 @@ import pytest
 
 from tests.support.landing_project import project
 
-NEXT = "; the time is told after 8 flights"
+NEXT = "; the time left follows after 8 flights"
 
 
 TIMED = """

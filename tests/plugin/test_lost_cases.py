@@ -322,6 +322,19 @@ def test_a_hook_that_expects_all_failures_hides_no_lost_case_from_a_build_server
     result.stdout.fnmatch_lines(["1 failure hidden by a mark xfail or by a hook:*"])
 
 
+def test_a_hook_may_skip_a_lost_case(pytester: pytest.Pytester, file: Path) -> None:
+    """As with a hook that skips all tests with the marker where nothing is to be flown."""
+    drop_map(pytester.path, file)
+    with (pytester.path / "conftest.py").open("a") as conftest:
+        conftest.write(
+            "import pytest\ndef pytest_collection_modifyitems(items):\n"
+            "    for item in items: item.add_marker(pytest.mark.skip)\n"
+        )
+    result = run(pytester)
+    assert result.ret == pytest.ExitCode.OK
+    result.assert_outcomes(skipped=4)
+
+
 def test_xdist_reports_a_lost_case_once(pytester: pytest.Pytester, file: Path) -> None:
     pytest.importorskip("xdist")
     drop_map(pytester.path, file)

@@ -48,17 +48,19 @@ def test_an_invalid_value_is_one_usage_error(
 
 
 @pytest.mark.parametrize("where", ["command line", "file"])
+@pytest.mark.parametrize(("key", "meant"), [("metod", "method"), ("case", "cases")])
 def test_an_unknown_ini_key_is_one_usage_error_that_names_the_nearest(
-    pytester: pytest.Pytester, where: str
+    pytester: pytest.Pytester, where: str, key: str, meant: str
 ) -> None:
     project(pytester)
-    args = ("-o", "garl_metod=random") if where == "command line" else ()
+    args = ("-o", f"garl_{key}=random") if where == "command line" else ()
     if not args:
         with (pytester.path / "pytest.ini").open("a") as ini:
-            ini.write("garl_metod = random\n")
+            ini.write(f"garl_{key} = random\n")
     result = run(pytester, *args)
     assert result.ret == pytest.ExitCode.USAGE_ERROR
-    result.stderr.fnmatch_lines(["*garl_metod: unknown ini key; did you mean garl_method? *"])
+    words = f"*garl_{key}: unknown ini key; did you mean garl_{meant}? *"
+    result.stderr.fnmatch_lines([words])
 
 
 @pytest.mark.parametrize(

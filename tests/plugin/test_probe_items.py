@@ -2,16 +2,23 @@
 
 from __future__ import annotations
 
+import dataclasses
+import os
 import shutil
 import sys
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
 import pytest
 
-from pytest_garl.plugin.probe_items import PASSED, has_cause_of
+from pytest_garl.execution.ledger import Ledger
+from pytest_garl.plugin import probe_items
+from pytest_garl.plugin.probe_items import PASSED, excusing_case, has_cause_of, passed_before
 from pytest_garl.scenarios.maps.loading import load_map
 from pytest_garl.scenarios.task import Task
 from pytest_garl.search.probes import clear_scenario
+from tests.cases.samples import case
 from tests.search.test_probes import FIELD
 from tests.support import probed_landers
 from tests.support.landing_project import project, result_hash
@@ -45,6 +52,9 @@ ONE_PROBE = """
 from pytest_garl.search import probes
 made = probes.probes_for
 
+def pytest_runtest_setup(item):
+    assert "database" not in item.fixturenames
+
 def no_marker(*args):
     return [each for each in made(*args) if each.name == "no-marker"]
 
@@ -73,7 +83,11 @@ def collected(pytester: pytest.Pytester, probes: str) -> list[str]:
 
 
 @pytest.mark.sim
-def test_a_violated_probe_is_red_again(pytester: pytest.Pytester) -> None:
+def test_a_violated_probe_is_red_again(
+    pytester: pytest.Pytester, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    step = pytester.path / "step.md"
+    monkeypatch.setenv("GITHUB_STEP_SUMMARY", str(step))
     write(pytester, "ZeroByDefault")
     done = run(pytester, "first", "--garl-shrink=0")
     done.assert_outcomes(failed=1, passed=2)
@@ -87,6 +101,7 @@ def test_a_violated_probe_is_red_again(pytester: pytest.Pytester) -> None:
         ]
     )
     assert (pytester.path / ".garl" / "probes" / "lawn-no-marker.toml").is_file()
+    assert "\nProbe: ZeroByDefault on lawn: no-marker: FAILED: " in step.read_text()
     assert collected(pytester, "first")[0] == ITEM.format("ZeroByDefault")
 
 
@@ -152,3 +167,43 @@ def test_a_known_case_excuses_only_the_probe_with_its_cause() -> None:
     assert not has_cause_of(twin, probe, twin)
     assert not has_cause_of(probe.replace({"wind.mean_mps": 5.0}), probe, twin)
     assert has_cause_of(twin, twin, twin)
+
+
+def test_all_processes_of_a_session_agree_on_what_had_passed(tmp_path: Path) -> None:
+    ledger = Ledger.create(tmp_path / "ledger.sqlite", {})
+    try:
+        (tmp_path / PASSED).write_text('["one"]')
+        assert passed_before(ledger, tmp_path) == ["one"]
+        # A worker of xdist that replaces another one collects after the first probes have passed.
+        (tmp_path / PASSED).write_text('["one", "two"]')
+        assert passed_before(ledger, tmp_path) == ["one"]
+        assert passed_before(None, tmp_path) == ["one", "two"]
+    finally:
+        ledger.close()
+
+
+def test_what_passes_in_two_processes_is_noted_by_both(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(probe_items, "_key", lambda options, target: target)
+    options: Any = SimpleNamespace(folder=tmp_path)
+    child = os.fork()
+    names: list[Any] = [f"{'parent' if child else 'child'} {number}" for number in range(15)]
+    try:
+        for name in names:
+            probe_items._note_passed(options, name)
+    finally:
+        if not child:
+            os._exit(0)
+    os.waitpid(child, 0)
+    assert len(passed_before(None, tmp_path)) == 30
+
+
+@pytest.mark.parametrize(("reason", "file"), [("", "saved.toml"), ("edge", "")])
+def test_a_case_on_an_edge_excuses_no_probe(reason: Any, file: str) -> None:
+    twin = clear_scenario(load_map("lawn"), Task(), FIELD)
+    probe = twin.replace({"cover.lasts_s": 60.0, "cover.share_percent": 100.0})
+    saved = dataclasses.replace(case(), scenario=probe, reason=reason, status="open")
+    entry = SimpleNamespace(case=saved, path=Path("saved.toml"))
+    corpus: Any = SimpleNamespace(entries=lambda name: [entry], is_accepted=lambda entry: True)
+    assert excusing_case(corpus, saved.system, saved.ending, probe, twin) == file

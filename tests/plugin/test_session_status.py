@@ -140,6 +140,34 @@ def test_ini_key_says_what_a_violation_is_that_no_test_asserts(
     assert expected in output
 
 
+TWO_SYSTEMS = """
+import pytest
+from systems import Good
+
+class Other(Good):
+    pass
+
+@pytest.mark.garl(system=Good, maps=["lawn"])
+def test_good(landing):
+    assert landing.distance_to_landing_m <= 1.5
+
+@pytest.mark.garl(system=Other, maps=["lawn"])
+def test_other(landing):
+    assert not landing.collisions
+"""
+
+
+def test_a_failure_of_one_system_asserts_no_violation_of_another(
+    pytester: pytest.Pytester, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("CI", "true")
+    project(pytester)
+    (pytester.path / "test_it.py").write_text(TWO_SYSTEMS)
+    result = run(pytester, "--garl-budget=2", "--garl-workers=0")
+    result.assert_outcomes(failed=1, passed=3)
+    result.stdout.fnmatch_lines(["no selected test fails for *: I:nothing:unseen (1 flight)"])
+
+
 def test_summary_notes_a_violation_whose_tests_are_all_expected_to_fail(
     pytester: pytest.Pytester,
 ) -> None:

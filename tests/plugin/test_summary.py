@@ -244,6 +244,7 @@ def test_junit_carries_properties_of_the_flight(
         found = {each.get("name"): each.get("value", "") for each in case.iter("property")}
         assert set(found) == {
             "garl.slot",
+            "garl.flight",
             "garl.outcome",
             "garl.signature",
             "garl.story",

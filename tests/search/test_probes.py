@@ -242,4 +242,6 @@ def test_a_flight_from_the_ground_arrives_beside_the_marker() -> None:
 
 def test_probes_are_flown_on_a_map_without_other_markers() -> None:
     assert probed_map([COURT, LAWN]) is LAWN
+    other = dataclasses.replace(LAWN, name="meadow")
+    assert probed_map([other, LAWN]) is probed_map([LAWN, other]) is LAWN
     assert probed_map([COURT]) is COURT

@@ -235,24 +235,24 @@ def _capitalised(text: str) -> str:
 def _unusual(task: FlightTask) -> Fact:
     """Return what was unusual in a flight of which nobody knows what it took."""
     severity = task.result.severity
-    told = severity.unusual or "nothing" if severity and severity.about else ""
-    return "Unusual in this flight", told
+    text = severity.unusual or "nothing" if severity and severity.about else ""
+    return "Unusual in this flight", text
 
 
 def _facts(plan: KindPlan, flight: ShownFlight, known: bool) -> tuple[Fact, ...]:
     kind, search, case = plan.kind, plan.search, plan.case
     shows_shrunk = case is not None and case.is_shrunk and _shows_case(plan)
     severity = case.severity if case and _shows_case(plan) else plan.task.result.severity
-    label, told = ("It took", severity.text if severity else "")
+    label, text = ("It took", severity.text if severity else "")
     if not shows_shrunk:
-        label, told = _unusual(plan.task)
+        label, text = _unusual(plan.task)
     means = grade_in_words(severity.grade) if severity and severity.grade else ""
     least, _, least_text = kind.least.partition(": ")
     is_told = shows_shrunk or kind.severest == plan.task.name
     seen = in_control_text(kind.in_control, search.random_flights)
     flights = f"{kind.count} of {len(search.flights)} flights"
     return (
-        (label, f"{told} ({means})" if told and means else told),
+        (label, f"{text} ({means})" if text and means else text),
         (_capitalised(least), "" if is_told else least_text),
         ("Found in", f"{flights}; {seen}" if seen else flights),
         ("Robustness", case.robustness if case else ""),

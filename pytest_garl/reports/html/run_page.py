@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from pytest_garl.reports.causes import cause_of, counted_causes
+from pytest_garl.reports.causes import counted_causes
 from pytest_garl.reports.html.charts import (
     Plot,
     kinds_over_flights,
@@ -17,7 +17,7 @@ from pytest_garl.reports.html.flight_task import ShownFlight
 from pytest_garl.reports.html.kind_page import Fact, KindPage, KindPlan
 from pytest_garl.reports.html.naming import page_address, shown_file, still_address
 from pytest_garl.reports.html.search_card import SearchCard, cost_rows, domain_rows, search_card
-from pytest_garl.reports.search_summary import LEGEND, SearchSummary
+from pytest_garl.reports.search_summary import LEGEND, SearchSummary, by_cause
 from pytest_garl.reports.shares_text import in_control_text, kinds_lines, percent
 
 PHASES = ("take-off", "transit", "search", "approach", "descent", "last-metre", "standing")
@@ -90,7 +90,8 @@ def run_page(
     missing: Sequence[str],
 ) -> RunPage:
     """Return the index of a run: ``found`` is its report as data, ``shown`` its pages in order."""
-    shown = _by_cause(shown)
+    # Over all searches, frequent ones first.
+    shown = by_cause(sorted(shown, key=_order), lambda each: each[0].kind)
     kinds = [_kind(plan, page, index) for index, (plan, page) in enumerate(shown)]
     flights = found["flights"]
     violating = sum(each.violating for each in searches)
@@ -147,20 +148,6 @@ def _title(searches: Sequence[SearchSummary], kinds: int, violating: int) -> str
     causes = counted_causes([kind.case for each in searches for kind in each.kinds])
     with_causes = f", {causes}" if causes else ""
     return f"{who}: {violating} of {flown} flights violate something, in {ways}{with_causes}"
-
-
-def _by_cause(
-    shown: Sequence[tuple[KindPlan, KindPage]],
-) -> list[tuple[KindPlan, KindPage]]:
-    """Return the pages with those of one cause together, over all searches, frequent ones first."""
-    groups: dict[tuple[str, ...], list[tuple[KindPlan, KindPage]]] = {}
-    for plan, page in sorted(shown, key=_order):
-        case = plan.kind.case
-        key = cause_of(case.severity) if case else ("", page.name)
-        groups.setdefault(key, []).append((plan, page))
-    # Sorting is stable: groups of the same size stay in the order of their first pages.
-    ordered = sorted(groups.values(), key=lambda group: -sum(p.kind.count for p, _ in group))
-    return [each for group in ordered for each in group]
 
 
 def _order(shown: tuple[KindPlan, KindPage]) -> tuple[int, str, str]:
