@@ -15,7 +15,7 @@ from rich.text import Text
 
 from pytest_garl.errors import OptionError
 from pytest_garl.messages import command
-from pytest_garl.scenarios.domains.names import DEFAULT_DOMAIN, OLD_WEATHER
+from pytest_garl.scenarios.domains.names import DEFAULT_DOMAIN
 from pytest_garl.verdicts.verdict import DEFAULT_LIMITS
 
 if TYPE_CHECKING:
@@ -60,12 +60,6 @@ _SPEC_OPTIONS = (
         metavar="NAME|FILE",
         show_default=DEFAULT_DOMAIN,
         help="Conditions that the scenarios are drawn from, as for --garl-domain.",
-    ),
-    click.option(
-        "--weather",
-        type=click.Choice(["confined", "full"]),
-        help="Deprecated, use --domain: 'confined' is the domain paper, 'full' the same with any "
-        "weather.",
     ),
     click.option(
         "--npcs",
@@ -247,7 +241,6 @@ def _spec(
     abort: Any,
     simulator: str,
     domain: str | None,
-    weather: str | None,
     npcs: str,
     **rest: Any,
 ) -> BaselineSpec:
@@ -258,14 +251,6 @@ def _spec(
     names = tuple(dict.fromkeys(part.strip() for part in maps.split(",") if part.strip()))
     if not names:
         raise OptionError(f"--maps: found {maps!r}, expected names such as court,lawn")
-    if weather and domain:
-        raise OptionError(
-            f"--weather={weather}: found beside --domain={domain}, which says how bad the weather "
-            "may become; give only --domain"
-        )
-    if weather:
-        domain = OLD_WEATHER[weather]
-        click.echo(f"--weather={weather} is deprecated; --domain={domain} means the same", err=True)
     conditions = domain_with_policy(domain or DEFAULT_DOMAIN)
     return BaselineSpec(
         maps=names,

@@ -74,12 +74,6 @@ OPTIONS = (
         f"{DEFAULT_DOMAIN}).",
     ),
     Option(
-        name="weather",
-        metavar="RANGE",
-        help="Deprecated, use --garl-domain: 'confined' is the domain paper, 'full' the same with "
-        "any weather.",
-    ),
-    Option(
         name="timeout",
         metavar="SECONDS",
         default="10",

@@ -19,7 +19,7 @@ from pytest_garl.plugin.arguments import DEFAULT_CASES, OPTIONS, Option
 from pytest_garl.plugin.keys import is_xdist_worker
 from pytest_garl.plugin.option_values import among, filmed, integer, number, wrong
 from pytest_garl.plugin.report_options import report_folder, report_url
-from pytest_garl.scenarios.domains.names import DEFAULT_DOMAIN, OLD_WEATHER
+from pytest_garl.scenarios.domains.names import DEFAULT_DOMAIN
 from pytest_garl.search.catalogue import default_policy, find_method, method_names
 
 if TYPE_CHECKING:
@@ -102,7 +102,7 @@ class Options:
         if named is None:
             return self.domain
         own = domain_with_policy(named, self.root)
-        return self.domain if self.given & {"domain", "weather"} else own
+        return self.domain if "domain" in self.given else own
 
     def policy_in(self, domain: Domain) -> str:
         """Return the name of the policy that moves the NPCs of a search in a domain."""
@@ -267,32 +267,11 @@ def _domain(config: pytest.Config) -> Domain:
     """Return the session's domain.
 
     The command line names a file as seen from here, the ini key as seen from the root.
-    ``--garl-weather`` is the old name of two domains.
     """
-    names = ("domain", "weather")
-    option = [str(config.getoption(f"--garl-{name}") or "") for name in names]
-    ini = [str(config.getini(f"garl_{name}")) for name in names]
-    for (domain, weather), folder in ((option, Path()), (ini, config.rootpath)):
-        if domain and weather:
-            raise pytest.UsageError(
-                f"--garl-weather={weather}: found beside --garl-domain={domain}, which says how "
-                "bad the weather may become; give only --garl-domain"
-            )
-        if weather:
-            domain = OLD_WEATHER[among("weather", weather, tuple(OLD_WEATHER))]
-            _warn_of_weather(config, weather, domain)
-        if domain:
-            return _read_domain(domain, folder)
-    return _read_domain(DEFAULT_DOMAIN, Path())
-
-
-def _warn_of_weather(config: pytest.Config, weather: str, domain: str) -> None:
-    if not hasattr(config, "workerinput"):
-        text = (
-            f"--garl-weather={weather} will go with the next release; --garl-domain={domain} "
-            "means the same"
-        )
-        config.issue_config_time_warning(pytest.PytestDeprecationWarning(text), stacklevel=2)
+    option, ini = config.getoption("--garl-domain"), config.getini("garl_domain")
+    if option:
+        return _read_domain(str(option), Path())
+    return _read_domain(str(ini or DEFAULT_DOMAIN), config.rootpath)
 
 
 def _read_domain(text: str, folder: Path) -> Domain:

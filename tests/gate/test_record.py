@@ -18,11 +18,12 @@ def test_equal_specs_draw_equal_scenarios_and_a_longer_one_begins_alike() -> Non
     assert BaselineSpec(count=5).scenarios(LAWN) != BaselineSpec(count=5, seed=1).scenarios(LAWN)
 
 
-def test_the_scenarios_of_a_baseline_come_from_its_domain() -> None:
+def test_the_scenarios_of_a_baseline_come_from_its_domain(tmp_path: Path) -> None:
     def drawn(name: str) -> list[Scenario]:
-        return [*BaselineSpec(count=50, domain=domain_named(name)).scenarios(LAWN)]
+        return [*BaselineSpec(count=50, domain=domain_named(name, tmp_path)).scenarios(LAWN)]
 
-    confined, full = drawn("paper"), drawn("paper-full")
+    (tmp_path / "any.toml").write_text('extends = "paper"\npaper = "full"\n')
+    confined, full = drawn("paper"), drawn("any.toml")
     assert max(each["environment.fog"] for each in confined) <= 0.15
     assert max(each["environment.fog"] for each in full) > 0.15
     assert {each["wind.mean_mps"] for each in confined} == {0}

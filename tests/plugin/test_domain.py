@@ -90,9 +90,8 @@ def test_case_that_the_default_domain_found_is_saved_and_flown(pytester: pytest.
         ("", ("-o", "garl_domain=calm"), "domain calm, NPCs graded"),
         ("'calm'", ("-o", "garl_domain=field"), "domain calm, NPCs graded"),
         ("'calm'", ("--garl-domain=field",), "domain field, NPCs graded"),
-        ("'calm'", ("--garl-weather=full",), "domain paper-full, NPCs dqn"),
-        ("", ("--garl-weather=confined", "-o", "garl_domain=field"), "domain paper, NPCs dqn"),
-        ("", ("--garl-domain=calm", "-o", "garl_weather=full"), "domain calm, NPCs graded"),
+        ("'calm'", ("--garl-domain=paper",), "domain paper, NPCs dqn"),
+        ("", ("--garl-domain=calm", "-o", "garl_domain=paper"), "domain calm, NPCs graded"),
         ("'calm'", ("--garl-npcs=stand",), "domain calm, NPCs stand"),
         ("'calm'", ("--garl-method=garl-paper",), "domain calm, NPCs graded"),
         ("'mine.toml'", (), "domain mine (????????), NPCs graded"),
@@ -122,8 +121,6 @@ def test_domain_of_a_marker_is_announced_and_named_under_xdist(pytester: pytest.
         (("--garl-domain=sea",), "*--garl-domain=sea: *found 'sea', expected field, calm*"),
         (("--garl-domain=no.toml",), "*--garl-domain=no.toml: *no.toml*"),
         (("--garl-domain=wild.toml",), "*wild.toml: key 'npc_behaviour': found 'wild', expected*"),
-        (("--garl-domain=calm", "--garl-weather=full"), "*--garl-weather=full: found beside*"),
-        (("--garl-weather=bad",), "*--garl-weather: found 'bad', expected one of confined, full"),
     ],
 )
 def test_invalid_domain_is_one_usage_error(
@@ -160,12 +157,6 @@ def test_domain_without_a_search_is_an_option_without_effect(pytester: pytest.Py
     result = run(pytester, "--garl-domain=calm")
     assert result.ret == pytest.ExitCode.USAGE_ERROR
     result.stderr.fnmatch_lines(["*--garl-domain has no effect without --garl-budget*"])
-
-
-def test_old_weather_option_warns(pytester: pytest.Pytester) -> None:
-    project(pytester)
-    result = run(pytester, *ONE, "--garl-weather=full")
-    result.stdout.fnmatch_lines(["*--garl-weather=full will go with the next release; *"])
 
 
 def test_fixture_npcs_wins_over_the_domain(pytester: pytest.Pytester) -> None:

@@ -188,7 +188,7 @@ def test_second_run_in_the_same_folder_is_refused(pytester: pytest.Pytester) -> 
     [
         (("--garl-seed=1",), "*seed was 0, is 1*"),
         (("--garl-method=random",), "*method was garl, is random*"),
-        (("--garl-domain=paper-full",), "*domain was paper, is paper-full*"),
+        (("--garl-domain=calm",), "*domain was paper, is calm*"),
     ],
 )
 def test_resume_refuses_another_search(

@@ -263,7 +263,8 @@ def test_ground_contact_before_an_abort_fails_the_search(
     conftest = pytester.path / "conftest.py"
     conftest.write_text(conftest.read_text().replace("tiny_simulator", "gives_up"))
     # In fog it comes down 3 m off the marker.
-    result = run(pytester, "--garl-budget=6", "--garl-workers=0", "--garl-domain=paper-full")
+    (pytester.path / "fog.toml").write_text('extends = "paper"\npaper = "full"\n')
+    result = run(pytester, "--garl-budget=6", "--garl-workers=0", "--garl-domain=fog.toml")
     # Elsewhere it gives up above the marker, needlessly.
     assert result.parseoutcomes()["failed"] == 2
     assert result.ret == pytest.ExitCode.TESTS_FAILED

@@ -103,9 +103,10 @@ def test_every_group_is_stated_in_field_and_those_of_calm_are_narrower(name: str
         assert limits[0] <= low <= high <= limits[1]
 
 
-def test_the_world_of_the_paper_is_that_of_before() -> None:
+def test_the_world_of_the_paper_has_the_genes_of_the_paper(tmp_path: Path) -> None:
     assert genome_of(domain_named("paper"), COURT) == genome_for(COURT)
-    assert genome_of(domain_named("paper-full"), COURT) == genome_for(COURT, weather="full")
+    any_weather = domain_with(tmp_path, 'extends = "paper"\npaper = "full"')
+    assert genome_of(any_weather, COURT) == genome_for(COURT, weather="full")
 
 
 def chromosomes(genome: Genome, count: int) -> list[np.ndarray]:

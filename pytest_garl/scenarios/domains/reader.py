@@ -14,7 +14,7 @@ from pytest_garl.files.reading import read_text
 from pytest_garl.files.toml import Table, parse
 from pytest_garl.messages import listed, shown
 from pytest_garl.scenarios.domains.domain import ABSENT, BIRD_HEIGHT, CONDITIONS, ELEVATION, Domain
-from pytest_garl.scenarios.domains.names import BUILT_IN, HIDDEN
+from pytest_garl.scenarios.domains.names import BUILT_IN
 from pytest_garl.scenarios.genes import WeatherRange
 from pytest_garl.scenarios.groups import GROUPS
 from pytest_garl.scenarios.light import NOON_DEG
@@ -31,7 +31,7 @@ def domain_named(text: str, folder: Path | None = None) -> Domain:
 
 
 def _named(text: str, folder: Path, above: tuple[str, ...]) -> Domain:
-    if text in (*BUILT_IN, *HIDDEN):
+    if text in BUILT_IN:
         return _read(Path(__file__).parent / f"{text}.toml", f"domain {text!r}", text, above)
     if not text.endswith(".toml"):
         raise ScenarioError(

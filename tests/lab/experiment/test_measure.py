@@ -12,7 +12,7 @@ from pytest_garl.search.methods.random import random_scenarios
 MAP = load_map("lawn")
 
 
-@pytest.mark.parametrize("domain", ["paper", "paper-full"])
+@pytest.mark.parametrize("domain", ["paper", "field"])
 def test_distances_leave_out_the_destinations_of_npcs(domain: str) -> None:
     genome = genome_for(MAP, weather="confined" if domain == "paper" else "full")
     bound = random_scenarios(MAP, with_destinations(genome), 3, 0, 5)
